@@ -1,0 +1,35 @@
+"""The errors a user can meet, each one sentence that says what is wrong and what to do."""
+
+from __future__ import annotations
+
+
+class RlacdError(Exception):
+    """Base of every error this package raises on purpose."""
+
+
+class MeshError(RlacdError, ValueError):
+    """The input is not a mesh that can be decomposed."""
+
+
+class MeshFileError(MeshError):
+    """The file cannot be read: missing, empty, truncated, or not of the format its name says."""
+
+
+class MeshDataError(MeshError):
+    """The vertices or faces are unusable: not finite, out of range, or of the wrong shape."""
+
+
+class EmptyMeshError(MeshError):
+    """There is nothing to decompose: no points at all."""
+
+
+class OptionError(RlacdError, ValueError):
+    """An option has a value outside its range, or two options contradict each other."""
+
+
+class OutputError(RlacdError, OSError):
+    """The result cannot be written where it was asked for."""
+
+
+class MissingExtraError(RlacdError, ImportError):
+    """A feature needs an optional dependency that is not installed."""
