@@ -1,0 +1,11 @@
+// The Python module: one bind function a kernel, each defined beside its kernel's bindings.
+#include <nanobind/nanobind.h>
+
+namespace rlacd {
+void bind_hull(nanobind::module_& m);
+}  // namespace rlacd
+
+NB_MODULE(_native, m) {
+  m.doc() = "C++ kernels of rlacd. Arrays are float64 points [N, 3] and int32 faces [F, 3]; the GIL is released inside.";
+  rlacd::bind_hull(m);
+}

@@ -1,0 +1,1 @@
+"""After the cuts: merging parts, limits on vertices and faces, slivers."""

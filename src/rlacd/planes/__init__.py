@@ -1,0 +1,1 @@
+"""Candidate cut planes and the sweep that scores them."""

@@ -1,0 +1,1 @@
+"""Which plane to cut next."""

@@ -1,0 +1,1 @@
+"""From a file to a closed solid and its components: load, repair, cut, hull, volume."""
