@@ -1,0 +1,386 @@
+// Convex hull of points: see hull.hpp for input, output and algorithm.
+#include "hull.hpp"
+
+#include <numeric>
+
+#include "predicates.hpp"
+
+namespace rlacd {
+
+namespace {
+
+constexpr double kRoundoff = 0x1p-53;
+constexpr double kFlatDistance = 1e-13;  // relative to the extent of the points; only for Precision::kSweep
+
+}  // namespace
+
+void HullBuilder::reserve(std::size_t points) {
+  points_.reserve(points);
+  next_outside_.reserve(points);
+}
+
+void HullBuilder::clear() {
+  rank_ = -1;
+  points_.clear();
+  facets_.clear();
+  free_.clear();
+  next_outside_.clear();
+  extent_ = Box();
+  insertion_ = 0;
+}
+
+bool HullBuilder::sees(const Facet& f, Vec3 p) const {
+  const Vec3 offset = p - f.origin;
+  const double h = dot(f.normal, offset);
+  const double bound = f.error * max_abs(offset);
+  if (h > bound) return h > f.flat;
+  if (h < -bound) return false;
+  if (f.flat > 0 && bound <= f.flat) return false;
+  return orient3d_exact(points_[f.corner[0]], points_[f.corner[1]], points_[f.corner[2]], p) > 0;
+}
+
+std::int32_t HullBuilder::new_facet(std::int32_t a, std::int32_t b, std::int32_t c) {
+  Facet f;
+  f.corner = {a, b, c};
+  const Vec3 ab = points_[b] - points_[a], ac = points_[c] - points_[a];
+  f.normal = cross(ab, ac);
+  f.origin = points_[a];
+  // Each component of the cross product is off by less than 6 u |ab||ac| and the dot product adds 3 terms of relative
+  // error 5 u, all in the maximum norm: 40 u |ab||ac||p - a| covers their sum.
+  f.error = 40 * kRoundoff * max_abs(ab) * max_abs(ac);
+  f.flat = 0;
+  if (precision_ == Precision::kSweep) {
+    const double extent = max_abs(extent_.upper - extent_.lower);
+    const double tolerance = kFlatDistance * extent * norm(f.normal);
+    if (f.error * extent <= tolerance) f.flat = tolerance;
+  }
+  f.outside = -1;
+  f.alive = true;
+  f.mark = -1;
+  if (free_.empty()) {
+    facets_.push_back(f);
+    return static_cast<std::int32_t>(facets_.size()) - 1;
+  }
+  const std::int32_t slot = free_.back();
+  free_.pop_back();
+  facets_[slot] = f;
+  return slot;
+}
+
+void HullBuilder::assign(std::int32_t point, const std::vector<std::int32_t>& facets) {
+  const Vec3 p = points_[point];
+  for (const std::int32_t id : facets) {
+    Facet& f = facets_[id];
+    if (sees(f, p)) {
+      next_outside_[point] = f.outside;
+      f.outside = point;
+      return;
+    }
+  }
+}
+
+// Finds four points in general position, if there are any, and makes them the first hull.
+bool HullBuilder::initialise() {
+  const auto count = static_cast<std::int32_t>(points_.size());
+  if (count == 0) return false;
+  const auto lexicographic = [this](std::int32_t i, std::int32_t j) {
+    const Vec3 a = points_[i], b = points_[j];
+    return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z != b.z ? a.z < b.z : i < j;
+  };
+  std::vector<std::int32_t> order(count);
+  std::iota(order.begin(), order.end(), 0);
+  const std::int32_t p0 = *std::min_element(order.begin(), order.end(), lexicographic);
+
+  const auto argmax = [count](const auto& value) {
+    std::int32_t best = 0;
+    double best_value = value(0);
+    for (std::int32_t i = 1; i < count; ++i)
+      if (const double v = value(i); v > best_value) best = i, best_value = v;
+    return best;
+  };
+  rank_ = 0;
+  const std::int32_t p1 = argmax([&](std::int32_t i) { return norm2(points_[i] - points_[p0]); });
+  if (points_[p1] == points_[p0]) return false;
+
+  rank_ = 1;
+  const Vec3 axis = points_[p1] - points_[p0];
+  std::int32_t p2 = argmax([&](std::int32_t i) { return norm2(cross(axis, points_[i] - points_[p0])); });
+  if (collinear_exact(points_[p0], points_[p1], points_[p2])) {  // rounding may have hidden the only other point
+    p2 = -1;
+    for (std::int32_t i = 0; i < count && p2 < 0; ++i)
+      if (!collinear_exact(points_[p0], points_[p1], points_[i])) p2 = i;
+    if (p2 < 0) return false;
+  }
+
+  rank_ = 2;
+  const Vec3 normal = cross(axis, points_[p2] - points_[p0]);
+  std::int32_t p3 = argmax([&](std::int32_t i) { return std::fabs(dot(normal, points_[i] - points_[p0])); });
+  int side = orient3d_exact(points_[p0], points_[p1], points_[p2], points_[p3]);
+  if (side == 0) {
+    for (std::int32_t i = 0; i < count && side == 0; ++i) {
+      side = orient3d_exact(points_[p0], points_[p1], points_[p2], points_[i]);
+      p3 = i;
+    }
+    if (side == 0) return false;
+  }
+
+  rank_ = 3;
+  const std::int32_t a = p0, b = side > 0 ? p2 : p1, c = side > 0 ? p1 : p2, d = p3;
+  facets_.clear();
+  free_.clear();
+  const std::int32_t f[4] = {new_facet(a, b, c), new_facet(a, d, b), new_facet(b, d, c), new_facet(c, d, a)};
+  const std::int32_t neighbours[4][3] = {{f[1], f[2], f[3]}, {f[3], f[2], f[0]}, {f[1], f[3], f[0]}, {f[2], f[1], f[0]}};
+  for (int i = 0; i < 4; ++i) std::copy_n(neighbours[i], 3, facets_[f[i]].neighbour);
+  return true;
+}
+
+void HullBuilder::add(const Vec3* points, std::size_t count) {
+  auto first = static_cast<std::int32_t>(points_.size());
+  points_.insert(points_.end(), points, points + count);
+  next_outside_.resize(points_.size(), -1);
+  for (std::size_t i = 0; i < count; ++i) extent_.extend(points[i]);
+  if (rank_ < 3) {
+    if (!initialise()) return;
+    first = 0;
+  }
+  std::vector<std::int32_t> alive;
+  alive.reserve(facets_.size());
+  for (std::size_t i = 0; i < facets_.size(); ++i)
+    if (facets_[i].alive) alive.push_back(static_cast<std::int32_t>(i));
+  for (auto i = first; i < static_cast<std::int32_t>(points_.size()); ++i) assign(i, alive);
+  std::vector<std::int32_t> pending;
+  for (const std::int32_t id : alive)
+    if (facets_[id].outside >= 0) pending.push_back(id);
+  expand(pending);
+}
+
+// Invariant between insertions: every point that lies outside the hull is in the list of one facet that sees it, and
+// every facet with such a list is in `pending`.
+void HullBuilder::expand(std::vector<std::int32_t>& pending) {
+  while (!pending.empty()) {
+    const std::int32_t id = pending.back();
+    const Facet& f = facets_[id];
+    if (!f.alive || f.outside < 0) {
+      pending.pop_back();
+      continue;
+    }
+    std::int32_t farthest = f.outside;
+    double farthest_height = height(f, points_[farthest]);
+    for (std::int32_t i = next_outside_[farthest]; i >= 0; i = next_outside_[i]) {
+      const double h = height(f, points_[i]);
+      if (h > farthest_height || (h == farthest_height && i < farthest)) farthest = i, farthest_height = h;
+    }
+    if (!insert(farthest, id, pending)) {
+      rebuild_exactly();
+      return;
+    }
+  }
+}
+
+// Replaces the facets that the point sees by a cone of triangles over their horizon. False (kSweep only): the horizon
+// is not one simple loop; the hull is then unusable.
+bool HullBuilder::insert(std::int32_t point, std::int32_t facet, std::vector<std::int32_t>& pending) {
+  const Vec3 p = points_[point];
+  const std::int32_t seen = 2 * insertion_, hidden = seen + 1;
+  ++insertion_;
+  visible_.assign(1, facet);
+  horizon_.clear();
+  facets_[facet].mark = seen;
+  for (std::size_t i = 0; i < visible_.size(); ++i) {
+    const Facet& f = facets_[visible_[i]];
+    for (int e = 0; e < 3; ++e) {
+      Facet& g = facets_[f.neighbour[e]];
+      if (g.mark < seen) {
+        g.mark = sees(g, p) ? seen : hidden;
+        if (g.mark == seen) visible_.push_back(f.neighbour[e]);
+      }
+      if (g.mark == hidden) horizon_.push_back({f.corner[e], f.corner[(e + 1) % 3], f.neighbour[e]});
+    }
+  }
+
+  first_edge_.resize(points_.size(), -1);
+  bool simple = true;
+  for (std::size_t i = 0; i < horizon_.size(); ++i) {
+    std::int32_t& slot = first_edge_[horizon_[i].from];
+    simple = simple && slot < 0;
+    slot = static_cast<std::int32_t>(i);
+  }
+  std::size_t length = 0;
+  if (simple && !horizon_.empty()) {
+    std::int32_t edge = 0;
+    do {
+      edge = first_edge_[horizon_[edge].to];
+      ++length;
+    } while (edge > 0 && length <= horizon_.size());
+    simple = edge == 0 && length == horizon_.size();
+  }
+  if (!simple || horizon_.size() < 3) {
+    for (const HorizonEdge& e : horizon_) first_edge_[e.from] = -1;
+    return false;
+  }
+
+  orphans_.clear();
+  for (const std::int32_t id : visible_) {
+    Facet& f = facets_[id];
+    for (std::int32_t i = f.outside; i >= 0; i = next_outside_[i])
+      if (i != point) orphans_.push_back(i);
+    f.alive = false;
+    f.outside = -1;
+  }
+  created_.clear();
+  std::int32_t edge = 0;
+  for (std::size_t i = 0; i < length; ++i) {
+    const HorizonEdge e = horizon_[edge];
+    const std::int32_t id = new_facet(e.from, e.to, point);
+    created_.push_back(id);
+    Facet& beyond = facets_[e.beyond];
+    for (int k = 0; k < 3; ++k)
+      if (beyond.corner[k] == e.to && beyond.corner[(k + 1) % 3] == e.from) beyond.neighbour[k] = id;
+    facets_[id].neighbour[0] = e.beyond;
+    edge = first_edge_[e.to];
+  }
+  for (std::size_t i = 0; i < length; ++i) {  // edge 1 is (to, point), edge 2 is (point, from)
+    facets_[created_[i]].neighbour[1] = created_[(i + 1) % length];
+    facets_[created_[i]].neighbour[2] = created_[(i + length - 1) % length];
+  }
+  for (const HorizonEdge& e : horizon_) first_edge_[e.from] = -1;
+  free_.insert(free_.end(), visible_.begin(), visible_.end());
+
+  // A point that saw a removed facet and still lies outside sees one of the new facets, so only those are searched.
+  for (const std::int32_t orphan : orphans_) assign(orphan, created_);
+  for (const std::int32_t id : created_)
+    if (facets_[id].outside >= 0) pending.push_back(id);
+  return true;
+}
+
+void HullBuilder::rebuild_exactly() {
+  const Precision precision = precision_;
+  const std::vector<Vec3> points = points_;
+  precision_ = Precision::kExact;
+  clear();
+  add(points.data(), points.size());
+  precision_ = precision;
+}
+
+double HullBuilder::volume() const {
+  if (rank_ < 3) return 0;
+  Vec3 apex;
+  bool found = false;
+  double sum = 0;
+  for (const Facet& f : facets_) {
+    if (!f.alive) continue;
+    if (!found) apex = f.origin, found = true;
+    sum += dot(f.normal, f.origin - apex);
+  }
+  return sum / 6;
+}
+
+double HullBuilder::area() const {
+  double sum = 0;
+  for (const Facet& f : facets_)
+    if (f.alive) sum += norm(f.normal);
+  return sum / 2;
+}
+
+std::vector<Triangle> HullBuilder::triangles() const {
+  std::vector<Triangle> result;
+  for (const Facet& f : facets_)
+    if (f.alive) result.push_back(f.corner);
+  return result;
+}
+
+Box HullBuilder::box() const {
+  Box box;
+  if (rank_ < 3) {
+    for (const Vec3 p : points_) box.extend(p);
+  } else {
+    for (const Facet& f : facets_)
+      if (f.alive)
+        for (const std::int32_t corner : f.corner) box.extend(points_[corner]);
+  }
+  return box;
+}
+
+namespace {
+
+// A corner is extreme when at least three of the edges around it are creases (their two facets not exactly coplanar):
+// none or two creases mean that it lies inside a facet or an edge of the polytope.
+std::vector<std::int32_t> extreme_points(const std::vector<Vec3>& points, const std::vector<Triangle>& faces) {
+  struct Side {
+    std::int32_t low, high, face, opposite;
+  };
+  std::vector<Side> sides;
+  sides.reserve(3 * faces.size());
+  for (std::size_t f = 0; f < faces.size(); ++f)
+    for (int e = 0; e < 3; ++e) {
+      const std::int32_t a = faces[f][e], b = faces[f][(e + 1) % 3];
+      sides.push_back({std::min(a, b), std::max(a, b), static_cast<std::int32_t>(f), faces[f][(e + 2) % 3]});
+    }
+  std::sort(sides.begin(), sides.end(), [](const Side& s, const Side& t) {
+    return s.low != t.low ? s.low < t.low : s.high != t.high ? s.high < t.high : s.face < t.face;
+  });
+  std::vector<std::int32_t> creases(points.size(), 0);
+  for (std::size_t i = 0; i + 1 < sides.size(); i += 2) {
+    const Triangle& f = faces[sides[i].face];
+    const Vec3 a = points[f[0]], ab = points[f[1]] - a, ac = points[f[2]] - a, d = points[sides[i + 1].opposite] - a;
+    const double bound = 40 * kRoundoff * max_abs(ab) * max_abs(ac) * max_abs(d);
+    if (dot(cross(ab, ac), d) < -bound ||
+        orient3d_exact(a, points[f[1]], points[f[2]], points[sides[i + 1].opposite]) != 0) {
+      ++creases[sides[i].low];
+      ++creases[sides[i].high];
+    }
+  }
+  std::vector<std::int32_t> extreme;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (creases[i] >= 3) extreme.push_back(static_cast<std::int32_t>(i));
+  return extreme;
+}
+
+}  // namespace
+
+Hull convex_hull(const std::vector<Vec3>& points) {
+  Hull hull;
+  HullBuilder builder;
+  builder.reserve(points.size());
+  builder.add(points.data(), points.size());
+  hull.rank = builder.rank();
+  if (hull.rank < 3) return hull;
+
+  hull.faces = builder.triangles();
+  hull.indices = extreme_points(points, hull.faces);
+  std::vector<bool> corner(points.size(), false);
+  std::size_t corners = 0;
+  for (const Triangle& face : hull.faces)
+    for (const std::int32_t c : face) corners += !corner[c], corner[c] = true;
+  std::vector<std::int32_t> rank_of(points.size(), -1);
+  if (corners > hull.indices.size()) {
+    std::vector<Vec3> extreme;
+    for (const std::int32_t i : hull.indices) extreme.push_back(points[i]);
+    builder.clear();
+    builder.add(extreme.data(), extreme.size());
+    hull.faces = builder.triangles();
+    return hull;
+  }
+  for (std::size_t i = 0; i < hull.indices.size(); ++i) rank_of[hull.indices[i]] = static_cast<std::int32_t>(i);
+  for (Triangle& face : hull.faces)
+    for (std::int32_t& c : face) c = rank_of[c];
+  return hull;
+}
+
+double mesh_volume(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
+  if (faces.empty()) return 0;
+  const Vec3 apex = vertices[faces[0][0]];
+  double sum = 0;
+  for (const Triangle& f : faces)
+    sum += dot(vertices[f[0]] - apex, cross(vertices[f[1]] - apex, vertices[f[2]] - apex));
+  return sum / 6;
+}
+
+double mesh_area(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
+  double sum = 0;
+  for (const Triangle& f : faces)
+    sum += norm(cross(vertices[f[1]] - vertices[f[0]], vertices[f[2]] - vertices[f[0]]));
+  return sum / 2;
+}
+
+}  // namespace rlacd
