@@ -10,7 +10,6 @@ namespace rlacd {
 namespace {
 
 constexpr double kRoundoff = 0x1p-53;
-constexpr double kFlatDistance = 1e-13;  // relative to the extent of the points; only for Precision::kSweep
 
 }  // namespace
 
@@ -25,7 +24,6 @@ void HullBuilder::clear() {
   facets_.clear();
   free_.clear();
   next_outside_.clear();
-  extent_ = Box();
   insertion_ = 0;
 }
 
@@ -33,9 +31,8 @@ bool HullBuilder::sees(const Facet& f, Vec3 p) const {
   const Vec3 offset = p - f.origin;
   const double h = dot(f.normal, offset);
   const double bound = f.error * max_abs(offset);
-  if (h > bound) return h > f.flat;
+  if (h > bound) return true;
   if (h < -bound) return false;
-  if (f.flat > 0 && bound <= f.flat) return false;
   return orient3d_exact(points_[f.corner[0]], points_[f.corner[1]], points_[f.corner[2]], p) > 0;
 }
 
@@ -48,12 +45,6 @@ std::int32_t HullBuilder::new_facet(std::int32_t a, std::int32_t b, std::int32_t
   // Each component of the cross product is off by less than 6 u |ab||ac| and the dot product adds 3 terms of relative
   // error 5 u, all in the maximum norm: 40 u |ab||ac||p - a| covers their sum.
   f.error = 40 * kRoundoff * max_abs(ab) * max_abs(ac);
-  f.flat = 0;
-  if (precision_ == Precision::kSweep) {
-    const double extent = max_abs(extent_.upper - extent_.lower);
-    const double tolerance = kFlatDistance * extent * norm(f.normal);
-    if (f.error * extent <= tolerance) f.flat = tolerance;
-  }
   f.outside = -1;
   f.alive = true;
   f.mark = -1;
@@ -134,11 +125,10 @@ bool HullBuilder::initialise() {
   return true;
 }
 
-void HullBuilder::add(const Vec3* points, std::size_t count) {
+void HullBuilder::add(const std::vector<Vec3>& points) {
   auto first = static_cast<std::int32_t>(points_.size());
-  points_.insert(points_.end(), points, points + count);
+  points_.insert(points_.end(), points.begin(), points.end());
   next_outside_.resize(points_.size(), -1);
-  for (std::size_t i = 0; i < count; ++i) extent_.extend(points[i]);
   if (rank_ < 3) {
     if (!initialise()) return;
     first = 0;
@@ -170,16 +160,12 @@ void HullBuilder::expand(std::vector<std::int32_t>& pending) {
       const double h = height(f, points_[i]);
       if (h > farthest_height || (h == farthest_height && i < farthest)) farthest = i, farthest_height = h;
     }
-    if (!insert(farthest, id, pending)) {
-      rebuild_exactly();
-      return;
-    }
+    insert(farthest, id, pending);
   }
 }
 
-// Replaces the facets that the point sees by a cone of triangles over their horizon. False (kSweep only): the horizon
-// is not one simple loop; the hull is then unusable.
-bool HullBuilder::insert(std::int32_t point, std::int32_t facet, std::vector<std::int32_t>& pending) {
+// Replaces the facets that the point sees by a cone of triangles over their horizon.
+void HullBuilder::insert(std::int32_t point, std::int32_t facet, std::vector<std::int32_t>& pending) {
   const Vec3 p = points_[point];
   const std::int32_t seen = 2 * insertion_, hidden = seen + 1;
   ++insertion_;
@@ -198,26 +184,9 @@ bool HullBuilder::insert(std::int32_t point, std::int32_t facet, std::vector<std
     }
   }
 
-  first_edge_.resize(points_.size(), -1);
-  bool simple = true;
-  for (std::size_t i = 0; i < horizon_.size(); ++i) {
-    std::int32_t& slot = first_edge_[horizon_[i].from];
-    simple = simple && slot < 0;
-    slot = static_cast<std::int32_t>(i);
-  }
-  std::size_t length = 0;
-  if (simple && !horizon_.empty()) {
-    std::int32_t edge = 0;
-    do {
-      edge = first_edge_[horizon_[edge].to];
-      ++length;
-    } while (edge > 0 && length <= horizon_.size());
-    simple = edge == 0 && length == horizon_.size();
-  }
-  if (!simple || horizon_.size() < 3) {
-    for (const HorizonEdge& e : horizon_) first_edge_[e.from] = -1;
-    return false;
-  }
+  // Exact signs make the horizon one simple loop: it is walked by the edge that starts at each corner.
+  first_edge_.resize(points_.size());
+  for (std::size_t i = 0; i < horizon_.size(); ++i) first_edge_[horizon_[i].from] = static_cast<std::int32_t>(i);
 
   orphans_.clear();
   for (const std::int32_t id : visible_) {
@@ -228,6 +197,7 @@ bool HullBuilder::insert(std::int32_t point, std::int32_t facet, std::vector<std
     f.outside = -1;
   }
   created_.clear();
+  const std::size_t length = horizon_.size();
   std::int32_t edge = 0;
   for (std::size_t i = 0; i < length; ++i) {
     const HorizonEdge e = horizon_[edge];
@@ -243,23 +213,12 @@ bool HullBuilder::insert(std::int32_t point, std::int32_t facet, std::vector<std
     facets_[created_[i]].neighbour[1] = created_[(i + 1) % length];
     facets_[created_[i]].neighbour[2] = created_[(i + length - 1) % length];
   }
-  for (const HorizonEdge& e : horizon_) first_edge_[e.from] = -1;
   free_.insert(free_.end(), visible_.begin(), visible_.end());
 
   // A point that saw a removed facet and still lies outside sees one of the new facets, so only those are searched.
   for (const std::int32_t orphan : orphans_) assign(orphan, created_);
   for (const std::int32_t id : created_)
     if (facets_[id].outside >= 0) pending.push_back(id);
-  return true;
-}
-
-void HullBuilder::rebuild_exactly() {
-  const Precision precision = precision_;
-  const std::vector<Vec3> points = points_;
-  precision_ = Precision::kExact;
-  clear();
-  add(points.data(), points.size());
-  precision_ = precision;
 }
 
 double HullBuilder::volume() const {
@@ -289,16 +248,18 @@ std::vector<Triangle> HullBuilder::triangles() const {
   return result;
 }
 
-Box HullBuilder::box() const {
-  Box box;
-  if (rank_ < 3) {
-    for (const Vec3 p : points_) box.extend(p);
-  } else {
-    for (const Facet& f : facets_)
-      if (f.alive)
-        for (const std::int32_t corner : f.corner) box.extend(points_[corner]);
+std::vector<Vec3> HullBuilder::corners() const {
+  if (rank_ < 3) return points_;
+  std::vector<bool> used(points_.size(), false);
+  std::vector<Vec3> result;
+  for (const Facet& f : facets_) {
+    if (!f.alive) continue;
+    for (const std::int32_t corner : f.corner) {
+      if (!used[corner]) result.push_back(points_[corner]);
+      used[corner] = true;
+    }
   }
-  return box;
+  return result;
 }
 
 namespace {
@@ -342,7 +303,7 @@ Hull convex_hull(const std::vector<Vec3>& points) {
   Hull hull;
   HullBuilder builder;
   builder.reserve(points.size());
-  builder.add(points.data(), points.size());
+  builder.add(points);
   hull.rank = builder.rank();
   if (hull.rank < 3) return hull;
 
@@ -357,7 +318,7 @@ Hull convex_hull(const std::vector<Vec3>& points) {
     std::vector<Vec3> extreme;
     for (const std::int32_t i : hull.indices) extreme.push_back(points[i]);
     builder.clear();
-    builder.add(extreme.data(), extreme.size());
+    builder.add(extreme);
     hull.faces = builder.triangles();
     return hull;
   }

@@ -7,10 +7,6 @@
 // is read from the facet's floating-point plane where an a-priori error bound allows it and from exact arithmetic
 // where it does not. A point on a facet's plane does not see it; since exact signs make the facets that a point sees a
 // topological disk, the horizon is one simple loop and no new triangle is degenerate.
-//
-// Precision::kSweep takes points within 1e-13 of a well-conditioned facet's plane as lying on it, which spares the
-// sweep most exact tests among the coplanar points of a section and moves no volume by more than that distance times
-// the surface. Its horizon is checked, and the hull built anew with exact tests where it is not a simple loop.
 #pragma once
 
 #include <cstdint>
@@ -20,17 +16,13 @@
 
 namespace rlacd {
 
-enum class Precision { kExact, kSweep };
-
 class HullBuilder {
  public:
-  explicit HullBuilder(Precision precision = Precision::kExact) : precision_(precision) {}
-
   void reserve(std::size_t points);
   void clear();
 
   // Extends the hull by a batch of points. Points seen so far keep their numbers, in the order they were added.
-  void add(const Vec3* points, std::size_t count);
+  void add(const std::vector<Vec3>& points);
 
   // Dimension of the points' affine hull: -1 (none), 0 (one point), 1 (a line), 2 (a plane), 3. Facets exist for 3.
   int rank() const { return rank_; }
@@ -38,7 +30,7 @@ class HullBuilder {
   double area() const;
   const std::vector<Vec3>& points() const { return points_; }
   std::vector<Triangle> triangles() const;
-  Box box() const;  // of the hull's corners (rank 3) or of all points
+  std::vector<Vec3> corners() const;  // of the facets (rank 3), or all points
 
  private:
   struct Facet {
@@ -47,7 +39,6 @@ class HullBuilder {
     Vec3 normal;                // (b - a) x (c - a), not normalised
     Vec3 origin;                // corner a
     double error;               // |computed height - exact height| <= error * max_abs(p - a)
-    double flat;                // heights below this count as zero (kSweep), 0 where the facet is ill-conditioned
     std::int32_t outside;       // first point of the list that this facet is responsible for, -1 when none
     bool alive;
     std::int32_t mark;  // number of the last insertion that looked at this facet
@@ -56,19 +47,16 @@ class HullBuilder {
   double height(const Facet& f, Vec3 p) const { return dot(f.normal, p - f.origin); }
   bool sees(const Facet& f, Vec3 p) const;
   bool initialise();
-  void rebuild_exactly();
   std::int32_t new_facet(std::int32_t a, std::int32_t b, std::int32_t c);
   void assign(std::int32_t point, const std::vector<std::int32_t>& facets);
   void expand(std::vector<std::int32_t>& pending);
-  bool insert(std::int32_t point, std::int32_t facet, std::vector<std::int32_t>& pending);
+  void insert(std::int32_t point, std::int32_t facet, std::vector<std::int32_t>& pending);
 
-  Precision precision_;
   int rank_ = -1;
   std::vector<Vec3> points_;
   std::vector<Facet> facets_;
   std::vector<std::int32_t> free_;
   std::vector<std::int32_t> next_outside_;  // linked lists of outside points, by point
-  Box extent_;                              // of all points added
   std::int32_t insertion_ = 0;
 
   struct HorizonEdge {

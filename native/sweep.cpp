@@ -1,0 +1,233 @@
+// Plane sweep: see sweep.hpp for input, output and algorithm.
+#include "sweep.hpp"
+
+#include <stdexcept>
+
+#include "hull.hpp"
+#include "parallel.hpp"
+
+namespace rlacd {
+
+namespace {
+
+int axis_of(Vec3 n) {
+  for (int axis = 0; axis < 3; ++axis)
+    if (std::fabs(n[axis]) == 1) return axis;
+  return -1;
+}
+
+// The point where the segment a-b meets the plane n.x = d; on the plane to the last bit when n is a coordinate axis.
+Vec3 crossing(Vec3 a, Vec3 b, double sa, double sb, double d, Vec3 n, int axis) {
+  const double t = (d - sa) / (sb - sa);
+  Vec3 p = a + t * (b - a);
+  if (axis >= 0) p[axis] = d * n[axis];
+  return p;
+}
+
+// Corners of the convex hull of points on a plane, by Andrew's monotone chain in the coordinates that the plane's
+// normal allows. Rounding may drop a corner that stands out by some 1e-16, which no volume notices.
+void reduce_to_planar_hull(std::vector<Vec3>& points, Vec3 n) {
+  if (points.size() < 4) return;
+  const int drop = std::fabs(n.x) >= std::fabs(n.y) && std::fabs(n.x) >= std::fabs(n.z) ? 0
+                   : std::fabs(n.y) >= std::fabs(n.z)                                  ? 1
+                                                                                       : 2;
+  const int u = (drop + 1) % 3, v = (drop + 2) % 3;
+  std::sort(points.begin(), points.end(), [u, v, drop](Vec3 a, Vec3 b) {
+    return a[u] != b[u] ? a[u] < b[u] : a[v] != b[v] ? a[v] < b[v] : a[drop] < b[drop];
+  });
+  std::vector<Vec3> chain;
+  const auto extend = [&](Vec3 p, std::size_t base) {
+    while (chain.size() >= base + 2) {
+      const Vec3 a = chain[chain.size() - 2], b = chain.back();
+      if ((b[u] - a[u]) * (p[v] - a[v]) - (b[v] - a[v]) * (p[u] - a[u]) > 0) break;
+      chain.pop_back();
+    }
+    chain.push_back(p);
+  };
+  for (const Vec3 p : points) extend(p, 0);
+  const std::size_t lower = chain.size() - 1;
+  for (std::size_t i = points.size() - 1; i-- > 0;) extend(points[i], lower);
+  chain.pop_back();
+  points = std::move(chain);
+}
+
+// Integral of min(s - d, 0) over a triangle with corner values s0 <= s1 <= s2, divided by its area.
+double mean_below(double s0, double s1, double s2, double d) {
+  if (d <= s0) return 0;
+  if (d >= s2) return (s0 + s1 + s2) / 3 - d;
+  if (d <= s1) {
+    const double t = (d - s0) * (d - s0) / ((s1 - s0) * (s2 - s0));
+    return t * (s0 - d) / 3;
+  }
+  const double t = (s2 - d) * (s2 - d) / ((s2 - s0) * (s2 - s1));
+  return (s0 + s1 + s2) / 3 - d - t * (s2 - d) / 3;
+}
+
+class DirectionSweep {
+ public:
+  DirectionSweep(const Mesh& mesh, Vec3 n, const std::vector<double>& offsets)
+      : mesh_(mesh), n_(n), axis_(axis_of(n)), d_(offsets), scores_(offsets.size()) {}
+
+  std::vector<PlaneScore> run() {
+    project();
+    fill_slabs();
+    measure_solid();
+    grow_hulls(true);
+    grow_hulls(false);
+    return std::move(scores_);
+  }
+
+ private:
+  void project() {
+    s_.resize(mesh_.vertices.size());
+    used_.assign(mesh_.vertices.size(), false);
+    for (const Triangle& f : mesh_.faces)
+      for (const std::int32_t c : f) used_[c] = true;
+    for (std::size_t i = 0; i < s_.size(); ++i) {
+      s_[i] = dot(n_, mesh_.vertices[i]);
+      if (!used_[i]) continue;
+      lowest_ = std::min(lowest_, s_[i]);
+      highest_ = std::max(highest_, s_[i]);
+    }
+  }
+
+  // First plane with offset > s.
+  std::size_t first_above(double s) const { return std::upper_bound(d_.begin(), d_.end(), s) - d_.begin(); }
+
+  void fill_slabs() {
+    inside_.resize(d_.size() + 1);
+    crossings_.resize(d_.size());
+    for (std::size_t i = 0; i < s_.size(); ++i) {
+      if (!used_[i]) continue;
+      const std::size_t j = first_above(s_[i]);
+      if (j > 0 && d_[j - 1] == s_[i])
+        crossings_[j - 1].push_back(mesh_.vertices[i]);  // on the plane: belongs to both sides
+      else
+        inside_[j].push_back(mesh_.vertices[i]);
+    }
+    for (const Triangle& f : mesh_.faces)
+      for (int e = 0; e < 3; ++e) {
+        // In a closed oriented mesh every edge is run through once in each direction: take the ascending one.
+        const std::int32_t a = f[e], b = f[(e + 1) % 3];
+        if (s_[a] >= s_[b]) continue;
+        for (std::size_t j = first_above(s_[a]); j < d_.size() && d_[j] < s_[b]; ++j)
+          crossings_[j].push_back(
+              crossing(mesh_.vertices[a], mesh_.vertices[b], s_[a], s_[b], d_[j], n_, axis_));
+      }
+    for (std::vector<Vec3>& points : crossings_) reduce_to_planar_hull(points, n_);
+    slabs_.resize(d_.size() + 1);
+    HullBuilder hull;
+    for (std::size_t j = 0; j <= d_.size(); ++j) {
+      hull.clear();
+      if (j > 0) hull.add(crossings_[j - 1]);
+      hull.add(inside_[j]);
+      if (j < d_.size()) hull.add(crossings_[j]);
+      slabs_[j] = hull.corners();
+    }
+  }
+
+  void measure_solid() {
+    std::vector<double> slope(d_.size() + 1, 0), constant(d_.size() + 1, 0), partial(d_.size(), 0);
+    std::vector<Vec3> area(d_.size());
+    for (const Triangle& f : mesh_.faces) {
+      const Vec3 a = mesh_.vertices[f[0]], b = mesh_.vertices[f[1]], c = mesh_.vertices[f[2]];
+      const double flux = dot(n_, cross(b - a, c - a)) / 2;
+      double s[3] = {s_[f[0]], s_[f[1]], s_[f[2]]};
+      std::sort(s, s + 3);
+      std::size_t j = first_above(s[0]);
+      for (; j < d_.size() && d_[j] < s[2]; ++j) {
+        partial[j] += flux * mean_below(s[0], s[1], s[2], d_[j]);
+        section_edge(f, j, area[j]);
+      }
+      // From here on the whole triangle lies below: flux * (mean - d), summed up as a line in d.
+      slope[j] += flux;
+      constant[j] += flux * ((s[0] + s[1] + s[2]) / 3);
+    }
+    double flux = 0, moment = 0;
+    const double total = mesh_volume(mesh_.vertices, mesh_.faces);
+    for (std::size_t j = 0; j < d_.size(); ++j) {
+      flux += slope[j];
+      moment += constant[j];
+      scores_[j].solid_below = partial[j] + moment - flux * d_[j];
+      scores_[j].solid_above = total - scores_[j].solid_below;
+      scores_[j].section_area = std::fabs(dot(n_, area[j])) / 2;
+    }
+  }
+
+  // Adds the segment in which plane j cuts the triangle to the section's perimeter and (as a directed edge) its area.
+  void section_edge(const Triangle& f, std::size_t j, Vec3& area) {
+    Vec3 up, down;  // where the boundary of the triangle crosses the plane upwards and downwards
+    bool has_up = false, has_down = false;
+    for (int e = 0; e < 3; ++e) {
+      const std::int32_t a = f[e], b = f[(e + 1) % 3];
+      const bool below_a = s_[a] <= d_[j], below_b = s_[b] <= d_[j];
+      if (below_a == below_b) continue;
+      const Vec3 p = below_a ? crossing(mesh_.vertices[a], mesh_.vertices[b], s_[a], s_[b], d_[j], n_, axis_)
+                             : crossing(mesh_.vertices[b], mesh_.vertices[a], s_[b], s_[a], d_[j], n_, axis_);
+      if (below_a)
+        up = p, has_up = true;
+      else
+        down = p, has_down = true;
+    }
+    if (!has_up || !has_down) return;
+    const Vec3 origin = d_[j] * n_;
+    scores_[j].section_perimeter += norm(down - up);
+    area = area + cross(up - origin, down - origin);
+  }
+
+  void grow_hulls(bool below) {
+    HullBuilder hull;
+    const auto planes = static_cast<std::ptrdiff_t>(d_.size());
+    const std::ptrdiff_t step = below ? 1 : -1;
+    Box box;
+    for (std::ptrdiff_t j = below ? 0 : planes - 1; j >= 0 && j < planes; j += step) {
+      const std::vector<Vec3>& slab = slabs_[below ? j : j + 1];
+      hull.add(slab);
+      for (const Vec3 p : slab) box.extend(p);
+
+      const double thickness = below ? d_[j] - lowest_ : highest_ - d_[j];
+      const double extent = hull.points().empty() ? 0 : std::max(thickness, max_abs(box.upper - box.lower));
+      PlaneScore& score = scores_[j];
+      (below ? score.hull_below : score.hull_above) = hull.volume();
+      (below ? score.thickness_below : score.thickness_above) = thickness;
+      (below ? score.extent_below : score.extent_above) = extent;
+    }
+  }
+
+  const Mesh& mesh_;
+  const Vec3 n_;
+  const int axis_;
+  const std::vector<double>& d_;
+  std::vector<PlaneScore> scores_;
+  std::vector<double> s_;
+  std::vector<bool> used_;
+  double lowest_ = std::numeric_limits<double>::infinity();
+  double highest_ = -std::numeric_limits<double>::infinity();
+  std::vector<std::vector<Vec3>> inside_;     // M + 1 slabs: the vertices strictly between their planes
+  std::vector<std::vector<Vec3>> crossings_;  // M planes: corners of the section's convex hull
+  std::vector<std::vector<Vec3>> slabs_;      // M + 1 slabs: corners of their convex hulls
+};
+
+}  // namespace
+
+std::vector<PlaneScore> sweep_direction(const Mesh& mesh, Vec3 direction, const std::vector<double>& offsets) {
+  return DirectionSweep(mesh, direction, offsets).run();
+}
+
+std::vector<PlaneScore> sweep(const Mesh& mesh, const std::vector<Vec3>& directions, const std::vector<double>& offsets,
+                              int threads) {
+  if (directions.empty()) return {};
+  if (offsets.size() % directions.size() != 0) throw std::invalid_argument("every direction needs as many offsets");
+  const std::size_t planes = offsets.size() / directions.size();
+  std::vector<PlaneScore> scores(offsets.size());
+  parallel_for(directions.size(), threads, [&](std::size_t k) {
+    const auto first = offsets.begin() + static_cast<std::ptrdiff_t>(k * planes);
+    const std::vector<double> own(first, first + static_cast<std::ptrdiff_t>(planes));
+    if (!std::is_sorted(own.begin(), own.end())) throw std::invalid_argument("offsets must ascend");
+    const std::vector<PlaneScore> result = sweep_direction(mesh, directions[k], own);
+    std::copy(result.begin(), result.end(), scores.begin() + static_cast<std::ptrdiff_t>(k * planes));
+  });
+  return scores;
+}
+
+}  // namespace rlacd
