@@ -248,17 +248,14 @@ std::vector<Triangle> HullBuilder::triangles() const {
   return result;
 }
 
-std::vector<Vec3> HullBuilder::corners() const {
-  if (rank_ < 3) return points_;
-  std::vector<bool> used(points_.size(), false);
-  std::vector<Vec3> result;
-  for (const Facet& f : facets_) {
-    if (!f.alive) continue;
-    for (const std::int32_t corner : f.corner) {
-      if (!used[corner]) result.push_back(points_[corner]);
-      used[corner] = true;
-    }
-  }
+std::vector<std::int32_t> HullBuilder::corners() const {
+  std::vector<bool> used(points_.size(), rank_ < 3);
+  for (const Facet& f : facets_)
+    if (f.alive)
+      for (const std::int32_t corner : f.corner) used[corner] = true;
+  std::vector<std::int32_t> result;
+  for (std::size_t i = 0; i < used.size(); ++i)
+    if (used[i]) result.push_back(static_cast<std::int32_t>(i));
   return result;
 }
 

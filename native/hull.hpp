@@ -30,7 +30,7 @@ class HullBuilder {
   double area() const;
   const std::vector<Vec3>& points() const { return points_; }
   std::vector<Triangle> triangles() const;
-  std::vector<Vec3> corners() const;  // of the facets (rank 3), or all points
+  std::vector<std::int32_t> corners() const;  // ascending: points that are corners of facets (rank 3), or all points
 
  private:
   struct Facet {

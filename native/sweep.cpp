@@ -63,6 +63,11 @@ double mean_below(double s0, double s1, double s2, double d) {
   return (s0 + s1 + s2) / 3 - d - t * (s2 - d) / 3;
 }
 
+// Corners of the convex hull of a slab: on its lower plane, between its planes, on its upper plane.
+struct Slab {
+  std::vector<Vec3> lower, inside, upper;
+};
+
 class DirectionSweep {
  public:
   DirectionSweep(const Mesh& mesh, Vec3 n, const std::vector<double>& offsets)
@@ -120,9 +125,15 @@ class DirectionSweep {
     for (std::size_t j = 0; j <= d_.size(); ++j) {
       hull.clear();
       if (j > 0) hull.add(crossings_[j - 1]);
+      const std::size_t first_inside = hull.points().size();
       hull.add(inside_[j]);
+      const std::size_t first_upper = hull.points().size();
       if (j < d_.size()) hull.add(crossings_[j]);
-      slabs_[j] = hull.corners();
+      for (const std::int32_t corner : hull.corners()) {
+        const auto i = static_cast<std::size_t>(corner);
+        Slab& slab = slabs_[j];
+        (i < first_inside ? slab.lower : i < first_upper ? slab.inside : slab.upper).push_back(hull.points()[i]);
+      }
     }
   }
 
@@ -181,9 +192,12 @@ class DirectionSweep {
     const std::ptrdiff_t step = below ? 1 : -1;
     Box box;
     for (std::ptrdiff_t j = below ? 0 : planes - 1; j >= 0 && j < planes; j += step) {
-      const std::vector<Vec3>& slab = slabs_[below ? j : j + 1];
-      hull.add(slab);
-      for (const Vec3 p : slab) box.extend(p);
+      const Slab& slab = slabs_[below ? j : j + 1];
+      // The points on the plane that this slab shares with the hull so far are in it already.
+      for (const std::vector<Vec3>* points : {&slab.inside, below ? &slab.upper : &slab.lower}) {
+        hull.add(*points);
+        for (const Vec3 p : *points) box.extend(p);
+      }
 
       const double thickness = below ? d_[j] - lowest_ : highest_ - d_[j];
       const double extent = hull.points().empty() ? 0 : std::max(thickness, max_abs(box.upper - box.lower));
@@ -205,7 +219,7 @@ class DirectionSweep {
   double highest_ = -std::numeric_limits<double>::infinity();
   std::vector<std::vector<Vec3>> inside_;     // M + 1 slabs: the vertices strictly between their planes
   std::vector<std::vector<Vec3>> crossings_;  // M planes: corners of the section's convex hull
-  std::vector<std::vector<Vec3>> slabs_;      // M + 1 slabs: corners of their convex hulls
+  std::vector<Slab> slabs_;                   // M + 1 slabs
 };
 
 }  // namespace
