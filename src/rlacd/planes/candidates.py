@@ -1,0 +1,51 @@
+"""The paper's candidate planes: equidistant along the coordinate axes and along the component's principal axes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.component import Component, Plane
+
+OFFSETS_PER_AXIS = 25
+"""25 planes along each of 6 axes: the paper's 150."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """K directions with M parallel planes each.
+
+    Attributes
+    ----------
+    directions : float64 [K, 3]
+        Unit normals.
+    offsets : float64 [K, M]
+        Ascending offsets d of the planes n.x = d.
+    """
+
+    directions: FloatArray
+    offsets: FloatArray
+
+    def __len__(self) -> int:
+        return self.offsets.size
+
+    def plane(self, index: int) -> Plane:
+        """Get plane number `index` of the K * M, counted direction by direction."""
+        k, j = divmod(index, self.offsets.shape[1])
+        x, y, z = (float(c) for c in self.directions[k])
+        return Plane((x, y, z), float(self.offsets[k, j]))
+
+
+def axis_and_principal(component: Component, per_axis: int = OFFSETS_PER_AXIS) -> Candidates:
+    """Candidates of one component: `per_axis` planes along x, y, z and its three principal axes.
+
+    The planes divide the component's extent along each direction into `per_axis` + 1 equal slabs (the paper, 3.2).
+    """
+    directions = np.concatenate([np.eye(3), component.principal_axes])
+    heights = component.hull.vertices @ directions.T
+    lower, upper = heights.min(axis=0), heights.max(axis=0)
+    steps = np.arange(1, per_axis + 1) / (per_axis + 1)
+    offsets = lower[:, None] + (upper - lower)[:, None] * steps
+    return Candidates(np.ascontiguousarray(directions), np.ascontiguousarray(offsets))

@@ -1,0 +1,59 @@
+"""Greedy: the valid candidate plane with the best score of its two sides, one step ahead."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import numpy as np
+
+from rlacd.planes.candidates import axis_and_principal
+from rlacd.planes.sweep import SLIVER, Sweep, sweep
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.component import Component, Plane
+
+
+def hull_sum(s: Sweep) -> FloatArray:
+    """|CH(m_l)| + |CH(m_r)|: the paper's greedy baseline (its reward r1)."""
+    return s.hull_below + s.hull_above
+
+
+def max_excess(s: Sweep) -> FloatArray:
+    """max(|CH(m_i)| - |m_i|): orders planes as the larger R_v of the two sides does (CoACD's one-step cost)."""
+    return np.maximum(s.hull_below - s.solid_below, s.hull_above - s.solid_above)
+
+
+def root_excess(s: Sweep) -> FloatArray:
+    """Sum of sqrt(|CH(m_i)| - |m_i|): favours planes that finish one side over planes that halve both."""
+    return np.sqrt(np.maximum(s.hull_below - s.solid_below, 0)) + np.sqrt(np.maximum(s.hull_above - s.solid_above, 0))
+
+
+SCORES: Mapping[str, Callable[[Sweep], FloatArray]] = MappingProxyType(
+    {"hull-sum": hull_sum, "max-excess": max_excess, "root-excess": root_excess}
+)
+
+
+class Greedy:
+    """The plane with the least score.
+
+    Parameters
+    ----------
+    score : str
+        A key of `SCORES`.
+    """
+
+    def __init__(self, score: str = "hull-sum") -> None:
+        self.score = SCORES[score]
+
+    def choose(self, component: Component, threads: int = 1) -> Plane | None:
+        """Choose the plane to cut a component by; None when every candidate misses it or shaves off a film.
+
+        Planes that leave slivers are taken only where no other is left.
+        """
+        scored = sweep(component, axis_and_principal(component), threads)
+        cost = self.score(scored)
+        for sliver in (SLIVER, SLIVER / 100):
+            valid = scored.valid(sliver)
+            if valid.any():
+                return scored.candidates.plane(int(np.argmin(np.where(valid, cost, np.inf))))
+        return None

@@ -1,0 +1,158 @@
+"""A piece of the solid on its way to becoming a part: its surface, its hull, and how it is cut and glued.
+
+Everything is in the normalised frame (bounding box of the input centred, longest side 2).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from manifold3d import Manifold, Mesh64
+
+from rlacd import _native
+from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.hull import Hull
+
+NEGLIGIBLE_VOLUME = 1e-12
+"""Solids below this volume (the frame's box has 8) are rounding left over by a cut."""
+
+
+@dataclass(frozen=True)
+class Plane:
+    """The plane n.x = d, n a unit normal; *below* is n.x < d, *above* n.x > d."""
+
+    normal: tuple[float, float, float]
+    offset: float
+
+
+class Part:
+    """A solid's surface with its volume and hull, computed once.
+
+    Parameters
+    ----------
+    vertices : float64 [V, 3]
+    faces : int32 [F, 3]
+        A surface that bounds the solid, to measure distances to; parts glued from several are not closed meshes.
+    volume : float
+        Of the solid.
+    hull : Hull
+        The solid's convex hull.
+    """
+
+    def __init__(self, vertices: FloatArray, faces: IntArray, volume: float, hull: Hull) -> None:
+        self.vertices = vertices
+        self.faces = faces
+        self.volume = volume
+        self.hull = hull
+
+    def __repr__(self) -> str:
+        name = type(self).__name__
+        return f"{name}({len(self.faces)} faces, volume {self.volume:.4g}, hull {self.hull.volume:.4g})"
+
+    @cached_property
+    def box(self) -> FloatArray:
+        """Lower and upper corner of the bounding box [2, 3]."""
+        return np.stack([self.hull.vertices.min(axis=0), self.hull.vertices.max(axis=0)])
+
+    @staticmethod
+    def glued(first: Part, second: Part) -> Part:
+        """Unite two parts with disjoint interiors; the regions where they touch are no surface of the union."""
+        vertices, faces = _native.glue(first.vertices, first.faces, second.vertices, second.faces)
+        return Part(vertices, faces, first.volume + second.volume, Hull.around(first.hull, second.hull))
+
+
+class Component(Part):
+    """A closed solid, not necessarily connected, that can be cut.
+
+    Parameters
+    ----------
+    manifold : manifold3d.Manifold
+        The solid, in the normalised frame; not flat.
+    """
+
+    def __init__(self, manifold: Manifold) -> None:
+        mesh = manifold.to_mesh64()
+        vertices = np.ascontiguousarray(mesh.vert_properties[:, :3], dtype=np.float64)
+        faces = np.ascontiguousarray(mesh.tri_verts, dtype=np.int32)
+        hull = Hull.of(vertices)
+        if hull is None:
+            raise ValueError("a component has to have a volume")
+        super().__init__(vertices, faces, _native.mesh_volume(vertices, faces), hull)
+        self.manifold = manifold
+
+    @cached_property
+    def principal_axes(self) -> FloatArray:
+        """Principal axes of the surface [3, 3], one a row, the longest first, right-handed.
+
+        Eigenvectors of the second moments of the surface (exact over its triangles). Their signs are fixed by making
+        the largest entry positive; axes closer than 1e-6 to a coordinate axis are that axis.
+        """
+        corners = self.vertices[self.faces]
+        a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+        area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        area /= area.sum()
+        centroid = area @ (corners.mean(axis=1))
+        a, b, c = a - centroid, b - centroid, c - centroid
+        middle = a + b + c
+        moments = sum((area[:, None] * x).T @ x for x in (a, b, c, middle))
+        _, axes = np.linalg.eigh(moments)
+        axes = axes.T[::-1].copy()
+        for axis in axes:
+            largest = int(np.argmax(np.abs(axis)))
+            axis *= np.sign(axis[largest])
+            if axis[largest] > 1 - 1e-12:
+                axis[:] = np.eye(3)[largest]
+        return axes
+
+    def cut(self, plane: Plane) -> tuple[Component | None, Component | None]:
+        """Cut by a plane: what lies below and what lies above, None where nothing (of any volume) does."""
+        above, below = self.manifold.split_by_plane(plane.normal, plane.offset)
+        return _component(below), _component(above)
+
+    def pieces(self) -> list[Component]:
+        """Connected pieces, cavities kept inside the piece that encloses them; ``[self]`` when there is but one."""
+        manifolds = self.manifold.decompose()
+        if len(manifolds) == 1:
+            return [self]
+        shells = [m for m in manifolds if m.volume() > 0]
+        cavities = [m for m in manifolds if m.volume() < 0]
+        if cavities:
+            shells = _enclose(shells, cavities)
+        return [piece for m in shells if (piece := _component(m)) is not None]
+
+
+def _component(manifold: Manifold) -> Component | None:
+    if manifold.is_empty() or manifold.volume() <= NEGLIGIBLE_VOLUME:
+        return None
+    try:
+        return Component(manifold)
+    except ValueError:
+        return None
+
+
+def _enclose(shells: list[Manifold], cavities: list[Manifold]) -> list[Manifold]:
+    """Give every cavity (a shell of negative volume) back to the smallest shell around it."""
+    by_shell: dict[int, list[Manifold]] = {i: [shell] for i, shell in enumerate(shells)}
+    by_volume = sorted(range(len(shells)), key=lambda i: (shells[i].volume(), i))
+    for cavity in cavities:
+        point = np.asarray(cavity.to_mesh64().vert_properties[:1, :3], dtype=np.float64)
+        for i in by_volume:
+            mesh = shells[i].to_mesh64()
+            vertices = np.ascontiguousarray(mesh.vert_properties[:, :3], dtype=np.float64)
+            faces = np.ascontiguousarray(mesh.tri_verts, dtype=np.int32)
+            if _native.Surface(vertices, faces).winding(point)[0] > 0.5:
+                by_shell[i].append(cavity)
+                break
+    return [group[0] if len(group) == 1 else _concatenate(group) for group in by_shell.values()]
+
+
+def _concatenate(manifolds: list[Manifold]) -> Manifold:
+    vertices, faces, count = [], [], 0
+    for manifold in manifolds:
+        mesh = manifold.to_mesh64()
+        vertices.append(np.asarray(mesh.vert_properties[:, :3], dtype=np.float64))
+        faces.append(np.asarray(mesh.tri_verts, dtype=np.uint64) + np.uint64(count))
+        count += len(vertices[-1])
+    return Manifold(Mesh64(np.concatenate(vertices), np.concatenate(faces)))

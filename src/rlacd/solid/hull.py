@@ -1,0 +1,45 @@
+"""Convex hulls of points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rlacd import _native
+from rlacd.solid.arrays import FloatArray, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Hull:
+    """A convex polytope.
+
+    Attributes
+    ----------
+    vertices : float64 [H, 3]
+        Its corners, all of them extreme points.
+    faces : int32 [F, 3]
+        Triangles, counter-clockwise seen from outside; coplanar triangles stay apart.
+    volume : float
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    volume: float
+
+    @classmethod
+    def of(cls, points: FloatArray) -> Hull | None:
+        """Take the hull of points [N, 3]; None when they all lie in one plane."""
+        points = np.ascontiguousarray(points, dtype=np.float64)
+        indices, faces, rank = _native.convex_hull(points)
+        if rank < 3:
+            return None
+        vertices = points[indices]
+        return cls(vertices, faces, _native.mesh_volume(vertices, faces))
+
+    @classmethod
+    def around(cls, *hulls: Hull) -> Hull:
+        """Take the joint hull of several."""
+        joint = cls.of(np.concatenate([hull.vertices for hull in hulls]))
+        assert joint is not None, "the hull of solid hulls is solid"
+        return joint
