@@ -63,7 +63,7 @@ double mean_below(double s0, double s1, double s2, double d) {
   return (s0 + s1 + s2) / 3 - d - t * (s2 - d) / 3;
 }
 
-// Corners of the convex hull of a slab: on its lower plane, between its planes, on its upper plane.
+// Corners of the convex hull of a slab: crossings of its lower plane, vertices, crossings of its upper plane.
 struct Slab {
   std::vector<Vec3> lower, inside, upper;
 };
@@ -94,6 +94,14 @@ class DirectionSweep {
       lowest_ = std::min(lowest_, s_[i]);
       highest_ = std::max(highest_, s_[i]);
     }
+    lowest_around_ = highest_around_ = s_;
+    for (const Triangle& f : mesh_.faces) {
+      const auto [low, high] = std::minmax({s_[f[0]], s_[f[1]], s_[f[2]]});
+      for (const std::int32_t c : f) {
+        lowest_around_[c] = std::min(lowest_around_[c], low);
+        highest_around_[c] = std::max(highest_around_[c], high);
+      }
+    }
   }
 
   // First plane with offset > s.
@@ -105,10 +113,11 @@ class DirectionSweep {
     for (std::size_t i = 0; i < s_.size(); ++i) {
       if (!used_[i]) continue;
       const std::size_t j = first_above(s_[i]);
-      if (j > 0 && d_[j - 1] == s_[i])
-        crossings_[j - 1].push_back(mesh_.vertices[i]);  // on the plane: belongs to both sides
-      else
-        inside_[j].push_back(mesh_.vertices[i]);
+      // A vertex on a plane belongs to a side when the surface goes on there: a face that lies in the plane bounds the
+      // solid on one side of it only.
+      const bool on_plane = j > 0 && d_[j - 1] == s_[i];
+      if (!on_plane || highest_around_[i] > s_[i]) inside_[j].push_back(mesh_.vertices[i]);
+      if (on_plane && lowest_around_[i] < s_[i]) inside_[j - 1].push_back(mesh_.vertices[i]);
     }
     for (const Triangle& f : mesh_.faces)
       for (int e = 0; e < 3; ++e) {
@@ -145,7 +154,8 @@ class DirectionSweep {
       const double flux = dot(n_, cross(b - a, c - a)) / 2;
       double s[3] = {s_[f[0]], s_[f[1]], s_[f[2]]};
       std::sort(s, s + 3);
-      std::size_t j = first_above(s[0]);
+      // A section is taken just above its plane, so a corner on the plane counts as below.
+      std::size_t j = std::lower_bound(d_.begin(), d_.end(), s[0]) - d_.begin();
       for (; j < d_.size() && d_[j] < s[2]; ++j) {
         partial[j] += flux * mean_below(s[0], s[1], s[2], d_[j]);
         section_edge(f, j, area[j]);
@@ -213,11 +223,12 @@ class DirectionSweep {
   const int axis_;
   const std::vector<double>& d_;
   std::vector<PlaneScore> scores_;
-  std::vector<double> s_;
+  std::vector<double> s_;  // n.x of every vertex, and the least and greatest of the faces around it
+  std::vector<double> lowest_around_, highest_around_;
   std::vector<bool> used_;
   double lowest_ = std::numeric_limits<double>::infinity();
   double highest_ = -std::numeric_limits<double>::infinity();
-  std::vector<std::vector<Vec3>> inside_;     // M + 1 slabs: the vertices strictly between their planes
+  std::vector<std::vector<Vec3>> inside_;     // M + 1 slabs: their vertices
   std::vector<std::vector<Vec3>> crossings_;  // M planes: corners of the section's convex hull
   std::vector<Slab> slabs_;                   // M + 1 slabs
 };

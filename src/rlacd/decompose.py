@@ -8,6 +8,7 @@ from rlacd.policies import Policy
 from rlacd.solid.component import Component, Plane
 from rlacd.workers import Workers
 
+
 def cut_until_done(
     solid: Component, criterion: Criterion, policy: Policy, workers: Workers, clock: Clock
 ) -> tuple[list[Component], list[Component]]:

@@ -52,7 +52,9 @@ def merge(parts: Sequence[Part], criterion: Criterion, workers: Workers, clock: 
         if pair not in unions:
             batch = [pair, *_next_pairs(queue, alive, unions, 2 * workers.threads - 1)]
             unions.update(
-                zip(batch, workers.map(lambda p: _unite(alive[p.first], alive[p.second], criterion), batch), strict=True)
+                zip(
+                    batch, workers.map(lambda p: _unite(alive[p.first], alive[p.second], criterion), batch), strict=True
+                )
             )
         if not clock.step(len(parts) - len(alive), None, len(alive)):
             break

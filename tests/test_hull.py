@@ -1,0 +1,146 @@
+"""The convex hull kernel against Qhull and exact rational arithmetic."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from scipy.spatial import ConvexHull, QhullError
+
+from rlacd import _native
+from rlacd.solid.hull import Hull
+
+
+def exact_height(a: np.ndarray, b: np.ndarray, c: np.ndarray, p: np.ndarray) -> Fraction:
+    """Six times the signed volume of a, b, c, p, without rounding."""
+    u, v, w = ([Fraction(float(x)) - Fraction(float(y)) for x, y in zip(q, a, strict=True)] for q in (b, c, p))
+    return u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0])
+
+
+def assert_is_hull(points: np.ndarray, exact_points: int = 40) -> None:
+    indices, faces, rank = _native.convex_hull(points)
+    assert rank == 3
+    corners = points[indices]
+    assert len(np.unique(indices)) == len(indices)
+    assert set(faces.ravel()) == set(range(len(indices)))
+    edges = {(int(f[i]), int(f[(i + 1) % 3])) for f in faces for i in range(3)}
+    assert len(edges) == 3 * len(faces), "every directed edge once"
+    assert all((b, a) in edges for a, b in edges), "closed"
+    assert len(indices) - len(faces) // 2 == 2, "a sphere"
+    for f in faces[:exact_points]:
+        for p in points[:exact_points]:
+            assert exact_height(*corners[f], p) <= 0, "no point above any facet, exactly"
+
+
+coordinate = st.floats(-1, 1, allow_subnormal=False, width=32).map(lambda x: 0.0 if abs(x) < 1e-6 else float(x))
+clouds = hnp.arrays(np.float64, st.tuples(st.integers(4, 60), st.just(3)), elements=coordinate)
+lattice = hnp.arrays(np.float64, st.tuples(st.integers(4, 60), st.just(3)), elements=st.integers(-2, 2).map(float))
+
+
+@pytest.mark.parametrize("strategy", ["clouds", "lattice"])
+def test_hull_is_exact_and_agrees_with_qhull(strategy: str) -> None:
+    @settings(max_examples=1000, deadline=None)
+    @given({"clouds": clouds, "lattice": lattice}[strategy])
+    def check(points: np.ndarray) -> None:
+        _, _, rank = _native.convex_hull(points)
+        try:
+            reference = ConvexHull(points)
+        except QhullError:
+            return  # flat within Qhull's tolerance
+        if rank < 3:
+            assert reference.volume < 1e-12
+            return
+        assert_is_hull(points, exact_points=12)
+        hull = Hull.of(points)
+        assert hull is not None
+        # Qhull merges facets that are flat within its tolerance, which costs thin hulls a relative error.
+        flat = 1e-15 * reference.area
+        assert hull.volume == pytest.approx(reference.volume, rel=1e-9, abs=10 * flat)
+        assert _native.mesh_area(hull.vertices, hull.faces) == pytest.approx(reference.area, rel=1e-9, abs=1e-12)
+
+    check()
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("count", [4, 10, 100, 3000])
+def test_hull_of_random_points(count: int, scale: float) -> None:
+    points = np.random.default_rng(count).normal(size=(count, 3)) * scale
+    assert_is_hull(points)
+    hull = Hull.of(points)
+    assert hull is not None
+    assert hull.volume == pytest.approx(ConvexHull(points).volume, rel=1e-9)
+
+
+def test_all_points_of_a_sphere_are_corners() -> None:
+    points = np.random.default_rng(0).normal(size=(2000, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    indices, _, _ = _native.convex_hull(points)
+    assert len(indices) == len(points)
+
+
+def test_only_extreme_points_are_corners() -> None:
+    grid = np.array(list(product(range(6), repeat=3)), dtype=np.float64)
+    hull = Hull.of(np.concatenate([grid, grid]))
+    assert hull is not None
+    assert len(hull.vertices) == 8
+    assert len(hull.faces) == 12
+    assert hull.volume == 125
+
+
+@pytest.mark.parametrize(
+    ("points", "rank"),
+    [
+        (np.zeros((0, 3)), -1),
+        (np.ones((7, 3)), 0),
+        (np.outer(np.arange(5.0), [1, 2, 3]), 1),
+        (np.array([[0, 0, 1], [1, 0, 1], [0, 1, 1], [1, 1, 1.0]]), 2),
+        (np.array([[0, 0, 0], [1, 1, 1], [2, 2, 2], [3, 3, np.nextafter(3, 4)]]), 1 + 0),
+    ],
+    ids=["none", "one point", "a line", "a square", "almost a line"],
+)
+def test_rank_of_degenerate_points(points: np.ndarray, rank: int) -> None:
+    indices, faces, found = _native.convex_hull(points)
+    assert found == rank if rank != 1 else found in (1, 2)
+    assert len(indices) == len(faces) == 0
+
+
+def test_points_one_ulp_off_a_plane_are_seen() -> None:
+    square = np.array([[0, 0, 1], [1, 0, 1], [0, 1, 1], [1, 1, 1.0]])
+    bump = np.array([[0.5, 0.5, np.nextafter(1, 2)]])
+    _, _, rank = _native.convex_hull(np.concatenate([square, bump]))
+    assert rank == 3
+
+
+def test_joint_hull_volumes() -> None:
+    rng = np.random.default_rng(1)
+    groups = [rng.normal(size=(n, 3)) for n in (5, 20, 9)]
+    starts = np.cumsum([0, *map(len, groups)], dtype=np.int32)
+    pairs = np.array([[0, 1], [1, 2], [2, 0]], dtype=np.int32)
+    volumes = _native.joint_hull_volumes(np.concatenate(groups), starts, pairs, 2)
+    expected = [ConvexHull(np.concatenate([groups[i], groups[j]])).volume for i, j in pairs]
+    assert volumes == pytest.approx(expected, rel=1e-9)
+    with pytest.raises(ValueError, match="range"):
+        _native.joint_hull_volumes(np.concatenate(groups), starts, np.array([[0, 3]], dtype=np.int32), 1)
+
+
+def test_same_bits_every_time() -> None:
+    points = np.random.default_rng(2).normal(size=(500, 3))
+    first, second = (_native.convex_hull(points) for _ in range(2))
+    assert np.array_equal(first[0], second[0])
+    assert np.array_equal(first[1], second[1])
+
+
+@pytest.mark.slow
+def test_hull_of_real_meshes(corpus) -> None:
+    import trimesh
+
+    for path in sorted((corpus / "test" / "vhacd").glob("*.ply"))[:25]:
+        points = np.asarray(trimesh.load(path, process=False).vertices, dtype=np.float64)
+        hull = Hull.of(points)
+        assert hull is not None
+        assert hull.volume == pytest.approx(ConvexHull(points).volume, rel=1e-9)
