@@ -1,0 +1,48 @@
+"""The normalised frame every length is measured in: bounding box centred, longest side 2."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The similarity ``x_frame = (x - center) * scale`` between the input and the normalised frame.
+
+    Attributes
+    ----------
+    center
+        ``[3]``, the centre of the input's bounding box, in the input's unit.
+    scale
+        Frame units per input unit: 2 divided by the longest side of the box, 1 when the box is a single point.
+    """
+
+    center: FloatArray
+    scale: float
+
+    @classmethod
+    def of(cls, points: ArrayLike) -> Frame:
+        """Return the frame of a set of finite points ``[N, 3]``; no points give the identity."""
+        points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+        if len(points) == 0:
+            return cls(np.zeros(3), 1.0)
+        lower, upper = points.min(axis=0), points.max(axis=0)
+        # Halves are taken before adding: the sum of two coordinates near 1e308 would overflow.
+        center = lower / 2 + upper / 2
+        half = float((upper / 2 - lower / 2).max())
+        with np.errstate(over="ignore"):
+            scale = float(np.float64(1.0) / half) if half > 0 else 1.0
+        return cls(center, scale if np.isfinite(scale) else 1.0)
+
+    def to_frame(self, points: ArrayLike) -> FloatArray:
+        """Map points ``[N, 3]`` from the input's unit into the frame."""
+        return np.ascontiguousarray((np.asarray(points, dtype=np.float64) - self.center) * self.scale)
+
+    def to_input(self, points: ArrayLike) -> FloatArray:
+        """Map points ``[N, 3]`` from the frame back to the input's unit."""
+        return np.ascontiguousarray(np.asarray(points, dtype=np.float64) / self.scale + self.center)

@@ -1,0 +1,67 @@
+"""From closed meshes to one solid: overlapping ones united, enclosed cavities filled."""
+
+from __future__ import annotations
+
+import manifold3d
+import numpy as np
+from manifold3d import Error, Manifold, Mesh64, OpType
+
+from rlacd.solid.frame import FloatArray
+from rlacd.solid.topology import IntArray
+
+# Uniting takes time per mesh even where nothing overlaps; above this many, meshes are put side by side instead.
+MOST_UNITED = 4000
+
+
+def to_manifold(vertices: FloatArray, faces: IntArray) -> Manifold:
+    """Return the solid a closed, oriented mesh bounds; the solid is empty if the mesh is not closed."""
+    mesh = Mesh64(np.ascontiguousarray(vertices, dtype=np.float64), np.ascontiguousarray(faces, dtype=np.uint64))
+    manifold = Manifold(mesh)
+    return manifold if manifold.status() == Error.NoError else Manifold()
+
+
+def to_arrays(manifold: Manifold) -> tuple[FloatArray, IntArray]:
+    """Return vertices float64 ``[V, 3]`` and faces int64 ``[F, 3]`` of a solid."""
+    mesh = manifold.to_mesh64()
+    return np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64)
+
+
+def split_labels(vertices: FloatArray, faces: IntArray, label: IntArray) -> list[tuple[FloatArray, IntArray]]:
+    """Take a mesh apart into the faces of each label, in ascending order of the labels."""
+    order = np.argsort(label, kind="stable")
+    cuts = np.flatnonzero(np.diff(label[order])) + 1
+    parts = []
+    for some in np.split(order, cuts) if len(order) else []:
+        used, index = np.unique(faces[some], return_inverse=True)
+        parts.append((vertices[used], index.reshape(-1, 3).astype(np.int64)))
+    return parts
+
+
+def unite(solids: list[Manifold]) -> Manifold:
+    """Unite solids and fill the cavities nothing can reach."""
+    solids = [s for s in solids if not s.is_empty()]
+    if not solids:
+        return Manifold()
+    if len(solids) > MOST_UNITED:
+        return Manifold.compose(solids)
+    return _without_cavities(solids[0] if len(solids) == 1 else Manifold.batch_boolean(solids, OpType.Add))
+
+
+def _without_cavities(solid: Manifold) -> Manifold:
+    shells = solid.decompose()
+    outer = [s for s in shells if s.volume() > 0]
+    if len(outer) == len(shells) or not outer:
+        return solid
+    # What lay inside a cavity overlaps the filled solid now.
+    return outer[0] if len(outer) == 1 else Manifold.batch_boolean(outer, OpType.Add)
+
+
+def hull_of_points(points: FloatArray, half_thickness: float) -> Manifold:
+    """Return the hull of points ``[N, 3]``, given thickness along the axes in which they have none."""
+    points = np.unique(points, axis=0)
+    middle = points.mean(axis=0)
+    _, _, axes = np.linalg.svd(np.concatenate([points - middle, np.zeros((3, 3))]), full_matrices=False)
+    extent = np.ptp((points - middle) @ axes.T, axis=0)
+    for axis in axes[extent < half_thickness]:
+        points = np.concatenate([points - half_thickness * axis, points + half_thickness * axis])
+    return manifold3d.Manifold.hull_points(points)

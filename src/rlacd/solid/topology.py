@@ -1,0 +1,221 @@
+"""What a soup of triangles is made of: shared vertices, edges, the two sides of every face, and how sides connect.
+
+Input: vertices float64 ``[V, 3]`` and faces int64 ``[F, 3]`` in any order and orientation. Output: index arrays only;
+nothing here moves a vertex.
+
+The central idea is the *side*. Every face has two: side ``2f`` is the front of face f (from where its corners run
+counter-clockwise) and ``2f + 1`` its back. Around an edge with k faces there are k wedges of empty space, each between
+the facing sides of two neighbouring faces (for k = 1, between both sides of the same face). Joining sides across wedges
+gives the boundary of every region of space the faces separate: a closed surface that is oriented by construction,
+whatever windings, doubled edges or missing orientability the soup has. The side component of the outside has positive
+volume, those of enclosed rooms negative; a face with both sides in one component is a sheet, without inside.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from rlacd.solid.frame import FloatArray
+
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+_NEXT = np.array([1, 2, 0])
+
+
+def merge_equal_vertices(vertices: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Return the distinct vertices ``[U, 3]``, in order of first appearance, and ``[V]`` the new index of every old one."""
+    vertices = np.ascontiguousarray(vertices + 0.0)  # turns -0.0 into 0.0: they are equal but differ in their bits
+    if len(vertices) == 0:
+        return vertices, np.empty(0, dtype=np.int64)
+    bits = vertices.view(np.uint64).reshape(-1, 3)
+    key = np.zeros(len(bits), dtype=np.uint64)
+    for axis in range(3):  # one 64-bit word per vertex sorts several times faster than rows do
+        key = (key ^ (bits[:, axis] >> np.uint64(29)) ^ bits[:, axis]) * np.uint64(0x9E3779B97F4A7C15)
+        key ^= key >> np.uint64(32)
+    _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
+    if not np.array_equal(vertices[first[inverse]], vertices):  # two different vertices with the same word
+        _, first, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first, kind="stable")
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    return vertices[first[order]], rank[inverse.reshape(-1)]
+
+
+def nondegenerate(faces: IntArray) -> BoolArray:
+    """Return ``[F]`` whether a face has three different corners."""
+    a, b, c = faces.T
+    result: BoolArray = (a != b) & (b != c) & (c != a)
+    return result
+
+
+def first_of_doubled(faces: IntArray, count: int) -> BoolArray:
+    """Return ``[F]`` whether a face is the first with its three corners, in any order; ``count`` vertices exist."""
+    ordered = np.sort(faces, axis=1).astype(np.uint64)
+    if count < 2**21:
+        key = (ordered[:, 0] << np.uint64(42)) | (ordered[:, 1] << np.uint64(21)) | ordered[:, 2]
+        _, first = np.unique(key, return_index=True)
+    else:
+        order = np.lexsort(ordered.T[::-1])
+        rows = ordered[order]
+        new = np.ones(len(rows), dtype=bool)
+        new[1:] = (rows[1:] != rows[:-1]).any(axis=1)
+        first = order[new]  # lexsort is stable: the first of a run is the first in the file
+    keep = np.zeros(len(faces), dtype=bool)
+    keep[first] = True
+    return keep
+
+
+def components(count: int, a: IntArray, b: IntArray) -> tuple[int, IntArray]:
+    """Connected components of ``count`` nodes under the links ``a[i] - b[i]``: their number, and a label per node.
+
+    Labels are numbered by the first node of each component.
+    """
+    links = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(count, count))
+    number, label = connected_components(links, directed=False)
+    _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
+    rank = np.empty(number, dtype=np.int64)
+    rank[np.argsort(first, kind="stable")] = np.arange(number)
+    return int(number), rank[inverse.reshape(-1)]
+
+
+@dataclass(frozen=True)
+class Edges:
+    """The undirected edges of a face list.
+
+    Attributes
+    ----------
+    of_halfedge
+        ``[3F]``, the edge of halfedge ``3f + c``, which runs from corner c of face f to its next corner.
+    vertices
+        ``[E, 2]``, the end vertices, smaller index first.
+    valence
+        ``[E]``, how many faces use the edge.
+    """
+
+    of_halfedge: IntArray
+    vertices: IntArray
+    valence: IntArray
+
+    @classmethod
+    def of(cls, faces: IntArray, count: int) -> Edges:
+        """Collect the edges of faces ``[F, 3]`` over ``count`` vertices."""
+        start, end = faces.ravel(), faces[:, _NEXT].ravel()
+        key = np.minimum(start, end) * count + np.maximum(start, end)
+        distinct, inverse, valence = np.unique(key, return_inverse=True, return_counts=True)
+        ends = np.stack([distinct // max(count, 1), distinct % max(count, 1)], axis=1)
+        return cls(inverse.reshape(-1).astype(np.int64), ends, valence.astype(np.int64))
+
+
+def bodies_of(faces: IntArray, edges: Edges) -> tuple[int, IntArray]:
+    """Group faces that share edges: the number of bodies, and ``[F]`` the body of each face."""
+    halfedge = np.argsort(edges.of_halfedge, kind="stable")
+    same = edges.of_halfedge[halfedge[1:]] == edges.of_halfedge[halfedge[:-1]]
+    return components(len(faces), halfedge[1:][same] // 3, halfedge[:-1][same] // 3)
+
+
+@dataclass(frozen=True)
+class Sides:
+    """How the sides of the faces connect around the edges.
+
+    Attributes
+    ----------
+    wedges
+        ``[W, 2]`` pairs of halfedges ``(h, g)``: going around their edge from its smaller to its larger vertex by the
+        right-hand rule, g follows h with nothing in between. A boundary edge gives ``h == g``.
+    label
+        ``[2F]``, the component of every side.
+    volume
+        ``[C]``, the signed volume each component encloses.
+    area
+        ``[C]``, the area of its sides.
+    sheet
+        ``[F]``, whether both sides of the face lie in one component.
+    """
+
+    wedges: IntArray
+    label: IntArray
+    volume: FloatArray
+    area: FloatArray
+    sheet: BoolArray
+
+
+def _angles_around(vertices: FloatArray, faces: IntArray, ends: IntArray, halfedges: IntArray) -> FloatArray:
+    """Angle of the faces of halfedges around their edges ``ends`` ``[N, 2]``, from a direction fixed per edge."""
+    tail = vertices[ends[:, 0]]
+    axis = vertices[ends[:, 1]] - tail
+    axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), np.finfo(float).tiny)
+    apex = vertices[_apex(faces, halfedges)]
+    across = apex - tail
+    # Any direction that is not parallel to the axis will do as zero, as long as all faces of the edge share it.
+    helper = np.eye(3)[np.abs(axis).argmin(axis=1)]
+    zero = np.cross(axis, helper)
+    zero /= np.maximum(np.linalg.norm(zero, axis=1, keepdims=True), np.finfo(float).tiny)
+    quarter = np.cross(axis, zero)
+    angle: FloatArray = np.arctan2((across * quarter).sum(axis=1), (across * zero).sum(axis=1))
+    return angle
+
+
+def _apex(faces: IntArray, halfedges: IntArray) -> IntArray:
+    corners: IntArray = faces[halfedges // 3, (halfedges % 3 + 2) % 3]
+    return corners
+
+
+def wedges_of(vertices: FloatArray, faces: IntArray, edges: Edges) -> IntArray:
+    """Return the wedges ``[3F, 2]`` around all edges (see `Sides`)."""
+    angle = np.zeros(3 * len(faces))
+    crowded = np.flatnonzero(edges.valence[edges.of_halfedge] > 2)  # the order of one or two faces needs no angle
+    if len(crowded):
+        ends = edges.vertices[edges.of_halfedge[crowded]]
+        angle[crowded] = _angles_around(vertices, faces, ends, crowded)
+        order = np.lexsort((angle, edges.of_halfedge))
+    else:
+        order = np.argsort(edges.of_halfedge, kind="stable")
+    start = np.concatenate([[0], np.cumsum(edges.valence)])
+    follower = np.arange(1, len(order) + 1)
+    follower[start[1:] - 1] = start[:-1]  # the last face around an edge is followed by the first
+    return np.stack([order, order[follower]], axis=1)
+
+
+def facing_sides(faces: IntArray, wedges: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the sides ``[W]`` that bound each wedge, on its first and on its second halfedge."""
+    forward = (faces < faces[:, _NEXT]).ravel()
+    first, second = wedges.T
+    # Seen along the edge, a face that runs with it shows its front to what follows counter-clockwise.
+    return 2 * (first // 3) + ~forward[first], 2 * (second // 3) + forward[second]
+
+
+def signed_tetrahedra(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return ``[F]`` the signed volume between the origin and each face."""
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    volume: FloatArray = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
+    return volume
+
+
+def face_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return ``[F]`` the area of each face."""
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    area: FloatArray = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    return area
+
+
+def sides_of(vertices: FloatArray, faces: IntArray, edges: Edges) -> Sides:
+    """Join the sides of all faces across their wedges."""
+    wedges = wedges_of(vertices, faces, edges)
+    first, second = facing_sides(faces, wedges)
+    number, label = components(2 * len(faces), first, second)
+    tetrahedra = signed_tetrahedra(vertices, faces)
+    area = face_areas(vertices, faces)
+    front, back = label[0::2], label[1::2]
+    return Sides(
+        wedges=wedges,
+        label=label,
+        volume=np.bincount(front, tetrahedra, number) - np.bincount(back, tetrahedra, number),
+        area=np.bincount(front, area, number) + np.bincount(back, area, number),
+        sheet=front == back,
+    )
