@@ -1,0 +1,132 @@
+"""The result of a decomposition: hulls, what they cost, and how to keep or look at them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import trimesh
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Decomposition:
+    """A mesh as convex hulls.
+
+    Iterating gives the hulls, ``len`` counts them.
+
+    Attributes
+    ----------
+    hulls : list of trimesh.Trimesh
+        Convex, closed, outward oriented; vertices float64 in the input's own frame and unit.
+    report : dict
+        Plain values that ``json`` can write. Lengths are in the frame where the input's bounding box is centred and
+        its longest side is 2. Its keys:
+
+        ``name`` : str
+            The input file's name without its ending; ``"mesh"`` for a mesh that came from memory.
+        ``version`` : str
+            The version of rlacd that made the result.
+        ``options`` : dict
+            Every option as it was used, defaults filled in.
+        ``complete`` : bool
+            False when the work was stopped early; the hulls are valid and cover the solid all the same, but some
+            may exceed the threshold.
+        ``stopped_by`` : None, "timeout" or "cancel"
+            Why the work was stopped early.
+        ``parts``, ``faces``, ``vertices`` : int
+            Number of hulls, and of all their triangles and vertices.
+        ``concavity`` : dict
+            ``per_part`` lists the concavity of each hull's part in the order of ``hulls``; ``max`` is the worst.
+        ``hausdorff`` : dict
+            ``over``: how far the hulls' surface reaches from the input's surface. ``under``: how far the input's
+            surface lies from the hulls' surface.
+        ``seconds`` : dict
+            Wall time of each stage, and their ``total``.
+        ``repair`` : list of dict
+            For each body of the input, the step that made it a closed solid and how far that moved its surface.
+        ``warnings`` : list of str
+            What the caller should know: one sentence each.
+    source : trimesh.Trimesh
+        The input's surface as it was read, in its own frame and unit.
+    """
+
+    hulls: list[trimesh.Trimesh]
+    report: dict[str, Any]
+    source: trimesh.Trimesh
+
+    @property
+    def name(self) -> str:
+        """What the input is called: ``report["name"]``."""
+        return str(self.report.get("name") or "mesh")
+
+    def save(self, path: str | os.PathLike[str], *, file_format: str | None = None) -> Path:
+        """Write the hulls to one file, or one file a hull to a folder; never leaves a half-written file.
+
+        Parameters
+        ----------
+        path : path-like
+            ``*.glb``, ``*.obj``, ``*.ply`` or ``*.stl`` for one file with a node, group or solid a hull
+            (``hull_000``, ...). An existing folder, or a name ending in ``/``, for one file a hull.
+        file_format : str, optional
+            The format inside a folder: ``"obj"`` (default), ``"glb"``, ``"ply"`` or ``"stl"``.
+
+        Returns
+        -------
+        pathlib.Path
+            Where it was written.
+
+        Raises
+        ------
+        OutputError
+            The ending is unknown, or the place cannot be written to.
+        OptionError
+            `file_format` is unknown, or given for a path that is not a folder.
+        """
+        from rlacd.formats import save_hulls
+
+        return save_hulls(self.hulls, path, stem=self.name, file_format=file_format)
+
+    def picture(self, path: str | os.PathLike[str], *, width: int = 1600) -> Path:
+        """Draw the input beside its hulls, together and pulled apart, as a PNG file; needs no display and no GPU.
+
+        Parameters
+        ----------
+        path : path-like
+            Where to write; must end in ``.png``.
+        width : int
+            Width in pixels; the height follows.
+
+        Returns
+        -------
+        pathlib.Path
+            Where it was written.
+
+        Raises
+        ------
+        MissingExtraError
+            The extra ``view`` is not installed.
+        OutputError
+            The place cannot be written to.
+        """
+        from rlacd.show import draw_picture
+
+        return draw_picture(self, path, width=width)
+
+    def __len__(self) -> int:
+        return len(self.hulls)
+
+    def __iter__(self) -> Iterator[trimesh.Trimesh]:
+        return iter(self.hulls)
+
+    def __repr__(self) -> str:
+        faces = sum(len(hull.faces) for hull in self.hulls)
+        words = [f"{len(self)} hull{'s' * (len(self) != 1)} of {self.name}", f"{faces} faces"]
+        worst = self.report.get("concavity", {}).get("max")
+        if worst is not None:
+            words.append(f"max concavity {worst:.4f}")
+        if not self.report.get("complete", True):
+            words.append(f"stopped by {self.report.get('stopped_by')}")
+        return f"<Decomposition: {', '.join(words)}>"

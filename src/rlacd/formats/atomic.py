@@ -1,0 +1,80 @@
+"""Write files so that nobody ever sees half of one."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import secrets
+from collections.abc import Iterator
+from pathlib import Path
+
+from rlacd.errors import OutputError
+
+
+def write_file(path: Path, data: bytes) -> None:
+    """Put `data` at `path`, whole or not at all.
+
+    The bytes go to a hidden file in the same folder, reach the disk, and only then take the name `path`, which
+    replaces an older file in one step. A link is followed: the file it points to is replaced.
+
+    Raises
+    ------
+    OutputError
+        The folder is missing or read-only, the disk is full, ...; what was at `path` is untouched.
+    """
+    with output_errors(path):
+        final = path.resolve()
+        temporary = final.with_name(f".{final.name[:200]}.{secrets.token_hex(6)}.tmp")
+        try:
+            _write_to_disk(temporary, data)
+            os.replace(temporary, final)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+        sync_folder(final.parent)
+
+
+@contextlib.contextmanager
+def output_errors(path: Path) -> Iterator[None]:
+    """Turn what the operating system refuses into an `OutputError` that names `path` and says what to do."""
+    try:
+        yield
+    except OutputError:
+        raise
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {_reason(error)}.") from error
+
+
+def sync_folder(folder: Path) -> None:
+    """Make renames inside `folder` survive a power cut, on systems that can."""
+    with contextlib.suppress(OSError):  # Windows cannot open a folder; some network disks cannot sync one.
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def _write_to_disk(path: Path, data: bytes) -> None:
+    # 0o666 is narrowed by the user's umask, as for any file they make; tempfile's 0o600 would lock out their group.
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
+    with os.fdopen(os.open(path, flags, 0o666), "wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _reason(error: OSError) -> str:
+    known = {
+        errno.ENOSPC: "the disk is full; free some space and run again",
+        errno.EDQUOT: "your disk quota is used up; free some space and run again",
+        errno.EACCES: "you may not write there; choose another place or change its permissions",
+        errno.EPERM: "you may not write there; choose another place or change its permissions",
+        errno.EROFS: "that disk is read-only; choose another place",
+        errno.ENOENT: "its folder does not exist; create it first",
+        errno.ENOTDIR: "a part of its path is a file, not a folder; choose another place",
+        errno.EISDIR: "it is a folder; give a file name",
+        errno.ENAMETOOLONG: "the name is too long; choose a shorter one",
+    }
+    return known.get(error.errno or 0, f"{error.strerror or error}; choose another place")

@@ -1,0 +1,49 @@
+"""Hulls that are still convex and closed after their coordinates were rounded to float32."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import trimesh
+
+from rlacd._native import convex_hull, mesh_volume
+
+# A hull keeps its shape if its volume changes by less than this share: a flat or tiny hull far from the origin
+# loses much more, or all of it, when float32 has no digits left for its thickness.
+VOLUME_TOLERANCE = 1e-3
+
+
+def rounded_hull(hull: trimesh.Trimesh, shift: npt.ArrayLike = (0.0, 0.0, 0.0)) -> trimesh.Trimesh | None:
+    """Round the vertices of ``hull - shift`` to float32 and take their convex hull again.
+
+    Rounding moves vertices by different amounts, which can dent a hull along its flat regions or fold a thin triangle.
+    Taking the hull of the rounded points, with exact predicates, gives a hull that stays one in a float32 file.
+
+    Parameters
+    ----------
+    hull : trimesh.Trimesh
+        A convex hull.
+    shift : array-like [3]
+        Subtracted, in float64, before rounding.
+
+    Returns
+    -------
+    trimesh.Trimesh or None
+        Vertices are float64 numbers that float32 holds exactly. None if float32 cannot hold the shape here.
+    """
+    with np.errstate(over="ignore"):
+        points = (hull.vertices - np.asarray(shift, dtype=np.float64)).astype(np.float32).astype(np.float64)
+    if not np.isfinite(points).all():
+        return None
+    indices, faces, rank = convex_hull(np.ascontiguousarray(points))
+    if rank < 3:
+        return None
+    rounded = trimesh.Trimesh(points[indices], faces, process=False, validate=False)
+    before, after = (_volume(mesh) for mesh in (hull, rounded))
+    return rounded if abs(after - before) <= VOLUME_TOLERANCE * before else None
+
+
+def _volume(mesh: trimesh.Trimesh) -> float:
+    # About a point of the mesh: far from the origin the signed tetrahedra would cancel to noise.
+    vertices = np.ascontiguousarray(mesh.vertices - mesh.vertices[0], dtype=np.float64)
+    return float(mesh_volume(vertices, np.ascontiguousarray(mesh.faces, dtype=np.int32)))

@@ -1,0 +1,91 @@
+"""Where the hulls go and in which format: decided, and checked, before any work begins."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from rlacd.errors import OptionError, OutputError
+
+FORMATS = ("glb", "obj", "ply", "stl")
+FOLDER_FORMAT = "obj"
+
+
+@dataclass(frozen=True)
+class Target:
+    """A checked place for hulls: one file, or a folder that gets one file a hull."""
+
+    path: Path
+    file_format: str
+    is_folder: bool
+
+
+def hull_target(path: str | os.PathLike[str], file_format: str | None = None) -> Target:
+    """Read `path` the way `Decomposition.save` does and check that it can be written to.
+
+    Parameters
+    ----------
+    path : path-like
+        An existing folder or a name ending in ``/`` is a folder; anything else is one file, its format told by its
+        ending.
+    file_format : str, optional
+        The format of the files in a folder.
+
+    Raises
+    ------
+    OutputError
+        Unknown ending, missing parent folder, no permission, or a folder where a file is meant or the reverse.
+    OptionError
+        `file_format` is unknown, or given for a single file with another ending.
+    """
+    text = os.fspath(path)
+    if not text:
+        raise OutputError("the output has no name; give a file such as hulls.glb, or a folder such as hulls/.")
+    place = Path(text)
+    ending = place.suffix.lower().lstrip(".")
+    wanted = None if file_format is None else file_format.lower().lstrip(".")
+    if wanted is not None and wanted not in FORMATS:
+        raise OptionError(f"unknown format {file_format!r}; use one of {', '.join(FORMATS)}.")
+
+    separators = tuple(mark for mark in (os.sep, os.altsep) if mark)
+    if text.endswith(separators) or (place.is_dir() and ending not in FORMATS):
+        _check_folder(place)
+        return Target(place, wanted or FOLDER_FORMAT, is_folder=True)
+
+    if ending not in FORMATS:
+        known = ", ".join(f".{name}" for name in FORMATS)
+        said = f"the ending .{ending} of {place}" if ending else f"{place} without an ending"
+        raise OutputError(f"cannot write {said}; use one of {known}, or end the name with / for a folder.")
+    if wanted not in (None, ending):
+        raise OptionError(f"the format {wanted} contradicts the name {place}; give one of the two, or a folder.")
+    check_file(place)
+    return Target(place, ending, is_folder=False)
+
+
+def check_file(path: Path) -> None:
+    """Raise `OutputError` if `path` cannot become a file, without touching the disk."""
+    if path.is_dir():
+        raise OutputError(f"cannot write {path}: it is a folder; give a file name, or end it with / to fill the folder.")
+    if path.exists() and not path.is_file():
+        raise OutputError(f"cannot write {path}: it is not an ordinary file; choose another name.")
+    _check_parent(path)
+
+
+def _check_folder(folder: Path) -> None:
+    if folder.is_dir():
+        if not os.access(folder, os.W_OK | os.X_OK):
+            raise OutputError(f"cannot write into {folder}: you may not; choose another place or change its permissions.")
+    elif folder.exists():
+        raise OutputError(f"cannot write into {folder}: it is a file, not a folder; choose another name.")
+    else:
+        _check_parent(folder)
+
+
+def _check_parent(path: Path) -> None:
+    # resolve() follows a link to where the bytes will really go.
+    parent = path.resolve().parent
+    if not parent.is_dir():
+        raise OutputError(f"cannot write {path}: the folder {parent} does not exist; create it first.")
+    if not os.access(parent, os.W_OK | os.X_OK):
+        raise OutputError(f"cannot write {path}: you may not write to {parent}; choose another place.")
