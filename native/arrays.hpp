@@ -42,6 +42,19 @@ inline Mesh to_mesh(const PointsIn& vertices, const FacesIn& faces) {
   return mesh;
 }
 
+inline void require_finite(const std::vector<Vec3>& points) {
+  for (const Vec3 p : points)
+    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
+      throw std::invalid_argument("a point is not finite");
+}
+
+// As to_mesh, for kernels that compare distances: a NaN would compare false with everything and go unnoticed.
+inline Mesh to_finite_mesh(const PointsIn& vertices, const FacesIn& faces) {
+  Mesh mesh = to_mesh(vertices, faces);
+  require_finite(mesh.vertices);
+  return mesh;
+}
+
 // Hands a vector of rows to numpy without a copy; the array owns it from then on.
 template <class Scalar, class Row>
 nb::ndarray<nb::numpy, Scalar> to_array(std::vector<Row>&& rows) {

@@ -2,13 +2,18 @@
 #include <nanobind/nanobind.h>
 
 namespace rlacd {
+void bind_concavity(nanobind::module_& m);
+void bind_distance(nanobind::module_& m);
 void bind_glue(nanobind::module_& m);
 void bind_hull(nanobind::module_& m);
 void bind_sweep(nanobind::module_& m);
 }  // namespace rlacd
 
 NB_MODULE(_native, m) {
-  m.doc() = "C++ kernels of rlacd. Arrays are float64 points [N, 3] and int32 faces [F, 3]; the GIL is released inside.";
+  m.doc() =
+      "C++ kernels of rlacd. Arrays are float64 points [N, 3] and int32 faces [F, 3]; the GIL is released inside.";
+  rlacd::bind_concavity(m);
+  rlacd::bind_distance(m);
   rlacd::bind_glue(m);
   rlacd::bind_hull(m);
   rlacd::bind_sweep(m);

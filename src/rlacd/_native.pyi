@@ -2,6 +2,9 @@
 
 from rlacd.solid.arrays import FloatArray, IntArray
 
+Interval = tuple[float, float]
+"""Certified lower and upper bound."""
+
 def convex_hull(points: FloatArray) -> tuple[IntArray, IntArray, int]: ...
 def joint_hull_volumes(points: FloatArray, starts: IntArray, pairs: IntArray, threads: int = 0) -> FloatArray: ...
 def mesh_volume(vertices: FloatArray, faces: IntArray) -> float: ...
@@ -12,3 +15,32 @@ def sweep(
 def glue(
     vertices_a: FloatArray, faces_a: IntArray, vertices_b: FloatArray, faces_b: IntArray
 ) -> tuple[FloatArray, IntArray]: ...
+
+class Surface:
+    def __init__(self, vertices: FloatArray, faces: IntArray) -> None: ...
+    def distance(self, points: FloatArray, threads: int = 0) -> FloatArray: ...  # [N]
+    def closest(self, points: FloatArray, threads: int = 0) -> tuple[FloatArray, IntArray]: ...  # [N, 3], [N]
+    def winding(self, points: FloatArray, accuracy: float = 2.0, threads: int = 0) -> FloatArray: ...  # [N]
+
+def sample_surface(vertices: FloatArray, faces: IntArray, count: int, seed: int) -> tuple[FloatArray, IntArray]: ...
+def directed_hausdorff(
+    vertices: FloatArray, faces: IntArray, surface: Surface, tolerance: float, threads: int = 0
+) -> Interval: ...
+def meets_concavity(
+    part_vertices: FloatArray,
+    part_faces: IntArray,
+    hull_vertices: FloatArray,
+    hull_faces: IntArray,
+    part_volume: float,
+    hull_volume: float,
+    threshold: float,
+) -> bool: ...
+def concavity(
+    part_vertices: FloatArray,
+    part_faces: IntArray,
+    hull_vertices: FloatArray,
+    hull_faces: IntArray,
+    part_volume: float,
+    hull_volume: float,
+    tolerance: float,
+) -> tuple[Interval, Interval, Interval, float]: ...

@@ -1,0 +1,80 @@
+#include "convex_planes.hpp"
+
+#include <stdexcept>
+
+namespace rlacd {
+namespace {
+
+constexpr std::size_t kBlock = 16;
+
+// Normals closer than this are one plane. It is pushed out to touch the hull like every other, so taking it for its
+// twin shifts a depth by no more than this times the hull's diameter, and only upwards.
+constexpr double kSameNormal = 1e-9;
+
+}  // namespace
+
+ConvexPlanes::ConvexPlanes(const Mesh& hull) {
+  struct Facet {
+    std::array<std::int64_t, 3> key;
+    double area;
+    Vec3 normal;
+    bool operator<(const Facet& other) const { return key != other.key ? key < other.key : area > other.area; }
+  };
+  std::vector<Facet> facets;
+  facets.reserve(hull.faces.size());
+  for (const Triangle& face : hull.faces) {
+    const Vec3 a = hull.vertices[face[0]];
+    const Vec3 product = cross(hull.vertices[face[1]] - a, hull.vertices[face[2]] - a);
+    const double area = norm(product);
+    if (!(area > 0)) continue;
+    const Vec3 n = (1 / area) * product;
+    if (!(std::fabs(norm2(n) - 1) < 1e-12)) continue;  // underflow
+    facets.push_back(
+        {{std::llround(n.x / kSameNormal), std::llround(n.y / kSameNormal), std::llround(n.z / kSameNormal)}, area, n});
+  }
+  if (facets.empty()) throw std::invalid_argument("the hull has no facet with an area");
+  std::sort(facets.begin(), facets.end());
+  facets.erase(std::unique(facets.begin(), facets.end(), [](const Facet& a, const Facet& b) { return a.key == b.key; }),
+               facets.end());
+
+  count_ = facets.size();
+  const std::size_t padded = (count_ + kBlock - 1) / kBlock * kBlock;
+  x_.assign(padded, 0);
+  y_.assign(padded, 0);
+  z_.assign(padded, 0);
+  h_.assign(padded, -std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < count_; ++i) {
+    x_[i] = facets[i].normal.x;
+    y_[i] = facets[i].normal.y;
+    z_[i] = facets[i].normal.z;
+  }
+  std::vector<bool> is_corner(hull.vertices.size(), false);
+  for (const Triangle& face : hull.faces)
+    for (const std::int32_t corner : face) is_corner[corner] = true;
+  for (std::size_t v = 0; v < hull.vertices.size(); ++v) {
+    if (!is_corner[v]) continue;
+    const Vec3 p = hull.vertices[v];
+    for (std::size_t i = 0; i < padded; ++i) {
+      const double height = x_[i] * p.x + y_[i] * p.y + z_[i] * p.z;
+      h_[i] = h_[i] > height ? h_[i] : height;
+    }
+  }
+  std::fill(h_.begin() + static_cast<std::ptrdiff_t>(count_), h_.end(), std::numeric_limits<double>::infinity());
+}
+
+ConvexPlanes::Nearest ConvexPlanes::nearest(Vec3 p) const {
+  Nearest best;
+  double depths[kBlock];
+  for (std::size_t start = 0; start < h_.size(); start += kBlock) {
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < kBlock; ++i)
+      depths[i] = h_[start + i] - (x_[start + i] * p.x + y_[start + i] * p.y + z_[start + i] * p.z);
+    for (std::size_t i = 0; i < kBlock; ++i) least = depths[i] < least ? depths[i] : least;
+    if (!(least < best.depth)) continue;
+    best.depth = least;
+    best.plane = static_cast<std::int32_t>(start + (std::find(depths, depths + kBlock, least) - depths));
+  }
+  return best;
+}
+
+}  // namespace rlacd

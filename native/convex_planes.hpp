@@ -1,0 +1,41 @@
+// The facet planes of a convex polytope, laid out for speed, and depth under them.
+//
+// In:  a closed convex triangle mesh, whose facets may be slivers and whose flat sides may be cut into many triangles.
+// Out: unit normals n_i and offsets h_i with n_i . x <= h_i for every corner x, one plane a flat side.
+// A sliver's computed normal can point anywhere. Every plane is therefore pushed out until it touches the hull's
+// farthest corner: it then supports the hull whatever its normal, and the distance from an inner point to it is never
+// less than the distance to the hull's surface.
+#pragma once
+
+#include <array>
+#include <limits>
+#include <vector>
+
+#include "geometry.hpp"
+
+namespace rlacd {
+
+class ConvexPlanes {
+ public:
+  explicit ConvexPlanes(const Mesh& hull);
+
+  std::size_t size() const { return count_; }
+  Vec3 normal(std::int32_t i) const { return {x_[i], y_[i], z_[i]}; }
+  double offset(std::int32_t i) const { return h_[i]; }
+
+  // Distance from p to plane i, positive inside.
+  double depth(std::int32_t i, Vec3 p) const { return h_[i] - (x_[i] * p.x + y_[i] * p.y + z_[i] * p.z); }
+
+  struct Nearest {
+    double depth = std::numeric_limits<double>::infinity();
+    std::int32_t plane = -1;
+  };
+  // The plane of least depth: for a point inside the hull, the distance to its surface; negative outside.
+  Nearest nearest(Vec3 p) const;
+
+ private:
+  std::size_t count_ = 0;  // the arrays are padded to whole blocks with planes infinitely far away
+  std::vector<double> x_, y_, z_, h_;
+};
+
+}  // namespace rlacd

@@ -1,0 +1,83 @@
+"""Closed test solids with known answers, and an independent reference for distances."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import manifold3d
+import numpy as np
+import numpy.typing as npt
+
+from rlacd import _native
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Closed:
+    vertices: Floats
+    faces: Ints
+
+    @property
+    def volume(self) -> float:
+        return _native.mesh_volume(self.vertices, self.faces)
+
+    @property
+    def hull(self) -> Closed:
+        indices, faces, rank = _native.convex_hull(self.vertices)
+        assert rank == 3
+        return Closed(np.ascontiguousarray(self.vertices[indices]), faces)
+
+
+def from_manifold(solid: Any) -> Closed:
+    mesh = solid.to_mesh64()
+    return Closed(
+        np.ascontiguousarray(mesh.vert_properties[:, :3]), np.ascontiguousarray(mesh.tri_verts.astype(np.int32))
+    )
+
+
+def to_manifold(vertices: Floats, faces: Ints) -> Any:
+    return manifold3d.Manifold(manifold3d.Mesh64(vertices.astype(np.float64), faces.astype(np.uint64)))
+
+
+def box(lower: tuple[float, float, float], upper: tuple[float, float, float]) -> Any:
+    size = tuple(b - a for a, b in zip(lower, upper, strict=True))
+    return manifold3d.Manifold.cube(size).translate(lower)
+
+
+def refined(solid: Any, levels: int) -> Any:
+    """The same solid with its faces cut into many coplanar ones."""
+    return solid.refine(levels)
+
+
+def point_to_triangles(points: Floats, vertices: Floats, faces: Ints) -> Floats:
+    """Distances [N] by brute force: the plane where the projection falls inside, the three edges always."""
+    best = np.full(len(points), np.inf)
+    for a, b, c in vertices[faces]:
+        for start, end in ((a, b), (b, c), (c, a)):
+            along = end - start
+            t = np.clip((points - start) @ along / max(float(along @ along), 1e-300), 0, 1)
+            best = np.minimum(best, np.linalg.norm(points - start - t[:, None] * along, axis=1))
+        normal = np.cross(b - a, c - a)
+        if (length := np.linalg.norm(normal)) > 0:
+            normal = normal / length
+            inside = np.ones(len(points), dtype=bool)
+            for start, end in ((a, b), (b, c), (c, a)):
+                inside &= (points - start) @ np.cross(normal, end - start) >= 0
+            best = np.where(inside, np.minimum(best, np.abs((points - a) @ normal)), best)
+    return best
+
+
+def depth_in(hull: Closed, points: Floats) -> Floats:
+    """Distance [N] from points inside a convex polytope to its surface, by Qhull's facet equations."""
+    from scipy.spatial import ConvexHull
+
+    equations = ConvexHull(hull.vertices).equations
+    return np.asarray(-(points @ equations[:, :3].T + equations[:, 3])).min(axis=1)
+
+
+def dense(mesh: Closed, count: int = 20_000) -> Floats:
+    points, _ = _native.sample_surface(mesh.vertices, mesh.faces, count, 7)
+    return np.vstack([points, mesh.vertices[np.unique(mesh.faces)]])

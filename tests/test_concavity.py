@@ -1,0 +1,247 @@
+"""The strict concavity test: its intervals hold the truth, its yes means yes."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import manifold3d
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rlacd import _native
+from rlacd.criteria.concavity import Concavity
+from rlacd.errors import OptionError
+from tests.shapes import Closed, box, dense, depth_in, from_manifold, to_manifold
+
+TOLERANCE = 1e-3
+
+
+def sampled(part: Closed) -> tuple[float, float]:
+    """Lower bounds of both one-sided distances, from many points and independent distance functions."""
+    hull = part.hull
+    surface = _native.Surface(part.vertices, part.faces)
+    return float(depth_in(hull, dense(part)).max()), float(surface.distance(dense(hull)).max())
+
+
+def hull_to_part(part: Closed, tolerance: float = TOLERANCE) -> float:
+    hull, surface = part.hull, _native.Surface(part.vertices, part.faces)
+    lower, upper = _native.directed_hausdorff(hull.vertices, hull.faces, surface, tolerance)
+    assert lower <= upper <= lower + tolerance + 1e-12
+    return lower
+
+
+def check(part: Closed) -> None:
+    """The interval holds what dense sampling finds and is no looser than sampling is coarse."""
+    measured = Concavity().measure(part, TOLERANCE)
+    lower, upper = measured.value
+    inward, outward = sampled(part)
+    by_volume = 0.3 * measured.volume_radius
+    assert inward <= measured.part_to_hull[1] + 1e-7
+    assert outward <= measured.hull_to_part[1] + 1e-7
+    assert 0 <= lower <= upper <= lower + TOLERANCE + 1e-12
+    assert lower <= max(inward, outward, by_volume) + 0.06  # how coarse the samples are
+    if upper > 1e-6:
+        assert Concavity(upper * 1.01 + TOLERANCE).is_met(part)
+    if lower > 1e-6:
+        assert not Concavity(lower * 0.99).is_met(part)
+
+
+@pytest.mark.parametrize(("levels", "turn"), [(1, 0), (1, 33), (7, 0), (7, 33)])
+def test_notched_box(levels: int, turn: float) -> None:
+    # A slot 0.4 wide and 0.5 deep: its floor is 0.5 below the hull's top, whose middle is 0.2 from the rims.
+    solid = box((-1, -1, -1), (1, 1, 1)) - box((-0.2, -2, 0.5), (0.2, 2, 2))
+    part = from_manifold(solid.rotate((turn, 2 * turn, 0)).refine(levels))
+    measured = Concavity().measure(part, TOLERANCE)
+    assert measured.part_to_hull[0] == pytest.approx(0.5, abs=TOLERANCE)
+    assert hull_to_part(part) == pytest.approx(0.2, abs=TOLERANCE)
+    assert measured.hull_to_part[0] <= 0.2 + 1e-12
+    assert measured.hull_to_part[1] >= 0.2 - 1e-12
+    assert measured.volume_radius == pytest.approx(np.cbrt(3 * 0.4 / (4 * np.pi)))
+    assert measured.value[0] <= 0.5 + 1e-9 <= measured.value[1] + 2e-9
+    assert Concavity(0.502).is_met(part)
+    assert not Concavity(0.499).is_met(part)
+
+
+@pytest.mark.parametrize("levels", [1, 6])
+def test_l_shape(levels: int) -> None:
+    # The inner edge (1, 1) is 1/sqrt 2 below the hull's slanted face from (2, 1) to (1, 2), but the L is 0.5 thick, so
+    # its middle is 0.25 from the hull's flat sides; the middle of the slanted face is 1/2 from the walls.
+    solid = box((0, 0, 0), (2, 1, 0.5)) + box((0, 0, 0), (1, 2, 0.5))
+    measured = Concavity().measure(from_manifold(solid.refine(levels)), TOLERANCE)
+    assert measured.part_to_hull[0] == pytest.approx(0.25, abs=TOLERANCE)
+    assert measured.hull_to_part[1] == pytest.approx(0.5, abs=TOLERANCE)
+
+
+@pytest.mark.parametrize("levels", [1, 2, 9])
+def test_deepest_point_that_is_no_corner_and_no_centroid(levels: int) -> None:
+    # A thin triangular slot runs across the whole box: the depth of its bottom edge is greatest at a place along the
+    # edge that no vertex, edge middle or centroid marks.
+    cutter = manifold3d.Manifold.hull_points(
+        np.array([[-3, -0.02, 1], [-3, 0.02, 1], [3, -0.02, 1], [3, 0.02, 1], [-3, 0, 0.7], [3, 0, 0.1]])
+    )
+    part = from_manifold((box((-1, -0.5, -0.5), (1, 0.5, 0.5)) - cutter).refine(levels))
+    # Bottom edge at height 0.4 - 0.1 x, 0.1 + 0.1 x below the top and 1 - x from the end: equal at x = 0.818.
+    x = 0.9 / 1.1
+    assert Concavity().measure(part, 1e-5).part_to_hull[0] == pytest.approx(1 - x, abs=2e-5)
+    assert not Concavity(1 - x - 1e-3).is_met(part)
+
+
+def test_hull_over_a_long_thin_slot() -> None:
+    # Only a stretch of the hull's top 0.06 wide is away from the part: a sampled test misses it.
+    for shift in np.linspace(0, 0.3, 7):
+        part = from_manifold(box((-1, -1, -1), (1, 1, 1)) - box((shift, -0.8, 0), (shift + 0.06, 0.77, 2)))
+        assert hull_to_part(part, 1e-4) == pytest.approx(0.03, abs=1e-4)
+
+
+@pytest.mark.parametrize("thickness", [0.3, 0.05, 0.01, 1e-3])
+def test_thin_shell(thickness: float) -> None:
+    # A cup: solid of a box with a box taken out from the top.
+    t = thickness
+    cup = box((-1, -1, -1), (1, 1, 1)) - box((-1 + t, -1 + t, -1 + t), (1 - t, 1 - t, 2))
+    check(from_manifold(cup))
+    measured = Concavity().measure(from_manifold(cup), TOLERANCE)
+    assert measured.hull_to_part[1] == pytest.approx(1 - t, abs=TOLERANCE)  # the middle of the open top
+    assert measured.part_to_hull[0] <= t + 1e-12  # no point of the walls is deeper, nor are the rim's inner faces
+
+
+@pytest.mark.parametrize("levels", [1, 5])
+def test_convex_parts_have_none(levels: int) -> None:
+    ball = manifold3d.Manifold.sphere(1.0, 24)
+    for solid in (box((-1, -1, -1), (1, 0.3, 0.01)).rotate((10, 20, 30)).refine(levels), ball):
+        part = from_manifold(solid)
+        assert Concavity().measure(part, TOLERANCE).value[1] <= 2 * TOLERANCE
+        assert Concavity(0.01).is_met(part)
+
+
+def test_sliver_facets_do_not_shorten_distances() -> None:
+    # Points along a box's edges, off by rounding: the hull has needle facets whose computed normals are noise.
+    rng = np.random.default_rng(0)
+    solid = box((-1, -1, -1), (1, 1, 1)) - box((-0.5, -0.5, 0), (0.5, 0.5, 2))
+    part = from_manifold(solid)
+    for scale in (1e-15, 1e-13, 1e-10, 1e-7):
+        along = np.stack([np.linspace(-1, 1, 200), np.ones(200), np.ones(200)], axis=1)
+        edges = np.vstack([along[:, order] * sign for order in ([0, 1, 2], [1, 0, 2], [1, 2, 0]) for sign in (1, -1)])
+        points = np.vstack([edges + rng.normal(scale=scale, size=edges.shape), 1.0001 * part.vertices])
+        hull = Closed(np.ascontiguousarray(points), np.zeros((0, 3), dtype=np.int32)).hull
+        _, part_to_hull, _, _ = _native.concavity(
+            part.vertices, part.faces, hull.vertices, hull.faces, part.volume, hull.volume, 1e-3
+        )
+        truth = 1.0  # the pocket's floor is 1 above the bottom and 1 below the top
+        assert part_to_hull[1] >= truth - 1e-3
+        assert part_to_hull[0] <= truth + 2e-3
+
+
+@st.composite
+def solids(draw: st.DrawFn) -> Closed:
+    """Unions and differences of a few boxes and hulls of points, some refined: any genus, slivers included."""
+    unit = st.floats(-1, 1, width=32)
+    points = st.lists(st.tuples(unit, unit, unit), min_size=5, max_size=9)
+    solid = box((-0.7, -0.6, -0.5), (0.7, 0.6, 0.5))
+    for _ in range(draw(st.integers(1, 3))):
+        other = manifold3d.Manifold.hull_points(np.array(draw(points)))
+        solid = solid + other if draw(st.booleans()) else solid - other
+    pieces = sorted(solid.decompose(), key=lambda piece: piece.volume())
+    if not pieces or pieces[-1].volume() < 1e-3:
+        return from_manifold(box((-1, -1, -1), (1, 1, 1)))
+    return from_manifold(pieces[-1].refine(draw(st.integers(1, 3))))
+
+
+@settings(deadline=None, max_examples=60)
+@given(solids())
+def test_made_solids_against_dense_sampling(part: Closed) -> None:
+    check(part)
+
+
+def cut_meshes(corpus: Path, count: int, seed: int) -> Iterator[Closed]:
+    """Pieces of real closed meshes, cut by random axis-aligned planes: what a decomposition asks about."""
+    rng = np.random.default_rng(seed)
+    rows = [row for row in csv.DictReader((corpus / "index.csv").open()) if row["watertight"] == "1"]
+    rows = [row for row in rows if int(row["faces"]) < 8000]
+    for row in rng.permutation(np.array(rows, dtype=object))[:count]:
+        mesh = trimesh.load(corpus / row["file"], process=False)
+        vertices = 2 * (np.asarray(mesh.vertices) - mesh.bounds.mean(axis=0)) / mesh.extents.max()
+        todo: list[Any] = to_manifold(vertices, np.asarray(mesh.faces)).decompose()
+        for _ in range(3):
+            pieces = [piece for piece in todo if piece.volume() > 1e-5]
+            if not pieces:
+                break
+            piece = max(pieces, key=lambda piece: piece.volume())
+            yield from_manifold(piece)
+            normal = np.eye(3)[rng.integers(3)]
+            heights = from_manifold(piece).vertices @ normal
+            offset = heights.min() + np.ptp(heights) * rng.uniform(0.2, 0.8)
+            todo = [part for half in piece.split_by_plane(normal, offset) for part in half.decompose()]
+
+
+@pytest.mark.slow
+def test_real_parts_against_dense_sampling(corpus: Path) -> None:
+    parts = list(cut_meshes(corpus, 60, seed=0))
+    assert len(parts) > 100
+    for part in parts:
+        check(part)
+
+
+def test_yes_is_never_contradicted_by_samples(corpus: Path) -> None:
+    met = 0
+    for part in cut_meshes(corpus, 40, seed=1):
+        if Concavity(0.05).is_met(part):
+            met += 1
+            assert max(sampled(part)) <= 0.05 + 1e-9
+    assert met > 10
+
+
+def test_hull_larger_than_the_part_counts_in_full() -> None:
+    # A hull fattened by a vertex limit: its distance from the part is part of the concavity.
+    part = from_manifold(box((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)))
+    hull = from_manifold(box((-0.6, -0.6, -0.6), (0.6, 0.6, 0.6)))
+    value, part_to_hull, hull_to_part, _ = _native.concavity(
+        part.vertices, part.faces, hull.vertices, hull.faces, part.volume, hull.volume, 1e-4
+    )
+    assert part_to_hull[1] == pytest.approx(0.1, abs=2e-4)
+    assert hull_to_part[0] == pytest.approx(0.1 * np.sqrt(3), abs=2e-4)
+    assert value[0] == pytest.approx(max(0.1 * np.sqrt(3), 0.3 * np.cbrt(3 * (1.2**3 - 1) / (4 * np.pi))), abs=2e-4)
+
+
+def test_parts_out_of_reach_and_excluded_volumes_never_meet() -> None:
+    criterion = Concavity(0.05)
+    for gap in (0.08, 0.1001, 0.2):
+        pair = from_manifold(box((-0.5, -0.5, -0.5), (0, 0.5, 0.5)) + box((gap, -0.5, -0.5), (0.5, 0.5, 0.5)))
+        assert gap <= criterion.reach or not criterion.is_met(pair)
+        assert not criterion.excludes(pair.volume, pair.hull.volume) or not criterion.is_met(pair)
+    assert not criterion.excludes(1.0, 1.0 + 4 / 3 * np.pi * 0.166**3)
+    assert criterion.excludes(1.0, 1.0 + 4 / 3 * np.pi * 0.167**3)
+
+
+def test_same_answer_every_time() -> None:
+    bowl = manifold3d.Manifold.sphere(1.0, 40) - manifold3d.Manifold.sphere(0.6, 32).translate((0, 0, 0.7))
+    part = from_manifold(bowl)
+    assert Concavity().measure(part) == Concavity().measure(part)
+
+
+@pytest.mark.parametrize("threshold", [0, -1, float("nan")])
+def test_bad_options_are_refused(threshold: float) -> None:
+    with pytest.raises(OptionError, match="must be positive"):
+        Concavity(threshold)
+    with pytest.raises(OptionError, match="must be positive"):
+        Concavity().measure(from_manifold(box((0, 0, 0), (1, 1, 1))), threshold)
+
+
+def test_bad_meshes_are_refused() -> None:
+    good = from_manifold(box((0, 0, 0), (1, 1, 1)))
+    nothing = np.zeros((0, 3), dtype=np.int32)
+    flat = Closed(good.vertices, np.zeros((4, 3), dtype=np.int32))
+    for part, hull, says in (
+        ((good.vertices, nothing), (good.vertices, good.faces), "part has no faces"),
+        ((good.vertices, good.faces), (good.vertices, nothing), "hull has no faces"),
+        ((good.vertices, good.faces), (flat.vertices, flat.faces), "no facet with an area"),
+        ((good.vertices * np.nan, good.faces), (good.vertices, good.faces), "not finite"),
+        ((good.vertices, good.faces + 100), (good.vertices, good.faces), "out of range"),
+    ):
+        with pytest.raises(ValueError, match=says):
+            _native.meets_concavity(*part, *hull, 1.0, 1.0, 0.05)
