@@ -28,7 +28,7 @@ TO_Z_UP = {  # rows: where the drawing's x, y, z axes come from
 }
 
 
-def check_picture(path: str | os.PathLike[str]) -> Path:
+def check_picture(path: str | os.PathLike[str], up: str | None = None) -> Path:
     """Check, before any work, that `draw_picture` will be able to write to `path`.
 
     Raises
@@ -37,8 +37,12 @@ def check_picture(path: str | os.PathLike[str]) -> Path:
         The name does not end in ``.png``, or the place cannot be written to.
     MissingExtraError
         The extra ``view`` is not installed.
+    OptionError
+        `up` is no axis.
     """
     place = Path(path)
+    if up is not None and up not in TO_Z_UP:
+        raise OptionError(f"{up!r} is no axis that can point up; choose x, y or z.")
     if place.suffix.lower() != ".png":
         raise OutputError(f"cannot write the picture {place}: it must end in .png; rename it.")
     check_file(place)
@@ -84,13 +88,11 @@ def draw_picture(
     OptionError
         `width`, `samples` or `up` is out of range.
     """
-    place = check_picture(path)
+    place = check_picture(path, up)
     if not 300 <= width <= 8000:
         raise OptionError(f"a picture cannot be {width} pixels wide; choose from 300 to 8000.")
     if samples < 1:
         raise OptionError(f"a picture cannot be drawn with {samples} samples; choose 1 or more.")
-    if up not in TO_Z_UP:
-        raise OptionError(f"{up!r} is no axis that can point up; choose x, y or z.")
 
     image = _require_pillow()
     panels = [
