@@ -6,9 +6,11 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import trimesh
+
+Axis = Literal["x", "y", "z"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -89,7 +91,7 @@ class Decomposition:
 
         return save_hulls(self.hulls, path, stem=self.name, file_format=file_format)
 
-    def picture(self, path: str | os.PathLike[str], *, width: int = 1600) -> Path:
+    def picture(self, path: str | os.PathLike[str], *, width: int = 1600, up: Axis = "z") -> Path:
         """Draw the input beside its hulls, together and pulled apart, as a PNG file; needs no display and no GPU.
 
         Parameters
@@ -97,7 +99,9 @@ class Decomposition:
         path : path-like
             Where to write; must end in ``.png``.
         width : int
-            Width in pixels; the height follows.
+            Width in pixels, 300 to 8000; the height follows.
+        up : {"x", "y", "z"}
+            The axis of the input that points up in the picture; files from glTF have y.
 
         Returns
         -------
@@ -110,10 +114,12 @@ class Decomposition:
             The extra ``view`` is not installed.
         OutputError
             The place cannot be written to.
+        OptionError
+            `width` or `up` is none of those above.
         """
         from rlacd.show import draw_picture
 
-        return draw_picture(self, path, width=width)
+        return draw_picture(self, path, width=width, up=up)
 
     def __len__(self) -> int:
         return len(self.hulls)

@@ -22,7 +22,13 @@ def hull_colors(count: int) -> npt.NDArray[np.uint8]:
     index = np.arange(count)
     hue = FIRST_HUE + index * GOLDEN_ANGLE
     oklab = np.stack([LIGHTNESS[index % 3], CHROMA * np.cos(hue), CHROMA * np.sin(hue)], axis=1)
-    return np.rint(255.0 * _srgb_from_linear(linear_from_oklab(oklab))).astype(np.uint8)
+    return srgb_from_linear(linear_from_oklab(oklab))
+
+
+def srgb_from_linear(linear: npt.NDArray[np.float64]) -> npt.NDArray[np.uint8]:
+    """sRGB bytes of linear light [..., 3] in [0, 1] (IEC 61966-2-1)."""
+    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
+    return np.rint(255.0 * encoded).astype(np.uint8)
 
 
 def linear_from_srgb(srgb: npt.NDArray[np.uint8]) -> npt.NDArray[np.float64]:
@@ -47,8 +53,5 @@ def linear_from_oklab(oklab: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]
             [-0.0041960863, -0.7034186147, 1.7076147010],
         ]
     )
-    return np.clip((oklab @ to_cone_root.T) ** 3 @ to_rgb.T, 0.0, 1.0)
-
-
-def _srgb_from_linear(linear: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
+    linear: npt.NDArray[np.float64] = np.clip((oklab @ to_cone_root.T) ** 3 @ to_rgb.T, 0.0, 1.0)
+    return linear

@@ -66,7 +66,7 @@ def hull_target(path: str | os.PathLike[str], file_format: str | None = None) ->
 def check_file(path: Path) -> None:
     """Raise `OutputError` if `path` cannot become a file, without touching the disk."""
     if path.is_dir():
-        raise OutputError(f"cannot write {path}: it is a folder; give a file name, or end it with / to fill the folder.")
+        raise OutputError(f"cannot write {path}: it is a folder; end the name with / to fill it.")
     if path.exists() and not path.is_file():
         raise OutputError(f"cannot write {path}: it is not an ordinary file; choose another name.")
     _check_parent(path)
@@ -75,7 +75,9 @@ def check_file(path: Path) -> None:
 def _check_folder(folder: Path) -> None:
     if folder.is_dir():
         if not os.access(folder, os.W_OK | os.X_OK):
-            raise OutputError(f"cannot write into {folder}: you may not; choose another place or change its permissions.")
+            raise OutputError(
+                f"cannot write into {folder}: you may not; choose another place or change its permissions."
+            )
     elif folder.exists():
         raise OutputError(f"cannot write into {folder}: it is a file, not a folder; choose another name.")
     else:

@@ -1,0 +1,368 @@
+"""The command line: one command a verb, nothing but wiring.
+
+Exit codes: 0 done; 1 a bug in rlacd; 2 bad input or option; 3 the output cannot be written; 4 stopped early (timeout or
+Ctrl-C), a valid decomposition was written; 130 interrupted at once, no file is left half-written.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from collections.abc import Iterator
+from enum import IntEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rlacd import __version__
+from rlacd.errors import OptionError, OutputError, RlacdError
+
+STDOUT = Path("-")
+
+
+class ExitCode(IntEnum):
+    """What the command tells the shell."""
+
+    OK = 0
+    BUG = 1
+    BAD_INPUT = 2
+    CANNOT_WRITE = 3
+    STOPPED_EARLY = 4
+    INTERRUPTED = 130
+
+
+# \b keeps the lines of a paragraph apart in the help.
+EPILOG = """\b
+[bold]Exit codes[/bold]
+  0    done
+  1    a bug in rlacd (RLACD_DEBUG=1 shows the traceback)
+  2    bad input or bad option
+  3    the output cannot be written
+  4    stopped early by --timeout or Ctrl-C; a valid decomposition was written
+  130  interrupted at once; no file is left half-written
+"""
+
+app = typer.Typer(
+    name="rlacd",
+    help="Approximate convex decomposition: any mesh in, few tight convex hulls out.",
+    epilog=EPILOG,
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def main() -> None:
+    """Run the command line: the entry point of the ``rlacd`` script."""
+    app()
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"rlacd {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Approximate convex decomposition: any mesh in, few tight convex hulls out."""
+
+
+QUALITY, LIMITS, METHOD, RUN, OUTPUT = "How tight", "Limits", "Method", "Running", "Output"
+
+
+@app.command(epilog=EPILOG)
+def decompose(
+    mesh: Annotated[
+        Path,
+        typer.Argument(
+            metavar="IN", help="The mesh: obj, stl, ply, off, glb, gltf, dae, 3mf. It need not be closed or clean."
+        ),
+    ],
+    output: Annotated[
+        str | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="OUT",
+            rich_help_panel=OUTPUT,
+            help="Where the hulls go: .glb, .obj, .ply or .stl for one file with a node, group or solid a hull; "
+            "an existing folder, or a name ending in /, for one file a hull. An older file is replaced. "
+            "[dim]\\[default: IN_hulls.glb, beside IN][/dim]",
+            show_default=False,
+        ),
+    ] = None,
+    folder_format: Annotated[
+        str | None,
+        typer.Option(
+            "--format",
+            metavar="EXT",
+            rich_help_panel=OUTPUT,
+            help="The format of the files in a folder: obj, glb, ply or stl. [dim]\\[default: obj][/dim]",
+            show_default=False,
+        ),
+    ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            rich_help_panel=OUTPUT,
+            help="Write everything measured as JSON; - writes it to stdout, and nothing else there.",
+        ),
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.png",
+            rich_help_panel=OUTPUT,
+            help="Draw the input beside its hulls, together and pulled apart. Needs the extra rlacd\\[view].",
+        ),
+    ] = None,
+    up: Annotated[
+        str | None,
+        typer.Option(
+            metavar="AXIS",
+            rich_help_panel=OUTPUT,
+            help="The axis of the mesh that points up in the picture: x, y or z. "
+            "[dim]\\[default: y for glb and gltf, else z][/dim]",
+            show_default=False,
+        ),
+    ] = None,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", rich_help_panel=OUTPUT, help="Say nothing unless something is wrong.")
+    ] = False,
+    threshold: Annotated[
+        float | None,
+        typer.Option(
+            "--threshold",
+            "-t",
+            rich_help_panel=QUALITY,
+            help="The concavity a hull may have, where the longest side of the mesh is 2. Smaller is tighter, with "
+            "more hulls: 0.02 is fine, 0.2 coarse. [dim]\\[default: 0.05][/dim]",
+            show_default=False,
+        ),
+    ] = None,
+    threshold_m: Annotated[
+        float | None,
+        typer.Option(
+            rich_help_panel=QUALITY,
+            help="The same as a length in the mesh's own unit, e.g. 0.002 for 2 mm in a file in metres.",
+            show_default=False,
+        ),
+    ] = None,
+    max_hulls: Annotated[
+        int | None,
+        typer.Option(
+            rich_help_panel=LIMITS,
+            help="At most this many hulls, even if the threshold must be exceeded; the report says by how much.",
+            show_default=False,
+        ),
+    ] = None,
+    max_vertices: Annotated[
+        int | None,
+        typer.Option(
+            rich_help_panel=LIMITS,
+            help="At most this many vertices a hull, e.g. 64 for PhysX on a GPU.",
+            show_default=False,
+        ),
+    ] = None,
+    max_faces: Annotated[
+        int | None,
+        typer.Option(rich_help_panel=LIMITS, help="At most this many triangles a hull.", show_default=False),
+    ] = None,
+    merge: Annotated[
+        bool | None,
+        typer.Option(
+            "--merge/--no-merge",
+            rich_help_panel=METHOD,
+            help="Join neighbouring hulls again where one hull is tight enough. [dim]\\[default: merge][/dim]",
+            show_default=False,
+        ),
+    ] = None,
+    policy: Annotated[
+        str | None,
+        typer.Option(
+            rich_help_panel=METHOD,
+            help="What chooses the next cut. [dim]\\[default: greedy][/dim]",
+            show_default=False,
+        ),
+    ] = None,
+    resolution: Annotated[
+        int | None,
+        typer.Option(
+            rich_help_panel=METHOD,
+            help="Grid cells along the longest side when bodies that are not closed are repaired.",
+            show_default=False,
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            rich_help_panel=RUN,
+            help="The same seed, input and options give the same bytes. [dim]\\[default: 0][/dim]",
+            show_default=False,
+        ),
+    ] = None,
+    threads: Annotated[
+        int | None,
+        typer.Option(
+            rich_help_panel=RUN,
+            help="Threads to use; the result does not depend on it. [dim]\\[default: all cores][/dim]",
+            show_default=False,
+        ),
+    ] = None,
+    timeout: Annotated[
+        float | None,
+        typer.Option(
+            metavar="SECONDS",
+            rich_help_panel=RUN,
+            help="Stop after this time and write what is reached (exit code 4).",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Turn a mesh into convex hulls for collision.
+
+    \b
+    [bold]Examples[/bold]
+      rlacd decompose chair.glb
+      rlacd decompose chair.glb -o chair_hulls.obj --threshold 0.02
+      rlacd decompose chair.glb -o hulls/ --format stl --max-vertices 64
+      rlacd decompose arm.dae -o arm.glb --picture arm.png --report - | jq .parts
+
+    Ctrl-C once stops gracefully and writes what is reached; twice quits at once.
+    """
+    with _exit_codes():
+        from rlacd.formats import check_file, hull_target, write_file
+        from rlacd.show import check_picture, draw_picture
+
+        place = _output_name(mesh, output)
+        _check_output(mesh, place, report, picture)
+        hull_target(place, folder_format)
+        if report is not None and report != STDOUT:
+            check_file(report)
+        if picture is not None:
+            check_picture(picture, up=up)
+        given = {
+            "threshold": threshold,
+            "threshold_m": threshold_m,
+            "max_hulls": max_hulls,
+            "max_vertices": max_vertices,
+            "max_faces": max_faces,
+            "merge": merge,
+            "policy": policy,
+            "resolution": resolution,
+            "seed": seed,
+            "threads": threads,
+            "timeout": timeout,
+        }
+
+        from rlacd.decompose import decompose as run
+        from rlacd.terminal import Watch, say, summary, to_json
+
+        with Watch(quiet=quiet) as watch:
+            result = run(mesh, **_chosen(given), progress=watch)
+        result.save(place, file_format=folder_format)
+        if not quiet:
+            say(summary(result, place))
+        if report == STDOUT:
+            typer.echo(to_json(result.report), nl=False)
+        elif report is not None:
+            write_file(report, to_json(result.report).encode())
+        if picture is not None:
+            draw_picture(result, picture, up=up or _usual_up(mesh))
+        if not result.report.get("complete", True):
+            raise typer.Exit(ExitCode.STOPPED_EARLY)
+
+
+@app.command(epilog=EPILOG)
+def info(
+    mesh: Annotated[Path, typer.Argument(metavar="FILE", help="The mesh to look at.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
+) -> None:
+    """Tell what a file holds and how it would be repaired, without decomposing it.
+
+    \b
+    [bold]Examples[/bold]
+      rlacd info chair.glb
+      rlacd info chair.glb --json | jq .repair
+    """
+    with _exit_codes():
+        from rlacd.describe import describe, describe_text
+        from rlacd.terminal import to_json
+
+        facts = describe(mesh)
+        typer.echo(to_json(facts) if as_json else describe_text(facts), nl=False)
+
+
+def _output_name(mesh: Path, output: str | None) -> str:
+    if output == str(STDOUT):
+        raise OptionError("hulls cannot be written to stdout; give -o a file name, and use - with --report only.")
+    return str(mesh.with_name(f"{mesh.stem or 'mesh'}_hulls.glb")) if output is None else output
+
+
+def _check_output(mesh: Path, place: str, report: Path | None, picture: Path | None) -> None:
+    """No file may be written twice, and the input never."""
+    named = {"-o": Path(place), "--report": report, "--picture": picture}
+    seen = {_same(mesh): "the input"}
+    for option, path in named.items():
+        if path is None or path == STDOUT:
+            continue
+        if _same(path) in seen:
+            raise OptionError(f"{option} {path} would overwrite {seen[_same(path)]}; choose another name.")
+        seen[_same(path)] = f"what {option} writes"
+
+
+def _same(path: Path) -> str:
+    return os.path.normcase(path.resolve())
+
+
+def _usual_up(mesh: Path) -> str:
+    return "y" if mesh.suffix.lower() in (".glb", ".gltf") else "z"
+
+
+def _chosen(options: dict[str, Any]) -> dict[str, Any]:
+    """Keep what the user gave: defaults are stated once, by `rlacd.decompose`."""
+    return {name: value for name, value in options.items() if value is not None}
+
+
+@contextlib.contextmanager
+def _exit_codes() -> Iterator[None]:
+    """Turn every error into one sentence on stderr and an exit code; RLACD_DEBUG=1 lets the traceback through."""
+    try:
+        yield
+    except (typer.Exit, typer.Abort, SystemExit):
+        raise
+    except KeyboardInterrupt:
+        _fail("interrupted; no file is left half-written.", ExitCode.INTERRUPTED)
+    except BrokenPipeError:
+        # The reader of stdout (head, jq) has left; say no more, not even when Python flushes at exit.
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+        raise typer.Exit(ExitCode.CANNOT_WRITE) from None
+    except OutputError as error:
+        _fail(error, ExitCode.CANNOT_WRITE)
+    except RlacdError as error:
+        _fail(error, ExitCode.BAD_INPUT)
+    except MemoryError:
+        _fail("there is not enough memory for this mesh; simplify it or use a larger machine.", ExitCode.BAD_INPUT)
+    except Exception as error:
+        message = f"a bug in rlacd ({type(error).__name__}: {_first_line(error)}); "
+        _fail(message + "run again with RLACD_DEBUG=1 for the traceback, and please report it.", ExitCode.BUG)
+
+
+def _fail(message: object, code: ExitCode) -> None:
+    if os.environ.get("RLACD_DEBUG") == "1":
+        raise
+    typer.echo(f"rlacd: {message}", err=True)
+    raise typer.Exit(code)
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).strip().splitlines() or ["no message"])[0]

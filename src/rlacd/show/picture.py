@@ -1,0 +1,165 @@
+"""One PNG that tells how good a decomposition is: the input, its hulls, and the hulls pulled apart."""
+
+from __future__ import annotations
+
+import io
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rlacd.errors import MissingExtraError, OptionError, OutputError
+from rlacd.formats import check_file, write_file
+from rlacd.formats.palette import hull_colors, linear_from_srgb
+from rlacd.show.render import Body, render, require_mitsuba
+
+if TYPE_CHECKING:
+    from rlacd.decomposition import Decomposition
+
+INPUT_COLOR = np.array([0.46, 0.47, 0.50])  # linear reflectance
+PULL = 0.55  # how far hulls move apart: a hull's distance from the middle grows by this share
+PAPER, INK, FADED = (255, 255, 255), (28, 30, 34), (120, 124, 132)
+TO_Z_UP = {  # rows: where the drawing's x, y, z axes come from
+    "x": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
+    "y": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+    "z": np.eye(3),
+}
+
+
+def check_picture(path: str | os.PathLike[str], up: str | None = None) -> Path:
+    """Check, before any work, that `draw_picture` will be able to write to `path`.
+
+    Raises
+    ------
+    OutputError
+        The name does not end in ``.png``, or the place cannot be written to.
+    MissingExtraError
+        The extra ``view`` is not installed.
+    OptionError
+        `up` is no axis.
+    """
+    place = Path(path)
+    if up is not None and up not in TO_Z_UP:
+        raise OptionError(f"{up!r} is no axis that can point up; choose x, y or z.")
+    if place.suffix.lower() != ".png":
+        raise OutputError(f"cannot write the picture {place}: it must end in .png; rename it.")
+    check_file(place)
+    require_mitsuba()
+    _require_pillow()
+    return place
+
+
+def draw_picture(
+    decomposition: Decomposition,
+    path: str | os.PathLike[str],
+    *,
+    width: int = 1600,
+    samples: int = 16,
+    up: str = "z",
+) -> Path:
+    """Draw the input, its hulls and the hulls pulled apart, side by side, with one line of numbers.
+
+    Parameters
+    ----------
+    decomposition : Decomposition
+        What to draw.
+    path : path-like
+        A ``.png`` file.
+    width : int
+        Pixels, from 300 to 8,000.
+    samples : int
+        Light paths a pixel: more are slower and less grainy.
+    up : {"x", "y", "z"}
+        The axis of the input that points up in the picture.
+
+    Returns
+    -------
+    pathlib.Path
+        Where it was written.
+
+    Raises
+    ------
+    MissingExtraError
+        The extra ``view`` is not installed.
+    OutputError
+        The place cannot be written to.
+    OptionError
+        `width`, `samples` or `up` is out of range.
+    """
+    place = check_picture(path, up)
+    if not 300 <= width <= 8000:
+        raise OptionError(f"a picture cannot be {width} pixels wide; choose from 300 to 8000.")
+    if samples < 1:
+        raise OptionError(f"a picture cannot be drawn with {samples} samples; choose 1 or more.")
+
+    image = _require_pillow()
+    panels = [
+        ("input", [_body(decomposition.source.triangles, INPUT_COLOR, up)]),
+        ("hulls", _hull_bodies(decomposition, up, pull=0.0)),
+        ("pulled apart", _hull_bodies(decomposition, up, pull=PULL)),
+    ]
+    panel_width = width // len(panels)
+    panel_height = round(panel_width * 0.92)
+    unit = width / 1600
+    header, footer = round(104 * unit), round(44 * unit)
+    sheet = image.new("RGB", (width, header + panel_height + footer), PAPER)
+    for column, (title, bodies) in enumerate(panels):
+        pixels = render(bodies, panel_width, panel_height, samples=samples)
+        sheet.paste(image.fromarray(pixels), (column * panel_width, header))
+        middle = (column * panel_width + panel_width // 2, header + panel_height + footer // 2)
+        _write(sheet, title, middle, round(20 * unit), FADED, anchor="mm")
+    margin = round(32 * unit)
+    _write(sheet, decomposition.name, (margin, round(40 * unit)), round(34 * unit), INK, anchor="lm")
+    _write(sheet, caption(decomposition), (margin, round(79 * unit)), round(21 * unit), FADED, anchor="lm")
+
+    encoded = io.BytesIO()
+    sheet.save(encoded, format="PNG")
+    write_file(place, encoded.getvalue())
+    return place
+
+
+def caption(decomposition: Decomposition) -> str:
+    """One line of numbers: hulls, faces, concavity, seconds; only what the report holds."""
+    report = decomposition.report
+    count = len(decomposition)
+    words = [f"{count} hull{'s' * (count != 1)}", f"{sum(len(hull.faces) for hull in decomposition)} triangles"]
+    worst = report.get("concavity", {}).get("max")
+    if worst is not None:
+        threshold = report.get("options", {}).get("threshold")
+        words.append(f"concavity {worst:.3f}" + (f" (threshold {threshold:g})" if threshold is not None else ""))
+    total = report.get("seconds", {}).get("total")
+    if total is not None:
+        words.append(f"{total:.2f} s")
+    if not report.get("complete", True):
+        words.append(f"stopped early by {report.get('stopped_by')}")
+    return "   ·   ".join(words)
+
+
+def _hull_bodies(decomposition: Decomposition, up: str, *, pull: float) -> list[Body]:
+    corners = np.concatenate([hull.bounds for hull in decomposition])
+    middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
+    colors = linear_from_srgb(hull_colors(len(decomposition)))
+    return [
+        _body(hull.triangles + pull * (hull.bounds.mean(axis=0) - middle), color, up)
+        for hull, color in zip(decomposition, colors, strict=True)
+    ]
+
+
+def _body(triangles: npt.ArrayLike, color: npt.NDArray[np.float64], up: str) -> Body:
+    return Body(np.asarray(triangles, dtype=np.float64) @ TO_Z_UP[up].T, color)
+
+
+def _write(sheet: Any, text: str, place: tuple[int, int], size: int, ink: tuple[int, int, int], anchor: str) -> None:
+    from PIL import ImageDraw, ImageFont
+
+    ImageDraw.Draw(sheet).text(place, text, font=ImageFont.load_default(size=size), fill=ink, anchor=anchor)
+
+
+def _require_pillow() -> Any:
+    try:
+        from PIL import Image
+    except ImportError as error:
+        raise MissingExtraError("pictures need an extra: run  pip install 'rlacd[view]'  and try again.") from error
+    return Image

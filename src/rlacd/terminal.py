@@ -1,0 +1,122 @@
+"""What the command line shows while it works and when it is done, and how Ctrl-C stops it."""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+import threading
+from types import FrameType, TracebackType
+from typing import Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+from rich.progress import Progress as Bars
+
+from rlacd.decomposition import Decomposition
+from rlacd.progress import Progress
+
+
+def say(text: str) -> None:
+    """Print a line to stderr; stdout is kept for what the user asked to be written there."""
+    typer.echo(text, err=True)
+
+
+class Watch:
+    """Shows progress on a terminal and turns Ctrl-C into a graceful stop.
+
+    The first Ctrl-C makes the decomposition stop at its next step and keep what it has; the second one interrupts at
+    once. The bar is drawn only where stderr is a terminal.
+    """
+
+    def __init__(self, *, quiet: bool) -> None:
+        self.interrupted = False
+        console = Console(stderr=True)
+        self._bars = Bars(
+            TextColumn("{task.description:<12}"),
+            BarColumn(),
+            TextColumn("{task.fields[parts]} parts"),
+            TimeElapsedColumn(),
+            console=console,
+            transient=True,
+            disable=quiet or not console.is_terminal,
+        )
+        self._task = self._bars.add_task("starting", total=None, parts=0)
+        self._previous: Any = None
+
+    def __enter__(self) -> Watch:
+        # Python runs signal handlers in the main thread only, and refuses to set them from another one.
+        if threading.current_thread() is threading.main_thread():
+            self._previous = signal.signal(signal.SIGINT, self._on_interrupt)
+        self._bars.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self._bars.stop()
+        if self._previous is not None:
+            signal.signal(signal.SIGINT, self._previous)
+
+    def __call__(self, progress: Progress) -> bool:
+        """Show `progress`; False when the user wants to stop."""
+        self._bars.update(
+            self._task,
+            description=progress.stage,
+            completed=progress.done,
+            total=progress.total,
+            parts=progress.parts,
+        )
+        return not self.interrupted
+
+    def _on_interrupt(self, number: int, frame: FrameType | None) -> None:
+        self.interrupted = True
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        say("stopping; what is reached will be written (Ctrl-C again to quit at once)")
+
+
+def summary(result: Decomposition, written: str) -> str:
+    """Tell in a few lines what came out, how good it is, and what the user should know."""
+    report = result.report
+    triangles = sum(len(hull.faces) for hull in result)
+    lines = [f"{written}: {len(result)} hull{'s' * (len(result) != 1)}, {triangles} triangles{_time(report)}"]
+    lines += [f"  {fit}" for fit in [_fit(report)] if fit]
+    if not report.get("complete", True):
+        reason = {"timeout": "by the timeout", "cancel": "by Ctrl-C"}.get(str(report.get("stopped_by")), "early")
+        lines.append(f"  stopped {reason}: the hulls are valid, but more work would have made them tighter")
+    lines += [f"  warning: {warning}" for warning in report.get("warnings", [])]
+    return "\n".join(lines)
+
+
+def to_json(value: Any) -> str:
+    """JSON that every parser reads: numbers that JSON does not know (NaN, infinity) become null."""
+    return json.dumps(_plain(value), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _time(report: dict[str, Any]) -> str:
+    total = report.get("seconds", {}).get("total")
+    return "" if total is None else f", {total:.2f} s"
+
+
+def _fit(report: dict[str, Any]) -> str:
+    words = []
+    worst = report.get("concavity", {}).get("max")
+    if worst is not None:
+        threshold = report.get("options", {}).get("threshold")
+        verdict = "" if threshold is None else f" (threshold {threshold:g}{', exceeded' * (worst > threshold)})"
+        words.append(f"max concavity {worst:.4f}{verdict}")
+    reach = report.get("hausdorff", {})
+    if reach.get("over") is not None:
+        words.append(f"hulls reach {reach['over']:.4f} from the input")
+    if reach.get("under") is not None:
+        words.append(f"input lies {reach['under']:.4f} from the hulls")
+    return "; ".join(words)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
