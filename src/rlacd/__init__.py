@@ -1,5 +1,8 @@
 """Approximate convex decomposition: any mesh in, few tight convex hulls out."""
 
+from rlacd._version import __version__
+from rlacd.decompose import decompose
+from rlacd.decomposition import Decomposition
 from rlacd.errors import (
     EmptyMeshError,
     MeshDataError,
@@ -10,10 +13,10 @@ from rlacd.errors import (
     OutputError,
     RlacdError,
 )
-
-__version__ = "0.1.0"
+from rlacd.progress import Progress
 
 __all__ = [
+    "Decomposition",
     "EmptyMeshError",
     "MeshDataError",
     "MeshError",
@@ -21,6 +24,8 @@ __all__ = [
     "MissingExtraError",
     "OptionError",
     "OutputError",
+    "Progress",
     "RlacdError",
     "__version__",
+    "decompose",
 ]

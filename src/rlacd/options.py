@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 
 from rlacd.errors import OptionError
 from rlacd.policies import POLICIES
-from rlacd.solid.repair import DEFAULT_RESOLUTION
+
+DEFAULT_RESOLUTION = 100
+"""Cells along the longest side of the grid on which repair looks for rooms that nothing can enter."""
+
+MIN_THRESHOLD = 0.001
+"""Least concavity that can be asked for; the longest side of the input is 2."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +39,7 @@ class Options:
     timeout: float | None = None
 
     def __post_init__(self) -> None:
-        _require(0.001 <= self.threshold <= 1, "threshold", self.threshold, "between 0.001 and 1")
+        _require(MIN_THRESHOLD <= self.threshold <= 2, "threshold", self.threshold, f"between {MIN_THRESHOLD} and 2")
         _require(_positive(self.threshold_m), "threshold_m", self.threshold_m, "a positive length in the input's unit")
         _require(_at_least(1, self.max_hulls), "max_hulls", self.max_hulls, "at least 1")
         _require(_at_least(4, self.max_vertices), "max_vertices", self.max_vertices, "at least 4 (a tetrahedron)")
@@ -42,6 +48,22 @@ class Options:
         _require(self.resolution >= 1, "resolution", self.resolution, "at least 1")
         _require(_at_least(1, self.threads), "threads", self.threads, "at least 1")
         _require(_positive(self.timeout), "timeout", self.timeout, "a positive number of seconds")
+
+    def with_threshold(self, threshold: float) -> Options:
+        """Get the same options with another threshold, which has to be in range too.
+
+        Raises
+        ------
+        OptionError
+            `threshold_m` is too small or too large for the object.
+        """
+        if not MIN_THRESHOLD <= threshold <= 2:
+            unit = self.threshold_m / threshold if self.threshold_m is not None else 1.0
+            raise OptionError(
+                f"threshold_m is {self.threshold_m!r}; for this object it has to be between "
+                f"{MIN_THRESHOLD * unit:.4g} and {2 * unit:.4g} (0.05 % and 100 % of its longest side)."
+            )
+        return dataclasses.replace(self, threshold=threshold)
 
 
 def _require(holds: bool, name: str, value: object, rule: str) -> None:

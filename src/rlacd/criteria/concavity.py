@@ -86,7 +86,20 @@ class Concavity:
 
     def excludes(self, volume: float, hull_volume: float) -> bool:
         """Whether ``0.3 R_v`` alone exceeds the threshold."""
-        return VOLUME_WEIGHT * volume_radius(volume, hull_volume) > self.threshold
+        return self.least_error(volume, hull_volume) > self.threshold
+
+    def least_error(self, volume: float, hull_volume: float) -> float:
+        """``0.3 R_v``, which the concavity is never less than."""
+        return VOLUME_WEIGHT * volume_radius(volume, hull_volume)
+
+    def scaled(self, factor: float) -> Concavity:
+        """The same criterion with ``factor`` times the threshold."""
+        return Concavity(self.threshold * factor)
+
+    def error(self, part: Part) -> float:
+        """Upper end of the measured concavity; no more than the threshold where the part certainly meets it."""
+        measured = self.measure(part, tolerance=self.threshold / 50).value[1]
+        return min(measured, self.threshold) if measured <= 1.02 * self.threshold and self.is_met(part) else measured
 
     def is_met(self, part: Part) -> bool:
         """Whether the part's concavity is certainly at most the threshold.

@@ -35,3 +35,12 @@ class Criterion(Protocol):
 
     def is_met(self, part: Part) -> bool:
         """Decide strictly whether the part meets the criterion."""
+
+    def least_error(self, volume: float, hull_volume: float) -> float:
+        """Bound from below, by the volumes alone, what the criterion measures."""
+
+    def error(self, part: Part) -> float:
+        """Bound from above, tightly, what the criterion compares with its threshold."""
+
+    def scaled(self, factor: float) -> Criterion:
+        """Get the same criterion with a threshold larger by `factor`."""

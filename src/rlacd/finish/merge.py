@@ -23,7 +23,7 @@ class _Pair:
     second: int
 
 
-def merge(parts: Sequence[Part], criterion: Criterion, workers: Workers, clock: Clock) -> list[Part]:
+def merge_parts(parts: Sequence[Part], criterion: Criterion, workers: Workers, clock: Clock) -> list[Part]:
     """Unite pairs of parts, the cheapest first, as long as the union meets the criterion.
 
     The test looks at the glued union: its own surface against its own hull, both ways. Pairs are tested a batch at a
@@ -82,26 +82,99 @@ def _unite(first: Part, second: Part, criterion: Criterion) -> Part | None:
 
 
 def _pairs(alive: dict[int, Part], new: Sequence[int], criterion: Criterion, workers: Workers) -> list[_Pair]:
-    """Pairs of a new part with any other that lie within the criterion's reach and that its volume bound allows."""
+    """Pairs of a new part with any other that the criterion's reach and volume bound allow, by their excess volume."""
+    return [
+        _Pair(hull_volume - volume, first, second)
+        for first, second, volume, hull_volume in _neighbours(alive, new, criterion.reach, workers)
+        if not criterion.excludes(volume, hull_volume)
+    ]
+
+
+def _neighbours(
+    alive: dict[int, Part], new: Sequence[int], reach: float, workers: Workers
+) -> list[tuple[int, int, float, float]]:
+    """Pairs of a new part with any other whose boxes lie within reach: (first, second, volume, joint hull's volume)."""
     ids = np.array(list(alive), dtype=np.int64)
     boxes = np.stack([alive[i].box for i in alive])
-    position = {int(i): k for k, i in enumerate(ids)}
-    rows = np.array([position[i] for i in new], dtype=np.int64)
+    rows = np.flatnonzero(np.isin(ids, new))
     gap = np.maximum(boxes[rows, None, 0] - boxes[None, :, 1], boxes[None, :, 0] - boxes[rows, None, 1])
-    near = np.linalg.norm(np.maximum(gap, 0.0), axis=2) <= criterion.reach
-    k, other = np.nonzero(near)
+    k, other = np.nonzero(np.linalg.norm(np.maximum(gap, 0.0), axis=2) <= reach)
     pairs = np.unique(np.sort(np.stack([rows[k], other], axis=1), axis=1), axis=0)
     pairs = pairs[pairs[:, 0] < pairs[:, 1]]
     if len(pairs) == 0:
         return []
-
     corners: list[FloatArray] = [alive[i].hull.vertices for i in alive]
     starts = np.cumsum([0, *map(len, corners)], dtype=np.int32)
     hulls = _native.joint_hull_volumes(np.concatenate(corners), starts, pairs.astype(np.int32), workers.threads)
-    volumes = np.array([alive[i].volume for i in alive])
-    solids = volumes[pairs].sum(axis=1)
+    solids = np.array([alive[i].volume for i in alive])[pairs].sum(axis=1)
     return [
-        _Pair(float(hull - solid), int(ids[i]), int(ids[j]))
-        for (i, j), hull, solid in zip(pairs, hulls, solids, strict=True)
-        if not criterion.excludes(float(solid), float(hull))
+        (int(ids[i]), int(ids[j]), float(solid), float(hull))
+        for (i, j), solid, hull in zip(pairs, solids, hulls, strict=True)
     ]
+
+
+def merge_to_count(parts: Sequence[Part], count: int, criterion: Criterion, workers: Workers, clock: Clock) -> list[Part]:
+    """Unite parts, the pair with the least error of its union first, until no more than `count` are left.
+
+    Errors are measured only for pairs whose lower bound could make them the best (lazy best-first search), first among
+    neighbours, then among all parts.
+
+    Raises
+    ------
+    ValueError
+        `count` is less than 1.
+    """
+    if count < 1:
+        raise ValueError("at least one part has to be left")
+    alive: dict[int, Part] = dict(enumerate(parts))
+    origin = {i: i for i in alive}
+    newest = len(parts)
+    reach = criterion.reach
+    queue = _bounded_pairs(alive, list(alive), reach, criterion, workers)
+    while len(alive) > count and clock.step(len(parts) - len(alive), len(parts) - count, len(alive)):
+        pair = _pop_least(queue, alive, criterion)
+        if pair is None:
+            if reach == np.inf:
+                break
+            reach = np.inf
+            queue = _bounded_pairs(alive, list(alive), reach, criterion, workers)
+            continue
+        union = Part.glued(alive.pop(pair.first), alive.pop(pair.second))
+        origin[newest] = min(origin[pair.first], origin[pair.second])
+        alive[newest] = union
+        queue += _bounded_pairs(alive, [newest], reach, criterion, workers)
+        heapq.heapify(queue)
+        newest += 1
+    return [alive[i] for i in sorted(alive, key=origin.__getitem__)]
+
+
+@dataclass(order=True, frozen=True)
+class _BoundedPair:
+    error: float  # of the union: a lower bound, or the measured value
+    first: int
+    second: int
+    measured: bool
+
+
+def _bounded_pairs(
+    alive: dict[int, Part], new: Sequence[int], reach: float, criterion: Criterion, workers: Workers
+) -> list[_BoundedPair]:
+    queue = [
+        _BoundedPair(criterion.least_error(volume, hull_volume), first, second, False)
+        for first, second, volume, hull_volume in _neighbours(alive, new, reach, workers)
+    ]
+    heapq.heapify(queue)
+    return queue
+
+
+def _pop_least(queue: list[_BoundedPair], alive: dict[int, Part], criterion: Criterion) -> _BoundedPair | None:
+    """Take the pair whose union has the least error off the queue; None when there is no pair left."""
+    while queue:
+        pair = heapq.heappop(queue)
+        if pair.first not in alive or pair.second not in alive:
+            continue
+        if pair.measured:
+            return pair
+        error = criterion.error(Part.glued(alive[pair.first], alive[pair.second]))
+        heapq.heappush(queue, _BoundedPair(max(error, pair.error), pair.first, pair.second, True))
+    return None
