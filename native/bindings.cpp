@@ -7,6 +7,7 @@ void bind_distance(nanobind::module_& m);
 void bind_glue(nanobind::module_& m);
 void bind_hull(nanobind::module_& m);
 void bind_sweep(nanobind::module_& m);
+void bind_union(nanobind::module_& m);
 }  // namespace rlacd
 
 NB_MODULE(_native, m) {
@@ -17,4 +18,5 @@ NB_MODULE(_native, m) {
   rlacd::bind_glue(m);
   rlacd::bind_hull(m);
   rlacd::bind_sweep(m);
+  rlacd::bind_union(m);
 }

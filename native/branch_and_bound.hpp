@@ -207,9 +207,18 @@ Interval maximize_in_waves(const Field& field, const Mesh& mesh, double toleranc
   Interval found;
   double dropped = 0;
   std::vector<Sample> at_vertex(mesh.vertices.size());
-  for_each(at_vertex.size(), [&](std::size_t v) { at_vertex[v] = field.at(mesh.vertices[v], -1, 0); });
-  for (const Triangle& face : mesh.faces)  // corners of no face do not count
-    for (const std::int32_t corner : face) found.lower = std::max(found.lower, at_vertex[corner].value);
+  std::vector<char> is_corner(mesh.vertices.size(), 0);
+  for (const Triangle& face : mesh.faces)
+    for (const std::int32_t corner : face) is_corner[corner] = 1;
+  // A few corners first: they tell how much distance matters, so that most of the others need no exact answer.
+  for (const std::size_t stride : {std::size_t{kChunk}, std::size_t{1}}) {
+    const double exact_above = kEnough * found.lower;
+    for_each((at_vertex.size() + stride - 1) / stride, [&](std::size_t i) {
+      if (is_corner[i * stride]) at_vertex[i * stride] = field.at(mesh.vertices[i * stride], -1, exact_above);
+    });
+    for (const Sample& sample : at_vertex)
+      if (sample.value > exact_above) found.lower = std::max(found.lower, sample.value);
+  }
 
   std::vector<Cell> cells(mesh.faces.size()), halves;
   for_each(cells.size(), [&](std::size_t f) {

@@ -1,0 +1,260 @@
+"""Certified distances: one-sided Hausdorff, and unions of hulls against a surface."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import manifold3d
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rlacd import _native
+from rlacd.errors import OptionError
+from rlacd.solid.distance import HullDistances, directed_hausdorff, hull_distances, hull_union
+from rlacd.solid.hull import Hull
+from tests.shapes import Closed, Floats, box, depth_in, from_manifold, to_manifold
+
+TOLERANCE = 1e-3
+BRICK = ((0, 0, 0), (2, 1, 1))
+
+
+def hulls_of(*solids: Any) -> list[Hull]:
+    found = [Hull.of(from_manifold(solid).vertices) for solid in solids]
+    return [hull for hull in found if hull is not None]
+
+
+def measured(hulls: list[Hull], surface: Any) -> HullDistances:
+    mesh = from_manifold(surface)
+    found = hull_distances(hulls, mesh.vertices, mesh.faces, TOLERANCE)
+    for lower, upper in (found.over, found.under):
+        assert 0 <= lower <= upper <= lower + TOLERANCE + 1e-12
+    return found
+
+
+def close(interval: tuple[float, float], value: float) -> bool:
+    return interval[0] - 1e-5 <= value <= interval[1] + 1e-5
+
+
+@pytest.mark.parametrize("levels", [1, 5])
+@pytest.mark.parametrize(
+    ("hulls", "over", "under"),
+    [
+        ([BRICK], 0, 0),
+        ([((0, 0, 0), (0.7, 1, 1)), ((0.7, 0, 0), (2, 1, 1))], 0, 0),
+        ([((0, 0, 0), (1.2, 1, 1)), ((0.7, 0, 0), (2, 1, 1))], 0, 0),
+        ([((x, y, 0), (x + 1, y + 0.5, 1)) for x in (0, 1) for y in (0, 0.5)], 0, 0),
+        ([BRICK, BRICK], 0, 0),
+        ([BRICK, ((0.5, 0.2, 0.2), (0.9, 0.8, 0.8))], 0, 0),
+        ([BRICK, ((0, 0, 0), (0.9, 0.8, 0.8))], 0, 0),
+        ([((0, 0, 0), (0.7, 1, 1))], 0.5, 1.3),
+        ([((-0.1, -0.1, -0.1), (2.1, 1.1, 1.1))], 0.1 * 3**0.5, 0),
+        ([((0, 0, 0), (1, 1, 1)), ((0.5, 0, 0), (2, 1, 1.25))], 0.25, 0),
+        ([((0, 0, 0), (0.9, 1, 1)), ((1.1, 0, 0), (2, 1, 1))], 0.5, 0.1),
+        ([((0, 0, 0), (1, 1, 1)), ((1, 0.25, 0.25), (2, 0.75, 0.75))], 0.25, 0.25 * 2**0.5),
+    ],
+    ids=[
+        "the same box",
+        "touching",
+        "overlapping, coplanar outside",
+        "four touching along a line",
+        "doubled",
+        "box in a box",
+        "box in a box, sharing sides",
+        "a missing part",
+        "fattened",
+        "one of two coplanar ones too high",
+        "a crack wide enough to count",
+        "touching in a part of a side",
+    ],
+)
+def test_known_answers(hulls: list[Any], over: float, under: float, levels: int) -> None:
+    for turn in ((0, 0, 0), (10, 20, 30)):
+        found = measured(
+            hulls_of(*(box(*hull).rotate(turn) for hull in hulls)), box(*BRICK).refine(levels).rotate(turn)
+        )
+        assert close(found.over, over)
+        assert close(found.under, under)
+
+
+def test_touching_facets_are_no_surface_and_outer_ones_are() -> None:
+    # A pear: two balls of unequal size, cut where they meet; the middle of the cut is 0.44 from the surface.
+    pear = manifold3d.Manifold.sphere(0.8, 48) + manifold3d.Manifold.sphere(0.5, 48).translate((0.9, 0, 0))
+    normal, offset = (1.0, 0.0, 0.0), 2 / 3
+    halves = hulls_of(*pear.split_by_plane(normal, offset))
+    found = measured(halves, pear)
+    assert found.over[1] < 0.02
+    _, faces = hull_union(halves).exposed()
+    vertices, _ = hull_union(halves).exposed()
+    on_cut = np.all(np.abs(vertices[faces][:, :, 0] - offset) < 1e-9, axis=1)
+    rim = np.linalg.norm(vertices[faces][on_cut][:, :, 1:], axis=2)
+    assert rim.size == 0 or rim.min() > 0.3  # at most the ring by which one half's hull is wider
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-9, 1e-7, 5e-7])
+@pytest.mark.parametrize("tilt", [0.0, 1e-7])
+def test_hairline_cracks_are_closed(gap: float, tilt: float) -> None:
+    hulls = hulls_of(box((0, 0, 0), (0.7 - gap, 1, 1)), box((0.7, 0, 0), (2, 1, 1)).rotate((0, np.rad2deg(tilt), 0)))
+    assert measured(hulls, box(*BRICK)).over[1] < 2 * TOLERANCE
+
+
+@pytest.mark.parametrize("angle", [1e-8, 1e-6, 1e-4, 1e-2])
+def test_nearly_coplanar_overlapping_facets_do_not_hide_each_other(angle: float) -> None:
+    # Two lids that cross at a tiny angle, both above the surface: some part of either must stay.
+    low, tilted = box((0, 0, 0), (2, 1, 1.2)), box((0, 0, 0), (2, 1, 1.2)).rotate((0, np.rad2deg(angle), 0))
+    assert measured(hulls_of(low, tilted), box(*BRICK)).over[0] >= 0.2 - 1e-5
+
+
+def test_area_of_the_exposed_surface() -> None:
+    touching = hull_union(hulls_of(box((0, 0, 0), (0.7, 1, 1)), box((0.7, 0, 0), (2, 1, 1)))).exposed()
+    assert _native.mesh_area(*touching) == pytest.approx(10)
+    crossing = [box((-1, -0.2, -0.2), (1, 0.2, 0.2)), box((-0.2, -1, -0.2), (0.2, 1, 0.2)).translate((0, 0, 0.1))]
+    exposed = hull_union(hulls_of(*crossing)).exposed()
+    joint = from_manifold(crossing[0] + crossing[1])
+    assert _native.mesh_area(*exposed) == pytest.approx(_native.mesh_area(joint.vertices, joint.faces), rel=1e-4)
+
+
+unit = st.floats(-1, 1, width=32)
+clouds = st.lists(st.tuples(unit, unit, unit), min_size=4, max_size=8)
+
+
+@settings(deadline=None, max_examples=80)
+@given(st.lists(clouds, min_size=1, max_size=5), st.integers(0, 3))
+def test_unions_against_dense_sampling(points: list[list[tuple[float, float, float]]], levels: int) -> None:
+    hulls = [hull for cloud in points if (hull := Hull.of(np.array(cloud))) is not None and hull.volume > 1e-4]
+    if not hulls:
+        return
+    surface = from_manifold(manifold3d.Manifold.sphere(0.7, 4 * (levels + 1)))
+    found = hull_distances(hulls, surface.vertices, surface.faces, TOLERANCE)
+    distances = hull_union(hulls).distance(sampled(surface))
+    assert distances.max() <= found.under[1] + 1e-7
+    assert found.under[0] <= distances.max() + 0.05
+    # The exposed surface lies on facets, inside no hull; every sample of a facet that is inside none is covered by it.
+    exposed, faces = hull_union(hulls).exposed()
+    points = _native.sample_surface(exposed, faces, 5000, 0)[0]
+    assert all(depth_in(Closed(hull.vertices, hull.faces), points).max() < 1e-5 for hull in hulls)
+    over = _native.Surface(surface.vertices, surface.faces).distance(points).max()
+    assert over <= found.over[1] + 1e-7
+    assert found.over[0] <= over + 0.1
+    shown = np.vstack([of_facets(hull, [other for other in hulls if other is not hull]) for hull in hulls])
+    if len(shown):
+        assert _native.Surface(exposed, faces).distance(shown).max() < 1e-5
+
+
+def sampled(mesh: Closed, count: int = 20_000) -> Floats:
+    return np.vstack([_native.sample_surface(mesh.vertices, mesh.faces, count, 3)[0], mesh.vertices])
+
+
+def of_facets(hull: Hull, others: list[Hull]) -> Floats:
+    points = sampled(Closed(hull.vertices, hull.faces), 5000)
+    for other in others:
+        points = points[depth_in(Closed(other.vertices, other.faces), points) < -1e-5]
+        if len(points) == 0:
+            break
+    return points
+
+
+def test_distance_to_the_union_is_that_to_the_nearest_hull() -> None:
+    rng = np.random.default_rng(0)
+    hulls = [h for c in rng.uniform(-1, 1, (12, 3)) if (h := Hull.of(c + rng.normal(scale=0.2, size=(20, 3))))]
+    points = rng.uniform(-2, 2, (3000, 3))
+    expected = np.full(len(points), np.inf)
+    for hull in hulls:
+        outside = depth_in(Closed(hull.vertices, hull.faces), points) < 0
+        expected = np.minimum(expected, outside * _native.Surface(hull.vertices, hull.faces).distance(points))
+    np.testing.assert_allclose(hull_union(hulls).distance(points), expected, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_hulls_of_cut_meshes(corpus: Path) -> None:
+    """Hulls of the pieces of a cut mesh hold it, and touch along the cuts only."""
+    rng = np.random.default_rng(0)
+    rows = [row for row in csv.DictReader((corpus / "index.csv").open()) if row["watertight"] == "1"]
+    rows = [row for row in rows if int(row["faces"]) < 8000]
+    done = 0
+    for row in rng.permutation(np.array(rows, dtype=object))[:60]:
+        mesh = trimesh.load(corpus / row["file"], process=False)
+        vertices = 2 * (np.asarray(mesh.vertices) - mesh.bounds.mean(axis=0)) / mesh.extents.max()
+        pieces = to_manifold(vertices, np.asarray(mesh.faces)).decompose()
+        for _ in range(5):
+            pieces = sorted((p for p in pieces if p.volume() > 1e-6), key=lambda piece: -piece.volume())
+            if not pieces:
+                break
+            normal = np.eye(3)[rng.integers(3)]
+            heights = from_manifold(pieces[0]).vertices @ normal
+            offset = heights.min() + np.ptp(heights) * rng.uniform(0.3, 0.7)
+            pieces = [part for half in pieces[0].split_by_plane(normal, offset) for part in half.decompose()] + pieces[
+                1:
+            ]
+        hulls = [h for p in pieces if (h := Hull.of(from_manifold(p).vertices))]
+        if not hulls:
+            continue
+        done += 1
+        kept = np.vstack([from_manifold(p).vertices for p in pieces])
+        assert hull_union(hulls).distance(kept).max() < 1e-9
+        surface = Closed(np.ascontiguousarray(vertices), np.ascontiguousarray(mesh.faces, dtype=np.int32))
+        found = hull_distances(hulls, surface.vertices, surface.faces)
+        exposed, faces = hull_union(hulls).exposed()
+        points = _native.sample_surface(exposed, faces, 20_000, 0)[0]
+        distances = _native.Surface(surface.vertices, surface.faces).distance(points)
+        assert distances.max() <= found.over[1] + 1e-7
+        assert hull_union(hulls).distance(sampled(surface)).max() <= found.under[1] + 1e-7
+        assert found.over[1] - found.over[0] <= 2e-3 + 1e-12
+        assert found.under[1] - found.under[0] <= 2e-3 + 1e-12
+    assert done > 30
+
+
+def test_hausdorff_of_a_shifted_box() -> None:
+    brick, shifted = from_manifold(box(*BRICK)), from_manifold(box(*BRICK).translate((0.3, 0, 0)))
+    lower, upper = directed_hausdorff(
+        brick.vertices, brick.faces, _native.Surface(shifted.vertices, shifted.faces), 1e-4
+    )
+    assert lower <= 0.3 + 1e-12
+    assert upper >= 0.3 - 1e-12
+    assert upper - lower <= 1e-4
+
+
+def test_hausdorff_is_found_between_the_corners() -> None:
+    # A plate above a groove: the farthest point is in the middle of the plate, at none of its corners.
+    plate = np.array([[-1.0, -1, 0], [1, -1, 0], [0, 2, 0]])
+    rails = np.array([[-1.0, -3, 0], [-1, 3, 0], [-2, 0, 0], [1, -3, 0], [1, 3, 0], [2, 0, 0]])
+    surface = _native.Surface(rails, np.array([[0, 1, 2], [3, 4, 5]], dtype=np.int32))
+    lower, upper = directed_hausdorff(plate, np.array([[0, 1, 2]], dtype=np.int32), surface, 1e-6)
+    assert lower == pytest.approx(1, abs=1e-6)
+    assert upper == pytest.approx(1, abs=1e-6)
+
+
+def test_results_do_not_depend_on_threads() -> None:
+    rng = np.random.default_rng(1)
+    hulls = [h for c in rng.uniform(-0.6, 0.6, (15, 3)) if (h := Hull.of(c + rng.normal(scale=0.2, size=(30, 3))))]
+    ball = from_manifold(manifold3d.Manifold.sphere(0.8, 60))
+    one, many = (hull_distances(hulls, ball.vertices, ball.faces, 1e-4, threads) for threads in (1, 7))
+    assert one == many
+    for a, b in zip(hull_union(hulls).exposed(threads=1), hull_union(hulls).exposed(threads=7), strict=True):
+        assert a.tobytes() == b.tobytes()
+    surface = _native.Surface(hulls[0].vertices, hulls[0].faces)
+    assert directed_hausdorff(ball.vertices, ball.faces, surface, 1e-4, 1) == directed_hausdorff(
+        ball.vertices, ball.faces, surface, 1e-4, 7
+    )
+
+
+def test_no_hulls_add_nothing_and_miss_everything() -> None:
+    assert measured_none() == HullDistances((0.0, 0.0), (np.inf, np.inf))
+
+
+def measured_none() -> HullDistances:
+    brick = from_manifold(box(*BRICK))
+    return hull_distances([], brick.vertices, brick.faces)
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, float("nan")])
+def test_bad_tolerances_are_refused(tolerance: float) -> None:
+    brick = from_manifold(box(*BRICK))
+    with pytest.raises(OptionError, match="must be positive"):
+        hull_distances(hulls_of(box(*BRICK)), brick.vertices, brick.faces, tolerance)
+    with pytest.raises(OptionError, match="must be positive"):
+        directed_hausdorff(brick.vertices, brick.faces, _native.Surface(brick.vertices, brick.faces), tolerance)
