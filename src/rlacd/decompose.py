@@ -11,7 +11,6 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
-from rlacd import _native
 from rlacd._version import __version__
 from rlacd.clock import Clock
 from rlacd.criteria import Concavity, Criterion
@@ -22,7 +21,7 @@ from rlacd.policies import Policy, make_policy
 from rlacd.progress import ProgressCallback
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part, Plane
-from rlacd.solid.distance import union_over, union_under
+from rlacd.solid.distance import hull_distances
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.load import InputMesh, load_mesh
@@ -34,9 +33,6 @@ MeshLike: TypeAlias = "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene 
 
 COARSER = 1.3
 """With `max_hulls`, decompositions at thresholds growing by this factor compete."""
-
-MEASURED_WITHIN = 2e-3
-"""Certified width of the Hausdorff distances in the report."""
 
 HONEST_WITHIN = 5e-3
 """What the hulls' union may reach beyond the threshold before the report says so: repair and measurement."""
@@ -192,9 +188,10 @@ def _report(
 ) -> dict[str, Any]:
     errors = workers.map(criterion.error, parts)
     hulls = [part.hull for part in parts]
-    surface = _native.Surface(*solid.surface) if len(solid.surface[1]) else None
-    over = union_over(hulls, surface, MEASURED_WITHIN, workers.threads)[1] if surface else None
-    under = union_under(hulls, surface, MEASURED_WITHIN, workers.threads)[1] if surface else None
+    over = under = None
+    if len(solid.surface[1]):  # a cloud of points has no surface
+        distances = hull_distances(hulls, *solid.surface, threads=workers.threads)
+        over, under = distances.over[1], distances.under[1]
     return {
         "name": source.name,
         "version": __version__,

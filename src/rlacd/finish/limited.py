@@ -1,0 +1,78 @@
+"""Hulls with few vertices and faces: the limit as part of the criterion, and its last application."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rlacd.criteria import Criterion
+from rlacd.criteria.criterion import Part as PartLike
+from rlacd.finish.limits import limit_hull
+from rlacd.solid.component import Part
+
+BOX_VERTICES, BOX_FACES = 8, 12
+"""Limits below a box's are applied at the end only: hardly anything could ever meet them, however often it is cut."""
+
+
+@dataclass(frozen=True)
+class Limited:
+    """A criterion that has to hold for the limited hull too.
+
+    Attributes
+    ----------
+    criterion : Criterion
+    max_vertices, max_faces : int or None
+        Limits on the hull's vertices and triangles.
+    """
+
+    criterion: Criterion
+    max_vertices: int | None
+    max_faces: int | None
+
+    @property
+    def reach(self) -> float:
+        """The underlying criterion's."""
+        return self.criterion.reach
+
+    def excludes(self, volume: float, hull_volume: float) -> bool:
+        """Limiting a hull only adds volume, so the underlying bound holds."""
+        return self.criterion.excludes(volume, hull_volume)
+
+    def least_error(self, volume: float, hull_volume: float) -> float:
+        """Limiting a hull only adds volume, so the underlying bound holds."""
+        return self.criterion.least_error(volume, hull_volume)
+
+    def is_met(self, part: PartLike) -> bool:
+        """Decide for the exact hull first, then for the limited one."""
+        return self.criterion.is_met(part) and (self._fits(part) or self.criterion.is_met(self._limited(part)))
+
+    def error(self, part: PartLike) -> float:
+        """Measure the part against its limited hull."""
+        return self.criterion.error(self._limited(part))
+
+    def scaled(self, factor: float) -> Limited:
+        """Get the same limits with a larger threshold."""
+        return Limited(self.criterion.scaled(factor), self.max_vertices, self.max_faces)
+
+    def _fits(self, part: PartLike) -> bool:
+        return (self.max_vertices is None or len(part.hull.vertices) <= self.max_vertices) and (
+            self.max_faces is None or len(part.hull.faces) <= self.max_faces
+        )
+
+    def _limited(self, part: PartLike) -> PartLike:
+        if self._fits(part):
+            return part
+        hull = limit_hull(part.hull, self.max_vertices, self.max_faces)
+        return Part(part.vertices, part.faces, part.volume, hull)
+
+
+def limited(criterion: Criterion, max_vertices: int | None, max_faces: int | None) -> Criterion:
+    """Add limits to a criterion where there are any that cutting can meet."""
+    if (max_vertices or BOX_VERTICES) < BOX_VERTICES or (max_faces or BOX_FACES) < BOX_FACES:
+        return criterion
+    return criterion if max_vertices is None and max_faces is None else Limited(criterion, max_vertices, max_faces)
+
+
+def limit_part(part: Part, max_vertices: int | None, max_faces: int | None) -> Part:
+    """Get the part with a hull inside the limits; the same part where it is already."""
+    hull = limit_hull(part.hull, max_vertices, max_faces)
+    return part if hull is part.hull else Part(part.vertices, part.faces, part.volume, hull)

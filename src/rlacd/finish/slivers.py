@@ -1,0 +1,77 @@
+"""Slivers: thin hulls that a cut shaved off and that nobody misses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.optimize import linprog
+
+from rlacd import _native
+from rlacd.solid.component import Part
+from rlacd.solid.distance import hull_union
+from rlacd.solid.hull import Hull
+from rlacd.workers import Workers
+
+THIN = 0.01
+"""A hull is a sliver when its inscribed ball's radius is below this share of its largest extent."""
+
+MISSED = 2e-3
+"""A sliver is dropped when no point of it lies farther than this from the other hulls (0.1 % of the longest side)."""
+
+
+def drop_slivers(parts: Sequence[Part], workers: Workers) -> list[Part]:
+    """Drop slivers that the other hulls stand for; slivers of parts that are thin themselves stay.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+        Merged parts: what could be united with a neighbour has been.
+
+    Returns
+    -------
+    list of Part
+        The rest, in the same order; every point of what was dropped lies within `MISSED` of the rest.
+    """
+    kept = list(parts)
+    thin = [part for part, is_thin in zip(parts, workers.map(lambda p: is_sliver(p.hull), parts), strict=True) if is_thin]
+    for sliver in sorted(thin, key=lambda part: part.hull.volume):
+        others = [part for part in kept if part is not sliver and _near(part, sliver)]
+        if others:
+            union = hull_union([part.hull for part in others], workers.threads)
+            _, missed = union.under(sliver.hull.vertices, sliver.hull.faces, MISSED / 4, workers.threads)
+            if missed <= MISSED:
+                kept.remove(sliver)
+    return kept
+
+
+def is_sliver(hull: Hull) -> bool:
+    """Tell whether the hull's inscribed ball is smaller than `THIN` times its largest extent."""
+    extent = float(np.ptp(hull.vertices, axis=0).max())
+    # A convex body's inradius lies between volume / area and three times that.
+    ratio = hull.volume / _native.mesh_area(hull.vertices, hull.faces)
+    if ratio > THIN * extent:
+        return False
+    return 3 * ratio < THIN * extent or inradius(hull) < THIN * extent
+
+
+def inradius(hull: Hull) -> float:
+    """Radius of the largest ball inside the hull (the Chebyshev ball, by linear programming)."""
+    corners = hull.vertices[hull.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1)
+    normals = normals[lengths > 0] / lengths[lengths > 0, None]
+    offsets = (hull.vertices @ normals.T).max(axis=0)
+    ball = linprog(
+        [0, 0, 0, -1],
+        A_ub=np.column_stack([normals, np.ones(len(normals))]),
+        b_ub=offsets,
+        bounds=[(None, None)] * 3 + [(0, None)],
+        method="highs",
+    )
+    return float(ball.x[3]) if ball.success else 0.0
+
+
+def _near(part: Part, sliver: Part) -> bool:
+    gap = np.maximum(part.box[0] - sliver.box[1], sliver.box[0] - part.box[1])
+    return bool((gap <= MISSED).all())
