@@ -10,6 +10,7 @@ namespace rlacd {
 namespace {
 
 constexpr double kRoundoff = 0x1p-53;
+constexpr double kFat = 1e-2;  // least ratio of inradius to extent for which the tolerance applies
 
 }  // namespace
 
@@ -24,6 +25,7 @@ void HullBuilder::clear() {
   facets_.clear();
   free_.clear();
   next_outside_.clear();
+  extent_ = Box();
   insertion_ = 0;
 }
 
@@ -45,6 +47,7 @@ std::int32_t HullBuilder::new_facet(std::int32_t a, std::int32_t b, std::int32_t
   // Each component of the cross product is off by less than 6 u |ab||ac| and the dot product adds 3 terms of relative
   // error 5 u, all in the maximum norm: 40 u |ab||ac||p - a| covers their sum.
   f.error = 40 * kRoundoff * max_abs(ab) * max_abs(ac);
+  f.length = norm(f.normal);
   f.outside = -1;
   f.alive = true;
   f.mark = -1;
@@ -58,7 +61,8 @@ std::int32_t HullBuilder::new_facet(std::int32_t a, std::int32_t b, std::int32_t
   return slot;
 }
 
-void HullBuilder::assign(std::int32_t point, const std::vector<std::int32_t>& facets) {
+template <class Sees>
+void HullBuilder::assign(std::int32_t point, const std::vector<std::int32_t>& facets, const Sees& sees) {
   const Vec3 p = points_[point];
   for (const std::int32_t id : facets) {
     Facet& f = facets_[id];
@@ -129,15 +133,22 @@ void HullBuilder::add(const std::vector<Vec3>& points) {
   auto first = static_cast<std::int32_t>(points_.size());
   points_.insert(points_.end(), points.begin(), points.end());
   next_outside_.resize(points_.size(), -1);
+  for (const Vec3 p : points) extent_.extend(p);
   if (rank_ < 3) {
     if (!initialise()) return;
     first = 0;
   }
-  std::vector<std::int32_t> alive;
+  std::vector<std::int32_t> alive;  // the newest first: points that come in order see these
   alive.reserve(facets_.size());
-  for (std::size_t i = 0; i < facets_.size(); ++i)
+  for (std::size_t i = facets_.size(); i-- > 0;)
     if (facets_[i].alive) alive.push_back(static_cast<std::int32_t>(i));
-  for (auto i = first; i < static_cast<std::int32_t>(points_.size()); ++i) assign(i, alive);
+  // Points below every facet's plane moved out by the tolerance t lie within t D / r of a hull of diameter D and inradius
+  // r: nothing, unless the hull is flat. The inradius is at least volume / area.
+  const bool fat = tolerance_ > 0 && volume() > kFat * area() * max_abs(extent_.upper - extent_.lower);
+  const auto clearly = [this, fat](const Facet& f, Vec3 p) {
+    return (!fat || height(f, p) >= tolerance_ * f.length) && sees(f, p);
+  };
+  for (auto i = first; i < static_cast<std::int32_t>(points_.size()); ++i) assign(i, alive, clearly);
   std::vector<std::int32_t> pending;
   for (const std::int32_t id : alive)
     if (facets_[id].outside >= 0) pending.push_back(id);
@@ -215,8 +226,10 @@ void HullBuilder::insert(std::int32_t point, std::int32_t facet, std::vector<std
   }
   free_.insert(free_.end(), visible_.begin(), visible_.end());
 
-  // A point that saw a removed facet and still lies outside sees one of the new facets, so only those are searched.
-  for (const std::int32_t orphan : orphans_) assign(orphan, created_);
+  // A point that saw a removed facet and still lies outside sees one of the new facets, so only those are searched. It
+  // may see them by less than the tolerance and another facet by more: here nothing is left out.
+  const auto strictly = [this](const Facet& f, Vec3 q) { return sees(f, q); };
+  for (const std::int32_t orphan : orphans_) assign(orphan, created_, strictly);
   for (const std::int32_t id : created_)
     if (facets_[id].outside >= 0) pending.push_back(id);
 }

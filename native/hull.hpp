@@ -18,6 +18,10 @@ namespace rlacd {
 
 class HullBuilder {
  public:
+  // Points about `tolerance` outside the hull reached so far, unless it is flat, may be left out; 0 for the exact hull.
+  // Decisions about the points that are taken in stay exact.
+  explicit HullBuilder(double tolerance = 0) : tolerance_(tolerance) {}
+
   void reserve(std::size_t points);
   void clear();
 
@@ -39,6 +43,7 @@ class HullBuilder {
     Vec3 normal;                // (b - a) x (c - a), not normalised
     Vec3 origin;                // corner a
     double error;               // |computed height - exact height| <= error * max_abs(p - a)
+    double length;              // of the normal
     std::int32_t outside;       // first point of the list that this facet is responsible for, -1 when none
     bool alive;
     std::int32_t mark;  // number of the last insertion that looked at this facet
@@ -48,15 +53,18 @@ class HullBuilder {
   bool sees(const Facet& f, Vec3 p) const;
   bool initialise();
   std::int32_t new_facet(std::int32_t a, std::int32_t b, std::int32_t c);
-  void assign(std::int32_t point, const std::vector<std::int32_t>& facets);
+  template <class Sees>
+  void assign(std::int32_t point, const std::vector<std::int32_t>& facets, const Sees& sees);
   void expand(std::vector<std::int32_t>& pending);
   void insert(std::int32_t point, std::int32_t facet, std::vector<std::int32_t>& pending);
 
+  double tolerance_;
   int rank_ = -1;
   std::vector<Vec3> points_;
   std::vector<Facet> facets_;
   std::vector<std::int32_t> free_;
   std::vector<std::int32_t> next_outside_;  // linked lists of outside points, by point
+  Box extent_;  // of all points
   std::int32_t insertion_ = 0;
 
   struct HorizonEdge {

@@ -68,6 +68,10 @@ struct Slab {
   std::vector<Vec3> lower, inside, upper;
 };
 
+// Points that stick out of a hull by less than this, relative to the mesh, are rounding: the crossings of one long edge
+// with many planes are collinear but for the last bits.
+constexpr double kFilm = 1e-13;
+
 class DirectionSweep {
  public:
   DirectionSweep(const Mesh& mesh, Vec3 n, const std::vector<double>& offsets)
@@ -94,6 +98,7 @@ class DirectionSweep {
       lowest_ = std::min(lowest_, s_[i]);
       highest_ = std::max(highest_, s_[i]);
     }
+    film_ = kFilm * (highest_ - lowest_);
     lowest_around_ = highest_around_ = s_;
     for (const Triangle& f : mesh_.faces) {
       const auto [low, high] = std::minmax({s_[f[0]], s_[f[1]], s_[f[2]]});
@@ -130,7 +135,7 @@ class DirectionSweep {
       }
     for (std::vector<Vec3>& points : crossings_) reduce_to_planar_hull(points, n_);
     slabs_.resize(d_.size() + 1);
-    HullBuilder hull;
+    HullBuilder hull(film_);
     for (std::size_t j = 0; j <= d_.size(); ++j) {
       hull.clear();
       if (j > 0) hull.add(crossings_[j - 1]);
@@ -197,7 +202,7 @@ class DirectionSweep {
   }
 
   void grow_hulls(bool below) {
-    HullBuilder hull;
+    HullBuilder hull(film_);
     const auto planes = static_cast<std::ptrdiff_t>(d_.size());
     const std::ptrdiff_t step = below ? 1 : -1;
     Box box;
@@ -228,6 +233,7 @@ class DirectionSweep {
   std::vector<bool> used_;
   double lowest_ = std::numeric_limits<double>::infinity();
   double highest_ = -std::numeric_limits<double>::infinity();
+  double film_ = 0;
   std::vector<std::vector<Vec3>> inside_;     // M + 1 slabs: their vertices
   std::vector<std::vector<Vec3>> crossings_;  // M planes: corners of the section's convex hull
   std::vector<Slab> slabs_;                   // M + 1 slabs
@@ -244,14 +250,23 @@ std::vector<PlaneScore> sweep(const Mesh& mesh, const std::vector<Vec3>& directi
   if (directions.empty()) return {};
   if (offsets.size() % directions.size() != 0) throw std::invalid_argument("every direction needs as many offsets");
   const std::size_t planes = offsets.size() / directions.size();
-  std::vector<PlaneScore> scores(offsets.size());
+  const auto row = [&](std::size_t k) { return offsets.begin() + static_cast<std::ptrdiff_t>(k * planes); };
+  // Principal axes are often coordinate axes: the same planes are swept once.
+  std::vector<std::size_t> same(directions.size());
+  for (std::size_t k = 0; k < directions.size(); ++k) {
+    if (!std::is_sorted(row(k), row(k) + static_cast<std::ptrdiff_t>(planes)))
+      throw std::invalid_argument("offsets must ascend");
+    same[k] = k;
+    for (std::size_t earlier = 0; earlier < k && same[k] == k; ++earlier)
+      if (directions[earlier] == directions[k] && std::equal(row(k), row(k + 1), row(earlier))) same[k] = earlier;
+  }
+  std::vector<std::vector<PlaneScore>> by_direction(directions.size());
   parallel_for(directions.size(), threads, [&](std::size_t k) {
-    const auto first = offsets.begin() + static_cast<std::ptrdiff_t>(k * planes);
-    const std::vector<double> own(first, first + static_cast<std::ptrdiff_t>(planes));
-    if (!std::is_sorted(own.begin(), own.end())) throw std::invalid_argument("offsets must ascend");
-    const std::vector<PlaneScore> result = sweep_direction(mesh, directions[k], own);
-    std::copy(result.begin(), result.end(), scores.begin() + static_cast<std::ptrdiff_t>(k * planes));
+    if (same[k] == k) by_direction[k] = sweep_direction(mesh, directions[k], {row(k), row(k + 1)});
   });
+  std::vector<PlaneScore> scores;
+  scores.reserve(offsets.size());
+  for (const std::size_t k : same) scores.insert(scores.end(), by_direction[k].begin(), by_direction[k].end());
   return scores;
 }
 

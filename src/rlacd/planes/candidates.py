@@ -13,6 +13,10 @@ OFFSETS_PER_AXIS = 25
 """25 planes along each of 6 axes: the paper's 150."""
 
 
+SAME_AXIS = 1e-3
+"""Principal axes within this angle (radians) of a coordinate axis are taken to be that axis."""
+
+
 @dataclass(frozen=True, eq=False)
 class Candidates:
     """K directions with M parallel planes each.
@@ -43,9 +47,15 @@ def axis_and_principal(component: Component, per_axis: int = OFFSETS_PER_AXIS) -
 
     The planes divide the component's extent along each direction into `per_axis` + 1 equal slabs (the paper, 3.2).
     """
-    directions = np.concatenate([np.eye(3), component.principal_axes])
+    directions = np.concatenate([np.eye(3), _snapped(component.principal_axes)])
     heights = component.hull.vertices @ directions.T
     lower, upper = heights.min(axis=0), heights.max(axis=0)
     steps = np.arange(1, per_axis + 1) / (per_axis + 1)
     offsets = lower[:, None] + (upper - lower)[:, None] * steps
     return Candidates(np.ascontiguousarray(directions), np.ascontiguousarray(offsets))
+
+
+def _snapped(axes: FloatArray) -> FloatArray:
+    nearest = np.eye(3)[np.abs(axes).argmax(axis=1)]
+    aligned = np.linalg.norm(np.cross(axes, nearest), axis=1) < SAME_AXIS
+    return np.where(aligned[:, None], nearest, axes)

@@ -87,7 +87,7 @@ class Component(Part):
         """Principal axes of the surface [3, 3], one a row, the longest first, right-handed.
 
         Eigenvectors of the second moments of the surface (exact over its triangles). Their signs are fixed by making
-        the largest entry positive; axes closer than 1e-6 to a coordinate axis are that axis.
+        the largest entry positive.
         """
         corners = self.vertices[self.faces]
         a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
@@ -102,8 +102,6 @@ class Component(Part):
         for axis in axes:
             largest = int(np.argmax(np.abs(axis)))
             axis *= np.sign(axis[largest])
-            if axis[largest] > 1 - 1e-12:
-                axis[:] = np.eye(3)[largest]
         return axes
 
     def cut(self, plane: Plane) -> tuple[Component | None, Component | None]:
