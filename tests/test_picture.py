@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
 from pathlib import Path
 
@@ -110,6 +111,15 @@ def test_a_missing_extra_is_one_sentence_with_the_command(
 ) -> None:
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(MissingExtraError, match=r"pip install 'rlacd\[view\]'"):
+        towers().picture(tmp_path / "out.png")
+
+
+def test_an_extra_that_does_not_load_is_told_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(module: str) -> None:
+        raise ImportError("libatomic.so.1: cannot open shared object file")
+
+    monkeypatch.setattr(importlib, "import_module", fail)
+    with pytest.raises(MissingExtraError, match=r"does not load here \(libatomic"):
         towers().picture(tmp_path / "out.png")
 
 
