@@ -283,6 +283,11 @@ def test_a_folder_gets_one_file_a_hull(tmp_path: Path, ending: str | None) -> No
         assert same_points(mesh.vertices, hull.vertices, 1e-6)
 
 
+def test_a_format_makes_a_name_without_ending_a_folder(tmp_path: Path) -> None:
+    folder = save_hulls(THREE[:1], tmp_path / "hulls", stem="chair", file_format="ply")
+    assert files_of(folder) == ["chair_000.ply", "chair_hulls.json"]
+
+
 def test_an_existing_folder_needs_no_slash_and_loses_only_our_older_hulls(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("mine")
     (tmp_path / "chair_007.obj").write_text("also mine: no run wrote it")
@@ -323,12 +328,12 @@ def test_a_failing_disk_leaves_the_folder_as_it_was(
     before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     real, calls = os.fsync, iter(range(1000))
 
-    def fail_on_the_third(descriptor: int) -> None:
+    def fail_on_the_fifth(descriptor: int) -> None:
         if next(calls) == 4:
             raise OSError(errno.ENOSPC, "No space left on device")
         real(descriptor)
 
-    monkeypatch.setattr(os, "fsync", fail_on_the_third)
+    monkeypatch.setattr(os, "fsync", fail_on_the_fifth)
     with pytest.raises(OutputError, match="disk is full"):
         save_hulls(THREE, f"{folder}/", stem="chair")
     assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
