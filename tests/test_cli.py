@@ -263,6 +263,13 @@ def test_a_real_missing_file(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("name", [".", "/", "", "..", "chair.glb/"])
+def test_a_real_odd_name(name: str, tmp_path: Path) -> None:
+    run = shell("decompose", name, cwd=tmp_path)
+    assert run.returncode in (2, 3), run.stderr
+    assert run.stderr.count("\n") == 1
+
+
 def test_a_real_bad_option(mesh: Path) -> None:
     run = shell("decompose", mesh, "--threshold", "-1")
     assert run.returncode == 2
