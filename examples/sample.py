@@ -56,12 +56,12 @@ def chair() -> Manifold:
 def jug() -> Manifold:
     """Return a hollow jug 0.2 m high with a handle, its bottom on z = 0."""
     outline = [(0.055, 0.0), (0.075, 0.05), (0.07, 0.12), (0.055, 0.17), (0.066, 0.20)]
-    inside = [(0.05, 0.01), (0.067, 0.05), (0.062, 0.12), (0.047, 0.17), (0.058, 0.20)]
+    inside = [(0.05, 0.01), (0.067, 0.05), (0.062, 0.12), (0.047, 0.17), (0.06, 0.205)]
     body, room = (
         CrossSection([[(0.0, line[0][1]), *line, (0.0, line[-1][1])]]).revolve(40) for line in (outline, inside)
     )
     bend = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 9)
-    grip = np.stack([0.055 + 0.06 * np.cos(bend), np.zeros(9), 0.11 + 0.06 * np.sin(bend)], axis=1)
+    grip = np.stack([0.055 + 0.06 * np.cos(bend), np.zeros(9), 0.108 + 0.058 * np.sin(bend)], axis=1)
     return body + chain(grip, 0.009) - room
 
 

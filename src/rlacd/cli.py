@@ -305,7 +305,7 @@ def info(
 def _output_name(mesh: Path, output: str | None) -> str:
     if output == str(STDOUT):
         raise OptionError("hulls cannot be written to stdout; give -o a file name, and use - with --report only.")
-    return str(mesh.with_name(f"{mesh.stem or 'mesh'}_hulls.glb")) if output is None else output
+    return str(mesh.parent / f"{mesh.stem or 'mesh'}_hulls.glb") if output is None else output
 
 
 def _check_output(mesh: Path, place: str, report: Path | None, picture: Path | None) -> None:

@@ -45,6 +45,8 @@ class Decomposition:
         ``hausdorff`` : dict
             ``over``: how far the hulls' surface reaches from the input's surface. ``under``: how far the input's
             surface lies from the hulls' surface.
+        ``scale`` : float
+            What one unit of the input measures in that frame: divide a length by it to have it in the input's unit.
         ``seconds`` : dict
             Wall time of each stage, and their ``total``.
         ``repair`` : list of dict
@@ -71,7 +73,8 @@ class Decomposition:
         ----------
         path : path-like
             ``*.glb``, ``*.obj``, ``*.ply`` or ``*.stl`` for one file with a node, group or solid a hull
-            (``hull_000``, ...). An existing folder, or a name ending in ``/``, for one file a hull.
+            (``hull_000``, ...). An existing folder, text ending in ``/``, or a name without ending given with a
+            `file_format`, for one file a hull.
         file_format : str, optional
             The format inside a folder: ``"obj"`` (default), ``"glb"``, ``"ply"`` or ``"stl"``.
 

@@ -80,9 +80,6 @@ def summary(result: Decomposition, written: str) -> str:
     triangles = sum(len(hull.faces) for hull in result)
     lines = [f"{written}: {len(result)} hull{'s' * (len(result) != 1)}, {triangles} triangles{_time(report)}"]
     lines += [f"  {fit}" for fit in [_fit(report)] if fit]
-    if not report.get("complete", True):
-        reason = {"timeout": "by the timeout", "cancel": "by Ctrl-C"}.get(str(report.get("stopped_by")), "early")
-        lines.append(f"  stopped {reason}: the hulls are valid, but more work would have made them tighter")
     lines += [f"  warning: {warning}" for warning in report.get("warnings", [])]
     return "\n".join(lines)
 
@@ -94,7 +91,10 @@ def to_json(value: Any) -> str:
 
 def _time(report: dict[str, Any]) -> str:
     total = report.get("seconds", {}).get("total")
-    return "" if total is None else f", {total:.2f} s"
+    reason = {None: "", "timeout": ", stopped by the timeout", "cancel": ", stopped by Ctrl-C"}[
+        report.get("stopped_by")
+    ]
+    return ("" if total is None else f", {total:.2f} s") + reason
 
 
 def _fit(report: dict[str, Any]) -> str:

@@ -27,8 +27,8 @@ def hull_target(path: str | os.PathLike[str], file_format: str | None = None) ->
     Parameters
     ----------
     path : path-like
-        An existing folder or a name ending in ``/`` is a folder; anything else is one file, its format told by its
-        ending.
+        An existing folder, text ending in ``/``, or a name without ending given with a `file_format` is a folder;
+        anything else is one file, its format told by its ending.
     file_format : str, optional
         The format of the files in a folder.
 
@@ -49,7 +49,7 @@ def hull_target(path: str | os.PathLike[str], file_format: str | None = None) ->
         raise OptionError(f"unknown format {file_format!r}; use one of {', '.join(FORMATS)}.")
 
     separators = tuple(mark for mark in (os.sep, os.altsep) if mark)
-    if text.endswith(separators) or (place.is_dir() and ending not in FORMATS):
+    if text.endswith(separators) or (place.is_dir() and ending not in FORMATS) or (wanted and not ending):
         _check_folder(place)
         return Target(place, wanted or FOLDER_FORMAT, is_folder=True)
 

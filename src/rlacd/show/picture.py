@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rlacd.errors import MissingExtraError, OptionError, OutputError
+from rlacd.errors import OptionError, OutputError
 from rlacd.formats import check_file, write_file
 from rlacd.formats.palette import hull_colors, linear_from_srgb
-from rlacd.show.render import Body, render, require_mitsuba
+from rlacd.show.render import Body, render, require_extra
 
 if TYPE_CHECKING:
     from rlacd.decomposition import Decomposition
@@ -46,8 +46,8 @@ def check_picture(path: str | os.PathLike[str], up: str | None = None) -> Path:
     if place.suffix.lower() != ".png":
         raise OutputError(f"cannot write the picture {place}: it must end in .png; rename it.")
     check_file(place)
-    require_mitsuba()
-    _require_pillow()
+    for module in ("mitsuba", "PIL"):
+        require_extra(module)
     return place
 
 
@@ -94,7 +94,7 @@ def draw_picture(
     if samples < 1:
         raise OptionError(f"a picture cannot be drawn with {samples} samples; choose 1 or more.")
 
-    image = _require_pillow()
+    image = require_extra("PIL.Image")
     panels = [
         ("input", [_body(decomposition.source.triangles, INPUT_COLOR, up)]),
         ("hulls", _hull_bodies(decomposition, up, pull=0.0)),
@@ -155,11 +155,3 @@ def _write(sheet: Any, text: str, place: tuple[int, int], size: int, ink: tuple[
     from PIL import ImageDraw, ImageFont
 
     ImageDraw.Draw(sheet).text(place, text, font=ImageFont.load_default(size=size), fill=ink, anchor=anchor)
-
-
-def _require_pillow() -> Any:
-    try:
-        from PIL import Image
-    except ImportError as error:
-        raise MissingExtraError("pictures need an extra: run  pip install 'rlacd[view]'  and try again.") from error
-    return Image

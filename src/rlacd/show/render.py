@@ -7,6 +7,7 @@ find no OpenGL and end the process.
 from __future__ import annotations
 
 import contextlib
+import importlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -31,13 +32,15 @@ class Body:
     color: npt.NDArray[np.float64]
 
 
-def require_mitsuba() -> Any:
-    """Import mitsuba, or say how to get it."""
+def require_extra(module: str) -> Any:
+    """Import a module of the extra ``view``, or say how to get it."""
     try:
-        import mitsuba
-    except ImportError as error:
+        return importlib.import_module(module)
+    except ModuleNotFoundError as error:
         raise MissingExtraError("pictures need an extra: run  pip install 'rlacd[view]'  and try again.") from error
-    return mitsuba
+    except ImportError as error:
+        # Installed, but a system library is absent: a container without a compiler may lack libatomic, for one.
+        raise MissingExtraError(f"pictures need {module}, which does not load here ({error}); install that.") from error
 
 
 def render(bodies: Sequence[Body], width: int, height: int, *, samples: int) -> npt.NDArray[np.uint8]:
@@ -57,7 +60,7 @@ def render(bodies: Sequence[Body], width: int, height: int, *, samples: int) -> 
     MissingExtraError
         Mitsuba is not installed.
     """
-    mi = require_mitsuba()
+    mi = require_extra("mitsuba")
     points = np.concatenate([body.triangles.reshape(-1, 3) for body in bodies])
     low, high = points.min(axis=0), points.max(axis=0)
     view = _view(points - (low + high) / 2.0, width / height)

@@ -1,0 +1,48 @@
+"""Hulls to test with, and an exact judge of whether a mesh is one."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import numpy.typing as npt
+import trimesh
+
+from rlacd._native import convex_hull
+
+
+def hull_of(points: npt.ArrayLike) -> trimesh.Trimesh:
+    array = np.ascontiguousarray(points, dtype=np.float64)
+    indices, faces, rank = convex_hull(array)
+    assert rank == 3
+    return trimesh.Trimesh(array[indices], faces, process=False)
+
+
+def random_hull(seed: int, count: int = 24) -> trimesh.Trimesh:
+    return hull_of(np.random.default_rng(seed).normal(size=(count, 3)))
+
+
+def moved(hull: trimesh.Trimesh, scale: float, shift: npt.ArrayLike) -> trimesh.Trimesh:
+    return hull_of(hull.vertices * scale + np.asarray(shift))
+
+
+def assert_convex_hull(mesh: trimesh.Trimesh) -> None:
+    """Closed, outward oriented, no face degenerate, and no vertex above any face: in exact arithmetic."""
+    edges = np.sort(mesh.edges, axis=1)
+    forward = {tuple(edge) for edge in mesh.edges.tolist()}
+    assert len(forward) == len(mesh.edges), "an edge is used twice in one direction"
+    assert all((b, a) in forward for a, b in forward), "an edge has no twin"
+    assert len(mesh.vertices) - len(np.unique(edges, axis=0)) + len(mesh.faces) == 2
+    points = [tuple(map(Fraction, vertex)) for vertex in mesh.vertices.tolist()]
+    for face in mesh.faces.tolist():
+        a, b, c = (points[corner] for corner in face)
+        u, v = _minus(b, a), _minus(c, a)
+        normal = (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
+        assert any(normal), "a face has no area"
+        heights = [sum(n * x for n, x in zip(normal, _minus(p, a), strict=True)) for p in points]
+        assert max(heights) == 0, "a vertex lies above a face"
+        assert min(heights) < 0, "the mesh is flat"
+
+
+def _minus(p: tuple[Fraction, ...], q: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
+    return tuple(x - y for x, y in zip(p, q, strict=True))

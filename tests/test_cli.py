@@ -1,0 +1,295 @@
+"""The command line: exit codes, what goes to stdout and stderr, and that errors come before the work."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import types
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import trimesh
+from typer.testing import CliRunner, Result
+
+from rlacd.cli import app
+from rlacd.decomposition import Decomposition
+from rlacd.errors import MeshFileError, OptionError, OutputError
+from rlacd.progress import Progress, ProgressCallback
+from tests.hulls import hull_of
+
+ELL = [(2.0, 0.4, 0.4), (0.4, 0.4, 2.0)]
+
+
+@pytest.fixture
+def mesh(tmp_path: Path) -> Path:
+    """Two boxes that make an L."""
+    ell = trimesh.util.concatenate([trimesh.creation.box(size) for size in ELL])
+    ell.apply_translation([1.0, 2.0, 3.0])
+    ell.export(tmp_path / "ell.stl")
+    return tmp_path / "ell.stl"
+
+
+@pytest.fixture(autouse=True)
+def no_debugging(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("RLACD_DEBUG", raising=False)
+
+
+def rlacd(*words: object) -> Result:
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+class StandIn:
+    """Takes the place of `rlacd.decompose` where a test needs it to be slow, stopped or broken."""
+
+    def __init__(self) -> None:
+        self.calls: list[dict[str, Any]] = []
+        self.during: Callable[[], None] = lambda: None
+        self.report: dict[str, Any] = {}
+
+    def __call__(self, mesh: Path, *, progress: ProgressCallback, **options: Any) -> Decomposition:
+        self.calls.append(options)
+        complete = True
+        for step in range(3):
+            complete = complete and progress(Progress("cut", step, None, step + 1, 0.1 * step)) is not False
+            if not complete:
+                break
+            self.during()
+        source = trimesh.load(mesh)
+        report = {
+            "name": mesh.stem,
+            "complete": complete,
+            "stopped_by": None if complete else "cancel",
+            "parts": 1,
+            "options": {"threshold": 0.05},
+            "concavity": {"per_part": [0.01], "max": 0.01},
+            "hausdorff": {"over": 0.02, "under": float("nan")},
+            "seconds": {"total": 0.3},
+            "warnings": ["one body was open"],
+        }
+        return Decomposition([hull_of(source.vertices)], {**report, **self.report}, source)
+
+
+@pytest.fixture
+def stand_in(monkeypatch: pytest.MonkeyPatch) -> StandIn:
+    module = types.ModuleType("rlacd.decompose")
+    module.decompose = StandIn()  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "rlacd.decompose", module)
+    return module.decompose
+
+
+# --- what a good run says ---------------------------------------------------------------------------------------------
+
+
+def test_hulls_go_beside_the_input_by_default_and_stdout_stays_empty(mesh: Path, stand_in: StandIn) -> None:
+    run = rlacd("decompose", mesh)
+    assert (run.exit_code, run.stdout) == (0, "")
+    assert len(trimesh.load_scene(mesh.with_name("ell_hulls.glb")).geometry) == 1
+    for words in ("ell_hulls.glb", "1 hull,", "max concavity 0.0100 (threshold 0.05)", "0.30 s", "one body was open"):
+        assert words in run.stderr
+    assert stand_in.calls == [{}], "defaults belong to rlacd.decompose"
+
+
+def test_quiet_says_nothing(mesh: Path, stand_in: StandIn) -> None:
+    run = rlacd("decompose", mesh, "-q", "-o", mesh.with_name("out.obj"))
+    assert (run.exit_code, run.stdout, run.stderr) == (0, "", "")
+
+
+def test_every_option_reaches_the_decomposition(mesh: Path, stand_in: StandIn) -> None:
+    options = {
+        "threshold": 0.1,
+        "threshold_m": 0.2,
+        "max_hulls": 5,
+        "max_vertices": 32,
+        "max_faces": 60,
+        "policy": "greedy",
+        "resolution": 80,
+        "seed": 7,
+        "threads": 1,
+        "timeout": 2.5,
+    }
+    words = [word for name, value in options.items() for word in ("--" + name.replace("_", "-"), value)]
+    assert rlacd("decompose", mesh, *words, "--no-merge").exit_code == 0
+    assert stand_in.calls == [{**options, "merge": False}]
+
+
+def test_a_report_on_stdout_is_json_and_nothing_else(mesh: Path, stand_in: StandIn) -> None:
+    run = rlacd("decompose", mesh, "--report", "-")
+    report = json.loads(run.stdout)
+    assert report["parts"] == 1
+    assert report["hausdorff"]["under"] is None, "NaN is not JSON"
+
+
+def test_report_and_picture_are_written(mesh: Path, stand_in: StandIn) -> None:
+    pytest.importorskip("mitsuba", reason="the extra view is not installed")
+    report, picture = mesh.with_name("r.json"), mesh.with_name("p.png")
+    assert rlacd("decompose", mesh, "--report", report, "--picture", picture).exit_code == 0
+    assert json.loads(report.read_text())["name"] == "ell"
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_folder_can_be_filled_in_any_format(mesh: Path, stand_in: StandIn) -> None:
+    assert rlacd("decompose", mesh, "-o", f"{mesh.parent}/out/", "--format", "stl").exit_code == 0
+    assert (mesh.parent / "out" / "ell_000.stl").exists()
+
+
+def test_a_concavity_above_the_threshold_is_said(mesh: Path, stand_in: StandIn) -> None:
+    stand_in.report = {"concavity": {"max": 0.07}}
+    assert "threshold 0.05, exceeded" in rlacd("decompose", mesh).stderr
+
+
+# --- what goes wrong --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "says"),
+    [
+        (["-o", "{dir}/out.fbx"], 3, ".glb, .obj, .ply, .stl"),
+        (["-o", "{dir}/no/out.glb"], 3, "does not exist"),
+        (["-o", "-"], 2, "stdout"),
+        (["-o", "{dir}/ell.stl"], 2, "overwrite the input"),
+        (["--report", "{dir}/no/r.json"], 3, "does not exist"),
+        (["--report", "{dir}"], 3, "it is a folder"),
+        (["--report", "{dir}/ell_hulls.glb"], 2, "overwrite what -o writes"),
+        (["--picture", "{dir}/p.jpg"], 3, ".png"),
+        (["--picture", "{dir}/p.png", "--up", "w"], 2, "x, y or z"),
+        (["-o", "{dir}/out.glb", "--format", "obj"], 2, "contradicts"),
+        (["--threshold", "tight"], 2, "--threshold"),
+        (["--wrong"], 2, "--wrong"),
+    ],
+)
+def test_mistakes_are_found_before_the_work(
+    mesh: Path, stand_in: StandIn, words: list[str], code: int, says: str
+) -> None:
+    run = rlacd("decompose", mesh, *(word.format(dir=mesh.parent) for word in words))
+    assert run.exit_code == code
+    assert says in " ".join(run.stderr.split())
+    assert stand_in.calls == []
+    assert [path.name for path in mesh.parent.iterdir()] == ["ell.stl"]
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (MeshFileError("cup.glb is empty; export it again."), 2),
+        (OptionError("threshold is -1; it has to be positive."), 2),
+        (OutputError("the disk is full; free some space."), 3),
+        (MemoryError(), 2),
+        (RuntimeError("surprise\nsecond line"), 1),
+        (KeyboardInterrupt(), 130),
+    ],
+)
+def test_errors_are_one_sentence_and_a_code(mesh: Path, stand_in: StandIn, error: BaseException, code: int) -> None:
+    def fail() -> None:
+        raise error
+
+    stand_in.during = fail
+    run = rlacd("decompose", mesh)
+    assert run.exit_code == code
+    assert run.stderr.startswith("rlacd: ")
+    assert run.stderr.count("\n") == 1
+    assert "Traceback" not in run.output
+    assert ("RLACD_DEBUG=1" in run.stderr) == (code == 1)
+    assert not mesh.with_name("ell_hulls.glb").exists()
+
+
+def test_debugging_lets_the_traceback_through(mesh: Path, stand_in: StandIn, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail() -> None:
+        raise RuntimeError("surprise")
+
+    stand_in.during = fail
+    monkeypatch.setenv("RLACD_DEBUG", "1")
+    assert isinstance(rlacd("decompose", mesh).exception, RuntimeError)
+
+
+def test_ctrl_c_once_writes_what_is_reached(mesh: Path, stand_in: StandIn) -> None:
+    stand_in.during = lambda: signal.raise_signal(signal.SIGINT)
+    before = signal.getsignal(signal.SIGINT)
+    run = rlacd("decompose", mesh)
+    assert run.exit_code == 4
+    assert "stopped by Ctrl-C" in run.stderr
+    assert len(trimesh.load_scene(mesh.with_name("ell_hulls.glb")).geometry) == 1
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_ctrl_c_twice_quits_and_writes_nothing(mesh: Path, stand_in: StandIn) -> None:
+    def twice() -> None:
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+
+    stand_in.during = twice
+    run = rlacd("decompose", mesh)
+    assert run.exit_code == 130
+    assert not mesh.with_name("ell_hulls.glb").exists()
+
+
+def test_help_names_every_exit_code_and_version_is_told() -> None:
+    run = rlacd("decompose", "--help")
+    assert run.exit_code == 0
+    for code in ("0 ", "1 ", "2 ", "3 ", "4 ", "130 "):
+        assert f"  {code}" in run.output
+    import rlacd as package
+
+    assert rlacd("--version").stdout == f"rlacd {package.__version__}\n"
+
+
+# --- the real thing ---------------------------------------------------------------------------------------------------
+
+
+def shell(*words: object, **options: Any) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", "from rlacd.cli import main; main()", *(str(word) for word in words)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, **options)
+
+
+def test_a_real_run_in_a_pipe(mesh: Path) -> None:
+    run = shell("decompose", mesh, "-o", mesh.with_name("out.obj"), "--report", "-")
+    assert run.returncode == 0, run.stderr
+    report = json.loads(run.stdout)
+    read = trimesh.load_scene(mesh.with_name("out.obj"), split_objects=True)
+    assert len(read.geometry) == report["parts"] == len(report["concavity"]["per_part"])
+    assert read.bounds == pytest.approx(trimesh.load(mesh).bounds, abs=1e-6)
+    assert report["complete"] is True
+    assert "\x1b" not in run.stderr, "no colours or bars in a pipe"
+
+
+def test_a_real_missing_file(tmp_path: Path) -> None:
+    run = shell("decompose", tmp_path / "nothing.glb")
+    assert run.returncode == 2
+    assert run.stderr.startswith("rlacd: ")
+    assert "nothing.glb" in run.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", [".", "/", "", "..", "chair.glb/"])
+def test_a_real_odd_name(name: str, tmp_path: Path) -> None:
+    run = shell("decompose", name, cwd=tmp_path)
+    assert run.returncode in (2, 3), run.stderr
+    assert run.stderr.count("\n") == 1
+
+
+def test_a_real_bad_option(mesh: Path) -> None:
+    run = shell("decompose", mesh, "--threshold", "-1")
+    assert run.returncode == 2
+    assert "threshold" in run.stderr
+    assert [path.name for path in mesh.parent.iterdir()] == ["ell.stl"]
+
+
+def test_a_real_timeout_still_writes_hulls(mesh: Path) -> None:
+    run = shell("decompose", mesh, "--timeout", "1e-6", "--report", "-")
+    assert run.returncode == 4, run.stderr
+    assert json.loads(run.stdout)["stopped_by"] == "timeout"
+    assert mesh.with_name("ell_hulls.glb").exists()
+
+
+def test_info_tells_bodies_and_repair(mesh: Path) -> None:
+    text = shell("info", mesh)
+    assert text.returncode == 0, text.stderr
+    assert "24 triangles" in text.stdout
+    facts = json.loads(shell("info", mesh, "--json").stdout)
+    assert facts["faces"] == 24
+    assert len(facts["repair"]) == 2
+    assert facts["solid"]["volume"] == pytest.approx(2 * 2.0 * 0.4**2 - 0.4**3, rel=1e-4)
+    assert shell("info", mesh.with_name("nothing.glb")).returncode == 2

@@ -1,0 +1,347 @@
+"""Files of hulls: what is written is what is read, every hull stays a hull, and nothing is ever half-written."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import struct
+from pathlib import Path
+
+import numpy as np
+import point_cloud_utils as pcu
+import pytest
+import trimesh
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from rlacd.errors import OptionError, OutputError
+from rlacd.formats import FORMATS, hull_target, save_hulls
+from rlacd.formats.palette import hull_colors
+from tests.hulls import assert_convex_hull, hull_of, moved, random_hull
+
+THREE = [moved(random_hull(seed), 0.3, (seed, 0.1, -0.7)) for seed in range(3)]
+NAMES = ["hull_000", "hull_001", "hull_002"]
+
+
+def load(path: Path) -> dict[str, trimesh.Trimesh]:
+    """Read hulls back by name, placed by their nodes; vertices that a format stores once a triangle are joined."""
+    # Without processing: trimesh would join vertices closer than 1e-8, which is all of a small mesh.
+    scene = trimesh.load_scene(path, process=False, **({"split_objects": True} if path.suffix == ".obj" else {}))
+    placed = {}
+    for node in scene.graph.nodes_geometry:
+        transform, geometry = scene.graph[node]
+        mesh = scene.geometry[geometry].copy()
+        mesh.apply_transform(transform)
+        if path.suffix == ".stl":
+            vertices, index = np.unique(mesh.vertices, axis=0, return_inverse=True)
+            mesh = trimesh.Trimesh(vertices, index.reshape(-1)[mesh.faces], process=False)
+        placed[node] = mesh
+    return dict(sorted(placed.items()))
+
+
+def same_points(a: np.ndarray, b: np.ndarray, tolerance: float) -> bool:
+    """Whether two point sets agree, whatever their order."""
+    return trimesh.proximity.cKDTree(a).query(b)[0].max() <= tolerance and len(a) == len(b)
+
+
+@pytest.mark.parametrize("ending", ["glb", "obj", "stl"])
+def test_every_hull_comes_back_under_its_name(tmp_path: Path, ending: str) -> None:
+    read = load(save_hulls(THREE, tmp_path / f"out.{ending}"))
+    assert list(read) == NAMES
+    for hull, mesh in zip(THREE, read.values(), strict=True):
+        assert_convex_hull(mesh)
+        assert len(mesh.faces) == len(hull.faces)
+        assert same_points(mesh.vertices, hull.vertices, 1e-6 if ending == "glb" else 0.0)
+
+
+def test_ply_keeps_hulls_apart_exact_and_coloured(tmp_path: Path) -> None:
+    mesh = trimesh.load(save_hulls(THREE, tmp_path / "out.ply"), process=False)
+    owner = mesh.metadata["_ply_raw"]["face"]["data"]["hull"].ravel()
+    colors = mesh.visual.vertex_colors[:, :3]
+    for index, (hull, color) in enumerate(zip(THREE, hull_colors(3), strict=True)):
+        part = mesh.submesh([np.flatnonzero(owner == index)], append=True, repair=False)
+        assert_convex_hull(part)
+        assert same_points(part.vertices, hull.vertices, 0.0)
+        assert (colors[np.unique(mesh.faces[owner == index])] == color).all()
+
+
+@pytest.mark.parametrize("ending", ["obj", "ply", "stl"])
+def test_a_second_parser_reads_the_same(tmp_path: Path, ending: str) -> None:
+    vertices, faces = pcu.load_mesh_vf(str(save_hulls(THREE[:1], tmp_path / f"out.{ending}")))
+    mesh = trimesh.Trimesh(vertices, faces, process=ending == "stl")
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(THREE[0].volume, rel=1e-5)
+    assert len(faces) == len(THREE[0].faces)
+
+
+def test_obj_text_holds_every_digit(tmp_path: Path) -> None:
+    lines = save_hulls(THREE, tmp_path / "out.obj").read_text().splitlines()
+    written = [[float(word) for word in line.split()[1:4]] for line in lines if line.startswith("v ")]
+    assert np.array_equal(written, np.concatenate([hull.vertices for hull in THREE]))
+    assert [line.split()[1] for line in lines if line.startswith("o ")] == NAMES
+
+
+def test_glb_has_a_named_coloured_node_a_hull(tmp_path: Path) -> None:
+    data = save_hulls(THREE, tmp_path / "out.glb").read_bytes()
+    magic, version, length, size = struct.unpack("<4sIII", data[:16])
+    assert (magic, version, length) == (b"glTF", 2, len(data))
+    tree = json.loads(data[20 : 20 + size])
+    assert sorted(tree["meshes"][node["mesh"]]["name"] for node in tree["nodes"] if "mesh" in node) == NAMES
+    colors = [tuple(material["pbrMetallicRoughness"]["baseColorFactor"]) for material in tree["materials"]]
+    assert len(set(colors)) == 3
+    assert not any("matrix" in node or "translation" in node for node in tree["nodes"])
+
+
+def test_one_stl_hull_is_binary_and_many_are_solids(tmp_path: Path) -> None:
+    one = save_hulls(THREE[:1], tmp_path / "one.stl").read_bytes()
+    assert len(one) == 84 + 50 * len(THREE[0].faces)
+    assert save_hulls(THREE, tmp_path / "three.stl").read_text().count("endsolid") == 3
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    seed=st.integers(0, 10**6),
+    scale=st.sampled_from([1e-9, 1e-3, 1.0, 1e4, 1e9]),
+    distance=st.sampled_from([0.0, 1.0, 1e3, 1e6]),
+    squash=st.sampled_from([1.0, 1e-3]),
+)
+def test_hulls_stay_hulls_in_the_file(
+    tmp_path: Path, ending: str, seed: int, scale: float, distance: float, squash: float
+) -> None:
+    """At any size, however far from the origin compared to the size, and thin as well as round."""
+    hull = moved(hull_of(random_hull(seed).vertices * [1.0, 1.0, squash]), scale, np.full(3, distance * scale))
+    path = save_hulls([hull], tmp_path / f"out.{ending}")
+    if ending == "glb":
+        mesh = in_place(path)
+    else:
+        (mesh,) = load(path).values()
+    assert_convex_hull(mesh)
+    assert mesh.bounds == pytest.approx(hull.bounds, abs=1e-6 * scale * max(distance, 10.0))
+    shifted = trimesh.Trimesh(mesh.vertices - hull.vertices[0], mesh.faces, process=False)
+    reference = trimesh.Trimesh(hull.vertices - hull.vertices[0], hull.faces, process=False)
+    assert shifted.volume == pytest.approx(reference.volume, rel=2e-3)
+
+
+def in_place(path: Path) -> trimesh.Trimesh:
+    """Read the one hull of a GLB as stored: the file holds it exactly, adding its node's translation would round."""
+    (mesh,) = trimesh.load_scene(path, process=False).geometry.values()
+    scene = trimesh.load_scene(path, process=False)
+    (node,) = scene.graph.nodes_geometry
+    assert_convex_hull(mesh)
+    moved_back = mesh.copy()
+    moved_back.vertices = mesh.vertices + scene.graph[node][0][:3, 3]
+    return mesh if np.allclose(scene.graph[node][0], np.eye(4)) else hull_of(moved_back.vertices)
+
+
+def test_far_from_the_origin_a_glb_keeps_the_shape(tmp_path: Path) -> None:
+    box = hull_of(trimesh.creation.box((0.01, 0.02, 0.03)).vertices + np.array([5e5, -5e5, 1e4]))
+    (mesh,) = load(save_hulls([box], tmp_path / "far.glb")).values()
+    assert mesh.extents == pytest.approx(box.extents, rel=1e-5)
+    assert mesh.bounds == pytest.approx(box.bounds, abs=1e-8)
+
+
+def test_too_thin_for_single_precision_is_said_and_double_precision_formats_work(tmp_path: Path) -> None:
+    # Thinner than the spacing of float32 numbers at its corners, on a slant so that no axis helps.
+    plate = trimesh.creation.box((1.0, 1.0, 1e-9))
+    plate.apply_transform(trimesh.transformations.rotation_matrix(0.7, [1.0, 2.0, 3.0]))
+    hull = hull_of(plate.vertices)
+    with pytest.raises(OutputError, match=r"hull_000.*single precision.*\.obj"):
+        save_hulls([hull], tmp_path / "thin.glb")
+    assert list(tmp_path.iterdir()) == []
+    for ending in ("obj", "ply", "stl"):
+        (mesh,) = load(save_hulls([hull], tmp_path / f"thin.{ending}")).values()
+        assert_convex_hull(mesh)
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+def test_same_hulls_same_bytes(tmp_path: Path, ending: str) -> None:
+    first, second = (save_hulls(THREE, tmp_path / f"{name}.{ending}").read_bytes() for name in "ab")
+    assert first == second
+
+
+def test_colours_of_neighbours_in_the_list_differ() -> None:
+    colors = hull_colors(200).astype(float)
+    assert np.array_equal(hull_colors(7), hull_colors(200)[:7])
+    for step in (1, 2, 3, 4):
+        assert np.linalg.norm(colors[step:] - colors[:-step], axis=1).min() > 30.0
+    assert len(np.unique(colors, axis=0)) == 200
+
+
+# --- places -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["hulls.fbx", "hulls", "hulls.glb.zip", ".glb"])
+def test_an_unknown_ending_is_refused_with_the_known_ones(tmp_path: Path, name: str) -> None:
+    with pytest.raises(OutputError, match=r"\.glb, \.obj, \.ply, \.stl"):
+        save_hulls(THREE, tmp_path / name)
+
+
+def test_endings_in_capitals_are_known(tmp_path: Path) -> None:
+    assert save_hulls(THREE, tmp_path / "HULLS.STL").stat().st_size > 0
+
+
+def test_places_that_cannot_be_written_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "folder.glb").mkdir()
+    with pytest.raises(OutputError, match="does not exist; create it first"):
+        hull_target(tmp_path / "missing" / "out.glb")
+    with pytest.raises(OutputError, match="does not exist; create it first"):
+        hull_target(f"{tmp_path}/missing/out/")
+    with pytest.raises(OutputError, match="it is a folder"):
+        hull_target(tmp_path / "folder.glb")
+    with pytest.raises(OutputError, match="it is a file, not a folder"):
+        hull_target(f"{tmp_path}/file/")
+    with pytest.raises(OutputError, match="does not exist"):
+        hull_target(tmp_path / "file" / "out.glb")
+    with pytest.raises(OutputError, match="no name"):
+        hull_target("")
+    with pytest.raises(OutputError, match="no hulls"):
+        save_hulls([], tmp_path / "out.glb")
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_without_permission_is_refused_before_work(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    with pytest.raises(OutputError, match="you may not"):
+        hull_target(tmp_path / "out.glb")
+    tmp_path.chmod(0o700)
+
+
+def test_contradicting_formats_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(OptionError, match="contradicts"):
+        hull_target(tmp_path / "out.glb", "obj")
+    with pytest.raises(OptionError, match="unknown format"):
+        hull_target(f"{tmp_path}/out/", "fbx")
+
+
+# --- whole or not at all ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+@pytest.mark.parametrize("stage", ["fsync", "replace"])
+def test_a_failing_disk_leaves_the_old_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str, stage: str
+) -> None:
+    path = tmp_path / f"out.{ending}"
+    path.write_bytes(b"old")
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, stage, full)
+    with pytest.raises(OutputError, match="disk is full"):
+        save_hulls(THREE, path)
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_an_interrupt_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "out.obj"
+    path.write_bytes(b"old")
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(os, "fsync", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        save_hulls(THREE, path)
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_link_is_followed_and_the_umask_kept(tmp_path: Path) -> None:
+    (tmp_path / "real").mkdir()
+    link = tmp_path / "out.glb"
+    link.symlink_to(tmp_path / "real" / "file.glb")
+    before = os.umask(0o027)
+    try:
+        save_hulls(THREE, link)
+    finally:
+        os.umask(before)
+    assert link.is_symlink()
+    assert (tmp_path / "real" / "file.glb").stat().st_mode & 0o777 == 0o640
+
+
+# --- folders ----------------------------------------------------------------------------------------------------------
+
+
+def files_of(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+@pytest.mark.parametrize("ending", [None, *FORMATS])
+def test_a_folder_gets_one_file_a_hull(tmp_path: Path, ending: str | None) -> None:
+    folder = save_hulls(THREE, f"{tmp_path}/hulls/", stem="chair", file_format=ending)
+    known = ending or "obj"
+    assert files_of(folder) == [*(f"chair_{i:03d}.{known}" for i in range(3)), "chair_hulls.json"]
+    assert files_of(tmp_path) == ["hulls"]
+    for index, hull in enumerate(THREE):
+        (mesh,) = load(folder / f"chair_{index:03d}.{known}").values()
+        assert_convex_hull(mesh)
+        assert same_points(mesh.vertices, hull.vertices, 1e-6)
+
+
+def test_a_format_makes_a_name_without_ending_a_folder(tmp_path: Path) -> None:
+    folder = save_hulls(THREE[:1], tmp_path / "hulls", stem="chair", file_format="ply")
+    assert files_of(folder) == ["chair_000.ply", "chair_hulls.json"]
+
+
+def test_an_existing_folder_needs_no_slash_and_loses_only_our_older_hulls(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / "chair_007.obj").write_text("also mine: no run wrote it")
+    save_hulls(THREE, tmp_path, stem="chair")
+    save_hulls(THREE, tmp_path, stem="table")
+    save_hulls(THREE[:1], tmp_path, stem="chair")
+    assert files_of(tmp_path) == [
+        "chair_000.obj",
+        "chair_007.obj",
+        "chair_hulls.json",
+        "notes.txt",
+        "table_000.obj",
+        "table_001.obj",
+        "table_002.obj",
+        "table_hulls.json",
+    ]
+
+
+@pytest.mark.parametrize("names", [["../precious_000.obj", "notes.txt", "chair_hulls.json", 3], "chair_000.obj", None])
+def test_a_list_that_somebody_changed_removes_nothing_else(tmp_path: Path, names: object) -> None:
+    folder = tmp_path / "hulls"
+    save_hulls(THREE[:1], f"{folder}/", stem="chair")
+    for path in (tmp_path / "precious_000.obj", folder / "notes.txt"):
+        path.write_text("mine")
+    (folder / "chair_hulls.json").write_text(json.dumps({"files": names}))
+    save_hulls(THREE[:1], folder, stem="chair")
+    assert files_of(tmp_path) == ["hulls", "precious_000.obj"]
+    assert files_of(folder) == ["chair_000.obj", "chair_hulls.json", "notes.txt"]
+
+
+@pytest.mark.parametrize("exists", [False, True])
+def test_a_failing_disk_leaves_the_folder_as_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, exists: bool
+) -> None:
+    folder = tmp_path / "hulls"
+    if exists:
+        save_hulls(THREE[1:], f"{folder}/", stem="chair")
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    real, calls = os.fsync, iter(range(1000))
+
+    def fail_on_the_fifth(descriptor: int) -> None:
+        if next(calls) == 4:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        real(descriptor)
+
+    monkeypatch.setattr(os, "fsync", fail_on_the_fifth)
+    with pytest.raises(OutputError, match="disk is full"):
+        save_hulls(THREE, f"{folder}/", stem="chair")
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+    assert folder.exists() == exists
+
+
+@pytest.mark.parametrize("name", ["../../etc/x", "a/b", "", "con\n?", "..", "x" * 300])
+def test_any_name_of_a_mesh_makes_safe_file_names(tmp_path: Path, name: str) -> None:
+    folder = save_hulls(THREE[:1], f"{tmp_path}/hulls/", stem=name)
+    assert files_of(tmp_path) == ["hulls"]
+    assert len(files_of(folder)) == 2
