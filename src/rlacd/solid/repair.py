@@ -62,6 +62,8 @@ with a few holes is meant as a solid, a cup is not. The caps are reported."""
 _WELDS = (2e-5, 5e-4)
 _WRAP_ERROR = 4e-3
 _NO_AREA = 1e-14
+# More sheets than this are not united one by one: it would take seconds, and cutting what comes out longer.
+_CROWD = 300
 # A solid may have a few faces sticking out of it, up to this share of its area.
 _FLAPS = 0.05
 # How far beside a face the winding number is asked for.
@@ -178,7 +180,7 @@ class _Repair:
         self._note(body[(faces != surface.faces[origin]).any(axis=1)], "welded")
 
         soup = self._cap(self._drop_hidden(_Soup(surface.vertices, faces, body)))
-        parts = self._build(soup)
+        parts = self._wrap_crowds(soup, self._build(soup))
         self.solid = unite([part for part, _ in parts])
         self._wrap_rooms(soup, parts)
         if self.solid.is_empty():
@@ -293,6 +295,26 @@ class _Repair:
         solids = [to_manifold(v, f) for v, f in split_labels(vertices, faces, label)]
         return list(zip(solids, body.tolist(), strict=True))
 
+    def _wrap(self, cells: BoolArray) -> Manifold:
+        """Return a solid of grid cells, drawn onto the input."""
+        return to_manifold(*self.reach.wrap(cells, self.input, HALF_THICKNESS)).simplify(_WRAP_ERROR)
+
+    def _wrap_crowds(self, soup: _Soup, parts: list[tuple[Manifold, int]]) -> list[tuple[Manifold, int]]:
+        """Wrap sheets by the hundred (leaves, feathers) as one body: what no ball of radius `GAP` can tell apart."""
+        is_slab = self.step == STEPS.index("slab")
+        if is_slab.sum() <= _CROWD:
+            return parts
+        slabs = soup.only(is_slab[soup.body])
+        points, _ = spread_points(slabs.vertices, slabs.faces, self.reach.pitch / 2)
+        wrap = self._wrap(self.reach.around_points(points))
+        if wrap.volume() <= 0:
+            return parts
+        first = int(slabs.body.min())
+        self._note(slabs.body, "wrapped")
+        self.faces_out[is_slab] = 0
+        self.faces_out[first] = wrap.num_tri()
+        return [*((part, body) for part, body in parts if not is_slab[body]), (wrap, first)]
+
     def _wrap_rooms(self, soup: _Soup, parts: list[tuple[Manifold, int]]) -> None:
         """Close rooms that sheets enclose but for gaps no ball of radius `GAP` passes."""
         is_slab = self.step == STEPS.index("slab")
@@ -307,7 +329,7 @@ class _Repair:
         rooms = np.intersect1d(rooms, room)
         if len(rooms) == 0:
             return
-        wrap = to_manifold(*self.reach.wrap(rooms, self.input)).simplify(_WRAP_ERROR)
+        wrap = self._wrap(self.reach.around_rooms(rooms))
         # The wrap takes the place of the faces that are nothing but walls of the rooms; the others stay slabs.
         wall = np.bincount(on, ~np.isin(room, rooms), len(slabs.faces)) == 0
         before = self.faces_out.copy()
