@@ -222,7 +222,7 @@ def _bake(source: trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud) -> tuple
             faces.append(f + count)
             count += len(v)
         elif isinstance(geometry, trimesh.PointCloud):
-            v = np.asarray(geometry.vertices, dtype=np.float64).reshape(-1, 3)
+            v, _ = _arrays(geometry.vertices, [])
             points.append(v if transform is None else v @ transform[:3, :3].T + transform[:3, 3])
     if vertices:
         return np.concatenate(vertices), np.concatenate(faces)

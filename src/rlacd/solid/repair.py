@@ -177,6 +177,7 @@ class _Repair:
         self.step = np.zeros(self.bodies, dtype=np.int64)
         self.deviation = np.zeros(self.bodies)
         self.faces_out = np.zeros(self.bodies, dtype=np.int64)
+        self.by_room = np.zeros(self.bodies, dtype=bool)  # capped only because nothing can reach the cap
         self._note(body[(faces != surface.faces[origin]).any(axis=1)], "welded")
 
         soup = self._cap(self._drop_hidden(_Soup(surface.vertices, faces, body)))
@@ -241,8 +242,10 @@ class _Repair:
         points, on = spread_points(soup.vertices, caps, GAP / 2)
         distance = self.input.distance(points)
         far = distance > GAP
+        unreachable = far.copy()
         if far.any():
             far[far] = self.reach.covers(points[far])
+            unreachable &= ~far
         cap_area = np.bincount(owner, face_areas(soup.vertices, caps), self.bodies)
         nearly_closed = cap_area <= HOLE_SHARE * np.bincount(soup.body, soup.area, self.bodies)
         chosen = np.zeros(self.bodies, dtype=bool)
@@ -262,6 +265,8 @@ class _Repair:
         if not chosen.any():
             return soup
         self._note(np.flatnonzero(chosen), "capped")
+        self.by_room[owner[on[unreachable]]] = True
+        self.by_room &= chosen
         wide = far & chosen[owner[on]]
         if wide.any():
             self.warnings.append(
@@ -278,12 +283,21 @@ class _Repair:
         has_sheet[front[sides.sheet]] = True
         is_front[front] = True
         none = _FLAT * sides.area
+        sheet_area = np.bincount(front, soup.area * sides.sheet, len(none))
+        # A component that is mostly sheet yet has negative volume joins the inside with the outside: its body is not a
+        # solid anywhere, so all of it becomes slabs (whose cavities are filled later).
+        leaky = np.isin(soup.body_of_side(), soup.body_of_side()[(sides.volume < -none) & (4 * sheet_area > sides.area)])
         # The two side components of a flat closed body are each other's mirror: build the fronts.
         flat = (np.abs(sides.volume) <= none) & ~has_sheet & is_front
-        keep = (sides.volume > none) | (has_sheet & (sides.volume >= -none)) | flat
-        thin = keep[front] & (sides.sheet | flat[front])
+        keep = (sides.volume > none) | (has_sheet & (sides.volume >= -none)) | flat | leaky
+        thin = keep[front] & (sides.sheet | flat[front] | leaky[front])
+        joined = np.arange(len(none))
+        joined[leaky] = np.flatnonzero(leaky)[np.unique(soup.body_of_side()[leaky], return_index=True)[1]][
+            np.unique(soup.body_of_side()[leaky], return_inverse=True)[1]
+        ]
 
         vertices, faces, label = skin(soup.vertices, soup.faces, sides, keep, thin, HALF_THICKNESS)
+        label = joined[label]
         built, count = np.unique(label, return_counts=True)
         body = soup.body_of_side()[built]
         np.add.at(self.faces_out, body, count)
@@ -319,29 +333,30 @@ class _Repair:
         """Close rooms that sheets enclose but for gaps no ball of radius `GAP` passes."""
         is_slab = self.step == STEPS.index("slab")
         slabs = soup.only(is_slab[soup.body])
-        if slabs.area.sum() < 4 * np.pi * GAP**2 or self.solid.is_empty():
+        around = soup.only((is_slab | self.by_room)[soup.body])
+        if around.area.sum() < 4 * np.pi * GAP**2 or self.solid.is_empty():
             return
         rooms = self.reach.rooms_outside(SurfaceQuery(*to_arrays(self.solid)))
         if len(rooms) == 0:
             return
-        points, on = spread_points(slabs.vertices, slabs.faces, GAP)
-        room = self.reach.rooms_near(points)
-        rooms = np.intersect1d(rooms, room)
+        rooms = np.intersect1d(rooms, self.reach.rooms_near(spread_points(around.vertices, around.faces, GAP)[0]))
         if len(rooms) == 0:
             return
         wrap = self._wrap(self.reach.around_rooms(rooms))
-        # The wrap takes the place of the faces that are nothing but walls of the rooms; the others stay slabs.
-        wall = np.bincount(on, ~np.isin(room, rooms), len(slabs.faces)) == 0
+        # The wrap takes the place of the sheets that are nothing but walls of the rooms; the others stay slabs.
+        points, on = spread_points(slabs.vertices, slabs.faces, GAP)
+        wall = np.bincount(on, ~np.isin(self.reach.rooms_near(points), rooms), len(slabs.faces)) == 0
         before = self.faces_out.copy()
         self.faces_out[is_slab] = 0
         others = [part for part, body in parts if not is_slab[body]]
         united = unite([*others, *(part for part, _ in self._build(slabs.only(~wall))), wrap])
-        if united.volume() <= self.solid.volume() or not wall.any():
+        if united.volume() <= self.solid.volume():
             self.faces_out = before
             return
         self.solid = united
-        self._note(slabs.body[wall], "wrapped")
-        self.faces_out[slabs.body[wall].min()] += wrap.num_tri()
+        wrapped = np.concatenate([slabs.body[wall], np.flatnonzero(self.by_room)])
+        self._note(wrapped, "wrapped")
+        self.faces_out[wrapped.min(initial=self.bodies - 1)] += wrap.num_tri()
 
     def _measure(self) -> None:
         """Record, for the bodies that were changed, how far the solid and the input lead from each other."""
