@@ -17,7 +17,7 @@ turns a dozen exact faces into tens of thousands of approximate ones; steps 3 to
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -27,7 +27,7 @@ from rlacd.errors import EmptyMeshError
 from rlacd.solid.frame import FloatArray, Frame
 from rlacd.solid.load import InputMesh
 from rlacd.solid.repair_distance import SurfaceQuery, spread_points
-from rlacd.solid.repair_holes import cap, free_edges, free_loops, split_at_free_vertices, weld_free_vertices
+from rlacd.solid.repair_holes import MOST_FREE_EDGES, cap, close_cracks, free_edges, free_loops
 from rlacd.solid.repair_skin import skin
 from rlacd.solid.repair_union import hull_of_points, split_labels, to_arrays, to_manifold, unite
 from rlacd.solid.repair_voxels import Reach
@@ -43,6 +43,7 @@ from rlacd.solid.topology import (
     merge_equal_vertices,
     nondegenerate,
     sides_of,
+    signed_tetrahedra,
 )
 
 STEPS = ("closed", "reoriented", "outer skin", "welded", "capped", "slab", "wrapped", "hull", "dropped")
@@ -61,35 +62,56 @@ with a few holes is meant as a solid, a cup is not. The caps are reported."""
 _WELDS = (2e-5, 5e-4)
 _WRAP_ERROR = 4e-3
 _NO_AREA = 1e-14
+# More sheets than this are not united one by one: it would take seconds, and cutting what comes out longer.
+_CROWD = 300
+# A solid may have a few faces sticking out of it, up to this share of its area.
+_FLAPS = 0.05
+# How far beside a face the winding number is asked for.
+_BESIDE = 2e-4
 # A closed body with less volume per area is flat: nothing could be cut from it.
 _FLAT = 1e-6
-# Tracing hole loops is the one step that walks edge by edge.
-_MOST_FREE_EDGES = 500_000
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Soup:
-    """Faces on their way through the steps, with their edges and bodies."""
+    """Faces on their way through the steps; `body` numbers the body of each, from the input to the end."""
 
     vertices: FloatArray
     faces: IntArray
-    edges: Edges = field(init=False)
-    bodies: int = field(init=False)
-    body: IntArray = field(init=False)
+    body: IntArray
 
-    def __post_init__(self) -> None:
-        self.edges = Edges.of(self.faces, len(self.vertices))
-        self.bodies, self.body = bodies_of(self.faces, self.edges)
+    @cached_property
+    def edges(self) -> Edges:
+        return Edges.of(self.faces, len(self.vertices))
 
-    def using_valence(self, marked: BoolArray) -> BoolArray:
+    @cached_property
+    def sides(self) -> Sides:
+        return sides_of(self.vertices, self.faces, self.edges)
+
+    @cached_property
+    def area(self) -> FloatArray:
+        return face_areas(self.vertices, self.faces)
+
+    def at_valence(self, marked: BoolArray) -> BoolArray:
         """Return ``[F]`` whether a face has an edge of marked valence, given ``[E]`` marks."""
         result: BoolArray = marked[self.edges.of_halfedge].reshape(-1, 3).any(axis=1)
         return result
 
-    @property
-    def free(self) -> BoolArray:
-        """``[E]``, the edges of one face only."""
-        return self.edges.valence == 1
+    def body_of_side(self) -> IntArray:
+        """Return ``[C]`` the body of each side component."""
+        result = np.zeros(len(self.sides.volume), dtype=np.int64)
+        result[self.sides.label] = np.repeat(self.body, 2)
+        return result
+
+    def sheet_share(self, bodies: int) -> FloatArray:
+        """Return ``[bodies]`` the share of the area of each body that has no inside."""
+        sheet = np.bincount(self.body, self.area * self.sides.sheet, bodies)
+        share: FloatArray = sheet / np.maximum(np.bincount(self.body, self.area, bodies), _NO_AREA)
+        return share
+
+    def only(self, keep: BoolArray) -> _Soup:
+        """The marked faces."""
+        return _Soup(self.vertices, self.faces[keep], self.body[keep])
 
 
 def repair(mesh: InputMesh, *, resolution: int = 100, threads: int | None = None) -> Solid:
@@ -102,7 +124,7 @@ def repair(mesh: InputMesh, *, resolution: int = 100, threads: int | None = None
     resolution
         Cells along the longest side of the grid on which enclosed rooms are looked for.
     threads
-        For symmetry with the other stages; the result does not depend on it.
+        How many threads measure distances; all there are by default. The result does not depend on it.
 
     Returns
     -------
@@ -112,17 +134,17 @@ def repair(mesh: InputMesh, *, resolution: int = 100, threads: int | None = None
     Raises
     ------
     EmptyMeshError
-        There is no finite point.
+        There is no point.
     """
-    del threads
     warnings = list(mesh.warnings)
     points = mesh.vertices[np.unique(mesh.faces)] if len(mesh.faces) else mesh.vertices
     if len(points) == 0:
         raise EmptyMeshError("the mesh has no points, so there is nothing to decompose: check the file or its export")
     frame = Frame.of(points)
     points = frame.to_frame(points)
-    vertices, index = merge_equal_vertices(frame.to_frame(mesh.vertices))
-    faces = index[mesh.faces.astype(np.int64)].reshape(-1, 3)
+    used, corner = np.unique(mesh.faces, return_inverse=True)
+    vertices, index = merge_equal_vertices(frame.to_frame(mesh.vertices[used]))
+    faces = index[corner.reshape(-1, 3)]
     faces = faces[nondegenerate(faces)]
     faces = faces[first_of_doubled(faces, len(vertices))]
     surface = (vertices, np.ascontiguousarray(faces, dtype=np.int32))
@@ -133,43 +155,44 @@ def repair(mesh: InputMesh, *, resolution: int = 100, threads: int | None = None
         body = BodyRepair(0, "hull", len(mesh.faces), solid.num_tri(), 0.0)
         return Solid(solid, surface, frame, (body,), tuple(warnings))
 
-    work = _Repair(vertices, faces, resolution)
+    work = _Repair(SurfaceQuery(vertices, faces, threads), resolution)
     return Solid(work.solid, surface, frame, work.report(), tuple(warnings + work.warnings))
 
 
 class _Repair:
     """The steps on one input; `solid`, `report()` and `warnings` are the result.
 
-    Bodies are numbered after cracks are welded; every array named ``of_body`` or by a quantity alone is per body.
+    Bodies are numbered after cracks are welded; `step`, `deviation` and `faces_out` are per body.
     """
 
-    def __init__(self, vertices: FloatArray, faces: IntArray, resolution: int) -> None:
-        self.input = SurfaceQuery(vertices, faces)
+    def __init__(self, surface: SurfaceQuery, resolution: int) -> None:
+        self.input = surface
         self.resolution = resolution
         self.warnings: list[str] = []
 
-        soup, origin = self._weld(vertices, faces)
-        self.soup = soup
-        self.body_of_input = np.zeros(len(faces), dtype=np.int64)
-        self.body_of_input[origin] = soup.body
-        self.step = np.zeros(soup.bodies, dtype=np.int64)
-        self.deviation = np.zeros(soup.bodies)
-        self.faces_out = np.zeros(soup.bodies, dtype=np.int64)
-        self._note(soup.body[(soup.faces != faces[origin]).any(axis=1)], "welded")
+        faces, origin = close_cracks(surface.vertices, surface.faces, _WELDS)
+        self.bodies, body = bodies_of(faces, Edges.of(faces, len(surface.vertices)))
+        self.body_of_input = np.zeros(len(surface.faces), dtype=np.int64)
+        self.body_of_input[origin] = body
+        self.step = np.zeros(self.bodies, dtype=np.int64)
+        self.deviation = np.zeros(self.bodies)
+        self.faces_out = np.zeros(self.bodies, dtype=np.int64)
+        self.by_room = np.zeros(self.bodies, dtype=bool)  # capped only because nothing can reach the cap
+        self._note(body[(faces != surface.faces[origin]).any(axis=1)], "welded")
 
-        closed, body = self._cap(soup)
-        self.parts, self.part_body = self._build(closed, body)
-        self.solid = unite(self.parts)
-        self._wrap_rooms()
+        soup = self._cap(self._drop_hidden(_Soup(surface.vertices, faces, body)))
+        parts = self._wrap_crowds(soup, self._build(soup))
+        self.solid = unite([part for part, _ in parts])
+        self._wrap_rooms(soup, parts)
         if self.solid.is_empty():
             self.warnings.append("the surface could not be closed: the hull of its points stands in for the solid")
             self.step[:] = STEPS.index("hull")
-            self.solid = hull_of_points(vertices[np.unique(faces)], HALF_THICKNESS)
+            self.solid = hull_of_points(surface.vertices, HALF_THICKNESS)
         self._measure()
 
     def report(self) -> tuple[BodyRepair, ...]:
         """One record a body."""
-        faces_in = np.bincount(self.soup.body, minlength=self.soup.bodies)
+        faces_in = np.bincount(self.body_of_input, minlength=self.bodies)
         rows = zip(self.step.tolist(), faces_in.tolist(), self.faces_out.tolist(), self.deviation.tolist(), strict=True)
         return tuple(BodyRepair(i, STEPS[s], a, b, d) for i, (s, a, b, d) in enumerate(rows))
 
@@ -183,29 +206,34 @@ class _Repair:
         """Where a ball of radius `GAP` can go around the input."""
         return Reach.of(self.input.vertices, self.input.faces, radius=GAP, resolution=self.resolution)
 
-    def _weld(self, vertices: FloatArray, faces: IntArray) -> tuple[_Soup, IntArray]:
-        """Close cracks; returns the new soup, and the face of the input each of its faces comes from."""
-        soup, origin = _Soup(vertices, faces), np.arange(len(faces))
-        for tolerance in _WELDS:
-            free = int(soup.free.sum())
-            if free == 0 or free > _MOST_FREE_EDGES:
-                break
-            welded = weld_free_vertices(vertices, soup.faces, tolerance)
-            split, parent = split_at_free_vertices(vertices, welded, tolerance)
-            keep = nondegenerate(split)
-            keep[keep] = first_of_doubled(split[keep], len(vertices))
-            trial = _Soup(vertices, split[keep])
-            if int(trial.free.sum()) < free:
-                soup, origin = trial, origin[parent[keep]]
-        return soup, origin
+    def _drop_hidden(self, soup: _Soup) -> _Soup:
+        """Drop faces that lie inside their own body, where that is what keeps the body from having an inside.
 
-    def _cap(self, soup: _Soup) -> tuple[_Soup, IntArray]:
-        """Cap the bodies all of whose holes can honestly be capped; returns the soup and the body of every face."""
+        Where parts meet in faces that overlap without matching, the order of faces around an edge is undecided, and one
+        wrong guess joins the inside with the outside. The winding number does not mind.
+        """
+        crowded = np.zeros(self.bodies, dtype=bool)
+        crowded[soup.body[soup.at_valence(soup.edges.valence > 2)]] = True
+        if not crowded.any():
+            return soup
+        share = soup.sheet_share(self.bodies)
+        hidden = np.zeros(len(soup.faces), dtype=bool)
+        for body in np.flatnonzero(crowded & (share > _FLAPS)):
+            some = np.flatnonzero(soup.body == body)
+            hidden[some] = _hidden_faces(soup.vertices, soup.faces[some])
+        if not hidden.any():
+            return soup
+        better = soup.only(~hidden).sheet_share(self.bodies) < share / 2
+        self._note(soup.body[hidden & better[soup.body]], "outer skin")
+        return soup.only(~hidden | ~better[soup.body])
+
+    def _cap(self, soup: _Soup) -> _Soup:
+        """Cap the bodies all of whose holes can honestly be capped."""
         edges = free_edges(soup.faces, len(soup.vertices))
-        loops = free_loops(edges) if len(edges) <= _MOST_FREE_EDGES else []
+        loops = free_loops(edges) if len(edges) <= MOST_FREE_EDGES else []
         if not loops:
-            return soup, soup.body
-        at_hole = soup.using_valence(soup.free)
+            return soup
+        at_hole = soup.at_valence(soup.edges.valence == 1)
         body_of_vertex = np.zeros(len(soup.vertices), dtype=np.int64)
         body_of_vertex[soup.faces[at_hole]] = soup.body[at_hole, None]
         caps = np.concatenate([loop[cap(soup.vertices[loop])] for loop in loops])
@@ -214,118 +242,149 @@ class _Repair:
         points, on = spread_points(soup.vertices, caps, GAP / 2)
         distance = self.input.distance(points)
         far = distance > GAP
+        unreachable = far.copy()
         if far.any():
             far[far] = self.reach.covers(points[far])
-        chosen = np.zeros(soup.bodies, dtype=bool)
+            unreachable &= ~far
+        cap_area = np.bincount(owner, face_areas(soup.vertices, caps), self.bodies)
+        nearly_closed = cap_area <= HOLE_SHARE * np.bincount(soup.body, soup.area, self.bodies)
+        chosen = np.zeros(self.bodies, dtype=bool)
         chosen[soup.body[at_hole]] = True
-        cap_area = np.bincount(owner, face_areas(soup.vertices, caps), soup.bodies)
-        body_area = np.bincount(soup.body, face_areas(soup.vertices, soup.faces), soup.bodies)
-        nearly_closed = cap_area <= HOLE_SHARE * body_area
-        chosen[owner[on[far & ~nearly_closed[owner[on]]]]] = False
-        chosen[owner[on[far & (distance > HOLE)]]] = False
+        chosen[owner[on[far & ~(nearly_closed[owner[on]] & (distance <= HOLE))]]] = False
 
-        def with_caps() -> tuple[_Soup, IntArray]:
+        def capped() -> _Soup:
             some = chosen[owner]
-            faces = np.concatenate([soup.faces, caps[some]])
-            keep = first_of_doubled(faces, len(soup.vertices))
-            return _Soup(soup.vertices, faces[keep]), np.concatenate([soup.body, owner[some]])[keep]
+            faces, body = np.concatenate([soup.faces, caps[some]]), np.concatenate([soup.body, owner[some]])
+            return _Soup(soup.vertices, faces, body).only(first_of_doubled(faces, len(soup.vertices)))
 
         # A cap is worth having only where it gives the body an inside: a strip whose cap lies on itself stays a sheet.
-        capped, body = with_caps()
-        sides = sides_of(capped.vertices, capped.faces, capped.edges)
-        volume = np.bincount(_component_body(sides, body), np.maximum(sides.volume, 0), soup.bodies)
-        area = np.bincount(body, face_areas(capped.vertices, capped.faces), soup.bodies)
-        chosen &= volume > HALF_THICKNESS * area / 2
-        chosen[body[sides.sheet]] = False
+        trial = capped()
+        volume = np.bincount(trial.body_of_side(), np.maximum(trial.sides.volume, 0), self.bodies)
+        chosen &= volume > HALF_THICKNESS / 2 * np.bincount(trial.body, trial.area, self.bodies)
+        chosen &= trial.sheet_share(self.bodies) <= _FLAPS
         if not chosen.any():
-            return soup, soup.body
+            return soup
         self._note(np.flatnonzero(chosen), "capped")
+        self.by_room[owner[on[unreachable]]] = True
+        self.by_room &= chosen
         wide = far & chosen[owner[on]]
         if wide.any():
             self.warnings.append(
-                f"{len(np.unique(owner[on[wide]]))} nearly closed bodies had holes that were closed although the caps lead "
-                f"up to {distance[wide].max():.3f} away from the surface"
+                f"{len(np.unique(owner[on[wide]]))} nearly closed bodies had holes that were closed although the caps "
+                f"lead up to {distance[wide].max():.3f} (longest side = 2) away from the surface"
             )
-        return with_caps()
+        return capped()
 
-    def _build(self, soup: _Soup, body: IntArray) -> tuple[list[Manifold], IntArray]:
+    def _build(self, soup: _Soup) -> list[tuple[Manifold, int]]:
         """Turn every body into closed solids; returns them, and the body each belongs to."""
-        vertices, faces = soup.vertices, soup.faces
-        sides = sides_of(vertices, faces, soup.edges)
+        sides = soup.sides
         front, back = sides.label[0::2], sides.label[1::2]
-        has_sheet = np.zeros(len(sides.volume), dtype=bool)
+        has_sheet, is_front = np.zeros((2, len(sides.volume)), dtype=bool)
         has_sheet[front[sides.sheet]] = True
-        flat = (np.abs(sides.volume) <= _FLAT * sides.area) & ~has_sheet
+        is_front[front] = True
+        none = _FLAT * sides.area
+        sheet_area = np.bincount(front, soup.area * sides.sheet, len(none))
+        # A component that is mostly sheet yet has negative volume joins the inside with the outside: its body is not a
+        # solid anywhere, so all of it becomes slabs (whose cavities are filled later).
+        leaky = np.isin(soup.body_of_side(), soup.body_of_side()[(sides.volume < -none) & (4 * sheet_area > sides.area)])
         # The two side components of a flat closed body are each other's mirror: build the fronts.
-        fronts = np.zeros_like(flat)
-        fronts[front] = True
-        keep = (sides.volume > _FLAT * sides.area) | (has_sheet & (sides.volume >= -_FLAT * sides.area)) | (flat & fronts)
-        thin = (sides.sheet & keep[front]) | (flat[front] & keep[front])
+        flat = (np.abs(sides.volume) <= none) & ~has_sheet & is_front
+        keep = (sides.volume > none) | (has_sheet & (sides.volume >= -none)) | flat | leaky
+        thin = keep[front] & (sides.sheet | flat[front] | leaky[front])
+        joined = np.arange(len(none))
+        joined[leaky] = np.flatnonzero(leaky)[np.unique(soup.body_of_side()[leaky], return_index=True)[1]][
+            np.unique(soup.body_of_side()[leaky], return_inverse=True)[1]
+        ]
 
-        new_vertices, new_faces, label = skin(vertices, faces, sides, keep, thin, HALF_THICKNESS)
-        parts = [to_manifold(v, f) for v, f in split_labels(new_vertices, new_faces, label)]
+        vertices, faces, label = skin(soup.vertices, soup.faces, sides, keep, thin, HALF_THICKNESS)
+        label = joined[label]
         built, count = np.unique(label, return_counts=True)
-        part_body = _component_body(sides, body)[built]
-        np.add.at(self.faces_out, part_body, count)
+        body = soup.body_of_side()[built]
+        np.add.at(self.faces_out, body, count)
 
-        self._note(body[keep[back] & ~keep[front]], "reoriented")
-        self._note(body[~keep[front] & ~keep[back]], "outer skin")
-        self._note(body[soup.using_valence(soup.edges.valence > 2)], "outer skin")
-        self._note(body[thin], "slab")
-        return parts, part_body
+        self._note(soup.body[keep[back] & ~keep[front]], "reoriented")
+        self._note(soup.body[~keep[front] & ~keep[back]], "outer skin")
+        self._note(soup.body[soup.at_valence(soup.edges.valence > 2)], "outer skin")
+        self._note(soup.body[thin], "slab")
+        solids = [to_manifold(v, f) for v, f in split_labels(vertices, faces, label)]
+        return list(zip(solids, body.tolist(), strict=True))
 
-    def _measure(self) -> None:
-        """Record, for the bodies that were changed, how far the solid's surface leads from the input's."""
-        if self.step.max() < STEPS.index("welded"):
-            return
-        vertices, faces = to_arrays(self.solid)
-        points, _ = spread_points(vertices, faces, GAP)
-        closest, face = self.input.closest(points)
-        distance = np.linalg.norm(points - closest, axis=1)
-        np.maximum.at(self.deviation, self.body_of_input[face], distance)
-        missing = np.isin(self.body_of_input, np.flatnonzero(self.step >= STEPS.index("wrapped")))
-        if missing.any():
-            solid = SurfaceQuery(vertices, faces)
-            points, on = spread_points(self.input.vertices, self.input.faces[missing], GAP)
-            outside = ~solid.inside(points)
-            np.maximum.at(self.deviation, self.body_of_input[missing][on[outside]], solid.distance(points[outside]))
+    def _wrap(self, cells: BoolArray) -> Manifold:
+        """Return a solid of grid cells, drawn onto the input."""
+        return to_manifold(*self.reach.wrap(cells, self.input, HALF_THICKNESS)).simplify(_WRAP_ERROR)
 
-    def _wrap_rooms(self) -> None:
+    def _wrap_crowds(self, soup: _Soup, parts: list[tuple[Manifold, int]]) -> list[tuple[Manifold, int]]:
+        """Wrap sheets by the hundred (leaves, feathers) as one body: what no ball of radius `GAP` can tell apart."""
+        is_slab = self.step == STEPS.index("slab")
+        if is_slab.sum() <= _CROWD:
+            return parts
+        slabs = soup.only(is_slab[soup.body])
+        points, _ = spread_points(slabs.vertices, slabs.faces, self.reach.pitch / 2)
+        wrap = self._wrap(self.reach.around_points(points))
+        if wrap.volume() <= 0:
+            return parts
+        first = int(slabs.body.min())
+        self._note(slabs.body, "wrapped")
+        self.faces_out[is_slab] = 0
+        self.faces_out[first] = wrap.num_tri()
+        return [*((part, body) for part, body in parts if not is_slab[body]), (wrap, first)]
+
+    def _wrap_rooms(self, soup: _Soup, parts: list[tuple[Manifold, int]]) -> None:
         """Close rooms that sheets enclose but for gaps no ball of radius `GAP` passes."""
-        slabs = np.flatnonzero(self.step == STEPS.index("slab"))
-        of_slab = np.isin(self.soup.body, slabs)
-        area = face_areas(self.soup.vertices, self.soup.faces[of_slab]).sum()
-        if area < 4 * np.pi * GAP**2 or self.solid.is_empty():
+        is_slab = self.step == STEPS.index("slab")
+        slabs = soup.only(is_slab[soup.body])
+        around = soup.only((is_slab | self.by_room)[soup.body])
+        if around.area.sum() < 4 * np.pi * GAP**2 or self.solid.is_empty():
             return
         rooms = self.reach.rooms_outside(SurfaceQuery(*to_arrays(self.solid)))
         if len(rooms) == 0:
             return
-        points, on = spread_points(self.soup.vertices, self.soup.faces[of_slab], GAP)
-        near = np.isin(self.reach.rooms_near(points), rooms)
-        owner = self.soup.body[of_slab][on]
-        share = np.bincount(owner, near, self.soup.bodies) / np.maximum(np.bincount(owner, minlength=self.soup.bodies), 1)
-        walls = share > 0.5
-        rooms = np.intersect1d(rooms, self.reach.rooms_near(points[walls[owner]]))
+        rooms = np.intersect1d(rooms, self.reach.rooms_near(spread_points(around.vertices, around.faces, GAP)[0]))
         if len(rooms) == 0:
             return
-        wrap_vertices, wrap_faces = self.reach.wrap(rooms, self.input)
-        wrap = to_manifold(wrap_vertices, wrap_faces).simplify(_WRAP_ERROR)
-        if wrap.is_empty() or wrap.volume() <= 0:
-            return
-        rest = [part for part, body in zip(self.parts, self.part_body, strict=True) if not walls[body]]
-        united = unite([*rest, wrap])
+        wrap = self._wrap(self.reach.around_rooms(rooms))
+        # The wrap takes the place of the sheets that are nothing but walls of the rooms; the others stay slabs.
+        points, on = spread_points(slabs.vertices, slabs.faces, GAP)
+        wall = np.bincount(on, ~np.isin(self.reach.rooms_near(points), rooms), len(slabs.faces)) == 0
+        before = self.faces_out.copy()
+        self.faces_out[is_slab] = 0
+        others = [part for part, body in parts if not is_slab[body]]
+        united = unite([*others, *(part for part, _ in self._build(slabs.only(~wall))), wrap])
         if united.volume() <= self.solid.volume():
+            self.faces_out = before
             return
         self.solid = united
-        self._note(np.flatnonzero(walls), "wrapped")
-        first = np.flatnonzero(walls)[0]
-        self.faces_out[walls] = 0
-        self.faces_out[first] = wrap.num_tri()
+        wrapped = np.concatenate([slabs.body[wall], np.flatnonzero(self.by_room)])
+        self._note(wrapped, "wrapped")
+        self.faces_out[wrapped.min(initial=self.bodies - 1)] += wrap.num_tri()
+
+    def _measure(self) -> None:
+        """Record, for the bodies that were changed, how far the solid and the input lead from each other."""
+        if self.step.max() < STEPS.index("outer skin"):
+            return
+        solid = SurfaceQuery(*to_arrays(self.solid), self.input.threads)
+        points, _ = spread_points(solid.vertices, solid.faces, GAP)
+        closest, face = self.input.closest(points)
+        np.maximum.at(self.deviation, self.body_of_input[face], np.linalg.norm(points - closest, axis=1))
+
+        changed = np.flatnonzero(self.step[self.body_of_input] >= STEPS.index("outer skin"))
+        points, on = spread_points(self.input.vertices, self.input.faces[changed], GAP)
+        distance = solid.distance(points)
+        lost = np.flatnonzero(distance > 2 * HALF_THICKNESS)
+        lost = lost[~solid.inside(points[lost])]
+        np.maximum.at(self.deviation, self.body_of_input[changed[on[lost]]], distance[lost])
 
 
-def _component_body(sides: Sides, body: IntArray) -> IntArray:
-    """Return ``[C]`` the body of each side component, given the body ``[F]`` of each face."""
-    result = np.zeros(len(sides.volume), dtype=np.int64)
-    result[sides.label[0::2]] = body
-    result[sides.label[1::2]] = body
+def _hidden_faces(vertices: FloatArray, faces: IntArray) -> BoolArray:
+    """Return ``[F]`` which faces of one body it winds around on both sides."""
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    normal = np.cross(b - a, c - a)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+    middle = (a + b + c) / 3
+    query = SurfaceQuery(vertices, faces)
+    beside = np.stack([query.winding(middle + _BESIDE * normal), query.winding(middle - _BESIDE * normal)])
+    if signed_tetrahedra(vertices, faces).sum() < 0:
+        beside = -beside
+    # On a skin the sides have 0 and 1; a wall inside has 0.5 and 1.5. A skin that lies double has 0 and 2.
+    result: BoolArray = (beside.mean(axis=0) > 0.75) & (beside.min(axis=0) > 0.25)
     return result

@@ -6,15 +6,40 @@ caller measures that.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import mapbox_earcut
 import numpy as np
 from scipy.spatial import cKDTree
 
 from rlacd.solid.frame import FloatArray
-from rlacd.solid.topology import Edges, IntArray, components, nondegenerate
+from rlacd.solid.topology import Edges, IntArray, components, first_of_doubled, nondegenerate
 
 # Minimum-area triangulation looks at every pair of corners; longer loops are cut by ears or spanned from the middle.
 _EXACT_LOOP = 60
+
+
+# Tracing loops is the one step of a repair that walks edge by edge; a soup with more free edges is no scan with holes.
+MOST_FREE_EDGES = 500_000
+
+
+def close_cracks(vertices: FloatArray, faces: IntArray, tolerances: Sequence[float]) -> tuple[IntArray, IntArray]:
+    """Merge free edges that nearly coincide, trying ever wider tolerances; a try that closes nothing is undone.
+
+    Returns the faces ``[G, 3]`` and ``[G]`` the given face each comes from.
+    """
+    origin = np.arange(len(faces))
+    free = len(free_edges(faces, len(vertices)))
+    for tolerance in tolerances:
+        if free == 0 or free > MOST_FREE_EDGES:
+            break
+        split, parent = split_at_free_vertices(vertices, weld_free_vertices(vertices, faces, tolerance), tolerance)
+        keep = nondegenerate(split)
+        keep[keep] = first_of_doubled(split[keep], len(vertices))
+        left = len(free_edges(split[keep], len(vertices)))
+        if left < free:
+            faces, origin, free = split[keep], origin[parent[keep]], left
+    return faces, origin
 
 
 def weld_free_vertices(vertices: FloatArray, faces: IntArray, tolerance: float) -> IntArray:

@@ -89,23 +89,35 @@ class Reach:
         label: IntArray = np.where(away[at] * self.pitch <= reach, nearest, 0)
         return label
 
-    def wrap(self, rooms: IntArray, surface: SurfaceQuery) -> tuple[FloatArray, IntArray]:
-        """Return closed surfaces around rooms, drawn onto the surface where it is near.
+    def around_rooms(self, rooms: IntArray) -> BoolArray:
+        """Return ``[X, Y, Z]`` the unreachable cells of some rooms and of their walls."""
+        distance = ndimage.distance_transform_edt(~np.isin(self.room, rooms)) * self.pitch
+        cells: BoolArray = (distance <= self.radius + 2 * self.pitch) & ~self.reached
+        return cells
 
-        The cells of the rooms and of their walls give a surface of squares; each corner then moves to the closest
-        point of the surface unless that is farther than two cells (there it spans a gap and is smoothed instead).
+    def around_points(self, points: FloatArray) -> BoolArray:
+        """Return ``[X, Y, Z]`` the unreachable cells at and between some points."""
+        mark = np.zeros(self.reached.shape, dtype=bool)
+        mark[tuple(np.rint((points - self.origin) / self.pitch).astype(np.int64).T)] = True
+        cells: BoolArray = (ndimage.distance_transform_edt(~mark) * self.pitch <= self.radius) & ~self.reached
+        return cells
+
+    def wrap(self, cells: BoolArray, surface: SurfaceQuery, thickness: float) -> tuple[FloatArray, IntArray]:
+        """Return the closed surface of a set of cells, drawn onto a surface where it is near.
+
+        Corners of cells move to `thickness` in front of the closest point of the surface, seen from where they were; so
+        a wrap around a single sheet keeps two sides. Corners farther than two cells away span a gap and are smoothed.
         """
-        chosen = np.isin(self.room, rooms)
-        near = ndimage.distance_transform_edt(~chosen) * self.pitch <= self.radius + 2 * self.pitch
-        solid = near & ~self.reached
-        corners, quads = _boundary_squares(solid)
+        corners, quads = _boundary_squares(cells)
         points = self.origin + (corners - 0.5) * self.pitch
-        triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
         closest, _ = surface.closest(points)
-        attached = np.linalg.norm(points - closest, axis=1) <= 2 * self.pitch
-        points[attached] = closest[attached]
+        away = points - closest
+        distance = np.linalg.norm(away, axis=1)
+        attached = distance <= 2 * self.pitch
+        step = thickness / np.maximum(distance, np.finfo(float).tiny)
+        points[attached] = (closest + np.minimum(step, 1)[:, None] * away)[attached]
         _smooth(points, quads, ~attached)
-        return points, triangles
+        return points, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
 def _boundary_squares(solid: BoolArray) -> tuple[FloatArray, IntArray]:

@@ -25,6 +25,9 @@ from rlacd.solid.frame import FloatArray
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
+# Faces closer in angle than this (radians) lie on each other as far as float32 files can tell.
+_SAME_ANGLE = 1e-4
+
 _NEXT = np.array([1, 2, 0])
 
 
@@ -174,12 +177,44 @@ def wedges_of(vertices: FloatArray, faces: IntArray, edges: Edges) -> IntArray:
         ends = edges.vertices[edges.of_halfedge[crowded]]
         angle[crowded] = _angles_around(vertices, faces, ends, crowded)
         order = np.lexsort((angle, edges.of_halfedge))
+        _order_ties(order, angle, edges, (faces < faces[:, _NEXT]).ravel())
     else:
         order = np.argsort(edges.of_halfedge, kind="stable")
     start = np.concatenate([[0], np.cumsum(edges.valence)])
     follower = np.arange(1, len(order) + 1)
     follower[start[1:] - 1] = start[:-1]  # the last face around an edge is followed by the first
     return np.stack([order, order[follower]], axis=1)
+
+
+def _order_ties(order: IntArray, angle: FloatArray, edges: Edges, forward: BoolArray) -> None:
+    """Put faces that lie on each other around an edge into the order their windings ask for, in place.
+
+    Their angles cannot tell which comes first, and a wrong guess would join the inside with the outside. Where windings
+    are consistent, both sides of a wedge are fronts or both are backs.
+    """
+    start = np.concatenate([[0], np.cumsum(edges.valence)])
+    sorted_angle = angle[order]
+    gap = np.empty(len(order))
+    gap[:-1] = np.diff(sorted_angle)
+    gap[start[1:] - 1] = sorted_angle[start[:-1]] + 2 * np.pi - sorted_angle[start[1:] - 1]
+    tied = np.zeros(len(edges.valence), dtype=bool)
+    tied[edges.of_halfedge[order[gap < _SAME_ANGLE]]] = True
+    for edge in np.flatnonzero(tied & (edges.valence > 2)):
+        here = slice(start[edge], start[edge + 1])
+        ring, gaps = order[here], gap[here]
+        alone = (gaps >= _SAME_ANGLE) & (np.roll(gaps, 1) >= _SAME_ANGLE)
+        # Begin with a face whose place is certain, else after the widest wedge: no tie crosses it.
+        turn = int(alone.argmax()) if alone.any() else int(gaps.argmax()) + 1
+        ring, gaps = np.roll(ring, -turn), np.roll(gaps, -turn)
+        result: list[int] = []
+        for group in np.split(ring, np.flatnonzero(gaps[:-1] >= _SAME_ANGLE) + 1):
+            left = group.tolist()
+            while left:
+                # The wedge after a face shows its front if it runs forward; the next face shows its front to the same
+                # wedge if it runs backward. With nothing to go by, fronts face out.
+                wanted = not forward[result[-1]] if result else False
+                result.append(left.pop(next((i for i, h in enumerate(left) if forward[h] == wanted), 0)))
+        order[here] = result
 
 
 def facing_sides(faces: IntArray, wedges: IntArray) -> tuple[IntArray, IntArray]:

@@ -1,0 +1,240 @@
+"""Any file gives triangles or one clear sentence."""
+
+import io
+import json
+import socket
+
+import numpy as np
+import pytest
+import trimesh
+
+from rlacd.errors import EmptyMeshError, MeshDataError, MeshError, MeshFileError
+from rlacd.solid.load import load_mesh
+
+FORMATS = ["obj", "stl", "ply", "off", "glb", "gltf", "dae", "3mf"]
+
+
+@pytest.fixture
+def box():
+    return trimesh.creation.box(extents=(1, 2, 3))
+
+
+def write(mesh, folder, extension):
+    path = folder / f"mesh.{extension}"
+    if extension == "gltf":
+        for name, content in trimesh.Scene(mesh).export(file_type="gltf").items():
+            (path if name == "model.gltf" else folder / name).write_bytes(content)
+    else:
+        path.write_bytes(content if isinstance(content := mesh.export(file_type=extension), bytes) else content.encode())
+    return path
+
+
+def triangles(mesh):
+    """The corners of all faces, in an order of their own."""
+    rows = np.round(mesh.vertices[mesh.faces], 5)
+    rows = np.stack([np.roll(t, -np.lexsort(t.T[::-1])[0], axis=0) for t in rows])
+    return rows.reshape(-1, 9)[np.lexsort(rows.reshape(-1, 9).T[::-1])]
+
+
+@pytest.mark.parametrize("extension", FORMATS)
+def test_every_format_gives_the_same_triangles(box, tmp_path, extension):
+    source = trimesh.Scene(box) if extension in ("glb", "3mf") else box
+    path = tmp_path / f"box.{extension}"
+    if extension in ("glb", "3mf"):
+        source.export(path)
+    else:
+        path = write(box, tmp_path, extension)
+    loaded = load_mesh(path)
+    assert loaded.vertices.dtype == np.float64
+    assert loaded.faces.dtype == np.int64
+    np.testing.assert_allclose(triangles(loaded), triangles(box), atol=1e-5)
+
+
+@pytest.mark.parametrize("extension", FORMATS)
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.7])
+def test_a_file_cut_off_is_an_error_or_usable(box, tmp_path, extension, share):
+    if extension in ("glb", "3mf"):
+        path = tmp_path / f"mesh.{extension}"
+        trimesh.Scene(box).export(path)
+    else:
+        path = write(box, tmp_path, extension)
+    content = path.read_bytes()
+    path.write_bytes(content[: int(len(content) * share)])
+    if extension == "obj" and share > 0:  # nothing in an obj file tells its length
+        try:
+            assert np.isfinite(load_mesh(path).vertices).all()
+        except MeshError as error:
+            assert str(error)
+        return
+    with pytest.raises(MeshFileError, match="again"):
+        load_mesh(path)
+
+
+@pytest.mark.parametrize("extension", ["stl", "ply", "off", "glb", "dae", "3mf"])
+@pytest.mark.parametrize("lie", ["obj", "stl", "ply", "glb", "dae", "txt"])
+def test_a_wrong_extension_names_the_right_one(box, tmp_path, extension, lie):
+    if extension == lie:
+        pytest.skip("that would be the truth")
+    path = tmp_path / f"mesh.{extension}"
+    (trimesh.Scene(box) if extension in ("glb", "3mf") else box).export(path)
+    wrong = path.rename(tmp_path / f"mesh.{lie}")
+    with pytest.raises(MeshFileError, match=f"rename it to .{extension}"):
+        load_mesh(wrong)
+
+
+def test_instances_are_placed_and_mirrored_ones_face_outward(box, tmp_path):
+    scene = trimesh.Scene()
+    scene.add_geometry(box, geom_name="box")
+    mirror = np.diag([-1.0, 1, 1, 1])
+    mirror[0, 3] = 10
+    scene.graph.update(frame_to="second", matrix=mirror, geometry="box")
+    path = tmp_path / "two.glb"
+    scene.export(path)
+    for loaded in (load_mesh(path), load_mesh(scene)):
+        assert len(loaded.faces) == 2 * len(box.faces)
+        np.testing.assert_allclose(np.ptp(loaded.vertices, axis=0), [11, 2, 3], atol=1e-6)
+        assert trimesh.Trimesh(loaded.vertices, loaded.faces).volume == pytest.approx(12)
+
+
+def test_polygons_groups_and_missing_materials_of_an_obj(tmp_path):
+    path = tmp_path / "house.obj"
+    path.write_text(
+        "mtllib nowhere.mtl\no a\ng one two\nusemtl red\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\nv 2 1 0\n"
+        "f 1 2 3 4\ng other\nusemtl blue\nf 2 5 6 3\nf -6/1/1 -5/2/1 -4\nl 1 2\n"
+    )
+    assert len(load_mesh(path).faces) == 5
+    path.write_text("\n".join(f"v {np.cos(a)} {np.sin(a)} 0" for a in np.linspace(0, 6, 7)) + "\nf 1 2 3 4 5 6 7\n")
+    assert len(load_mesh(path).faces) == 5
+
+
+def test_a_point_cloud_has_points_and_no_faces(tmp_path):
+    path = tmp_path / "cloud.ply"
+    trimesh.PointCloud(np.random.default_rng(0).random((20, 3))).export(path)
+    loaded = load_mesh(path)
+    assert loaded.vertices.shape == (20, 3)
+    assert loaded.faces.shape == (0, 3)
+
+
+def test_arrays_and_quads():
+    square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    assert load_mesh((square, [[0, 1, 2, 3]])).faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+    assert load_mesh((square, np.array([[0, 1, 2]], dtype=np.uint8))).faces.dtype == np.int64
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_faces_with_vertices_that_are_not_finite_are_left_out(bad):
+    vertices = np.array([[bad, 0, 0], [0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    loaded = load_mesh((vertices, [[0, 1, 2], [1, 2, 3]]))
+    np.testing.assert_array_equal(loaded.vertices[loaded.faces], vertices[[[1, 2, 3]]])
+    assert "1 faces" in loaded.warnings[0]
+    with pytest.raises(MeshDataError, match="NaN or infinite"):
+        load_mesh((vertices, [[0, 1, 2]]))
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces"),
+    [
+        ([[0, 0, 0]], [[0, 1, 2]]),
+        ([[0, 0, 0]] * 3, [[-1, 0, 1]]),
+        ([[0, 0]] * 3, [[0, 1, 2]]),
+        ([[0, 0, 0]] * 3, [[0, 1]]),
+        ([[0, 0, 0]] * 3, [[0.5, 1, 2]]),
+        ([[0, 0, 0], [1, 2]], [[0, 1, 0]]),
+        ("abc", [[0, 1, 2]]),
+    ],
+)
+def test_unusable_arrays_are_one_sentence(vertices, faces):
+    with pytest.raises(MeshDataError):
+        load_mesh((vertices, faces))
+
+
+def test_indices_out_of_range_in_a_file(tmp_path):
+    path = tmp_path / "bad.off"
+    path.write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n")
+    with pytest.raises(MeshError):
+        load_mesh(path)
+
+
+def test_no_points_at_all():
+    with pytest.raises(EmptyMeshError):
+        load_mesh((np.empty((0, 3)), np.empty((0, 3), int)))
+    with pytest.raises(EmptyMeshError):
+        load_mesh(trimesh.Scene())
+
+
+def test_files_that_are_none(tmp_path):
+    with pytest.raises(MeshFileError, match="does not exist"):
+        load_mesh(tmp_path / "nowhere.stl")
+    with pytest.raises(MeshFileError, match="folder"):
+        load_mesh(tmp_path)
+    blank = tmp_path / "blank.glb"
+    blank.write_bytes(b" \n\0")
+    with pytest.raises(MeshFileError, match="empty"):
+        load_mesh(blank)
+    with pytest.raises(MeshDataError, match="int"):
+        load_mesh(3)
+
+
+@pytest.mark.parametrize("extension", FORMATS)
+def test_noise_is_refused(tmp_path, extension):
+    path = tmp_path / f"noise.{extension}"
+    path.write_bytes(np.random.default_rng(1).bytes(5000))
+    with pytest.raises(MeshError):
+        load_mesh(path)
+
+
+def gltf_of(box, folder, uri):
+    write(box, folder, "gltf")
+    tree = json.loads((folder / "mesh.gltf").read_text())
+    for buffer in tree["buffers"]:
+        buffer["uri"] = uri(buffer["uri"])
+    (folder / "mesh.gltf").write_text(json.dumps(tree))
+    return folder / "mesh.gltf"
+
+
+@pytest.mark.parametrize("style", ["dots", "absolute", "link"])
+def test_references_do_not_lead_out_of_the_folder(box, tmp_path, style):
+    outside, inside = tmp_path / "outside", tmp_path / "inside"
+    outside.mkdir()
+    inside.mkdir()
+
+    def uri(name):
+        (outside / name).write_bytes((inside / name).read_bytes())
+        (inside / name).unlink()
+        if style == "dots":
+            return f"../outside/{name}"
+        if style == "absolute":
+            return str(outside / name)
+        (inside / name).symlink_to(outside / name)
+        return name
+
+    with pytest.raises(MeshFileError, match="beside the mesh"):
+        load_mesh(gltf_of(box, inside, uri))
+
+
+def test_nothing_is_fetched(box, tmp_path, monkeypatch):
+    def refuse(*args, **kwargs):
+        raise AssertionError("loading opened a socket")
+
+    monkeypatch.setattr(socket, "socket", refuse)
+    monkeypatch.setattr(socket, "create_connection", refuse)
+    with pytest.raises(MeshFileError):
+        load_mesh(gltf_of(box, tmp_path, lambda name: f"http://localhost:1/{name}"))
+    with pytest.raises(MeshFileError, match="does not exist"):
+        load_mesh("http://localhost:1/mesh.stl")
+
+
+def test_paths_in_a_scene_are_ignored(box):
+    scene = trimesh.Scene([box, trimesh.load_path(np.array([[0.0, 0, 0], [9, 9, 9]]))])
+    assert len(load_mesh(scene).faces) == 12
+
+
+def test_real_files_of_every_kind(corpus):
+    files = sorted((corpus / "raw").iterdir())
+    assert {f.suffix for f in files} >= {".glb", ".dae", ".obj", ".stl"}
+    for path in files:
+        loaded = load_mesh(path)
+        reference = trimesh.load_scene(io.BytesIO(path.read_bytes()), file_type=path.suffix[1:], process=False).to_mesh()
+        assert len(loaded.faces) == len(reference.faces)
+        np.testing.assert_allclose(loaded.vertices.min(axis=0), reference.vertices.min(axis=0), atol=1e-6)
+        np.testing.assert_allclose(loaded.vertices.max(axis=0), reference.vertices.max(axis=0), atol=1e-6)
