@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib
+import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -121,6 +123,19 @@ def test_an_extra_that_does_not_load_is_told_apart(tmp_path: Path, monkeypatch: 
     monkeypatch.setattr(importlib, "import_module", fail)
     with pytest.raises(MissingExtraError, match=r"does not load here \(libatomic"):
         towers().picture(tmp_path / "out.png")
+
+
+def test_drawing_leaves_stdout_and_stderr_alone(tmp_path: Path) -> None:
+    """In a process of its own: what Mitsuba's libraries say, they say once, when they are loaded."""
+    code = (
+        "import sys, trimesh; from rlacd.decomposition import Decomposition; box = trimesh.creation.box();"
+        "Decomposition([box], {}, box).picture(sys.argv[1], width=300); print('drawn', file=sys.stderr)"
+    )
+    # A path that holds no LLVM makes the machine look like one without it.
+    environment = {**os.environ, "DRJIT_LIBLLVM_PATH": str(tmp_path / "none.so")}
+    command = [sys.executable, "-c", code, str(tmp_path / "out.png")]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=120, env=environment)
+    assert (run.returncode, run.stdout, run.stderr) == (0, "", "drawn\n")
 
 
 def test_the_callers_own_choice_of_renderer_comes_back(tmp_path: Path) -> None:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import os
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -35,12 +37,32 @@ class Body:
 def require_extra(module: str) -> Any:
     """Import a module of the extra ``view``, or say how to get it."""
     try:
-        return importlib.import_module(module)
+        with _without_native_stderr():
+            return importlib.import_module(module)
     except ModuleNotFoundError as error:
         raise MissingExtraError("pictures need an extra: run  pip install 'rlacd[view]'  and try again.") from error
     except ImportError as error:
         # Installed, but a system library is absent: a container without a compiler may lack libatomic, for one.
         raise MissingExtraError(f"pictures need {module}, which does not load here ({error}); install that.") from error
+
+
+@contextlib.contextmanager
+def _without_native_stderr() -> Iterator[None]:
+    """Keep C++ code from writing to stderr: while it loads, Mitsuba's compiler, not used here, complains about LLVM."""
+    if sys.stderr is not None:
+        sys.stderr.flush()
+    try:
+        kept = os.dup(2)
+    except OSError:  # There is no stderr to keep clean.
+        yield
+        return
+    try:
+        with open(os.devnull, "wb") as nowhere:
+            os.dup2(nowhere.fileno(), 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
 
 
 def render(bodies: Sequence[Body], width: int, height: int, *, samples: int) -> npt.NDArray[np.uint8]:
