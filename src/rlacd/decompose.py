@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -126,8 +127,12 @@ def decompose(
             parts = workers.map(lambda part: limit_part(part, max_vertices, max_faces), parts)
             hulls = workers.map(lambda part: _in_input(part.hull, solid.frame), parts)
         with clock.stage("measure"):
-            report = _report(source, solid, parts, options, criterion, workers, clock)
-    report["seconds"] = {**clock.seconds, "total": clock.elapsed}
+            report = _report(solid, parts, hulls, options, criterion, workers, clock)
+    report = {
+        "name": Path(source.name).stem if isinstance(mesh, (str, os.PathLike)) else "mesh",
+        **report,
+        "seconds": {**clock.seconds, "total": clock.elapsed},
+    }
     return Decomposition(hulls, report, trimesh.Trimesh(source.vertices, source.faces, process=False))
 
 
@@ -178,22 +183,20 @@ def box_around(points: FloatArray) -> FloatArray:
 
 
 def _report(
-    source: InputMesh,
     solid: Solid,
     parts: list[Part],
+    hulls: list[trimesh.Trimesh],
     options: Options,
     criterion: Criterion,
     workers: Workers,
     clock: Clock,
 ) -> dict[str, Any]:
     errors = workers.map(criterion.error, parts)
-    hulls = [part.hull for part in parts]
     over = under = None
     if len(solid.surface[1]):  # a cloud of points has no surface
-        distances = hull_distances(hulls, *solid.surface, threads=workers.threads)
+        distances = hull_distances([part.hull for part in parts], *solid.surface, threads=workers.threads)
         over, under = distances.over[1], distances.under[1]
     return {
-        "name": source.name,
         "version": __version__,
         "options": asdict(options),
         "complete": clock.stopped_by is None,
@@ -213,7 +216,10 @@ def _shortcomings(errors: list[float], over: float | None, options: Options, clo
     """Say where the result falls short of what was asked for."""
     sentences = []
     if clock.stopped_by is not None:
-        sentences.append(f"The work was stopped by {clock.stopped_by}; the hulls cover the solid but are too coarse.")
+        reason = {"timeout": "the timeout ended", "cancel": "the caller ended"}[clock.stopped_by]
+        sentences.append(
+            f"Incomplete: {reason} the work early; the hulls cover the solid but are coarser than asked for."
+        )
     exceeding = [error for error in errors if error > options.threshold]
     if exceeding:
         sentences.append(

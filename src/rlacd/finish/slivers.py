@@ -34,7 +34,9 @@ def drop_slivers(parts: Sequence[Part], workers: Workers) -> list[Part]:
         The rest, in the same order; every point of what was dropped lies within `MISSED` of the rest.
     """
     kept = list(parts)
-    thin = [part for part, is_thin in zip(parts, workers.map(lambda p: is_sliver(p.hull), parts), strict=True) if is_thin]
+    thin = [
+        part for part, is_thin in zip(parts, workers.map(lambda p: is_sliver(p.hull), parts), strict=True) if is_thin
+    ]
     for sliver in sorted(thin, key=lambda part: part.hull.volume):
         others = [part for part in kept if part is not sliver and _near(part, sliver)]
         if others:
@@ -69,7 +71,7 @@ def inradius(hull: Hull) -> float:
         bounds=[(None, None)] * 3 + [(0, None)],
         method="highs",
     )
-    return float(ball.x[3]) if ball.success else 0.0
+    return float(ball.x[3]) if ball.x is not None else 0.0
 
 
 def _near(part: Part, sliver: Part) -> bool:

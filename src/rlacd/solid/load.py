@@ -120,7 +120,9 @@ def _read(path: Path) -> trimesh.Scene:
         if holds and holds != extension:
             raise MeshFileError(f"{path} is not {extension} but {holds}: rename it to .{holds}") from error
         # A parser that misses a module was trying an encoding no mesh has: that says nothing about the file.
-        reason = "" if isinstance(error, ImportError) else f" ({str(error).splitlines()[0][:200]})" if str(error) else ""
+        reason = (
+            "" if isinstance(error, ImportError) else f" ({str(error).splitlines()[0][:200]})" if str(error) else ""
+        )
         raise MeshFileError(
             f"{path} cannot be read as {extension}: it is damaged or cut off{reason}; export it again"
         ) from error

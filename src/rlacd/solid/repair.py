@@ -286,7 +286,9 @@ class _Repair:
         sheet_area = np.bincount(front, soup.area * sides.sheet, len(none))
         # A component that is mostly sheet yet has negative volume joins the inside with the outside: its body is not a
         # solid anywhere, so all of it becomes slabs (whose cavities are filled later).
-        leaky = np.isin(soup.body_of_side(), soup.body_of_side()[(sides.volume < -none) & (4 * sheet_area > sides.area)])
+        leaky = np.isin(
+            soup.body_of_side(), soup.body_of_side()[(sides.volume < -none) & (4 * sheet_area > sides.area)]
+        )
         # The two side components of a flat closed body are each other's mirror: build the fronts.
         flat = (np.abs(sides.volume) <= none) & ~has_sheet & is_front
         keep = (sides.volume > none) | (has_sheet & (sides.volume >= -none)) | flat | leaky
