@@ -1,0 +1,177 @@
+#include "simplify_hull.hpp"
+
+#include <stdexcept>
+
+#include "bvh.hpp"
+#include "convex_collapse.hpp"
+#include "convex_planes.hpp"
+#include "convex_relax.hpp"
+
+namespace rlacd {
+namespace {
+
+// With more corners than this, edge collapse was better than a plain cover on every hull tried.
+constexpr std::size_t kFewCorners = 10;
+
+// Collapses leave room between the hulls, and what they cost shows only after it is used up: on the last stretch, from
+// this many times the corners asked for, collapses and relaxation take turns.
+constexpr double kLastStretch = 1.5, kStep = 1.1;
+constexpr int kSweepsOnTheWay = 3, kSweepsAtTheEnd = 30;
+
+// x -> L^-1 (x - centre), L the Cholesky factor of the corners' covariance: about unit variance in all directions.
+struct Whitening {
+  Vec3 centre;
+  double l00, l10, l11, l20, l21, l22;
+
+  explicit Whitening(const std::vector<Vec3>& points) {
+    const double share = 1.0 / static_cast<double>(points.size());
+    for (const Vec3 p : points) centre = centre + share * p;
+    double xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0;
+    for (const Vec3 p : points) {
+      const Vec3 d = p - centre;
+      xx += share * d.x * d.x, xy += share * d.x * d.y, xz += share * d.x * d.z;
+      yy += share * d.y * d.y, yz += share * d.y * d.z, zz += share * d.z * d.z;
+    }
+    l00 = std::sqrt(xx);
+    l10 = xy / l00;
+    l20 = xz / l00;
+    l11 = std::sqrt(yy - l10 * l10);
+    l21 = (yz - l20 * l10) / l11;
+    l22 = std::sqrt(zz - l20 * l20 - l21 * l21);
+    if (!(l00 > 0 && l11 > 0 && l22 > 0) || !std::isfinite(1 / l22)) throw std::invalid_argument("the hull is flat");
+  }
+  Vec3 to(Vec3 p) const {
+    const Vec3 d = p - centre;
+    const double x = d.x / l00, y = (d.y - l10 * x) / l11;
+    return {x, y, (d.z - l20 * x - l21 * y) / l22};
+  }
+  Vec3 from(Vec3 p) const { return centre + Vec3{l00 * p.x, l10 * p.x + l11 * p.y, l20 * p.x + l21 * p.y + l22 * p.z}; }
+};
+
+double volume_of(const Mesh& mesh) { return mesh_volume(mesh.vertices, mesh.faces); }
+
+Mesh hull_mesh(const std::vector<Vec3>& points) {
+  const Hull hull = convex_hull(points);
+  Mesh mesh;
+  for (const std::int32_t i : hull.indices) mesh.vertices.push_back(points[i]);
+  mesh.faces = hull.faces;
+  return mesh;
+}
+
+// The corners of the intersection of half-spaces n . x <= h that all hold the origin inside: facets of the hull of n /
+// h.
+std::vector<Vec3> corners_of_intersection(const std::vector<Above>& planes) {
+  std::vector<Vec3> dual;
+  for (const Above& plane : planes) dual.push_back(1 / plane.offset * plane.normal);
+  const Mesh polar = hull_mesh(dual);
+  std::vector<Vec3> corners;
+  for (const Triangle& face : polar.faces) {
+    const Vec3 a = polar.vertices[face[0]];
+    const Vec3 normal = cross(polar.vertices[face[1]] - a, polar.vertices[face[2]] - a);
+    corners.push_back(1 / dot(normal, a) * normal);
+  }
+  return corners;
+}
+
+// Polytopes of supporting planes in fixed directions that have at most `most` corners: tetrahedra, prisms, a box.
+std::vector<Mesh> plain_covers(const Mesh& hull, std::size_t most) {
+  const auto cover = [&](const std::vector<Vec3>& normals) {
+    std::vector<Above> planes;
+    for (const Vec3 normal : normals) {
+      double offset = 0;
+      for (const Vec3 p : hull.vertices) offset = std::max(offset, dot(normal, p));
+      planes.push_back({normal, offset});
+    }
+    return hull_mesh(corners_of_intersection(planes));
+  };
+  const Vec3 axes[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  const double third = 1 / std::sqrt(3.0), half = 0.5, cosine = std::sqrt(0.75);
+  std::vector<Mesh> covers = {
+      cover({{third, third, third}, {third, -third, -third}, {-third, third, -third}, {-third, -third, third}})};
+  for (int octant = 0; octant < 8 && most < 6; ++octant) {
+    const Vec3 x = (octant & 1 ? -1.0 : 1.0) * axes[0], y = (octant & 2 ? -1.0 : 1.0) * axes[1],
+               z = (octant & 4 ? -1.0 : 1.0) * axes[2];
+    covers.push_back(cover({x, y, z, third * (-x - y - z)}));
+  }
+  for (int axis = 0; axis < 3 && most >= 6; ++axis) {
+    const Vec3 along = axes[axis], u = axes[(axis + 1) % 3], v = axes[(axis + 2) % 3];
+    covers.push_back(cover({along, -along, u, cosine * v - half * u, -cosine * v - half * u}));
+  }
+  if (most >= 8) covers.push_back(cover({axes[0], -axes[0], axes[1], -axes[1], axes[2], -axes[2]}));
+  return covers;
+}
+
+// How much larger than 1 a scaling about the origin must be for `outer` to hold every corner of `inner`.
+double missing_scale(const Mesh& outer, const Mesh& inner) {
+  const auto reach = [](const Mesh& mesh, Vec3 normal) {
+    double farthest = 0;
+    for (const Vec3 p : mesh.vertices) farthest = std::max(farthest, dot(normal, p));
+    return farthest;
+  };
+  double scale = 1;
+  for (const Triangle& face : outer.faces) {
+    const Vec3 a = outer.vertices[face[0]];
+    const Vec3 normal = normalized(cross(outer.vertices[face[1]] - a, outer.vertices[face[2]] - a));
+    const double own = reach(outer, normal);
+    if (own > 0) scale = std::max(scale, reach(inner, normal) / own);
+  }
+  return scale;
+}
+
+// Out of the whitened frame, scaled by the hair that tolerances and rounding may have left it too small.
+Mesh brought_back(Mesh outer, const Mesh& inner, const Whitening& whitening) {
+  const double scale = missing_scale(outer, inner);
+  for (Vec3& p : outer.vertices) p = whitening.from(scale * p);
+  return hull_mesh(outer.vertices);
+}
+
+std::vector<std::size_t> stages(std::size_t corners, std::size_t most) {
+  std::vector<std::size_t> sizes;
+  for (double size = kLastStretch * static_cast<double>(most); size > static_cast<double>(most); size /= kStep)
+    if (static_cast<std::size_t>(size) < (sizes.empty() ? corners : sizes.back()))
+      sizes.push_back(static_cast<std::size_t>(size));
+  if (sizes.empty() || sizes.back() != most) sizes.push_back(most);
+  return sizes;
+}
+
+}  // namespace
+
+Mesh simplify_hull(const Mesh& hull, std::size_t max_vertices, std::size_t max_faces, double tolerance) {
+  if (max_vertices < 4 || max_faces < 4) throw std::invalid_argument("a hull has at least 4 vertices and 4 faces");
+  // A triangulated convex polytope has twice as many triangles as corners, less four.
+  const std::size_t most = std::min(max_vertices, (max_faces + 4) / 2);
+  const Whitening whitening(hull.vertices);
+  std::vector<Vec3> whitened;
+  for (const Vec3 p : hull.vertices) whitened.push_back(whitening.to(p));
+  const Mesh inner = hull_mesh(whitened);
+  if (inner.faces.empty()) throw std::invalid_argument("the hull is flat");
+
+  const Bvh surface(hull);
+  const ConvexPlanes planes(hull);
+  const auto redundant = [&](Vec3 point) {
+    const Vec3 p = whitening.from(point);
+    return planes.nearest(p).depth >= -tolerance && surface.closest(p).distance2 <= tolerance * tolerance;
+  };
+  if (inner.vertices.size() <= most) {
+    ConvexCollapse collapse(inner);
+    collapse.reduce(most, redundant);
+    const std::vector<Vec3> left = collapse.corners();
+    return left.size() == hull.vertices.size() ? hull : brought_back(hull_mesh(left), inner, whitening);
+  }
+  Mesh best = inner;
+  bool fits = true;
+  for (const std::size_t stage : stages(best.vertices.size(), most)) {
+    ConvexCollapse collapse(best);
+    fits = collapse.reduce(stage, redundant);
+    best = relax_around(hull_mesh(collapse.corners()), inner, stage > most ? kSweepsOnTheWay : kSweepsAtTheEnd);
+    if (!fits) break;
+  }
+  if (!fits || most <= kFewCorners)
+    for (Mesh& cover : plain_covers(inner, most)) {
+      cover = relax_around(std::move(cover), inner, kSweepsAtTheEnd);
+      if (!fits || volume_of(cover) < volume_of(best)) best = std::move(cover), fits = true;
+    }
+  return brought_back(best, inner, whitening);
+}
+
+}  // namespace rlacd

@@ -1,0 +1,196 @@
+"""Hulls with limits: within them, convex, around the given hull, and not much larger."""
+
+from __future__ import annotations
+
+import csv
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from rlacd import _native
+from rlacd.errors import OptionError
+from rlacd.finish.limits import limit_hull
+from rlacd.solid.hull import Hull
+
+
+def hull_of(points: np.ndarray) -> Hull:
+    hull = Hull.of(points)
+    assert hull is not None
+    return hull
+
+
+def excess(outer: Hull, inner: Hull) -> float:
+    """How far a corner of `inner` sticks out of `outer`, by planes pushed out to the outer's own corners."""
+    a, b, c = (outer.vertices[outer.faces[:, i]] for i in range(3))
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1)
+    normals = normals[lengths > 0] / lengths[lengths > 0, None]
+    return float(((inner.vertices @ normals.T).max(axis=0) - (outer.vertices @ normals.T).max(axis=0)).max())
+
+
+def exactly_convex(hull: Hull) -> bool:
+    """Whether every corner lies on or below the plane of every facet, in exact arithmetic."""
+    points = [[Fraction(float(x)) for x in p] for p in hull.vertices]
+    for i, j, k in hull.faces:
+        a, u, v = points[i], *([x - y for x, y in zip(points[n], points[i], strict=True)] for n in (j, k))
+        normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+        if any(sum(n * (x - y) for n, x, y in zip(normal, p, a, strict=True)) > 0 for p in points):
+            return False
+    return True
+
+
+def check(hull: Hull, max_vertices: int | None = None, max_faces: int | None = None) -> Hull:
+    limited = limit_hull(hull, max_vertices, max_faces)
+    assert len(limited.vertices) <= (max_vertices or len(hull.vertices))
+    assert len(limited.faces) <= (max_faces or len(hull.faces))
+    assert len(limited.faces) == 2 * len(limited.vertices) - 4
+    assert excess(limited, hull) < 1e-12 * max(1.0, float(np.abs(limited.vertices).max()))
+    assert limited.volume >= hull.volume * (1 - 1e-9)
+    again = hull_of(limited.vertices)
+    assert len(again.vertices) == len(limited.vertices)
+    assert limited.volume == pytest.approx(again.volume, rel=1e-12)
+    return limited
+
+
+points = hnp.arrays(np.float64, st.tuples(st.integers(5, 40), st.just(3)), elements=st.floats(-1, 1, width=32))
+
+
+@settings(deadline=None, max_examples=300)
+@given(points, st.integers(4, 20))
+def test_any_hull_within_any_limit(cloud: np.ndarray, most: int) -> None:
+    hull = Hull.of(cloud)
+    if hull is None or hull.volume < 1e-9:
+        return
+    check(hull, max_vertices=most)
+    check(hull, max_faces=most)
+
+
+@settings(deadline=None, max_examples=100)
+@given(points, st.integers(4, 12), hnp.arrays(np.float64, 3, elements=st.floats(-8, 0)))
+def test_needles_and_plates(cloud: np.ndarray, most: int, exponents: np.ndarray) -> None:
+    hull = Hull.of(cloud)
+    if hull is None or hull.volume < 1e-3:
+        return
+    check(hull_of(hull.vertices * 10**exponents), max_vertices=most)
+
+
+@settings(deadline=None, max_examples=60)
+@given(points, st.integers(4, 12))
+def test_limited_hulls_are_exactly_convex(cloud: np.ndarray, most: int) -> None:
+    hull = Hull.of(cloud)
+    if hull is not None and hull.volume > 1e-6:
+        assert exactly_convex(check(hull, max_vertices=most))
+
+
+def ball(count: int) -> Hull:
+    points = np.random.default_rng(1).normal(size=(count, 3))
+    return hull_of(points / np.linalg.norm(points, axis=1)[:, None])
+
+
+@pytest.mark.parametrize(
+    ("most", "growth"), [(64, 0.055), (32, 0.11), (16, 0.28), (12, 0.4), (8, 0.8), (6, 1.5), (4, 3.0)]
+)
+def test_ball(most: int, growth: float) -> None:
+    # For comparison: circumscribed platonic bodies with 12, 6 and 4 corners add 21 %, 65 % and 231 %.
+    hull = ball(500)
+    assert check(hull, max_vertices=most).volume < hull.volume * (1 + growth)
+
+
+def test_chamfers_go_first() -> None:
+    # A cube with its twelve edges cut off slightly: eight corners are enough, and the cube is the answer.
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+    hull = hull_of(np.vstack([signs * np.roll([1, 1, 0.9], k) for k in range(3)]))
+    assert len(hull.vertices) == 24
+    limited = check(hull, max_vertices=8)
+    np.testing.assert_allclose(np.unique(np.round(np.abs(limited.vertices), 6)), [1])
+    assert limited.volume == pytest.approx(8, rel=1e-6)
+
+
+def test_prism_keeps_its_flat_ends() -> None:
+    angles = np.linspace(0, 2 * np.pi, 64, endpoint=False)
+    rim = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    hull = hull_of(np.vstack([np.column_stack([rim, np.full(64, z)]) for z in (-1, 1)]))
+    limited = check(hull, max_vertices=16)
+    # Two regular octagons around the circle add 5.5 %.
+    assert limited.volume < hull.volume * 1.075
+    assert np.ptp(limited.vertices[:, 2]) < 2 + 1e-6
+
+
+def test_box_of_eight_is_left_alone() -> None:
+    hull = hull_of(np.array(np.meshgrid([0, 1], [0, 2], [0, 3])).reshape(3, -1).T.astype(float))
+    assert limit_hull(hull, max_vertices=8) is hull
+    assert limit_hull(hull) is hull
+    assert check(hull, max_vertices=4).volume < 4.6 * hull.volume
+
+
+def test_redundant_corners_go_without_a_limit() -> None:
+    # Corners pushed out of a cube's sides by less than the tolerance, and near-duplicates of its corners.
+    rng = np.random.default_rng(0)
+    cube = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T.astype(float)
+    sides = rng.uniform(-0.9, 0.9, (60, 3))
+    sides[np.arange(60), rng.integers(3, size=60)] = 1 + 1e-8 * rng.uniform(size=60)
+    twins = cube[rng.integers(8, size=40)] * (1 - 1e-8 * rng.uniform(size=(40, 3)))
+    hull = hull_of(np.vstack([cube, sides, twins]))
+    assert len(hull.vertices) > 30
+    limited = check(hull)
+    assert len(limited.vertices) <= 10
+    surface = _native.Surface(hull.vertices, hull.faces)
+    assert surface.distance(limited.vertices).max() <= 1e-6 + 1e-9
+
+
+def test_clean_up_stays_within_the_tolerance() -> None:
+    for tolerance in (1e-6, 1e-3, 1e-2):
+        hull = ball(800)
+        limited = limit_hull(hull, tolerance=tolerance)
+        assert excess(limited, hull) < 1e-11
+        assert _native.Surface(hull.vertices, hull.faces).distance(limited.vertices).max() <= tolerance + 1e-8
+    assert len(limited.vertices) < 400
+
+
+def test_same_bits_every_time() -> None:
+    one, two = (limit_hull(ball(300), max_vertices=24) for _ in range(2))
+    assert one.vertices.tobytes() == two.vertices.tobytes()
+    assert one.faces.tobytes() == two.faces.tobytes()
+
+
+@pytest.mark.slow
+def test_real_hulls(corpus: Path) -> None:
+    rows = list(csv.DictReader((corpus / "index.csv").open()))
+    growth = []
+    for row in np.random.default_rng(0).permutation(np.array(rows, dtype=object))[:150]:
+        vertices = np.asarray(trimesh.load(corpus / row["file"], process=False).vertices, dtype=np.float64)
+        low, high = vertices.min(axis=0), vertices.max(axis=0)
+        hull = Hull.of(2 * (vertices - (low + high) / 2) / (high - low).max())
+        if hull is None or hull.volume < 1e-9:
+            continue
+        for most in (32, 8, 4):
+            limited = check(hull, max_vertices=most)
+            if most == 32:
+                growth.append(limited.volume / hull.volume - 1)
+    assert len(growth) > 100
+    assert np.mean(growth) < 0.03
+
+
+@pytest.mark.parametrize("limits", [{"max_vertices": 3}, {"max_faces": 3}, {"max_vertices": -1}])
+def test_impossible_limits_are_refused(limits: dict[str, int]) -> None:
+    with pytest.raises(OptionError, match="at least 4"):
+        limit_hull(ball(20), **limits)
+    with pytest.raises(OptionError, match="tolerance"):
+        limit_hull(ball(20), tolerance=-1.0)
+
+
+def test_bad_hulls_are_refused() -> None:
+    flat = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
+    faces = np.array([[0, 1, 2], [0, 2, 1]], dtype=np.int32)
+    with pytest.raises(ValueError, match="flat"):
+        _native.simplify_hull(flat, faces, 4, 4)
+    with pytest.raises(ValueError, match="not finite"):
+        _native.simplify_hull(flat * np.nan, faces, 4, 4)
+    with pytest.raises(ValueError, match="no vertices"):
+        _native.simplify_hull(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32), 4, 4)
