@@ -65,9 +65,7 @@ def clocked(function: Any) -> tuple[Any, float, float]:
 
 
 def run_rlacd(vertices: Any, faces: Any, threshold: float, threads: int) -> dict[str, Any]:
-    runs = [
-        clocked(lambda: rlacd.decompose((vertices, faces), threshold=threshold, threads=threads)) for _ in range(3)
-    ]
+    runs = [clocked(lambda: rlacd.decompose((vertices, faces), threshold=threshold, threads=threads)) for _ in range(3)]
     report = runs[0][0].report
     return {
         "parts": report["parts"],
@@ -105,7 +103,9 @@ def run(root: Path, files: list[str], out: Path, threshold: float) -> None:
         row["coacd"] = run_coacd(mesh.vertices, mesh.faces, threshold, root / file)
         with out.open("a") as lines:
             lines.write(json.dumps(row) + "\n")
-        print(file, row["rlacd"]["parts"], row["coacd"]["parts"], f"{row['coacd']['wall'] / row['rlacd']['wall']:.0f} x")
+        print(
+            file, row["rlacd"]["parts"], row["coacd"]["parts"], f"{row['coacd']['wall'] / row['rlacd']['wall']:.0f} x"
+        )
 
 
 def table(out: Path) -> None:
@@ -131,8 +131,12 @@ def table(out: Path) -> None:
     print(f"geometric mean of the ratio of parts: {float(np.exp(np.mean(np.log(fewer)))):.2f}")
     for key, name in (("rlacd", "rlacd"), ("coacd", "CoACD")):
         total = sum(r[key]["parts"] for r in rows)
-        print(f"{name}: parts over the threshold by the strict test: {sum(r[key]['parts_over'] for r in rows)} of {total}")
-        print(f"{name}: meshes whose union leaves 0.055: {[Path(r['file']).stem for r in rows if r[key]['over'] > 0.055]}")
+        print(
+            f"{name}: parts over the threshold by the strict test: {sum(r[key]['parts_over'] for r in rows)} of {total}"
+        )
+        print(
+            f"{name}: meshes whose union leaves 0.055: {[Path(r['file']).stem for r in rows if r[key]['over'] > 0.055]}"
+        )
 
 
 def main() -> None:

@@ -30,12 +30,14 @@ class Clock:
         self._progress = progress
         self._start = time.perf_counter()
         self._stage = ""
+        self._parts = 0
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
         """Count the time inside towards stage `name`."""
         self._stage = name
         start = time.perf_counter()
+        self.step(0, None, self._parts)
         try:
             yield
         finally:
@@ -48,6 +50,7 @@ class Clock:
 
     def step(self, done: int, total: int | None, parts: int) -> bool:
         """Report a step of the current stage; True when the work may go on."""
+        self._parts = parts
         if self.stopped_by is None:
             if self._timeout is not None and self.elapsed > self._timeout:
                 self.stopped_by = "timeout"

@@ -1,0 +1,76 @@
+"""What is said of a decomposition: measured on the input's surface, with everything that falls short in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import trimesh
+
+from rlacd._version import __version__
+from rlacd.clock import Clock
+from rlacd.criteria import Criterion
+from rlacd.options import Options
+from rlacd.solid.component import Part
+from rlacd.solid.distance import hull_distances
+from rlacd.solid.solid import Solid
+from rlacd.workers import Workers
+
+HONEST_WITHIN = 5e-3
+"""What the hulls' union may reach beyond the threshold before the report says so: repair and measurement."""
+
+
+def make_report(
+    solid: Solid,
+    parts: Sequence[Part],
+    hulls: Sequence[trimesh.Trimesh],
+    options: Options,
+    criterion: Criterion,
+    workers: Workers,
+    clock: Clock,
+) -> dict[str, Any]:
+    """Measure a finished decomposition; the keys are those of `rlacd.Decomposition`, without name and seconds."""
+    errors = workers.map(criterion.error, parts)
+    over = under = None
+    vertices, faces = solid.surface
+    if len(faces):  # a cloud of points has no surface
+        distances = hull_distances([part.hull for part in parts], vertices, faces, threads=workers.threads)
+        over, under = distances.over[1], distances.under[1]
+    return {
+        "version": __version__,
+        "options": asdict(options),
+        "complete": clock.stopped_by is None,
+        "stopped_by": clock.stopped_by,
+        "parts": len(hulls),
+        "faces": sum(len(hull.faces) for hull in hulls),
+        "vertices": sum(len(hull.vertices) for hull in hulls),
+        "concavity": {"per_part": errors, "max": max(errors)},
+        "hausdorff": {"over": over, "under": under},
+        "scale": solid.frame.scale,
+        "repair": [asdict(body) for body in solid.bodies],
+        "warnings": [*solid.warnings, *_shortcomings(errors, over, options, clock)],
+    }
+
+
+def _shortcomings(errors: Sequence[float], over: float | None, options: Options, clock: Clock) -> list[str]:
+    sentences = []
+    if clock.stopped_by is not None:
+        reason = {"timeout": "the timeout ended", "cancel": "the caller ended"}[clock.stopped_by]
+        sentences.append(
+            f"Incomplete: {reason} the work early; the hulls cover the solid but are coarser than asked for."
+        )
+    exceeding = [error for error in errors if error > options.threshold]
+    if exceeding:
+        sentences.append(
+            f"{len(exceeding)} of {len(errors)} parts exceed the concavity {options.threshold:.4g}; "
+            f"the worst has {max(exceeding):.4g}."
+        )
+    if options.max_hulls is not None and len(errors) > options.max_hulls:
+        sentences.append(f"{len(errors)} hulls are left, more than the {options.max_hulls} asked for.")
+    if over is not None and not exceeding and over > options.threshold + HONEST_WITHIN:
+        sentences.append(
+            f"The hulls reach up to {over:.4g} beyond the input's surface, more than the threshold: "
+            "the repair closed what may be open in the input (see `repair`)."
+        )
+    return sentences
