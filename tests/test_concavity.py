@@ -208,6 +208,15 @@ def test_hull_larger_than_the_part_counts_in_full() -> None:
     assert value[0] == pytest.approx(max(0.1 * np.sqrt(3), 0.3 * np.cbrt(3 * (1.2**3 - 1) / (4 * np.pi))), abs=2e-4)
 
 
+def test_below_the_floor_nothing_is_told_apart() -> None:
+    plate = from_manifold(box((-1, -1, -0.1), (1, 1, 0.1)).refine(6))
+    assert Concavity().measure(plate, TOLERANCE, floor=0.02).value[1] <= 0.02
+    notched = from_manifold(box((-1, -1, -1), (1, 1, 1)) - box((-0.2, -2, 0.5), (0.2, 2, 2)))
+    lower, upper = Concavity().measure(notched, TOLERANCE, floor=0.1).value
+    assert lower <= 0.5 + 1e-12 <= upper + 2e-12
+    assert upper - lower <= TOLERANCE + 1e-12
+
+
 def test_parts_out_of_reach_and_excluded_volumes_never_meet() -> None:
     criterion = Concavity(0.05)
     for gap in (0.08, 0.1001, 0.2):
