@@ -20,22 +20,24 @@ void bind_concavity(nb::module_& m) {
   m.def(
       "concavity",
       [](const PointsIn& part_vertices, const FacesIn& part_faces, const PointsIn& hull_vertices,
-         const FacesIn& hull_faces, double part_volume, double hull_volume, double tolerance) {
+         const FacesIn& hull_faces, double part_volume, double hull_volume, double tolerance, double floor) {
         const Mesh part = to_finite_mesh(part_vertices, part_faces), hull = to_finite_mesh(hull_vertices, hull_faces);
         if (!(tolerance > 0)) throw std::invalid_argument("the tolerance must be positive");
         Concavity c;
         {
           nb::gil_scoped_release release;
-          c = concavity(part, hull, part_volume, hull_volume, tolerance);
+          c = concavity(part, hull, part_volume, hull_volume, tolerance, floor);
         }
         const auto pair = [](const Interval& i) { return nb::make_tuple(i.lower, i.upper); };
         return nb::make_tuple(pair(c.value()), pair(c.part_to_hull), pair(c.hull_to_part), c.volume_radius);
       },
       nb::arg("part_vertices"), nb::arg("part_faces"), nb::arg("hull_vertices"), nb::arg("hull_faces"),
-      nb::arg("part_volume"), nb::arg("hull_volume"), nb::arg("tolerance"),
+      nb::arg("part_volume"), nb::arg("hull_volume"), nb::arg("tolerance"), nb::arg("floor") = 0.0,
       "Concavity of a closed part with this hull: (value, part_to_hull, hull_to_part, volume_radius).\n\n"
       "The first three are certified intervals (lower, upper). The value's is at most `tolerance` wide; that of a\n"
-      "one-sided distance may be wider below the value, where the others decide it.");
+      "one-sided distance may be wider below the value, where the others decide it. Values up to `floor` need not be "
+      "told\n"
+      "apart: the interval may then be as wide as (0, floor), which is much faster for nearly convex parts.");
 }
 
 }  // namespace rlacd

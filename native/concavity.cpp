@@ -74,7 +74,8 @@ double volume_radius(double part_volume, double hull_volume) {
   return std::cbrt(std::max(0.0, 3 * (hull_volume - part_volume) / (4 * kPi)));
 }
 
-Concavity concavity(const Mesh& part, const Mesh& hull, double part_volume, double hull_volume, double tolerance) {
+Concavity concavity(const Mesh& part, const Mesh& hull, double part_volume, double hull_volume, double tolerance,
+                    double floor) {
   check(part, hull);
   const ConvexPlanes planes(hull);
   DepthField depth(planes, hull);
@@ -84,7 +85,7 @@ Concavity concavity(const Mesh& part, const Mesh& hull, double part_volume, doub
   result.volume_radius = volume_radius(part_volume, hull_volume);
   Goal goal;
   goal.tolerance = tolerance;
-  goal.pass = kVolumeWeight * result.volume_radius + tolerance;
+  goal.pass = std::max(floor, kVolumeWeight * result.volume_radius + tolerance);
   result.part_to_hull = maximize(depth, part, goal);
   goal.pass = std::max(goal.pass, result.part_to_hull.lower + tolerance);
   result.hull_to_part = maximize(distance, hull, goal);

@@ -75,7 +75,7 @@ def test_l_shape(levels: int) -> None:
     solid = box((0, 0, 0), (2, 1, 0.5)) + box((0, 0, 0), (1, 2, 0.5))
     measured = Concavity().measure(from_manifold(solid.refine(levels)), TOLERANCE)
     assert measured.part_to_hull[0] == pytest.approx(0.25, abs=TOLERANCE)
-    assert measured.hull_to_part[1] == pytest.approx(0.5, abs=TOLERANCE)
+    assert measured.hull_to_part[0] == pytest.approx(0.5, abs=TOLERANCE)
 
 
 @pytest.mark.parametrize("levels", [1, 2, 9])
@@ -106,7 +106,7 @@ def test_thin_shell(thickness: float) -> None:
     cup = box((-1, -1, -1), (1, 1, 1)) - box((-1 + t, -1 + t, -1 + t), (1 - t, 1 - t, 2))
     check(from_manifold(cup))
     measured = Concavity().measure(from_manifold(cup), TOLERANCE)
-    assert measured.hull_to_part[1] == pytest.approx(1 - t, abs=TOLERANCE)  # the middle of the open top
+    assert measured.hull_to_part[0] == pytest.approx(1 - t, abs=TOLERANCE)  # the middle of the open top
     assert measured.part_to_hull[0] <= t + 1e-12  # no point of the walls is deeper, nor are the rim's inner faces
 
 
@@ -203,9 +203,18 @@ def test_hull_larger_than_the_part_counts_in_full() -> None:
     value, part_to_hull, hull_to_part, _ = _native.concavity(
         part.vertices, part.faces, hull.vertices, hull.faces, part.volume, hull.volume, 1e-4
     )
-    assert part_to_hull[1] == pytest.approx(0.1, abs=2e-4)
+    assert part_to_hull[0] - 1e-12 <= 0.1 <= part_to_hull[1] + 1e-12
     assert hull_to_part[0] == pytest.approx(0.1 * np.sqrt(3), abs=2e-4)
     assert value[0] == pytest.approx(max(0.1 * np.sqrt(3), 0.3 * np.cbrt(3 * (1.2**3 - 1) / (4 * np.pi))), abs=2e-4)
+
+
+def test_below_the_floor_nothing_is_told_apart() -> None:
+    plate = from_manifold(box((-1, -1, -0.1), (1, 1, 0.1)).refine(6))
+    assert Concavity().measure(plate, TOLERANCE, floor=0.02).value[1] <= 0.02
+    notched = from_manifold(box((-1, -1, -1), (1, 1, 1)) - box((-0.2, -2, 0.5), (0.2, 2, 2)))
+    lower, upper = Concavity().measure(notched, TOLERANCE, floor=0.1).value
+    assert lower <= 0.5 + 1e-12 <= upper + 2e-12
+    assert upper - lower <= TOLERANCE + 1e-12
 
 
 def test_parts_out_of_reach_and_excluded_volumes_never_meet() -> None:

@@ -135,7 +135,7 @@ def test_unions_against_dense_sampling(points: list[list[tuple[float, float, flo
     assert found.under[0] <= distances.max() + 0.05
     # The exposed surface lies on facets, inside no hull; every sample of a facet that is inside none is covered by it.
     exposed, faces = hull_union(hulls).exposed()
-    points = _native.sample_surface(exposed, faces, 5000, 0)[0]
+    points = sampled(Closed(exposed, faces), 5000)
     assert all(depth_in(Closed(hull.vertices, hull.faces), points).max() < 1e-5 for hull in hulls)
     over = _native.Surface(surface.vertices, surface.faces).distance(points).max()
     assert over <= found.over[1] + 1e-7

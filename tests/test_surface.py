@@ -46,6 +46,7 @@ def test_needles_are_as_near_as_their_edges(width: float) -> None:
     np.testing.assert_allclose(surface.distance(points), np.linalg.norm(points - on_segment, axis=1), atol=width + 1e-8)
 
 
+@pytest.mark.slow
 def test_distance_to_real_meshes(corpus: Path) -> None:
     rng = np.random.default_rng(0)
     for name in (corpus / "quick.txt").read_text().split():

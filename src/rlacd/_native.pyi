@@ -43,6 +43,7 @@ def concavity(
     part_volume: float,
     hull_volume: float,
     tolerance: float,
+    floor: float = 0.0,
 ) -> tuple[Interval, Interval, Interval, float]: ...
 
 class HullUnion:

@@ -111,13 +111,18 @@ class Concavity:
             part.vertices, part.faces, hull.vertices, hull.faces, part.volume, hull.volume, self.threshold
         )
 
-    def measure(self, part: Part, tolerance: float = 1e-3) -> ConcavityValue:
-        """Measure the concavity to within ``tolerance`` (same frame as the threshold)."""
+    def measure(self, part: Part, tolerance: float = 1e-3, floor: float = 0.0) -> ConcavityValue:
+        """Measure the concavity to within ``tolerance`` (same frame as the threshold).
+
+        Values up to ``floor`` need not be told apart: for them the interval may be as wide as ``(0, floor)``. That is
+        much faster for nearly convex parts with many faces, where it takes cells as small as the tolerance to tell
+        almost nothing from nothing.
+        """
         if not tolerance > 0:
             raise OptionError(f"The tolerance must be positive, not {tolerance}; 0.001 is usual.")
         hull = part.hull
         return ConcavityValue(
             *_native.concavity(
-                part.vertices, part.faces, hull.vertices, hull.faces, part.volume, hull.volume, tolerance
+                part.vertices, part.faces, hull.vertices, hull.faces, part.volume, hull.volume, tolerance, floor
             )
         )
