@@ -60,7 +60,9 @@ def table(rows: list[dict[str, Any]]) -> str:
     lines += [f"  {step:12} in {files[step]:5} files, {bodies[step]:6} bodies" for step in sorted(bodies)]
     seconds = sorted(row["seconds"] for row in good)
     if seconds:
-        lines.append(f"seconds: median {seconds[len(seconds) // 2]:.3f}, worst {seconds[-1]:.2f}, sum {sum(seconds):.1f}")
+        lines.append(
+            f"seconds: median {seconds[len(seconds) // 2]:.3f}, worst {seconds[-1]:.2f}, sum {sum(seconds):.1f}"
+        )
     for key in ("seconds", "deviation", "faces_out"):
         lines.append(f"most {key}:")
         worst = sorted(good, key=lambda row: -row[key])[:10]

@@ -9,7 +9,9 @@ from rlacd.solid.frame import Frame
 finite = st.floats(-1e3, 1e3, allow_nan=False, width=64)
 
 
-@given(hnp.arrays(np.float64, st.tuples(st.integers(1, 30), st.just(3)), elements=finite), st.sampled_from([1e-9, 1, 1e9]))
+@given(
+    hnp.arrays(np.float64, st.tuples(st.integers(1, 30), st.just(3)), elements=finite), st.sampled_from([1e-9, 1, 1e9])
+)
 def test_frame_is_centred_and_two_long_and_reversible(points, unit):
     points = points * unit
     frame = Frame.of(points)

@@ -25,7 +25,9 @@ def write(mesh, folder, extension):
         for name, content in trimesh.Scene(mesh).export(file_type="gltf").items():
             (path if name == "model.gltf" else folder / name).write_bytes(content)
     else:
-        path.write_bytes(content if isinstance(content := mesh.export(file_type=extension), bytes) else content.encode())
+        path.write_bytes(
+            content if isinstance(content := mesh.export(file_type=extension), bytes) else content.encode()
+        )
     return path
 
 
@@ -234,7 +236,9 @@ def test_real_files_of_every_kind(corpus):
     assert {f.suffix for f in files} >= {".glb", ".dae", ".obj", ".stl"}
     for path in files:
         loaded = load_mesh(path)
-        reference = trimesh.load_scene(io.BytesIO(path.read_bytes()), file_type=path.suffix[1:], process=False).to_mesh()
+        reference = trimesh.load_scene(
+            io.BytesIO(path.read_bytes()), file_type=path.suffix[1:], process=False
+        ).to_mesh()
         assert len(loaded.faces) == len(reference.faces)
         np.testing.assert_allclose(loaded.vertices.min(axis=0), reference.vertices.min(axis=0), atol=1e-6)
         np.testing.assert_allclose(loaded.vertices.max(axis=0), reference.vertices.max(axis=0), atol=1e-6)

@@ -74,7 +74,10 @@ def spread_points(vertices: FloatArray, faces: IntArray, spacing: float) -> tupl
         v, u = np.divmod(np.arange(n * m + m), n + 1)
         u, v = np.append(u / n, 0.0)[None, :, None], np.append(v / m, 1.0)[None, :, None]
         for chunk in np.array_split(some, max(1, len(some) * u.size // _CHUNK)):
-            row_start, row_end = a[chunk, None] * (1 - v) + c[chunk, None] * v, b[chunk, None] * (1 - v) + c[chunk, None] * v
+            row_start, row_end = (
+                a[chunk, None] * (1 - v) + c[chunk, None] * v,
+                b[chunk, None] * (1 - v) + c[chunk, None] * v,
+            )
             points.append((row_start * (1 - u) + row_end * u).reshape(-1, 3))
             owner.append(np.repeat(chunk, u.size))
     return np.concatenate(points), np.concatenate(owner)

@@ -49,7 +49,9 @@ def weld_free_vertices(vertices: FloatArray, faces: IntArray, tolerance: float) 
     """
     free = free_edges(faces, len(vertices))
     ends = np.unique(free)
-    pairs = cKDTree(vertices[ends]).query_pairs(tolerance, output_type="ndarray") if len(ends) else np.empty((0, 2), int)
+    pairs = (
+        cKDTree(vertices[ends]).query_pairs(tolerance, output_type="ndarray") if len(ends) else np.empty((0, 2), int)
+    )
     if len(pairs) == 0:
         return faces
     _, label = components(len(ends), pairs[:, 0], pairs[:, 1])

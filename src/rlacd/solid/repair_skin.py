@@ -84,9 +84,7 @@ def skin(
         return positions, triangles, label
 
     # A rim edge from low to high: its face shows one side to the wedge's beginning and the other to its end.
-    low_a, high_a, low_b, high_b = (
-        fan[s[rim]] for s in (low_first, high_first, low_second, high_second)
-    )
+    low_a, high_a, low_b, high_b = (fan[s[rim]] for s in (low_first, high_first, low_second, high_second))
     rim_label = sides.label[side_first[rim]]
     quads = [np.stack([high_a, low_a, low_b], axis=1), np.stack([high_a, low_b, high_b], axis=1)]
     caps, cap_label, centers = _rim_caps(
@@ -117,9 +115,7 @@ def _fan_offsets(
     weight = np.empty((len(corners), 3))
     for i, (p, q, r) in enumerate(((a, b, c), (b, c, a), (c, a, b))):
         along, across = q - p, r - p
-        weight[:, i] = np.arctan2(
-            np.linalg.norm(np.cross(along, across), axis=1), np.einsum("ij,ij->i", along, across)
-        )
+        weight[:, i] = np.arctan2(np.linalg.norm(np.cross(along, across), axis=1), np.einsum("ij,ij->i", along, across))
     corner_normal = np.repeat(normal, 3, axis=0)
     total = np.stack([np.bincount(fan, weight.ravel() * corner_normal[:, k], number) for k in range(3)], axis=1)
     length = np.linalg.norm(total, axis=1, keepdims=True)
@@ -134,9 +130,7 @@ def _fan_offsets(
     return offsets
 
 
-def _rim_caps(
-    tail: IntArray, head: IntArray, label: IntArray, number: int
-) -> tuple[IntArray, IntArray, IntArray]:
+def _rim_caps(tail: IntArray, head: IntArray, label: IntArray, number: int) -> tuple[IntArray, IntArray, IntArray]:
     """Close the ends of rims where three or more free edges meet in a vertex.
 
     Each rim quad leaves a link between two fans at both of its ends. Two links between the same two fans match each

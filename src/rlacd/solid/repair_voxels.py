@@ -130,7 +130,9 @@ def _boundary_squares(solid: BoolArray) -> tuple[FloatArray, IntArray]:
             beyond = np.zeros_like(solid)
             to: list[slice] = [slice(None)] * 3
             frm: list[slice] = [slice(None)] * 3
-            to[axis], frm[axis] = (slice(None, -1), slice(1, None)) if direction == 1 else (slice(1, None), slice(None, -1))
+            to[axis], frm[axis] = (
+                (slice(None, -1), slice(1, None)) if direction == 1 else (slice(1, None), slice(None, -1))
+            )
             beyond[tuple(to)] = solid[tuple(frm)]
             cells = np.argwhere(solid & ~beyond)
             cells[:, axis] += direction == 1
