@@ -30,7 +30,7 @@ from rlacd.workers import Workers
 
 MeshLike: TypeAlias = "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]"
 
-COARSER = 1.3
+COARSER = 1.5
 """With `max_hulls`, decompositions at thresholds growing by this factor compete."""
 
 
@@ -141,9 +141,9 @@ def _parts(tree: CutTree, criterion: Criterion, options: Options, workers: Worke
     coarser = criterion
     while True:
         with clock.stage("merge"):
-            few = merge_to_count(parts, options.max_hulls, criterion, workers, clock)
-            error = max(workers.map(criterion.error, few))
-        if not best or (len(few) <= options.max_hulls and error < least):
+            few = merge_to_count(parts, options.max_hulls, criterion, workers, clock, worst=least)
+            error = max(workers.map(criterion.error, few)) if few else np.inf
+        if few and (not best or error < least):
             best, least = few, error
         if len(parts) <= options.max_hulls or clock.stopped_by is not None:
             return best

@@ -121,6 +121,11 @@ def merge_to_count(
     Errors are measured only for pairs whose lower bound could make them the best (lazy best-first search), first among
     neighbours, then among all parts.
 
+    Parameters
+    ----------
+    worst : float
+        Give up (None) as soon as a union is needed whose error is not below this.
+
     Raises
     ------
     ValueError
@@ -141,6 +146,8 @@ def merge_to_count(
             reach = np.inf
             queue = _bounded_pairs(alive, list(alive), reach, criterion, workers)
             continue
+        if pair.error >= worst:
+            return None
         union = Part.glued(alive.pop(pair.first), alive.pop(pair.second))
         origin[newest] = min(origin[pair.first], origin[pair.second])
         alive[newest] = union

@@ -12,7 +12,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import trimesh
@@ -22,9 +22,9 @@ from trimesh.resolvers import Resolver
 
 from rlacd.errors import EmptyMeshError, MeshDataError, MeshFileError
 from rlacd.solid.frame import FloatArray
-from rlacd.solid.topology import IntArray
+from rlacd.solid.topology import BoolArray, IntArray
 
-Source = str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]
+Source: TypeAlias = str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]
 
 # Triangles are all we need of a file: no colours, and no images, whose decoders are the riskier part of any loader.
 _DATA_FILES = {".bin", ".gltf", ".glb", ".xml", ".model"}
@@ -172,7 +172,7 @@ def _format_of(content: bytes) -> str | None:
 _OBJ_WORDS = {b"v", b"vn", b"vt", b"vp", b"f", b"l", b"p", b"g", b"o", b"s", b"mtllib", b"usemtl"}
 
 
-class _FolderResolver(Resolver):
+class _FolderResolver(Resolver):  # type: ignore[misc]
     """Hands out data files of one folder and nothing else.
 
     A name that leads out of the folder, by ``..``, an absolute path or a link, does not exist for it; nor do images
@@ -270,7 +270,7 @@ def _clean(vertices: FloatArray, faces: IntArray, name: str) -> InputMesh:
     if len(faces) and (faces.min() < 0 or faces.max() >= len(vertices)):
         _raise_out_of_range(faces, len(vertices))
     warnings = []
-    finite = np.isfinite(vertices).all(axis=1)
+    finite: BoolArray = np.isfinite(vertices).all(axis=1)
     if not finite.all():
         usable = finite[faces].all(axis=1)
         if len(faces) and not usable.any():

@@ -38,6 +38,7 @@ from rlacd.solid.topology import (
     IntArray,
     Sides,
     bodies_of,
+    components,
     face_areas,
     first_of_doubled,
     merge_equal_vertices,
@@ -108,6 +109,19 @@ class _Soup:
         sheet = np.bincount(self.body, self.area * self.sides.sheet, bodies)
         share: FloatArray = sheet / np.maximum(np.bincount(self.body, self.area, bodies), _NO_AREA)
         return share
+
+    def in_patches(self) -> _Soup:
+        """The same faces, come apart along every edge that more than two of them share.
+
+        Sheets that meet in an edge are thickened one by one and united afterwards: where all corners of a sheet lie on
+        others, no vertex would be left to give it thickness.
+        """
+        halfedge = np.argsort(self.edges.of_halfedge, kind="stable")
+        halfedge = halfedge[self.edges.valence[self.edges.of_halfedge[halfedge]] == 2].reshape(-1, 2)
+        count, patch = components(len(self.faces), halfedge[:, 0] // 3, halfedge[:, 1] // 3)
+        key = self.faces * count + patch[:, None]
+        distinct, corner = np.unique(key, return_inverse=True)
+        return _Soup(self.vertices[distinct // max(count, 1)], corner.reshape(-1, 3), self.body)
 
     def only(self, keep: BoolArray) -> _Soup:
         """The marked faces."""
@@ -279,41 +293,47 @@ class _Repair:
         """Turn every body into closed solids; returns them, and the body each belongs to."""
         sides = soup.sides
         front, back = sides.label[0::2], sides.label[1::2]
-        has_sheet, is_front = np.zeros((2, len(sides.volume)), dtype=bool)
-        has_sheet[front[sides.sheet]] = True
-        is_front[front] = True
         none = _FLAT * sides.area
         sheet_area = np.bincount(front, soup.area * sides.sheet, len(none))
         # A component that is mostly sheet yet has negative volume joins the inside with the outside: its body is not a
         # solid anywhere, so all of it becomes slabs (whose cavities are filled later).
-        leaky = np.isin(
-            soup.body_of_side(), soup.body_of_side()[(sides.volume < -none) & (4 * sheet_area > sides.area)]
-        )
+        leaky = soup.body_of_side()[(sides.volume < -none) & (4 * sheet_area > sides.area)]
+        solid = sides.volume > none
+        skin_face = (solid[front] | solid[back]) & ~sides.sheet
+        flat = (np.abs(sides.volume) <= none)[front] & (np.abs(sides.volume) <= none)[back]
+        sheet = (sides.sheet & (sides.volume >= -none)[front]) | flat | np.isin(soup.body, leaky)
+        skin_face &= ~sheet
+
+        self._note(soup.body[solid[back] & skin_face], "reoriented")
+        self._note(soup.body[~skin_face & ~sheet], "outer skin")
+        self._note(soup.body[soup.at_valence(soup.edges.valence > 2)], "outer skin")
+        self._note(soup.body[sheet], "slab")
+        return self._skins(soup.only(skin_face)) + self._skins(soup.only(sheet).in_patches())
+
+    def _skins(self, soup: _Soup) -> list[tuple[Manifold, int]]:
+        """Build the outer side components of a soup; sheets and flat bodies get thickness."""
+        if len(soup.faces) == 0:
+            return []
+        sides = soup.sides
+        front = sides.label[0::2]
+        none = _FLAT * sides.area
+        has_sheet, is_front = np.zeros((2, len(none)), dtype=bool)
+        has_sheet[front[sides.sheet]] = True
+        is_front[front] = True
         # The two side components of a flat closed body are each other's mirror: build the fronts.
         flat = (np.abs(sides.volume) <= none) & ~has_sheet & is_front
-        keep = (sides.volume > none) | (has_sheet & (sides.volume >= -none)) | flat | leaky
-        thin = keep[front] & (sides.sheet | flat[front] | leaky[front])
-        joined = np.arange(len(none))
-        joined[leaky] = np.flatnonzero(leaky)[np.unique(soup.body_of_side()[leaky], return_index=True)[1]][
-            np.unique(soup.body_of_side()[leaky], return_inverse=True)[1]
-        ]
-
+        keep = (sides.volume > none) | (has_sheet & (sides.volume >= -none)) | flat
+        thin = keep[front] & (sides.sheet | flat[front])
         vertices, faces, label = skin(soup.vertices, soup.faces, sides, keep, thin, HALF_THICKNESS)
-        label = joined[label]
         built, count = np.unique(label, return_counts=True)
         body = soup.body_of_side()[built]
         np.add.at(self.faces_out, body, count)
-
-        self._note(soup.body[keep[back] & ~keep[front]], "reoriented")
-        self._note(soup.body[~keep[front] & ~keep[back]], "outer skin")
-        self._note(soup.body[soup.at_valence(soup.edges.valence > 2)], "outer skin")
-        self._note(soup.body[thin], "slab")
         solids = [to_manifold(v, f) for v, f in split_labels(vertices, faces, label)]
         return list(zip(solids, body.tolist(), strict=True))
 
-    def _wrap(self, cells: BoolArray) -> Manifold:
-        """Return a solid of grid cells, drawn onto the input."""
-        return to_manifold(*self.reach.wrap(cells, self.input, HALF_THICKNESS)).simplify(_WRAP_ERROR)
+    def _wrap(self, cells: BoolArray, error: float) -> Manifold:
+        """Return a solid of grid cells, drawn onto the input and simplified."""
+        return to_manifold(*self.reach.wrap(cells, self.input, HALF_THICKNESS)).simplify(error)
 
     def _wrap_crowds(self, soup: _Soup, parts: list[tuple[Manifold, int]]) -> list[tuple[Manifold, int]]:
         """Wrap sheets by the hundred (leaves, feathers) as one body: what no ball of radius `GAP` can tell apart."""
@@ -322,7 +342,7 @@ class _Repair:
             return parts
         slabs = soup.only(is_slab[soup.body])
         points, _ = spread_points(slabs.vertices, slabs.faces, self.reach.pitch / 2)
-        wrap = self._wrap(self.reach.around_points(points))
+        wrap = self._wrap(self.reach.around_points(points), HALF_THICKNESS / 2)
         if wrap.volume() <= 0:
             return parts
         first = int(slabs.body.min())
@@ -344,7 +364,7 @@ class _Repair:
         rooms = np.intersect1d(rooms, self.reach.rooms_near(spread_points(around.vertices, around.faces, GAP)[0]))
         if len(rooms) == 0:
             return
-        wrap = self._wrap(self.reach.around_rooms(rooms))
+        wrap = self._wrap(self.reach.around_rooms(rooms), _WRAP_ERROR)
         # The wrap takes the place of the sheets that are nothing but walls of the rooms; the others stay slabs.
         points, on = spread_points(slabs.vertices, slabs.faces, GAP)
         wall = np.bincount(on, ~np.isin(self.reach.rooms_near(points), rooms), len(slabs.faces)) == 0

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import manifold3d
+import numpy as np
+from numpy.typing import NDArray
 
 from rlacd.solid.frame import FloatArray, Frame
-from rlacd.solid.topology import IntArray
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class Solid:
     """
 
     manifold: manifold3d.Manifold
-    surface: tuple[FloatArray, IntArray]
+    surface: tuple[FloatArray, NDArray[np.int32]]
     frame: Frame
     bodies: tuple[BodyRepair, ...]
     warnings: tuple[str, ...]

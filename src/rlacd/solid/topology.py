@@ -239,6 +239,10 @@ def face_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
     return area
 
 
+def _sums(group: IntArray, values: FloatArray, number: int) -> FloatArray:
+    return np.bincount(group, values, number).astype(np.float64)
+
+
 def sides_of(vertices: FloatArray, faces: IntArray, edges: Edges) -> Sides:
     """Join the sides of all faces across their wedges."""
     wedges = wedges_of(vertices, faces, edges)
@@ -250,7 +254,7 @@ def sides_of(vertices: FloatArray, faces: IntArray, edges: Edges) -> Sides:
     return Sides(
         wedges=wedges,
         label=label,
-        volume=np.bincount(front, tetrahedra, number) - np.bincount(back, tetrahedra, number),
-        area=np.bincount(front, area, number) + np.bincount(back, area, number),
+        volume=_sums(front, tetrahedra, number) - _sums(back, tetrahedra, number),
+        area=_sums(front, area, number) + _sums(back, area, number),
         sheet=front == back,
     )

@@ -1,0 +1,402 @@
+"""Any soup gives one closed solid, by the least change."""
+
+import manifold3d
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rlacd.errors import EmptyMeshError
+from rlacd.solid.load import load_mesh
+from rlacd.solid.repair import GAP, HALF_THICKNESS, HOLE, repair
+from rlacd.solid.repair_union import to_arrays
+
+BOX = trimesh.creation.box(extents=(2, 2, 2))
+
+
+def solid_of(mesh, **options):
+    solid = repair(
+        load_mesh(mesh if isinstance(mesh, tuple) else trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)),
+        **options,
+    )
+    check_closed(solid)
+    return solid
+
+
+def check_closed(solid):
+    """By trimesh, which knows nothing of how the solid was made."""
+    vertices, faces = to_arrays(solid.manifold)
+    assert solid.manifold.status() == manifold3d.Error.NoError
+    assert np.isfinite(vertices).all()
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    assert mesh.is_watertight
+    assert mesh.is_winding_consistent
+    assert mesh.volume > 0
+
+
+def steps(solid):
+    return [body.step for body in solid.bodies]
+
+
+def volume(solid):
+    """In the input's unit."""
+    return solid.manifold.volume() / solid.frame.scale**3
+
+
+def moved(mesh, *offset):
+    mesh = mesh.copy()
+    mesh.apply_translation(offset)
+    return mesh
+
+
+def without(mesh, *faces):
+    return trimesh.Trimesh(mesh.vertices, np.delete(mesh.faces, faces, axis=0), process=False)
+
+
+def soup(mesh):
+    """Every face with corners of its own."""
+    return trimesh.Trimesh(
+        mesh.vertices[mesh.faces].reshape(-1, 3), np.arange(3 * len(mesh.faces)).reshape(-1, 3), process=False
+    )
+
+
+def join(*meshes):
+    return trimesh.util.concatenate([trimesh.Trimesh(m.vertices, m.faces, process=False) for m in meshes])
+
+
+SHAPES = {
+    "box": BOX,
+    "ball": trimesh.creation.icosphere(subdivisions=2),
+    "ring": trimesh.creation.torus(1, 0.3),
+    "pipe": trimesh.creation.annulus(0.5, 1, 2),
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@given(seed=st.integers(0, 10**6), flip=st.sampled_from(["none", "all", "some"]), split=st.booleans())
+@settings(max_examples=15, deadline=None)
+def test_a_closed_body_keeps_every_face_whatever_its_windings(name, seed, flip, split):
+    mesh = SHAPES[name].copy()
+    random = np.random.default_rng(seed)
+    faces = mesh.faces[random.permutation(len(mesh.faces))]
+    turned = {"none": np.zeros, "all": np.ones, "some": lambda n, dtype: random.random(n) < 0.5}[flip](
+        len(faces), dtype=bool
+    )
+    faces[turned] = faces[turned][:, ::-1]
+    given_mesh = trimesh.Trimesh(mesh.vertices, faces, process=False)
+    solid = solid_of(soup(given_mesh) if split else given_mesh)
+    assert volume(solid) == pytest.approx(mesh.volume, rel=1e-12)
+    assert solid.bodies[0].step == ("closed" if flip == "none" else "reoriented")
+    assert solid.bodies[0].deviation == 0
+    vertices, out = to_arrays(solid.manifold)
+    expected = solid.frame.to_frame(mesh.vertices[mesh.faces].reshape(-1, 3)).reshape(-1, 3, 3)
+
+    def rows(t):
+        """Triangles as sets of corners, sorted."""
+        t = np.round(t.reshape(-1, 3, 3), 9) + 0.0
+        t = np.array([corner[np.lexsort(corner.T)] for corner in t]).reshape(-1, 9)
+        return t[np.lexsort(t.T)]
+
+    np.testing.assert_array_equal(rows(vertices[out]), rows(expected))
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=30, deadline=None)
+def test_overlapping_boxes_have_the_volume_of_their_union(seed):
+    random = np.random.default_rng(seed)
+    lower = random.uniform(-1, 1, (3, 3))
+    upper = lower + random.uniform(0.3, 1.5, (3, 3))
+    boxes = [trimesh.creation.box(bounds=np.stack([a, b])) for a, b in zip(lower, upper, strict=True)]
+    solid = solid_of(join(*boxes))
+
+    def meet(some):
+        return np.prod(np.maximum(upper[some].min(axis=0) - lower[some].max(axis=0), 0))
+
+    union = sum(meet([i]) for i in range(3)) - meet([0, 1]) - meet([0, 2]) - meet([1, 2]) + meet([0, 1, 2])
+    assert volume(solid) == pytest.approx(union, rel=1e-9)
+    assert steps(solid) == ["closed"] * 3
+
+
+def test_doubled_faces_in_both_orientations_are_one_box():
+    mesh = join(BOX, BOX, trimesh.Trimesh(BOX.vertices, BOX.faces[:, ::-1], process=False))
+    solid = solid_of(mesh)
+    assert volume(solid) == pytest.approx(8)
+    assert len(solid.surface[1]) == 12
+
+
+def test_equal_bodies_count_once():
+    assert volume(solid_of(join(soup(BOX), soup(BOX)))) == pytest.approx(8)
+
+
+@pytest.mark.parametrize("offset", [(2, 2, 0), (2, 2, 2), (2, 0, 0)], ids=["edge", "vertex", "face"])
+def test_boxes_that_touch_stay_two_boxes_worth(offset):
+    solid = solid_of(join(BOX, moved(BOX, *offset)))
+    assert volume(solid) == pytest.approx(16)
+    assert max(body.deviation for body in solid.bodies) < 1e-9
+
+
+def test_a_wall_between_two_rooms_goes():
+    left, right = (
+        trimesh.creation.box(bounds=[[0, 0, 0], [1, 1, 1]]),
+        trimesh.creation.box(bounds=[[1, 0, 0], [2, 1, 1]]),
+    )
+    mesh = join(left, right)
+    mesh.merge_vertices()
+    solid = solid_of(mesh)
+    assert volume(solid) == pytest.approx(2)
+    assert len(solid.manifold.decompose()) == 1
+
+
+def test_a_cavity_is_filled():
+    inner = trimesh.creation.icosphere(radius=0.5)
+    inner.invert()
+    assert volume(solid_of(join(BOX, inner))) == pytest.approx(8)
+
+
+def test_a_box_with_a_missing_side_is_a_thin_walled_box():
+    solid = solid_of(without(BOX, *np.flatnonzero(BOX.face_normals[:, 2] > 0.9)))
+    assert steps(solid) == ["slab"]
+    walls = 5 * 4 * 2 * HALF_THICKNESS
+    assert solid.manifold.volume() == pytest.approx(walls, rel=0.02)
+    assert solid.bodies[0].deviation <= 2 * HALF_THICKNESS + 1e-9
+
+
+def with_hole(radius, subdivisions=5):
+    """A ball of radius 1 without the faces near its pole."""
+    ball = trimesh.creation.icosphere(subdivisions=subdivisions)
+    near = np.linalg.norm(ball.triangles_center - ball.vertices[0] / np.linalg.norm(ball.vertices[0]), axis=1) < radius
+    return without(ball, *np.flatnonzero(near)), ball.volume
+
+
+def test_a_pinhole_is_closed_without_a_word():
+    mesh, full = with_hole(GAP / 2, subdivisions=6)
+    solid = solid_of(mesh)
+    assert steps(solid) == ["capped"]
+    assert solid.bodies[0].deviation <= GAP
+    assert volume(solid) == pytest.approx(full, rel=1e-3)
+    assert not solid.warnings
+
+
+def test_a_small_hole_in_a_scan_is_closed_and_told():
+    mesh, full = with_hole(0.08)
+    solid = solid_of(mesh)
+    assert steps(solid) == ["capped"]
+    assert GAP < solid.bodies[0].deviation <= HOLE
+    assert volume(solid) == pytest.approx(full, rel=1e-2)
+    assert "holes" in solid.warnings[0]
+
+
+def test_a_wide_mouth_stays_open():
+    mesh, full = with_hole(0.4)
+    solid = solid_of(mesh)
+    assert steps(solid) == ["slab"]
+    assert volume(solid) < 0.01 * full
+
+
+def test_six_separate_sides_make_one_box():
+    sides = [
+        BOX.submesh([np.flatnonzero(BOX.face_normals @ n > 0.9)], append=True)
+        for n in np.vstack([np.eye(3), -np.eye(3)])
+    ]
+    assert volume(solid_of(join(*sides))) == pytest.approx(8)
+    gap = 0.004  # sides that do not quite touch
+    apart = [moved(side, *(gap * side.face_normals[0])) for side in sides]
+    solid = solid_of(join(*apart))
+    assert volume(solid) == pytest.approx(8 * (1 + gap) ** 3, rel=0.05)
+    assert max(body.deviation for body in solid.bodies) < 2 * GAP
+
+
+def test_a_crack_and_a_t_junction_are_welded():
+    mesh = soup(BOX)
+    jitter = np.random.default_rng(0).uniform(-1e-5, 1e-5, mesh.vertices.shape)
+    assert volume(solid_of(trimesh.Trimesh(mesh.vertices + jitter, mesh.faces, process=False))) == pytest.approx(
+        8, rel=1e-3
+    )
+    # One face of the box split at the middle of an edge that its neighbour keeps whole.
+    vertices, faces = BOX.vertices.tolist(), BOX.faces.tolist()
+    a, b, c = faces.pop(0)
+    vertices.append(((BOX.vertices[a] + BOX.vertices[b]) / 2).tolist())
+    faces += [[a, 8, c], [8, b, c]]
+    solid = solid_of((vertices, faces))
+    assert volume(solid) == pytest.approx(8)
+    assert steps(solid) == ["welded"]
+
+
+def test_a_flat_card_becomes_a_thin_slab():
+    card = trimesh.Trimesh([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]], process=False)
+    solid = solid_of(card)
+    assert steps(solid) == ["slab"]
+    assert solid.manifold.volume() == pytest.approx(2 * 2 * HALF_THICKNESS, rel=1e-6)
+    assert solid.bodies[0].deviation == pytest.approx(HALF_THICKNESS, rel=1e-6)
+
+
+def test_a_closed_body_without_volume_becomes_a_slab():
+    flat = BOX.copy()
+    flat.vertices[:, 2] = 0
+    solid = solid_of(trimesh.Trimesh(flat.vertices, flat.faces, process=False))
+    assert solid.manifold.volume() == pytest.approx(4 * 2 * HALF_THICKNESS, rel=0.1)
+
+
+@pytest.mark.parametrize("sheets", [3, 4, 5])
+def test_sheets_that_share_an_edge(sheets):
+    angle = 2 * np.pi * np.arange(sheets) / sheets
+    around = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    vertices = np.vstack([[[0, 0, 0], [0, 0, 1]], around, around + [0, 0, 1]])
+    faces = [f for i in range(sheets) for f in ([0, 2 + i, 1], [1, 2 + i, 2 + sheets + i])]
+    solid = solid_of((vertices, faces))
+    assert solid.manifold.volume() == pytest.approx(sheets * solid.frame.scale**2 * 2 * HALF_THICKNESS, rel=0.02)
+
+
+def strip(twists, count=400):
+    """A band with half twists; an odd number makes it one-sided."""
+    t = 2 * np.pi * np.arange(count) / count
+    half = 0.3 * np.stack(
+        [np.cos(twists * t / 2) * np.cos(t), np.cos(twists * t / 2) * np.sin(t), np.sin(twists * t / 2)], axis=1
+    )
+    middle = np.stack([np.cos(t), np.sin(t), 0 * t], axis=1)
+    vertices = np.vstack([middle + half, middle - half])
+    faces = []
+    for i in range(count):
+        j, swap = (i + 1) % count, twists % 2 == 1 and i == count - 1
+        a, b = i, i + count
+        c, d = (j + count, j) if swap else (j, j + count)
+        faces += [[a, c, b], [b, c, d]]
+    return trimesh.Trimesh(vertices, faces, process=False)
+
+
+@pytest.mark.parametrize("twists", [0, 1, 2, 3])
+def test_twisted_bands_become_slabs(twists):
+    mesh = strip(twists)
+    solid = solid_of(mesh)
+    assert steps(solid) == ["slab"]
+    area = mesh.area * solid.frame.scale**2
+    assert solid.manifold.volume() == pytest.approx(2 * HALF_THICKNESS * area, rel=0.05)
+    assert solid.bodies[0].deviation < 3 * HALF_THICKNESS
+
+
+def klein_bottle(count=40):
+    u, v = (a.ravel() for a in np.meshgrid(*2 * [2 * np.pi * np.arange(count) / count], indexing="ij"))
+    r = 2 + np.cos(u / 2) * np.sin(v) - np.sin(u / 2) * np.sin(2 * v)
+    vertices = np.stack(
+        [r * np.cos(u), r * np.sin(u), np.sin(u / 2) * np.sin(v) + np.cos(u / 2) * np.sin(2 * v)], axis=1
+    )
+
+    def at(i, j):
+        # Going around once turns v over.
+        return (i % count) * count + (j if i < count else -j) % count
+
+    faces = []
+    for i in range(count):
+        for j in range(count):
+            faces += [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]
+    return trimesh.Trimesh(vertices, faces, process=False)
+
+
+def test_a_klein_bottle_is_a_result():
+    solid = solid_of(klein_bottle())
+    assert max(body.deviation for body in solid.bodies) < 2 * GAP
+
+
+def test_a_body_that_crosses_itself_is_a_result():
+    twisted = SHAPES["ring"].copy()
+    twisted.vertices[:, 0] *= np.sign(twisted.vertices[:, 1]) * 0.9 + 0.1
+    solid = solid_of(twisted)
+    assert solid.manifold.num_tri() > 0
+
+
+@pytest.mark.parametrize(
+    ("points", "faces"),
+    [
+        ([[1, 2, 3]], []),
+        ([[1, 2, 3]] * 5, [[0, 1, 2], [2, 3, 4]]),
+        ([[0, 0, 0], [1, 1, 1]], []),
+        ([[0, 0, 0], [1, 1, 1], [2, 2, 2]], [[0, 1, 2]]),
+        ([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], []),
+        (np.random.default_rng(0).random((50, 3)), []),
+    ],
+    ids=["point", "same points", "two points", "line", "plane", "cloud"],
+)
+def test_what_has_no_area_gets_the_hull_of_its_points(points, faces):
+    solid = solid_of((points, np.array(faces, dtype=int).reshape(-1, 3)))
+    assert steps(solid) == ["hull"]
+    assert "hull of the points" in solid.warnings[-1]
+    vertices, _ = to_arrays(solid.manifold)
+    inside = solid.frame.to_frame(points)
+    assert (inside.min(axis=0) >= vertices.min(axis=0) - 1e-9).all()
+    assert (inside.max(axis=0) <= vertices.max(axis=0) + 1e-9).all()
+    assert np.ptp(vertices, axis=0).max() <= np.ptp(inside, axis=0).max() + 4 * HALF_THICKNESS
+
+
+def test_one_triangle_is_a_thin_solid():
+    solid = solid_of(([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
+    assert solid.manifold.volume() == pytest.approx(2 * 2 * HALF_THICKNESS, rel=1e-6)
+
+
+def test_no_point_is_an_error():
+    mesh = load_mesh(([[0, 0, 0]], np.empty((0, 3), int)))
+    empty = type(mesh)(mesh.vertices[:0], mesh.faces, "nothing", ())
+    with pytest.raises(EmptyMeshError):
+        repair(empty)
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1e9])
+@pytest.mark.parametrize("far", [0.0, 100.0])
+def test_unit_and_place_do_not_matter(unit, far):
+    solid = solid_of(trimesh.Trimesh((BOX.vertices + far) * unit, BOX.faces, process=False))
+    assert steps(solid) == ["closed"]
+    assert volume(solid) == pytest.approx(8 * unit**3, rel=1e-9)
+    vertices, _ = to_arrays(solid.manifold)
+    np.testing.assert_allclose(np.ptp(solid.frame.to_input(vertices), axis=0), 2 * unit)
+
+
+def with_leaves(count):
+    """Small triangles in a ball, some of them far from all others."""
+    random = np.random.default_rng(3)
+    leaves = (random.normal(size=(count, 1, 3)) * 0.3 + random.normal(size=(count, 3, 3)) * 0.03).reshape(-1, 3)
+    return leaves, np.arange(3 * count).reshape(-1, 3)
+
+
+def test_hundreds_of_leaves_are_one_crowd():
+    solid = solid_of(with_leaves(600))
+    assert set(steps(solid)) == {"wrapped"}
+    assert max(body.deviation for body in solid.bodies) < 2 * GAP
+
+
+def test_a_sheet_attached_to_a_solid_stays():
+    fin = [[1, -1, 1], [1, 1, 1], [1, 1, 1.1], [1, -1, 1.1]]
+    solid = solid_of(join(BOX, trimesh.Trimesh(fin, [[0, 1, 2], [0, 2, 3]], process=False)))
+    assert volume(solid) == pytest.approx(8, rel=5e-3)
+    vertices, _ = to_arrays(solid.manifold)
+    assert solid.frame.to_input(vertices)[:, 2].max() == pytest.approx(1.1, abs=1e-2)
+
+
+@given(st.integers(0, 10**6), st.integers(1, 12))
+@settings(max_examples=25, deadline=None)
+def test_random_soup_gives_a_closed_solid_near_it(seed, count):
+    random = np.random.default_rng(seed)
+    vertices = random.uniform(-1, 1, (max(3, count // 2), 3)).round(1)
+    faces = random.integers(0, len(vertices), (count, 3))
+    solid = solid_of((vertices, faces))
+    assert np.isfinite([body.deviation for body in solid.bodies]).all()
+
+
+def test_same_input_same_bytes():
+    mesh, _ = with_hole(0.4)
+    leaves = with_leaves(400)
+    for source in (mesh, klein_bottle(), leaves):
+        first, second = (solid_of(source, threads=threads) for threads in (1, 4))
+        for a, b in zip(to_arrays(first.manifold), to_arrays(second.manifold), strict=True):
+            assert a.tobytes() == b.tobytes()
+        assert first.bodies == second.bodies
+
+
+@pytest.mark.slow
+def test_the_quick_corpus(corpus):
+    """Every real mesh gives a closed solid whose surface is near the input's, and all of the input is on or in it."""
+    allowed = {"test/vhacd/bunny.ply": HOLE}
+    for name in (corpus / "quick.txt").read_text().split():
+        solid = repair(load_mesh(corpus / name))
+        check_closed(solid)
+        worst = max(body.deviation for body in solid.bodies)
+        assert worst <= allowed.get(name, 0.05), name
