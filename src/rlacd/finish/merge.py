@@ -114,8 +114,13 @@ def _neighbours(
 
 
 def merge_to_count(
-    parts: Sequence[Part], count: int, criterion: Criterion, workers: Workers, clock: Clock
-) -> list[Part]:
+    parts: Sequence[Part],
+    count: int,
+    criterion: Criterion,
+    workers: Workers,
+    clock: Clock,
+    worst: float = np.inf,
+) -> list[Part] | None:
     """Unite parts, the pair with the least error of its union first, until no more than `count` are left.
 
     Errors are measured only for pairs whose lower bound could make them the best (lazy best-first search), first among

@@ -1,0 +1,261 @@
+"""What a user can rely on: the promises of a decomposition, on known shapes and on real meshes."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import trimesh
+from manifold3d import Manifold
+
+import rlacd
+from rlacd.criteria import Concavity
+from rlacd.solid.component import Component, Part
+from rlacd.solid.hull import Hull
+from tests.hulls import assert_convex_hull
+
+
+def mesh_of(manifold: Manifold) -> trimesh.Trimesh:
+    mesh = manifold.to_mesh64()
+    return trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts, process=False)
+
+
+def table() -> trimesh.Trimesh:
+    legs = [Manifold.cube((0.1, 0.1, 1)).translate((x, y, 0)) for x in (0, 1.9) for y in (0, 0.9)]
+    return mesh_of(sum(legs, Manifold.cube((2, 1, 0.1)).translate((0, 0, 1))))
+
+
+def cup() -> trimesh.Trimesh:
+    outside = Manifold.cylinder(1, 0.5, 0.5, 48)
+    return mesh_of(outside - Manifold.cylinder(1, 0.45, 0.45, 48).translate((0, 0, 0.05)))
+
+
+SHAPES = {"table": table, "cup": cup, "torus": lambda: trimesh.creation.torus(1, 0.3)}
+
+
+def assert_convex(hull: trimesh.Trimesh) -> None:
+    if len(hull.vertices) <= 40:
+        assert_convex_hull(hull)
+    else:  # rational arithmetic takes too long
+        assert hull.is_watertight
+        assert hull.volume == pytest.approx(hull.convex_hull.volume, rel=1e-9)
+
+
+def assert_keeps_promises(result: rlacd.Decomposition, threshold: float) -> None:
+    report = result.report
+    assert report["complete"]
+    assert len(result) == report["parts"] == len(result.hulls) == len(report["concavity"]["per_part"])
+    assert report["faces"] == sum(len(hull.faces) for hull in result)
+    for hull in result:
+        assert_convex(hull)
+    assert report["concavity"]["max"] == max(report["concavity"]["per_part"]) <= threshold
+    assert report["hausdorff"]["under"] < 0.005
+    assert report["hausdorff"]["over"] < threshold + 0.005
+    json.dumps(report, allow_nan=False)
+
+
+@pytest.mark.parametrize("threshold", [0.02, 0.05, 0.2])
+@pytest.mark.parametrize("shape", SHAPES)
+def test_promises_hold_on_known_shapes(shape: str, threshold: float) -> None:
+    result = rlacd.decompose(SHAPES[shape](), threshold=threshold)
+    assert_keeps_promises(result, threshold)
+
+
+def test_convex_input_is_one_hull_exactly() -> None:
+    ball = trimesh.creation.icosphere(3)
+    result = rlacd.decompose(ball)
+    assert len(result) == 1
+    assert result.hulls[0].volume == pytest.approx(ball.volume)
+    assert result.report["concavity"]["max"] < 1e-6
+
+
+def test_a_table_is_its_top_and_legs() -> None:
+    assert len(rlacd.decompose(table())) == 5
+
+
+def test_far_apart_bodies_stay_apart() -> None:
+    boxes = [trimesh.creation.box((1, 1, 1), np.eye(4) + np.eye(4, k=3) * 3 * i) for i in range(4)]
+    result = rlacd.decompose(trimesh.util.concatenate(boxes))
+    assert len(result) == 4
+    assert sum(hull.volume for hull in result) == pytest.approx(4)
+
+
+def test_a_cavity_costs_nothing() -> None:
+    hollow = mesh_of(Manifold.sphere(1, 64) - Manifold.sphere(0.8, 64))
+    assert len(rlacd.decompose(hollow)) == 1
+
+
+def test_input_frame_and_unit_are_kept() -> None:
+    placed = table()
+    placed.apply_scale(1000)
+    placed.apply_translation([5e4, -3e3, 70])
+    result, reference = rlacd.decompose(placed), rlacd.decompose(table())
+    assert len(result) == len(reference)
+    joint = np.concatenate([hull.vertices for hull in result])
+    assert joint.min(axis=0) == pytest.approx(placed.bounds[0], abs=1e-6)
+    assert joint.max(axis=0) == pytest.approx(placed.bounds[1], abs=1e-6)
+
+
+def test_threshold_in_the_unit_of_the_input() -> None:
+    mesh = table()
+    mesh.apply_scale(50)  # longest side 100: one unit is 0.02 in the frame
+    metric = rlacd.decompose(mesh, threshold_m=2.5)
+    assert metric.report["options"]["threshold"] == pytest.approx(0.05)
+    with pytest.raises(rlacd.OptionError, match="threshold_m"):
+        rlacd.decompose(mesh, threshold_m=1e-6)
+
+
+@pytest.mark.parametrize("source", ["path", "trimesh", "scene", "arrays", "lists"])
+def test_every_kind_of_input_gives_the_same(source: str, tmp_path) -> None:
+    mesh = table()
+    mesh.export(tmp_path / "table.obj", digits=17)
+    given = {
+        "path": tmp_path / "table.obj",
+        "trimesh": mesh,
+        "scene": trimesh.Scene([mesh]),
+        "arrays": (mesh.vertices, mesh.faces),
+        "lists": (mesh.vertices.tolist(), mesh.faces.tolist()),
+    }[source]
+    result = rlacd.decompose(given)
+    assert len(result) == 5
+    assert result.report["name"] == ("table" if source == "path" else "mesh")
+
+
+def test_same_bytes_for_any_number_of_threads_and_any_run() -> None:
+    runs = [rlacd.decompose(SHAPES["cup"](), threads=threads) for threads in (1, 1, 4)]
+    for other in runs[1:]:
+        assert len(other) == len(runs[0])
+        for a, b in zip(runs[0], other, strict=True):
+            assert a.vertices.tobytes() == b.vertices.tobytes()
+            assert a.faces.tobytes() == b.faces.tobytes()
+        assert other.report["concavity"] == runs[0].report["concavity"]
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5, 40])
+def test_max_hulls(count: int) -> None:
+    free = rlacd.decompose(cup())
+    result = rlacd.decompose(cup(), max_hulls=count)
+    assert len(result) <= count
+    assert result.report["hausdorff"]["under"] < 0.005
+    if count < len(free):
+        assert result.report["concavity"]["max"] > 0.05
+        assert any("exceed" in warning for warning in result.report["warnings"])
+    else:
+        assert len(result) == len(free)
+
+
+def test_more_hulls_fit_better() -> None:
+    errors = [rlacd.decompose(cup(), max_hulls=n).report["concavity"]["max"] for n in (2, 4, 8)]
+    assert errors == sorted(errors, reverse=True)
+
+
+@pytest.mark.parametrize("limit", [{"max_vertices": 16}, {"max_vertices": 32}, {"max_faces": 24}])
+def test_limits_hold_together_with_the_promises(limit: dict[str, int]) -> None:
+    result = rlacd.decompose(SHAPES["torus"](), **limit)
+    assert_keeps_promises(result, 0.05)
+    assert max(len(hull.vertices) for hull in result) <= limit.get("max_vertices", 10**9)
+    assert max(len(hull.faces) for hull in result) <= limit.get("max_faces", 10**9)
+
+
+def test_without_merging_there_are_no_fewer_parts() -> None:
+    assert len(rlacd.decompose(cup(), merge=False)) >= len(rlacd.decompose(cup()))
+
+
+@pytest.mark.parametrize("policy", ["greedy", "greedy-hull-sum", "greedy-max-excess", "greedy-excess-norm"])
+def test_every_policy_keeps_the_promises(policy: str) -> None:
+    assert_keeps_promises(rlacd.decompose(cup(), policy=policy), 0.05)
+
+
+def test_progress_names_the_stages_and_counts_parts() -> None:
+    seen: list[rlacd.Progress] = []
+    result = rlacd.decompose(cup(), progress=lambda p: seen.append(p))
+    assert [s for i, s in enumerate([p.stage for p in seen]) if s not in [p.stage for p in seen[:i]]] == [
+        "load",
+        "repair",
+        "cut",
+        "merge",
+        "finish",
+        "measure",
+    ]
+    assert seen[-1].parts >= len(result)
+    assert all(a.seconds <= b.seconds for a, b in zip(seen, seen[1:], strict=False))
+
+
+@pytest.mark.parametrize("steps", [0, 3, 6, 9])
+def test_cancel_returns_what_is_reached(steps: int) -> None:
+    calls = iter(range(10**6))
+    result = rlacd.decompose(cup(), progress=lambda _: next(calls) < steps)
+    assert not result.report["complete"]
+    assert result.report["stopped_by"] == "cancel"
+    assert len(result) >= 1
+    assert result.report["hausdorff"]["under"] < 0.005
+    for hull in result:
+        assert_convex(hull)
+
+
+def test_timeout_returns_what_is_reached() -> None:
+    result = rlacd.decompose(cup(), timeout=1e-6)
+    assert result.report["stopped_by"] == "timeout"
+    assert result.report["hausdorff"]["under"] < 0.005
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"threshold": 0},
+        {"threshold": float("nan")},
+        {"threshold": 3},
+        {"threshold_m": -1},
+        {"max_hulls": 0},
+        {"max_vertices": 3},
+        {"max_faces": 2},
+        {"policy": "clever"},
+        {"threads": 0},
+        {"timeout": 0},
+        {"resolution": 0},
+    ],
+    ids=str,
+)
+def test_options_out_of_range_are_refused(options: dict[str, object]) -> None:
+    with pytest.raises(rlacd.OptionError, match=next(iter(options))):
+        rlacd.decompose(cup(), **options)
+
+
+def test_concavity_of_the_merged_parts_is_that_of_the_solid_inside_their_hulls() -> None:
+    """A merged part is a glued surface; cut the solid anew along its hull and measure that instead."""
+    mesh = SHAPES["torus"]()
+    result = rlacd.decompose(mesh)
+    scale = result.report["scale"]
+    center = mesh.bounds.mean(axis=0)
+    solid = Component(_manifold((mesh.vertices - center) * scale, mesh.faces))
+    total = 0.0
+    for hull in result:
+        points = (hull.vertices - center) * scale
+        share = solid.manifold ^ _manifold(points, hull.faces)
+        inside = Component(share)
+        exact = Hull.of(points)
+        assert exact is not None
+        value = Concavity().measure(Part(inside.vertices, inside.faces, inside.volume, exact)).value[0]
+        # The hull may hold a little of its neighbours' solid, which only fills it better.
+        assert value <= 0.05 + 1e-3
+        total += inside.volume
+    assert total >= solid.volume * (1 - 1e-9)
+
+
+def _manifold(vertices: np.ndarray, faces: np.ndarray) -> Manifold:
+    from manifold3d import Mesh64
+
+    return Manifold(Mesh64(np.ascontiguousarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.uint64)))
+
+
+@pytest.mark.slow
+def test_real_meshes(corpus) -> None:
+    for name in (corpus / "quick.txt").read_text().split():
+        result = rlacd.decompose(corpus / name)
+        report = result.report
+        for hull in result:
+            assert_convex(hull)
+        assert report["concavity"]["max"] <= 0.05, name
+        assert report["hausdorff"]["over"] <= 0.055 or report["warnings"], name
+        assert report["hausdorff"]["under"] <= 0.01, name
