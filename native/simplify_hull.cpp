@@ -1,5 +1,6 @@
 #include "simplify_hull.hpp"
 
+#include <array>
 #include <stdexcept>
 
 #include "bvh.hpp"
@@ -18,34 +19,41 @@ constexpr std::size_t kFewCorners = 10;
 constexpr double kLastStretch = 1.5, kStep = 1.1;
 constexpr int kSweepsOnTheWay = 3, kSweepsAtTheEnd = 30;
 
-// x -> L^-1 (x - centre), L the Cholesky factor of the corners' covariance: about unit variance in all directions.
-struct Whitening {
-  Vec3 centre;
-  double l00, l10, l11, l20, l21, l22;
-
+// The affine map to a frame where the hull is about 2 wide in three perpendicular directions and around the origin. The
+// directions come from extreme points (the longest line, the point farthest from it), not from second moments, whose
+// cancellation would lose a plate's thickness below 1e-8 of its width.
+class Whitening {
+ public:
   explicit Whitening(const std::vector<Vec3>& points) {
     const double share = 1.0 / static_cast<double>(points.size());
-    for (const Vec3 p : points) centre = centre + share * p;
-    double xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0;
-    for (const Vec3 p : points) {
-      const Vec3 d = p - centre;
-      xx += share * d.x * d.x, xy += share * d.x * d.y, xz += share * d.x * d.z;
-      yy += share * d.y * d.y, yz += share * d.y * d.z, zz += share * d.z * d.z;
+    for (const Vec3 p : points) centre_ = centre_ + share * p;
+    const auto farthest = [&](const auto& distance) {
+      return *std::max_element(points.begin(), points.end(), [&](Vec3 p, Vec3 q) { return distance(p) < distance(q); });
+    };
+    const Vec3 a = farthest([&](Vec3 p) { return norm2(p - centre_); });
+    const Vec3 b = farthest([&](Vec3 p) { return norm2(p - a); });
+    axes_[0] = normalized(b - a);
+    const Vec3 c = farthest([&](Vec3 p) { return norm2(cross(axes_[0], p - a)); });
+    axes_[2] = normalized(cross(axes_[0], c - a));
+    axes_[1] = cross(axes_[2], axes_[0]);
+    for (int i = 0; i < 3; ++i) {
+      for (const Vec3 p : points) scale_[i] = std::max(scale_[i], std::fabs(dot(axes_[i], p - centre_)));
+      if (!(norm2(axes_[i]) > 0.5 && scale_[i] > 0) || !std::isfinite(1 / scale_[i]))
+        throw std::invalid_argument("the hull is flat");
     }
-    l00 = std::sqrt(xx);
-    l10 = xy / l00;
-    l20 = xz / l00;
-    l11 = std::sqrt(yy - l10 * l10);
-    l21 = (yz - l20 * l10) / l11;
-    l22 = std::sqrt(zz - l20 * l20 - l21 * l21);
-    if (!(l00 > 0 && l11 > 0 && l22 > 0) || !std::isfinite(1 / l22)) throw std::invalid_argument("the hull is flat");
   }
   Vec3 to(Vec3 p) const {
-    const Vec3 d = p - centre;
-    const double x = d.x / l00, y = (d.y - l10 * x) / l11;
-    return {x, y, (d.z - l20 * x - l21 * y) / l22};
+    const Vec3 d = p - centre_;
+    return {dot(axes_[0], d) / scale_[0], dot(axes_[1], d) / scale_[1], dot(axes_[2], d) / scale_[2]};
   }
-  Vec3 from(Vec3 p) const { return centre + Vec3{l00 * p.x, l10 * p.x + l11 * p.y, l20 * p.x + l21 * p.y + l22 * p.z}; }
+  Vec3 from(Vec3 p) const {
+    return centre_ + scale_[0] * p.x * axes_[0] + scale_[1] * p.y * axes_[1] + scale_[2] * p.z * axes_[2];
+  }
+
+ private:
+  Vec3 centre_;
+  Vec3 axes_[3];
+  double scale_[3] = {0, 0, 0};
 };
 
 double volume_of(const Mesh& mesh) { return mesh_volume(mesh.vertices, mesh.faces); }
@@ -73,31 +81,53 @@ std::vector<Vec3> corners_of_intersection(const std::vector<Above>& planes) {
   return corners;
 }
 
-// Polytopes of supporting planes in fixed directions that have at most `most` corners: tetrahedra, prisms, a box.
+// The normals of three large facets in different directions, divided by the hull's width along them: in these
+// coordinates any parallelepiped is the unit cube.
+std::array<Vec3, 3> main_directions(const Mesh& hull) {
+  std::array<Vec3, 3> best;
+  for (int i = 0; i < 3; ++i) {
+    double most = 0;
+    for (const Triangle& face : hull.faces) {
+      const Vec3 a = hull.vertices[face[0]];
+      const Vec3 normal = cross(hull.vertices[face[1]] - a, hull.vertices[face[2]] - a);
+      const double size = i == 0   ? norm(normal)
+                          : i == 1 ? norm(cross(best[0], normal))
+                                   : std::fabs(dot(cross(best[0], best[1]), normal));
+      if (size > most) most = size, best[i] = normalized(normal);
+    }
+  }
+  for (Vec3& normal : best) {
+    double low = 0, high = 0;
+    for (const Vec3 p : hull.vertices) low = std::min(low, dot(normal, p)), high = std::max(high, dot(normal, p));
+    normal = 1 / (high - low) * normal;
+  }
+  return best;
+}
+
+// Polytopes of supporting planes in a few directions that have at most `most` corners: tetrahedra, prisms, a box.
 std::vector<Mesh> plain_covers(const Mesh& hull, std::size_t most) {
   const auto cover = [&](const std::vector<Vec3>& normals) {
     std::vector<Above> planes;
-    for (const Vec3 normal : normals) {
+    for (const Vec3 direction : normals) {
+      const Vec3 normal = normalized(direction);
       double offset = 0;
       for (const Vec3 p : hull.vertices) offset = std::max(offset, dot(normal, p));
       planes.push_back({normal, offset});
     }
     return hull_mesh(corners_of_intersection(planes));
   };
-  const Vec3 axes[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  const double third = 1 / std::sqrt(3.0), half = 0.5, cosine = std::sqrt(0.75);
-  std::vector<Mesh> covers = {
-      cover({{third, third, third}, {third, -third, -third}, {-third, third, -third}, {-third, -third, third}})};
+  const std::array<Vec3, 3> axes = main_directions(hull);
+  const auto [x, y, z] = axes;
+  std::vector<Mesh> covers = {cover({x + y + z, x - y - z, y - x - z, z - x - y})};
   for (int octant = 0; octant < 8 && most < 6; ++octant) {
-    const Vec3 x = (octant & 1 ? -1.0 : 1.0) * axes[0], y = (octant & 2 ? -1.0 : 1.0) * axes[1],
-               z = (octant & 4 ? -1.0 : 1.0) * axes[2];
-    covers.push_back(cover({x, y, z, third * (-x - y - z)}));
+    const Vec3 u = (octant & 1 ? -1.0 : 1.0) * x, v = (octant & 2 ? -1.0 : 1.0) * y, w = (octant & 4 ? -1.0 : 1.0) * z;
+    covers.push_back(cover({u, v, w, -u - v - w}));
   }
   for (int axis = 0; axis < 3 && most >= 6; ++axis) {
     const Vec3 along = axes[axis], u = axes[(axis + 1) % 3], v = axes[(axis + 2) % 3];
-    covers.push_back(cover({along, -along, u, cosine * v - half * u, -cosine * v - half * u}));
+    covers.push_back(cover({along, -along, u, std::sqrt(0.75) * v - 0.5 * u, -std::sqrt(0.75) * v - 0.5 * u}));
   }
-  if (most >= 8) covers.push_back(cover({axes[0], -axes[0], axes[1], -axes[1], axes[2], -axes[2]}));
+  if (most >= 8) covers.push_back(cover({x, -x, y, -y, z, -z}));
   return covers;
 }
 

@@ -80,6 +80,15 @@ def test_needles_and_plates(cloud: np.ndarray, most: int, exponents: np.ndarray)
     check(hull_of(hull.vertices * 10**exponents), max_vertices=most)
 
 
+@pytest.mark.parametrize("thickness", [1e-2, 1e-4, 1e-6, 1e-8, 1e-10])
+def test_tilted_plates(thickness: float) -> None:
+    cloud = np.random.default_rng(2).uniform(-1, 1, (60, 3)) * [1, 0.8, thickness]
+    turn = trimesh.transformations.euler_matrix(0.3, 0.5, 0.7)[:3, :3]
+    hull = hull_of(cloud @ turn.T)
+    for most in (4, 8, 12):
+        assert check(hull, max_vertices=most).volume < 6 * hull.volume
+
+
 @settings(deadline=None, max_examples=60)
 @given(points, st.integers(4, 12))
 def test_limited_hulls_are_exactly_convex(cloud: np.ndarray, most: int) -> None:
