@@ -9,10 +9,13 @@ import numpy as np
 from rlacd import _native
 from rlacd.planes.candidates import Candidates
 from rlacd.solid.arrays import BoolArray, FloatArray
-from rlacd.solid.component import Component
+from rlacd.solid.component import NEGLIGIBLE_VOLUME, Component
 
 SLIVER = 0.02
 """A side thinner than this share of its largest extent (an inscribed ball of 1/100) is a sliver."""
+
+ROUNDING = 10
+"""How much more than a negligible volume a side must have: the sweep and the cut round differently."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +51,8 @@ class Sweep:
     def valid(self, sliver: float = SLIVER) -> BoolArray:
         """Tell which planes meet the solid and leave no side thinner than `sliver` times its largest extent."""
         return (
-            (self.solid_below > 0)
-            & (self.solid_above > 0)
+            (self.solid_below > ROUNDING * NEGLIGIBLE_VOLUME)
+            & (self.solid_above > ROUNDING * NEGLIGIBLE_VOLUME)
             & (self.thickness_below > sliver * self.extent_below)
             & (self.thickness_above > sliver * self.extent_above)
         )
