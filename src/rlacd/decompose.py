@@ -154,10 +154,13 @@ def _parts(tree: CutTree, criterion: Criterion, options: Options, workers: Worke
 def _cut_and_merge(tree: CutTree, criterion: Criterion, options: Options, workers: Workers, clock: Clock) -> list[Part]:
     with clock.stage("cut"):
         done, left = tree.cut_until(criterion, clock)
+        parts: list[Part] = [*done, *left]
+        if clock.stopped_by is None:
+            parts = drop_slivers(parts, workers, suspects=left)
     if not options.merge:
-        return [*done, *left]
+        return parts
     with clock.stage("merge"):
-        return merge_parts([*done, *left], criterion, workers, clock)
+        return merge_parts(parts, criterion, workers, clock)
 
 
 def _in_input(hull: Hull, frame: Frame) -> trimesh.Trimesh:

@@ -16,17 +16,22 @@ from rlacd.workers import Workers
 THIN = 0.01
 """A hull is a sliver when its inscribed ball's radius is below this share of its largest extent."""
 
+FILM = 2e-4
+"""Mean thickness below which a part is a film: sheets are made ten times thicker, so that rounding left it over."""
+
 MISSED = 2e-3
 """A sliver is dropped when no point of it lies farther than this from the other hulls (0.1 % of the longest side)."""
 
 
-def drop_slivers(parts: Sequence[Part], workers: Workers) -> list[Part]:
-    """Drop slivers that the other hulls stand for; slivers of parts that are thin themselves stay.
+def drop_slivers(parts: Sequence[Part], workers: Workers, suspects: Sequence[Part] | None = None) -> list[Part]:
+    """Drop slivers and films that the other hulls stand for; slivers of parts that are thin themselves stay.
 
     Parameters
     ----------
     parts : sequence of Part
-        Merged parts: what could be united with a neighbour has been.
+        Parts with disjoint interiors.
+    suspects : sequence of Part, optional
+        Those of the parts that may be dropped; all of them by default.
 
     Returns
     -------
@@ -34,17 +39,23 @@ def drop_slivers(parts: Sequence[Part], workers: Workers) -> list[Part]:
         The rest, in the same order; every point of what was dropped lies within `MISSED` of the rest.
     """
     kept = list(parts)
-    thin = [
-        part for part, is_thin in zip(parts, workers.map(lambda p: is_sliver(p.hull), parts), strict=True) if is_thin
-    ]
-    for sliver in sorted(thin, key=lambda part: part.hull.volume):
+    suspects = kept if suspects is None else suspects
+    thin = workers.map(lambda part: is_film(part) or is_sliver(part.hull), suspects)
+    for sliver in sorted(
+        (p for p, is_thin in zip(suspects, thin, strict=True) if is_thin), key=lambda p: p.hull.volume
+    ):
         others = [part for part in kept if part is not sliver and _near(part, sliver)]
         if others:
             union = hull_union([part.hull for part in others], workers.threads)
-            _, missed = union.under(sliver.hull.vertices, sliver.hull.faces, MISSED / 4, workers.threads)
+            _, missed = union.under(sliver.vertices, sliver.faces, MISSED / 4, workers.threads)
             if missed <= MISSED:
                 kept.remove(sliver)
     return kept
+
+
+def is_film(part: Part) -> bool:
+    """Tell whether the part's mean thickness, twice its volume over its area, is below `FILM`."""
+    return 2 * part.volume < FILM * _native.mesh_area(part.vertices, part.faces)
 
 
 def is_sliver(hull: Hull) -> bool:
