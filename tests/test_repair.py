@@ -238,17 +238,39 @@ def test_a_closed_body_without_volume_becomes_a_slab():
     assert solid.manifold.volume() == pytest.approx(4 * 2 * HALF_THICKNESS, rel=0.1)
 
 
+def test_a_sheet_that_hangs_between_two_boxes_stays():
+    """All its corners are corners of the boxes."""
+    left, right = moved(BOX, -3, 0, 0), moved(BOX, 3, 0, 0)
+    sheet = trimesh.Trimesh([[-2, -1, 1], [2, -1, 1], [2, 1, 1], [-2, 1, 1]], [[0, 1, 2], [0, 2, 3]], process=False)
+    solid = solid_of(join(left, right, sheet))
+    assert solid.bodies[0].deviation < 2 * HALF_THICKNESS
+    assert volume(solid) == pytest.approx(16 + 8 * 2 * HALF_THICKNESS / solid.frame.scale, rel=1e-3)
+
+
+def test_a_pillow_of_two_coplanar_layers_is_a_slab():
+    square = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]]
+    solid = solid_of((square, [[0, 1, 2], [0, 2, 3], [1, 0, 3], [1, 3, 2]]))
+    assert solid.manifold.volume() == pytest.approx(4 * 2 * HALF_THICKNESS, rel=1e-6)
+
+
+def test_planks_that_touch_along_faces_that_do_not_match():
+    planks = [trimesh.creation.box(bounds=[[i, 0, 0], [i + 1, 3 + i % 2, 1]]) for i in range(4)]
+    mesh = join(*planks)
+    mesh.merge_vertices()
+    assert volume(solid_of(mesh)) == pytest.approx(3 + 4 + 3 + 4)
+
+
 @pytest.mark.parametrize("sheets", [3, 4, 5])
 def test_sheets_that_share_an_edge(sheets):
     angle = 2 * np.pi * np.arange(sheets) / sheets
     around = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    vertices = np.vstack([[[0, 0, 0], [0, 0, 1]], around, around + [0, 0, 1]])
+    vertices = np.vstack([[[0, 0, 0], [0, 0, 1]], around, around + np.array([0, 0, 1])])
     faces = [f for i in range(sheets) for f in ([0, 2 + i, 1], [1, 2 + i, 2 + sheets + i])]
     solid = solid_of((vertices, faces))
     assert solid.manifold.volume() == pytest.approx(sheets * solid.frame.scale**2 * 2 * HALF_THICKNESS, rel=0.02)
 
 
-def strip(twists, count=400):
+def strip(twists, count=100):
     """A band with half twists; an odd number makes it one-sided."""
     t = 2 * np.pi * np.arange(count) / count
     half = 0.3 * np.stack(
@@ -271,7 +293,8 @@ def test_twisted_bands_become_slabs(twists):
     solid = solid_of(mesh)
     assert steps(solid) == ["slab"]
     area = mesh.area * solid.frame.scale**2
-    assert solid.manifold.volume() == pytest.approx(2 * HALF_THICKNESS * area, rel=0.05)
+    # The faces of a twisted square lie at an angle; a vertex keeps its distance to both, so the slab is thicker there.
+    assert 0.99 < solid.manifold.volume() / (2 * HALF_THICKNESS * area) < (1.01 if twists == 0 else 1.4)
     assert solid.bodies[0].deviation < 3 * HALF_THICKNESS
 
 

@@ -1,8 +1,8 @@
 """From a file or an object in memory to one list of triangles.
 
-Input: a path, a `trimesh.Trimesh` or `Scene`, or arrays. Output: an `InputMesh` whose vertices are finite and whose faces
-are in range, in the input's own frame and unit. Parsing is trimesh's; this file decides what may be opened, bakes scenes,
-and turns whatever goes wrong into one sentence.
+Input: a path, a `trimesh.Trimesh` or `Scene`, or arrays. Output: an `InputMesh` whose vertices are finite and whose
+faces are in range, in the input's own frame and unit. Parsing is trimesh's; this file decides what may be opened, bakes
+scenes, and turns whatever goes wrong into one sentence.
 """
 
 from __future__ import annotations
@@ -270,7 +270,7 @@ def _clean(vertices: FloatArray, faces: IntArray, name: str) -> InputMesh:
     if len(faces) and (faces.min() < 0 or faces.max() >= len(vertices)):
         _raise_out_of_range(faces, len(vertices))
     warnings = []
-    finite: BoolArray = np.isfinite(vertices).all(axis=1)
+    finite: BoolArray = np.asarray(np.isfinite(vertices).all(axis=1))
     if not finite.all():
         usable = finite[faces].all(axis=1)
         if len(faces) and not usable.any():

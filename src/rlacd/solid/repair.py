@@ -63,6 +63,10 @@ with a few holes is meant as a solid, a cup is not. The caps are reported."""
 _WELDS = (2e-5, 5e-4)
 _WRAP_ERROR = 4e-3
 _NO_AREA = 1e-14
+# Sheets of a body are thickened apart if they are at most this many, of at most this many faces in all.
+_MOST_PATCHES, _MOST_PATCHED = 100, 4000
+# Cosine of the angle between two faces below which a sheet is folded onto itself (20 degrees).
+_FOLD = 0.94
 # More sheets than this are not united one by one: it would take seconds, and cutting what comes out longer.
 _CROWD = 300
 # A solid may have a few faces sticking out of it, up to this share of its area.
@@ -95,8 +99,7 @@ class _Soup:
 
     def at_valence(self, marked: BoolArray) -> BoolArray:
         """Return ``[F]`` whether a face has an edge of marked valence, given ``[E]`` marks."""
-        result: BoolArray = marked[self.edges.of_halfedge].reshape(-1, 3).any(axis=1)
-        return result
+        return np.asarray(marked[self.edges.of_halfedge].reshape(-1, 3).any(axis=1))
 
     def body_of_side(self) -> IntArray:
         """Return ``[C]`` the body of each side component."""
@@ -111,14 +114,23 @@ class _Soup:
         return share
 
     def in_patches(self) -> _Soup:
-        """The same faces, come apart along every edge that more than two of them share.
+        """The same faces, come apart along folds and along every edge that more than two of them share.
 
         Sheets that meet in an edge are thickened one by one and united afterwards: where all corners of a sheet lie on
-        others, no vertex would be left to give it thickness.
+        others, or face both ways, no vertex would be left to give it thickness.
         """
         halfedge = np.argsort(self.edges.of_halfedge, kind="stable")
         halfedge = halfedge[self.edges.valence[self.edges.of_halfedge[halfedge]] == 2].reshape(-1, 2)
+        across = [_across(self.vertices, self.faces, some) for some in halfedge.T]
+        halfedge = halfedge[np.einsum("ij,ij->i", *across) < _FOLD]
         count, patch = components(len(self.faces), halfedge[:, 0] // 3, halfedge[:, 1] // 3)
+        # Layers of thousands of faces on each other take minutes to unite: there, thin spots are the lesser evil.
+        patches = np.unique(np.stack([self.body, patch], axis=1), axis=0)[:, 0]
+        tangled = (np.bincount(patches)[self.body] > _MOST_PATCHES) | (
+            np.bincount(self.body)[self.body] > _MOST_PATCHED
+        )
+        patch = np.where(tangled, count + self.body, patch)
+        count += int(self.body.max(initial=0)) + 1
         key = self.faces * count + patch[:, None]
         distinct, corner = np.unique(key, return_inverse=True)
         return _Soup(self.vertices[distinct // max(count, 1)], corner.reshape(-1, 3), self.body)
@@ -299,16 +311,16 @@ class _Repair:
         # solid anywhere, so all of it becomes slabs (whose cavities are filled later).
         leaky = soup.body_of_side()[(sides.volume < -none) & (4 * sheet_area > sides.area)]
         solid = sides.volume > none
-        skin_face = (solid[front] | solid[back]) & ~sides.sheet
-        flat = (np.abs(sides.volume) <= none)[front] & (np.abs(sides.volume) <= none)[back]
-        sheet = (sides.sheet & (sides.volume >= -none)[front]) | flat | np.isin(soup.body, leaky)
-        skin_face &= ~sheet
+        flat = np.abs(sides.volume) <= none
+        sheet = (sides.sheet & (sides.volume >= -none)[front]) | (flat[front] & flat[back]) | np.isin(soup.body, leaky)
+        wall = (solid[front] | solid[back]) & ~sides.sheet & ~sheet
 
-        self._note(soup.body[solid[back] & skin_face], "reoriented")
-        self._note(soup.body[~skin_face & ~sheet], "outer skin")
+        self._note(soup.body[solid[back] & wall], "reoriented")
+        self._note(soup.body[~wall & ~sheet], "outer skin")
         self._note(soup.body[soup.at_valence(soup.edges.valence > 2)], "outer skin")
         self._note(soup.body[sheet], "slab")
-        return self._skins(soup.only(skin_face)) + self._skins(soup.only(sheet).in_patches())
+        mixed = np.bincount(soup.body[sheet], minlength=self.bodies) > 0
+        return self._skins(soup.only(~sheet & (wall | ~mixed[soup.body]))) + self._skins(soup.only(sheet).in_patches())
 
     def _skins(self, soup: _Soup) -> list[tuple[Manifold, int]]:
         """Build the outer side components of a soup; sheets and flat bodies get thickness."""
@@ -323,13 +335,31 @@ class _Repair:
         # The two side components of a flat closed body are each other's mirror: build the fronts.
         flat = (np.abs(sides.volume) <= none) & ~has_sheet & is_front
         keep = (sides.volume > none) | (has_sheet & (sides.volume >= -none)) | flat
-        thin = keep[front] & (sides.sheet | flat[front])
-        vertices, faces, label = skin(soup.vertices, soup.faces, sides, keep, thin, HALF_THICKNESS)
+        vertices, faces, label = self._skin(soup, keep, flat)
+        # Where parts touch along an edge, their common outer skin runs through the edge twice. Their insides are plain:
+        # build those, turned inside out, and let the union join them.
+        pinched = np.zeros(self.bodies, dtype=bool)
+        pinched[soup.body_of_side()[label[_on_repeated_edge(faces, len(vertices))]]] = True
+        # Only where the skin is one piece: volumes of crossing pieces do not add up to those of the insides.
+        pinched &= np.bincount(soup.body_of_side(), sides.volume > 0, self.bodies) == 1
+        pinched[soup.body[sides.sheet]] = False
+        pinched = pinched[soup.body_of_side()]
+        if pinched.any():
+            rooms = pinched & (sides.volume < -none)
+            vertices, faces, label = self._skin(soup, (keep & ~pinched) | rooms, flat)
+            faces[rooms[label]] = faces[rooms[label]][:, ::-1]
         built, count = np.unique(label, return_counts=True)
         body = soup.body_of_side()[built]
         np.add.at(self.faces_out, body, count)
         solids = [to_manifold(v, f) for v, f in split_labels(vertices, faces, label)]
         return list(zip(solids, body.tolist(), strict=True))
+
+    @staticmethod
+    def _skin(soup: _Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, IntArray, IntArray]:
+        """Build side components, sheets and flat ones with thickness."""
+        front = soup.sides.label[0::2]
+        thin = keep[front] & (soup.sides.sheet | flat[front])
+        return skin(soup.vertices, soup.faces, soup.sides, keep, thin, HALF_THICKNESS)
 
     def _wrap(self, cells: BoolArray, error: float) -> Manifold:
         """Return a solid of grid cells, drawn onto the input and simplified."""
@@ -395,6 +425,23 @@ class _Repair:
         lost = np.flatnonzero(distance > 2 * HALF_THICKNESS)
         lost = lost[~solid.inside(points[lost])]
         np.maximum.at(self.deviation, self.body_of_input[changed[on[lost]]], distance[lost])
+
+
+def _across(vertices: FloatArray, faces: IntArray, halfedges: IntArray) -> FloatArray:
+    """Return the unit direction ``[N, 3]`` in which each halfedge's face leads away from it."""
+    face, corner = halfedges // 3, halfedges % 3
+    a, b, c = (vertices[faces[face, (corner + i) % 3]] for i in range(3))
+    along = (b - a) / np.maximum(np.linalg.norm(b - a, axis=1, keepdims=True), np.finfo(float).tiny)
+    away = c - a - np.einsum("ij,ij->i", c - a, along)[:, None] * along
+    return np.asarray(away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), np.finfo(float).tiny))
+
+
+def _on_repeated_edge(faces: IntArray, count: int) -> BoolArray:
+    """Return ``[F]`` which faces have a directed edge that another face has too."""
+    key = (faces * count + np.roll(faces, -1, axis=1)).ravel()
+    _, inverse, number = np.unique(key, return_inverse=True, return_counts=True)
+    result: BoolArray = (number[inverse.reshape(-1, 3)] > 1).any(axis=1)
+    return result
 
 
 def _hidden_faces(vertices: FloatArray, faces: IntArray) -> BoolArray:

@@ -187,7 +187,7 @@ def _strips(count: int) -> IntArray:
 
 
 def _least_area(points: FloatArray) -> IntArray:
-    """Triangulate a loop with the least total area, by dynamic programming over its sub-chains (Barequet & Sharir 1995)."""
+    """Triangulate a loop with the least total area, by dynamic programming (Barequet & Sharir 1995)."""
     n = len(points)
     cost = np.zeros((n, n))
     choice = np.zeros((n, n), dtype=np.int64)

@@ -1,7 +1,7 @@
 """Which space a ball of given radius can reach from outside, on a voxel grid, and a closed wrap of what it cannot.
 
-Input: a surface in the normalised frame. The reachable space is the union of all balls that touch no face and can roll in
-from infinity; the rest (the surface's closing) is the solid a collision with anything larger than the ball sees. Every
+Input: a surface in the normalised frame. The reachable space is the union of all balls that touch no face and can roll
+in from infinity; the rest (the surface's closing) is what a collision with anything larger than the ball sees. Every
 point of its boundary is within about 1.4 radii of the surface.
 """
 
@@ -121,7 +121,7 @@ class Reach:
 
 
 def _boundary_squares(solid: BoolArray) -> tuple[FloatArray, IntArray]:
-    """Return corner coordinates ``[N, 3]`` (cell (0, 0, 0) spans 0 to 1) and outward squares ``[Q, 4]`` of a cell set."""
+    """Return corner coordinates ``[N, 3]`` (cell (0, 0, 0) spans 0 to 1), outward squares ``[Q, 4]`` of a cell set."""
     shape = np.array(solid.shape) + 1
     squares = []
     for axis in range(3):

@@ -32,7 +32,7 @@ _NEXT = np.array([1, 2, 0])
 
 
 def merge_equal_vertices(vertices: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return the distinct vertices ``[U, 3]``, in order of first appearance, and ``[V]`` the new index of every old one."""
+    """Return the distinct vertices ``[U, 3]``, in order of first appearance, and ``[V]`` the new index of each."""
     vertices = np.ascontiguousarray(vertices + 0.0)  # turns -0.0 into 0.0: they are equal but differ in their bits
     if len(vertices) == 0:
         return vertices, np.empty(0, dtype=np.int64)
