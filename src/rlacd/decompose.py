@@ -146,7 +146,7 @@ def _parts(tree: CutTree, criterion: Criterion, options: Options, workers: Worke
         with clock.stage("merge"):
             few = merge_to_count(parts, options.max_hulls, criterion, workers, clock, worst=least)
             error = max(workers.map(criterion.error, few)) if few else np.inf
-        if few and (not best or error < least):
+        if few and (not best or (len(few) <= options.max_hulls and error < least)):
             best, least = few, error
         if len(parts) <= options.max_hulls or clock.stopped_by is not None:
             return best
