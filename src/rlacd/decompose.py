@@ -178,8 +178,8 @@ def _box_around(points: FloatArray) -> FloatArray:
 
     One step of floating point along an axis may be nothing beside a large coordinate on another.
     """
-    step = np.spacing(np.abs(points).max())
-    most = np.finfo(np.float64).max
-    lower = np.clip(points.min(axis=0) - step, -most, most - step)
-    upper = np.clip(points.max(axis=0) + step, step - most, most)
+    limits = np.finfo(np.float64)
+    step = np.abs(points).max() * limits.eps + limits.smallest_subnormal
+    lower = np.maximum(points.min(axis=0), step - limits.max) - step
+    upper = np.minimum(points.max(axis=0), limits.max - step) + step
     return np.array(list(itertools.product(*zip(lower, upper, strict=True))))
