@@ -1,6 +1,8 @@
 // Convex hull of points: see hull.hpp for input, output and algorithm.
 #include "hull.hpp"
 
+#include <cmath>
+#include <cstdlib>
 #include <numeric>
 
 #include "predicates.hpp"
@@ -10,7 +12,8 @@ namespace rlacd {
 namespace {
 
 constexpr double kRoundoff = 0x1p-53;
-constexpr double kFat = 1e-2;  // least ratio of inradius to extent for which the tolerance applies
+constexpr int kExactRange = 100;  // largest binary exponent of coordinates, either way, that is not scaled away
+constexpr double kFat = 1e-2;     // least ratio of inradius to extent for which the tolerance applies
 
 }  // namespace
 
@@ -124,7 +127,8 @@ bool HullBuilder::initialise() {
   facets_.clear();
   free_.clear();
   const std::int32_t f[4] = {new_facet(a, b, c), new_facet(a, d, b), new_facet(b, d, c), new_facet(c, d, a)};
-  const std::int32_t neighbours[4][3] = {{f[1], f[2], f[3]}, {f[3], f[2], f[0]}, {f[1], f[3], f[0]}, {f[2], f[1], f[0]}};
+  const std::int32_t neighbours[4][3] = {
+      {f[1], f[2], f[3]}, {f[3], f[2], f[0]}, {f[1], f[3], f[0]}, {f[2], f[1], f[0]}};
   for (int i = 0; i < 4; ++i) std::copy_n(neighbours[i], 3, facets_[f[i]].neighbour);
   return true;
 }
@@ -142,8 +146,8 @@ void HullBuilder::add(const std::vector<Vec3>& points) {
   alive.reserve(facets_.size());
   for (std::size_t i = facets_.size(); i-- > 0;)
     if (facets_[i].alive) alive.push_back(static_cast<std::int32_t>(i));
-  // Points below every facet's plane moved out by the tolerance t lie within t D / r of a hull of diameter D and inradius
-  // r: nothing, unless the hull is flat. The inradius is at least volume / area.
+  // Points below every facet's plane moved out by the tolerance t lie within t D / r of a hull of diameter D and
+  // inradius r: nothing, unless the hull is flat. The inradius is at least volume / area.
   const bool fat = tolerance_ > 0 && volume() > kFat * area() * max_abs(extent_.upper - extent_.lower);
   const auto clearly = [this, fat](const Facet& f, Vec3 p) {
     return (!fat || height(f, p) >= tolerance_ * f.length) && sees(f, p);
@@ -307,10 +311,25 @@ std::vector<std::int32_t> extreme_points(const std::vector<Vec3>& points, const 
   return extreme;
 }
 
+// The exponent of the power of two that brings the points into the range where the predicates are exact; 0 inside it.
+int exponent_out_of_range(const std::vector<Vec3>& points) {
+  double largest = 0;
+  for (const Vec3 p : points) largest = std::max(largest, max_abs(p));
+  if (largest == 0) return 0;
+  const int exponent = std::ilogb(largest);
+  return std::abs(exponent) > kExactRange ? exponent : 0;
+}
+
 }  // namespace
 
 Hull convex_hull(const std::vector<Vec3>& points) {
   Hull hull;
+  // Scaling by a power of two rounds nothing, so it decides nothing differently.
+  if (const int exponent = exponent_out_of_range(points); exponent != 0) {
+    std::vector<Vec3> scaled = points;
+    for (Vec3& p : scaled) p = {std::ldexp(p.x, -exponent), std::ldexp(p.y, -exponent), std::ldexp(p.z, -exponent)};
+    return convex_hull(scaled);
+  }
   HullBuilder builder;
   builder.reserve(points.size());
   builder.add(points);
@@ -349,8 +368,7 @@ double mesh_volume(const std::vector<Vec3>& vertices, const std::vector<Triangle
 
 double mesh_area(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
   double sum = 0;
-  for (const Triangle& f : faces)
-    sum += norm(cross(vertices[f[1]] - vertices[f[0]], vertices[f[2]] - vertices[f[0]]));
+  for (const Triangle& f : faces) sum += norm(cross(vertices[f[1]] - vertices[f[0]], vertices[f[2]] - vertices[f[0]]));
   return sum / 2;
 }
 

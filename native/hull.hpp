@@ -64,7 +64,7 @@ class HullBuilder {
   std::vector<Facet> facets_;
   std::vector<std::int32_t> free_;
   std::vector<std::int32_t> next_outside_;  // linked lists of outside points, by point
-  Box extent_;  // of all points
+  Box extent_;                              // of all points
   std::int32_t insertion_ = 0;
 
   struct HorizonEdge {

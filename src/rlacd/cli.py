@@ -296,10 +296,10 @@ def info(
     """
     with _exit_codes():
         from rlacd.describe import describe, describe_text
-        from rlacd.terminal import to_json
+        from rlacd.terminal import printable, to_json
 
         facts = describe(mesh)
-        typer.echo(to_json(facts) if as_json else describe_text(facts), nl=False)
+        typer.echo(to_json(facts) if as_json else printable(describe_text(facts)), nl=False)
 
 
 def _output_name(mesh: Path, output: str | None) -> str:
@@ -321,7 +321,7 @@ def _check_output(mesh: Path, place: str, report: Path | None, picture: Path | N
 
 
 def _same(path: Path) -> str:
-    return os.path.normcase(path.resolve())
+    return os.path.normcase(os.path.realpath(path))  # unlike Path.resolve, at ease with links in a circle
 
 
 def _usual_up(mesh: Path) -> str:

@@ -15,6 +15,7 @@ from rlacd.clock import Clock
 from rlacd.criteria import Concavity, Criterion
 from rlacd.cut import CutTree
 from rlacd.decomposition import Decomposition
+from rlacd.errors import OptionError
 from rlacd.finish import drop_slivers, limit_part, limited, merge_parts, merge_to_count
 from rlacd.options import DEFAULT_RESOLUTION, Options
 from rlacd.policies import make_policy
@@ -107,20 +108,22 @@ def decompose(
         threads=threads,
         timeout=timeout,
     )
-    clock = Clock(timeout, progress)
-    with Workers(threads) as workers:
+    if progress is not None and not callable(progress):
+        raise OptionError(f"progress is {progress!r}; it has to be a function that takes a `rlacd.Progress`.")
+    clock = Clock(options.timeout, progress)
+    with Workers(options.threads) as workers:
         with clock.stage("load"):
             source = load_mesh(mesh)
         with clock.stage("repair"):
-            solid = repair(source, resolution=resolution, threads=threads)
-        if threshold_m is not None:
-            options = options.with_threshold(threshold_m * solid.frame.scale)
-        criterion = limited(Concavity(options.threshold), max_vertices, max_faces)
-        tree = CutTree(Component(solid.manifold), make_policy(policy), workers)
+            solid = repair(source, resolution=options.resolution, threads=workers.threads)
+        if options.threshold_m is not None:
+            options = options.with_threshold(options.threshold_m * solid.frame.scale)
+        criterion = limited(Concavity(options.threshold), options.max_vertices, options.max_faces)
+        tree = CutTree(Component(solid.manifold), make_policy(options.policy), workers)
         parts = _parts(tree, criterion, options, workers, clock)
         with clock.stage("finish"):
             parts = drop_slivers(parts, workers)
-            parts = workers.map(lambda part: limit_part(part, max_vertices, max_faces), parts)
+            parts = workers.map(lambda part: limit_part(part, options.max_vertices, options.max_faces), parts)
             hulls = workers.map(lambda part: _in_input(part.hull, solid.frame), parts)
         with clock.stage("measure"):
             report = make_report(solid, parts, hulls, options, criterion, workers, clock)
@@ -143,7 +146,7 @@ def _parts(tree: CutTree, criterion: Criterion, options: Options, workers: Worke
         with clock.stage("merge"):
             few = merge_to_count(parts, options.max_hulls, criterion, workers, clock, worst=least)
             error = max(workers.map(criterion.error, few)) if few else np.inf
-        if few and (not best or error < least):
+        if few and (not best or (len(few) <= options.max_hulls and error < least)):
             best, least = few, error
         if len(parts) <= options.max_hulls or clock.stopped_by is not None:
             return best
@@ -174,6 +177,12 @@ def _in_input(hull: Hull, frame: Frame) -> trimesh.Trimesh:
 
 
 def _box_around(points: FloatArray) -> FloatArray:
-    """Corners [8, 3] of the smallest box around the points that floating point can tell from a flat one."""
-    lower, upper = np.nextafter(points.min(axis=0), -np.inf), np.nextafter(points.max(axis=0), np.inf)
+    """Corners [8, 3] of a box around the points, just as thick everywhere as their largest coordinate can resolve.
+
+    One step of floating point along an axis may be nothing beside a large coordinate on another.
+    """
+    limits = np.finfo(np.float64)
+    step = np.abs(points).max() * limits.eps + limits.smallest_subnormal
+    lower = np.maximum(points.min(axis=0), step - limits.max) - step
+    upper = np.minimum(points.max(axis=0), limits.max - step) + step
     return np.array(list(itertools.product(*zip(lower, upper, strict=True))))

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import numbers
+from collections.abc import Callable
 from dataclasses import dataclass
+
+import numpy as np
 
 from rlacd.errors import OptionError
 from rlacd.policies import POLICIES
@@ -14,6 +18,13 @@ DEFAULT_RESOLUTION = 100
 
 MIN_THRESHOLD = 0.001
 """Least concavity that can be asked for; the longest side of the input is 2."""
+
+
+MAX_RESOLUTION = 400
+"""The grid that repair looks for rooms on has this number cubed of cells; more would take over 4 GB."""
+
+MAX_THREADS = 1024
+MAX_SEED = 2**63 - 1
 
 
 @dataclass(frozen=True)
@@ -39,15 +50,38 @@ class Options:
     timeout: float | None = None
 
     def __post_init__(self) -> None:
-        _require(MIN_THRESHOLD <= self.threshold <= 2, "threshold", self.threshold, f"between {MIN_THRESHOLD} and 2")
-        _require(_positive(self.threshold_m), "threshold_m", self.threshold_m, "a positive length in the input's unit")
-        _require(_at_least(1, self.max_hulls), "max_hulls", self.max_hulls, "at least 1")
-        _require(_at_least(4, self.max_vertices), "max_vertices", self.max_vertices, "at least 4 (a tetrahedron)")
-        _require(_at_least(4, self.max_faces), "max_faces", self.max_faces, "at least 4 (a tetrahedron)")
+        self._as_number("threshold", lambda x: MIN_THRESHOLD <= x <= 2, f"between {MIN_THRESHOLD} and 2")
+        self._as_number("threshold_m", lambda x: 0 < x < math.inf, "a positive length in the input's unit", None)
+        self._as_integer("max_hulls", 1, None, "at least 1", None)
+        self._as_integer("max_vertices", 4, None, "at least 4 (a tetrahedron)", None)
+        self._as_integer("max_faces", 4, None, "at least 4 (a tetrahedron)", None)
+        _require(isinstance(self.merge, (bool, np.bool_)), "merge", self.merge, "True or False")
+        object.__setattr__(self, "merge", bool(self.merge))
         _require(self.policy in POLICIES, "policy", self.policy, "one of " + ", ".join(POLICIES))
-        _require(self.resolution >= 1, "resolution", self.resolution, "at least 1")
-        _require(_at_least(1, self.threads), "threads", self.threads, "at least 1")
-        _require(_positive(self.timeout), "timeout", self.timeout, "a positive number of seconds")
+        self._as_integer("resolution", 1, MAX_RESOLUTION, f"between 1 and {MAX_RESOLUTION}")
+        self._as_integer("seed", 0, MAX_SEED, "between 0 and 2**63 - 1")
+        self._as_integer("threads", 1, MAX_THREADS, f"between 1 and {MAX_THREADS}", None)
+        self._as_number("timeout", lambda x: 0 < x < math.inf, "a positive number of seconds", None)
+
+    def _as_number(self, name: str, allowed: Callable[[float], bool], rule: str, *absent: None) -> None:
+        """Make the option a plain float, so that the report is plain too, whichever library its number came from."""
+        given = getattr(self, name)
+        if given is None and absent:
+            return
+        is_number = isinstance(given, (numbers.Real, np.number)) and not isinstance(given, bool)
+        value = float(given) if is_number else math.nan
+        _require(allowed(value), name, given, rule)
+        object.__setattr__(self, name, value)
+
+    def _as_integer(self, name: str, least: int, most: int | None, rule: str, *absent: None) -> None:
+        """Make the option a plain int."""
+        given = getattr(self, name)
+        if given is None and absent:
+            return
+        is_integer = isinstance(given, (numbers.Integral, np.integer)) and not isinstance(given, bool)
+        value = int(given) if is_integer else -1
+        _require(value >= least and (most is None or value <= most), name, given, f"an integer, {rule}")
+        object.__setattr__(self, name, value)
 
     def with_threshold(self, threshold: float) -> Options:
         """Get the same options with another threshold, which has to be in range too.
@@ -69,11 +103,3 @@ class Options:
 def _require(holds: bool, name: str, value: object, rule: str) -> None:
     if not holds:
         raise OptionError(f"{name} is {value!r}; it has to be {rule}.")
-
-
-def _positive(value: float | None) -> bool:
-    return value is None or (math.isfinite(value) and value > 0)
-
-
-def _at_least(least: int, value: int | None) -> bool:
-    return value is None or value >= least

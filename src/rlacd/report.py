@@ -49,11 +49,13 @@ def make_report(
         "hausdorff": {"over": over, "under": under},
         "scale": solid.frame.scale,
         "repair": [asdict(body) for body in solid.bodies],
-        "warnings": [*solid.warnings, *_shortcomings(errors, over, options, clock)],
+        "warnings": [*solid.warnings, *_shortcomings(errors, over, under, options, clock)],
     }
 
 
-def _shortcomings(errors: Sequence[float], over: float | None, options: Options, clock: Clock) -> list[str]:
+def _shortcomings(
+    errors: Sequence[float], over: float | None, under: float | None, options: Options, clock: Clock
+) -> list[str]:
     sentences = []
     if clock.stopped_by is not None:
         reason = {"timeout": "the timeout ended", "cancel": "the caller ended"}[clock.stopped_by]
@@ -68,6 +70,11 @@ def _shortcomings(errors: Sequence[float], over: float | None, options: Options,
         )
     if options.max_hulls is not None and len(errors) > options.max_hulls:
         sentences.append(f"{len(errors)} hulls are left, more than the {options.max_hulls} asked for.")
+    if under is not None and under > HONEST_WITHIN:
+        sentences.append(
+            f"Some of the input's surface lies {under:.4g} from the hulls: the repair gave up what could not be made "
+            "solid (see `deviation` in `repair`)."
+        )
     if over is not None and not exceeding and over > options.threshold + HONEST_WITHIN:
         sentences.append(
             f"The hulls reach up to {over:.4g} beyond the input's surface, more than the threshold: "

@@ -86,7 +86,12 @@ def summary(result: Decomposition, written: str) -> str:
 
 def to_json(value: Any) -> str:
     """JSON that every parser reads: numbers that JSON does not know (NaN, infinity) become null."""
-    return json.dumps(_plain(value), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return printable(json.dumps(_plain(value), indent=2, ensure_ascii=False, allow_nan=False)) + "\n"
+
+
+def printable(text: str) -> str:
+    """Replace what UTF-8 cannot hold: Python keeps the odd bytes of a file name as surrogates."""
+    return text.encode(errors="replace").decode()
 
 
 def _time(report: dict[str, Any]) -> str:

@@ -62,5 +62,6 @@ def save_hulls(
 
 
 def _file_stem(name: str) -> str:
-    # A mesh may be called anything; a file may not.
-    return re.sub(r'[\x00-\x1f/\\:*?"<>|]', "_", name).strip(". ")[:150] or "mesh"
+    # A mesh may be called anything; a file may not, and file systems count its name in bytes.
+    plain = re.sub(r'[\x00-\x1f/\\:*?"<>|]', "_", name).strip(". ")
+    return plain.encode(errors="replace")[:150].decode(errors="ignore").strip(". ") or "mesh"

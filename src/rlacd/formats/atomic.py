@@ -25,7 +25,8 @@ def write_file(path: Path, data: bytes) -> None:
     """
     with output_errors(path):
         final = path.resolve()
-        temporary = final.with_name(f".{final.name[:200]}.{secrets.token_hex(6)}.tmp")
+        # Not made of the final name, which may be as long as a name can be.
+        temporary = final.with_name(f".rlacd-{secrets.token_hex(8)}.tmp")
         try:
             _write_to_disk(temporary, data)
             os.replace(temporary, final)
@@ -44,6 +45,8 @@ def output_errors(path: Path) -> Iterator[None]:
         raise
     except OSError as error:
         raise OutputError(f"cannot write {path}: {_reason(error)}.") from error
+    except (RuntimeError, ValueError) as error:  # what pathlib makes of links in a circle and of null characters
+        raise OutputError(f"cannot write {str(path)!r}: {error}; choose another name.") from error
 
 
 def sync_folder(folder: Path) -> None:

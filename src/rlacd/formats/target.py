@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rlacd.errors import OptionError, OutputError
+from rlacd.formats.atomic import output_errors
 
 FORMATS = ("glb", "obj", "ply", "stl")
 FOLDER_FORMAT = "obj"
+SEPARATORS = tuple(mark for mark in (os.sep, os.altsep) if mark)
 
 
 @dataclass(frozen=True)
@@ -48,10 +50,11 @@ def hull_target(path: str | os.PathLike[str], file_format: str | None = None) ->
     if wanted is not None and wanted not in FORMATS:
         raise OptionError(f"unknown format {file_format!r}; use one of {', '.join(FORMATS)}.")
 
-    separators = tuple(mark for mark in (os.sep, os.altsep) if mark)
-    if text.endswith(separators) or (place.is_dir() and ending not in FORMATS) or (wanted and not ending):
-        _check_folder(place)
-        return Target(place, wanted or FOLDER_FORMAT, is_folder=True)
+    with output_errors(place):
+        is_folder = text.endswith(SEPARATORS) or (place.is_dir() and ending not in FORMATS) or (wanted and not ending)
+        if is_folder:
+            _check_folder(place)
+            return Target(place, wanted or FOLDER_FORMAT, is_folder=True)
 
     if ending not in FORMATS:
         known = ", ".join(f".{name}" for name in FORMATS)
@@ -65,11 +68,12 @@ def hull_target(path: str | os.PathLike[str], file_format: str | None = None) ->
 
 def check_file(path: Path) -> None:
     """Raise `OutputError` if `path` cannot become a file, without touching the disk."""
-    if path.is_dir():
-        raise OutputError(f"cannot write {path}: it is a folder; end the name with / to fill it.")
-    if path.exists() and not path.is_file():
-        raise OutputError(f"cannot write {path}: it is not an ordinary file; choose another name.")
-    _check_parent(path)
+    with output_errors(path):
+        if path.is_dir():
+            raise OutputError(f"cannot write {path}: it is a folder; end the name with / to fill it.")
+        if path.exists() and not path.is_file():
+            raise OutputError(f"cannot write {path}: it is not an ordinary file; choose another name.")
+        _check_parent(path)
 
 
 def _check_folder(folder: Path) -> None:

@@ -9,6 +9,12 @@ from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
 
+SMALLEST = 1e-300
+"""Half the longest side of the least box that fills the frame; a smaller one becomes a speck in it."""
+
+NOTHING = 2.0**-280
+"""Frame coordinates below this become 0: products of three, on which exact decisions rest, would underflow."""
+
 
 @dataclass(frozen=True)
 class Frame:
@@ -35,13 +41,13 @@ class Frame:
         # Halves are taken before adding: the sum of two coordinates near 1e308 would overflow.
         center = lower / 2 + upper / 2
         half = float((upper / 2 - lower / 2).max())
-        with np.errstate(over="ignore"):
-            scale = float(np.float64(1.0) / half) if half > 0 else 1.0
-        return cls(center, scale if np.isfinite(scale) else 1.0)
+        return cls(center, 1.0 / max(half, SMALLEST) if half > 0 else 1.0)
 
     def to_frame(self, points: ArrayLike) -> FloatArray:
         """Map points ``[N, 3]`` from the input's unit into the frame."""
-        return np.ascontiguousarray((np.asarray(points, dtype=np.float64) - self.center) * self.scale)
+        there = np.ascontiguousarray((np.asarray(points, dtype=np.float64) - self.center) * self.scale)
+        there[np.abs(there) < NOTHING] = 0.0
+        return there
 
     def to_input(self, points: ArrayLike) -> FloatArray:
         """Map points ``[N, 3]`` from the frame back to the input's unit."""

@@ -1,0 +1,64 @@
+"""Inputs that no modeller would hand in on purpose."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import trimesh
+from trimesh import creation
+
+from tests.shapes import Floats
+
+Mesh = tuple[Floats, Any]
+
+
+def arrays(mesh: trimesh.Trimesh) -> Mesh:
+    return np.array(mesh.vertices), np.array(mesh.faces)
+
+
+def ell() -> Mesh:
+    """Two boxes that overlap in an L; three hulls at the usual threshold."""
+    return arrays(trimesh.util.concatenate([creation.box((2, 0.4, 0.4)), creation.box((0.4, 0.4, 2))]))
+
+
+def klein_bottle(around: int = 24, tube: int = 12) -> Mesh:
+    """A closed surface without an inside: the tube's end meets its start mirrored."""
+    u, v = np.meshgrid(
+        np.linspace(0, 2 * np.pi, around, endpoint=False),
+        np.linspace(0, 2 * np.pi, tube, endpoint=False),
+        indexing="ij",
+    )
+    radius = 4 * (1 - np.cos(u) / 2)
+    body = 6 * np.cos(u) * (1 + np.sin(u))
+    x = np.where(u < np.pi, body + radius * np.cos(u) * np.cos(v), body - radius * np.cos(v))
+    y = np.where(u < np.pi, 16 * np.sin(u) + radius * np.sin(u) * np.cos(v), 16 * np.sin(u))
+    vertices = np.stack([x, y, radius * np.sin(v)], axis=-1).reshape(-1, 3)
+    faces = []
+    for i in range(around):
+        for j in range(tube):
+            here = [i * tube + j, i * tube + (j + 1) % tube]
+            last = i == around - 1
+            there = [(tube // 2 - k) % tube if last else (i + 1) * tube + k % tube for k in (j, j + 1)]
+            faces += [[here[0], there[0], here[1]], [here[1], there[0], there[1]]]
+    return vertices, np.array(faces)
+
+
+def moebius_strip(around: int = 30, across: int = 3) -> Mesh:
+    t, w = np.meshgrid(np.linspace(0, 2 * np.pi, around, endpoint=False), np.linspace(-0.4, 0.4, across), indexing="ij")
+    reach = 1 + w * np.cos(t / 2)
+    vertices = np.stack([reach * np.cos(t), reach * np.sin(t), w * np.sin(t / 2)], axis=-1).reshape(-1, 3)
+    faces = []
+    for i in range(around):
+        for j in range(across - 1):
+            a, b = i * across + j, i * across + j + 1
+            c, d = (a + across, b + across) if i < around - 1 else (across - 1 - j, across - 2 - j)
+            faces += [[a, c, b], [b, c, d]]
+    return vertices, np.array(faces)
+
+
+def folded_sphere() -> Mesh:
+    """A sphere one half of which is turned into the other: it goes through itself."""
+    vertices, faces = arrays(creation.icosphere(1))
+    vertices[vertices[:, 0] > 0] *= [-0.8, 1, 1]
+    return vertices, faces

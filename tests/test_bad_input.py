@@ -1,0 +1,501 @@
+"""Whatever comes in: valid hulls, or one clear typed error. Never a traceback, a crash or half a file."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from trimesh import creation
+from typer.testing import CliRunner, Result
+
+import rlacd
+from rlacd.cli import app
+from rlacd.errors import EmptyMeshError, MeshDataError, OptionError, OutputError, RlacdError
+from tests.hulls import assert_convex_hull
+from tests.shapes_bad import arrays, ell, folded_sphere, klein_bottle, moebius_strip
+
+ELL, FACES = ell()
+BOX = arrays(creation.box())
+NO_FACES = np.zeros((0, 3), dtype=int)
+
+
+def check(mesh: Any, **options: Any) -> rlacd.Decomposition:
+    """Decompose and judge what came out."""
+    result = rlacd.decompose(mesh, threads=1, **options)
+    assert len(result) >= 1
+    for hull in result:
+        assert np.isfinite(hull.vertices).all()
+        assert_convex_hull(hull)
+    json.dumps(result.report, allow_nan=False)
+    return result
+
+
+def is_one_sentence(text: str) -> bool:
+    return len(text.strip().splitlines()) == 1 and len(text) > 20
+
+
+# --- meshes that give hulls -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("exponent", [-300, -160, -100, -9, 9, 100, 150, 300, 307])
+def test_any_scale_gives_the_hulls_of_scale_one(exponent: int) -> None:
+    expected = check((ELL, FACES))
+    result = check((ELL * 10.0**exponent, FACES))
+    assert len(result) == len(expected)
+    assert result.report["concavity"]["max"] == pytest.approx(expected.report["concavity"]["max"], rel=1e-2)
+
+
+def test_the_largest_and_the_smallest_numbers_there_are() -> None:
+    largest = check((np.sign(BOX[0]) * np.finfo(float).max, BOX[1]))
+    assert np.abs(largest.hulls[0].vertices).max() == np.finfo(float).max
+    denormal = check((BOX[0] * 1e-310, BOX[1]))
+    assert 0 < np.abs(denormal.hulls[0].vertices).max() < 1e-300
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-3, 1e-7])
+def test_a_far_offset_costs_precision_and_nothing_else(size: float) -> None:
+    result = check((ELL * size + 1e9, FACES))
+    bounds = np.stack([hull.bounds for hull in result])
+    assert bounds[:, 0].min() == pytest.approx(1e9 - size, abs=5e-7)
+    assert bounds[:, 1].max() == pytest.approx(1e9 + size, abs=5e-7)
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces"),
+    [
+        pytest.param([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], id="one triangle"),
+        pytest.param([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]], id="flat card"),
+        pytest.param([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]], id="line"),
+        pytest.param([[0, 0, 0], [1, 1, 1], [2, 2, 2]], [[0, 1, 2]], id="slanted line"),
+        pytest.param([[0, 0, 0], [1, 1, 1]], NO_FACES, id="two points"),
+        pytest.param([[1, 2, 3]], NO_FACES, id="one point"),
+        pytest.param([[1, 2, 3]] * 5, [[0, 1, 2], [2, 3, 4]], id="all points equal"),
+        pytest.param([[1e9, 2e300, 3]] * 3, [[0, 1, 2]], id="one point, coordinates far apart"),
+        pytest.param([[-1e300, 1e9, 3]] * 3, [[0, 1, 2]], id="one far point"),
+        pytest.param([[np.finfo(float).max] * 3] * 3, [[0, 1, 2]], id="the farthest point"),
+        pytest.param(ELL, np.stack([FACES[:, 0], FACES[:, 0], FACES[:, 1]], axis=1), id="faces without area"),
+        pytest.param(np.random.default_rng(0).random((50, 3)), NO_FACES, id="cloud"),
+        pytest.param(np.random.default_rng(0).random((50, 3)) * [1, 1, 0], NO_FACES, id="flat cloud"),
+        pytest.param(BOX[0] * [1, 1, 0], BOX[1], id="box pressed flat"),
+        pytest.param(BOX[0] * [1, 1, 1e-12], BOX[1], id="box pressed nearly flat"),
+        pytest.param(BOX[0] * [1, 1e-9, 1e-9], BOX[1], id="hair"),
+    ],
+)
+def test_what_has_no_volume_gives_one_thin_hull_around_it(vertices: Any, faces: Any) -> None:
+    result = check((vertices, faces))
+    points, size = np.asarray(vertices, dtype=float), 1e-9
+    with np.errstate(over="ignore"):
+        size = max(float(np.ptp(points, axis=0).max()), 1e-9)
+    (hull,) = result.hulls
+    np.testing.assert_array_less(hull.vertices.min(axis=0), points.min(axis=0) + 1e-2 * size)
+    np.testing.assert_array_less(points.max(axis=0) - 1e-2 * size, hull.vertices.max(axis=0))
+    assert result.report["repair"][0]["step"] in ("slab", "hull", "closed")
+
+
+def test_closed_bodies_that_hide_each_other_count_once() -> None:
+    for bodies in ([ELL, ELL], [ELL, 0.99 * ELL], [BOX[0], 0.5 * BOX[0], 0.2 * BOX[0]]):
+        faces = FACES if bodies[0] is ELL else BOX[1]
+        one = check((bodies[0], faces))
+        stacked = np.concatenate([faces + i * len(bodies[0]) for i in range(len(bodies))])
+        all_of_them = check((np.concatenate(bodies), stacked))
+        assert len(all_of_them) == len(one)
+        assert sum(hull.volume for hull in all_of_them) == pytest.approx(sum(hull.volume for hull in one), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "faces",
+    [
+        pytest.param(np.concatenate([FACES, FACES[:, ::-1]]), id="both ways"),
+        pytest.param(np.concatenate([FACES, FACES]), id="twice"),
+        pytest.param(FACES[:, ::-1], id="inside out"),
+        pytest.param(np.where(np.arange(len(FACES))[:, None] % 3 == 0, FACES[:, ::-1], FACES), id="a third turned"),
+        pytest.param(FACES.astype(np.uint8), id="uint8"),
+        pytest.param(FACES.tolist(), id="list"),
+    ],
+)
+def test_however_the_faces_are_written_the_solid_is_the_same(faces: Any) -> None:
+    expected = check((ELL, FACES))
+    result = check((ELL, faces))
+    assert len(result) == len(expected)
+    assert sum(hull.volume for hull in result) == pytest.approx(sum(hull.volume for hull in expected), rel=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("surface", [klein_bottle, moebius_strip, folded_sphere])
+def test_surfaces_without_an_inside_are_covered(surface: Any) -> None:
+    vertices, faces = surface()
+    result = check((vertices, faces), threshold=0.2)
+    assert result.report["hausdorff"]["under"] < 0.07
+
+
+def test_vertices_that_are_not_numbers_are_left_out_and_said() -> None:
+    broken = ELL.copy()
+    broken[3] = np.nan
+    result = check((broken, FACES))
+    assert any("NaN or infinite" in sentence for sentence in result.report["warnings"])
+
+
+def test_a_triangle_that_is_given_up_is_said() -> None:
+    vertices = np.vstack([ELL, [[1e6, 0, 0]]])
+    result = check((vertices, np.vstack([FACES, [[0, 1, len(ELL)]]])))
+    missed = result.report["hausdorff"]["under"]
+    assert (missed > 0.005) == any("from the hulls" in sentence for sentence in result.report["warnings"])
+
+
+# --- meshes that give an error ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("mesh", "error"),
+    [
+        pytest.param((ELL * np.nan, FACES), MeshDataError, id="nothing but NaN"),
+        pytest.param((ELL + np.inf, FACES), MeshDataError, id="nothing but infinity"),
+        pytest.param((ELL, FACES + 5), MeshDataError, id="index too large"),
+        pytest.param((ELL, FACES - 1), MeshDataError, id="index negative"),
+        pytest.param((ELL, np.full((2, 3), 2**62)), MeshDataError, id="index huge"),
+        pytest.param((ELL, np.full((2, 3), 2**64 - 1, dtype=np.uint64)), MeshDataError, id="index of 64 bits"),
+        pytest.param((ELL, FACES.astype(float)), MeshDataError, id="faces of float"),
+        pytest.param((ELL, FACES.astype(bool)), MeshDataError, id="faces of bool"),
+        pytest.param((ELL, {}), MeshDataError, id="faces of dict"),
+        pytest.param((None, FACES), MeshDataError, id="vertices of None"),
+        pytest.param((ELL[:, :2], FACES), MeshDataError, id="vertices in the plane"),
+        pytest.param((ELL[None], FACES), MeshDataError, id="vertices of three dimensions"),
+        pytest.param((ELL, FACES[:, :2]), MeshDataError, id="faces of two corners"),
+        pytest.param((ELL, np.hstack([FACES, FACES])), MeshDataError, id="faces of six corners"),
+        pytest.param((ELL, FACES, FACES), MeshDataError, id="three arrays"),
+        pytest.param(None, MeshDataError, id="None"),
+        pytest.param(b"solid", MeshDataError, id="bytes"),
+        pytest.param((np.zeros((0, 3)), NO_FACES), EmptyMeshError, id="no points"),
+        pytest.param(trimesh.Trimesh(), EmptyMeshError, id="empty mesh"),
+        pytest.param(trimesh.Scene(), EmptyMeshError, id="empty scene"),
+        pytest.param(
+            trimesh.Scene([trimesh.load_path(np.array([[0.0, 0, 0], [9, 9, 9]]))]), EmptyMeshError, id="only a path"
+        ),
+    ],
+)
+def test_what_is_no_mesh_is_one_sentence(mesh: Any, error: type[RlacdError]) -> None:
+    with pytest.raises(error) as caught:
+        rlacd.decompose(mesh)
+    assert is_one_sentence(str(caught.value))
+
+
+# --- options ----------------------------------------------------------------------------------------------------------
+
+NAN, INFINITE = float("nan"), float("inf")
+WRONG_OPTIONS = {
+    "threshold": [0, -1, NAN, INFINITE, 3, 0.0009, "a", None, True, [0.1]],
+    "threshold_m": [0, -1, NAN, INFINITE, "a", 1e9, 1e-9],
+    "max_hulls": [0, -1, 2.5, "2", True, NAN],
+    "max_vertices": [3, 0, -8, 4.5, "8"],
+    "max_faces": [3, 0, 12.0, "x"],
+    "merge": [None, "no", 0, 2],
+    "policy": ["", None, 3, "GREEDY", "greedy-", ["greedy"]],
+    "resolution": [0, -1, 2.5, "3", None, 10**6],
+    "seed": [-1, 1.5, "a", None, 2**70],
+    "threads": [0, -1, 1.5, "2", True, 10**6],
+    "timeout": [0, -1, NAN, INFINITE, "3"],
+    "progress": [3, "no"],
+}
+
+
+@pytest.mark.parametrize(("name", "value"), [(name, value) for name, some in WRONG_OPTIONS.items() for value in some])
+def test_an_option_out_of_range_is_named_with_its_range(name: str, value: Any) -> None:
+    with pytest.raises(OptionError, match=name) as caught:
+        rlacd.decompose(BOX, **{name: value})
+    assert is_one_sentence(str(caught.value))
+
+
+def test_numbers_of_numpy_are_numbers_and_the_report_stays_plain() -> None:
+    result = check(
+        BOX, threshold=np.float32(0.1), max_hulls=np.int64(2), max_vertices=np.uint8(32), seed=np.int32(3), timeout=9
+    )
+    assert result.report["options"]["threshold"] == pytest.approx(0.1)
+    assert type(result.report["options"]["max_hulls"]) is int
+
+
+@pytest.mark.parametrize("threshold", [0.001, 0.02, 2])
+def test_the_ends_of_the_threshold(threshold: float) -> None:
+    result = check((ELL, FACES), threshold=threshold)
+    assert result.report["concavity"]["max"] <= threshold
+    assert threshold < 2 or len(result) == 1
+
+
+def test_more_threads_than_the_machine_has_change_nothing() -> None:
+    one = check((ELL, FACES))
+    many = rlacd.decompose((ELL, FACES), threads=300)
+    for a, b in zip(one, many, strict=True):
+        np.testing.assert_array_equal(a.vertices, b.vertices)
+
+
+@pytest.mark.parametrize("max_hulls", [1, 2])
+@pytest.mark.parametrize("max_vertices", [None, 4, 8])
+def test_hulls_and_corners_can_be_limited_below_what_fits(max_hulls: int, max_vertices: int | None) -> None:
+    result = check((ELL, FACES), max_hulls=max_hulls, max_vertices=max_vertices)
+    assert len(result) <= max_hulls
+    assert all(len(hull.vertices) <= (max_vertices or np.inf) for hull in result)
+    assert any("exceed the concavity" in sentence for sentence in result.report["warnings"])
+    assert result.report["hausdorff"]["under"] < 2e-3
+
+
+@pytest.mark.parametrize("max_faces", [4, 6, 12])
+def test_faces_can_be_limited(max_faces: int) -> None:
+    result = check(arrays(creation.icosphere(2)), max_faces=max_faces, threshold=0.6)
+    assert all(len(hull.faces) <= max_faces for hull in result)
+    assert result.report["hausdorff"]["under"] < 2e-3
+
+
+# --- stopping ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_timeout_too_short_for_anything_still_gives_hulls() -> None:
+    result = check((ELL, FACES), timeout=1e-9)
+    assert result.report["stopped_by"] == "timeout"
+    assert result.report["complete"] is False
+    assert any(sentence.startswith("Incomplete") for sentence in result.report["warnings"])
+
+
+def test_cancelled_at_any_step_the_hulls_still_cover_the_solid() -> None:
+    torus = arrays(creation.torus(1, 0.3, major_sections=12, minor_sections=6))
+    steps = []
+    check(torus, progress=lambda progress: steps.append(progress))
+    for last in range(0, len(steps), max(1, len(steps) // 6)):
+        left = iter(range(last))
+        result = check(torus, progress=lambda progress, left=left: next(left, None) is not None)
+        assert result.report["stopped_by"] == "cancel"
+        assert result.report["hausdorff"]["under"] < 2e-3
+
+
+def test_an_exception_of_the_callback_is_the_callers_own() -> None:
+    class MyError(Exception):
+        pass
+
+    def fail(progress: rlacd.Progress) -> bool:
+        raise MyError
+
+    with pytest.raises(MyError):
+        rlacd.decompose((ELL, FACES), progress=fail, threads=2)
+    assert len(rlacd.decompose((ELL, FACES), threads=2)) == 3, "the next run is not disturbed"
+
+
+# --- files, through the command line ----------------------------------------------------------------------------------
+
+FORMATS = ["obj", "stl", "stl-text", "ply", "ply-text", "off", "glb", "gltf", "dae", "3mf"]
+
+
+def write(folder: Path, kind: str) -> Path:
+    """Write a box in a format; gltf brings its data file along."""
+    extension = kind.split("-")[0]
+    path = folder / f"mesh.{extension}"
+    box = creation.box((1, 2, 3))
+    if kind == "gltf":
+        for name, content in trimesh.Scene(box).export(file_type="gltf").items():
+            (path if name == "model.gltf" else folder / name).write_bytes(content)
+    elif kind in ("glb", "3mf"):
+        trimesh.Scene(box).export(path)
+    elif kind == "stl-text":
+        path.write_text(box.export(file_type="stl_ascii"))
+    elif kind == "ply-text":
+        path.write_bytes(box.export(file_type="ply", encoding="ascii"))
+    else:
+        box.export(path)
+    return path
+
+
+def run(*words: object) -> Result:
+    return CliRunner().invoke(app, ["decompose", *(str(word) for word in words)])
+
+
+def assert_hulls_or_one_sentence(result: Result, output: Path) -> None:
+    if result.exit_code == 0:
+        for hull in trimesh.load_scene(output, split_objects=True, process=False).geometry.values():
+            assert_convex_hull(hull)
+        return
+    assert result.exit_code == 2, result.stderr
+    assert result.stderr.startswith("rlacd: ")
+    assert is_one_sentence(result.stderr), result.stderr
+    assert not output.exists()
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_a_file_cut_off_anywhere(kind: str, tmp_path: Path) -> None:
+    path = write(tmp_path, kind)
+    content = path.read_bytes()
+    output = tmp_path / "out.obj"
+    for share in (0.0, 0.02, 0.1, 0.25, 0.5, 0.6, 0.75, 0.9):
+        path.write_bytes(content[: int(share * len(content))])
+        assert_hulls_or_one_sentence(run(path, "-o", output, "--threshold", "0.2"), output)
+        output.unlink(missing_ok=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", FORMATS)
+def test_a_file_with_bytes_changed(kind: str, tmp_path: Path) -> None:
+    path = write(tmp_path, kind)
+    content = path.read_bytes()
+    output = tmp_path / "out.obj"
+    rng = np.random.default_rng(0)
+    for _ in range(25):
+        damaged = bytearray(content)
+        for place in rng.integers(len(content), size=rng.integers(1, 6)):
+            damaged[place] = rng.integers(256)
+        path.write_bytes(bytes(damaged))
+        assert_hulls_or_one_sentence(run(path, "-o", output, "--threshold", "0.2"), output)
+        output.unlink(missing_ok=True)
+
+
+@pytest.mark.parametrize("kind", ["stl", "ply", "glb", "dae"])
+def test_a_wrong_extension_is_named(kind: str, tmp_path: Path) -> None:
+    path = write(tmp_path, kind)
+    lie = path.rename(tmp_path / ("mesh.off" if kind != "off" else "mesh.stl"))
+    result = run(lie, "-o", tmp_path / "out.obj")
+    assert result.exit_code == 2
+    assert f"rename it to .{kind}" in result.stderr
+
+
+def test_a_point_cloud_file_gives_the_hull_of_its_points(tmp_path: Path) -> None:
+    points = np.random.default_rng(0).random((40, 3))
+    trimesh.PointCloud(points).export(tmp_path / "cloud.ply")
+    result = run(tmp_path / "cloud.ply")
+    assert result.exit_code == 0
+    assert "hull of the points" in result.stderr
+    hull = trimesh.load(tmp_path / "cloud_hulls.glb", force="mesh")
+    assert hull.volume == pytest.approx(trimesh.PointCloud(points).convex_hull.volume, rel=1e-4)
+
+
+NAMES = [
+    "kürbis 椅子 🪑.stl",
+    "with\nnewline.stl",
+    "quote'\" $(x);&.stl",
+    "mesh.STL",
+    "two.dots.stl",
+    "椅" * 80 + ".stl",
+    os.fsdecode(b"\xff\xfe.stl"),
+]
+
+
+@pytest.mark.parametrize("name", NAMES, ids=ascii)
+def test_any_file_name_works(name: str, tmp_path: Path) -> None:
+    try:
+        creation.box().export(tmp_path / "plain.stl")
+        path = (tmp_path / "plain.stl").rename(tmp_path / name)
+    except (OSError, UnicodeError):
+        pytest.skip("this file system does not take such a name")
+    before = {path}
+    result = run(path, "-o", tmp_path / "out.glb", "--report", tmp_path / "out.json")
+    assert result.exit_code == 0, result.stderr
+    assert json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))["parts"] == 1
+    assert run(path, "-o", tmp_path / path.with_suffix(".obj").name).exit_code == 0
+    assert run(path, "-o", f"{tmp_path}/folder/").exit_code == 0
+    assert CliRunner().invoke(app, ["info", str(path)]).exit_code == 0
+    assert CliRunner().invoke(app, ["info", str(path), "--json"]).exit_code == 0
+    assert not [p for p in tmp_path.iterdir() if p.name.endswith(".tmp")]
+    assert before < set(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("output", "says"),
+    [
+        ("y" * 300 + ".glb", "too long"),
+        ("nowhere/out.glb", "does not exist"),
+        ("box.stl/out.glb", "does not exist"),
+        ("circle.glb", "cannot write"),
+        ("pipe.obj", "not an ordinary file"),
+        ("taken", "cannot write"),
+        ("", "no name"),
+        ("/proc/out.glb", "cannot write"),
+    ],
+)
+def test_an_output_that_cannot_be_written_has_code_3(output: str, says: str, tmp_path: Path) -> None:
+    path = tmp_path / "box.stl"
+    creation.box().export(path)
+    (tmp_path / "circle.glb").symlink_to(tmp_path / "circle.glb")
+    (tmp_path / "taken").write_text("mine")
+    os.mkfifo(tmp_path / "pipe.obj")
+    if output.startswith("/proc") and not Path("/proc/self").exists():
+        pytest.skip("no /proc here")
+    before = sorted(tmp_path.iterdir())
+    result = run(path, "-o", tmp_path / output if output else "")
+    assert result.exit_code == 3, result.stderr
+    assert says in result.stderr
+    assert is_one_sentence(result.stderr)
+    assert sorted(tmp_path.iterdir()) == before
+    assert (tmp_path / "taken").read_text() == "mine"
+
+
+def test_the_library_refuses_names_that_no_file_can_have(tmp_path: Path) -> None:
+    result = rlacd.decompose(BOX)
+    for name in ("\0.glb", "y" * 300 + ".stl", "no/such/folder/x.obj"):
+        with pytest.raises(OutputError):
+            result.save(tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_links_are_followed_and_their_target_is_never_overwritten(tmp_path: Path) -> None:
+    real, link = tmp_path / "box.stl", tmp_path / "link.stl"
+    creation.box().export(real)
+    link.symlink_to(real)
+    assert run(link, "-o", tmp_path / "out.obj").exit_code == 0
+    refused = run(link, "-o", real)
+    assert refused.exit_code == 2
+    assert "overwrite the input" in refused.stderr
+
+
+@pytest.mark.parametrize("name", ["folder", "dangling.stl", "circle.stl", "pipe.stl", "nowhere.stl", "blank.glb"])
+def test_an_input_that_is_no_file_has_code_2(name: str, tmp_path: Path) -> None:
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "dangling.stl").symlink_to(tmp_path / "gone.stl")
+    (tmp_path / "circle.stl").symlink_to(tmp_path / "circle.stl")
+    os.mkfifo(tmp_path / "pipe.stl")
+    (tmp_path / "blank.glb").write_bytes(b"")
+    result = run(tmp_path / name, "-o", tmp_path / "out.glb")
+    assert result.exit_code == 2, result.stderr
+    assert is_one_sentence(result.stderr)
+    assert name in result.stderr
+    assert not (tmp_path / "out.glb").exists()
+
+
+def test_a_disk_that_is_full_leaves_the_old_file(tmp_path: Path) -> None:
+    """In a process that may write no file larger than 100 bytes: what the system says then ends in one sentence."""
+    resource = pytest.importorskip("resource")
+    path, output = tmp_path / "box.stl", tmp_path / "out.glb"
+    creation.box().export(path)
+    output.write_bytes(b"old")
+    command = [sys.executable, "-c", "from rlacd.cli import main; main()", "decompose", str(path), "-o", str(output)]
+    done = subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100)),
+    )
+    assert done.returncode == 3, done.stderr
+    assert is_one_sentence(done.stderr)
+    assert output.read_bytes() == b"old"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["box.stl", "out.glb"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--threshold", "nan"],
+        ["--max-hulls", "0"],
+        ["--threads", "99999"],
+        ["--resolution", "0"],
+        ["--policy", "magic"],
+    ],
+)
+def test_a_bad_option_of_the_command_line_has_code_2(words: list[str], tmp_path: Path) -> None:
+    creation.box().export(tmp_path / "box.stl")
+    command = [sys.executable, "-c", "from rlacd.cli import main; main()", "decompose", str(tmp_path / "box.stl")]
+    done = subprocess.run([*command, *words], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 2
+    assert done.stderr.startswith("rlacd: ")
+    assert is_one_sentence(done.stderr)
+    assert [p.name for p in tmp_path.iterdir()] == ["box.stl"]
