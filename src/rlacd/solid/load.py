@@ -105,7 +105,7 @@ def _read(path: Path) -> trimesh.Scene:
     extension = path.suffix.lower().lstrip(".")
     holds = _format_of(content)
     if extension not in mesh_formats():
-        hint = f"it seems to hold {holds}; rename it to .{holds}" if holds else "convert it to glb, obj, stl or ply"
+        hint = f"rename it to .{holds}, which it seems to hold" if holds else "convert it to glb, obj, stl or ply"
         raise MeshFileError(f"{path} has no mesh format's extension: {hint}")
     try:
         scene = trimesh.load_scene(
@@ -139,9 +139,8 @@ def _check_off_is_whole(path: Path, content: bytes) -> None:
     words = b" ".join(lines[:2]).replace(b"COFF", b" ").replace(b"OFF", b" ").split()
     body = len(lines) - (1 if len(lines[0].split()) > 2 else 2)
     if len(words) >= 2 and body < int(words[0]) + int(words[1]):
-        raise MeshFileError(
-            f"{path} is cut off: its header promises {int(words[0])} vertices and {int(words[1])} faces; export it again"
-        )
+        promised = f"{int(words[0])} vertices and {int(words[1])} faces"
+        raise MeshFileError(f"{path} is cut off: its header promises {promised}; export it again")
 
 
 def _format_of(content: bytes) -> str | None:
