@@ -17,7 +17,8 @@ void bind_glue(nb::module_& m) {
         return nb::make_tuple(to_array<double>(std::move(out.vertices)), to_array<std::int32_t>(std::move(out.faces)));
       },
       nb::arg("vertices_a"), nb::arg("faces_a"), nb::arg("vertices_b"), nb::arg("faces_b"),
-      "Surface (vertices [V, 3], faces [F, 3]) of the union of two closed solids with disjoint interiors: both surfaces\n"
+      "Surface (vertices [V, 3], faces [F, 3]) of the union of two closed solids with disjoint interiors: both "
+      "surfaces\n"
       "without the regions where they touch face to face (within 1e-8). Not a closed mesh: for measuring only.");
 }
 

@@ -24,7 +24,8 @@ void bind_hull(nb::module_& m) {
       "oriented. rank < 3 (all points coplanar): no indices, no faces.");
   m.def(
       "joint_hull_volumes",
-      [](const PointsIn& array, const nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>& starts,
+      [](const PointsIn& array,
+         const nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>& starts,
          const nb::ndarray<const std::int32_t, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>& pairs, int threads) {
         const std::vector<Vec3> points = to_points(array);
         const std::vector<std::int32_t> start(starts.data(), starts.data() + starts.size());

@@ -21,7 +21,8 @@ void bind_sweep(nb::module_& m) {
         return to_array<double>(std::move(scores));
       },
       nb::arg("vertices"), nb::arg("faces"), nb::arg("directions"), nb::arg("offsets"), nb::arg("threads") = 0,
-      "Scores of the planes n.x = d for unit directions n [K, 3] and ascending offsets d [K, M]: float64 [K * M, 10].\n\n"
+      "Scores of the planes n.x = d for unit directions n [K, 3] and ascending offsets d [K, M]: float64 [K * M, "
+      "10].\n\n"
       "Columns: hull volume below, above; solid volume below, above; section area, perimeter; thickness below, above;\n"
       "largest extent below, above. The mesh must be closed and outward oriented.");
 }

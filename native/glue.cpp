@@ -84,8 +84,8 @@ struct Facet {
     normal = normalized(n);
     offset = dot(normal, corner[0]);
     const int drop = std::fabs(n.x) >= std::fabs(n.y) && std::fabs(n.x) >= std::fabs(n.z) ? 0
-                     : std::fabs(n.y) >= std::fabs(n.z)                                  ? 1
-                                                                                         : 2;
+                     : std::fabs(n.y) >= std::fabs(n.z)                                   ? 1
+                                                                                          : 2;
     u = (drop + 1) % 3;
     v = (drop + 2) % 3;
     if (n[drop] < 0) std::swap(u, v);  // so that the triangle is counter-clockwise in (u, v)
@@ -145,12 +145,12 @@ void append_untouched(Mesh& out, const Mesh& a, const Mesh& b, const Box& common
       for (const Facet& other : others) {
         if (!overlap(facet.box, other.box) || !facet.touches(other)) continue;
         if (whole)
-          polygons.assign(1, {facet.project(facet.corner[0]), facet.project(facet.corner[1]),
-                              facet.project(facet.corner[2])});
+          polygons.assign(
+              1, {facet.project(facet.corner[0]), facet.project(facet.corner[1]), facet.project(facet.corner[2])});
         whole = false;
         // Seen from this side the other triangle is clockwise.
-        subtract(polygons, {facet.project(other.corner[0]), facet.project(other.corner[2]),
-                            facet.project(other.corner[1])});
+        subtract(polygons,
+                 {facet.project(other.corner[0]), facet.project(other.corner[2]), facet.project(other.corner[1])});
         if (polygons.empty()) break;
       }
     }

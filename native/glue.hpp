@@ -5,9 +5,11 @@
 //         the other: there the solids touch and the union has no surface. Exact up to kCoincident; triangles cut along
 //         such regions do not share vertices with their neighbours any more, so the result is a surface to measure
 //         distances to, not a mesh to cut.
-// Algorithm: from every triangle, the coincident triangles of the other mesh are subtracted in the triangle's plane. What
+// Algorithm: from every triangle, the coincident triangles of the other mesh are subtracted in the triangle's plane.
+// What
 //         is left of a convex polygon outside a triangle is at most three convex polygons, so plain half-plane clipping
-//         does. (A mesh boolean would ask for exactly coincident faces; two sides of a slanted cut agree to some 1e-16.)
+//         does. (A mesh boolean would ask for exactly coincident faces; two sides of a slanted cut agree to some
+//         1e-16.)
 #pragma once
 
 #include "geometry.hpp"

@@ -29,8 +29,8 @@ Vec3 crossing(Vec3 a, Vec3 b, double sa, double sb, double d, Vec3 n, int axis) 
 void reduce_to_planar_hull(std::vector<Vec3>& points, Vec3 n) {
   if (points.size() < 4) return;
   const int drop = std::fabs(n.x) >= std::fabs(n.y) && std::fabs(n.x) >= std::fabs(n.z) ? 0
-                   : std::fabs(n.y) >= std::fabs(n.z)                                  ? 1
-                                                                                       : 2;
+                   : std::fabs(n.y) >= std::fabs(n.z)                                   ? 1
+                                                                                        : 2;
   const int u = (drop + 1) % 3, v = (drop + 2) % 3;
   std::sort(points.begin(), points.end(), [u, v, drop](Vec3 a, Vec3 b) {
     return a[u] != b[u] ? a[u] < b[u] : a[v] != b[v] ? a[v] < b[v] : a[drop] < b[drop];
@@ -130,8 +130,7 @@ class DirectionSweep {
         const std::int32_t a = f[e], b = f[(e + 1) % 3];
         if (s_[a] >= s_[b]) continue;
         for (std::size_t j = first_above(s_[a]); j < d_.size() && d_[j] < s_[b]; ++j)
-          crossings_[j].push_back(
-              crossing(mesh_.vertices[a], mesh_.vertices[b], s_[a], s_[b], d_[j], n_, axis_));
+          crossings_[j].push_back(crossing(mesh_.vertices[a], mesh_.vertices[b], s_[a], s_[b], d_[j], n_, axis_));
       }
     for (std::vector<Vec3>& points : crossings_) reduce_to_planar_hull(points, n_);
     slabs_.resize(d_.size() + 1);

@@ -1,0 +1,96 @@
+"""Components: cutting, connected pieces, principal axes; slivers and shavings."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from manifold3d import Manifold
+
+from rlacd.finish.slivers import drop_slivers, inradius, is_film, is_sliver
+from rlacd.planes.candidates import OFFSETS_PER_AXIS, axis_and_principal
+from rlacd.policies import SCORES, Greedy
+from rlacd.solid.component import Component, Plane
+from rlacd.workers import Workers
+
+
+def box(x: float, y: float, z: float, at: tuple[float, float, float] = (0, 0, 0)) -> Component:
+    return Component(Manifold.cube((x, y, z)).translate(at))
+
+
+def test_cut_keeps_the_volume() -> None:
+    component = Component(Manifold.sphere(1, 48))
+    below, above = component.cut(Plane((0.6, 0.0, 0.8), 0.3))
+    assert below is not None
+    assert above is not None
+    assert below.volume + above.volume == pytest.approx(component.volume)
+    assert (below.vertices @ [0.6, 0, 0.8]).max() == pytest.approx(0.3)
+
+
+def test_cut_that_misses_leaves_one_side() -> None:
+    below, above = box(1, 1, 1).cut(Plane((1.0, 0.0, 0.0), 2.0))
+    assert below is not None
+    assert above is None
+
+
+def test_cavities_stay_in_the_piece_around_them() -> None:
+    hollow = Manifold.sphere(1, 32) - Manifold.sphere(0.5, 32)
+    solid = Component(hollow + Manifold.cube((1, 1, 1)).translate((2, 0, 0)))
+    pieces = sorted(solid.pieces(), key=lambda piece: piece.volume)
+    assert len(pieces) == 2
+    assert pieces[1].volume == pytest.approx(hollow.volume())
+
+
+def test_principal_axes_follow_a_rotation() -> None:
+    solid = Manifold.cube((3, 2, 1), True)
+    assert np.abs(Component(solid).principal_axes) == pytest.approx(np.eye(3), abs=1e-9)
+    turned = Component(solid.rotate((0, 0, 30)))
+    assert np.abs(turned.principal_axes[0]) == pytest.approx([np.cos(np.pi / 6), 0.5, 0], abs=1e-9)
+    axes = turned.principal_axes
+    assert axes @ axes.T == pytest.approx(np.eye(3), abs=1e-9)
+
+
+def test_candidates_are_the_papers_150() -> None:
+    component = Component(Manifold.cube((3, 2, 1), True).rotate((10, 20, 30)))
+    candidates = axis_and_principal(component)
+    assert len(candidates) == 6 * OFFSETS_PER_AXIS == 150
+    for k, direction in enumerate(candidates.directions):
+        heights = component.vertices @ direction
+        steps = np.diff([heights.min(), *candidates.offsets[k], heights.max()])
+        assert steps == pytest.approx(np.full(26, np.ptp(heights) / 26))
+    plane = candidates.plane(25 * 4 + 7)
+    assert plane.normal == pytest.approx(candidates.directions[4])
+    assert plane.offset == candidates.offsets[4, 7]
+
+
+@pytest.mark.parametrize("score", SCORES)
+def test_greedy_cuts_a_dumbbell_at_its_bar(score: str) -> None:
+    balls = Manifold.sphere(0.5, 32).translate((-1, 0, 0)) + Manifold.sphere(0.5, 32).translate((1, 0, 0))
+    dumbbell = Component(balls + Manifold.cylinder(2, 0.1, 0.1, 16, True).rotate((0, 90, 0)))
+    plane = Greedy(score).choose(dumbbell)
+    assert plane is not None
+    assert abs(plane.normal[0]) > 0.99
+    assert abs(plane.offset) < 0.7
+
+
+def test_inradius_of_known_bodies() -> None:
+    assert inradius(box(2, 3, 4).hull) == pytest.approx(1)
+    assert inradius(Component(Manifold.tetrahedron()).hull) == pytest.approx(1 / np.sqrt(3))
+
+
+def test_slivers_are_told_from_thin_but_sound_parts() -> None:
+    assert is_sliver(box(1, 1, 0.01).hull)
+    assert not is_sliver(box(1, 1, 0.03).hull)
+    assert not is_sliver(Component(Manifold.sphere(1, 32)).hull)
+
+
+def test_a_sliver_goes_only_where_others_stand_for_it() -> None:
+    block, shaving, sheet = box(1, 1, 1), box(1, 1, 0.001, (0, 0, 1)), box(1, 1, 0.001, (0, 0, 3))
+    with Workers(1) as workers:
+        assert drop_slivers([block, shaving, sheet], workers) == [block, sheet]
+        assert drop_slivers([block, shaving], workers, suspects=[block]) == [block, shaving]
+        assert drop_slivers([sheet], workers) == [sheet]
+
+
+def test_films_are_thinner_than_sheets() -> None:
+    assert is_film(box(1, 1, 1e-4))
+    assert not is_film(box(1, 1, 2e-3))
