@@ -115,7 +115,8 @@ def table(out: Path) -> None:
     for r in rows:
         a, b = r["rlacd"], r["coacd"]
         print(
-            f"| {Path(r['file']).stem} | {r['faces']} | {a['parts']} | {b['parts']} | {a['wall']:.2f} | {b['wall']:.1f} "
+            f"| {Path(r['file']).stem} | {r['faces']} | {a['parts']} | {b['parts']} "
+            f"| {a['wall']:.2f} | {b['wall']:.1f} "
             f"| {b['wall'] / a['wall']:.0f} | {a['concavity']:.3f} | {b['concavity']:.3f} ({b['parts_over']} parts) "
             f"| {a['over']:.3f} | {b['over']:.3f} | {a['under']:.3f} | {b['under']:.3f} |"
         )

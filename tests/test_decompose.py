@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 
 import numpy as np
@@ -181,7 +182,7 @@ def test_progress_names_the_stages_and_counts_parts() -> None:
         "measure",
     ]
     assert seen[-1].parts >= len(result)
-    assert all(a.seconds <= b.seconds for a, b in zip(seen, seen[1:], strict=False))
+    assert all(a.seconds <= b.seconds for a, b in itertools.pairwise(seen))
 
 
 @pytest.mark.parametrize("steps", [0, 3, 6, 9])

@@ -12,7 +12,7 @@ from rlacd.solid.component import Component
 from rlacd.workers import Workers
 
 FILM = 2e-4
-"""Mean thickness (twice the volume over the area) below which a piece may be a shaving; sheets are ten times thicker."""
+"""Mean thickness (twice the volume over the area) below which a piece may be a shaving; sheets are 10 times thicker."""
 
 MISSED = 1e-3
 """No point of a shaving is farther than this from the solid that stands for it."""
