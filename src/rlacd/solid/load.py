@@ -90,16 +90,16 @@ def load_mesh(source: Source) -> InputMesh:
 def _read(path: Path) -> trimesh.Scene:
     """Parse a file; raises MeshFileError with the likeliest reason."""
     # The content is opened here and not by name: a name that looks like an address must never be fetched.
-    if path.is_dir():
-        raise MeshFileError(f"{path} is a folder: give a mesh file in it")
-    if not path.exists():
-        raise MeshFileError(f"{path} does not exist: check the spelling and the folder")
-    if not path.is_file():
-        raise MeshFileError(f"{path} is not a regular file: save the mesh to a file first")
     try:
+        if path.is_dir():
+            raise MeshFileError(f"{path} is a folder: give a mesh file in it")
+        if not path.exists():
+            raise MeshFileError(f"{path} does not exist: check the spelling and the folder")
+        if not path.is_file():
+            raise MeshFileError(f"{path} is not a regular file: save the mesh to a file first")
         content = path.read_bytes()
     except OSError as error:
-        raise MeshFileError(f"{path} cannot be opened ({error.strerror}): check its permissions") from error
+        raise MeshFileError(f"{path} cannot be opened ({error.strerror}): check its name and permissions") from error
     if not content.strip(b"\0 \t\r\n"):
         raise MeshFileError(f"{path} is empty: export the mesh again")
     extension = path.suffix.lower().lstrip(".")
@@ -107,6 +107,8 @@ def _read(path: Path) -> trimesh.Scene:
     if extension not in mesh_formats():
         hint = f"rename it to .{holds}, which it seems to hold" if holds else "convert it to glb, obj, stl or ply"
         raise MeshFileError(f"{path} has no mesh format's extension: {hint}")
+    if extension == "stl" and holds in (None, "stl"):
+        _check_stl_is_whole(path, content)
     try:
         scene = trimesh.load_scene(
             io.BytesIO(content),
@@ -133,13 +135,23 @@ def _read(path: Path) -> trimesh.Scene:
     return scene
 
 
+def _check_stl_is_whole(path: Path, content: bytes) -> None:
+    """Compare the length of a binary STL file with the count in its header; a short one would be read as text."""
+    if b"\0" not in content[:512]:
+        return
+    count = int.from_bytes(content[80:84], "little")
+    if len(content) < 84 + 50 * count:
+        raise MeshFileError(f"{path} is cut off: its header promises {count} triangles; export it again")
+
+
 def _check_off_is_whole(path: Path, content: bytes) -> None:
     """Compare the lines of an OFF file with the counts in its header, which the parser takes on trust."""
     lines = [line for line in (raw.split(b"#")[0].strip() for raw in content.splitlines()) if line]
     words = b" ".join(lines[:2]).replace(b"COFF", b" ").replace(b"OFF", b" ").split()
     body = len(lines) - (1 if len(lines[0].split()) > 2 else 2)
-    if len(words) >= 2 and body < int(words[0]) + int(words[1]):
-        promised = f"{int(words[0])} vertices and {int(words[1])} faces"
+    counts = [int(word) for word in words[:2] if word.isdigit()]
+    if len(counts) == 2 and body < sum(counts):
+        promised = f"{counts[0]} vertices and {counts[1]} faces"
         raise MeshFileError(f"{path} is cut off: its header promises {promised}; export it again")
 
 
