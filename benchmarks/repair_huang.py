@@ -124,9 +124,9 @@ def huang(vertices: FloatArray, faces: IntArray, leaves: int, together: bool) ->
 def distances(solid: Manifold, vertices: FloatArray, faces: IntArray) -> tuple[float, float]:
     """How far the solid's surface leads from the input's, and how far input points lie outside the solid."""
     v, f = to_arrays(solid)
-    over = directed_hausdorff(np.ascontiguousarray(v), f.astype(np.int32), _native.Surface(vertices, faces), threads=1)[
-        1
-    ]
+    over = directed_hausdorff(
+        np.ascontiguousarray(v), f.astype(np.int32), _native.Surface(vertices, faces.astype(np.int32)), threads=1
+    )[1]
     query = SurfaceQuery(v, f, 1)
     points, _ = spread_points(vertices, faces, 0.03)
     distance = query.distance(points)
@@ -153,7 +153,7 @@ def measure(path: Path, way: str) -> dict[str, Any]:
     if solid.is_empty():
         return {**row, "error": "no solid"}
     row |= {"faces": solid.num_tri(), "volume": solid.volume()}
-    row["solid_over"], row["solid_under"] = distances(solid, vertices, faces)
+    row["solid_over"], row["solid_under"] = distances(solid, vertices, faces.astype(np.int64))
     with Workers(1) as workers:
         clock = Clock(CUT_SECONDS)
         criterion = Concavity(0.05)
@@ -247,15 +247,16 @@ def table(out: Path) -> None:
     print("|---|---|---|---|---|---|---|---|---|---|")
     for file, found in sorted(rows.items()):
         steps = ", ".join(f"{step} {n}" for step, n in found["shipped"].get("steps", {}).items())
-        for way, r in found.items():
+        for way, row in found.items():
             head = f"| {Path(file).stem[:40]} | {steps} | {way} "
-            if "parts" not in r:
-                print(head + f"| {r['error']} |")
+            if "parts" not in row:
+                print(head + f"| {row['error']} |")
                 continue
-            late = "" if r["cut_complete"] else " (stopped)"
+            late = "" if row["cut_complete"] else " (stopped)"
             print(
-                head + f"| {r['faces']} | {r['repair_seconds']:.2f} | {r['cut_seconds']:.2f}{late} | {r['parts']} "
-                f"| {r['hull_volume']:.3f} | {r['over']:.3f} | {r['under']:.3f} |"
+                head
+                + f"| {row['faces']} | {row['repair_seconds']:.2f} | {row['cut_seconds']:.2f}{late} | {row['parts']} "
+                f"| {row['hull_volume']:.3f} | {row['over']:.3f} | {row['under']:.3f} |"
             )
     done = [found for found in rows.values() if all(found.get(way, {}).get("cut_complete") for way in ways)]
     print(f"\nmeshes {len(rows)}; {len(done)} where every way was done in time, which these sums are of:\n")
@@ -288,7 +289,7 @@ def table(out: Path) -> None:
 
 
 def _heaviest(row: dict[str, Any]) -> str:
-    return max(row["steps"], key=STEPS.index)
+    return str(max(row["steps"], key=STEPS.index))
 
 
 def _leaks(found: dict[str, dict[str, Any]], way: str) -> bool:
