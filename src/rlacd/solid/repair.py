@@ -47,7 +47,7 @@ from rlacd.solid.topology import (
     signed_tetrahedra,
 )
 
-STEPS = ("closed", "reoriented", "outer skin", "welded", "capped", "slab", "wrapped", "hull", "dropped")
+STEPS = ("closed", "reoriented", "outer skin", "welded", "capped", "slab", "wrapped", "hull")
 """What can be done to a body, from the least change to the most."""
 
 HALF_THICKNESS = 1e-3
