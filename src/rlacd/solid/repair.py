@@ -181,7 +181,14 @@ def repair(mesh: InputMesh, *, resolution: int = 100, threads: int | None = None
         body = BodyRepair(0, "hull", len(mesh.faces), solid.num_tri(), 0.0)
         return Solid(solid, surface, frame, (body,), tuple(warnings))
 
-    work = _Repair(SurfaceQuery(vertices, faces, threads), resolution)
+    query = SurfaceQuery(vertices, faces, threads)
+    work = _Repair(query, resolution)
+    doubted = work.doubted()
+    if len(doubted):
+        # Faces of one body that cross each other can be joined wrongly into a skin: try them as sheets.
+        other = _Repair(query, resolution, doubted)
+        if other.deviation.max() < work.deviation.max():
+            work = other
     return Solid(work.solid, surface, frame, work.report(), tuple(warnings + work.warnings))
 
 
@@ -191,9 +198,10 @@ class _Repair:
     Bodies are numbered after cracks are welded; `step`, `deviation` and `faces_out` are per body.
     """
 
-    def __init__(self, surface: SurfaceQuery, resolution: int) -> None:
+    def __init__(self, surface: SurfaceQuery, resolution: int, as_sheets: IntArray | None = None) -> None:
         self.input = surface
         self.resolution = resolution
+        self.as_sheets = np.empty(0, dtype=np.int64) if as_sheets is None else as_sheets
         self.warnings: list[str] = []
 
         faces, origin = close_cracks(surface.vertices, surface.faces, _WELDS)
@@ -225,6 +233,10 @@ class _Repair:
         faces_in = np.bincount(self.body_of_input, minlength=self.bodies)
         rows = zip(self.step.tolist(), faces_in.tolist(), self.faces_out.tolist(), self.deviation.tolist(), strict=True)
         return tuple(BodyRepair(i, STEPS[s], a, b, d) for i, (s, a, b, d) in enumerate(rows))
+
+    def doubted(self) -> IntArray:
+        """Bodies whose skin was chosen among faces that cross, and that leads away from them."""
+        return np.flatnonzero((self.step == STEPS.index("outer skin")) & (self.deviation > GAP))
 
     def _note(self, bodies: IntArray, step: str) -> None:
         """Record a step; a body keeps the one that changes it most."""
@@ -336,6 +348,7 @@ class _Repair:
         leaky = soup.body_of_side()[(sides.volume < -none) & (4 * sheet_area > sides.area)]
         solid = sides.volume > none
         flat = np.abs(sides.volume) <= none
+        leaky = np.union1d(leaky, self.as_sheets)
         sheet = (sides.sheet & (sides.volume >= -none)[front]) | (flat[front] & flat[back]) | np.isin(soup.body, leaky)
         wall = (solid[front] | solid[back]) & ~sides.sheet & ~sheet
 
