@@ -24,7 +24,9 @@ MOST_FREE_EDGES = 500_000
 
 
 def close_cracks(vertices: FloatArray, faces: IntArray, tolerances: Sequence[float]) -> tuple[IntArray, IntArray]:
-    """Merge free edges that nearly coincide, trying ever wider tolerances; a try that closes nothing is undone.
+    """Merge free edges that nearly coincide, trying ever wider tolerances.
+
+    A try that closes nothing, or leaves no face, is undone.
 
     Returns the faces ``[G, 3]`` and ``[G]`` the given face each comes from.
     """
@@ -37,7 +39,7 @@ def close_cracks(vertices: FloatArray, faces: IntArray, tolerances: Sequence[flo
         keep = nondegenerate(split)
         keep[keep] = first_of_doubled(split[keep], len(vertices))
         left = len(free_edges(split[keep], len(vertices)))
-        if left < free:
+        if left < free and keep.any():
             faces, origin, free = split[keep], origin[parent[keep]], left
     return faces, origin
 
