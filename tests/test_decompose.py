@@ -153,12 +153,28 @@ def test_more_hulls_fit_better() -> None:
     assert errors == sorted(errors, reverse=True)
 
 
-@pytest.mark.parametrize("limit", [{"max_vertices": 16}, {"max_vertices": 32}, {"max_faces": 24}])
+@pytest.mark.parametrize("limit", [{"max_vertices": 24}, {"max_vertices": 32}, {"max_faces": 60}])
 def test_limits_hold_together_with_the_promises(limit: dict[str, int]) -> None:
     result = rlacd.decompose(SHAPES["torus"](), **limit)
     assert_keeps_promises(result, 0.05)
     assert max(len(hull.vertices) for hull in result) <= limit.get("max_vertices", 10**9)
     assert max(len(hull.faces) for hull in result) <= limit.get("max_faces", 10**9)
+
+
+def test_limits_too_low_for_the_threshold_keep_the_count_and_warn() -> None:
+    free, result = (rlacd.decompose(SHAPES["torus"](), max_vertices=limit) for limit in (None, 8))
+    assert len(result) == len(free)
+    assert max(len(hull.vertices) for hull in result) <= 8
+    assert result.report["concavity"]["max"] > 0.05
+    assert any("exceed" in warning for warning in result.report["warnings"])
+    assert result.report["hausdorff"]["under"] < 0.005
+
+
+def test_a_timeout_after_the_work_is_done_changes_nothing() -> None:
+    stages: list[str] = []
+    result = rlacd.decompose(cup(), progress=lambda p: stages.append(p.stage) or p.stage not in ("finish", "measure"))
+    assert stages[-1] == "measure"
+    assert result.report["complete"]
 
 
 def test_without_merging_there_are_no_fewer_parts() -> None:

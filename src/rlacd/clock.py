@@ -31,6 +31,7 @@ class Clock:
         self._start = time.perf_counter()
         self._stage = ""
         self._parts = 0
+        self._nothing_left_to_stop = False
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -52,11 +53,18 @@ class Clock:
         """Report a step of the current stage; True when the work may go on."""
         self._parts = parts
         if self.stopped_by is None:
-            if self._timeout is not None and self.elapsed > self._timeout:
-                self.stopped_by = "timeout"
-            elif (
+            told_to_stop = (
                 self._progress is not None
                 and self._progress(Progress(self._stage, done, total, parts, self.elapsed)) is False
-            ):
+            )
+            if self._nothing_left_to_stop:
+                return True
+            if self._timeout is not None and self.elapsed > self._timeout:
+                self.stopped_by = "timeout"
+            elif told_to_stop:
                 self.stopped_by = "cancel"
         return self.stopped_by is None
+
+    def nothing_left_to_stop(self) -> None:
+        """Say that the decomposition is reached: from here on the work is only written up, and cannot be incomplete."""
+        self._nothing_left_to_stop = True

@@ -16,7 +16,7 @@ from rlacd.criteria import Concavity, Criterion
 from rlacd.cut import CutTree
 from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError
-from rlacd.finish import drop_slivers, limit_part, limited, merge_parts, merge_to_count
+from rlacd.finish import drop_slivers, limit_part, merge_parts, merge_to_count, with_limits
 from rlacd.options import DEFAULT_RESOLUTION, Options
 from rlacd.policies import make_policy
 from rlacd.progress import ProgressCallback
@@ -118,9 +118,12 @@ def decompose(
             solid = repair(source, resolution=options.resolution, threads=workers.threads)
         if options.threshold_m is not None:
             options = options.with_threshold(options.threshold_m * solid.frame.scale)
-        criterion = limited(Concavity(options.threshold), options.max_vertices, options.max_faces)
+        criterion: Criterion = Concavity(options.threshold)
+        if options.max_hulls is None:  # otherwise the threshold may be exceeded anyway
+            criterion = with_limits(criterion, options.max_vertices, options.max_faces)
         tree = CutTree(Component(solid.manifold), make_policy(options.policy), workers)
         parts = _parts(tree, criterion, options, workers, clock)
+        clock.nothing_left_to_stop()
         with clock.stage("finish"):
             parts = drop_slivers(parts, workers)
             parts = workers.map(lambda part: limit_part(part, options.max_vertices, options.max_faces), parts)

@@ -9,8 +9,9 @@ from rlacd.criteria.criterion import Part as PartLike
 from rlacd.finish.limits import limit_hull
 from rlacd.solid.component import Part
 
-BOX_VERTICES, BOX_FACES = 8, 12
-"""Limits below a box's are applied at the end only: hardly anything could ever meet them, however often it is cut."""
+FEWEST_VERTICES, FEWEST_FACES = 24, 44
+"""Lower limits are applied at the end only, with a warning where a hull then exceeds the threshold: round parts would have
+to be cut very small to meet them (a ball into 75 pieces for 16 vertices at a threshold of 0.05, into 12 for 32)."""
 
 
 @dataclass(frozen=True)
@@ -65,11 +66,13 @@ class Limited:
         return Part(part.vertices, part.faces, part.volume, hull)
 
 
-def limited(criterion: Criterion, max_vertices: int | None, max_faces: int | None) -> Criterion:
+def with_limits(criterion: Criterion, max_vertices: int | None, max_faces: int | None) -> Criterion:
     """Add limits to a criterion where there are any that cutting can meet."""
-    if (max_vertices or BOX_VERTICES) < BOX_VERTICES or (max_faces or BOX_FACES) < BOX_FACES:
+    if max_vertices is None and max_faces is None:
         return criterion
-    return criterion if max_vertices is None and max_faces is None else Limited(criterion, max_vertices, max_faces)
+    if (max_vertices or FEWEST_VERTICES) < FEWEST_VERTICES or (max_faces or FEWEST_FACES) < FEWEST_FACES:
+        return criterion
+    return Limited(criterion, max_vertices, max_faces)
 
 
 def limit_part(part: Part, max_vertices: int | None, max_faces: int | None) -> Part:

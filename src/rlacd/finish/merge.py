@@ -43,37 +43,36 @@ def merge_parts(parts: Sequence[Part], criterion: Criterion, workers: Workers, c
     origin = {i: i for i in alive}
     queue = _pairs(alive, list(alive), criterion, workers)
     heapq.heapify(queue)
-    unions: dict[_Pair, Part | None] = {}
+    unions: dict[_Pair, Part | None] = {}  # verdicts on pairs that are back in the queue
     newest = len(parts)
-    while queue:
-        pair = heapq.heappop(queue)
-        if pair.first not in alive or pair.second not in alive:
-            continue
-        if pair not in unions:
-            batch = [pair, *_next_pairs(queue, alive, unions, 2 * workers.threads - 1)]
-            unions.update(
-                zip(
-                    batch, workers.map(lambda p: _unite(alive[p.first], alive[p.second], criterion), batch), strict=True
-                )
-            )
-        if not clock.step(len(parts) - len(alive), None, len(alive)):
+    while queue and clock.step(len(parts) - len(alive), None, len(alive)):
+        batch = _cheapest(queue, alive, 2 * workers.threads)
+        new = [pair for pair in batch if pair not in unions]
+        unions.update(
+            zip(new, workers.map(lambda p: _unite(alive[p.first], alive[p.second], criterion), new), strict=True)
+        )
+        for taken, pair in enumerate(batch, start=1):
+            union = unions.pop(pair)
+            if union is None:
+                continue
+            origin[newest] = min(origin[pair.first], origin[pair.second])
+            del alive[pair.first], alive[pair.second]
+            alive[newest] = union
+            for other in [*batch[taken:], *_pairs(alive, [newest], criterion, workers)]:
+                heapq.heappush(queue, other)
+            newest += 1
             break
-        union = unions.pop(pair)
-        if union is None:
-            continue
-        origin[newest] = min(origin[pair.first], origin[pair.second])
-        del alive[pair.first], alive[pair.second]
-        alive[newest] = union
-        for candidate in _pairs(alive, [newest], criterion, workers):
-            heapq.heappush(queue, candidate)
-        newest += 1
     return [alive[i] for i in sorted(alive, key=origin.__getitem__)]
 
 
-def _next_pairs(queue: list[_Pair], alive: dict[int, Part], known: dict[_Pair, Part | None], most: int) -> list[_Pair]:
-    """Cheapest pairs of the queue that are not judged yet."""
-    candidates = (p for p in queue if p.first in alive and p.second in alive and p not in known)
-    return heapq.nsmallest(most, candidates)
+def _cheapest(queue: list[_Pair], alive: dict[int, Part], most: int) -> list[_Pair]:
+    """Take the cheapest pairs of parts that are still there off the queue."""
+    batch: list[_Pair] = []
+    while queue and len(batch) < most:
+        pair = heapq.heappop(queue)
+        if pair.first in alive and pair.second in alive:
+            batch.append(pair)
+    return batch
 
 
 def _unite(first: Part, second: Part, criterion: Criterion) -> Part | None:
