@@ -67,7 +67,8 @@ def decompose(
         threshold; ``report["warnings"]`` then says by how much.
     max_vertices, max_faces : int, optional
         Limits on the vertices and triangles of each hull. A limited hull still contains its part, and the threshold
-        holds for it too.
+        holds for it too, unless the limit is below 24 vertices or 44 triangles or `max_hulls` is given: then a warning
+        says by how much it is exceeded.
     merge : bool
         Unite parts whose joint hull still meets the threshold.
     policy : str
