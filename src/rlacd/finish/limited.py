@@ -10,8 +10,8 @@ from rlacd.finish.limits import limit_hull
 from rlacd.solid.component import Part
 
 FEWEST_VERTICES, FEWEST_FACES = 24, 44
-"""Lower limits are applied at the end only, with a warning where a hull then exceeds the threshold: round parts would have
-to be cut very small to meet them (a ball into 75 pieces for 16 vertices at a threshold of 0.05, into 12 for 32)."""
+"""Lower limits are applied at the end only, with a warning where a hull then exceeds the threshold: round parts would
+have to be cut very small to meet them (a ball into 75 pieces for 16 vertices at threshold 0.05, into 12 for 32)."""
 
 CLEANED_UP_TO = 2000
 """Hulls with more corners are left as they are when there is no limit: the clean-up takes quadratic time."""
