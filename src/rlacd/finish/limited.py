@@ -13,9 +13,6 @@ FEWEST_VERTICES, FEWEST_FACES = 24, 44
 """Lower limits are applied at the end only, with a warning where a hull then exceeds the threshold: round parts would
 have to be cut very small to meet them (a ball into 75 pieces for 16 vertices at threshold 0.05, into 12 for 32)."""
 
-CLEANED_UP_TO = 2000
-"""Hulls with more corners are left as they are when there is no limit: the clean-up takes quadratic time."""
-
 
 @dataclass(frozen=True)
 class Limited:
@@ -80,7 +77,5 @@ def with_limits(criterion: Criterion, max_vertices: int | None, max_faces: int |
 
 def limit_part(part: Part, max_vertices: int | None, max_faces: int | None) -> Part:
     """Get the part with a hull inside the limits, and without corners it hardly needs; the same part if it has that."""
-    if max_vertices is None and max_faces is None and len(part.hull.vertices) > CLEANED_UP_TO:
-        return part
     hull = limit_hull(part.hull, max_vertices, max_faces)
     return part if hull is part.hull else Part(part.vertices, part.faces, part.volume, hull)
