@@ -9,6 +9,7 @@ Tree Search", SIGGRAPH 2022). CoACD samples ``H_b``; here it is bounded.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rlacd import _native
@@ -91,6 +92,14 @@ class Concavity:
     def least_error(self, volume: float, hull_volume: float) -> float:
         """``0.3 R_v``, which the concavity is never less than."""
         return VOLUME_WEIGHT * volume_radius(volume, hull_volume)
+
+    def filled(self, part: Part) -> float:
+        """The solid's volume: what is left is what ``R_v`` is made of."""
+        return part.volume
+
+    def settled(self, parts: Sequence[Part]) -> Concavity:
+        """The same: parts that exceed the threshold are reported."""
+        return self
 
     def scaled(self, factor: float) -> Concavity:
         """The same criterion with ``factor`` times the threshold."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 from rlacd.solid.arrays import FloatArray, IntArray
@@ -9,10 +10,15 @@ from rlacd.solid.hull import Hull
 
 
 class Part(Protocol):
-    """A closed solid with its hull; everything in the normalised frame."""
+    """A solid with its hull; everything in the normalised frame."""
 
-    vertices: FloatArray
-    faces: IntArray
+    @property
+    def vertices(self) -> FloatArray:
+        """Points of a surface that bounds the solid [V, 3]."""
+
+    @property
+    def faces(self) -> IntArray:
+        """Triangles of that surface [F, 3]."""
 
     @property
     def volume(self) -> float:
@@ -21,6 +27,17 @@ class Part(Protocol):
     @property
     def hull(self) -> Hull:
         """A convex hull that contains it."""
+
+    @property
+    def piece_hulls(self) -> float:
+        """Volumes of the hulls of the pieces it was glued from, added up."""
+
+    @property
+    def within(self) -> Part | None:
+        """A part whose hull contains this one's: what it was cut from."""
+
+    def with_hull(self, hull: Hull) -> Part:
+        """Get the same solid with another hull around it."""
 
 
 class Criterion(Protocol):
@@ -35,6 +52,15 @@ class Criterion(Protocol):
 
     def is_met(self, part: Part) -> bool:
         """Decide strictly whether the part meets the criterion."""
+
+    def filled(self, part: Part) -> float:
+        """Volume that a joint hull may fill for this part's sake at no cost: the merge takes the cheapest pair first."""
+
+    def settled(self, parts: Sequence[Part]) -> Criterion:
+        """Get the criterion as it is to be from now on, given the finest parts that cutting has reached.
+
+        Where no cut could make a part meet it, a criterion may have to give way, and say so.
+        """
 
     def least_error(self, volume: float, hull_volume: float) -> float:
         """Bound from below, by the volumes alone, what the criterion measures."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rlacd.criteria import Criterion
@@ -50,6 +51,16 @@ class Limited:
         """Measure the part against its limited hull."""
         return self.criterion.error(self._limited(part))
 
+    def filled(self, part: PartLike) -> float:
+        """The underlying criterion's."""
+        return self.criterion.filled(part)
+
+    def settled(self, parts: Sequence[PartLike]) -> Limited:
+        """Settle the underlying criterion with the limited hulls."""
+        return Limited(
+            self.criterion.settled([self._limited(part) for part in parts]), self.max_vertices, self.max_faces
+        )
+
     def scaled(self, factor: float) -> Limited:
         """Get the same limits with a larger threshold."""
         return Limited(self.criterion.scaled(factor), self.max_vertices, self.max_faces)
@@ -63,7 +74,7 @@ class Limited:
         if self._fits(part):
             return part
         hull = limit_hull(part.hull, self.max_vertices, self.max_faces)
-        return Part(part.vertices, part.faces, part.volume, hull)
+        return part.with_hull(hull)
 
 
 def with_limits(criterion: Criterion, max_vertices: int | None, max_faces: int | None) -> Criterion:
@@ -78,4 +89,4 @@ def with_limits(criterion: Criterion, max_vertices: int | None, max_faces: int |
 def limit_part(part: Part, max_vertices: int | None, max_faces: int | None) -> Part:
     """Get the part with a hull inside the limits, and without corners it hardly needs; the same part if it has that."""
     hull = limit_hull(part.hull, max_vertices, max_faces)
-    return part if hull is part.hull else Part(part.vertices, part.faces, part.volume, hull)
+    return part if hull is part.hull else part.with_hull(hull)

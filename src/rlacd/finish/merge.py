@@ -18,7 +18,7 @@ from rlacd.workers import Workers
 
 @dataclass(order=True, frozen=True)
 class _Pair:
-    cost: float  # volume of the joint hull - volume of the two solids: what R_v of their union is made of
+    cost: float  # volume of the joint hull - what the criterion counts as filled by each
     first: int
     second: int
 
@@ -81,9 +81,9 @@ def _unite(first: Part, second: Part, criterion: Criterion) -> Part | None:
 
 
 def _pairs(alive: dict[int, Part], new: Sequence[int], criterion: Criterion, workers: Workers) -> list[_Pair]:
-    """Pairs of a new part with any other that the criterion's reach and volume bound allow, by their excess volume."""
+    """Pairs of a new part with any other that the criterion's reach and volume bound allow, and their costs."""
     return [
-        _Pair(hull_volume - volume, first, second)
+        _Pair(hull_volume - (criterion.filled(alive[first]) + criterion.filled(alive[second])), first, second)
         for first, second, volume, hull_volume in _neighbours(alive, new, criterion.reach, workers)
         if not criterion.excludes(volume, hull_volume)
     ]

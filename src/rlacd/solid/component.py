@@ -5,6 +5,7 @@ Everything is in the normalised frame (bounding box of the input centred, longes
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -38,29 +39,97 @@ class Part:
     volume : float
         Of the solid.
     hull : Hull
-        The solid's convex hull.
+        A convex hull that contains the solid.
+    piece_hulls : float, optional
+        Volumes of the hulls of the pieces it was glued from, added up; its own hull's volume by default.
+
+    Attributes
+    ----------
+    within : Part or None
+        A part whose hull contains this one's: what it was cut from.
     """
 
-    def __init__(self, vertices: FloatArray, faces: IntArray, volume: float, hull: Hull) -> None:
-        self.vertices = vertices
-        self.faces = faces
+    def __init__(
+        self,
+        vertices: FloatArray,
+        faces: IntArray,
+        volume: float,
+        hull: Hull,
+        piece_hulls: float | None = None,
+    ) -> None:
+        self._surface: tuple[FloatArray, IntArray] | None = (vertices, faces)
         self.volume = volume
         self.hull = hull
+        self.piece_hulls = hull.volume if piece_hulls is None else piece_hulls
+        self.within: Part | None = None
 
     def __repr__(self) -> str:
-        name = type(self).__name__
-        return f"{name}({len(self.faces)} faces, volume {self.volume:.4g}, hull {self.hull.volume:.4g})"
+        return f"{type(self).__name__}(volume {self.volume:.4g}, hull {self.hull.volume:.4g})"
+
+    @property
+    def vertices(self) -> FloatArray:
+        """Points of the surface [V, 3]."""
+        return self._resolved()[0]
+
+    @property
+    def faces(self) -> IntArray:
+        """Triangles of the surface [F, 3]."""
+        return self._resolved()[1]
 
     @cached_property
     def box(self) -> FloatArray:
         """Lower and upper corner of the bounding box [2, 3]."""
         return np.stack([self.hull.vertices.min(axis=0), self.hull.vertices.max(axis=0)])
 
+    def with_hull(self, hull: Hull) -> Part:
+        """Get the same solid with another hull around it."""
+        other = copy.copy(self)
+        other.hull = hull
+        other.__dict__.pop("box", None)
+        return other
+
     @staticmethod
     def glued(first: Part, second: Part) -> Part:
         """Unite two parts with disjoint interiors; the regions where they touch are no surface of the union."""
-        vertices, faces = _native.glue(first.vertices, first.faces, second.vertices, second.faces)
-        return Part(vertices, faces, first.volume + second.volume, Hull.around(first.hull, second.hull))
+        return _Union(first, second)
+
+    def _resolved(self) -> tuple[FloatArray, IntArray]:
+        assert self._surface is not None
+        return self._surface
+
+
+class _Union(Part):
+    """Two parts as one. They are glued when the surface is first asked for: some criteria look at the hull only."""
+
+    def __init__(self, first: Part, second: Part) -> None:
+        self._surface = None
+        self._operands: tuple[Part, Part] | None = (first, second)
+        self.volume = first.volume + second.volume
+        self.hull = Hull.around(first.hull, second.hull)
+        self.piece_hulls = first.piece_hulls + second.piece_hulls
+        self.within = None
+
+    def _resolved(self) -> tuple[FloatArray, IntArray]:
+        if self._surface is None:
+            for union in reversed(self._unresolved()):  # a loop: a thousand unions in a row are too deep to recurse
+                operands = union._operands
+                if operands is not None:  # another thread may have been here
+                    (a, b), (c, d) = (part._resolved() for part in operands)
+                    union._surface = _native.glue(a, b, c, d)
+                    union._operands = None
+        assert self._surface is not None
+        return self._surface
+
+    def _unresolved(self) -> list[_Union]:
+        """This union and all below it that are not glued yet, the outer before the inner."""
+        found: list[_Union] = []
+        waiting: list[Part] = [self]
+        while waiting:
+            part = waiting.pop()
+            if isinstance(part, _Union) and (operands := part._operands) is not None:
+                found.append(part)
+                waiting += operands
+        return found
 
 
 class Component(Part):
@@ -107,7 +176,7 @@ class Component(Part):
     def cut(self, plane: Plane) -> tuple[Component | None, Component | None]:
         """Cut by a plane: what lies below and what lies above, None where nothing (of any volume) does."""
         above, below = self.manifold.split_by_plane(plane.normal, plane.offset)
-        return _component(below), _component(above)
+        return _component(below, self), _component(above, self)
 
     def pieces(self) -> list[Component]:
         """Connected pieces, cavities kept inside the piece that encloses them; ``[self]`` when there is but one."""
@@ -118,16 +187,18 @@ class Component(Part):
         cavities = [m for m in manifolds if m.volume() < 0]
         if cavities:
             shells = _enclose(shells, cavities)
-        return [piece for m in shells if (piece := _component(m)) is not None]
+        return [piece for m in shells if (piece := _component(m, self)) is not None]
 
 
-def _component(manifold: Manifold) -> Component | None:
+def _component(manifold: Manifold, within: Component) -> Component | None:
     if manifold.is_empty() or manifold.volume() <= NEGLIGIBLE_VOLUME:
         return None
     try:
-        return Component(manifold)
+        component = Component(manifold)
     except ValueError:
         return None
+    component.within = within
+    return component
 
 
 def _enclose(shells: list[Manifold], cavities: list[Manifold]) -> list[Manifold]:
