@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
@@ -32,6 +33,7 @@ def make_report(
 ) -> dict[str, Any]:
     """Measure a finished decomposition; the keys are those of `rlacd.Decomposition`, without name and seconds."""
     errors = workers.map(criterion.error, parts)
+    account = criterion.account(errors)
     over = under = None
     vertices, faces = solid.surface
     if len(faces):  # a cloud of points has no surface
@@ -45,37 +47,36 @@ def make_report(
         "parts": len(hulls),
         "faces": sum(len(hull.faces) for hull in hulls),
         "vertices": sum(len(hull.vertices) for hull in hulls),
-        "concavity": {"per_part": errors, "max": max(errors)},
+        **account.entries,
         "hausdorff": {"over": over, "under": under},
         "scale": solid.frame.scale,
         "repair": [asdict(body) for body in solid.bodies],
-        "warnings": [*solid.warnings, *_shortcomings(errors, over, under, options, clock)],
+        "warnings": [
+            *solid.warnings,
+            *_early_end(clock),
+            *account.warnings,
+            *_shortcomings(len(hulls), over, under, options, criterion.overhang if not account.warnings else math.inf),
+        ],
     }
 
 
-def _shortcomings(
-    errors: Sequence[float], over: float | None, under: float | None, options: Options, clock: Clock
-) -> list[str]:
+def _early_end(clock: Clock) -> list[str]:
+    if clock.stopped_by is None:
+        return []
+    reason = {"timeout": "the timeout ended", "cancel": "the caller ended"}[clock.stopped_by]
+    return [f"Incomplete: {reason} the work early; the hulls cover the solid but are coarser than asked for."]
+
+
+def _shortcomings(count: int, over: float | None, under: float | None, options: Options, overhang: float) -> list[str]:
     sentences = []
-    if clock.stopped_by is not None:
-        reason = {"timeout": "the timeout ended", "cancel": "the caller ended"}[clock.stopped_by]
-        sentences.append(
-            f"Incomplete: {reason} the work early; the hulls cover the solid but are coarser than asked for."
-        )
-    exceeding = [error for error in errors if error > options.threshold]
-    if exceeding:
-        sentences.append(
-            f"{len(exceeding)} of {len(errors)} parts exceed the concavity {options.threshold:.4g}; "
-            f"the worst has {max(exceeding):.4g}."
-        )
-    if options.max_hulls is not None and len(errors) > options.max_hulls:
-        sentences.append(f"{len(errors)} hulls are left, more than the {options.max_hulls} asked for.")
+    if options.max_hulls is not None and count > options.max_hulls:
+        sentences.append(f"{count} hulls are left, more than the {options.max_hulls} asked for.")
     if under is not None and under > HONEST_WITHIN:
         sentences.append(
             f"Some of the input's surface lies {under:.4g} from the hulls: the repair gave up what could not be made "
             "solid (see `deviation` in `repair`)."
         )
-    if over is not None and not exceeding and over > options.threshold + HONEST_WITHIN:
+    if over is not None and over > overhang + HONEST_WITHIN:
         sentences.append(
             f"The hulls reach up to {over:.4g} beyond the input's surface, more than the threshold: "
             "the repair closed what may be open in the input (see `repair`)."

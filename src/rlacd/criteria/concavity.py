@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rlacd import _native
-from rlacd.criteria.criterion import Part
+from rlacd.criteria.criterion import Account, Part
 from rlacd.errors import OptionError
 
 VOLUME_WEIGHT = 0.3
@@ -104,6 +104,21 @@ class Concavity:
     def scaled(self, factor: float) -> Concavity:
         """The same criterion with ``factor`` times the threshold."""
         return Concavity(self.threshold * factor)
+
+    @property
+    def overhang(self) -> float:
+        """The threshold."""
+        return self.threshold
+
+    def account(self, errors: Sequence[float]) -> Account:
+        """The concavity of each part, and how many exceed the threshold."""
+        exceeding = [error for error in errors if error > self.threshold]
+        warning = (
+            f"{len(exceeding)} of {len(errors)} parts exceed the concavity {self.threshold:.4g}; "
+            f"the worst has {max(exceeding, default=0):.4g}."
+        )
+        entries = {"concavity": {"per_part": list(errors), "max": max(errors)}}
+        return Account(entries, (warning,) if exceeding else ())
 
     def error(self, part: Part) -> float:
         """Upper end of the measured concavity; no more than the threshold where the part certainly meets it."""

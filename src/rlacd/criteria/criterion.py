@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.hull import Hull
@@ -40,6 +41,22 @@ class Part(Protocol):
         """Get the same solid with another hull around it."""
 
 
+@dataclass(frozen=True)
+class Account:
+    """What a report says of a criterion.
+
+    Attributes
+    ----------
+    entries
+        Keys and plain values for the report.
+    warnings
+        One sentence for everything that falls short.
+    """
+
+    entries: dict[str, Any]
+    warnings: tuple[str, ...] = ()
+
+
 class Criterion(Protocol):
     """When a component is close enough to its hull to be a part."""
 
@@ -54,7 +71,7 @@ class Criterion(Protocol):
         """Decide strictly whether the part meets the criterion."""
 
     def filled(self, part: Part) -> float:
-        """Volume that a joint hull may fill for this part's sake at no cost: the merge takes the cheapest pair first."""
+        """Volume that a joint hull may fill at no cost for this part's sake; cheapest pairs are merged first."""
 
     def settled(self, parts: Sequence[Part]) -> Criterion:
         """Get the criterion as it is to be from now on, given the finest parts that cutting has reached.
@@ -70,3 +87,10 @@ class Criterion(Protocol):
 
     def scaled(self, factor: float) -> Criterion:
         """Get the same criterion with a threshold larger by `factor`."""
+
+    @property
+    def overhang(self) -> float:
+        """How far the hull of a part that meets the criterion may reach beyond the part's surface."""
+
+    def account(self, errors: Sequence[float]) -> Account:
+        """Tell how well finished parts meet the criterion, given the error of each."""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rlacd.criteria import Criterion
+from rlacd.criteria.criterion import Account
 from rlacd.criteria.criterion import Part as PartLike
 from rlacd.finish.limits import limit_hull
 from rlacd.solid.component import Part
@@ -60,6 +61,15 @@ class Limited:
         return Limited(
             self.criterion.settled([self._limited(part) for part in parts]), self.max_vertices, self.max_faces
         )
+
+    @property
+    def overhang(self) -> float:
+        """The underlying criterion's."""
+        return self.criterion.overhang
+
+    def account(self, errors: Sequence[float]) -> Account:
+        """The underlying criterion's."""
+        return self.criterion.account(errors)
 
     def scaled(self, factor: float) -> Limited:
         """Get the same limits with a larger threshold."""
