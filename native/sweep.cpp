@@ -1,6 +1,7 @@
 // Plane sweep: see sweep.hpp for input, output and algorithm.
 #include "sweep.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "hull.hpp"
@@ -249,23 +250,37 @@ std::vector<PlaneScore> sweep(const Mesh& mesh, const std::vector<Vec3>& directi
   if (directions.empty()) return {};
   if (offsets.size() % directions.size() != 0) throw std::invalid_argument("every direction needs as many offsets");
   const std::size_t planes = offsets.size() / directions.size();
-  const auto row = [&](std::size_t k) { return offsets.begin() + static_cast<std::ptrdiff_t>(k * planes); };
-  // Principal axes are often coordinate axes: the same planes are swept once.
-  std::vector<std::size_t> same(directions.size());
+  // Principal axes are often coordinate axes, and faces parallel to them: equal directions share one sweep, in which
+  // every plane counts once.
+  std::vector<Vec3> distinct;
+  std::vector<std::vector<double>> merged;
+  std::vector<std::size_t> group(directions.size());
   for (std::size_t k = 0; k < directions.size(); ++k) {
-    if (!std::is_sorted(row(k), row(k) + static_cast<std::ptrdiff_t>(planes)))
-      throw std::invalid_argument("offsets must ascend");
-    same[k] = k;
-    for (std::size_t earlier = 0; earlier < k && same[k] == k; ++earlier)
-      if (directions[earlier] == directions[k] && std::equal(row(k), row(k + 1), row(earlier))) same[k] = earlier;
+    const auto row = offsets.begin() + static_cast<std::ptrdiff_t>(k * planes);
+    const auto row_end = row + static_cast<std::ptrdiff_t>(planes);
+    if (!std::is_sorted(row, row_end) || !std::all_of(row, row_end, [](double d) { return std::isfinite(d); }))
+      throw std::invalid_argument("offsets must be finite and ascend");
+    group[k] = static_cast<std::size_t>(std::find(distinct.begin(), distinct.end(), directions[k]) - distinct.begin());
+    if (group[k] == distinct.size()) {
+      distinct.push_back(directions[k]);
+      merged.emplace_back();
+    }
+    merged[group[k]].insert(merged[group[k]].end(), row, row_end);
   }
-  std::vector<std::vector<PlaneScore>> by_direction(directions.size());
-  parallel_for(directions.size(), threads, [&](std::size_t k) {
-    if (same[k] == k) by_direction[k] = sweep_direction(mesh, directions[k], {row(k), row(k + 1)});
-  });
+  for (std::vector<double>& d : merged) {
+    std::sort(d.begin(), d.end());
+    d.erase(std::unique(d.begin(), d.end()), d.end());
+  }
+  std::vector<std::vector<PlaneScore>> swept(distinct.size());
+  parallel_for(distinct.size(), threads,
+               [&](std::size_t g) { swept[g] = sweep_direction(mesh, distinct[g], merged[g]); });
   std::vector<PlaneScore> scores;
   scores.reserve(offsets.size());
-  for (const std::size_t k : same) scores.insert(scores.end(), by_direction[k].begin(), by_direction[k].end());
+  for (std::size_t i = 0; i < offsets.size(); ++i) {
+    const std::vector<double>& d = merged[group[i / planes]];
+    const auto place = std::lower_bound(d.begin(), d.end(), offsets[i]) - d.begin();
+    scores.push_back(swept[group[i / planes]][static_cast<std::size_t>(place)]);
+  }
   return scores;
 }
 

@@ -28,7 +28,8 @@ struct PlaneScore {
 // Scores of the M planes of one direction. Deterministic.
 std::vector<PlaneScore> sweep_direction(const Mesh& mesh, Vec3 direction, const std::vector<double>& offsets);
 
-// Scores [K * M] of K directions times M offsets (row-major), the directions spread over threads.
+// Scores [K * M] of K directions times M offsets (row-major), the directions spread over threads. Rows with the same
+// direction are swept together.
 std::vector<PlaneScore> sweep(const Mesh& mesh, const std::vector<Vec3>& directions, const std::vector<double>& offsets,
                               int threads);
 

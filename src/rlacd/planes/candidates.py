@@ -35,6 +35,13 @@ class Candidates:
     def __len__(self) -> int:
         return self.offsets.size
 
+    @classmethod
+    def joined(cls, *blocks: Candidates) -> Candidates:
+        """Put the planes of several blocks after each other, one a row; the sweep shares rows of equal directions."""
+        directions = [np.repeat(block.directions, block.offsets.shape[1], axis=0) for block in blocks]
+        offsets = [block.offsets.reshape(-1, 1) for block in blocks]
+        return cls(np.concatenate(directions), np.concatenate(offsets))
+
     def plane(self, index: int) -> Plane:
         """Get plane number `index` of the K * M, counted direction by direction."""
         k, j = divmod(index, self.offsets.shape[1])

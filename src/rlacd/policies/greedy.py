@@ -7,7 +7,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from rlacd.planes.candidates import axis_and_principal
+from rlacd.planes.candidates import Candidates, axis_and_principal
+from rlacd.planes.concave_edges import concave_edge_planes
 from rlacd.planes.sweep import SLIVER, Sweep, sweep
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
@@ -35,6 +36,18 @@ SCORES: Mapping[str, Callable[[Sweep], FloatArray]] = MappingProxyType(
 )
 
 
+def cheapest(scored: Sweep, cost: FloatArray) -> Plane | None:
+    """Get the valid plane of least cost; None when every plane misses the solid or shaves off a film.
+
+    Planes that leave slivers are taken only where no other is left.
+    """
+    for sliver in (SLIVER, SLIVER / 100):
+        valid = scored.valid(sliver)
+        if valid.any():
+            return scored.candidates.plane(int(np.argmin(np.where(valid, cost, np.inf))))
+    return None
+
+
 class Greedy:
     """The plane with the least score.
 
@@ -42,20 +55,18 @@ class Greedy:
     ----------
     score : str
         A key of `SCORES`.
+    concave_edges : int
+        The planes of so many concave edges compete with the 150.
     """
 
-    def __init__(self, score: str = "excess-norm") -> None:
+    def __init__(self, score: str = "excess-norm", concave_edges: int = 0) -> None:
         self.score = SCORES[score]
+        self.concave_edges = concave_edges
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
-        """Choose the plane to cut a component by; None when every candidate misses it or shaves off a film.
-
-        Planes that leave slivers are taken only where no other is left.
-        """
-        scored = sweep(component, axis_and_principal(component), threads)
-        cost = self.score(scored)
-        for sliver in (SLIVER, SLIVER / 100):
-            valid = scored.valid(sliver)
-            if valid.any():
-                return scored.candidates.plane(int(np.argmin(np.where(valid, cost, np.inf))))
-        return None
+        """Choose the plane to cut a component by; None when every candidate misses it or shaves off a film."""
+        candidates = axis_and_principal(component)
+        if self.concave_edges > 0:
+            candidates = Candidates.joined(candidates, concave_edge_planes(component, self.concave_edges))
+        scored = sweep(component, candidates, threads)
+        return cheapest(scored, self.score(scored))
