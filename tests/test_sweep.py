@@ -9,9 +9,9 @@ from manifold3d import Manifold, Mesh64
 from scipy.spatial import ConvexHull, QhullError
 
 from rlacd import _native
-from rlacd.planes.candidates import axis_and_principal
+from rlacd.planes.candidates import Candidates, axis_and_principal
 from rlacd.planes.sweep import sweep
-from rlacd.solid.component import Component
+from rlacd.solid.component import Component, Plane
 
 
 def from_trimesh(mesh: trimesh.Trimesh) -> Manifold:
@@ -103,7 +103,25 @@ def test_same_bits_for_any_number_of_threads() -> None:
     assert np.array_equal(one, many)
 
 
-def test_offsets_have_to_ascend() -> None:
+def test_rows_of_equal_directions_share_a_sweep() -> None:
+    component = Component(gear())
+    grid = axis_and_principal(component)
+    extra = Candidates(np.eye(3)[[2, 0, 2, 0]], np.array([[0.4], [0.3], [0.15], [0.4]]))
+    joined = Candidates.joined(grid, extra)
+    assert [joined.plane(i) for i in (0, 40, 150, 153)] == [
+        grid.plane(0),
+        grid.plane(40),
+        Plane((0.0, 0.0, 1.0), 0.4),
+        Plane((1.0, 0.0, 0.0), 0.4),
+    ]
+    together, apart = sweep(component, joined), (sweep(component, grid), sweep(component, extra))
+    for scores in ("hull_below", "hull_above", "solid_below", "section_area", "thickness_above", "extent_below"):
+        expected = np.concatenate([getattr(part, scores) for part in apart])
+        assert getattr(together, scores) == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("offsets", [[0.5, 0.2], [0.2, np.nan], [np.inf, np.inf]])
+def test_offsets_have_to_be_finite_and_ascend(offsets: list[float]) -> None:
     component = Component(Manifold.cube((1, 1, 1)))
-    with pytest.raises(ValueError, match="ascend"):
-        _native.sweep(component.vertices, component.faces, np.eye(3)[:1], np.array([[0.5, 0.2]]), 1)
+    with pytest.raises(ValueError, match="finite and ascend"):
+        _native.sweep(component.vertices, component.faces, np.eye(3)[:1], np.array([offsets]), 1)
