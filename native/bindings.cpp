@@ -6,6 +6,7 @@ void bind_concavity(nanobind::module_& m);
 void bind_distance(nanobind::module_& m);
 void bind_glue(nanobind::module_& m);
 void bind_hull(nanobind::module_& m);
+void bind_navigable(nanobind::module_& m);
 void bind_simplify(nanobind::module_& m);
 void bind_sweep(nanobind::module_& m);
 void bind_union(nanobind::module_& m);
@@ -18,6 +19,7 @@ NB_MODULE(_native, m) {
   rlacd::bind_distance(m);
   rlacd::bind_glue(m);
   rlacd::bind_hull(m);
+  rlacd::bind_navigable(m);
   rlacd::bind_simplify(m);
   rlacd::bind_sweep(m);
   rlacd::bind_union(m);

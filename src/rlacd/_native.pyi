@@ -56,3 +56,22 @@ class HullUnion:
 def simplify_hull(
     vertices: FloatArray, faces: IntArray, max_vertices: int, max_faces: int, tolerance: float = 1e-6
 ) -> tuple[FloatArray, IntArray]: ...
+
+def navigable_balls(
+    surface: Surface,
+    hull_vertices: FloatArray,
+    hull_faces: IntArray,
+    radius: float,
+    tolerance: float,
+    reachable_only: bool,
+    seeds: FloatArray | None,
+    closed: FloatArray,
+    pitch: float,
+    threads: int = 0,
+) -> tuple[FloatArray, FloatArray]: ...  # [B, 3], [B]
+
+class BallSet:
+    def __init__(self, centres: FloatArray, radii: FloatArray) -> None: ...
+    def intrusions(
+        self, vertices: FloatArray, faces: IntArray, candidates: IntArray | None, least: float, first: bool = False
+    ) -> tuple[IntArray, FloatArray]: ...  # [K], [K]

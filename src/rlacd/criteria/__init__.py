@@ -2,5 +2,6 @@
 
 from rlacd.criteria.concavity import Concavity
 from rlacd.criteria.criterion import Criterion
+from rlacd.criteria.navigable import Balls, Conflicts, Navigable, NavigableSpace
 
-__all__ = ["Concavity", "Criterion"]
+__all__ = ["Balls", "Concavity", "Conflicts", "Criterion", "Navigable", "NavigableSpace"]

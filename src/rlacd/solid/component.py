@@ -85,6 +85,7 @@ class Part:
         """Get the same solid with another hull around it."""
         other = copy.copy(self)
         other.hull = hull
+        other.within = None  # the other hull may be larger
         other.__dict__.pop("box", None)
         return other
 

@@ -1,0 +1,432 @@
+"""Navigable space: a part is done when its hull keeps out of where a ball can go.
+
+The space that a ball of radius r can use around a solid is kept free of hulls; what no ball can reach may be filled.
+The definition follows Andrews, "Navigation-Driven Approximate Convex Decomposition" (SIGGRAPH 2024). In the frame where
+the input's bounding box is centred and its longest side is 2, the space is the set of points
+
+- outside the solid and at least r + t away from its surface, t the tolerance,
+- no farther than r from its convex hull,
+- where a ball of radius r stays out of the closed half-spaces, and
+- which the centre of such a ball can reach.
+
+It is represented by balls whose centres are spread over its boundary, each as large as leaves t to the surface.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rlacd import _native
+from rlacd.criteria.criterion import Part
+from rlacd.errors import OptionError
+from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.frame import Frame
+from rlacd.solid.hull import Hull
+from rlacd.solid.solid import Solid
+
+Point: TypeAlias = tuple[float, float, float]
+
+MOST_CELLS = 256
+"""Cells along the longest side of the grid: where a radius asks for more, balls stand wider apart than it."""
+
+TOUCH = 1e-9
+"""Hulls that reach no deeper into a ball than this do not touch it."""
+
+LEAST_RADIUS = 0.1
+"""Share of the radius below which a ball that had to shrink is dropped."""
+
+_OPEN = ("capped", "slab", "wrapped", "hull")
+
+
+@dataclass(frozen=True)
+class NavigableSpace:
+    """The criterion "no hull intrudes into the space that a ball can reach".
+
+    Parameters
+    ----------
+    radius : float
+        Of the ball, as a fraction of the longest side of the input's bounding box.
+    tolerance : float
+        How far a hull may lead away from the surface, as such a fraction too.
+    reachable_only : bool
+        Count only what the ball can reach; otherwise every place outside the solid with room for the ball counts, sealed
+        cavities too.
+    seeds : array_like [S, 3], optional
+        Points, in the input's frame and unit, that balls come from; by default they come from outside.
+    closed_planes : sequence of (normal [3], offset)
+        Half-spaces n.x < offset, in the input's frame and unit, that balls cannot enter: ``((0, 0, 1), 0)`` is a ground
+        at z = 0. The normal need not have length 1; the offset goes with the normal as given.
+    radius_m, tolerance_m : float, optional
+        In the input's unit; they replace `radius` and `tolerance`.
+
+    Raises
+    ------
+    OptionError
+        A length is not positive, or seeds or planes do not have the right shape.
+    """
+
+    radius: float | None = 0.025
+    tolerance: float | None = 0.05
+    reachable_only: bool = field(default=True, kw_only=True)
+    seeds: tuple[Point, ...] | None = field(default=None, kw_only=True)
+    closed_planes: tuple[tuple[Point, float], ...] = field(default=(), kw_only=True)
+    radius_m: float | None = field(default=None, kw_only=True)
+    tolerance_m: float | None = field(default=None, kw_only=True)
+
+    def __post_init__(self) -> None:
+        for name in ("radius", "tolerance"):
+            if getattr(self, f"{name}_m") is not None:
+                object.__setattr__(self, name, None)
+                self._require_length(f"{name}_m")
+            else:
+                self._require_length(name)
+        if not isinstance(self.reachable_only, (bool, np.bool_)):
+            raise OptionError(f"reachable_only is {self.reachable_only!r}; it has to be True or False.")
+        object.__setattr__(self, "reachable_only", bool(self.reachable_only))
+        if self.seeds is not None:
+            object.__setattr__(self, "seeds", _as_seeds(self.seeds))
+        object.__setattr__(self, "closed_planes", _as_planes(self.closed_planes))
+
+    def prepare(self, solid: Solid, threads: int = 0) -> Navigable:
+        """Find the space around a solid and spread its balls.
+
+        Parameters
+        ----------
+        solid : Solid
+            What the input was repaired to; its cavities count only with ``keep_cavities``.
+        threads : int
+            0 takes every core. The result does not depend on it.
+
+        Raises
+        ------
+        OptionError
+            A seed lies inside the solid, nearer than the radius to it, or in a closed half-space.
+
+        Notes
+        -----
+        Distances are exact. Ways in are found on a grid half a radius wide, and where that leaves the answer open, by
+        following the way itself: none narrower than 99 % of the ball counts, and one as wide as the ball is found unless
+        it is so contorted that it cannot be followed in steps of half a radius.
+
+        Where a ball touches the hull of the solid, a place of the space's boundary is about 0.6 ball radii from a centre
+        at most: between balls a hull can reach up to a fifth of their radius beyond the boundary unseen.
+        """
+        scale = solid.frame.scale
+        radius = _in_frame(self.radius, self.radius_m, scale)
+        tolerance = _in_frame(self.tolerance, self.tolerance_m, scale)
+        warnings = list(_warnings(solid))
+        vertices, faces = _surface_of(solid)
+        surface = _native.Surface(vertices, faces)
+        planes = _planes_in_frame(self.closed_planes, solid.frame)
+        seeds = None
+        if self.seeds is not None:
+            seeds = solid.frame.to_frame(self.seeds)
+            _check_seeds(seeds, self.seeds, surface, planes, radius, scale)
+        hull = Hull.of(vertices)
+        balls = Balls(np.empty((0, 3)), np.empty(0))
+        if radius >= 2:
+            warnings.append("the radius is larger than the object, so that no ball comes in: one hull is enough")
+        elif hull is not None:
+            pitch = max(radius / 2, (2 + 2 * radius) / MOST_CELLS)
+            if pitch > radius / 2:
+                warnings.append(
+                    f"the radius, {50 * radius:.3g} % of the longest side, is small: the balls stand "
+                    f"{pitch / radius:.2g} radii apart and what lies between them may be missed"
+                )
+            balls = Balls(
+                *_native.navigable_balls(
+                    surface,
+                    hull.vertices,
+                    hull.faces,
+                    radius,
+                    tolerance,
+                    self.reachable_only,
+                    seeds,
+                    planes,
+                    pitch,
+                    threads,
+                )
+            )
+        return Navigable(self, radius, tolerance, balls, tuple(warnings))
+
+    def _require_length(self, name: str) -> None:
+        value = getattr(self, name)
+        number = math.nan if value is None or isinstance(value, (bool, str)) else float(value)
+        if not 0 < number < math.inf:
+            unit = "length in the input's unit" if name.endswith("_m") else "fraction of the longest side"
+            raise OptionError(f"The navigable space's {name} is {value!r}; it has to be a positive {unit}.")
+        object.__setattr__(self, name, number)
+
+
+@dataclass(frozen=True, eq=False)
+class Balls:
+    """Balls that hulls have to keep out of, in the normalised frame.
+
+    Attributes
+    ----------
+    centres : float64 [B, 3]
+    radii : float64 [B]
+    """
+
+    centres: FloatArray
+    radii: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.radii)
+
+
+@dataclass(frozen=True)
+class Conflicts:
+    """What finished parts cost the balls.
+
+    Attributes
+    ----------
+    shrunk, dropped : int
+        Balls that were made smaller, and that were given up.
+    most : float
+        Largest reduction of a radius, in the normalised frame; all of it for a ball that was given up.
+    """
+
+    shrunk: int = 0
+    dropped: int = 0
+    most: float = 0.0
+
+
+class Navigable:
+    """The navigable space of one solid, as a criterion.
+
+    Every length is in the normalised frame.
+
+    Attributes
+    ----------
+    space : NavigableSpace
+        What was asked for.
+    radius, tolerance : float
+    balls : Balls
+    allowance : float
+        How deep a hull may reach into a ball: 0 but for `scaled` criteria.
+    warnings : tuple of str
+        One sentence for everything the user should know.
+    conflicts : Conflicts
+        What `settled` did to the balls.
+    """
+
+    def __init__(
+        self,
+        space: NavigableSpace,
+        radius: float,
+        tolerance: float,
+        balls: Balls,
+        warnings: tuple[str, ...] = (),
+        conflicts: Conflicts | None = None,
+    ) -> None:
+        self.space = space
+        self.radius = radius
+        self.tolerance = tolerance
+        self.balls = balls
+        self.allowance = 0.0
+        self.warnings = warnings
+        self.conflicts = conflicts or Conflicts()
+        self._intrusions = _Intrusions(balls)
+
+    def __repr__(self) -> str:
+        return f"Navigable(radius {self.radius:.4g}, tolerance {self.tolerance:.4g}, {len(self.balls)} balls)"
+
+    @property
+    def reach(self) -> float:
+        """Twice radius and tolerance: through a wider gap between two parts a ball can come."""
+        return 2 * (self.radius + self.tolerance)
+
+    def excludes(self, volume: float, hull_volume: float) -> bool:
+        """Nothing: volumes say nothing about balls."""
+        return False
+
+    def least_error(self, volume: float, hull_volume: float) -> float:
+        """0: volumes say nothing about balls."""
+        return 0.0
+
+    def filled(self, part: Part) -> float:
+        """Volume of the hulls of the pieces: filling what a piece's own hull fills already costs nothing."""
+        return part.piece_hulls
+
+    def is_met(self, part: Part) -> bool:
+        """Whether the part's hull touches no ball, or the part is smaller than half the tolerance."""
+        if self._is_small(part) or len(self.balls) == 0:
+            return True
+        if not self._intrusions.any_beyond(part, max(self.allowance, TOUCH)):
+            return True
+        if self.allowance == 0:
+            return False
+        return self.allowance >= self._deepest(part, self.allowance)
+
+    def error(self, part: Part) -> float:
+        """How deep the part's hull reaches into a ball at most: radius less signed distance of the ball's centre."""
+        return 0.0 if self._is_small(part) else self._deepest(part, 0.0)
+
+    def scaled(self, factor: float) -> Navigable:
+        """Coarser: hulls may reach so far into the balls that the tolerance, all in all, grows by `factor`."""
+        other = Navigable.__new__(Navigable)
+        other.__dict__.update(self.__dict__)
+        other.allowance = max(0.0, (self.tolerance + self.allowance) * factor - self.tolerance)
+        return other
+
+    def settled(self, parts: Sequence[Part]) -> Navigable:
+        """Give way to finished parts: balls that their hulls touch shrink to the outside of the hull, or are dropped.
+
+        Dropped is what would be left with less than a tenth of the radius. What was done is in `conflicts`.
+        """
+        radii = self.balls.radii.copy()
+        for part in parts:
+            touched, depth = self._intrusions.of(part)
+            radii[touched] = np.minimum(radii[touched], self.balls.radii[touched] - depth)
+        kept = radii >= LEAST_RADIUS * self.radius
+        loss = np.where(kept, self.balls.radii - radii, self.balls.radii)
+        conflicts = Conflicts(
+            shrunk=int(np.count_nonzero(kept & (loss > 0))),
+            dropped=int(np.count_nonzero(~kept)),
+            most=float(loss.max(initial=0.0)),
+        )
+        if conflicts == Conflicts():
+            return self
+        settled = Navigable(
+            self.space,
+            self.radius,
+            self.tolerance,
+            Balls(self.balls.centres[kept], radii[kept]),
+            self.warnings,
+            conflicts,
+        )
+        settled.allowance = self.allowance
+        return settled
+
+    def _is_small(self, part: Part) -> bool:
+        extent = np.ptp(part.hull.vertices, axis=0).max()
+        return bool(extent < (self.tolerance + self.allowance) / 2)
+
+    def _deepest(self, part: Part, least_radius: float) -> float:
+        """Deepest intrusion into a ball larger than `least_radius`."""
+        touched, depth = self._intrusions.of(part)
+        return float(depth[self.balls.radii[touched] > least_radius].max(initial=0.0))
+
+
+class _Intrusions:
+    """Which balls each part touches and how deep, remembered as long as the part lives.
+
+    A part's hull lies within that of the part it was cut from, so it can only touch balls that one touches.
+    """
+
+    def __init__(self, balls: Balls) -> None:
+        self._balls = _native.BallSet(balls.centres, balls.radii)
+        self._known: WeakKeyDictionary[Part, tuple[IntArray, FloatArray]] = WeakKeyDictionary()
+        self._lock = threading.Lock()
+
+    def of(self, part: Part) -> tuple[IntArray, FloatArray]:
+        """Balls that the part's hull touches [K], ascending, and its depths in them [K]."""
+        known = self._recall(part)
+        if known is None:
+            within = part.within
+            candidates = None if within is None else self.of(within)[0]
+            known = self._balls.intrusions(part.hull.vertices, part.hull.faces, candidates, TOUCH)
+            with self._lock:  # another thread may have been here: with the same result
+                self._known[part] = known
+        return known
+
+    def any_beyond(self, part: Part, depth: float) -> bool:
+        """Whether the part's hull reaches deeper than `depth` into any ball."""
+        if part.within is None and self._recall(part) is None:  # a union: most fail, and at the first ball
+            first, _ = self._balls.intrusions(part.hull.vertices, part.hull.faces, None, depth, first=True)
+            return len(first) > 0
+        _, depths = self.of(part)
+        return bool((depths > depth).any())
+
+    def _recall(self, part: Part) -> tuple[IntArray, FloatArray] | None:
+        with self._lock:
+            return self._known.get(part)
+
+
+def _as_seeds(given: object) -> tuple[Point, ...]:
+    try:
+        points = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        points = np.empty(0)
+    if points.ndim != 2 or points.shape[1:] != (3,) or len(points) == 0 or not np.isfinite(points).all():
+        raise OptionError(f"seeds is {given!r}; it has to be a list of at least one finite point [x, y, z].")
+    return tuple((x, y, z) for x, y, z in points.tolist())
+
+
+def _as_planes(given: object) -> tuple[tuple[Point, float], ...]:
+    planes: list[tuple[Point, float]] = []
+    try:
+        for normal, offset in given:  # type: ignore[attr-defined]
+            x, y, z = (float(c) for c in normal)
+            if not (math.isfinite(float(offset)) and 0 < math.hypot(x, y, z) < math.inf):
+                raise ValueError
+            planes.append(((x, y, z), float(offset)))
+    except (TypeError, ValueError):
+        raise OptionError(
+            f"closed_planes is {given!r}; it has to be a list of (normal, offset) pairs, every normal a finite vector "
+            "[x, y, z] that is not zero."
+        ) from None
+    return tuple(planes)
+
+
+def _in_frame(fraction: float | None, length_m: float | None, scale: float) -> float:
+    if length_m is not None:
+        return length_m * scale
+    assert fraction is not None, "checked when the space was made"
+    return 2 * fraction
+
+
+def _surface_of(solid: Solid) -> tuple[FloatArray, IntArray]:
+    mesh = solid.manifold.to_mesh64()
+    return (
+        np.ascontiguousarray(mesh.vert_properties[:, :3], dtype=np.float64),
+        np.ascontiguousarray(mesh.tri_verts, dtype=np.int32),
+    )
+
+
+def _planes_in_frame(planes: Sequence[tuple[Point, float]], frame: Frame) -> FloatArray:
+    """Rows of unit normal and offset [P, 4]."""
+    rows = np.empty((len(planes), 4))
+    for row, (normal, offset) in zip(rows, planes, strict=True):
+        length = math.hypot(*normal)
+        row[:3] = np.array(normal) / length
+        row[3] = (offset / length - row[:3] @ frame.center) * frame.scale
+    return rows
+
+
+def _check_seeds(
+    seeds: FloatArray, given: ArrayLike, surface: _native.Surface, planes: FloatArray, radius: float, scale: float
+) -> None:
+    inside = surface.winding(seeds, accuracy=4.0) > 0.5
+    distance = surface.distance(seeds)
+    above = (seeds @ planes[:, :3].T - planes[:, 3]).min(axis=1, initial=np.inf)
+    for i, seed in enumerate(np.asarray(given)):
+        if inside[i]:
+            raise OptionError(f"seed {i} at {seed.tolist()} lies inside the solid; put it where a ball can be.")
+        if distance[i] < radius:
+            raise OptionError(
+                f"seed {i} at {seed.tolist()} is {distance[i] / scale:.4g} away from the solid, which is less than the "
+                f"radius, {radius / scale:.4g}; put it where a ball has room."
+            )
+        if above[i] < radius:
+            raise OptionError(
+                f"seed {i} at {seed.tolist()} is nearer than the radius, {radius / scale:.4g}, to a closed plane or "
+                "beyond it; put it where a ball has room."
+            )
+
+
+def _warnings(solid: Solid) -> list[str]:
+    opened = sum(body.step in _OPEN for body in solid.bodies)
+    if opened == 0:
+        return []
+    bodies = f"{opened} open bod{'y' if opened == 1 else 'ies'}"
+    return [f"the space is measured from the closed surface that repair made of {bodies}"]
