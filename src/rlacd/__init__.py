@@ -1,6 +1,7 @@
 """Approximate convex decomposition: any mesh in, few tight convex hulls out."""
 
 from rlacd._version import __version__
+from rlacd.criteria import NavigableSpace
 from rlacd.decompose import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import (
@@ -22,6 +23,7 @@ __all__ = [
     "MeshError",
     "MeshFileError",
     "MissingExtraError",
+    "NavigableSpace",
     "OptionError",
     "OutputError",
     "Progress",

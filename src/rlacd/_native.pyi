@@ -56,7 +56,6 @@ class HullUnion:
 def simplify_hull(
     vertices: FloatArray, faces: IntArray, max_vertices: int, max_faces: int, tolerance: float = 1e-6
 ) -> tuple[FloatArray, IntArray]: ...
-
 def navigable_balls(
     surface: Surface,
     hull_vertices: FloatArray,

@@ -10,7 +10,7 @@ import contextlib
 import os
 import sys
 from collections.abc import Iterator
-from enum import IntEnum
+from enum import Enum, IntEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -20,6 +20,7 @@ from rlacd import __version__
 from rlacd.errors import OptionError, OutputError, RlacdError
 
 STDOUT = Path("-")
+_SPELLED = {"reachable-only": "everywhere", "seeds": "seed-point", "closed-planes": "closed-plane"}
 
 
 class ExitCode(IntEnum):
@@ -75,7 +76,21 @@ def common(
     """Approximate convex decomposition: any mesh in, few tight convex hulls out."""
 
 
-QUALITY, LIMITS, METHOD, RUN, OUTPUT = "How tight", "Limits", "Method", "Running", "Output"
+QUALITY, SPACE, LIMITS, METHOD, RUN, OUTPUT = (
+    "How tight",
+    "Navigable space (--criterion navigable)",
+    "Limits",
+    "Method",
+    "Running",
+    "Output",
+)
+
+
+class Criterion(str, Enum):
+    """What --criterion takes."""
+
+    CONCAVITY = "concavity"
+    NAVIGABLE = "navigable"
 
 
 @app.command(epilog=EPILOG)
@@ -125,6 +140,14 @@ def decompose(
             help="Draw the input beside its hulls, together and pulled apart. Needs the extra rlacd\\[view].",
         ),
     ] = None,
+    balls: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            rich_help_panel=OUTPUT,
+            help="Write the balls that no hull touches: .csv (x, y, z, radius) or .glb. Needs --criterion navigable.",
+        ),
+    ] = None,
     up: Annotated[
         str | None,
         typer.Option(
@@ -154,6 +177,68 @@ def decompose(
         typer.Option(
             rich_help_panel=QUALITY,
             help="The same as a length in the mesh's own unit, e.g. 0.002 for 2 mm in a file in metres.",
+            show_default=False,
+        ),
+    ] = None,
+    criterion: Annotated[
+        Criterion | None,
+        typer.Option(
+            rich_help_panel=QUALITY,
+            help="When a hull is tight enough: concavity (see --threshold), or navigable: it stays out of the space "
+            "that a ball of --radius can reach, and what nobody can reach costs nothing. "
+            "[dim]\\[default: concavity][/dim]",
+            show_default=False,
+        ),
+    ] = None,
+    radius: Annotated[
+        float | None,
+        typer.Option(
+            rich_help_panel=SPACE,
+            help="The ball's radius, as a share of the longest side of the mesh. [dim]\\[default: 0.025][/dim]",
+            show_default=False,
+        ),
+    ] = None,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(
+            rich_help_panel=SPACE,
+            help="Space nearer to the surface than this may be filled; the same share. [dim]\\[default: 0.05][/dim]",
+            show_default=False,
+        ),
+    ] = None,
+    radius_m: Annotated[
+        float | None,
+        typer.Option(rich_help_panel=SPACE, help="--radius in the mesh's own unit.", show_default=False),
+    ] = None,
+    tolerance_m: Annotated[
+        float | None,
+        typer.Option(rich_help_panel=SPACE, help="--tolerance in the mesh's own unit.", show_default=False),
+    ] = None,
+    reachable_only: Annotated[
+        bool | None,
+        typer.Option(
+            "--reachable-only/--everywhere",
+            rich_help_panel=SPACE,
+            help="Only what a ball can reach from outside, or every room. [dim]\\[default: reachable-only][/dim]",
+            show_default=False,
+        ),
+    ] = None,
+    seed_point: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="X,Y,Z",
+            rich_help_panel=SPACE,
+            help="A place balls come from instead of outside, in the mesh's own unit; may be repeated.",
+            show_default=False,
+        ),
+    ] = None,
+    closed_plane: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="X,Y,Z,D",
+            rich_help_panel=SPACE,
+            help="A plane that balls do not cross, such as the ground 0,0,1,0: they stay where the normal X,Y,Z "
+            "points, D its distance from the origin; may be repeated.",
             show_default=False,
         ),
     ] = None,
@@ -236,21 +321,42 @@ def decompose(
       rlacd decompose chair.glb -o chair_hulls.obj --threshold 0.02
       rlacd decompose chair.glb -o hulls/ --format stl --max-vertices 64
       rlacd decompose arm.dae -o arm.glb --picture arm.png --report - | jq .parts
+      rlacd decompose house.glb --criterion navigable --radius-m 0.3 --tolerance-m 0.05
 
     Ctrl-C once stops gracefully and writes what is reached; twice quits at once.
     """
     with _exit_codes():
-        from rlacd.formats import check_file, hull_target, write_file
+        from rlacd.criteria import NavigableSpace
+        from rlacd.formats import check_balls, check_file, hull_target, write_file
         from rlacd.show import check_picture, draw_picture
 
         place = _output_name(mesh, output)
-        _check_output(mesh, place, report, picture)
+        _check_output(mesh, {"-o": Path(place), "--report": report, "--picture": picture, "--balls": balls})
         hull_target(place, folder_format)
         if report is not None and report != STDOUT:
             check_file(report)
         if picture is not None:
             check_picture(picture, up=up)
+        if balls is not None:
+            check_balls(balls)
+        space = _chosen(
+            {
+                "radius": radius,
+                "tolerance": tolerance,
+                "radius_m": radius_m,
+                "tolerance_m": tolerance_m,
+                "reachable_only": reachable_only,
+                "seeds": seed_point and [_numbers("--seed-point", text, 3) for text in seed_point],
+                "closed_planes": closed_plane and [_plane(text) for text in closed_plane],
+            }
+        )
+        if criterion != Criterion.NAVIGABLE and (space or balls):
+            option = "balls" if balls else next(iter(space)).replace("_", "-")
+            raise OptionError(f"--{_SPELLED.get(option, option)} needs --criterion navigable.")
+        if criterion == Criterion.NAVIGABLE and (threshold is not None or threshold_m is not None):
+            raise OptionError("--threshold belongs to --criterion concavity; give --radius and --tolerance instead.")
         given = {
+            "criterion": NavigableSpace(**space) if criterion == Criterion.NAVIGABLE else None,
             "threshold": threshold,
             "threshold_m": threshold_m,
             "max_hulls": max_hulls,
@@ -276,6 +382,8 @@ def decompose(
             typer.echo(to_json(result.report), nl=False)
         elif report is not None:
             write_file(report, to_json(result.report).encode())
+        if balls is not None:
+            result.save_balls(balls)
         if picture is not None:
             draw_picture(result, picture, up=up or _usual_up(mesh))
         if not result.report.get("complete", True):
@@ -308,9 +416,25 @@ def _output_name(mesh: Path, output: str | None) -> str:
     return str(mesh.parent / f"{mesh.stem or 'mesh'}_hulls.glb") if output is None else output
 
 
-def _check_output(mesh: Path, place: str, report: Path | None, picture: Path | None) -> None:
+def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
+    try:
+        values = tuple(float(word) for word in text.split(","))
+    except ValueError:
+        values = ()
+    if len(values) != count:
+        raise OptionError(
+            f"{option} is {text!r}; it takes {count} numbers with commas between, such as {'0,0,1,0'[: 2 * count - 1]}."
+        )
+    return values
+
+
+def _plane(text: str) -> tuple[tuple[float, ...], float]:
+    *normal, offset = _numbers("--closed-plane", text, 4)
+    return tuple(normal), offset
+
+
+def _check_output(mesh: Path, named: dict[str, Path | None]) -> None:
     """No file may be written twice, and the input never."""
-    named = {"-o": Path(place), "--report": report, "--picture": picture}
     seen = {_same(mesh): "the input"}
     for option, path in named.items():
         if path is None or path == STDOUT:

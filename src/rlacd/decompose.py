@@ -12,12 +12,12 @@ import trimesh
 from numpy.typing import ArrayLike
 
 from rlacd.clock import Clock
-from rlacd.criteria import Concavity, Criterion
+from rlacd.criteria import Concavity, Criterion, NavigableSpace
 from rlacd.cut import CutTree
 from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError
 from rlacd.finish import drop_slivers, limit_part, merge_parts, merge_to_count, with_limits
-from rlacd.options import DEFAULT_RESOLUTION, Options
+from rlacd.options import CONCAVITY, DEFAULT_RESOLUTION, DEFAULT_THRESHOLD, Options
 from rlacd.policies import make_policy
 from rlacd.progress import ProgressCallback
 from rlacd.report import make_report
@@ -27,6 +27,7 @@ from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.load import load_mesh
 from rlacd.solid.repair import repair
+from rlacd.solid.solid import Solid
 from rlacd.workers import Workers
 
 MeshLike: TypeAlias = "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]"
@@ -38,7 +39,8 @@ COARSER = 1.5
 def decompose(
     mesh: MeshLike,
     *,
-    threshold: float = 0.05,
+    criterion: str | NavigableSpace = CONCAVITY,
+    threshold: float = DEFAULT_THRESHOLD,
     threshold_m: float | None = None,
     max_hulls: int | None = None,
     max_vertices: int | None = None,
@@ -57,6 +59,9 @@ def decompose(
     ----------
     mesh : path, trimesh.Trimesh, trimesh.Scene or (vertices, faces)
         Any triangle mesh or file of one; it need not be closed, oriented or clean.
+    criterion : "concavity" or NavigableSpace
+        When a part is tight enough: when its concavity is at most `threshold`, or when its hull stays out of the space
+        that a ball of a given size can reach.
     threshold : float
         Largest concavity of a part, in the frame where the input's longest side is 2 (CoACD's measure and frame):
         the farthest that a part's surface and its hull's surface may lie apart. Between 0.001 and 1.
@@ -97,6 +102,7 @@ def decompose(
         An option is out of range.
     """
     options = Options(
+        criterion=criterion,
         threshold=threshold,
         threshold_m=threshold_m,
         max_hulls=max_hulls,
@@ -116,33 +122,52 @@ def decompose(
         with clock.stage("load"):
             source = load_mesh(mesh)
         with clock.stage("repair"):
-            solid = repair(source, resolution=options.resolution, threads=workers.threads)
+            solid = repair(
+                source,
+                resolution=options.resolution,
+                threads=workers.threads,
+            )
         if options.threshold_m is not None:
             options = options.with_threshold(options.threshold_m * solid.frame.scale)
-        criterion: Criterion = Concavity(options.threshold)
+        goal = _prepared(options, solid, workers, clock)
         if options.max_hulls is None:  # otherwise the threshold may be exceeded anyway
-            criterion = with_limits(criterion, options.max_vertices, options.max_faces)
+            goal = with_limits(goal, options.max_vertices, options.max_faces)
         tree = CutTree(Component(solid.manifold), make_policy(options.policy), workers)
-        parts = _parts(tree, criterion, options, workers, clock)
+        parts, goal = _parts(tree, goal, options, workers, clock)
         clock.nothing_left_to_stop()
         with clock.stage("finish"):
             parts = drop_slivers(parts, workers)
             parts = workers.map(lambda part: limit_part(part, options.max_vertices, options.max_faces), parts)
             hulls = workers.map(lambda part: _in_input(part.hull, solid.frame), parts)
         with clock.stage("measure"):
-            report = make_report(solid, parts, hulls, options, criterion, workers, clock)
+            report = make_report(solid, parts, hulls, options, goal, workers, clock)
     report = {
         "name": Path(source.name).stem if isinstance(mesh, (str, os.PathLike)) else "mesh",
         **report,
         "seconds": {**clock.seconds, "total": clock.elapsed},
     }
-    return Decomposition(hulls, report, trimesh.Trimesh(source.vertices, source.faces, process=False))
+    return Decomposition(
+        hulls,
+        report,
+        trimesh.Trimesh(source.vertices, source.faces, process=False),
+        goal.obstacles.in_input(solid.frame) if goal.obstacles is not None else None,
+    )
 
 
-def _parts(tree: CutTree, criterion: Criterion, options: Options, workers: Workers, clock: Clock) -> list[Part]:
-    parts = _cut_and_merge(tree, criterion, options, workers, clock)
+def _prepared(options: Options, solid: Solid, workers: Workers, clock: Clock) -> Criterion:
+    if isinstance(options.criterion, NavigableSpace):
+        with clock.stage("space"):
+            return options.criterion.prepare(solid, workers.threads)
+    return Concavity(options.threshold)
+
+
+def _parts(
+    tree: CutTree, criterion: Criterion, options: Options, workers: Workers, clock: Clock
+) -> tuple[list[Part], Criterion]:
+    """The parts, and the criterion they were settled on."""
+    parts, criterion = _cut_and_merge(tree, criterion, options, workers, clock)
     if options.max_hulls is None or len(parts) <= options.max_hulls:
-        return parts
+        return parts, criterion
     best: list[Part] = []
     least = np.inf
     coarser = criterion
@@ -153,21 +178,24 @@ def _parts(tree: CutTree, criterion: Criterion, options: Options, workers: Worke
         if few and (not best or (len(few) <= options.max_hulls and error < least)):
             best, least = few, error
         if len(parts) <= options.max_hulls or clock.stopped_by is not None:
-            return best
+            return best, criterion
         coarser = coarser.scaled(COARSER)
-        parts = _cut_and_merge(tree, coarser, options, workers, clock)
+        parts, _ = _cut_and_merge(tree, coarser, options, workers, clock)
 
 
-def _cut_and_merge(tree: CutTree, criterion: Criterion, options: Options, workers: Workers, clock: Clock) -> list[Part]:
+def _cut_and_merge(
+    tree: CutTree, criterion: Criterion, options: Options, workers: Workers, clock: Clock
+) -> tuple[list[Part], Criterion]:
     with clock.stage("cut"):
         done, left = tree.cut_until(criterion, clock)
         parts: list[Part] = [*done, *left]
         if clock.stopped_by is None:
             parts = drop_slivers(parts, workers, suspects=left)
+            criterion = criterion.settled(parts)
     if not options.merge:
-        return parts
+        return parts, criterion
     with clock.stage("merge"):
-        return merge_parts(parts, criterion, workers, clock)
+        return merge_parts(parts, criterion, workers, clock), criterion
 
 
 def _in_input(hull: Hull, frame: Frame) -> trimesh.Trimesh:

@@ -10,6 +10,9 @@ from typing import Any, Literal
 
 import trimesh
 
+from rlacd.errors import OutputError
+from rlacd.solid.balls import Balls
+
 Axis = Literal["x", "y", "z"]
 
 
@@ -42,6 +45,10 @@ class Decomposition:
             Number of hulls, and of all their triangles and vertices.
         ``concavity`` : dict
             ``per_part`` lists the concavity of each hull's part in the order of ``hulls``; ``max`` is the worst.
+        ``navigable`` : dict
+            Instead of ``concavity`` with `NavigableSpace`: ``radius`` and ``tolerance``; ``balls``, their number;
+            ``shrunk`` and ``dropped``, how many had to give way to parts that no cut could keep off them, and ``most``,
+            by how much; ``intrusion``: how deep the hulls reach into the final balls, like ``concavity``.
         ``hausdorff`` : dict
             ``over``: how far the hulls' surface reaches from the input's surface. ``under``: how far the input's
             surface lies from the hulls' surface.
@@ -55,11 +62,14 @@ class Decomposition:
             What the caller should know: one sentence each.
     source : trimesh.Trimesh
         The input's surface as it was read, in its own frame and unit.
+    balls : Balls or None
+        With `NavigableSpace`, the balls that no hull touches, in the input's frame and unit.
     """
 
     hulls: list[trimesh.Trimesh]
     report: dict[str, Any]
     source: trimesh.Trimesh
+    balls: Balls | None = None
 
     @property
     def name(self) -> str:
@@ -93,6 +103,30 @@ class Decomposition:
         from rlacd.formats import save_hulls
 
         return save_hulls(self.hulls, path, stem=self.name, file_format=file_format)
+
+    def save_balls(self, path: str | os.PathLike[str]) -> Path:
+        """Write the balls that no hull touches.
+
+        Parameters
+        ----------
+        path : path-like
+            ``*.csv`` for a line ``x,y,z,radius`` a ball, ``*.glb`` for spheres to look at.
+
+        Returns
+        -------
+        pathlib.Path
+            Where it was written.
+
+        Raises
+        ------
+        OutputError
+            The criterion was not `NavigableSpace`, the ending is unknown, or the place cannot be written to.
+        """
+        from rlacd.formats import save_balls
+
+        if self.balls is None:
+            raise OutputError("there are no balls to write; decompose with a NavigableSpace.")
+        return save_balls(self.balls, path)
 
     def picture(self, path: str | os.PathLike[str], *, width: int = 1600, up: Axis = "z") -> Path:
         """Draw the input beside its hulls, together and pulled apart, as a PNG file; needs no display and no GPU.
@@ -136,6 +170,8 @@ class Decomposition:
         worst = self.report.get("concavity", {}).get("max")
         if worst is not None:
             words.append(f"max concavity {worst:.4f}")
+        if self.balls is not None:
+            words.append(f"{len(self.balls)} balls left free")
         if not self.report.get("complete", True):
             words.append(f"stopped by {self.report.get('stopped_by')}")
         return f"<Decomposition: {', '.join(words)}>"

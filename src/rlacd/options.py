@@ -6,15 +6,23 @@ import dataclasses
 import math
 import numbers
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
+from rlacd.criteria import NavigableSpace
 from rlacd.errors import OptionError
 from rlacd.policies import POLICIES
 
 DEFAULT_RESOLUTION = 100
 """Cells along the longest side of the grid on which repair looks for rooms that nothing can enter."""
+
+CONCAVITY = "concavity"
+"""The default criterion's name."""
+
+DEFAULT_THRESHOLD = 0.05
+"""CoACD's default."""
 
 MIN_THRESHOLD = 0.001
 """Least concavity that can be asked for; the longest side of the input is 2."""
@@ -37,7 +45,8 @@ class Options:
         A value is out of range.
     """
 
-    threshold: float = 0.05
+    criterion: str | NavigableSpace = CONCAVITY
+    threshold: float = DEFAULT_THRESHOLD
     threshold_m: float | None = None
     max_hulls: int | None = None
     max_vertices: int | None = None
@@ -50,6 +59,15 @@ class Options:
     timeout: float | None = None
 
     def __post_init__(self) -> None:
+        _require(
+            self.criterion == CONCAVITY or isinstance(self.criterion, NavigableSpace),
+            "criterion",
+            self.criterion,
+            f'"{CONCAVITY}" or an `rlacd.NavigableSpace`',
+        )
+        if isinstance(self.criterion, NavigableSpace):
+            unused = self.threshold_m is not None or self.threshold != DEFAULT_THRESHOLD
+            _require(not unused, "threshold", self.threshold_m or self.threshold, "left out: a NavigableSpace has none")
         self._as_number("threshold", lambda x: MIN_THRESHOLD <= x <= 2, f"between {MIN_THRESHOLD} and 2")
         self._as_number("threshold_m", lambda x: 0 < x < math.inf, "a positive length in the input's unit", None)
         self._as_integer("max_hulls", 1, None, "at least 1", None)
@@ -82,6 +100,10 @@ class Options:
         value = int(given) if is_integer else -1
         _require(value >= least and (most is None or value <= most), name, given, f"an integer, {rule}")
         object.__setattr__(self, name, value)
+
+    def as_plain(self) -> dict[str, Any]:
+        """Everything as plain values, the criterion by its name or its own options."""
+        return asdict(self)
 
     def with_threshold(self, threshold: float) -> Options:
         """Get the same options with another threshold, which has to be in range too.

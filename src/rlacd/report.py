@@ -41,7 +41,7 @@ def make_report(
         over, under = distances.over[1], distances.under[1]
     return {
         "version": __version__,
-        "options": asdict(options),
+        "options": options.as_plain(),
         "complete": clock.stopped_by is None,
         "stopped_by": clock.stopped_by,
         "parts": len(hulls),

@@ -109,6 +109,14 @@ def _fit(report: dict[str, Any]) -> str:
         threshold = report.get("options", {}).get("threshold")
         verdict = "" if threshold is None else f" (threshold {threshold:g}{', exceeded' * (worst > threshold)})"
         words.append(f"max concavity {worst:.4f}{verdict}")
+    space = report.get("navigable")
+    if space is not None:
+        intruding = space["intrusion"]["max"]
+        words.append(
+            f"no hull touches any of the {space['balls']} balls"
+            if intruding <= 0
+            else f"hulls reach {intruding:.4f} into the {space['balls']} balls"
+        )
     reach = report.get("hausdorff", {})
     if reach.get("over") is not None:
         words.append(f"hulls reach {reach['over']:.4f} from the input")

@@ -2,6 +2,6 @@
 
 from rlacd.criteria.concavity import Concavity
 from rlacd.criteria.criterion import Criterion
-from rlacd.criteria.navigable import Balls, Conflicts, Navigable, NavigableSpace
+from rlacd.criteria.navigable import Navigable, NavigableSpace
 
-__all__ = ["Balls", "Concavity", "Conflicts", "Criterion", "Navigable", "NavigableSpace"]
+__all__ = ["Concavity", "Criterion", "Navigable", "NavigableSpace"]

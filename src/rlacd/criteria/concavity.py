@@ -110,6 +110,10 @@ class Concavity:
         """The threshold."""
         return self.threshold
 
+    @property
+    def obstacles(self) -> None:
+        """None: concavity is not about space."""
+
     def account(self, errors: Sequence[float]) -> Account:
         """The concavity of each part, and how many exceed the threshold."""
         exceeding = [error for error in errors if error > self.threshold]

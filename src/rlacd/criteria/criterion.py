@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.balls import Balls
 from rlacd.solid.hull import Hull
 
 
@@ -91,6 +92,10 @@ class Criterion(Protocol):
     @property
     def overhang(self) -> float:
         """How far the hull of a part that meets the criterion may reach beyond the part's surface."""
+
+    @property
+    def obstacles(self) -> Balls | None:
+        """Balls that no hull may touch, where the criterion is made of them."""
 
     def account(self, errors: Sequence[float]) -> Account:
         """Tell how well finished parts meet the criterion, given the error of each."""

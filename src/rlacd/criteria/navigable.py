@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TypeAlias
 from weakref import WeakKeyDictionary
 
@@ -25,9 +25,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rlacd import _native
-from rlacd.criteria.criterion import Part
+from rlacd.criteria.criterion import Account, Part
 from rlacd.errors import OptionError
 from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.balls import Balls
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.solid import Solid
@@ -57,8 +58,8 @@ class NavigableSpace:
     tolerance : float
         How far a hull may lead away from the surface, as such a fraction too.
     reachable_only : bool
-        Count only what the ball can reach; otherwise every place outside the solid with room for the ball counts, sealed
-        cavities too.
+        Count only what the ball can reach; otherwise every place outside the solid with room for the ball counts,
+        sealed cavities too.
     seeds : array_like [S, 3], optional
         Points, in the input's frame and unit, that balls come from; by default they come from outside.
     closed_planes : sequence of (normal [3], offset)
@@ -113,11 +114,11 @@ class NavigableSpace:
         Notes
         -----
         Distances are exact. Ways in are found on a grid half a radius wide, and where that leaves the answer open, by
-        following the way itself: none narrower than 99 % of the ball counts, and one as wide as the ball is found unless
-        it is so contorted that it cannot be followed in steps of half a radius.
+        following the way itself: none narrower than 99 % of the ball counts, and one as wide as the ball is found
+        unless it is so contorted that it cannot be followed in steps of half a radius.
 
-        Where a ball touches the hull of the solid, a place of the space's boundary is about 0.6 ball radii from a centre
-        at most: between balls a hull can reach up to a fifth of their radius beyond the boundary unseen.
+        Where a ball touches the hull of the solid, a place of the space's boundary is about 0.6 ball radii from a
+        centre at most: between balls a hull can reach up to a fifth of their radius beyond the boundary unseen.
         """
         scale = solid.frame.scale
         radius = _in_frame(self.radius, self.radius_m, scale)
@@ -157,6 +158,11 @@ class NavigableSpace:
             )
         return Navigable(self, radius, tolerance, balls, tuple(warnings))
 
+    @property
+    def sees_cavities(self) -> bool:
+        """Whether sealed cavities may count, so that repair has to keep them."""
+        return not self.reachable_only or self.seeds is not None
+
     def _require_length(self, name: str) -> None:
         value = getattr(self, name)
         number = math.nan if value is None or isinstance(value, (bool, str)) else float(value)
@@ -164,23 +170,6 @@ class NavigableSpace:
             unit = "length in the input's unit" if name.endswith("_m") else "fraction of the longest side"
             raise OptionError(f"The navigable space's {name} is {value!r}; it has to be a positive {unit}.")
         object.__setattr__(self, name, number)
-
-
-@dataclass(frozen=True, eq=False)
-class Balls:
-    """Balls that hulls have to keep out of, in the normalised frame.
-
-    Attributes
-    ----------
-    centres : float64 [B, 3]
-    radii : float64 [B]
-    """
-
-    centres: FloatArray
-    radii: FloatArray
-
-    def __len__(self) -> int:
-        return len(self.radii)
 
 
 @dataclass(frozen=True)
@@ -252,6 +241,40 @@ class Navigable:
     def least_error(self, volume: float, hull_volume: float) -> float:
         """0: volumes say nothing about balls."""
         return 0.0
+
+    @property
+    def overhang(self) -> float:
+        """No bound: places nobody can reach may be filled, however far from the surface."""
+        return math.inf
+
+    @property
+    def obstacles(self) -> Balls:
+        """The balls."""
+        return self.balls
+
+    def account(self, errors: Sequence[float]) -> Account:
+        """How many balls there are, what became of them, and how deep the parts' hulls reach into them."""
+        exceeding = [error for error in errors if error > 0]
+        sentences = list(self.warnings)
+        given_way = self.conflicts.shrunk + self.conflicts.dropped
+        if given_way:
+            sentences.append(
+                f"{given_way} balls gave way to parts that no cut could keep off them: {self.conflicts.shrunk} shrank, "
+                f"{self.conflicts.dropped} were dropped; the largest loss of radius is {self.conflicts.most:.4g}."
+            )
+        if exceeding:
+            sentences.append(
+                f"{len(exceeding)} of {len(errors)} hulls reach into balls of the navigable space, "
+                f"up to {max(exceeding):.4g} deep."
+            )
+        entries = {
+            "radius": self.radius,
+            "tolerance": self.tolerance,
+            "balls": len(self.balls),
+            **asdict(self.conflicts),
+            "intrusion": {"per_part": list(errors), "max": max(errors)},
+        }
+        return Account({"navigable": entries}, tuple(sentences))
 
     def filled(self, part: Part) -> float:
         """Volume of the hulls of the pieces: filling what a piece's own hull fills already costs nothing."""

@@ -9,6 +9,7 @@ from rlacd.criteria import Criterion
 from rlacd.criteria.criterion import Account
 from rlacd.criteria.criterion import Part as PartLike
 from rlacd.finish.limits import limit_hull
+from rlacd.solid.balls import Balls
 from rlacd.solid.component import Part
 
 FEWEST_VERTICES, FEWEST_FACES = 24, 44
@@ -66,6 +67,11 @@ class Limited:
     def overhang(self) -> float:
         """The underlying criterion's."""
         return self.criterion.overhang
+
+    @property
+    def obstacles(self) -> Balls | None:
+        """The underlying criterion's."""
+        return self.criterion.obstacles
 
     def account(self, errors: Sequence[float]) -> Account:
         """The underlying criterion's."""

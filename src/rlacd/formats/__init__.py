@@ -11,11 +11,21 @@ import trimesh
 
 from rlacd.errors import OutputError
 from rlacd.formats.atomic import write_file
+from rlacd.formats.balls import check_balls, save_balls
 from rlacd.formats.encode import ENCODERS
 from rlacd.formats.folder import write_folder
 from rlacd.formats.target import FORMATS, Target, check_file, hull_target
 
-__all__ = ["FORMATS", "Target", "check_file", "hull_target", "save_hulls", "write_file"]
+__all__ = [
+    "FORMATS",
+    "Target",
+    "check_balls",
+    "check_file",
+    "hull_target",
+    "save_balls",
+    "save_hulls",
+    "write_file",
+]
 
 
 def save_hulls(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,12 +14,13 @@ import numpy.typing as npt
 from rlacd.errors import OptionError, OutputError
 from rlacd.formats import check_file, write_file
 from rlacd.formats.palette import hull_colors, linear_from_srgb
-from rlacd.show.render import Body, render, require_extra
+from rlacd.show.render import Body, Spheres, render, require_extra
 
 if TYPE_CHECKING:
     from rlacd.decomposition import Decomposition
 
 INPUT_COLOR = np.array([0.46, 0.47, 0.50])  # linear reflectance
+BALL_COLOR = np.array([0.10, 0.30, 0.75])
 PULL = 0.55  # how far hulls move apart: a hull's distance from the middle grows by this share
 PAPER, INK, FADED = (255, 255, 255), (28, 30, 34), (120, 124, 132)
 TO_Z_UP = {  # rows: where the drawing's x, y, z axes come from
@@ -95,20 +97,30 @@ def draw_picture(
         raise OptionError(f"a picture cannot be drawn with {samples} samples; choose 1 or more.")
 
     image = require_extra("PIL.Image")
-    panels = [
-        ("input", [_body(decomposition.source.triangles, INPUT_COLOR, up)]),
-        ("hulls", _hull_bodies(decomposition, up, pull=0.0)),
-        ("pulled apart", _hull_bodies(decomposition, up, pull=PULL)),
+    panels: list[tuple[str, list[Body], Spheres | None]] = [
+        ("input", [_body(decomposition.source.triangles, INPUT_COLOR, up)], None),
+        ("hulls", _hull_bodies(decomposition, up, pull=0.0), None),
+        ("pulled apart", _hull_bodies(decomposition, up, pull=PULL), None),
     ]
-    panel_width = width // len(panels)
-    panel_height = round(panel_width * 0.92)
+    if decomposition.balls is not None:
+        spheres = Spheres(decomposition.balls.centres @ TO_Z_UP[up].T, decomposition.balls.radii, BALL_COLOR)
+        panels.insert(2, ("the balls they leave free", _hull_bodies(decomposition, up, pull=0.0), spheres))
+    columns = 3 if len(panels) == 3 else 2
+    rows = math.ceil(len(panels) / columns)
+    panel_width = width // columns
+    panel_height = round(panel_width * 0.92 if rows == 1 else panel_width * 0.62)
     unit = width / 1600
     header, footer = round(104 * unit), round(44 * unit)
-    sheet = image.new("RGB", (width, header + panel_height + footer), PAPER)
-    for column, (title, bodies) in enumerate(panels):
+    sheet = image.new("RGB", (width, header + rows * (panel_height + footer)), PAPER)
+    for number, (title, bodies, veil) in enumerate(panels):
+        left = number % columns * panel_width
+        top = header + number // columns * (panel_height + footer)
         pixels = render(bodies, panel_width, panel_height, samples=samples)
-        sheet.paste(image.fromarray(pixels), (column * panel_width, header))
-        middle = (column * panel_width + panel_width // 2, header + panel_height + footer // 2)
+        if veil is not None:  # the spheres let half of what is behind them through
+            veiled = render(bodies, panel_width, panel_height, samples=samples, spheres=veil)
+            pixels = ((pixels.astype(np.uint16) + veiled + 1) // 2).astype(np.uint8)
+        sheet.paste(image.fromarray(pixels), (left, top))
+        middle = (left + panel_width // 2, top + panel_height + footer // 2)
         _write(sheet, title, middle, round(20 * unit), FADED, anchor="mm")
     margin = round(32 * unit)
     _write(sheet, decomposition.name, (margin, round(40 * unit)), round(34 * unit), INK, anchor="lm")
@@ -129,6 +141,8 @@ def caption(decomposition: Decomposition) -> str:
     if worst is not None:
         threshold = report.get("options", {}).get("threshold")
         words.append(f"concavity {worst:.3f}" + (f" (threshold {threshold:g})" if threshold is not None else ""))
+    if "navigable" in report:
+        words.append(f"{report['navigable']['balls']} balls left free")
     total = report.get("seconds", {}).get("total")
     if total is not None:
         words.append(f"{total:.2f} s")

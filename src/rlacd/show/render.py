@@ -34,6 +34,15 @@ class Body:
     color: npt.NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class Spheres:
+    """Spheres to draw: centres [B, 3], radii [B], z up, and their linear RGB reflectance [3]."""
+
+    centres: npt.NDArray[np.float64]
+    radii: npt.NDArray[np.float64]
+    color: npt.NDArray[np.float64]
+
+
 def require_extra(module: str) -> Any:
     """Import a module of the extra ``view``, or say how to get it."""
     try:
@@ -65,7 +74,9 @@ def _without_native_stderr() -> Iterator[None]:
         os.close(kept)
 
 
-def render(bodies: Sequence[Body], width: int, height: int, *, samples: int) -> npt.NDArray[np.uint8]:
+def render(
+    bodies: Sequence[Body], width: int, height: int, *, samples: int, spheres: Spheres | None = None
+) -> npt.NDArray[np.uint8]:
     """Render `bodies`, framed to fit, as sRGB bytes [height, width, 3]; the same bytes every time.
 
     Parameters
@@ -76,6 +87,8 @@ def render(bodies: Sequence[Body], width: int, height: int, *, samples: int) -> 
         Pixels.
     samples : int
         Light paths a pixel: more are slower and less grainy.
+    spheres : Spheres, optional
+        Drawn too; the camera does not look for them.
 
     Raises
     ------
@@ -99,6 +112,10 @@ def render(bodies: Sequence[Body], width: int, height: int, *, samples: int) -> 
         for index, body in enumerate(bodies):
             placed = (body.triangles - (low + high) / 2.0) / size
             scene[f"body_{index}"] = _mesh(mi, placed, body.color)
+        if spheres is not None:
+            for index, (centre, radius) in enumerate(zip(spheres.centres, spheres.radii, strict=True)):
+                placed = (centre - (low + high) / 2.0) / size
+                scene[f"sphere_{index}"] = _sphere(placed, radius / size, spheres)
         light = np.array(mi.render(mi.load_dict(scene), spp=samples))
     return srgb_from_linear(np.clip(light[..., :3] + PAPER * (1.0 - light[..., 3:]), 0.0, 1.0))
 
@@ -157,6 +174,16 @@ def _mesh(mi: Any, triangles: npt.NDArray[np.float64], color: npt.NDArray[np.flo
     arrays["faces"] = np.arange(3 * len(triangles), dtype=np.uint32)
     arrays.update()
     return mesh
+
+
+def _sphere(centre: npt.NDArray[np.float64], radius: float, look: Spheres) -> dict[str, Any]:
+    surface = {"type": "diffuse", "reflectance": {"type": "rgb", "value": look.color.tolist()}}
+    return {
+        "type": "sphere",
+        "center": centre.tolist(),
+        "radius": float(radius),
+        "surface": surface,
+    }
 
 
 @contextlib.contextmanager
