@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import cKDTree
 
 from rlacd.errors import OptionError, OutputError
 from rlacd.formats import check_file, write_file
 from rlacd.formats.palette import hull_colors, linear_from_srgb
 from rlacd.show.render import Body, Spheres, render, require_extra
+from rlacd.solid.balls import Balls
 
 if TYPE_CHECKING:
     from rlacd.decomposition import Decomposition
@@ -103,8 +105,9 @@ def draw_picture(
         ("pulled apart", _hull_bodies(decomposition, up, pull=PULL), None),
     ]
     if decomposition.balls is not None:
-        spheres = Spheres(decomposition.balls.centres @ TO_Z_UP[up].T, decomposition.balls.radii, BALL_COLOR)
-        panels.insert(2, ("the balls they leave free", _hull_bodies(decomposition, up, pull=0.0), spheres))
+        some = _apart(decomposition.balls)
+        spheres = Spheres(some.centres @ TO_Z_UP[up].T, some.radii, BALL_COLOR)
+        panels.insert(2, ("some of the balls they leave free", _hull_bodies(decomposition, up, pull=0.0), spheres))
     columns = 3 if len(panels) == 3 else 2
     rows = math.ceil(len(panels) / columns)
     panel_width = width // columns
@@ -149,6 +152,21 @@ def caption(decomposition: Decomposition) -> str:
     if not report.get("complete", True):
         words.append(f"stopped early by {report.get('stopped_by')}")
     return "   ·   ".join(words)
+
+
+def _apart(balls: Balls) -> Balls:
+    """Some of the balls, the smallest first, that do not overlap: all of them would be one cloud."""
+    order = np.argsort(balls.radii, kind="stable")
+    tree = cKDTree(balls.centres)
+    hidden = np.zeros(len(balls), dtype=bool)
+    shown: list[int] = []
+    for i in order:
+        if not hidden[i]:
+            shown.append(int(i))
+            near = np.array(tree.query_ball_point(balls.centres[i], balls.radii[i] + balls.radii.max()))
+            apart = np.linalg.norm(balls.centres[near] - balls.centres[i], axis=1)
+            hidden[near[apart < balls.radii[near] + balls.radii[i]]] = True
+    return Balls(balls.centres[shown], balls.radii[shown])
 
 
 def _hull_bodies(decomposition: Decomposition, up: str, *, pull: float) -> list[Body]:
