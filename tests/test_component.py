@@ -94,3 +94,33 @@ def test_a_sliver_goes_only_where_others_stand_for_it() -> None:
 def test_films_are_thinner_than_sheets() -> None:
     assert is_film(box(1, 1, 1e-4))
     assert not is_film(box(1, 1, 2e-3))
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_a_cut_along_an_axis_is_exact(axis: int) -> None:
+    """Faces in the plane stay whole on their own side, whatever the last bits of its offset: no side keeps a film."""
+
+    def block(lower: tuple[float, float, float], upper: tuple[float, float, float]) -> Manifold:
+        a, b = np.roll(lower, axis + 1), np.roll(upper, axis + 1)  # the last coordinate becomes number `axis`
+        corners = [np.where([i & 1, i & 2, i & 4], b, a) for i in range(8)]
+        return Manifold.hull_points(np.array(corners))
+
+    normal = tuple(np.eye(3)[axis].tolist())
+    for offset in np.linspace(-0.4, 0.6, 30):
+        slab, foot = block((0, 0, -0.7), (1, 1, offset)), block((0.2, 0.2, offset), (0.3, 0.3, 1))
+        overhang = block((0.2, 0.2, offset), (1.5, 0.3, 1))
+        for upper in (foot, overhang):
+            below, above = Component(slab + upper).cut(Plane(normal, float(offset)))
+            assert below is not None
+            assert above is not None
+            assert below.box[1, axis] == offset == above.box[0, axis]
+            for side, solid in ((below, slab), (above, upper)):
+                assert side.volume == pytest.approx(solid.volume(), rel=1e-12)
+                assert side.hull.volume == pytest.approx(solid.volume(), rel=1e-12)
+
+
+def test_a_plane_beside_a_component_leaves_it_whole() -> None:
+    component = box(1, 1, 1)
+    for normal in ((0.0, 1.0, 0.0), (0.6, 0.0, 0.8)):
+        assert component.cut(Plane(normal, 5.0))[1] is None
+        assert component.cut(Plane(normal, -5.0))[0] is None

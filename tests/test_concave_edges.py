@@ -286,7 +286,7 @@ def test_an_l_falls_into_two_convex_parts(turn: tuple[float, float, float]) -> N
         assert side.hull.volume == pytest.approx(side.volume, rel=1e-7)
 
 
-@pytest.mark.parametrize("policy", [NavACD(), Greedy(concave_edges=4)], ids=["navacd", "greedy"])
+@pytest.mark.parametrize("policy", [NavACD(), Greedy()], ids=["navacd", "greedy"])
 @pytest.mark.parametrize("name", SOLIDS)
 def test_policies_cut_every_solid(policy: Policy, name: str) -> None:
     component = Component(SOLIDS[name]())
@@ -301,12 +301,22 @@ def test_policies_cut_every_solid(policy: Policy, name: str) -> None:
 
 @pytest.mark.parametrize("turn", [(0, 0, 0), (17, 31, 5)], ids=["upright", "tilted"])
 @pytest.mark.parametrize("inset", [0, 0.1], ids=["legs at the corners", "legs set in"])
-def test_a_table_is_its_top_and_legs(turn: tuple[float, float, float], inset: float) -> None:
+@pytest.mark.parametrize("policy", ["greedy", "navacd"])
+def test_a_table_is_its_top_and_legs(policy: str, inset: float, turn: tuple[float, float, float]) -> None:
     mesh = table(inset).rotate(turn).to_mesh64()
-    result = rlacd.decompose((mesh.vert_properties[:, :3], mesh.tri_verts), policy="navacd")
+    result = rlacd.decompose((mesh.vert_properties[:, :3], mesh.tri_verts), policy=policy)
     assert len(result) == 5
     if inset:
         assert [len(hull.vertices) for hull in result] == [8] * 5, "no ledges where the cuts ran"
+
+
+@pytest.mark.parametrize("policy", ["greedy", "navacd"])
+def test_offset_bricks_come_apart(policy: str) -> None:
+    """The plane between them holds a face of each, on opposite sides."""
+    bricks = (box((0, 0, 0), (2, 1, 1)) + box((1, 1, 0), (3, 2, 1))).to_mesh64()
+    result = rlacd.decompose((bricks.vert_properties[:, :3], bricks.tri_verts), policy=policy)
+    assert [len(hull.vertices) for hull in result] == [8, 8]
+    assert [hull.volume for hull in result] == pytest.approx([2, 2])
 
 
 @pytest.mark.slow

@@ -77,7 +77,7 @@ def decompose(
     merge : bool
         Unite parts whose joint hull still meets the threshold.
     policy : str
-        Who chooses the cuts: ``greedy``, or ``greedy-SCORE`` (see `rlacd.policies.POLICIES`).
+        Who chooses the cuts: ``greedy``, ``greedy-SCORE`` or ``navacd`` (see `rlacd.policies.make_policy`).
     resolution : int
         Cells along the longest side of the grid on which repair looks for enclosed rooms.
     seed : int

@@ -9,7 +9,11 @@ POLICIES = ("greedy", *(f"greedy-{score}" for score in SCORES), "navacd")
 
 
 def make_policy(name: str) -> Policy:
-    """Build the policy called `name`: ``greedy``, ``greedy-SCORE`` with another score than the default, or ``navacd``.
+    """Build the policy called `name`.
+
+    ``greedy`` looks at 150 planes and those of four concave edges, and takes the one with the least p-norm of excess
+    volumes; ``greedy-SCORE`` takes the one with the least SCORE of the 150 alone (``greedy-hull-sum`` is the paper's
+    baseline); ``navacd`` takes the least sum of hull volumes of three planes and those of four concave edges.
 
     Raises
     ------
@@ -22,7 +26,7 @@ def make_policy(name: str) -> Policy:
         return NavACD()
     family, _, score = name.partition("-")
     if family == "greedy" and score in SCORES:
-        return Greedy(score)
+        return Greedy(score, concave_edges=0)
     raise KeyError(name)
 
 

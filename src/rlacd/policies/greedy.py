@@ -49,17 +49,17 @@ def cheapest(scored: Sweep, cost: FloatArray) -> Plane | None:
 
 
 class Greedy:
-    """The plane with the least score.
+    """The plane with the least score, out of the paper's 150 and those of a few concave edges.
 
     Parameters
     ----------
     score : str
         A key of `SCORES`.
     concave_edges : int
-        The planes of so many concave edges compete with the 150.
+        How many concave edges add their planes; with 0, the paper's baseline.
     """
 
-    def __init__(self, score: str = "excess-norm", concave_edges: int = 0) -> None:
+    def __init__(self, score: str = "excess-norm", concave_edges: int = 4) -> None:
         self.score = SCORES[score]
         self.concave_edges = concave_edges
 

@@ -176,7 +176,14 @@ class Component(Part):
 
     def cut(self, plane: Plane) -> tuple[Component | None, Component | None]:
         """Cut by a plane: what lies below and what lies above, None where nothing (of any volume) does."""
-        above, below = self.manifold.split_by_plane(plane.normal, plane.offset)
+        axis = next((axis for axis in range(3) if plane.normal[axis] == 1), None)
+        if axis is not None and (self.vertices[:, axis] == plane.offset).any():
+            # Faces in the plane belong to one side only. Subtraction takes them away with the other side; splitting
+            # would leave them on both, as a film on one, and a half-space rounds the plane by some 1e-16.
+            below_block, above_block = _blocks_beside(self.box, axis, plane.offset)
+            below, above = self.manifold - above_block, self.manifold - below_block
+        else:
+            above, below = self.manifold.split_by_plane(plane.normal, plane.offset)
         return _component(below, self), _component(above, self)
 
     def pieces(self) -> list[Component]:
@@ -189,6 +196,31 @@ class Component(Part):
         if cavities:
             shells = _enclose(shells, cavities)
         return [piece for m in shells if (piece := _component(m, self)) is not None]
+
+
+_BLOCK = np.array(
+    [
+        [(0, 4, 6), (0, 6, 2), (1, 3, 7), (1, 7, 5)],
+        [(0, 1, 5), (0, 5, 4), (2, 6, 7), (2, 7, 3)],
+        [(0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6)],
+    ],
+    dtype=np.uint64,
+).reshape(12, 3)
+"""Triangles of a block whose corner i has the upper coordinates of the axes that are set in the bits of i, x lowest."""
+
+
+def _blocks_beside(box: FloatArray, axis: int, offset: float) -> tuple[Manifold, Manifold]:
+    """Build two blocks that hold what of a box [2, 3] lies below and above a plane along an axis, to the last bit."""
+    lower, upper = box[0] - 1, box[1] + 1
+    low, high = min(lower[axis], offset - 1), max(upper[axis], offset + 1)
+    return _block(lower, upper, axis, low, offset), _block(lower, upper, axis, offset, high)
+
+
+def _block(lower: FloatArray, upper: FloatArray, axis: int, low: float, high: float) -> Manifold:
+    corners = np.stack([lower, upper])
+    corners[:, axis] = low, high
+    is_upper = np.arange(8)[:, None] >> np.arange(3) & 1
+    return Manifold(Mesh64(np.take_along_axis(corners, is_upper, axis=0), _BLOCK))
 
 
 def _component(manifold: Manifold, within: Component) -> Component | None:
