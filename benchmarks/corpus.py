@@ -1,6 +1,8 @@
-"""Decompose every mesh of a folder and say what went wrong: crashes, hangs, invalid hulls, broken promises.
+r"""Decompose every mesh of a folder and say what went wrong: crashes, hangs, invalid hulls, broken promises.
 
     python benchmarks/corpus.py MESHES/test --out test.jsonl [--jobs 2] [--limit 120] [--options '{"max_vertices": 32}']
+    python benchmarks/corpus.py MESHES/test --out space.jsonl --options \
+        '{"criterion": {"radius": 0.05, "tolerance": 0.01}, "policy": "navacd"}'
     python benchmarks/corpus.py --table test.jsonl
 
 Each mesh is decomposed in a worker process with one thread; a worker that crashes or exceeds the limit is replaced and
@@ -42,20 +44,69 @@ def invalid_hulls(hulls: list[Any]) -> int:
     return bad
 
 
+def overlapped_balls(hulls: list[Any], balls: Any, slack: float) -> int:
+    """Count pairs of a hull and a ball that overlap by more than `slack`, judged without our own kernels."""
+    count = 0
+    for hull in hulls:
+        corners = hull.triangles
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        normals = normals[lengths[:, 0] > 0] / lengths[lengths[:, 0] > 0]
+        offsets = (normals @ np.asarray(hull.vertices).T).max(axis=1)
+        # A ball beyond one facet's plane is apart; only the others need their distance.
+        height = np.full(len(balls), -np.inf)
+        for normal, offset in zip(normals, offsets, strict=True):
+            np.maximum(height, balls.centres @ normal - offset, out=height)
+        near = np.flatnonzero(height < balls.radii - slack)
+        distance = distance_to_triangles(balls.centres[near], corners)
+        count += int(np.count_nonzero((height[near] <= 0) | (distance < balls.radii[near] - slack)))
+    return count
+
+
+def distance_to_triangles(points: Any, corners: Any) -> Any:
+    """Distances [N]: the plane of each triangle where the projection falls inside, its three edges always."""
+    best = np.full(len(points), np.inf)
+    if len(points) == 0:
+        return best
+    for a, b, c in corners:
+        for start, end in ((a, b), (b, c), (c, a)):
+            along = end - start
+            t = np.clip((points - start) @ along / max(along @ along, 1e-300), 0, 1)
+            best = np.minimum(best, np.linalg.norm(points - start - t[:, None] * along, axis=1))
+        normal = np.cross(b - a, c - a)
+        if (length := np.linalg.norm(normal)) > 0:
+            normal = normal / length
+            inside = np.ones(len(points), dtype=bool)
+            for start, end in ((a, b), (b, c), (c, a)):
+                inside &= (points - start) @ np.cross(normal, end - start) >= 0
+            best[inside] = np.minimum(best[inside], np.abs((points[inside] - a) @ normal))
+    return best
+
+
 def decompose_one(path: str, options: dict[str, Any]) -> dict[str, Any]:
     import rlacd
 
+    space = options.get("criterion")
+    if isinstance(space, dict):
+        options = {**options, "criterion": rlacd.NavigableSpace(**space)}
     start = time.process_time()
     try:
         result = rlacd.decompose(path, threads=1, **options)
     except rlacd.RlacdError as error:
         return {"error": f"{type(error).__name__}: {error}"}
+    cpu = time.process_time() - start
     report = result.report
+    extra: dict[str, Any] = {}
+    if result.balls is not None:
+        slack = 1e-7 * float(np.ptp(result.source.vertices, axis=0).max())
+        account = {key: value for key, value in report["navigable"].items() if key != "intrusion"}
+        extra = {**account, "overlapped": overlapped_balls(result.hulls, result.balls, slack)}
     return {
-        "cpu": time.process_time() - start,
+        "cpu": cpu,
         "parts": report["parts"],
         "invalid": invalid_hulls(result.hulls),
-        "concavity": report["concavity"]["max"],
+        "concavity": report["concavity"]["max"] if "concavity" in report else None,
+        **extra,
         **report["hausdorff"],
         "seconds": report["seconds"],
         "steps": dict(Counter(body["step"] for body in report["repair"])),
@@ -140,7 +191,12 @@ def table(out: Path) -> None:
             if kind in row:
                 print(f"  {kind}: {row['file']}: {row[kind]}")
     print(f"meshes with invalid hulls: {[r['file'] for r in good if r['invalid']]}")
-    print(f"meshes with a part over the threshold: {[r['file'] for r in good if r['concavity'] > 0.05]}")
+    print(f"meshes with a part over the threshold: {[r['file'] for r in good if (r['concavity'] or 0) > 0.05]}")
+    spacious = [r for r in good if "balls" in r]
+    if spacious:
+        print(f"meshes with a hull that overlaps a final ball: {[r['file'] for r in spacious if r['overlapped']]}")
+        gave_way = [(r["file"], r["shrunk"], r["dropped"], r["most"]) for r in spacious if r["shrunk"] or r["dropped"]]
+        print(f"meshes whose balls gave way (shrunk, dropped, most): {gave_way}")
     print("\n| repair step | bodies | meshes |\n|---|---|---|")
     bodies, meshes = Counter[str](), Counter[str]()
     for row in good:
