@@ -57,8 +57,8 @@ class NavigableSpace:
     tolerance : float
         How far a hull may lead away from the surface, as such a fraction too.
     reachable_only : bool
-        Count only what the ball can reach; otherwise every place outside the solid with room for the ball counts, sealed
-        cavities too.
+        Count only what the ball can reach; otherwise every place outside the solid with room for the ball counts,
+        sealed cavities too.
     seeds : array_like [S, 3], optional
         Points, in the input's frame and unit, that balls come from; by default they come from outside.
     closed_planes : sequence of (normal [3], offset)
@@ -113,11 +113,11 @@ class NavigableSpace:
         Notes
         -----
         Distances are exact. Ways in are found on a grid half a radius wide, and where that leaves the answer open, by
-        following the way itself: none narrower than 99 % of the ball counts, and one as wide as the ball is found unless
-        it is so contorted that it cannot be followed in steps of half a radius.
+        following the way itself: none narrower than 99 % of the ball counts, and one as wide as the ball is found
+        unless it is so contorted that it cannot be followed in steps of half a radius.
 
-        Where a ball touches the hull of the solid, a place of the space's boundary is about 0.6 ball radii from a centre
-        at most: between balls a hull can reach up to a fifth of their radius beyond the boundary unseen.
+        Where a ball touches the hull of the solid, a place of the space's boundary is about 0.6 ball radii from a
+        centre at most: between balls a hull can reach up to a fifth of their radius beyond the boundary unseen.
         """
         scale = solid.frame.scale
         radius = _in_frame(self.radius, self.radius_m, scale)
