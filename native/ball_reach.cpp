@@ -14,18 +14,23 @@ constexpr double kInCell = 0.55;
 
 }  // namespace
 
-BallReach::BallReach(const NavigableField& field, const ClearanceGrid& grid, std::vector<Vec3> points)
+BallReach::BallReach(const NavigableField& field, ClearanceGrid& grid)
     : field_(field),
       grid_(grid),
-      points_(std::move(points)),
       least_(field.radius() * (1 - kRounding)),
       half_diagonal_(0.5 * std::sqrt(3.0) * grid.pitch * (1 + kRounding)) {
-  parent_.resize(1 + grid_.size() + points_.size());
+  parent_.resize(1 + grid_.size());
   for (std::size_t i = 0; i < parent_.size(); ++i) parent_[i] = static_cast<std::int32_t>(i);
-  clearance_.reserve(points_.size());
-  for (const Vec3 point : points_) clearance_.push_back(field_.clearance(point).value);
   join_cells();
-  for (std::size_t i = 0; i < points_.size(); ++i) join_point(static_cast<std::int32_t>(i));
+}
+
+std::int32_t BallReach::add(Vec3 point, double clearance) {
+  const auto number = static_cast<std::int32_t>(points_.size());
+  points_.push_back(point);
+  clearance_.push_back(clearance);
+  parent_.push_back(node_of(number));
+  join_point(number);
+  return number;
 }
 
 std::int32_t BallReach::root(std::int32_t node) {
@@ -67,10 +72,7 @@ void BallReach::join_cells() {
 
 void BallReach::join_point(std::int32_t point) {
   const auto [i, j, k] = grid_.over(points_[point]);
-  if (!grid_.holds(i, j, k)) {
-    join(node_of(point), kStart);
-    return;
-  }
+  if (!grid_.holds(i, j, k)) return;
   for_neighbours(grid_.at(i, j, k), [&](std::int32_t cell) {
     const double clearances = clearance_[point] + grid_.clearance[cell];
     if (is_free(cell) && clearances >= norm(grid_.centre(cell) - points_[point]) + 2 * least_)
@@ -78,7 +80,13 @@ void BallReach::join_point(std::int32_t point) {
   });
 }
 
-void BallReach::start_outside() {
+void BallReach::start_at(std::int32_t point) {
+  join(kStart, node_of(point));
+  const auto [i, j, k] = grid_.over(points_[point]);
+  if (!grid_.holds(i, j, k)) start_outside();
+}
+
+void BallReach::start_on_border() {
   for (std::int32_t cell = 0; cell < grid_.size(); ++cell) {
     const auto place = grid_.place(cell);
     bool border = false;
@@ -87,38 +95,37 @@ void BallReach::start_outside() {
   }
 }
 
+// Pushes a place away from what is nearest, from one side to the other where it is narrow, until it is free.
+bool BallReach::push(Place& place) const {
+  for (int i = 0; i < kPushes; ++i) {
+    const NavigableField::Value value = field_.clearance(place.at, place.slot);
+    place.clearance = value.value;
+    place.slot = value.slot;
+    if (value.value >= (1 - kSlackOfPoint) * field_.radius()) return true;
+    place.at = place.at + (field_.radius() - value.value) * value.uphill;
+  }
+  return false;
+}
+
 const BallReach::Place* BallReach::place_in(std::int32_t cell) {
   if (!may_be_free(cell)) return nullptr;
   const auto [entry, is_new] = places_.try_emplace(cell);
   Place& place = entry->second;
   if (is_new) {
     const Vec3 centre = grid_.centre(cell);
-    Vec3 x = centre;
-    NavigableField::Value value = field_.clearance(x);
-    const double slack = kSlackOfPoint * field_.radius();
-    const auto field = [this](Vec3 p, std::int32_t hint) { return field_.clearance(p, hint); };
-    const bool found = value.value >= least_ || settle(field, field_.radius(), slack, kPushes, x, value,
-                                                       [](Vec3, const NavigableField::Value&) {});
-    const bool here = max_abs(x - centre) <= kInCell * grid_.pitch;
-    place = {x, found && here ? value.value : 0.0, value.slot};
+    place = {centre, 0, -1};
+    if (!push(place) || max_abs(place.at - centre) > kInCell * grid_.pitch) place.clearance = 0;
   }
   return place.clearance > 0 ? &place : nullptr;
 }
 
 bool BallReach::is_way(const Place& a, const Place& b) const {
-  const double length = norm(b.at - a.at), radius = field_.radius();
-  if (a.clearance + b.clearance >= length + 2 * (1 - kSlackOfWay) * radius) return true;
-  Vec3 x = 0.5 * (a.at + b.at);
-  const Vec3 middle = x;
-  NavigableField::Value value = field_.clearance(x, a.slot);
-  if (value.value < (1 - kSlackOfPoint) * radius) {
-    const auto field = [this](Vec3 p, std::int32_t hint) { return field_.clearance(p, hint); };
-    if (!settle(field, radius, kSlackOfPoint * radius, kPushes, x, value, [](Vec3, const NavigableField::Value&) {}))
-      return false;
-  }
+  const double length = norm(b.at - a.at);
+  if (a.clearance + b.clearance >= length + 2 * (1 - kSlackOfWay) * field_.radius()) return true;
+  const Vec3 middle = 0.5 * (a.at + b.at);
+  Place between = {middle, 0, a.slot};
   // Both halves have to be shorter, or the halving would not end.
-  if (norm(x - middle) > 0.35 * length) return false;
-  const Place between = {x, value.value, value.slot};
+  if (!push(between) || norm(between.at - middle) > 0.35 * length) return false;
   return is_way(a, between) && is_way(between, b);
 }
 
@@ -181,7 +188,11 @@ void BallReach::grow(const std::vector<std::int32_t>& points, const std::vector<
   for (const std::int32_t cell : open) mark_[cell] = kShut;
 }
 
-void BallReach::look_closely(const std::vector<std::int32_t>& points) {
+void BallReach::look_closely(const std::vector<std::int32_t>& points, int threads) {
+  resolve(field_, grid_, threads);
+  join_cells();
+  if (from_outside_) start_on_border();
+  for (std::size_t i = 0; i < points_.size(); ++i) join_point(static_cast<std::int32_t>(i));
   std::unordered_map<std::int32_t, std::size_t> number;
   std::vector<std::vector<std::int32_t>> regions;
   for (const std::int32_t point : points) {

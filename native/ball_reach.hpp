@@ -19,20 +19,25 @@ namespace rlacd {
 
 class BallReach {
  public:
-  // Points are numbered in the order of the vector; their clearance has to be at least the radius.
-  BallReach(const NavigableField& field, const ClearanceGrid& grid, std::vector<Vec3> points);
+  BallReach(const NavigableField& field, ClearanceGrid& grid);
+
+  // A further point, with its clearance, which has to be at least the radius; returns its number, counted from 0.
+  std::int32_t add(Vec3 point, double clearance);
 
   // Makes everything around the grid, or a point, a place to start from.
-  void start_outside();
-  void start_at(std::int32_t point) { join(kStart, node_of(point)); }
+  void start_outside() {
+    from_outside_ = true;
+    start_on_border();
+  }
+  void start_at(std::int32_t point);
 
   bool reached(std::int32_t point) { return root(node_of(point)) == root(kStart); }
   // Points with the same number can reach each other; cells that are not free are alone.
   std::int32_t region(std::int32_t point) { return root(node_of(point)); }
   std::int32_t region_of_cell(std::int32_t cell) { return root(node_of_cell(cell)); }
 
-  // Looks closely at what is not reached but holds one of these points.
-  void look_closely(const std::vector<std::int32_t>& points);
+  // Looks closely at what is not reached but holds one of these points. It resolves the grid.
+  void look_closely(const std::vector<std::int32_t>& points, int threads);
 
  private:
   struct Place {
@@ -48,6 +53,7 @@ class BallReach {
   std::int32_t root(std::int32_t node);
   bool join(std::int32_t a, std::int32_t b);  // whether they were apart
 
+  void start_on_border();
   bool is_free(std::int32_t cell) const { return grid_.clearance[cell] >= least_; }
   void join_cells();
   void join_point(std::int32_t point);
@@ -55,15 +61,17 @@ class BallReach {
   bool may_be_reached(const std::vector<std::int32_t>& cells, std::int32_t region);
   void grow(const std::vector<std::int32_t>& points, const std::vector<std::int32_t>& cells, std::int32_t region);
   const Place* place_in(std::int32_t cell);
+  bool push(Place& place) const;
   bool is_way(const Place& a, const Place& b) const;
   template <class Action>
   void for_neighbours(std::int32_t cell, const Action& action) const;
 
   const NavigableField& field_;
-  const ClearanceGrid& grid_;
+  ClearanceGrid& grid_;
   std::vector<Vec3> points_;
   std::vector<double> clearance_;  // of the points
   double least_, half_diagonal_;
+  bool from_outside_ = false;
   std::vector<std::int32_t> parent_;
   std::unordered_map<std::int32_t, Place> places_;  // clearance 0: the cell has none
   // By cell: which look at which region has seen it, or that everything that can be reached from it has been.

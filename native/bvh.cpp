@@ -132,8 +132,9 @@ Bvh::Bvh(const Mesh& mesh) {
   }
 }
 
-Bvh::Hit Bvh::closest(Vec3 p, std::int32_t hint, double enough) const {
+Bvh::Hit Bvh::closest(Vec3 p, std::int32_t hint, double enough, double within) const {
   Hit best;
+  best.distance2 = within * within;
   const double enough2 = enough * enough;
   const auto look_at = [&](std::int32_t slot) {
     const Vec3 q = closest_on_triangle(triangles_[slot], p);

@@ -27,8 +27,10 @@ class Bvh {
   };
 
   // The closest point to p. A hint (the slot of a triangle thought to be near) only makes it faster. The search ends at
-  // the first triangle within `enough`: the distance then is at most `enough`, not the least.
-  Hit closest(Vec3 p, std::int32_t hint = -1, double enough = 0) const;
+  // the first triangle within `enough`: the distance then is at most `enough`, not the least. Where no triangle is
+  // nearer than `within`, the slot is -1.
+  Hit closest(Vec3 p, std::int32_t hint = -1, double enough = 0,
+              double within = std::numeric_limits<double>::infinity()) const;
 
   double distance(std::int32_t slot, Vec3 p) const { return distance_to_triangle(triangles_[slot], p); }
   std::int32_t face(std::int32_t slot) const { return faces_[slot]; }

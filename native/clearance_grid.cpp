@@ -1,64 +1,92 @@
 #include "clearance_grid.hpp"
 
+#include <utility>
+
 #include "parallel.hpp"
 
 namespace rlacd {
 namespace {
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::int32_t kBlock = 8;  // cells along a side of the largest cubes
 constexpr double kHalfDiagonal = 0.8660254037844387;
 // Cells up to a whole pitch below the level are asked too: from there the way up leads into creases and corners.
 constexpr double kBelow = 1.0;
 
+struct Found {
+  std::vector<ClearanceGrid::Crossed> boundary;
+  std::vector<ClearanceGrid::Cube> unresolved;
+};
+
 class Filling {
  public:
-  Filling(const NavigableField& field, ClearanceGrid& grid) : field_(field), grid_(grid) {}
+  Filling(const NavigableField& field, ClearanceGrid& grid, bool to_the_end)
+      : field_(field), grid_(grid), to_the_end_(to_the_end) {}
 
-  // Fills the cells of one cube; `inside` bounds from below how deep in the hull its centre lies.
-  void fill(std::array<std::int32_t, 3> first, std::int32_t side, std::int32_t hint, double inside,
-            std::vector<std::int32_t>& boundary) {
-    const double half = 0.5 * side;
-    const Vec3 x = grid_.origin + grid_.pitch * Vec3{first[0] + half, first[1] + half, first[2] + half};
-    const double reach = kHalfDiagonal * side * grid_.pitch;
+  void fill(ClearanceGrid::Cube cube, Found& found) const {
+    const double half = 0.5 * cube.side, reach = kHalfDiagonal * cube.side * grid_.pitch;
+    const Vec3 x = grid_.origin + grid_.pitch * Vec3{cube.first[0] + half, cube.first[1] + half, cube.first[2] + half};
     const double radius = field_.radius(), level = field_.level();
+    const double off_by = reach + (kBelow - kHalfDiagonal) * grid_.pitch;
 
-    const Bvh::Hit hit = field_.surface().closest(x, hint);
-    const double distance = std::sqrt(hit.distance2), ground = field_.above_ground(x);
-    const double clearance = std::min(distance, ground);
-    if (side > 1 && clearance + reach < radius) return;  // -infinity stays
+    if (cube.inside < reach) cube.inside = -field_.hull().distance(x, radius + off_by);
+    const double away = std::max(-cube.inside, 0.0), ground = field_.above_ground(x);
+    const double others = std::min(ground + field_.tolerance(), field_.room_by_hull(away));
+    // The surface is no nearer than the hull.
+    if (others + off_by < level && std::min(away, ground) - reach >= radius)
+      return fill_free(cube, x, std::min(away, ground));
 
-    if (inside < reach) inside = -field_.hull().distance(x, radius + reach + grid_.pitch);
-    const double room = std::min({distance, ground + field_.tolerance(), field_.room_by_hull(std::max(-inside, 0.0))});
-    const bool off = room + reach + (kBelow - kHalfDiagonal) * grid_.pitch<level, on = room - reach> level;
-    if (side == 1) {
-      const std::int32_t cell = grid_.at(first[0], first[1], first[2]);
+    // One triangle often shows that the cube is too near the surface.
+    const double most = cube.slot >= 0 ? field_.surface().distance(cube.slot, x) : kInfinity;
+    if (std::min(most, ground) + reach < radius) return;
+    if (std::min(most, others) + off_by < level && !to_the_end_) return found.unresolved.push_back(cube);
+
+    const double within = level + reach;
+    const Bvh::Hit hit = field_.surface().closest(x, cube.slot, 0, within);
+    const double distance = hit.slot >= 0 ? std::sqrt(hit.distance2) : within;
+    const double clearance = std::min(distance, ground), room = std::min(distance, others);
+    if (clearance + reach < radius) return;
+    const bool off = room + off_by < level, on = room - reach >= level;
+    if (cube.side == 1) {
+      const std::int32_t cell = grid_.at(cube.first[0], cube.first[1], cube.first[2]);
       grid_.clearance[cell] = static_cast<float>(clearance);
-      if (!off && !on) boundary.push_back(cell);
+      if (off || on) return;
+      NavigableField::Value value;
+      if (room < field_.room_by_hull(away))
+        value = field_.room_near(x, hit.slot);
+      else
+        value = {room, normalized(field_.hull().closest(x) - x), hit.slot, NavigableField::Limit::kHull};
+      found.boundary.push_back({cell, cube.inside, value});
       return;
     }
-    if ((off || on) && clearance - reach >= radius) return fill_free(first, side, x, clearance);
-    const std::int32_t part = side / 2;
-    const double shift = 0.5 * reach;  // to the centre of a child
+    if ((off || on) && clearance - reach >= radius) return fill_free(cube, x, clearance);
+    if (hit.slot >= 0) cube.slot = hit.slot;
+    if (off && !to_the_end_) return found.unresolved.push_back(cube);
+    const std::int32_t part = cube.side / 2;
     for (std::int32_t k = 0; k < 2; ++k)
       for (std::int32_t j = 0; j < 2; ++j)
         for (std::int32_t i = 0; i < 2; ++i)
-          fill({first[0] + i * part, first[1] + j * part, first[2] + k * part}, part, hit.slot, inside - shift,
-               boundary);
+          fill({{cube.first[0] + i * part, cube.first[1] + j * part, cube.first[2] + k * part},
+                part,
+                cube.slot,
+                cube.inside - 0.5 * reach},
+               found);
   }
 
  private:
-  void fill_free(std::array<std::int32_t, 3> first, std::int32_t side, Vec3 x, double clearance) {
-    for (std::int32_t k = first[2]; k < first[2] + side; ++k)
-      for (std::int32_t j = first[1]; j < first[1] + side; ++j)
-        for (std::int32_t i = first[0]; i < first[0] + side; ++i) {
-          const std::int32_t cell = grid_.at(i, j, k);
+  void fill_free(const ClearanceGrid::Cube& cube, Vec3 x, double clearance) const {
+    const auto [a, b, c] = cube.first;
+    for (std::int32_t k = c; k < c + cube.side; ++k)
+      for (std::int32_t j = b; j < b + cube.side; ++j)
+        for (std::int32_t i = a; i < a + cube.side; ++i) {
           const Vec3 there = grid_.origin + grid_.pitch * Vec3{i + 0.5, j + 0.5, k + 0.5};
-          grid_.clearance[cell] = static_cast<float>(clearance - norm(there - x));
+          grid_.clearance[grid_.at(i, j, k)] = static_cast<float>(clearance - norm(there - x));
         }
   }
 
   const NavigableField& field_;
   ClearanceGrid& grid_;
+  bool to_the_end_;
 };
 
 }  // namespace
@@ -77,18 +105,31 @@ ClearanceGrid clearance_grid(const NavigableField& field, double pitch, int thre
   }
   grid.clearance.assign(grid.size(), -std::numeric_limits<float>::infinity());
 
-  std::vector<std::vector<std::int32_t>> boundary(static_cast<std::size_t>(blocks[0]) * blocks[1] * blocks[2]);
-  Filling filling(field, grid);
-  parallel_for(boundary.size(), threads, [&](std::size_t block) {
+  std::vector<Found> found(static_cast<std::size_t>(blocks[0]) * blocks[1] * blocks[2]);
+  const Filling filling(field, grid, false);
+  parallel_for(found.size(), threads, [&](std::size_t block) {
     const auto b = static_cast<std::int32_t>(block);
     const std::array<std::int32_t, 3> first = {kBlock * (b % blocks[0]), kBlock * (b / blocks[0] % blocks[1]),
                                                kBlock * (b / blocks[0] / blocks[1])};
-    filling.fill(first, kBlock, -1, -std::numeric_limits<double>::infinity(), boundary[block]);
+    filling.fill({first, kBlock, -1, -kInfinity}, found[block]);
   });
-  for (const std::vector<std::int32_t>& cells : boundary)
-    grid.boundary.insert(grid.boundary.end(), cells.begin(), cells.end());
-  std::sort(grid.boundary.begin(), grid.boundary.end());
+  for (const Found& own : found) {
+    grid.boundary.insert(grid.boundary.end(), own.boundary.begin(), own.boundary.end());
+    grid.unresolved.insert(grid.unresolved.end(), own.unresolved.begin(), own.unresolved.end());
+  }
+  std::sort(grid.boundary.begin(), grid.boundary.end(),
+            [](const ClearanceGrid::Crossed& a, const ClearanceGrid::Crossed& b) { return a.cell < b.cell; });
   return grid;
+}
+
+void resolve(const NavigableField& field, ClearanceGrid& grid, int threads) {
+  const std::vector<ClearanceGrid::Cube> cubes = std::move(grid.unresolved);
+  grid.unresolved.clear();
+  const Filling filling(field, grid, true);
+  parallel_for(cubes.size(), threads, [&](std::size_t i) {
+    Found nothing;  // the boundary of the space does not cross these cubes
+    filling.fill(cubes[i], nothing);
+  });
 }
 
 }  // namespace rlacd

@@ -1,7 +1,8 @@
 // The clearance on a grid of cells around a solid, and the cells that the boundary of the navigable space crosses.
 //
-// How: cubes of cells are halved as long as the field at their centre, which changes no faster than one moves, leaves
-//      open what holds for all of them; only near the two level sets each cell is asked for.
+// How: cubes of cells are halved as long as the fields at their centre, which change no faster than one moves, leave
+//      open what holds for all of them. First only near the boundary of the space; that a cell farther off is free is
+//      left unsaid unless a large cube says so, which is nearly always all that the way of a ball depends on.
 #pragma once
 
 #include "navigable_field.hpp"
@@ -14,10 +15,24 @@ struct ClearanceGrid {
   std::int32_t count[3] = {0, 0, 0};
 
   // At the centre of each cell. Where the whole cell is free it may be a lower bound that says so; where no point of
-  // the cell is, -infinity.
+  // the cell is, or the cell is not resolved, -infinity.
   std::vector<float> clearance;
-  // Cells that the boundary of the space may cross, ascending.
-  std::vector<std::int32_t> boundary;
+
+  // Cells that the boundary of the space may cross, ascending, and the room at their centres.
+  struct Crossed {
+    std::int32_t cell;
+    double inside;  // at most the depth of its centre in the hull
+    NavigableField::Value room;
+  };
+  std::vector<Crossed> boundary;
+
+  struct Cube {
+    std::array<std::int32_t, 3> first;
+    std::int32_t side;
+    std::int32_t slot;  // of a triangle thought to be near
+    double inside;      // at most the depth of its centre in the hull
+  };
+  std::vector<Cube> unresolved;
 
   std::int32_t size() const { return count[0] * count[1] * count[2]; }
   std::int32_t at(std::int32_t i, std::int32_t j, std::int32_t k) const { return (k * count[1] + j) * count[0] + i; }
@@ -40,5 +55,8 @@ struct ClearanceGrid {
 
 // Every cell on the grid's border lies farther than the radius from the hull.
 ClearanceGrid clearance_grid(const NavigableField& field, double pitch, int threads);
+
+// Asks for the cells of the cubes that are not resolved.
+void resolve(const NavigableField& field, ClearanceGrid& grid, int threads);
 
 }  // namespace rlacd

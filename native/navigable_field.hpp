@@ -35,13 +35,16 @@ class NavigableField {
   const Bvh& surface() const { return surface_; }
   const ConvexBody& hull() const { return hull_; }
 
+  enum class Limit { kSurface, kGround, kHull };
   struct Value {
-    double value;
-    Vec3 uphill;  // unit, but zero on the surface itself
-    std::int32_t slot = -1;
+    double value = 0;
+    Vec3 uphill;             // unit, but zero on the surface itself
+    std::int32_t slot = -1;  // of the nearest triangle
+    Limit by = Limit::kSurface;
   };
-  Value clearance(Vec3 x, std::int32_t hint = -1) const;
-  Value room(Vec3 x, std::int32_t hint = -1) const;
+  Value clearance(Vec3 x, std::int32_t hint = -1) const { return by_surface_and_ground(x, hint, 0); }
+  // The room but for the hull's part in it.
+  Value room_near(Vec3 x, std::int32_t hint = -1) const { return by_surface_and_ground(x, hint, tolerance_); }
 
   // Distance to the nearest closed half-space, negative in it.
   double above_ground(Vec3 x) const;
@@ -49,31 +52,12 @@ class NavigableField {
   double room_by_hull(double away) const { return level() + radius_ - away; }
 
  private:
-  void lower_by_ground(Vec3 x, double margin, Value& value) const;
+  Value by_surface_and_ground(Vec3 x, std::int32_t hint, double margin) const;
 
   const Bvh& surface_;
   const ConvexBody& hull_;
   std::vector<HalfSpace> closed_;
   double radius_, tolerance_;
 };
-
-// Moves x to a place where the field is `level`, up to `slack`, or, from below, at least that; false where it finds
-// none. Downhill one step is exact. Uphill, x is pushed away from what is nearest until nothing is too near: in a
-// narrow place from one side to the other, which ends on the crease between them. `visit(x, value)` sees every value on
-// the way.
-template <class Field, class Visit>
-bool settle(const Field& field, double level, double slack, int steps, Vec3& x, NavigableField::Value& value,
-            const Visit& visit) {
-  std::int32_t hint = value.slot;
-  for (int step = 0; step < steps; ++step) {
-    value = field(x, hint);
-    hint = value.slot;
-    visit(x, value);
-    if (std::fabs(value.value - level) <= slack) return true;
-    if (value.value > level && step > 0) return true;
-    x = x + (level - value.value) * value.uphill;
-  }
-  return false;
-}
 
 }  // namespace rlacd

@@ -11,7 +11,6 @@ namespace rlacd {
 namespace {
 
 constexpr double kSlack = 1e-9;  // absolute: the frame is 2 wide
-constexpr int kPushes = 40;
 constexpr double kTouch = 1e-9;
 constexpr double kWindingAccuracy = 3;
 constexpr std::size_t kChunk = 64;
@@ -19,47 +18,125 @@ constexpr std::size_t kChunk = 64;
 struct Candidate {
   Vec3 at;
   double radius = 0;
+  double clearance = 0;
   double sharpness = 0;
 };
 
-// What was nearest on the way to a candidate, and whether it still is: two directions that disagree make a crease,
-// three that span space a corner.
-class Witnesses {
+// Climbs to the boundary from below. In a crease the places that were nearest on the way are kept at the level
+// together, up to three at a time: Newton's method on the planes in front of them.
+class Climb {
  public:
-  void see(Vec3 x, const NavigableField::Value& value) {
-    const Seen seen = {x - value.value * value.uphill, value.uphill};
-    for (int i = 0; i < std::min(count_, kMost); ++i)
-      if (dot(seen_[i].uphill, seen.uphill) > kSame) {
-        seen_[i] = seen;
-        return;
+  Climb(const NavigableField& field, Vec3 x, const NavigableField::Value& value)
+      : field_(field), x_(x), value_(value) {}
+
+  bool to_level(double farthest) {
+    const Vec3 start = x_;
+    for (int step = 0; step < kSteps; ++step) {
+      if (value_.value >= field_.level() - kSlack) {
+        x_ = x_ - (value_.value - field_.level()) * value_.uphill;
+        value_.value = field_.level();
+        return true;
       }
-    seen_[count_++ % kMost] = seen;
+      see();
+      x_ = x_ + correction();
+      if (!(max_abs(x_ - start) <= farthest)) return false;
+      value_ = field_.room_near(x_, value_.slot);
+    }
+    return false;
   }
-  // 0 on a smooth place, up to 2 in a crease, up to 4 in a corner.
-  double sharpness(Vec3 x, double level, double slack) const {
+
+  Vec3 at() const { return x_; }
+  const NavigableField::Value& value() const { return value_; }
+
+  // 0 on a smooth place; in a crease, the more the sides disagree; most in a corner of three.
+  double sharpness(double slack) {
     Vec3 near[kMost];
     int count = 0;
-    for (int i = 0; i < std::min(count_, kMost); ++i)
-      if (std::fabs(dot(x - seen_[i].origin, seen_[i].uphill) - level) <= slack) near[count++] = seen_[i].uphill;
-    double crease = 0, corner = 0;
+    see();
+    for (int i = 0; i < count_; ++i)
+      if (std::fabs(value_at(seen_[i])) <= slack) near[count++] = seen_[i].uphill;
+    double sharpest = 0;
     for (int a = 0; a < count; ++a)
-      for (int b = 0; b < a; ++b) {
-        crease = std::max(crease, 1 - dot(near[a], near[b]));
-        for (int c = 0; c < b; ++c)
-          corner = std::max(corner, std::fabs(dot(cross(near[a], near[b]), near[c])) > kSpans ? 2.0 : 0.0);
-      }
-    return crease > 1 - kSame ? crease + corner : 0;
+      for (int b = 0; b < a; ++b) sharpest = std::max(sharpest, 1 - dot(near[a], near[b]));
+    if (count == 3) sharpest += 2 * std::fabs(dot(cross(near[0], near[1]), near[2]));
+    return sharpest;
   }
 
  private:
+  static constexpr int kMost = 3, kSteps = 16;
+  static constexpr double kSame = 0.97;
   struct Seen {
-    Vec3 origin;  // the value is the distance from the plane through here
+    Vec3 level;  // a point of the plane on which this is at the level
     Vec3 uphill;
   };
-  static constexpr int kMost = 6;
-  static constexpr double kSame = 0.97, kSpans = 0.1;
+
+  double value_at(const Seen& seen) const { return dot(x_ - seen.level, seen.uphill); }
+
+  // Takes in what is nearest, in the place of what it is nearly the same as, or of what was seen first.
+  void see() {
+    const Seen seen = {x_ + (field_.level() - value_.value) * value_.uphill, value_.uphill};
+    for (int i = 0; i < count_; ++i)
+      if (dot(seen_[i].uphill, seen.uphill) > kSame) {
+        std::rotate(seen_ + i, seen_ + i + 1, seen_ + count_);
+        seen_[count_ - 1] = seen;
+        return;
+      }
+    if (count_ == kMost) std::rotate(seen_, seen_ + 1, seen_ + kMost), --count_;
+    seen_[count_++] = seen;
+  }
+
+  // The least step onto the planes of all that has been seen, or of the newest where those hardly meet.
+  Vec3 correction() {
+    for (; count_ > 1; std::rotate(seen_, seen_ + 1, seen_ + count_), --count_) {
+      const Vec3 a = seen_[count_ - 1].uphill, b = seen_[count_ - 2].uphill;
+      const double ha = -value_at(seen_[count_ - 1]), hb = -value_at(seen_[count_ - 2]);
+      const Vec3 along = cross(a, b);
+      if (count_ == 2) {
+        const double ab = dot(a, b), sine2 = norm2(along);
+        if (sine2 > kMeeting) return ((ha - ab * hb) / sine2) * a + ((hb - ab * ha) / sine2) * b;
+      } else {
+        const Vec3 c = seen_[0].uphill;
+        const double hc = -value_at(seen_[0]), volume = dot(along, c);
+        if (std::fabs(volume) > kMeeting) return (1 / volume) * (ha * cross(b, c) + hb * cross(c, a) + hc * along);
+      }
+    }
+    return -value_at(seen_[0]) * seen_[0].uphill;
+  }
+  static constexpr double kMeeting = 0.05;
+
+  const NavigableField& field_;
+  Vec3 x_;
+  NavigableField::Value value_;
   Seen seen_[kMost];
   int count_ = 0;
+};
+
+// Tells cells next to which the ways up meet: below the level, only from there one comes to a crease.
+class Meeting {
+ public:
+  explicit Meeting(const ClearanceGrid& grid) : grid_(grid), index_(grid.size(), -1) {
+    for (std::size_t i = 0; i < grid.boundary.size(); ++i) index_[grid.boundary[i].cell] = static_cast<std::int32_t>(i);
+  }
+  bool at(const ClearanceGrid::Crossed& crossed) const {
+    if (crossed.room.by == NavigableField::Limit::kHull)
+      return false;  // smooth, and no ball there would touch the hull
+    const auto [i, j, k] = grid_.place(crossed.cell);
+    for (std::int32_t c = -1; c <= 1; ++c)
+      for (std::int32_t b = -1; b <= 1; ++b)
+        for (std::int32_t a = -1; a <= 1; ++a) {
+          if (!grid_.holds(i + a, j + b, k + c)) continue;
+          const std::int32_t other = index_[grid_.at(i + a, j + b, k + c)];
+          if (other < 0 || grid_.boundary[other].room.by == NavigableField::Limit::kHull) continue;
+          const Vec3 there = {static_cast<double>(a), static_cast<double>(b), static_cast<double>(c)};
+          if (dot(grid_.boundary[other].room.uphill - crossed.room.uphill, there) < -kMeet * norm(there)) return true;
+        }
+    return false;
+  }
+
+ private:
+  static constexpr double kMeet = 0.15;
+  const ClearanceGrid& grid_;
+  std::vector<std::int32_t> index_;  // into the boundary, by cell
 };
 
 class Spreading {
@@ -68,72 +145,88 @@ class Spreading {
       : surface_(surface), field_(field), threads_(threads), grid_(clearance_grid(field, pitch, threads)) {}
 
   Balls run(const BallSources& sources) {
-    std::vector<Candidate> candidates = on_boundary();
-    candidates = reachable(std::move(candidates), sources);
-    return spread(candidates);
+    BallReach reach(field_, grid_);
+    const std::vector<Candidate> candidates = on_boundary(reach);
+    return spread(reachable(candidates, sources, reach));
   }
 
  private:
   // Candidates whose ball touches the hull, in the order of the cells they come from.
-  std::vector<Candidate> on_boundary() const {
+  std::vector<Candidate> on_boundary(BallReach& reach) const {
     const std::size_t count = grid_.boundary.size();
+    std::vector<bool> wanted(count);
+    for (std::size_t i = 0; i < count; ++i) wanted[i] = !is_inside(grid_.boundary[i].cell, reach);
+    const Meeting meeting(grid_);
     std::vector<Candidate> all(count);
     parallel_for((count + kChunk - 1) / kChunk, threads_, [&](std::size_t chunk) {
-      std::int32_t hint = -1;
       for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i)
-        all[i] = from(grid_.boundary[i], hint);
+        if (wanted[i]) all[i] = from(grid_.boundary[i], meeting);
     });
     all.erase(std::remove_if(all.begin(), all.end(), [](const Candidate& c) { return !(c.radius > 0); }), all.end());
     return all;
   }
 
-  Candidate from(std::int32_t cell, std::int32_t& hint) const {
-    const Vec3 centre = grid_.centre(cell);
+  // Whether a cell is free, but on the inner side of the surface. All places of a region are on one side.
+  bool is_inside(std::int32_t cell, BallReach& reach) const {
+    if (grid_.clearance[cell] < field_.radius()) return false;
+    return is_inside(reach.region_of_cell(cell), grid_.centre(cell));
+  }
+  bool is_inside(std::int32_t region, Vec3 x) const {
+    const auto [entry, is_new] = inside_.try_emplace(region);
+    if (is_new) entry->second = surface_.winding().at(x, kWindingAccuracy) > 0.5;
+    return entry->second;
+  }
+
+  Candidate from(const ClearanceGrid::Crossed& crossed, const Meeting& meeting) const {
+    const Vec3 centre = grid_.centre(crossed.cell);
+    const double level = field_.level();
+    NavigableField::Value value = crossed.room;
     Candidate candidate;
     candidate.at = centre;
-    Witnesses witnesses;
-    NavigableField::Value value;
-    value.slot = hint;
-    const auto field = [this](Vec3 x, std::int32_t slot) { return field_.room(x, slot); };
-    const bool found = settle(field, field_.level(), kSlack, kPushes, candidate.at, value,
-                              [&](Vec3 x, const NavigableField::Value& v) { witnesses.see(x, v); });
-    hint = value.slot;
-    if (!found || max_abs(candidate.at - centre) > 2 * grid_.pitch) return candidate;
-    // The ball keeps t from the surface and all of it out of the closed half-spaces.
-    const double distance = std::sqrt(field_.surface().closest(candidate.at, hint).distance2);
-    const double radius = std::min(distance - field_.tolerance(), field_.above_ground(candidate.at));
-    if (field_.hull().distance(candidate.at, radius) >= radius - kTouch) return candidate;
+    if (value.value >= level) {
+      candidate.at = centre - (value.value - level) * value.uphill;
+    } else {
+      // A neighbour above the level comes to the same place, unless there is a crease.
+      if (!meeting.at(crossed)) return candidate;
+      Climb climb(field_, centre, value);
+      if (!climb.to_level(2 * grid_.pitch)) return candidate;
+      candidate.at = climb.at();
+      value = climb.value();
+      candidate.sharpness = climb.sharpness(0.02 * field_.radius());
+    }
+    const double distance = value.by == NavigableField::Limit::kSurface
+                                ? level
+                                : std::sqrt(field_.surface().closest(candidate.at, value.slot).distance2);
+    // The ball keeps t from the surface, and all of it out of the closed half-spaces.
+    const double ground = field_.above_ground(candidate.at);
+    const double radius = std::min(distance - field_.tolerance(), ground);
+    const bool in_hull = crossed.inside >= norm(candidate.at - centre);
+    if (!in_hull && field_.hull().distance(candidate.at, radius) >= radius - kTouch) return candidate;
     candidate.radius = radius;
-    candidate.sharpness = witnesses.sharpness(candidate.at, field_.level(), 0.02 * field_.radius());
+    candidate.clearance = std::min(distance, ground);
     return candidate;
   }
 
-  std::vector<Candidate> reachable(std::vector<Candidate> candidates, const BallSources& sources) const {
-    std::vector<Vec3> points;
-    points.reserve(candidates.size() + sources.seeds.size());
-    for (const Candidate& candidate : candidates) points.push_back(candidate.at);
-    points.insert(points.end(), sources.seeds.begin(), sources.seeds.end());
-    BallReach reach(field_, grid_, points);
+  std::vector<Candidate> reachable(const std::vector<Candidate>& candidates, const BallSources& sources,
+                                   BallReach& reach) const {
+    for (const Candidate& candidate : candidates) reach.add(candidate.at, candidate.clearance);
     if (sources.outside) reach.start_outside();
-    for (std::size_t i = candidates.size(); i < points.size(); ++i) reach.start_at(static_cast<std::int32_t>(i));
+    for (const Vec3 seed : sources.seeds) reach.start_at(reach.add(seed, field_.clearance(seed).value));
 
-    // All points of a region are on one side of the surface. Only ways into regions outside it matter.
-    std::unordered_map<std::int32_t, bool> is_outside;
+    inside_.clear();  // points have joined regions
     std::vector<std::int32_t> cut_off;
     std::vector<bool> keep(candidates.size());
     for (std::size_t i = 0; i < candidates.size(); ++i) {
       const auto point = static_cast<std::int32_t>(i);
-      if (reach.reached(point)) {
+      keep[i] = reach.reached(point);
+      if (keep[i] || is_inside(reach.region(point), candidates[i].at)) continue;
+      if (sources.reachable_only)
+        cut_off.push_back(point);
+      else
         keep[i] = true;
-        continue;
-      }
-      const auto [entry, is_new] = is_outside.try_emplace(reach.region(point));
-      if (is_new) entry->second = surface_.winding().at(points[i], kWindingAccuracy) < 0.5;
-      keep[i] = entry->second && !sources.reachable_only;
-      if (entry->second && sources.reachable_only) cut_off.push_back(point);
     }
     if (!cut_off.empty()) {
-      reach.look_closely(cut_off);
+      reach.look_closely(cut_off, threads_);
       for (const std::int32_t point : cut_off) keep[point] = reach.reached(point);
     }
     std::vector<Candidate> kept;
@@ -210,6 +303,7 @@ class Spreading {
   const NavigableField& field_;
   int threads_;
   ClearanceGrid grid_;
+  mutable std::unordered_map<std::int32_t, bool> inside_;  // by region
 };
 
 }  // namespace

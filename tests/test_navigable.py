@@ -1,0 +1,470 @@
+"""The navigable space: where balls are, where they get in, and what they make of a part."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+from typing import Any
+
+import manifold3d
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+from rlacd import _native
+from rlacd.criteria.navigable import LEAST_RADIUS, Balls, Navigable, NavigableSpace
+from rlacd.errors import OptionError
+from rlacd.solid.component import Component, Part, Plane
+from rlacd.solid.frame import Frame
+from rlacd.solid.hull import Hull
+from rlacd.solid.load import load_mesh
+from rlacd.solid.repair import repair
+from rlacd.solid.solid import Solid
+from tests.shapes import Floats, box, from_manifold, point_to_triangles
+
+# With these the balls are 0.1 wide in a frame 2 wide.
+RADIUS, TOLERANCE = 0.05, 0.02
+R, T = 2 * RADIUS, 2 * TOLERANCE
+
+
+def solid_of(manifold: Any) -> Solid:
+    """As repair would hand it over, cavities kept; the frame is that of the points."""
+    mesh = from_manifold(manifold)
+    frame = Frame.of(mesh.vertices)
+    there = manifold.translate(tuple(-frame.center)).scale((frame.scale,) * 3)
+    mesh = from_manifold(there)
+    return Solid(there, (mesh.vertices, mesh.faces), frame, (), ())
+
+
+def prepare(manifold: Any, radius: float = RADIUS, tolerance: float = TOLERANCE, **options: Any) -> Navigable:
+    return NavigableSpace(radius, tolerance, **options).prepare(solid_of(manifold), threads=1)
+
+
+def turned(manifold: Any, turn: int) -> Any:
+    """Four orientations: as it is, and turned by angles that nothing is aligned with."""
+    return manifold.rotate([(0, 0, 0), (31, 17, 53), (45, 45, 0), (10, 80, 33)][turn])
+
+
+def torus(hole: float, tube: float = 0.3) -> Any:
+    """Around z, as large as the frame when hole + 2 tube is 1."""
+    circle = manifold3d.CrossSection.circle(tube, 48).translate((hole + tube, 0))
+    return manifold3d.Manifold.revolve(circle, 96)
+
+
+def table() -> Any:
+    legs = [box((x, y, -0.8), (x + 0.15, y + 0.15, 0.1)) for x in (-1, 0.85) for y in (-0.7, 0.55)]
+    return box((-1, -0.7, 0), (1, 0.7, 0.15)) + manifold3d.Manifold.batch_boolean(legs, manifold3d.OpType.Add)
+
+
+def house(door: float | None, wall: float = 0.06, height: float = 1.2) -> Any:
+    """A furnished room, 1.4 x 1.4 x 1.6 inside; its door is as wide as given and higher."""
+    inside = box((-0.7, -0.7, -0.8), (0.7, 0.7, 0.8))
+    outer = box((-0.7 - wall, -0.7 - wall, -0.8 - wall), (0.7 + wall, 0.7 + wall, 0.8 + wall))
+    shell = outer - inside
+    if door is not None:
+        shell -= box((0.1 - door / 2, 0.5, -0.8), (0.1 + door / 2, 1, -0.8 + height))
+    return shell + box((-0.71, -0.5, -0.81), (-0.3, 0.1, -0.3)) + box((0.3, -0.4, -0.81), (0.5, -0.2, 0.2))
+
+
+def inside_house(nav: Navigable, manifold: Any, turn: int) -> Floats:
+    """Which centres lie within the walls."""
+    frame = solid_of(manifold).frame
+    centres = frame.to_input(nav.balls.centres)
+    # Back by the same turn: the axes of the turned frame are its images.
+    axes = np.stack([from_manifold(turned(box(*e), turn)).vertices.mean(axis=0) * 2 for e in _AXES])
+    there = centres @ axes.T
+    return (np.abs(there) < (0.7, 0.7, 0.8)).all(axis=1)
+
+
+_AXES = [((0, -0.5, -0.5), (1, 0.5, 0.5)), ((-0.5, 0, -0.5), (0.5, 1, 0.5)), ((-0.5, -0.5, 0), (0.5, 0.5, 1))]
+
+
+def depth_of(hull: Hull, points: Floats) -> Floats:
+    """Signed distance to a hull, negative inside, by Qhull's planes and brute force."""
+    equations = ConvexHull(hull.vertices).equations
+    inner = (points @ equations[:, :3].T + equations[:, 3]).max(axis=1)
+    return np.where(inner <= 0, inner, point_to_triangles(points, hull.vertices, hull.faces))
+
+
+SHAPES = {
+    "bracket": box((-1, -1, -0.5), (1, 1, 0.5)) - box((-0.4, -0.4, 0), (2, 2, 2)),
+    "torus": torus(0.4),
+    "table": table(),
+    "turned table": turned(table(), 1),
+    "open house": house(0.4),
+    "two boxes": box((-1, -0.3, -0.3), (-0.2, 0.3, 0.3)) + box((0.2, -0.3, -0.3), (1, 0.3, 0.3)),
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_balls_are_where_the_definition_says(name: str) -> None:
+    solid = solid_of(SHAPES[name])
+    nav = NavigableSpace(RADIUS, TOLERANCE).prepare(solid)
+    check_balls(nav, solid)
+
+
+def check_balls(nav: Navigable, solid: Solid) -> None:
+    mesh = from_manifold(solid.manifold)
+    hull = Hull.of(mesh.vertices)
+    assert hull is not None
+    centres, radii = nav.balls.centres, nav.balls.radii
+    assert len(centres) > 0
+    assert (radii >= nav.radius - 1e-8).all()
+    distance = point_to_triangles(centres, mesh.vertices, mesh.faces)
+    np.testing.assert_allclose(radii, distance - nav.tolerance, atol=2e-8)
+    assert (_native.Surface(mesh.vertices, mesh.faces).winding(centres, accuracy=np.inf) < 0.01).all()
+    away = depth_of(hull, centres)
+    assert (away <= nav.radius + 1e-8).all()
+    assert (away < radii).all()
+    # On the boundary: at the distance of radius and tolerance from the surface, or of the radius from the hull.
+    on = np.minimum(np.abs(distance - nav.radius - nav.tolerance), np.abs(away - nav.radius))
+    assert on.max() < 1e-7
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize(("radius", "tolerance"), [(0.05, 0.02), (0.025, 0.05), (0.05, 0.005)])
+def test_the_boundary_is_covered(name: str, radius: float, tolerance: float) -> None:
+    """Points at the distance of radius and tolerance, found without a grid; all of these shapes are open."""
+    solid = solid_of(SHAPES[name])
+    nav = NavigableSpace(radius, tolerance).prepare(solid)
+    mesh = from_manifold(solid.manifold)
+    surface, hull = _native.Surface(mesh.vertices, mesh.faces), Hull.of(mesh.vertices)
+    assert hull is not None
+    points = np.random.default_rng(5).uniform(-1.2, 1.2, (60_000, 3))
+    points = points[surface.winding(points) < 0.5]
+    closest, _ = surface.closest(points)
+    distance = np.linalg.norm(points - closest, axis=1)
+    far = distance > nav.radius + nav.tolerance
+    level = closest[far] + (points - closest)[far] * ((nav.radius + nav.tolerance) / distance[far])[:, None]
+    level = level[depth_of(hull, level) < 0.9 * nav.radius]
+    assert len(level) > 1000
+    gap = np.linalg.norm(level[:, None] - nav.balls.centres[None], axis=2).min(axis=1)
+    assert gap.max() < 0.75 * nav.radius
+    assert np.quantile(gap, 0.99) < 0.6 * nav.radius
+
+
+@pytest.mark.parametrize("turn", range(4))
+def test_creases_and_corners_get_a_ball(turn: int) -> None:
+    """A ball in the corner of three walls, and one every spacing along their edges."""
+    corner = turned(box((-1, -1, -1), (1, 1, 1)) - box((-0.5, -0.5, -0.5), (2, 2, 2)), turn)
+    solid = solid_of(corner)
+    nav = NavigableSpace(RADIUS, TOLERANCE).prepare(solid)
+    mesh = from_manifold(solid.manifold)
+    triangles = mesh.vertices[mesh.faces]
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    heights = np.einsum("ij,bij->bi", normals, nav.balls.centres[:, None] - triangles[None, :, 0])
+    walls = [i for i in range(len(normals)) if heights[:, i].min() > 0]  # of the notch: all balls are in front of them
+    near = np.abs(heights[:, walls] - (R + T)) < 1e-6
+    distinct = np.unique(np.round(normals[walls], 6), axis=0)
+    count = np.array([len(np.unique(np.round(normals[walls][row], 6), axis=0)) for row in near])
+    assert len(distinct) == 3
+    assert (count == 3).sum() == 1
+    assert (count >= 2).sum() >= 3 * 12
+
+
+def test_a_convex_solid_has_no_balls() -> None:
+    nav = prepare(box((-1, -0.5, -0.2), (1, 0.5, 0.2)))
+    assert len(nav.balls) == 0
+    assert nav.warnings == ()
+    assert nav.is_met(Component(box((-1, -0.5, -0.2), (1, 0.5, 0.2))))
+
+
+@pytest.mark.parametrize("turn", [0, 1])
+@pytest.mark.parametrize("hole", [0.2, 0.4])
+def test_a_hole_is_open_exactly_when_the_ball_fits(turn: int, hole: float) -> None:
+    ring = turned(torus(hole), turn)
+    solid = solid_of(ring)
+    for share, is_open in ((0.97, True), (1.03, False)):
+        length = 2 * (hole + 0.6)
+        space = NavigableSpace(radius_m=0.7 * share * hole, tolerance_m=0.3 * share * hole)
+        balls = solid.frame.to_input(space.prepare(solid).balls.centres)
+        assert (np.linalg.norm(balls, axis=1) < 0.1 * hole).any() == is_open
+        assert space.prepare(solid).radius == pytest.approx(2 * 0.7 * share * hole / np.ptp(_points(ring), axis=0).max())
+        assert length > 0
+
+
+def _points(manifold: Any) -> Floats:
+    return from_manifold(manifold).vertices
+
+
+@pytest.mark.parametrize("turn", range(4))
+@pytest.mark.parametrize("wall", [0.01, 0.06, 0.3])
+@pytest.mark.parametrize("share", [0.96, 0.98, 1.02, 1.04])
+def test_a_door_lets_in_what_is_narrower(turn: int, wall: float, share: float) -> None:
+    diameter = 0.2
+    home = turned(house(share * diameter, wall), turn)
+    nav = NavigableSpace(radius_m=diameter / 2, tolerance_m=0.02).prepare(solid_of(home))
+    assert inside_house(nav, home, turn).any() == (share > 1)
+
+
+@pytest.mark.parametrize("turn", range(2))
+@pytest.mark.parametrize("share", [0.97, 0.985, 1.015, 1.03])
+@pytest.mark.parametrize("wall", [0.02, 0.4])
+def test_a_round_hole_lets_in_what_is_narrower(turn: int, share: float, wall: float) -> None:
+    radius = 0.1
+    hole = manifold3d.Manifold.cylinder(2, share * radius, circular_segments=256).rotate((0, 90, 0))
+    home = turned(house(None, wall) - hole.translate((0.5, 0.2, 0.23)), turn)
+    nav = NavigableSpace(radius_m=radius, tolerance_m=0.01).prepare(solid_of(home))
+    assert inside_house(nav, home, turn).any() == (share > 1)
+
+
+@pytest.mark.parametrize("turn", range(2))
+@pytest.mark.parametrize("share", [0.97, 1.03])
+def test_a_winding_passage_is_followed(turn: int, share: float) -> None:
+    """Three legs at right angles through a thick wall, hardly wider than the ball."""
+    half = share * 0.1
+    legs = [
+        box((0.6, -half, -half), (0.9 + half, half, half)),
+        box((0.9 - half, -half, -half), (0.9 + half, 0.4 + half, half)),
+        box((0.9 - half, 0.4 - half, -half), (2, 0.4 + half, half)),
+    ]
+    home = turned(house(None, 0.6) - manifold3d.Manifold.batch_boolean(legs, manifold3d.OpType.Add), turn)
+    nav = NavigableSpace(radius_m=0.1, tolerance_m=0.01).prepare(solid_of(home))
+    assert inside_house(nav, home, turn).any() == (share > 1)
+
+
+def test_of_two_doors_the_wider_one_counts() -> None:
+    home = house(0.98 * 0.2) - box((-2, -0.2, -0.1), (0, -0.2 + 1.02 * 0.2, 0.4))
+    nav = NavigableSpace(radius_m=0.1, tolerance_m=0.01).prepare(solid_of(home))
+    assert inside_house(nav, home, 0).any()
+
+
+def test_a_sealed_house_is_one_part_and_its_inside_counts_when_asked_for() -> None:
+    home = house(None)
+    shut = prepare(home)
+    assert len(shut.balls) == 0
+    assert shut.is_met(Component(solid_of(home).manifold))
+    everything = prepare(home, reachable_only=False)
+    assert len(everything.balls) > 100
+    assert inside_house(everything, home, 0).all()
+    check_balls(everything, solid_of(home))
+    assert not everything.is_met(Component(solid_of(home).manifold))
+
+
+def test_balls_from_seeds_stay_where_they_can_come_from_there() -> None:
+    """A notch outside, a room inside: the seed says which of them counts, the door whether both do."""
+    notch = box((-0.5, -2, 0.5), (0.5, -0.9, 2))
+    shut, opened = (house(door, 0.3) - notch for door in (None, 0.3))
+    within = ((0.0, 0.3, 0.3),)
+    nav = prepare(shut, seeds=within)
+    assert len(nav.balls) > 100
+    assert inside_house(nav, shut, 0).all()
+    nav = prepare(shut, seeds=[(0, -5, 0)])
+    assert len(nav.balls) > 10
+    assert not inside_house(nav, shut, 0).any()
+    nav = prepare(opened, seeds=within)
+    assert inside_house(nav, opened, 0).any()
+    assert not inside_house(nav, opened, 0).all()
+    np.testing.assert_array_equal(nav.balls.centres, prepare(opened).balls.centres)
+
+
+def test_the_ground_keeps_balls_above_it() -> None:
+    """A table on the ground: balls go under it from the sides. A crate upside down: nothing comes in."""
+    ground = ((0, 0, 2), -1.6)  # z = -0.8; the normal's length does not matter
+    solid = solid_of(table())
+    nav = NavigableSpace(RADIUS, TOLERANCE, closed_planes=[ground]).prepare(solid)
+    floor = float(solid.frame.to_frame([[0, 0, -0.8]])[0, 2])
+    lowest = nav.balls.centres[:, 2] - nav.balls.radii
+    assert lowest.min() == pytest.approx(floor, abs=1e-9)
+    assert (nav.balls.radii >= nav.radius - 1e-8).all()
+    under = (np.abs(nav.balls.centres[:, :2]) < 0.5).all(axis=1)
+    assert under.any()
+    crate = box((-0.5, -0.5, -0.8), (0.5, 0.5, 0)) - box((-0.4, -0.4, -1), (0.4, 0.4, -0.1))
+    assert len(prepare(crate).balls) > 0
+    assert len(prepare(crate, closed_planes=[ground]).balls) == 0
+
+
+def test_a_table_leg_seen_from_the_ground_up() -> None:
+    """Between the legs, just above the ground, a hull is met by balls that stand on the ground."""
+    solid = solid_of(table())
+    nav = NavigableSpace(RADIUS, TOLERANCE, closed_planes=[((0, 0, 1), -0.8)]).prepare(solid)
+    feet = from_manifold(solid.manifold.trim_by_plane((0, 0, -1), 0.75)).vertices
+    hull = Hull.of(feet)
+    assert hull is not None
+    assert not nav.is_met(part_of(hull))
+
+
+@pytest.mark.parametrize("reachable_only", [True, False])
+def test_the_number_of_threads_changes_nothing(reachable_only: bool) -> None:
+    solid = solid_of(turned(house(0.21), 1))
+    space = NavigableSpace(0.05, 0.01, reachable_only=reachable_only)
+    first = space.prepare(solid, threads=1)
+    for threads in (2, 5):
+        other = space.prepare(solid, threads=threads)
+        np.testing.assert_array_equal(first.balls.centres, other.balls.centres)
+        np.testing.assert_array_equal(first.balls.radii, other.balls.radii)
+
+
+def test_lengths_in_the_unit_of_the_input() -> None:
+    here, there = (table().scale((s,) * 3).translate((1, 2, 3)) for s in (1, 0.01))
+    # The longest side is 2 and 0.02.
+    a = prepare(here, 0.05, 0.02)
+    b = NavigableSpace(radius_m=0.001, tolerance_m=0.0004).prepare(solid_of(there))
+    np.testing.assert_allclose(a.balls.centres, b.balls.centres, atol=1e-9)
+    assert b.space.radius is None
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"radius": 0}, "radius is 0"),
+        ({"tolerance": -0.1}, "tolerance is -0.1"),
+        ({"radius": float("nan")}, "radius is nan"),
+        ({"tolerance": float("inf")}, "tolerance is inf"),
+        ({"radius": None}, "radius is None"),
+        ({"radius": "wide"}, "radius is 'wide'"),
+        ({"radius_m": 0.0}, "radius_m is 0"),
+        ({"tolerance_m": -1}, "tolerance_m is -1"),
+        ({"seeds": [(0, 0)]}, "seeds"),
+        ({"seeds": []}, "seeds"),
+        ({"seeds": [(0, 0, float("nan"))]}, "seeds"),
+        ({"seeds": "here"}, "seeds"),
+        ({"closed_planes": [((0, 0, 0), 1)]}, "closed_planes"),
+        ({"closed_planes": [(0, 0, 1)]}, "closed_planes"),
+        ({"closed_planes": 3}, "closed_planes"),
+        ({"reachable_only": "yes"}, "reachable_only"),
+    ],
+)
+def test_options_out_of_range_are_told(given: dict[str, Any], says: str) -> None:
+    with pytest.raises(OptionError, match=says):
+        NavigableSpace(**given)
+
+
+def test_a_space_can_be_compared_and_hashed() -> None:
+    a = NavigableSpace(0.1, seeds=np.array([[1, 2, 3]]), closed_planes=[(np.array([0, 0, 1]), 0)])
+    b = NavigableSpace(0.1, seeds=((1.0, 2.0, 3.0),), closed_planes=(((0, 0, 1), 0.0),))
+    assert a == b
+    assert hash(a) == hash(b)
+
+
+@pytest.mark.parametrize(
+    ("seed", "says"), [((0, 0, 0.05), "inside"), ((0, 0, 0.2), "radius"), ((0, 0, -0.75), "closed plane")]
+)
+def test_a_seed_without_room_is_told(seed: tuple[float, float, float], says: str) -> None:
+    with pytest.raises(OptionError, match=says):
+        prepare(table(), seeds=[seed], closed_planes=[((0, 0, 1), -0.8)])
+
+
+def test_a_ball_larger_than_the_object_leaves_one_hull_and_says_so() -> None:
+    nav = prepare(table(), 1.5)
+    assert len(nav.balls) == 0
+    assert any("larger than the object" in warning for warning in nav.warnings)
+    assert nav.is_met(Component(solid_of(table()).manifold))
+
+
+def test_a_radius_too_small_for_the_grid_is_told() -> None:
+    nav = prepare(box((-1, -0.2, -0.2), (1, 0.2, 0.2)) - box((-0.5, -0.1, 0), (0.5, 0.1, 1)), 0.002, 0.002)
+    assert len(nav.balls) > 0
+    assert any("is small" in warning for warning in nav.warnings)
+
+
+def test_what_was_open_is_told() -> None:
+    vertices, faces = _cup()
+    nav = NavigableSpace().prepare(repair(load_mesh((vertices, faces))))
+    assert any("open bod" in warning for warning in nav.warnings)
+    assert len(nav.balls) > 0
+
+
+def _cup() -> tuple[Floats, Any]:
+    mesh = from_manifold(box((-1, -1, -1), (1, 1, 1)))
+    top = (mesh.vertices[mesh.faces][:, :, 2] > 0.5).all(axis=1)
+    return mesh.vertices, mesh.faces[~top]
+
+
+# The criterion.
+
+
+def part_of(hull: Hull, within: Part | None = None) -> Part:
+    part = Part(hull.vertices, hull.faces, hull.volume, hull)
+    part.within = within
+    return part
+
+
+def some_balls(count: int = 400, seed: int = 3) -> Navigable:
+    rng = np.random.default_rng(seed)
+    balls = Balls(rng.uniform(-1, 1, (count, 3)), rng.uniform(0.05, 0.2, count))
+    return Navigable(NavigableSpace(0.025, 0.01), 0.05, 0.02, balls)
+
+
+def some_hull(seed: int, size: float = 0.4) -> Hull:
+    rng = np.random.default_rng(seed)
+    hull = Hull.of(rng.uniform(-1, 1, 3) * 0.7 + size * rng.uniform(-1, 1, (20, 3)))
+    assert hull is not None
+    return hull
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_error_is_the_deepest_intrusion(seed: int) -> None:
+    nav, hull = some_balls(seed=seed), some_hull(seed, 0.1 + 0.1 * seed)
+    depth = nav.balls.radii - depth_of(hull, nav.balls.centres)
+    assert nav.error(part_of(hull)) == pytest.approx(max(0.0, depth.max()), abs=1e-7)
+    assert nav.is_met(part_of(hull)) == (depth.max() <= 1e-9)
+    for factor in (1.5, 5.0, 12.0):
+        coarser = nav.scaled(factor)
+        allowance = 0.02 * (factor - 1)
+        assert coarser.allowance == pytest.approx(allowance)
+        expected = depth[nav.balls.radii > allowance].max(initial=0.0) <= max(allowance, 1e-9)
+        assert coarser.is_met(part_of(hull)) == expected
+        assert coarser.error(part_of(hull)) == nav.error(part_of(hull))
+
+
+def test_scaling_twice_is_scaling_by_the_product() -> None:
+    nav = some_balls()
+    assert nav.scaled(2).scaled(3).allowance == pytest.approx(nav.scaled(6).allowance)
+
+
+def test_children_are_judged_as_if_they_had_no_parents() -> None:
+    solid = solid_of(turned(table(), 1))
+    nav = NavigableSpace(RADIUS, TOLERANCE).prepare(solid)
+    generation = [Component(solid.manifold)]
+    for axis in (0, 1, 2, 0, 1):
+        for component in generation:
+            alone = NavigableSpace(RADIUS, TOLERANCE).prepare(solid)
+            assert nav.is_met(component) == alone.is_met(part_of(component.hull))
+            assert nav.error(component) == alone.error(part_of(component.hull))
+        normal = tuple(float(axis == i) for i in range(3))
+        cut = [c.cut(Plane(normal, float(c.box[:, axis].mean()))) for c in generation]
+        generation = [side for pair in cut for side in pair if side is not None]
+    assert len(generation) > 8
+
+
+def test_a_part_smaller_than_half_the_tolerance_is_done() -> None:
+    nav = Navigable(NavigableSpace(0.1, 0.1), 0.2, 0.2, Balls(np.zeros((1, 3)), np.array([0.2])))
+    for side, done in ((0.09, True), (0.11, False)):
+        hull = Hull.of(side * np.array(list(itertools.product((0, 1), repeat=3)), dtype=float))
+        assert hull is not None
+        assert nav.is_met(part_of(hull)) == done
+        assert (nav.error(part_of(hull)) == 0) == done
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_balls_give_way_to_finished_parts(seed: int) -> None:
+    nav = some_balls(seed=seed)
+    parts = [part_of(some_hull(10 * seed + i, 0.3)) for i in range(4)]
+    settled = nav.settled(parts)
+    assert all(settled.is_met(part) for part in parts)
+    away = np.min([depth_of(part.hull, nav.balls.centres) for part in parts], axis=0)
+    left = np.minimum(nav.balls.radii, away)
+    kept = left >= LEAST_RADIUS * nav.radius
+    np.testing.assert_allclose(settled.balls.radii, left[kept], atol=1e-7)
+    np.testing.assert_array_equal(settled.balls.centres, nav.balls.centres[kept])
+    assert settled.conflicts.dropped == (~kept).sum()
+    assert settled.conflicts.shrunk == (kept & (left < nav.balls.radii - 1e-9)).sum()
+    lost = np.where(kept, nav.balls.radii - left, nav.balls.radii)
+    assert settled.conflicts.most == pytest.approx(lost.max(), abs=1e-7)
+    assert nav.settled([]) is nav
+
+
+@pytest.mark.slow
+def test_on_real_meshes(corpus: Path) -> None:
+    for name in (corpus / "quick.txt").read_text().split()[::4]:
+        solid = repair(load_mesh(corpus / name))
+        for radius, tolerance in ((0.025, 0.05), (0.05, 0.01)):
+            nav = NavigableSpace(radius, tolerance).prepare(solid)
+            mesh = from_manifold(solid.manifold)
+            surface = _native.Surface(mesh.vertices, mesh.faces)
+            distance = surface.distance(nav.balls.centres)
+            np.testing.assert_allclose(nav.balls.radii, distance - nav.tolerance, atol=1e-7)
+            assert (nav.balls.radii >= nav.radius - 1e-8).all()
+            assert (surface.winding(nav.balls.centres, accuracy=np.inf) < 0.01).all()
