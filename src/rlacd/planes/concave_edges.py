@@ -49,6 +49,9 @@ SAME_DIRECTION = 3e-7
 SAME_PLANE = 1e-4
 """Planes whose coordinates (see `_coordinates`) differ by less than this are one."""
 
+TIE = 1e-9
+"""Edges whose scores are this close in proportion are alike: the first one goes, not the one that rounding prefers."""
+
 
 @dataclass(frozen=True, eq=False)
 class ConcaveEdges:
@@ -226,7 +229,7 @@ def _spread_out(
     novelty = np.ones((len(edges), 3))
     for _ in range(count):
         score = np.where(novelty.max(axis=1) > SAME_PLANE, weight * distance * novelty.mean(axis=1), 0)
-        best = int(score.argmax())
+        best = int((score >= (1 - TIE) * score.max()).argmax())
         if score[best] <= 0:
             break
         from_best = np.linalg.norm(middle - middle[best], axis=1)

@@ -36,15 +36,21 @@ SCORES: Mapping[str, Callable[[Sweep], FloatArray]] = MappingProxyType(
 )
 
 
+TIE = 1e-9
+"""Costs that differ by less than this share of the largest are equal."""
+
+
 def cheapest(scored: Sweep, cost: FloatArray) -> Plane | None:
     """Get the valid plane of least cost; None when every plane misses the solid or shaves off a film.
 
-    Planes that leave slivers are taken only where no other is left.
+    Planes that leave slivers are taken only where no other is left. Of planes that cost the same but for rounding, as
+    they do in symmetric shapes, the first is taken, so that the cuts do not depend on the input's unit and place.
     """
     for sliver in (SLIVER, SLIVER / 100):
         valid = scored.valid(sliver)
         if valid.any():
-            return scored.candidates.plane(int(np.argmin(np.where(valid, cost, np.inf))))
+            equal = cost[valid].min() + TIE * cost[valid].max()
+            return scored.candidates.plane(int(np.argmax(valid & (cost <= equal))))
     return None
 
 
