@@ -25,7 +25,12 @@ from typing import Any
 import numpy as np
 
 SETTINGS = {"r2.5t5": (0.025, 0.05), "r5t1": (0.05, 0.01)}
-POLICIES = {"navacd": "navacd", "greedy-150": "greedy-hull-sum", "greedy": "greedy"}
+POLICIES = {
+    "navacd": "navacd",
+    "greedy-150": "greedy-hull-sum",
+    "greedy-162": "greedy-hull-sum+edges",
+    "greedy": "greedy",
+}
 COACD_CRACKS = 1e-3
 """CoACD's hulls leave cracks of some 1e-5 between them; narrower ones than this are closed, else their walls count."""
 

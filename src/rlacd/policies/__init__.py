@@ -1,10 +1,17 @@
 """Which plane to cut next."""
 
 from rlacd.policies.greedy import SCORES, Greedy
-from rlacd.policies.navacd import NavACD
+from rlacd.policies.navacd import CONCAVE_EDGES, NavACD
 from rlacd.policies.policy import Policy
 
-POLICIES = ("greedy", *(f"greedy-{score}" for score in SCORES), "navacd")
+EDGES = "+edges"
+
+POLICIES = (
+    "greedy",
+    *(f"greedy-{score}" for score in SCORES),
+    *(f"greedy-{score}{EDGES}" for score in SCORES),
+    "navacd",
+)
 """Names that `make_policy` knows."""
 
 
@@ -12,8 +19,9 @@ def make_policy(name: str) -> Policy:
     """Build the policy called `name`.
 
     ``greedy`` looks at 150 planes and those of four concave edges, and takes the one with the least p-norm of excess
-    volumes; ``greedy-SCORE`` takes the one with the least SCORE of the 150 alone (``greedy-hull-sum`` is the paper's
-    baseline); ``navacd`` takes the least sum of hull volumes of three planes and those of four concave edges.
+    volumes; ``greedy-SCORE`` takes the one with the least SCORE of the 150 alone, ``greedy-SCORE+edges`` of the 150 and
+    those of the edges (SCORE ``hull-sum`` is the paper's baseline); ``navacd`` takes the least sum of hull volumes of
+    three planes and those of four concave edges.
 
     Raises
     ------
@@ -25,8 +33,8 @@ def make_policy(name: str) -> Policy:
     if name == "navacd":
         return NavACD()
     family, _, score = name.partition("-")
-    if family == "greedy" and score in SCORES:
-        return Greedy(score, concave_edges=0)
+    if family == "greedy" and score.removesuffix(EDGES) in SCORES:
+        return Greedy(score.removesuffix(EDGES), concave_edges=CONCAVE_EDGES if score.endswith(EDGES) else 0)
     raise KeyError(name)
 
 
