@@ -430,3 +430,39 @@ def test_skins_that_lead_away_are_tried_as_sheets(corpus) -> None:
     """Crossing faces of one body: the first skin of this cabinet led 0.15 away from it."""
     solid = repair(load_mesh(corpus / "train/kenney_cc0/furniture_pack__cabinetBedDrawer.ply"))
     assert max(body.deviation for body in solid.bodies) < 0.03
+
+
+def inverted(mesh):
+    return trimesh.Trimesh(mesh.vertices, mesh.faces[:, ::-1], process=False)
+
+
+def sealed_rooms():
+    """A room with a stool in it, walls 0.2 thick: as two shells, the same turned inside out, and as six slabs."""
+    outer, inner = BOX, trimesh.creation.box(extents=(1.6, 1.6, 1.6))
+    stool = trimesh.creation.box(extents=(0.4, 0.4, 0.4))
+    shells = join(outer, inverted(inner), stool)
+    slabs = []
+    for axis in range(3):
+        extents, offset = [2.0, 2.0, 2.0], np.zeros(3)
+        extents[axis], offset[axis] = 0.2, 0.9
+        slabs += [moved(trimesh.creation.box(extents=extents), *(side * offset)) for side in (-1, 1)]
+    return {"shells": shells, "inside out": inverted(shells), "slabs": join(*slabs, stool)}
+
+
+@pytest.mark.parametrize("name", sealed_rooms())
+def test_sealed_rooms_are_filled_or_kept(name):
+    mesh = sealed_rooms()[name]
+    assert volume(solid_of(mesh)) == pytest.approx(8)
+    assert volume(solid_of(mesh, keep_cavities=True)) == pytest.approx(8 - 1.6**3 + 0.4**3)
+
+
+def test_a_cavity_in_what_stands_in_a_cavity():
+    nested = [trimesh.creation.box(extents=(side,) * 3) for side in (2.0, 1.6, 1.0, 0.6)]
+    mesh = join(nested[0], inverted(nested[1]), nested[2], inverted(nested[3]))
+    assert volume(solid_of(mesh, keep_cavities=True)) == pytest.approx(8 - 1.6**3 + 1 - 0.6**3)
+
+
+def test_bodies_side_by_side_are_no_cavities_whatever_their_windings():
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    mesh = join(moved(ball, -2, 0, 0), inverted(moved(ball, 2, 0, 0)))
+    assert volume(solid_of(mesh, keep_cavities=True)) == pytest.approx(2 * ball.volume)

@@ -126,6 +126,7 @@ def decompose(
                 source,
                 resolution=options.resolution,
                 threads=workers.threads,
+                keep_cavities=isinstance(criterion, NavigableSpace) and criterion.sees_cavities,
             )
         if options.threshold_m is not None:
             options = options.with_threshold(options.threshold_m * solid.frame.scale)

@@ -29,7 +29,14 @@ from rlacd.solid.load import InputMesh
 from rlacd.solid.repair_distance import SurfaceQuery, spread_points
 from rlacd.solid.repair_holes import MOST_FREE_EDGES, cap, close_cracks, free_edges, free_loops
 from rlacd.solid.repair_skin import skin
-from rlacd.solid.repair_union import hull_of_points, split_labels, to_arrays, to_manifold, unite
+from rlacd.solid.repair_union import (
+    hull_of_points,
+    split_labels,
+    to_arrays,
+    to_manifold,
+    unite,
+    unite_around_cavities,
+)
 from rlacd.solid.repair_voxels import Reach
 from rlacd.solid.solid import BodyRepair, Solid
 from rlacd.solid.topology import (
@@ -140,7 +147,7 @@ class _Soup:
         return _Soup(self.vertices, self.faces[keep], self.body[keep])
 
 
-def repair(mesh: InputMesh, *, resolution: int = 100, threads: int | None = None) -> Solid:
+def repair(mesh: InputMesh, *, resolution: int = 100, threads: int | None = None, keep_cavities: bool = False) -> Solid:
     """Make a mesh into one closed, oriented solid.
 
     Parameters
@@ -151,6 +158,9 @@ def repair(mesh: InputMesh, *, resolution: int = 100, threads: int | None = None
         Cells along the longest side of the grid on which enclosed rooms are looked for.
     threads
         How many threads measure distances; all there are by default. The result does not depend on it.
+    keep_cavities
+        Leave sealed rooms open: what a union encloses, and closed bodies wound the other way round than what encloses
+        them. A closed sheet without thickness is a solid all the same.
 
     Returns
     -------
@@ -182,11 +192,11 @@ def repair(mesh: InputMesh, *, resolution: int = 100, threads: int | None = None
         return Solid(solid, surface, frame, (body,), tuple(warnings))
 
     query = SurfaceQuery(vertices, faces, threads)
-    work = _Repair(query, resolution)
+    work = _Repair(query, resolution, keep_cavities)
     doubted = work.doubted()
     if len(doubted):
         # Faces of one body that cross each other can be joined wrongly into a skin: try them as sheets.
-        other = _Repair(query, resolution, doubted)
+        other = _Repair(query, resolution, keep_cavities, doubted)
         if other.deviation.max() < work.deviation.max():
             work = other
     return Solid(work.solid, surface, frame, work.report(), tuple(warnings + work.warnings))
@@ -198,9 +208,12 @@ class _Repair:
     Bodies are numbered after cracks are welded; `step`, `deviation` and `faces_out` are per body.
     """
 
-    def __init__(self, surface: SurfaceQuery, resolution: int, as_sheets: IntArray | None = None) -> None:
+    def __init__(
+        self, surface: SurfaceQuery, resolution: int, keep_cavities: bool, as_sheets: IntArray | None = None
+    ) -> None:
         self.input = surface
         self.resolution = resolution
+        self.keep_cavities = keep_cavities
         self.as_sheets = np.empty(0, dtype=np.int64) if as_sheets is None else as_sheets
         self.warnings: list[str] = []
 
@@ -220,8 +233,12 @@ class _Repair:
         else:
             soup = self._cap(self._drop_hidden(soup))
             parts = self._wrap_crowds(soup, self._build(soup))
-        self.solid = unite([part for part, _ in parts])
-        self._wrap_rooms(soup, parts)
+        if keep_cavities:
+            inward = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces), self.bodies) < 0
+            self.solid = unite_around_cavities([part for part, _ in parts], [bool(inward[body]) for _, body in parts])
+        else:
+            self.solid = unite([part for part, _ in parts])
+            self._wrap_rooms(soup, parts)
         if self.solid.is_empty():
             self.warnings.append("the surface could not be closed: the hull of its points stands in for the solid")
             self.step[:] = STEPS.index("hull")
@@ -305,7 +322,7 @@ class _Repair:
         distance = self.input.distance(points)
         far = distance > GAP
         unreachable = far.copy()
-        if far.any():
+        if far.any() and not self.keep_cavities:
             far[far] = self.reach.covers(points[far])
             unreachable &= ~far
         cap_area = np.bincount(owner, face_areas(soup.vertices, caps), self.bodies)

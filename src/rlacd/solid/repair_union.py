@@ -6,6 +6,7 @@ import manifold3d
 import numpy as np
 from manifold3d import Error, Manifold, Mesh64, OpType
 
+from rlacd import _native
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.topology import IntArray
 
@@ -37,14 +38,56 @@ def split_labels(vertices: FloatArray, faces: IntArray, label: IntArray) -> list
     return parts
 
 
-def unite(solids: list[Manifold]) -> Manifold:
+def unite(solids: list[Manifold], *, keep_cavities: bool = False) -> Manifold:
     """Unite solids and fill the cavities nothing can reach."""
     solids = [s for s in solids if not s.is_empty()]
     if not solids:
         return Manifold()
     if len(solids) > MOST_UNITED:
         return Manifold.compose(solids)
-    return _without_cavities(solids[0] if len(solids) == 1 else Manifold.batch_boolean(solids, OpType.Add))
+    united = solids[0] if len(solids) == 1 else Manifold.batch_boolean(solids, OpType.Add)
+    return united if keep_cavities else _without_cavities(united)
+
+
+def unite_around_cavities(solids: list[Manifold], inward: list[bool]) -> Manifold:
+    """Unite solids but for the cavities that some of them bound, and keep what stands in a cavity.
+
+    Parameters
+    ----------
+    solids : list of Manifold
+        Each with positive volume.
+    inward : list of bool
+        Which of them the input winds the other way round. A solid is a cavity if it is wound otherwise than the
+        outermost solid around it.
+    """
+    kept = [i for i, solid in enumerate(solids) if not solid.is_empty()]
+    if len({inward[i] for i in kept}) < 2:
+        return unite(solids, keep_cavities=True)
+    around = {kept[i]: [kept[j] for j in others] for i, others in enumerate(_around([solids[i] for i in kept]))}
+    outermost = {i: max(around[i], key=lambda j: solids[j].volume(), default=i) for i in kept}
+    cavities = {i for i in kept if inward[i] != inward[outermost[i]]}
+    hosts = {j for i in cavities for j in around[i]} - cavities
+    hollow = unite([solids[i] for i in sorted(hosts)], keep_cavities=True) - unite([solids[i] for i in sorted(cavities)])
+    rest = [solids[i] for i in kept if i not in hosts and i not in cavities]
+    return unite([hollow, *rest], keep_cavities=True)
+
+
+def _around(solids: list[Manifold]) -> list[list[int]]:
+    """Which solids each solid lies in, if it crosses none."""
+    boxes = np.reshape([solid.bounding_box() for solid in solids], (-1, 2, 3))
+    around: list[list[int]] = [[] for _ in solids]
+    for j, solid in enumerate(solids):
+        inner = (boxes[:, 0] >= boxes[j, 0]).all(axis=1) & (boxes[:, 1] <= boxes[j, 1]).all(axis=1)
+        inner[j] = False
+        if not inner.any():
+            continue
+        vertices, faces = to_arrays(solid)
+        surface = _native.Surface(np.ascontiguousarray(vertices), np.ascontiguousarray(faces, dtype=np.int32))
+        candidates = np.flatnonzero(inner)
+        points = np.stack([to_arrays(solids[i])[0][0] for i in candidates])
+        for i in candidates[surface.winding(points) > 0.5]:
+            around[i].append(j)
+    return around
 
 
 def _without_cavities(solid: Manifold) -> Manifold:
