@@ -441,11 +441,12 @@ def sealed_rooms():
     outer, inner = BOX, trimesh.creation.box(extents=(1.6, 1.6, 1.6))
     stool = trimesh.creation.box(extents=(0.4, 0.4, 0.4))
     shells = join(outer, inverted(inner), stool)
-    slabs = []
-    for axis in range(3):
-        extents, offset = [2.0, 2.0, 2.0], np.zeros(3)
-        extents[axis], offset[axis] = 0.2, 0.9
-        slabs += [moved(trimesh.creation.box(extents=extents), *(side * offset)) for side in (-1, 1)]
+    sizes = {2: (2.0, 2.0, 0.2), 0: (0.2, 2.0, 1.7), 1: (1.7, 0.2, 1.7)}
+    slabs = [
+        moved(trimesh.creation.box(extents=size), *(side * np.eye(3)[axis]))
+        for axis, size in sizes.items()
+        for side in (-0.9, 0.9)
+    ]
     return {"shells": shells, "inside out": inverted(shells), "slabs": join(*slabs, stool)}
 
 

@@ -66,10 +66,9 @@ def unite_around_cavities(solids: list[Manifold], inward: list[bool]) -> Manifol
     around = {kept[i]: [kept[j] for j in others] for i, others in enumerate(_around([solids[i] for i in kept]))}
     outermost = {i: max(around[i], key=lambda j: solids[j].volume(), default=i) for i in kept}
     cavities = {i for i in kept if inward[i] != inward[outermost[i]]}
-    hosts = {j for i in cavities for j in around[i]} - cavities
-    hollow = unite([solids[i] for i in sorted(hosts)], keep_cavities=True) - unite([solids[i] for i in sorted(cavities)])
-    rest = [solids[i] for i in kept if i not in hosts and i not in cavities]
-    return unite([hollow, *rest], keep_cavities=True)
+    inside: dict[int, list[Manifold]] = {j: [solids[i] for i in sorted(cavities) if j in around[i]] for j in kept}
+    hollow = [solids[j] - unite(inside[j]) if inside[j] else solids[j] for j in kept if j not in cavities]
+    return unite(hollow, keep_cavities=True)
 
 
 def _around(solids: list[Manifold]) -> list[list[int]]:
