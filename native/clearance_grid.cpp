@@ -10,8 +10,10 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::int32_t kBlock = 8;  // cells along a side of the largest cubes
 constexpr double kHalfDiagonal = 0.8660254037844387;
-// Cells up to a whole pitch below the level are asked too: from there the way up leads into creases and corners.
-constexpr double kBelow = 1.0;
+// Up to how many pitches from the level a cell is said to be crossed. Beyond the half diagonal, so that along any
+// straight line there is a cell on either side: those above come down on all of the boundary, those below come up into
+// its creases and corners.
+constexpr double kCrossed = 1.0;
 
 struct Found {
   std::vector<ClearanceGrid::Crossed> boundary;
@@ -27,26 +29,26 @@ class Filling {
     const double half = 0.5 * cube.side, reach = kHalfDiagonal * cube.side * grid_.pitch;
     const Vec3 x = grid_.origin + grid_.pitch * Vec3{cube.first[0] + half, cube.first[1] + half, cube.first[2] + half};
     const double radius = field_.radius(), level = field_.level();
-    const double off_by = reach + (kBelow - kHalfDiagonal) * grid_.pitch;
+    const double margin = reach + (kCrossed - kHalfDiagonal) * grid_.pitch;
 
-    if (cube.inside < reach) cube.inside = -field_.hull().distance(x, radius + off_by);
+    if (cube.inside < reach) cube.inside = -field_.hull().distance(x, radius + margin);
     const double away = std::max(-cube.inside, 0.0), ground = field_.above_ground(x);
     const double others = std::min(ground + field_.tolerance(), field_.room_by_hull(away));
     // The surface is no nearer than the hull.
-    if (others + off_by < level && std::min(away, ground) - reach >= radius)
+    if (others + margin < level && std::min(away, ground) - reach >= radius)
       return fill_free(cube, x, std::min(away, ground));
 
     // One triangle often shows that the cube is too near the surface.
     const double most = cube.slot >= 0 ? field_.surface().distance(cube.slot, x) : kInfinity;
     if (std::min(most, ground) + reach < radius) return;
-    if (std::min(most, others) + off_by < level && !to_the_end_) return found.unresolved.push_back(cube);
+    if (std::min(most, others) + margin < level && !to_the_end_) return found.unresolved.push_back(cube);
 
-    const double within = level + reach;
+    const double within = level + margin;
     const Bvh::Hit hit = field_.surface().closest(x, cube.slot, 0, within);
     const double distance = hit.slot >= 0 ? std::sqrt(hit.distance2) : within;
     const double clearance = std::min(distance, ground), room = std::min(distance, others);
     if (clearance + reach < radius) return;
-    const bool off = room + off_by < level, on = room - reach >= level;
+    const bool off = room + margin < level, on = room - margin >= level;
     if (cube.side == 1) {
       const std::int32_t cell = grid_.at(cube.first[0], cube.first[1], cube.first[2]);
       grid_.clearance[cell] = static_cast<float>(clearance);

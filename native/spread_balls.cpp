@@ -22,27 +22,31 @@ struct Candidate {
   double sharpness = 0;
 };
 
-// Climbs to the boundary from below. In a crease the places that were nearest on the way are kept at the level
+// Climbs to the boundary from near it. In a crease the places that were nearest on the way are kept at the level
 // together, up to three at a time: Newton's method on the planes in front of them.
 class Climb {
  public:
   Climb(const NavigableField& field, Vec3 x, const NavigableField::Value& value)
-      : field_(field), x_(x), value_(value) {}
+      : field_(field), start_(x), x_(x), value_(value) {}
 
-  bool to_level(double farthest) {
-    const Vec3 start = x_;
-    for (int step = 0; step < kSteps; ++step) {
-      if (value_.value >= field_.level() - kSlack) {
-        x_ = x_ - (value_.value - field_.level()) * value_.uphill;
-        value_.value = field_.level();
-        return true;
-      }
-      see();
-      x_ = x_ + correction();
-      if (!(max_abs(x_ - start) <= farthest)) return false;
-      value_ = field_.room_near(x_, value_.slot);
+  // Pushed off whatever is too near, as often as it takes.
+  bool by_pushing(double farthest) {
+    for (int push = 0; push < kPushes && !is_there(); ++push) {
+      count_ = 0;
+      see(x_, value_);
+      if (!move(farthest)) return false;
     }
-    return false;
+    return is_there();
+  }
+
+  // The first step goes into the crease between what is nearest there and here.
+  bool into_crease(Vec3 there, const NavigableField::Value& value_there, double farthest) {
+    see(there, value_there);
+    for (int step = 0; step == 0 || (step < kSteps && !is_there()); ++step) {
+      see(x_, value_);
+      if (!move(farthest)) return false;
+    }
+    return is_there();
   }
 
   Vec3 at() const { return x_; }
@@ -52,7 +56,7 @@ class Climb {
   double sharpness(double slack) {
     Vec3 near[kMost];
     int count = 0;
-    see();
+    see(x_, value_);
     for (int i = 0; i < count_; ++i)
       if (std::fabs(value_at(seen_[i])) <= slack) near[count++] = seen_[i].uphill;
     double sharpest = 0;
@@ -63,18 +67,33 @@ class Climb {
   }
 
  private:
-  static constexpr int kMost = 3, kSteps = 16;
+  static constexpr int kMost = 3, kSteps = 8, kPushes = 32;
   static constexpr double kSame = 0.97;
   struct Seen {
     Vec3 level;  // a point of the plane on which this is at the level
     Vec3 uphill;
   };
 
+  // At the level, or above it: then down to it.
+  bool is_there() {
+    if (value_.value < field_.level() - kSlack) return false;
+    x_ = x_ - (value_.value - field_.level()) * value_.uphill;
+    value_.value = field_.level();
+    return true;
+  }
+
+  bool move(double farthest) {
+    x_ = x_ + correction();
+    if (!(max_abs(x_ - start_) <= farthest)) return false;
+    value_ = field_.room_near(x_, value_.slot);
+    return true;
+  }
+
   double value_at(const Seen& seen) const { return dot(x_ - seen.level, seen.uphill); }
 
   // Takes in what is nearest, in the place of what it is nearly the same as, or of what was seen first.
-  void see() {
-    const Seen seen = {x_ + (field_.level() - value_.value) * value_.uphill, value_.uphill};
+  void see(Vec3 x, const NavigableField::Value& value) {
+    const Seen seen = {x + (field_.level() - value.value) * value.uphill, value.uphill};
     for (int i = 0; i < count_; ++i)
       if (dot(seen_[i].uphill, seen.uphill) > kSame) {
         std::rotate(seen_ + i, seen_ + i + 1, seen_ + count_);
@@ -102,35 +121,41 @@ class Climb {
     }
     return -value_at(seen_[0]) * seen_[0].uphill;
   }
-  static constexpr double kMeeting = 0.05;
+  static constexpr double kMeeting = 0.15;
 
   const NavigableField& field_;
-  Vec3 x_;
+  Vec3 start_, x_;
   NavigableField::Value value_;
   Seen seen_[kMost];
   int count_ = 0;
 };
 
-// Tells cells next to which the ways up meet: below the level, only from there one comes to a crease.
+// Finds cells next to which the ways up meet: there the boundary has a crease.
 class Meeting {
  public:
   explicit Meeting(const ClearanceGrid& grid) : grid_(grid), index_(grid.size(), -1) {
-    for (std::size_t i = 0; i < grid.boundary.size(); ++i) index_[grid.boundary[i].cell] = static_cast<std::int32_t>(i);
+    for (std::size_t i = 0; i < grid.boundary.size(); ++i)
+      if (grid.boundary[i].room.by != NavigableField::Limit::kHull)  // smooth, but where no ball would touch the hull
+        index_[grid.boundary[i].cell] = static_cast<std::int32_t>(i);
   }
-  bool at(const ClearanceGrid::Crossed& crossed) const {
-    if (crossed.room.by == NavigableField::Limit::kHull)
-      return false;  // smooth, and no ball there would touch the hull
+
+  // The neighbour whose way up meets a cell's most head-on; none on a smooth place.
+  const ClearanceGrid::Crossed* at(const ClearanceGrid::Crossed& crossed) const {
+    if (index_[crossed.cell] < 0) return nullptr;
     const auto [i, j, k] = grid_.place(crossed.cell);
+    const ClearanceGrid::Crossed* found = nullptr;
+    double most = kMeet;
     for (std::int32_t c = -1; c <= 1; ++c)
       for (std::int32_t b = -1; b <= 1; ++b)
         for (std::int32_t a = -1; a <= 1; ++a) {
           if (!grid_.holds(i + a, j + b, k + c)) continue;
           const std::int32_t other = index_[grid_.at(i + a, j + b, k + c)];
-          if (other < 0 || grid_.boundary[other].room.by == NavigableField::Limit::kHull) continue;
+          if (other < 0) continue;
           const Vec3 there = {static_cast<double>(a), static_cast<double>(b), static_cast<double>(c)};
-          if (dot(grid_.boundary[other].room.uphill - crossed.room.uphill, there) < -kMeet * norm(there)) return true;
+          const double meet = dot(crossed.room.uphill - grid_.boundary[other].room.uphill, normalized(there));
+          if (meet > most) most = meet, found = &grid_.boundary[other];
         }
-    return false;
+    return found;
   }
 
  private:
@@ -157,10 +182,18 @@ class Spreading {
     std::vector<bool> wanted(count);
     for (std::size_t i = 0; i < count; ++i) wanted[i] = !is_inside(grid_.boundary[i].cell, reach);
     const Meeting meeting(grid_);
-    std::vector<Candidate> all(count);
+    std::vector<Candidate> all(2 * count);
     parallel_for((count + kChunk - 1) / kChunk, threads_, [&](std::size_t chunk) {
-      for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i)
-        if (wanted[i]) all[i] = from(grid_.boundary[i], meeting);
+      for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) {
+        if (!wanted[i]) continue;
+        const ClearanceGrid::Crossed& crossed = grid_.boundary[i];
+        const ClearanceGrid::Crossed* other = meeting.at(crossed);
+        if (crossed.room.value >= field_.level())
+          all[2 * i] = down_from(crossed);
+        else if (other != nullptr)  // elsewhere a cell above the level comes to the same place
+          all[2 * i] = up_from(crossed);
+        if (other != nullptr) all[2 * i + 1] = between(crossed, *other);
+      }
     });
     all.erase(std::remove_if(all.begin(), all.end(), [](const Candidate& c) { return !(c.radius > 0); }), all.end());
     return all;
@@ -177,34 +210,38 @@ class Spreading {
     return entry->second;
   }
 
-  Candidate from(const ClearanceGrid::Crossed& crossed, const Meeting& meeting) const {
-    const Vec3 centre = grid_.centre(crossed.cell);
-    const double level = field_.level();
-    NavigableField::Value value = crossed.room;
-    Candidate candidate;
-    candidate.at = centre;
-    if (value.value >= level) {
-      candidate.at = centre - (value.value - level) * value.uphill;
-    } else {
-      // A neighbour above the level comes to the same place, unless there is a crease.
-      if (!meeting.at(crossed)) return candidate;
-      Climb climb(field_, centre, value);
-      if (!climb.to_level(2 * grid_.pitch)) return candidate;
-      candidate.at = climb.at();
-      value = climb.value();
-      candidate.sharpness = climb.sharpness(0.02 * field_.radius());
-    }
+  Candidate down_from(const ClearanceGrid::Crossed& crossed) const {
+    const NavigableField::Value& room = crossed.room;
+    return candidate(crossed, grid_.centre(crossed.cell) - (room.value - field_.level()) * room.uphill, room, 0);
+  }
+
+  Candidate up_from(const ClearanceGrid::Crossed& crossed) const {
+    Climb climb(field_, grid_.centre(crossed.cell), crossed.room);
+    return climb.by_pushing(2 * grid_.pitch) ? candidate(crossed, climb) : Candidate{};
+  }
+
+  Candidate between(const ClearanceGrid::Crossed& crossed, const ClearanceGrid::Crossed& other) const {
+    Climb climb(field_, grid_.centre(crossed.cell), crossed.room);
+    const bool found = climb.into_crease(grid_.centre(other.cell), other.room, 2 * grid_.pitch);
+    return found ? candidate(crossed, climb) : Candidate{};
+  }
+
+  Candidate candidate(const ClearanceGrid::Crossed& crossed, Climb& climb) const {
+    return candidate(crossed, climb.at(), climb.value(), climb.sharpness(0.02 * field_.radius()));
+  }
+
+  // The ball around a point on the boundary; none where it would not touch the hull.
+  Candidate candidate(const ClearanceGrid::Crossed& crossed, Vec3 at, const NavigableField::Value& value,
+                      double sharpness) const {
     const double distance = value.by == NavigableField::Limit::kSurface
-                                ? level
-                                : std::sqrt(field_.surface().closest(candidate.at, value.slot).distance2);
-    // The ball keeps t from the surface, and all of it out of the closed half-spaces.
-    const double ground = field_.above_ground(candidate.at);
+                                ? field_.level()
+                                : std::sqrt(field_.surface().closest(at, value.slot).distance2);
+    // It keeps t from the surface, and all of it out of the closed half-spaces.
+    const double ground = field_.above_ground(at);
     const double radius = std::min(distance - field_.tolerance(), ground);
-    const bool in_hull = crossed.inside >= norm(candidate.at - centre);
-    if (!in_hull && field_.hull().distance(candidate.at, radius) >= radius - kTouch) return candidate;
-    candidate.radius = radius;
-    candidate.clearance = std::min(distance, ground);
-    return candidate;
+    const bool in_hull = crossed.inside >= norm(at - grid_.centre(crossed.cell));
+    if (!in_hull && field_.hull().distance(at, radius) >= radius - kTouch) return {};
+    return {at, radius, std::min(distance, ground), sharpness};
   }
 
   std::vector<Candidate> reachable(const std::vector<Candidate>& candidates, const BallSources& sources,
