@@ -26,6 +26,9 @@ PORTFOLIO = ("excess-norm", "hull-sum", "max-excess")
 
 assert set(PORTFOLIO) <= set(SCORES)
 
+HOPELESS = 5
+"""A pass that makes so many times more pieces than there are parts will not have fewer of them after merging."""
+
 PLANES_PER_AXIS = 12
 """Neighbourhoods are small: half the planes are as good in them, and twice as fast."""
 
@@ -177,7 +180,8 @@ def _best_of_portfolio(
     for ranking in rankings:
         if pace.is_over or len(parts) == 1:
             break
-        other = _whole(CutTree(root, Ranked(ranking, views), workers, divisions), criterion, workers, pace)
+        tree = CutTree(root, Ranked(ranking, views), workers, divisions)
+        other = _whole(tree, criterion, workers, pace, most=HOPELESS * len(parts))
         if other is not None and cost(other) < cost(parts):
             parts = other
             pace.parts = len(parts)
@@ -189,10 +193,10 @@ def cost(parts: Sequence[Part]) -> tuple[int, float]:
     return len(parts), sum(part.hull.volume for part in parts)
 
 
-def _whole(tree: CutTree, criterion: Criterion, workers: Workers, pace: Pace) -> list[Part] | None:
-    """The parts of a tree of cuts, merged; None when the clock stopped them or not all meet the criterion."""
-    done, left = tree.cut_until(criterion, pace)
-    if pace.is_over:
+def _whole(tree: CutTree, criterion: Criterion, workers: Workers, pace: Pace, most: int) -> list[Part] | None:
+    """The parts of a tree of cuts, merged; None when the clock or `most` stopped them, or not all are feasible."""
+    done, left = tree.cut_until(criterion, pace, most)
+    if pace.is_over or len(done) + len(left) > most:
         return None
     parts = drop_slivers([*done, *left], workers, suspects=left)
     if not all(workers.map(criterion.is_met, [part for part in left if part in parts])):

@@ -56,6 +56,7 @@ REMEMBERED = 1000
 """Reunited clusters that are kept for their next first planes."""
 
 Cluster: TypeAlias = tuple[int, ...]
+Fingerprint: TypeAlias = tuple[int, ...]
 
 
 @dataclass(order=True)
@@ -135,6 +136,7 @@ class Neighbourhood:
         self._numbers = itertools.count()
         self._ids = itertools.count()
         self._lock = threading.Lock()
+        self._partitions: dict[tuple[Cluster, Cluster], set[Fingerprint]] = {}
         self._reunited: OrderedDict[Cluster, Component | None] = OrderedDict()
         self._admit(parts)
 
@@ -235,7 +237,7 @@ class Neighbourhood:
             return None
         tree = CutTree(solid, Ranked(ranking, self._views, first), self._alone)
         pieces, left = tree.cut_until(self._criterion, Clock(), most=len(trial.cluster) + SPARE)
-        if left:
+        if left or not self._is_new(pieces, trial, scene):
             return None
         others = {i: part for i, part in scene.items() if i not in trial.cluster}
         merged = merge_parts(pieces, self._criterion, self._alone, Clock(), beside=list(others.values()))
@@ -246,6 +248,16 @@ class Neighbourhood:
             len(new) == len(old) and _hulls(new) < (1 - SAME) * _hulls([scene[i] for i in old])
         )
         return _Found(old, new) if better else None
+
+    def _is_new(self, pieces: Sequence[Part], trial: _Trial, scene: dict[int, Part]) -> bool:
+        """Whether a cluster among these neighbours has not been in the same pieces before."""
+        before = _fingerprint([scene[i] for i in trial.cluster])
+        now = _fingerprint(pieces)
+        with self._lock:
+            known = self._partitions.setdefault((trial.cluster, tuple(scene)), {before})
+            is_new = now not in known
+            known.add(now)
+        return is_new
 
     def _solid(self, cluster: Cluster, scene: dict[int, Part]) -> Component | None:
         with self._lock:
@@ -271,6 +283,12 @@ class Neighbourhood:
         self._remove(found.old)
         self._admit(found.new)
         return True
+
+
+def _fingerprint(parts: Sequence[Part]) -> Fingerprint:
+    """Volumes, to six digits or so of the whole: two ways to divide a solid that share them are the same."""
+    whole = sum(part.volume for part in parts)
+    return tuple(sorted(round(1e6 * part.volume / whole) for part in parts))
 
 
 def _hulls(parts: Sequence[Part]) -> float:
