@@ -1,9 +1,13 @@
 // Gluing two solids that touch: see glue.hpp for input, output and algorithm.
 #include "glue.hpp"
 
+#include <algorithm>
+
 namespace rlacd {
 
 namespace {
+
+constexpr double kSameNormal = 1e-6;  // 1 - cosine between normals of faces in one plane
 
 struct Point2 {
   double u, v;
@@ -180,6 +184,26 @@ Mesh glue(const Mesh& a, const Mesh& b) {
   append_untouched(out, a, b, common);
   append_untouched(out, b, a, common);
   return out;
+}
+
+std::vector<Vec3> outward_where_touching(const Mesh& a, const Mesh& b) {
+  const Box box_a = box_of(a), box_b = box_of(b);
+  const std::vector<Facet> others = facets_within(b, box_a);
+  std::vector<Vec3> outward(a.vertices.size());
+  for (const Triangle& face : a.faces) {
+    const Facet facet(a, face);
+    if (facet.height <= kCoincident || !overlap(facet.box, box_b)) continue;
+    const bool touching = std::any_of(others.begin(), others.end(), [&](const Facet& other) {
+      return overlap(facet.box, other.box) && facet.touches(other);
+    });
+    if (!touching) continue;
+    for (const std::int32_t corner : face) {
+      Vec3& sum = outward[static_cast<std::size_t>(corner)];
+      const double lacking = 1 - dot(sum, facet.normal);
+      if (lacking > kSameNormal) sum = sum + lacking * facet.normal;  // faces of one plane count once
+    }
+  }
+  return outward;
 }
 
 }  // namespace rlacd

@@ -20,4 +20,9 @@ constexpr double kCoincident = 1e-8;  // distance at which faces count as touchi
 
 Mesh glue(const Mesh& a, const Mesh& b);
 
+// For every vertex of a, the direction that leads out of all its faces that touch b: 1 along the normal of each such
+// plane (as far as more than one allow), zero where it has none. Moved along it by a little, the solids overlap where
+// they touched, and a mesh boolean unites them without a crack.
+std::vector<Vec3> outward_where_touching(const Mesh& a, const Mesh& b);
+
 }  // namespace rlacd

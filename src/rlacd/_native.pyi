@@ -15,6 +15,9 @@ def sweep(
 def glue(
     vertices_a: FloatArray, faces_a: IntArray, vertices_b: FloatArray, faces_b: IntArray
 ) -> tuple[FloatArray, IntArray]: ...
+def outward_where_touching(
+    vertices_a: FloatArray, faces_a: IntArray, vertices_b: FloatArray, faces_b: IntArray
+) -> FloatArray: ...  # [Va, 3]
 
 class Surface:
     def __init__(self, vertices: FloatArray, faces: IntArray) -> None: ...

@@ -93,6 +93,14 @@ class Criterion(str, Enum):
     NAVIGABLE = "navigable"
 
 
+class Quality(str, Enum):
+    """What --quality takes."""
+
+    FAST = "fast"
+    BALANCED = "balanced"
+    BEST = "best"
+
+
 @app.command(epilog=EPILOG)
 def decompose(
     mesh: Annotated[
@@ -312,6 +320,33 @@ def decompose(
             show_default=False,
         ),
     ] = None,
+    quality: Annotated[
+        Quality | None,
+        typer.Option(
+            rich_help_panel=METHOD,
+            help="How long to search for fewer hulls: fast not at all, balanced about a second, best until --budget "
+            "ends. [dim]\\[default: fast][/dim]",
+            show_default=False,
+        ),
+    ] = None,
+    budget: Annotated[
+        float | None,
+        typer.Option(
+            metavar="SECONDS",
+            rich_help_panel=METHOD,
+            help="How long the search may take. [dim]\\[default: 5 with --quality best][/dim]",
+            show_default=False,
+        ),
+    ] = None,
+    search_steps: Annotated[
+        int | None,
+        typer.Option(
+            rich_help_panel=METHOD,
+            help="How many steps the search may take; unlike --budget, this gives the same bytes on every machine. "
+            "[dim]\\[default: 24 with --quality balanced][/dim]",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Turn a mesh into convex hulls for collision.
 
@@ -368,6 +403,9 @@ def decompose(
             "seed": seed,
             "threads": threads,
             "timeout": timeout,
+            "quality": quality and quality.value,
+            "budget": budget,
+            "search_steps": search_steps,
         }
 
         from rlacd.decompose import decompose as run

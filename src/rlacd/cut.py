@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from rlacd import _native
 from rlacd.clock import Clock
 from rlacd.criteria import Criterion
 from rlacd.policies import Policy
-from rlacd.solid.component import Component
+from rlacd.solid.component import Component, Plane
 from rlacd.workers import Workers
 
 FILM = 2e-4
@@ -16,6 +17,40 @@ FILM = 2e-4
 
 MISSED = 1e-3
 """No point of a shaving is farther than this from the solid that stands for it."""
+
+
+class Divisions:
+    """What components fall into, each way of dividing one made once: several trees of cuts share their first levels."""
+
+    def __init__(self) -> None:
+        self._pieces: dict[Component, list[Component]] = {}
+        self._sides: dict[tuple[Component, Plane], list[Component]] = {}
+        self._across: dict[Component, Component] = {}  # the other side of the last cut
+
+    def pieces(self, component: Component) -> list[Component]:
+        """Get the connected pieces of a component, but for shavings; ``[component]`` when there is but one."""
+        if component not in self._pieces:
+            own = component.pieces()
+            if len(own) == 1:
+                own = [component]
+            across = self._across.get(component)
+            if len(own) > 1 and across is not None:
+                own = [piece for piece in own if not _is_shaving(piece, across)]
+                self._across.update((piece, across) for piece in own)
+            self._pieces[component] = own
+        return self._pieces[component]
+
+    def sides(self, component: Component, plane: Plane) -> list[Component]:
+        """Get what lies below and above a plane, but for shavings; nothing where one side would be empty."""
+        key = component, plane
+        if key not in self._sides:
+            below, above = component.cut(plane)
+            if below is None or above is None:
+                self._sides[key] = []
+            else:
+                self._across[below], self._across[above] = above, below
+                self._sides[key] = [side for side in (below, above) if not _is_shaving(side, self._across[side])]
+        return self._sides[key]
 
 
 class CutTree:
@@ -32,24 +67,33 @@ class CutTree:
         Chooses the planes.
     workers : Workers
         Runs the kernels.
+    divisions : Divisions, optional
+        Shared with other trees.
     """
 
-    def __init__(self, root: Component, policy: Policy, workers: Workers) -> None:
+    def __init__(self, root: Component, policy: Policy, workers: Workers, divisions: Divisions | None = None) -> None:
         self._root = root
         self._policy = policy
         self._workers = workers
+        self._divisions = divisions or Divisions()
         self._children: dict[Component, list[Component]] = {}
-        self._across: dict[Component, Component] = {}  # the other side of the last cut
 
-    def cut_until(self, criterion: Criterion, clock: Clock) -> tuple[list[Component], list[Component]]:
+    def cut_until(
+        self, criterion: Criterion, clock: Clock, most: float = math.inf
+    ) -> tuple[list[Component], list[Component]]:
         """Cut the solid until each component meets the criterion.
+
+        Parameters
+        ----------
+        most : float
+            Give up as soon as there are more components than this.
 
         Returns
         -------
         done : list of Component
             Components that meet the criterion.
         left : list of Component
-            Components that do not: no plane cuts them, or the clock ran out first.
+            Components that do not: no plane cuts them, the clock ran out first, or there were more than `most`.
         """
         done: list[Component] = []
         left: list[Component] = []
@@ -59,6 +103,8 @@ class CutTree:
             done += [c for c, met in zip(frontier, verdicts, strict=True) if met]
             unmet = [c for c, met in zip(frontier, verdicts, strict=True) if not met]
             if not clock.step(len(done), None, len(done) + len(left) + len(unmet)):
+                return done, left + unmet
+            if len(done) + len(left) + len(unmet) > most:
                 return done, left + unmet
             self._divide([c for c in unmet if c not in self._children])
             frontier = []
@@ -70,23 +116,13 @@ class CutTree:
 
     def _divide(self, components: Sequence[Component]) -> None:
         """Split components into their connected pieces, and cut those that are in one piece already."""
-        pieces = [component.pieces() for component in components]
-        whole = [c for c, own in zip(components, pieces, strict=True) if len(own) == 1]
+        pieces = [self._divisions.pieces(component) for component in components]
+        whole = [c for c, own in zip(components, pieces, strict=True) if own == [c]]
         threads = self._workers.share(len(whole))
         planes = self._workers.map(lambda c: self._policy.choose(c, threads), whole)
-        for component, own in zip(components, pieces, strict=True):
-            if len(own) > 1:
-                across = self._across.get(component)
-                kept = [piece for piece in own if across is None or not _is_shaving(piece, across)]
-                self._children[component] = kept
-                self._across.update((piece, across) for piece in kept if across is not None)
+        self._children.update(zip(components, pieces, strict=True))
         for component, plane in zip(whole, planes, strict=True):
-            below, above = component.cut(plane) if plane is not None else (None, None)
-            if below is None or above is None:  # no plane leaves a volume on both sides
-                self._children[component] = []
-                continue
-            self._across[below], self._across[above] = above, below
-            self._children[component] = [side for side in (below, above) if not _is_shaving(side, self._across[side])]
+            self._children[component] = [] if plane is None else self._divisions.sides(component, plane)
 
 
 def _is_shaving(piece: Component, across: Component) -> bool:

@@ -18,9 +18,11 @@ from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError
 from rlacd.finish import drop_slivers, limit_part, merge_parts, merge_to_count, with_limits
 from rlacd.options import CONCAVITY, DEFAULT_RESOLUTION, DEFAULT_THRESHOLD, Options
+from rlacd.planes.views import Views
 from rlacd.policies import make_policy
 from rlacd.progress import ProgressCallback
 from rlacd.report import make_report
+from rlacd.search import level, search
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part
 from rlacd.solid.frame import Frame
@@ -51,6 +53,9 @@ def decompose(
     seed: int = 0,
     threads: int | None = None,
     timeout: float | None = None,
+    quality: str = "fast",
+    budget: float | None = None,
+    search_steps: int | None = None,
     progress: ProgressCallback | None = None,
 ) -> Decomposition:
     """Decompose a mesh into few convex hulls that fit it tightly.
@@ -86,6 +91,14 @@ def decompose(
         Threads to use; all processors by default. The result does not depend on it.
     timeout : float, optional
         Seconds after which the decomposition reached so far is returned.
+    quality : str
+        ``fast``: one pass of cuts. ``balanced``: the best of several passes, then a short search for fewer parts.
+        ``best``: a long one. A level is never worse than the one before it: fewer hulls, or as many with less volume.
+    budget : float, optional
+        Seconds the search may take; 5 with ``best``. What is found in a time depends on the machine.
+    search_steps : int, optional
+        Steps the search may take instead (about 10 to 20 a second on one core); 24 with ``balanced``. The result
+        depends on nothing else.
     progress : callable, optional
         Called with a `Progress` between steps; when it returns False, the decomposition reached so far is returned.
 
@@ -114,6 +127,9 @@ def decompose(
         seed=seed,
         threads=threads,
         timeout=timeout,
+        quality=quality,
+        budget=budget,
+        search_steps=search_steps,
     )
     if progress is not None and not callable(progress):
         raise OptionError(f"progress is {progress!r}; it has to be a function that takes a `rlacd.Progress`.")
@@ -133,8 +149,17 @@ def decompose(
         goal = _prepared(options, solid, workers, clock)
         if options.max_hulls is None:  # otherwise the threshold may be exceeded anyway
             goal = with_limits(goal, options.max_vertices, options.max_faces)
-        tree = CutTree(Component(solid.manifold), make_policy(options.policy), workers)
+        root = Component(solid.manifold)
+        views = Views()
+        tree = CutTree(root, make_policy(options.policy, views), workers)
         parts, goal = _parts(tree, goal, options, workers, clock)
+        found = None
+        if options.quality != "fast" and clock.stopped_by is None:
+            bounds = level(options.quality, options.budget, options.search_steps)
+            with clock.stage("search"):
+                parts, found = search(
+                    root, parts, goal, options.quality, bounds, views, workers, clock, options.seed, options.max_hulls
+                )
         clock.nothing_left_to_stop()
         with clock.stage("finish"):
             parts = drop_slivers(parts, workers)
@@ -145,6 +170,7 @@ def decompose(
     report = {
         "name": Path(source.name).stem if isinstance(mesh, (str, os.PathLike)) else "mesh",
         **report,
+        "search": None if found is None else found.as_plain(),
         "seconds": {**clock.seconds, "total": clock.elapsed},
     }
     return Decomposition(

@@ -31,6 +31,9 @@ MIN_THRESHOLD = 0.001
 MAX_RESOLUTION = 400
 """The grid that repair looks for rooms on has this number cubed of cells; more would take over 4 GB."""
 
+QUALITIES = ("fast", "balanced", "best")
+"""Levels of search; see `rlacd.search`."""
+
 MAX_THREADS = 1024
 MAX_SEED = 2**63 - 1
 
@@ -57,6 +60,9 @@ class Options:
     seed: int = 0
     threads: int | None = None
     timeout: float | None = None
+    quality: str = "fast"
+    budget: float | None = None
+    search_steps: int | None = None
 
     def __post_init__(self) -> None:
         _require(
@@ -80,6 +86,14 @@ class Options:
         self._as_integer("seed", 0, MAX_SEED, "between 0 and 2**63 - 1")
         self._as_integer("threads", 1, MAX_THREADS, f"between 1 and {MAX_THREADS}", None)
         self._as_number("timeout", lambda x: 0 < x < math.inf, "a positive number of seconds", None)
+        _require(self.quality in QUALITIES, "quality", self.quality, "one of " + ", ".join(QUALITIES))
+        self._as_number("budget", lambda x: 0 < x < math.inf, "a positive number of seconds", None)
+        self._as_integer("search_steps", 0, None, "at least 0", None)
+        for name in ("budget", "search_steps"):
+            unused = getattr(self, name) is not None and self.quality == "fast"
+            _require(not unused, name, getattr(self, name), "left out with quality='fast', which does not search")
+        if not self.merge:
+            _require(self.quality == "fast", "quality", self.quality, "'fast' without merge: searching means merging")
 
     def _as_number(self, name: str, allowed: Callable[[float], bool], rule: str, *absent: None) -> None:
         """Make the option a plain float, so that the report is plain too, whichever library its number came from."""

@@ -23,7 +23,9 @@ class _Pair:
     second: int
 
 
-def merge_parts(parts: Sequence[Part], criterion: Criterion, workers: Workers, clock: Clock) -> list[Part]:
+def merge_parts(
+    parts: Sequence[Part], criterion: Criterion, workers: Workers, clock: Clock, beside: Sequence[Part] = ()
+) -> list[Part]:
     """Unite pairs of parts, the cheapest first, as long as the union meets the criterion.
 
     The test looks at the glued union: its own surface against its own hull, both ways. Pairs are tested a batch at a
@@ -33,19 +35,21 @@ def merge_parts(parts: Sequence[Part], criterion: Criterion, workers: Workers, c
     ----------
     parts : sequence of Part
         Solids with disjoint interiors.
+    beside : sequence of Part
+        More of them, of which no two are to be united with each other: that has been tried before.
 
     Returns
     -------
     list of Part
-        Parts that could not be united further, in the order of their first piece.
+        Parts that could not be united further, in the order of their first piece, those beside last.
     """
-    alive: dict[int, Part] = dict(enumerate(parts))
+    alive: dict[int, Part] = dict(enumerate([*parts, *beside]))
     origin = {i: i for i in alive}
-    queue = _pairs(alive, list(alive), criterion, workers)
+    queue = _pairs(alive, list(range(len(parts))), criterion, workers)
     heapq.heapify(queue)
     unions: dict[_Pair, Part | None] = {}  # verdicts on pairs that are back in the queue
-    newest = len(parts)
-    while queue and clock.step(len(parts) - len(alive), None, len(alive)):
+    count = newest = len(alive)
+    while queue and clock.step(count - len(alive), None, len(alive)):
         batch = _cheapest(queue, alive, 2 * workers.threads)
         new = [pair for pair in batch if pair not in unions]
         unions.update(
@@ -84,12 +88,12 @@ def _pairs(alive: dict[int, Part], new: Sequence[int], criterion: Criterion, wor
     """Pairs of a new part with any other that the criterion's reach and volume bound allow, and their costs."""
     return [
         _Pair(hull_volume - (criterion.filled(alive[first]) + criterion.filled(alive[second])), first, second)
-        for first, second, volume, hull_volume in _neighbours(alive, new, criterion.reach, workers)
+        for first, second, volume, hull_volume in neighbours(alive, new, criterion.reach, workers)
         if not criterion.excludes(volume, hull_volume)
     ]
 
 
-def _neighbours(
+def neighbours(
     alive: dict[int, Part], new: Sequence[int], reach: float, workers: Workers
 ) -> list[tuple[int, int, float, float]]:
     """Pairs of a new part with any other whose boxes lie within reach: (first, second, volume, joint hull's volume)."""
@@ -174,7 +178,7 @@ def _bounded_pairs(
 ) -> list[_BoundedPair]:
     queue = [
         _BoundedPair(criterion.least_error(volume, hull_volume), first, second, False)
-        for first, second, volume, hull_volume in _neighbours(alive, new, reach, workers)
+        for first, second, volume, hull_volume in neighbours(alive, new, reach, workers)
     ]
     heapq.heapify(queue)
     return queue

@@ -1,5 +1,6 @@
 """Which plane to cut next."""
 
+from rlacd.planes.views import Views
 from rlacd.policies.greedy import SCORES, Greedy
 from rlacd.policies.navacd import CONCAVE_EDGES, NavACD
 from rlacd.policies.policy import Policy
@@ -15,7 +16,7 @@ POLICIES = (
 """Names that `make_policy` knows."""
 
 
-def make_policy(name: str) -> Policy:
+def make_policy(name: str, views: Views | None = None) -> Policy:
     """Build the policy called `name`.
 
     ``greedy`` looks at 150 planes and those of four concave edges, and takes the one with the least p-norm of excess
@@ -23,13 +24,19 @@ def make_policy(name: str) -> Policy:
     those of the edges (SCORE ``hull-sum`` is the paper's baseline); ``navacd`` takes the least sum of hull volumes of
     three planes and those of four concave edges.
 
+    Parameters
+    ----------
+    name : str
+    views : Views, optional
+        Sweeps over the 150 planes and those of four concave edges, shared with others.
+
     Raises
     ------
     KeyError
         No policy has this name.
     """
     if name == "greedy":
-        return Greedy()
+        return Greedy(views=views)
     if name == "navacd":
         return NavACD()
     family, _, score = name.partition("-")

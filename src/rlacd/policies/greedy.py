@@ -7,9 +7,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from rlacd.planes.candidates import Candidates, axis_and_principal
-from rlacd.planes.concave_edges import concave_edge_planes
-from rlacd.planes.sweep import SLIVER, Sweep, sweep
+from rlacd.planes.sweep import SLIVER, Sweep
+from rlacd.planes.views import Views
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
 
@@ -63,16 +62,15 @@ class Greedy:
         A key of `SCORES`.
     concave_edges : int
         How many concave edges add their planes; with 0, the paper's baseline.
+    views : Views, optional
+        Where the sweeps come from, to share them with others; decides about the planes then.
     """
 
-    def __init__(self, score: str = "excess-norm", concave_edges: int = 4) -> None:
+    def __init__(self, score: str = "excess-norm", concave_edges: int = 4, views: Views | None = None) -> None:
         self.score = SCORES[score]
-        self.concave_edges = concave_edges
+        self.views = views or Views(concave_edges=concave_edges)
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None when every candidate misses it or shaves off a film."""
-        candidates = axis_and_principal(component)
-        if self.concave_edges > 0:
-            candidates = Candidates.joined(candidates, concave_edge_planes(component, self.concave_edges))
-        scored = sweep(component, candidates, threads)
+        scored = self.views.of(component, threads)
         return cheapest(scored, self.score(scored))

@@ -67,6 +67,11 @@ class Part:
         return f"{type(self).__name__}(volume {self.volume:.4g}, hull {self.hull.volume:.4g})"
 
     @property
+    def members(self) -> tuple[Component, ...]:
+        """The components it was glued from; none where it was not made of components."""
+        return ()
+
+    @property
     def vertices(self) -> FloatArray:
         """Points of the surface [V, 3]."""
         return self._resolved()[0]
@@ -109,6 +114,12 @@ class _Union(Part):
         self.hull = Hull.around(first.hull, second.hull)
         self.piece_hulls = first.piece_hulls + second.piece_hulls
         self.within = None
+        self._members = (*first.members, *second.members)
+
+    @property
+    def members(self) -> tuple[Component, ...]:
+        """Those of both parts."""
+        return self._members
 
     def _resolved(self) -> tuple[FloatArray, IntArray]:
         if self._surface is None:
@@ -151,6 +162,11 @@ class Component(Part):
             raise ValueError("a component has to have a volume")
         super().__init__(vertices, faces, _native.mesh_volume(vertices, faces), hull)
         self.manifold = manifold
+
+    @property
+    def members(self) -> tuple[Component, ...]:
+        """Itself."""
+        return (self,)
 
     @cached_property
     def principal_axes(self) -> FloatArray:

@@ -1,0 +1,205 @@
+"""Quality levels: how much is searched after the first pass of cuts, and the bounds of a search."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from rlacd.clock import Clock
+from rlacd.criteria.criterion import Criterion
+from rlacd.cut import CutTree, Divisions
+from rlacd.finish import drop_slivers, merge_parts
+from rlacd.planes.views import Views
+from rlacd.policies.greedy import SCORES
+from rlacd.search.neighbourhood import Neighbourhood, Outcome
+from rlacd.search.pace import Pace
+from rlacd.search.rankings import Ranked, Ranking, by_score
+from rlacd.search.tighten import tighten
+from rlacd.solid.component import Component, Part
+from rlacd.workers import Workers
+
+PORTFOLIO = ("excess-norm", "hull-sum", "max-excess")
+"""Scores by which the whole solid is cut anew, the better first."""
+
+assert set(PORTFOLIO) <= set(SCORES)
+
+HOPELESS = 5
+"""A pass that makes so many times more pieces than there are parts will not have fewer of them after merging."""
+
+PLANES_PER_AXIS = 12
+"""Neighbourhoods are small: half the planes are as good in them, and twice as fast."""
+
+CONCAVE_EDGES = 0
+"""Planes of concave edges are found in the first pass; in neighbourhoods they cost more than they bring."""
+
+
+@dataclass(frozen=True)
+class Level:
+    """How much is searched.
+
+    Attributes
+    ----------
+    steps : int or None
+        Trials of the neighbourhood search at most.
+    seconds : float or None
+        Wall time of the search at most.
+    """
+
+    steps: int | None
+    seconds: float | None
+
+
+LEVELS = {"fast": Level(0, None), "balanced": Level(24, None), "best": Level(None, 5.0)}
+"""What the levels mean when neither steps nor seconds are given."""
+
+
+def level(quality: str, seconds: float | None, steps: int | None) -> Level:
+    """Get the level called `quality` with other bounds: those given replace its own."""
+    if quality == "fast" or (seconds is None and steps is None):
+        return LEVELS[quality]
+    return Level(steps, seconds)
+
+
+@dataclass
+class Account:
+    """What a search reports.
+
+    Attributes
+    ----------
+    level : str
+    seconds : float
+        Wall time it took.
+    first_pass, portfolio, parts : int
+        Parts before it, after the best of the portfolio, and in the end.
+    steps : int
+        Trials of the neighbourhood search.
+    accepted : int
+        Trials that were taken over.
+    exhausted : bool
+        There was nothing left to try.
+    """
+
+    level: str
+    seconds: float
+    first_pass: int
+    portfolio: int
+    parts: int
+    steps: int
+    accepted: int
+    exhausted: bool
+
+    def as_plain(self) -> dict[str, Any]:
+        """Everything as plain values."""
+        return asdict(self)
+
+
+def search(
+    root: Component,
+    parts: Sequence[Part],
+    criterion: Criterion,
+    name: str,
+    bounds: Level,
+    views: Views,
+    workers: Workers,
+    clock: Clock,
+    seed: int,
+    most_parts: int | None = None,
+) -> tuple[list[Part], Account]:
+    """Look for fewer parts, or as many with less volume in their hulls.
+
+    Parameters
+    ----------
+    root : Component
+        The solid.
+    parts : sequence of Part
+        A decomposition of it.
+    criterion : Criterion
+        What every new part will meet.
+    name : str
+        Of the level, for the account.
+    bounds : Level
+        When to stop.
+    views : Views
+        Sweeps of the solid's components, those of the first pass among them.
+    seed : int
+    most_parts : int, optional
+        Where the parts are so few and do not meet the criterion, look for parts that come closer to it instead.
+
+    Returns
+    -------
+    parts : list of Part
+        Never worse than those given. Depends on the seed and the steps, and on time only where the seconds or the
+        clock end the search.
+    account : Account
+    """
+    start = time.perf_counter()
+    pace = Pace(clock, bounds.seconds, len(parts))
+    steps = math.inf if bounds.steps is None else bounds.steps
+    rankings = [by_score(score) for score in PORTFOLIO]
+    near_views = Views(PLANES_PER_AXIS, CONCAVE_EDGES)
+    best = list(parts)
+    if most_parts is not None and not all(workers.map(criterion.is_met, best)):
+        if len(best) <= most_parts:
+            outcome = tighten(
+                root, best, criterion, most_parts, rankings, views, near_views, workers, pace, steps, seed
+            )
+        else:  # parts that cannot be united
+            outcome = Outcome(best, 0, 0, True)
+        from_portfolio = len(parts)
+    else:
+        best = _best_of_portfolio(root, best, criterion, rankings, views, workers, pace)
+        from_portfolio = len(best)
+        outcome = Neighbourhood(best, criterion, rankings, near_views, workers, seed).run(pace, steps)
+    account = Account(
+        level=name,
+        seconds=time.perf_counter() - start,
+        first_pass=len(parts),
+        portfolio=from_portfolio,
+        parts=len(outcome.parts),
+        steps=outcome.steps,
+        accepted=outcome.accepted,
+        exhausted=outcome.exhausted,
+    )
+    return outcome.parts, account
+
+
+def _best_of_portfolio(
+    root: Component,
+    parts: list[Part],
+    criterion: Criterion,
+    rankings: Sequence[Ranking],
+    views: Views,
+    workers: Workers,
+    pace: Pace,
+) -> list[Part]:
+    """The given parts, or those of the whole solid cut by another ranking where they are better."""
+    divisions = Divisions()
+    for ranking in rankings:
+        if pace.is_over or len(parts) == 1:
+            break
+        tree = CutTree(root, Ranked(ranking, views), workers, divisions)
+        other = _whole(tree, criterion, workers, pace, most=HOPELESS * len(parts))
+        if other is not None and cost(other) < cost(parts):
+            parts = other
+            pace.parts = len(parts)
+    return parts
+
+
+def cost(parts: Sequence[Part]) -> tuple[int, float]:
+    """How many parts there are, and the volume of their hulls: the less, the better they fit."""
+    return len(parts), sum(part.hull.volume for part in parts)
+
+
+def _whole(tree: CutTree, criterion: Criterion, workers: Workers, pace: Pace, most: int) -> list[Part] | None:
+    """The parts of a tree of cuts, merged; None when the clock or `most` stopped them, or not all are feasible."""
+    done, left = tree.cut_until(criterion, pace, most)
+    if pace.is_over or len(done) + len(left) > most:
+        return None
+    parts = drop_slivers([*done, *left], workers, suspects=left)
+    if not all(workers.map(criterion.is_met, [part for part in left if part in parts])):
+        return None
+    merged = merge_parts(parts, criterion, workers, pace)
+    return None if pace.is_over else merged

@@ -1,0 +1,51 @@
+"""The time a search may take, within that of the whole decomposition."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rlacd.clock import Clock
+
+
+class Pace(Clock):
+    """A clock within another: it runs out sooner, and that is not an early end of the work.
+
+    Parameters
+    ----------
+    clock : Clock
+        Timeout, progress and cancel are its own.
+    seconds : float or None
+        Wall time that is left.
+    parts : int
+        Told to the other clock as the number of parts so far.
+    """
+
+    def __init__(self, clock: Clock, seconds: float | None, parts: int) -> None:
+        super().__init__()
+        self._outer = clock
+        self._end = math.inf if seconds is None else time.perf_counter() + seconds
+        self.parts = parts
+        self.steps = 0
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the work has to stop, for this clock or for the other."""
+        return self._outer.stopped_by is not None or time.perf_counter() >= self._end
+
+    def step(self, done: int, total: int | None, parts: int) -> bool:
+        """Report to the other clock; True when the work may go on."""
+        return self._outer.step(self.steps, None, self.parts) and not self.is_over
+
+    @contextmanager
+    def share(self, among: int) -> Iterator[None]:
+        """Leave only an equal share of the time that is left to what is done inside."""
+        end = self._end
+        now = time.perf_counter()
+        self._end = now + (end - now) / among
+        try:
+            yield
+        finally:
+            self._end = end

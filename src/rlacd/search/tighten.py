@@ -1,0 +1,100 @@
+"""Search with a limit on the number of hulls: as many parts, with less error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from rlacd.criteria.criterion import Criterion
+from rlacd.cut import CutTree
+from rlacd.finish import merge_parts
+from rlacd.planes.views import Views
+from rlacd.search.neighbourhood import Neighbourhood, Outcome
+from rlacd.search.pace import Pace
+from rlacd.search.rankings import Ranked, Ranking
+from rlacd.solid.component import Component, Part
+from rlacd.workers import Workers
+
+ROUNDS = 6
+"""So many thresholds, between the one asked for and the one reached, are tried."""
+
+CLOSE = 1.02
+"""A threshold is told from another when it is larger by this factor."""
+
+
+def tighten(
+    root: Component,
+    parts: Sequence[Part],
+    criterion: Criterion,
+    most_parts: int,
+    rankings: Sequence[Ranking],
+    views: Views,
+    near_views: Views,
+    workers: Workers,
+    pace: Pace,
+    steps: float,
+    seed: int,
+) -> Outcome:
+    """Look for no more parts than allowed that meet a finer criterion than the given parts do.
+
+    The factor by which the threshold is exceeded is bisected: at each, the solid is cut and merged anew, and a
+    neighbourhood search tries to get down to the number of parts allowed.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+        No more than `most_parts`.
+    criterion : Criterion
+        What was asked for.
+    views, near_views : Views
+        Sweeps of the solid's components, and of those in neighbourhoods.
+    steps : float
+        Trials in all; every factor gets an equal share of them, and of the time.
+
+    Returns
+    -------
+    Outcome
+        Its parts exceed the threshold by no larger factor than those given.
+    """
+    tree = CutTree(root, Ranked(rankings[0], views), workers)
+    best = list(parts)
+    total = accepted = 0
+    least, reached = 1.0, _factor(best, criterion, workers)
+    for left in range(ROUNDS, 0, -1):
+        if pace.is_over or reached <= least * CLOSE:
+            break
+        factor = math.sqrt(least * reached)
+        finer = criterion.scaled(factor)
+        with pace.share(left):
+            done, unmet = tree.cut_until(finer, pace)
+            fine = merge_parts(done, finer, workers, pace)
+            if unmet or pace.is_over:
+                least = factor
+                continue
+            found = Neighbourhood(fine, finer, rankings, near_views, workers, seed).run(
+                pace, math.floor((steps - total) / left) if math.isfinite(steps) else steps, most_parts
+            )
+        total += found.steps
+        accepted += found.accepted
+        if len(found.parts) <= most_parts:
+            best, reached = found.parts, factor
+            pace.parts = len(best)
+        else:
+            least = factor
+    return Outcome(best, total, accepted, False)
+
+
+def _factor(parts: Sequence[Part], criterion: Criterion, workers: Workers) -> float:
+    """Least factor (to within `CLOSE`) by which a criterion has to be scaled for all parts to meet it."""
+
+    def meets(factor: float) -> bool:
+        return all(workers.map(criterion.scaled(factor).is_met, parts))
+
+    upper = 1.0
+    while not meets(upper):
+        upper *= 2
+    lower = upper / 2
+    while upper > 1 and upper > lower * CLOSE:
+        middle = math.sqrt(lower * upper)
+        lower, upper = (lower, middle) if meets(middle) else (middle, upper)
+    return upper

@@ -1,0 +1,241 @@
+"""Searching: never worse than the level below, every part feasible, nothing lost, the same whatever the threads."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import rlacd
+from rlacd import _native
+from rlacd.clock import Clock
+from rlacd.criteria import Concavity
+from rlacd.cut import CutTree
+from rlacd.finish import merge_parts
+from rlacd.planes.views import Views
+from rlacd.policies import make_policy
+from rlacd.search.levels import LEVELS, Level, cost, level, search
+from rlacd.search.neighbourhood import Neighbourhood
+from rlacd.search.pace import Pace
+from rlacd.search.rankings import by_score, diverse
+from rlacd.solid.component import Component, Part, Plane
+from rlacd.solid.load import load_mesh
+from rlacd.solid.repair import repair
+from rlacd.solid.reunite import reunite
+from rlacd.workers import Workers
+from tests.shapes import box
+
+SHAPES = ("test/coacd_examples/SnowFlake.ply", "test/vhacd/ob_chess_table.ply", "test/capod/class8__m85.ply")
+CRITERION = Concavity(0.05)
+
+
+def frame() -> Any:
+    """A picture frame, turned so that no face lies along an axis."""
+    return (box((-1, -1, -0.3), (1, 1, 0.3)) - box((-0.5, -0.5, -1), (0.5, 0.5, 1))).rotate([20, 30, 10])
+
+
+def solid_of(mesh: Path) -> Component:
+    return Component(repair(load_mesh(mesh), resolution=100, threads=1).manifold)
+
+
+def first_pass(root: Component, workers: Workers) -> list[Part]:
+    done, left = CutTree(root, make_policy("greedy"), workers).cut_until(CRITERION, Clock())
+    assert not left
+    return merge_parts(done, CRITERION, workers, Clock())
+
+
+@pytest.fixture(scope="module", params=SHAPES)
+def real(request: pytest.FixtureRequest, corpus: Path) -> Component:
+    return solid_of(corpus / request.param)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.lists(
+        st.tuples(st.tuples(*[st.floats(-1, 1)] * 3), st.floats(-0.5, 0.5)),
+        min_size=1,
+        max_size=3,
+    )
+)
+def test_what_slanted_planes_cut_is_reunited(cuts: list[tuple[tuple[float, float, float], float]]) -> None:
+    solid = Component(frame())
+    pieces = [solid]
+    for normal, offset in cuts:
+        length = math.hypot(*normal)
+        if length < 1e-3:
+            continue
+        x, y, z = (x / length for x in normal)
+        plane = Plane((x, y, z), offset)
+        pieces = [side for piece in pieces for side in piece.cut(plane) if side is not None]
+    again = reunite(pieces)
+    if again is None:  # it may give up; it must not return something else
+        return
+    assert again.volume == pytest.approx(solid.volume, rel=1e-6)
+    assert _native.mesh_area(again.vertices, again.faces) == pytest.approx(
+        _native.mesh_area(solid.vertices, solid.faces), rel=1e-5
+    )
+
+
+@pytest.mark.slow
+def test_most_neighbours_can_be_reunited_without_a_wall_between_them(real: Component) -> None:
+    with Workers(1) as workers:
+        parts = first_pass(real, workers)
+    reunited = glued = 0.0
+    tried = failed = 0
+    for first, second in itertools.pairwise(parts):
+        tried += 1
+        solid = reunite([*first.members, *second.members])
+        if solid is None:
+            failed += 1
+            continue
+        union = Part.glued(first, second)
+        reunited += _native.mesh_area(solid.vertices, solid.faces)
+        glued += _native.mesh_area(union.vertices, union.faces)
+        assert solid.volume == pytest.approx(first.volume + second.volume, rel=1e-4)
+    assert failed <= 0.2 * tried
+    assert reunited == pytest.approx(glued, rel=1e-2)
+
+
+@pytest.mark.slow
+def test_a_search_only_improves_and_keeps_the_solid(real: Component) -> None:
+    with Workers(1) as workers:
+        parts = first_pass(real, workers)
+        found, account = search(real, parts, CRITERION, "best", Level(40, None), Views(), workers, Clock(), seed=0)
+    assert cost(found) <= cost(parts)
+    assert account.parts == len(found) <= account.portfolio <= account.first_pass == len(parts)
+    assert account.steps == 40 or account.exhausted
+    assert all(CRITERION.is_met(part) for part in found)
+    assert sum(part.volume for part in found) == pytest.approx(real.volume, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_more_steps_are_never_worse(real: Component) -> None:
+    costs = []
+    with Workers(1) as workers:
+        parts = first_pass(real, workers)
+        for steps in (0, 8, 24):
+            found, _ = search(real, parts, CRITERION, "best", Level(steps, None), Views(), workers, Clock(), seed=3)
+            costs.append(cost(found))
+    assert costs[0] >= costs[1] >= costs[2]
+
+
+def test_the_state_of_a_search_is_always_feasible() -> None:
+    root = Component(frame())
+    with Workers(1) as workers:
+        parts = first_pass(root, workers)
+        state = Neighbourhood(parts, CRITERION, [by_score("hull-sum")], Views(12, 0), workers, 0)
+        for _ in range(4):
+            state.run(Pace(Clock(), None, len(parts)), 3)
+            assert all(CRITERION.is_met(part) for part in state.parts)
+            assert sum(part.volume for part in state.parts) == pytest.approx(root.volume, rel=1e-6)
+
+
+def test_first_planes_differ() -> None:
+    root = Component(frame())
+    seen = Views(25, 4).of(root)
+    planes = diverse(seen, by_score("hull-sum")(root, seen), 6)
+    assert len(planes) > 1
+    for i, a in enumerate(planes):
+        for b in planes[:i]:
+            cosine = float(np.dot(a.normal, b.normal))
+            assert abs(cosine) < 0.999 or abs(a.offset - math.copysign(1, cosine) * b.offset) > 0.05
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("options", [{"quality": "balanced"}, {"quality": "best", "search_steps": 30, "seed": 5}])
+@pytest.mark.parametrize("name", SHAPES[:2])
+def test_the_same_hulls_for_any_number_of_threads(name: str, options: dict[str, Any], corpus: Path) -> None:
+    one, four = (rlacd.decompose(corpus / name, threads=threads, **options) for threads in (1, 4))
+    assert len(one) == len(four)
+    for a, b in zip(one, four, strict=True):
+        assert (a.vertices == b.vertices).all()
+        assert (a.faces == b.faces).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SHAPES)
+def test_levels_are_ordered(name: str, corpus: Path) -> None:
+    fast, balanced, best = (
+        rlacd.decompose(corpus / name, **options)
+        for options in ({}, {"quality": "balanced"}, {"quality": "best", "search_steps": 48})
+    )
+    assert len(best) <= len(balanced) <= len(fast)
+    assert len(best) < len(fast)  # these shapes have something to gain
+    for result in (balanced, best):
+        assert result.report["concavity"]["max"] <= 0.05
+        assert all(hull.is_convex and hull.is_watertight for hull in result)
+        assert result.report["complete"]
+    assert fast.report["search"] is None
+    assert balanced.report["search"]["steps"] <= 24
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [3, 8])
+def test_with_a_limit_on_hulls_the_error_falls(count: int, corpus: Path) -> None:
+    mesh = corpus / SHAPES[0]
+    fast = rlacd.decompose(mesh, max_hulls=count)
+    balanced = rlacd.decompose(mesh, max_hulls=count, quality="balanced")
+    assert len(balanced) <= count
+    assert balanced.report["concavity"]["max"] <= 1.02 * fast.report["concavity"]["max"]
+
+
+@pytest.mark.slow
+def test_cancelling_a_search_keeps_what_it_has_reached(corpus: Path) -> None:
+    told: list[rlacd.Progress] = []
+
+    def stop(progress: rlacd.Progress) -> bool:
+        told.append(progress)
+        return progress.stage != "search" or progress.done < 8
+
+    result = rlacd.decompose(corpus / SHAPES[0], quality="best", search_steps=1000, progress=stop)
+    assert result.report["stopped_by"] == "cancel"
+    assert result.report["concavity"]["max"] <= 0.05
+    assert 8 <= result.report["search"]["steps"] < 1000
+    counts = [progress.parts for progress in told if progress.stage == "search"]
+    assert counts == sorted(counts, reverse=True)
+
+
+@pytest.mark.slow
+def test_a_budget_ends_the_search_and_not_the_work(corpus: Path) -> None:
+    result = rlacd.decompose(corpus / SHAPES[0], quality="best", budget=0.01)
+    assert result.report["complete"]
+    assert result.report["search"]["steps"] == 0
+    assert result.report["concavity"]["max"] <= 0.05
+
+
+def test_a_convex_solid_needs_no_search() -> None:
+    result = rlacd.decompose(trimesh.creation.icosphere(), quality="best")
+    assert len(result) == 1
+    assert result.report["search"]["exhausted"]
+
+
+def test_bounds_of_levels() -> None:
+    assert level("balanced", None, None) == LEVELS["balanced"]
+    assert level("best", 2.0, None) == Level(None, 2.0)
+    assert level("best", None, 7) == Level(7, None)
+    assert level("best", 2.0, 7) == Level(7, 2.0)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"quality": "better"},
+        {"quality": "best", "budget": 0},
+        {"quality": "best", "budget": math.inf},
+        {"quality": "best", "search_steps": -1},
+        {"quality": "best", "search_steps": 1.5},
+        {"budget": 1.0},
+        {"search_steps": 3},
+        {"quality": "balanced", "merge": False},
+    ],
+)
+def test_bad_options(options: dict[str, Any]) -> None:
+    with pytest.raises(rlacd.OptionError):
+        rlacd.decompose(([[0, 0, 0]], [[0, 0, 0]]), **options)
