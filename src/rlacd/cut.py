@@ -77,7 +77,7 @@ class CutTree:
         for component, own in zip(components, pieces, strict=True):
             if len(own) > 1:
                 across = self._across.get(component)
-                kept = [piece for piece in own if across is None or not _is_shaving(piece, across)]
+                kept = [piece for piece in own if across is None or not is_shaving(piece, across)]
                 self._children[component] = kept
                 self._across.update((piece, across) for piece in kept if across is not None)
         for component, plane in zip(whole, planes, strict=True):
@@ -86,10 +86,10 @@ class CutTree:
                 self._children[component] = []
                 continue
             self._across[below], self._across[above] = above, below
-            self._children[component] = [side for side in (below, above) if not _is_shaving(side, self._across[side])]
+            self._children[component] = [side for side in (below, above) if not is_shaving(side, self._across[side])]
 
 
-def _is_shaving(piece: Component, across: Component) -> bool:
+def is_shaving(piece: Component, across: Component) -> bool:
     """Tell whether a piece is a film that a cut nearly parallel to the surface has taken off the solid across it.
 
     Films have ragged outlines that hardly any number of cuts makes convex, and the solid they came from stands for

@@ -77,7 +77,7 @@ def decompose(
     merge : bool
         Unite parts whose joint hull still meets the threshold.
     policy : str
-        Who chooses the cuts: ``greedy``, ``greedy-SCORE`` or ``navacd`` (see `rlacd.policies.make_policy`).
+        Who chooses the cuts: ``greedy``, ``greedy-SCORE``, ``navacd``, ``learned`` or the path of an ONNX file (see `rlacd.policies.make_policy`).
     resolution : int
         Cells along the longest side of the grid on which repair looks for enclosed rooms.
     seed : int
@@ -133,7 +133,7 @@ def decompose(
         goal = _prepared(options, solid, workers, clock)
         if options.max_hulls is None:  # otherwise the threshold may be exceeded anyway
             goal = with_limits(goal, options.max_vertices, options.max_faces)
-        tree = CutTree(Component(solid.manifold), make_policy(options.policy), workers)
+        tree = CutTree(Component(solid.manifold), make_policy(options.policy, options.threshold), workers)
         parts, goal = _parts(tree, goal, options, workers, clock)
         clock.nothing_left_to_stop()
         with clock.stage("finish"):
