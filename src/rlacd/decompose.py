@@ -77,7 +77,8 @@ def decompose(
     merge : bool
         Unite parts whose joint hull still meets the threshold.
     policy : str
-        Who chooses the cuts: ``greedy``, ``greedy-SCORE``, ``navacd``, ``learned`` or the path of an ONNX file (see `rlacd.policies.make_policy`).
+        Who chooses the cuts: ``greedy``, ``greedy-SCORE``, ``navacd``, ``learned`` or the path of an ONNX file (see
+        `rlacd.policies.make_policy`).
     resolution : int
         Cells along the longest side of the grid on which repair looks for enclosed rooms.
     seed : int

@@ -18,15 +18,17 @@ import numpy as np
 import onnxruntime
 
 from rlacd.errors import WeightsError
-from rlacd.planes.candidates import axis_and_principal
 from rlacd.planes.sweep import Sweep, sweep
-from rlacd.policies.features import VERSION, features, measures, sweep_table
+from rlacd.policies.features import VERSION, candidates_of, features, measures, tables
 from rlacd.policies.greedy import cheapest, excess_norm
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
 
 SHIPPED = "guide.onnx"
 """The weights in `rlacd.weights`."""
+
+INPUTS = ["planes", "edges", "component"]
+OUTPUTS = ["q", "q_edges", "value"]
 
 NOTHING = 1e-9
 """Least greedy score, relative to the hull."""
@@ -79,31 +81,30 @@ class Guide:
             raise WeightsError(f"{name} is damaged or no ONNX file; export the policy again.") from error
         self.about = _about(name, self._session.get_modelmeta().custom_metadata_map.get("rlacd"))
         signature = [[v.name for v in self._session.get_inputs()], [v.name for v in self._session.get_outputs()]]
-        if signature != [["planes", "component"], ["q", "value"]]:
+        if signature != [INPUTS, OUTPUTS]:
             raise WeightsError(f"{name} is no guide network; export the policy again.")
 
-    def log_parts(self, component: Component, swept: Sweep, scale: float) -> FloatArray:
-        """Predict, for every plane of a component's sweep, log(parts the component ends in, merged) [K * M]."""
-        planes, whole = features(
-            sweep_table(swept)[None],
-            measures(component)[None],
-            np.clip(np.array([scale]), *self.about.scales),
-        )
-        q: FloatArray = self._session.run(["q"], {"planes": planes, "component": whole})[0][0].astype(np.float64)
+    def log_parts(self, component: Component, swept: Sweep, scale: float, per_axis: int) -> FloatArray:
+        """Predict, for every plane of a component's sweep, log(parts the component ends in, merged)."""
+        grid, edges = tables(swept, per_axis)
+        scales = np.clip(np.array([scale]), *self.about.scales)
+        inputs = features(grid[None], edges[None], measures(component)[None], scales)
+        outputs = self._session.run(["q", "q_edges"], dict(zip(INPUTS, inputs, strict=True)))
+        q: FloatArray = np.concatenate(outputs, axis=1)[0, : len(swept.candidates)].astype(np.float64)
         return q
 
 
 def guided_cost(
-    guide: Guide, component: Component, swept: Sweep, scale: float, blend: float | None = None
+    guide: Guide, component: Component, swept: Sweep, scale: float, per_axis: int, blend: float | None = None
 ) -> FloatArray:
-    """Cost of every plane [K * M]: log(parts expected) + blend * log(greedy score), both up to a constant.
+    """Cost of every plane of a sweep: log(parts expected) + blend * log(greedy score), both up to a constant.
 
-    The greedy score counts what the network cannot know: it has been told of few of the 150 planes what they end in,
-    and the best of 150 guesses is one that is wrong.
+    The greedy score counts what the network cannot know: it has been told of few planes of a component what they end
+    in, and the best of 150 guesses is one that is wrong.
     """
     blend = guide.about.blend if blend is None else blend
     greedy = np.log(excess_norm(swept) + NOTHING * component.hull.volume) / 1.3
-    return guide.log_parts(component, swept, scale) + blend * greedy
+    return guide.log_parts(component, swept, scale, per_axis) + blend * greedy
 
 
 class Learned:
@@ -136,8 +137,9 @@ class Learned:
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None when every candidate misses it or shaves off a film."""
-        swept = sweep(component, axis_and_principal(component, self._guide.about.per_axis), threads)
-        return cheapest(swept, guided_cost(self._guide, component, swept, self._scale, self._blend))
+        per_axis = self._guide.about.per_axis
+        swept = sweep(component, candidates_of(component, per_axis), threads)
+        return cheapest(swept, guided_cost(self._guide, component, swept, self._scale, per_axis, self._blend))
 
 
 @lru_cache(maxsize=4)

@@ -13,9 +13,7 @@ from safetensors.torch import load_file, save_file
 
 from rlacd.learn.guide.network import Ensemble, GuideNetwork
 from rlacd.planes.candidates import OFFSETS_PER_AXIS
-from rlacd.policies.features import COMPONENT_FEATURES, PLANE_FEATURES, VERSION
-
-DIRECTIONS = 6
+from rlacd.policies.features import COMPONENT_FEATURES, DIRECTIONS, EDGE_PLANES, PLANE_FEATURES, VERSION
 
 
 def export(network: Ensemble, path: Path, about: dict[str, Any]) -> None:
@@ -32,8 +30,13 @@ def export(network: Ensemble, path: Path, about: dict[str, Any]) -> None:
     """
     about = {"kind": "guide", "features": VERSION, "per_axis": OFFSETS_PER_AXIS, "width": network.width, **about}
     network = network.eval()
-    example = (torch.zeros(2, DIRECTIONS, PLANE_FEATURES, OFFSETS_PER_AXIS), torch.zeros(2, COMPONENT_FEATURES))
-    batch = torch.export.Dim("batch", min=1)
+    example = (
+        torch.zeros(2, DIRECTIONS, PLANE_FEATURES, OFFSETS_PER_AXIS),
+        torch.zeros(2, EDGE_PLANES, PLANE_FEATURES),
+        torch.zeros(2, COMPONENT_FEATURES),
+    )
+    batch, per_axis = torch.export.Dim("batch", min=1), torch.export.Dim("per_axis", min=2)
+    shapes = {"planes": {0: batch, 3: per_axis}, "edges": {0: batch}, "component": {0: batch}}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         program = torch.onnx.export(
@@ -41,9 +44,9 @@ def export(network: Ensemble, path: Path, about: dict[str, Any]) -> None:
             example,
             dynamo=True,
             verbose=False,
-            input_names=["planes", "component"],
-            output_names=["q", "value"],
-            dynamic_shapes={"planes": {0: batch, 3: torch.export.Dim("per_axis", min=2)}, "component": {0: batch}},
+            input_names=["planes", "edges", "component"],
+            output_names=["q", "q_edges", "value"],
+            dynamic_shapes=shapes,
         )
     assert program is not None
     model = program.model_proto

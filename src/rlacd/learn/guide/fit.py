@@ -15,6 +15,12 @@ from rlacd.learn.guide.files import load_arrays
 from rlacd.learn.guide.network import GuideNetwork
 from rlacd.policies.features import features
 
+SHARPNESS = 8.0
+"""Of the distributions that the listwise loss compares: 10 % more parts halve a plane's weight (2 ** -1.1)."""
+
+THINNED = 0.3
+"""Share of the batches of which every second plane is left out, since rollouts see components that way."""
+
 
 @dataclass
 class Dataset:
@@ -22,10 +28,11 @@ class Dataset:
 
     Attributes
     ----------
-    planes : float32 [S, K, 22, M]
+    planes : float32 [S, 6, 22, M]
+    edges : float32 [S, 12, 22]
     component : float32 [S, 10]
     index : int64 [S, W]
-        Numbers of the labelled planes; 0 where there are fewer than W.
+        Numbers of the labelled planes, those of the edges after the others; 0 where there are fewer than W.
     parts : float32 [S, W]
         log(parts).
     known : bool [S, W]
@@ -35,6 +42,7 @@ class Dataset:
     """
 
     planes: Tensor
+    edges: Tensor
     component: Tensor
     index: Tensor
     parts: Tensor
@@ -50,49 +58,47 @@ class Dataset:
 
     def thinned(self) -> Dataset:
         """Leave out every second plane of each direction: the sweep of half as many planes."""
-        per_axis = self.planes.shape[3]
+        planes = self.planes[..., 1::2]
+        per_axis, fewer = self.planes.shape[3], planes.shape[3]
+        total, total_fewer = (self.planes.shape[1] * m for m in (per_axis, fewer))
         direction, j = self.index // per_axis, self.index % per_axis
-        kept = j % 2 == 1
-        index = torch.where(kept, direction * (per_axis // 2) + j // 2, 0)
+        of_edge = self.index >= total
+        kept = (j % 2 == 1) | of_edge
+        index = torch.where(of_edge, self.index - total + total_fewer, direction * fewer + j // 2)
+        index = torch.where(kept, index, 0)
         known = self.known & kept
-        some = known.any(1)
-        return Dataset(self.planes[..., 1::2], self.component, index, self.parts, known, self.given_up).take(
-            some.nonzero()[:, 0]
-        )
+        thinned = Dataset(planes, self.edges, self.component, index, self.parts, known, self.given_up)
+        return thinned.take(known.any(1).nonzero()[:, 0])
+
+    @property
+    def least(self) -> Tensor:
+        """log(parts) of the best labelled plane of each state [S]."""
+        return self.parts.masked_fill(~self.known, np.inf).amin(1)
 
 
 def load_labels(paths: Sequence[Path]) -> Dataset:
     """Read shards of labels (see `rlacd.learn.guide.label`); those without any are skipped."""
     shards = [arrays for path in paths if len(arrays := load_arrays(path))]
-    planes, component, rows = [], [], []
+    inputs = [
+        features(*(np.asarray(shard[k], np.float64) for k in ("grid", "edges", "whole", "scale"))) for shard in shards
+    ]
+    rows = []
     for shard in shards:
-        p, c = features(*(np.asarray(shard[k], np.float64) for k in ("table", "whole", "scale")))
-        planes.append(p)
-        component.append(c)
-        for state in range(len(c)):
+        for state in range(len(shard["scale"])):
             mine = shard["state"] == state
             rows.append((shard["plane"][mine], shard["parts"][mine], shard["given_up"][mine]))
-    width = max(len(r[0]) for r in rows)
+    width = max(len(row[0]) for row in rows)
 
     def padded(column: int, dtype: type) -> Tensor:
         out: NDArray[np.generic] = np.zeros((len(rows), width), dtype)
-        for i, r in enumerate(rows):
-            out[i, : len(r[column])] = r[column]
+        for i, row in enumerate(rows):
+            out[i, : len(row[column])] = row[column]
         return torch.from_numpy(out)
 
-    known = torch.arange(width)[None] < torch.tensor([len(r[0]) for r in rows])[:, None]
-    return Dataset(
-        torch.from_numpy(np.concatenate(planes)),
-        torch.from_numpy(np.concatenate(component)),
-        padded(0, np.int64),
-        padded(1, np.float32).clamp(min=1).log(),
-        known,
-        padded(2, np.bool_),
-    )
-
-
-SHARPNESS = 8.0
-"""Of the distributions that the listwise loss compares: 10 % more parts halve a plane's weight (2 ** -1.1)."""
+    known = torch.arange(width)[None] < torch.tensor([len(row[0]) for row in rows])[:, None]
+    planes, edges, component = (torch.from_numpy(np.concatenate(column)) for column in zip(*inputs, strict=True))
+    parts = padded(1, np.float32).clamp(min=1).log()
+    return Dataset(planes, edges, component, padded(0, np.int64), parts, known, padded(2, np.bool_))
 
 
 def loss(network: GuideNetwork, batch: Dataset, listwise: float) -> Tensor:
@@ -100,19 +106,22 @@ def loss(network: GuideNetwork, batch: Dataset, listwise: float) -> Tensor:
 
     A label that was given up is only a lower bound: predictions above it cost nothing.
     """
-    q, value = network(batch.planes, batch.component)
-    q = q.gather(1, batch.index)
+    q, value = _of_labels(network, batch)
     known = batch.known
     miss = q - batch.parts
     miss = torch.where(batch.given_up, miss.clamp(max=0), miss)
     regression = (_huber(miss) * known).sum() / known.sum()
-    far = -1e9
-    target = torch.softmax((-SHARPNESS * batch.parts).masked_fill(~known, far), dim=1)
-    logits = torch.log_softmax((-SHARPNESS * q).masked_fill(~known, far), dim=1)
+    impossible = -1e9
+    target = torch.softmax((-SHARPNESS * batch.parts).masked_fill(~known, impossible), dim=1)
+    logits = torch.log_softmax((-SHARPNESS * q).masked_fill(~known, impossible), dim=1)
     ranking = -(target * logits.masked_fill(~known, 0)).sum(1).mean()
-    least = batch.parts.masked_fill(~known, np.inf).amin(1)
-    worth = _huber(value - least).mean()
-    return regression + worth + listwise * ranking
+    return regression + _huber(value - batch.least).mean() + listwise * ranking
+
+
+def _of_labels(network: GuideNetwork, batch: Dataset) -> tuple[Tensor, Tensor]:
+    """Predictions for the labelled planes [S, W], and values [S]."""
+    q, q_edges, value = network(batch.planes, batch.edges, batch.component)
+    return torch.cat([q, q_edges], dim=1).gather(1, batch.index), value
 
 
 def _huber(miss: Tensor) -> Tensor:
@@ -143,8 +152,10 @@ def fit(
         total = 0.0
         for rows in torch.split(torch.randperm(len(data), generator=generator), batch):
             part = data.take(rows)
-            if torch.rand((), generator=generator) < 0.3:
+            if torch.rand((), generator=generator) < THINNED:
                 part = part.thinned()
+            if len(part) == 0:
+                continue
             value = loss(network, part, listwise)
             optimizer.zero_grad()
             value.backward()  # type: ignore[no-untyped-call]
@@ -167,10 +178,9 @@ def judge(network: GuideNetwork, data: Dataset, listwise: float) -> dict[str, fl
     for rows in torch.split(torch.arange(len(data)), 1024):
         part = data.take(rows)
         total += float(loss(network, part, listwise)) * len(rows)
-        q, _ = network(part.planes, part.component)
-        pick = q.gather(1, part.index).masked_fill(~part.known, np.inf).argmin(1, keepdim=True)
-        least = part.parts.masked_fill(~part.known, np.inf).amin(1)
-        regret += float((part.parts.gather(1, pick)[:, 0] - least).sum())
-        policy += float((part.parts[:, 0] - least).sum())
+        q, _ = _of_labels(network, part)
+        pick = q.masked_fill(~part.known, np.inf).argmin(1, keepdim=True)
+        regret += float((part.parts.gather(1, pick)[:, 0] - part.least).sum())
+        policy += float((part.parts[:, 0] - part.least).sum())
     n = len(data)
     return {"held_out_loss": total / n, "held_out_regret": regret / n, "policy_regret": policy / n}

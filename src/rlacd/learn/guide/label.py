@@ -13,8 +13,9 @@ from manifold3d import Manifold
 
 from rlacd.criteria import Concavity
 from rlacd.learn.guide.rollout import Cost, Rollouts, State
+from rlacd.planes.candidates import OFFSETS_PER_AXIS
 from rlacd.planes.sweep import Sweep
-from rlacd.policies.features import measures, sweep_table
+from rlacd.policies.features import DIRECTIONS, measures, tables
 from rlacd.policies.greedy import excess_norm, hull_sum, max_excess
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component
@@ -27,7 +28,7 @@ SPARE = 3
 USUAL = 8
 """States that end in more parts are labelled the less often, in proportion to what a rollout costs."""
 
-RANKED = 6
+RANKED = 4
 """Planes labelled of those that the ranking puts first."""
 
 
@@ -35,11 +36,13 @@ RANKED = 6
 class Labels:
     """States of one mesh, and labels of some of their planes.
 
-    As arrays (see `arrays`): ``table`` [S, K, M, 10], ``whole`` [S, 4] and ``scale`` [S] of the S states; ``state``,
-    ``plane``, ``parts`` (merged; where given up, more than any other of the state) and ``given_up`` [L] of the labels.
+    As arrays (see `arrays`): ``grid`` [S, 6, M, 10], ``edges`` [S, 12, 10] (see `rlacd.policies.features.tables`),
+    ``whole`` [S, 4] and ``scale`` [S] of the S states; ``state``, ``plane``, ``parts`` (merged; where given up, more
+    than any other of the state) and ``given_up`` [L] of the labels.
     """
 
-    table: list[FloatArray] = field(default_factory=list)
+    grid: list[FloatArray] = field(default_factory=list)
+    edges: list[FloatArray] = field(default_factory=list)
     whole: list[FloatArray] = field(default_factory=list)
     scale: list[float] = field(default_factory=list)
     state: list[int] = field(default_factory=list)
@@ -108,7 +111,9 @@ def _add(labels: Labels, rollouts: Rollouts, state: State, planes: list[int], mo
     labels.state += [len(labels.scale)] * len(planes)
     labels.parts += [worst + 1 if count is None else count for count in counts]
     labels.given_up += [count is None for count in counts]
-    labels.table.append(sweep_table(state.sweep))
+    grid, edges = tables(state.sweep, OFFSETS_PER_AXIS)
+    labels.grid.append(grid)
+    labels.edges.append(edges)
     labels.whole.append(measures(state.component))
     labels.scale.append(rollouts.criterion.threshold)
 
@@ -116,13 +121,15 @@ def _add(labels: Labels, rollouts: Rollouts, state: State, planes: list[int], mo
 def _candidates(state: State, cost: Cost, rng: np.random.Generator) -> list[int]:
     """The policy's plane, the best of its ranking and of each greedy score, and some that are drawn."""
     planes: list[int] = []
-    per_axis = state.sweep.candidates.offsets.shape[1]
+    costs = cost(state.component, state.sweep, OFFSETS_PER_AXIS)
     scores = [score(state.sweep) for score in (excess_norm, hull_sum, max_excess)]
-    noisy = np.log(scores[0] + 1e-12) + rng.gumbel(size=len(state.valid))
-    drawn = rng.random(len(state.valid))
-    wanted = [(cost(state.component, state.sweep), RANKED), *((score, 1) for score in scores), (noisy, 1), (drawn, 1)]
+    noisy = np.log(scores[0] + 1e-12) + rng.gumbel(size=len(costs))
+    drawn = rng.random(len(costs))
+    edges = np.arange(len(costs)) >= DIRECTIONS * OFFSETS_PER_AXIS
+    wanted = [(costs, RANKED), *((score, 1) for score in scores), (noisy, 1), (drawn, 1)]
+    wanted += [(np.where(edges, x, np.inf), n) for x, n in ((costs, 2), (scores[0], 1), (drawn, 1))]
     for wanting, count in wanted:
-        for plane in shortlist(np.where(state.valid, wanting, np.inf), count, per_axis):
+        for plane in shortlist(np.where(state.valid, wanting, np.inf), count, OFFSETS_PER_AXIS):
             if not any(_same(state.sweep, plane, other) for other in planes):
                 planes.append(plane)
     return planes
@@ -133,19 +140,18 @@ def shortlist(cost: FloatArray, count: int, per_axis: int) -> list[int]:
 
     Parameters
     ----------
-    cost : float64 [K * M]
+    cost : float64 [6 * per_axis + E]
     per_axis : int
-        M, planes along each direction.
+        Planes along each direction.
     """
-    left = cost.reshape(-1, per_axis).copy()
+    left = cost.copy()
     picked: list[int] = []
-    while len(picked) < count:
+    while len(picked) < count and np.isfinite(left).any():
         best = int(np.argmin(left))
-        if not np.isfinite(left.flat[best]):
-            break
         picked.append(best)
-        direction, j = divmod(best, per_axis)
-        left[direction, max(0, j - 1) : j + 2] = np.inf
+        first = best if best >= DIRECTIONS * per_axis or best % per_axis == 0 else best - 1
+        last = best if best >= DIRECTIONS * per_axis or best % per_axis == per_axis - 1 else best + 1
+        left[first : last + 1] = np.inf
     return picked
 
 

@@ -37,34 +37,47 @@ class GuideNetwork(nn.Module):
         self.judge = nn.Sequential(nn.ReLU(), nn.Linear(width, width), nn.ReLU(), nn.Linear(width, 1))
         self.value = nn.Linear(2 * width, 1)
 
-    def forward(self, planes: Tensor, component: Tensor) -> tuple[Tensor, Tensor]:
+    def forward(self, planes: Tensor, edges: Tensor, component: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Predict log(final parts).
 
         Parameters
         ----------
         planes : Tensor [B, K, 22, M]
             K directions, the coordinate axes first, with M planes each.
+        edges : Tensor [B, E, 22]
+            Planes of concave edges, each a direction of its own.
         component : Tensor [B, 10]
 
         Returns
         -------
         q : Tensor [B, K * M]
             When the plane is taken.
+        q_edges : Tensor [B, E]
         value : Tensor [B]
             When the best of the planes is taken.
         """
-        b, k, f, m = planes.shape
-        is_axis = (torch.arange(k, device=planes.device) < 3).to(planes.dtype).reshape(1, k, 1, 1)
-        flat = torch.cat([planes, is_axis.expand(b, k, 1, m)], dim=2).reshape(b * k, f + 1, m)
-        back = torch.cat([planes[:, :, self._mirrored].flip(3), is_axis.expand(b, k, 1, m)], dim=2)
-        h = self._trunk(flat) + self._trunk(back.reshape(b * k, f + 1, m)).flip(2)
-        h = h.reshape(b, k, self.width, m)
-        along = torch.cat([h.mean(3), h.amax(3)], dim=2)  # [B, K, 2W]
+        is_axis = (torch.arange(planes.shape[1], device=planes.device) < 3).to(planes.dtype)
+        h, along = self._along(planes, is_axis)
         whole = self.whole(torch.cat([along.mean(1), along.amax(1), component], dim=1))  # [B, 2W]
-        mixed = self.plane(h.transpose(2, 3)) + self.direction(along)[:, :, None] + self.context(whole)[:, None, None]
         value = self.value(whole)[:, 0]
-        q = value[:, None] + self.judge(mixed).reshape(b, k * m)
-        return q, value
+        q = self._judge(h, along, whole)
+        is_edge = torch.full_like(edges[0, :, 0], -1.0)
+        q_edges = self._judge(*self._along(edges.unsqueeze(3), is_edge), whole)
+        return value[:, None] + q, value[:, None] + q_edges, value
+
+    def _along(self, planes: Tensor, kind: Tensor) -> tuple[Tensor, Tensor]:
+        """Channels of planes [B, K, W, M], and of directions [B, K, 2W]."""
+        b, k, f, m = planes.shape
+        kinds = kind.reshape(1, k, 1, 1).expand(b, k, 1, m)
+        flat = torch.cat([planes, kinds], dim=2).reshape(b * k, f + 1, m)
+        back = torch.cat([planes[:, :, self._mirrored].flip(3), kinds], dim=2).reshape(b * k, f + 1, m)
+        h = (self._trunk(flat) + self._trunk(back).flip(2)).reshape(b, k, self.width, m)
+        return h, torch.cat([h.mean(3), h.amax(3)], dim=2)
+
+    def _judge(self, h: Tensor, along: Tensor, whole: Tensor) -> Tensor:
+        mixed = self.plane(h.transpose(2, 3)) + self.direction(along)[:, :, None] + self.context(whole)[:, None, None]
+        q: Tensor = self.judge(mixed)
+        return q.flatten(1)
 
     def _trunk(self, x: Tensor) -> Tensor:
         h = torch.relu(self.enter(x))
@@ -81,9 +94,8 @@ class Ensemble(nn.Module):
         self.members = nn.ModuleList(members)
         self.width = members[0].width
 
-    def forward(self, planes: Tensor, component: Tensor) -> tuple[Tensor, Tensor]:
+    def forward(self, planes: Tensor, edges: Tensor, component: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Predict as the members do on average; shapes as in `GuideNetwork.forward`."""
-        outputs = [member(planes, component) for member in self.members]
-        q = torch.stack([q for q, _ in outputs]).mean(0)
-        value = torch.stack([value for _, value in outputs]).mean(0)
-        return q, value
+        outputs = [member(planes, edges, component) for member in self.members]
+        q, q_edges, value = (torch.stack(column).mean(0) for column in zip(*outputs, strict=True))
+        return q, q_edges, value

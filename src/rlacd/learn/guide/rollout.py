@@ -15,14 +15,15 @@ from rlacd.clock import Clock
 from rlacd.criteria import Concavity
 from rlacd.cut import is_shaving
 from rlacd.finish import merge_parts
-from rlacd.planes.candidates import Candidates, axis_and_principal
+from rlacd.planes.candidates import OFFSETS_PER_AXIS, Candidates
 from rlacd.planes.sweep import SLIVER, Sweep, sweep
+from rlacd.policies.features import DIRECTIONS, candidates_of
 from rlacd.solid.arrays import BoolArray, FloatArray
 from rlacd.solid.component import Component
 from rlacd.workers import Workers
 
-Cost = Callable[[Component, Sweep], FloatArray]
-"""A policy: the cost of every plane of a component's sweep [K * M]; the valid one of least cost is taken."""
+Cost = Callable[[Component, Sweep, int], FloatArray]
+"""A policy: the cost of every plane of a component's sweep, given the planes per axis; the least valid one is taken."""
 
 COARSE = slice(1, None, 2)
 """Rollouts try every second plane of a direction: half the work, for a few percent more parts."""
@@ -31,7 +32,7 @@ COARSE = slice(1, None, 2)
 class State:
     """A connected component that does not meet the criterion, and what is known of its cuts.
 
-    Planes are numbered as in the full sweep everywhere.
+    Planes are numbered as in the full sweep everywhere: direction by direction, then those of the concave edges.
     """
 
     def __init__(self, component: Component, across: Component | None) -> None:
@@ -42,8 +43,8 @@ class State:
 
     @cached_property
     def candidates(self) -> Candidates:
-        """The paper's 150 planes."""
-        return axis_and_principal(self.component)
+        """All planes."""
+        return candidates_of(self.component, OFFSETS_PER_AXIS)
 
     @cached_property
     def sweep(self) -> Sweep:
@@ -52,27 +53,28 @@ class State:
 
     @cached_property
     def valid(self) -> BoolArray:
-        """Planes that may be taken [K * M]."""
+        """Planes that may be taken."""
         return valid_planes(self.sweep)
 
     def choose(self, cost: Cost) -> int:
         """Choose a plane by the full sweep; -1 when none is valid."""
         if not self.valid.any():
             return -1
-        return int(np.argmin(np.where(self.valid, cost(self.component, self.sweep), np.inf)))
+        costs = cost(self.component, self.sweep, OFFSETS_PER_AXIS)
+        return int(np.argmin(np.where(self.valid, costs, np.inf)))
 
     def choose_coarsely(self, cost: Cost) -> int:
-        """Choose by a sweep over every second plane."""
-        full = self.candidates
-        thinned = Candidates(full.directions, np.ascontiguousarray(full.offsets[:, COARSE]))
-        scored = sweep(self.component, thinned)
+        """Choose by a sweep over every second plane of a direction."""
+        grid = np.arange(DIRECTIONS * OFFSETS_PER_AXIS).reshape(DIRECTIONS, OFFSETS_PER_AXIS)[:, COARSE]
+        numbers = np.concatenate([grid.reshape(-1), np.arange(DIRECTIONS * OFFSETS_PER_AXIS, len(self.candidates))])
+        scored = sweep(
+            self.component, Candidates(self.candidates.directions[numbers], self.candidates.offsets[numbers])
+        )
         valid = valid_planes(scored)
         if not valid.any():
             return -1
-        best = int(np.argmin(np.where(valid, cost(self.component, scored), np.inf)))
-        direction, j = divmod(best, thinned.offsets.shape[1])
-        per_axis = full.offsets.shape[1]
-        return int(direction * per_axis + range(per_axis)[COARSE][j])
+        costs = cost(self.component, scored, grid.shape[1])
+        return int(numbers[np.argmin(np.where(valid, costs, np.inf))])
 
 
 def valid_planes(scored: Sweep) -> BoolArray:

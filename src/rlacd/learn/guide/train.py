@@ -111,8 +111,8 @@ def _label_round(
 def _cost(guide: Guide | None, threshold: float) -> Cost:
     """The policy whose choices are labelled: greedy at first, then the last network's."""
     if guide is None:
-        return lambda component, swept: excess_norm(swept)
-    return lambda component, swept: guided_cost(guide, component, swept, threshold)
+        return lambda component, swept, per_axis: excess_norm(swept)
+    return lambda component, swept, per_axis: guided_cost(guide, component, swept, threshold, per_axis)
 
 
 def _fit_round(options: TrainOptions, number: int, say: Callable[[str], None]) -> Path:
@@ -163,7 +163,7 @@ def _deploy_round(
     counts = deploy(Learned(network, options.threshold), solids, options.threshold)
     row: dict[str, Any] = {"raw": sum(c.raw for c in counts), "merged": sum(c.merged for c in counts)}
     for score in ("hull-sum", "excess-norm"):
-        baseline = deploy(Greedy(score), solids, options.threshold)
+        baseline = deploy(Greedy(score, concave_edges=0), solids, options.threshold)
         both = [min(pair, key=lambda c: c.merged) for pair in zip(counts, baseline, strict=True)]
         row |= {f"ratio to {score}": ratio(counts, baseline), f"the better of it and {score}": ratio(both, baseline)}
     say(f"round {number}: deployed {row}")
