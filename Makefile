@@ -21,7 +21,7 @@ $(VENV)/installed: $(VENV)/tools $(NATIVE_SOURCES)
 	touch $@
 
 $(VENV)/test-extras: $(VENV)/installed
-	$(BIN)/pip install --quiet --constraint constraints-dev.txt --group test
+	$(RLACD_INSTALL) --editable '.[view,train]' --group test
 	touch $@
 
 demo: install

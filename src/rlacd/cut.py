@@ -35,7 +35,7 @@ class Divisions:
                 own = [component]
             across = self._across.get(component)
             if len(own) > 1 and across is not None:
-                own = [piece for piece in own if not _is_shaving(piece, across)]
+                own = [piece for piece in own if not is_shaving(piece, across)]
                 self._across.update((piece, across) for piece in own)
             self._pieces[component] = own
         return self._pieces[component]
@@ -49,7 +49,7 @@ class Divisions:
                 self._sides[key] = []
             else:
                 self._across[below], self._across[above] = above, below
-                self._sides[key] = [side for side in (below, above) if not _is_shaving(side, self._across[side])]
+                self._sides[key] = [side for side in (below, above) if not is_shaving(side, self._across[side])]
         return self._sides[key]
 
 
@@ -125,7 +125,7 @@ class CutTree:
             self._children[component] = [] if plane is None else self._divisions.sides(component, plane)
 
 
-def _is_shaving(piece: Component, across: Component) -> bool:
+def is_shaving(piece: Component, across: Component) -> bool:
     """Tell whether a piece is a film that a cut nearly parallel to the surface has taken off the solid across it.
 
     Films have ragged outlines that hardly any number of cuts makes convex, and the solid they came from stands for

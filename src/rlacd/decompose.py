@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import os
 from pathlib import Path
 from typing import TypeAlias
@@ -82,7 +83,8 @@ def decompose(
     merge : bool
         Unite parts whose joint hull still meets the threshold.
     policy : str
-        Who chooses the cuts: ``greedy``, ``greedy-SCORE`` or ``navacd`` (see `rlacd.policies.make_policy`).
+        Who chooses the cuts: ``greedy``, ``greedy-SCORE``, ``navacd``, ``learned`` or the path of an ONNX file (see
+        `rlacd.policies.make_policy`).
     resolution : int
         Cells along the longest side of the grid on which repair looks for enclosed rooms.
     seed : int
@@ -151,7 +153,7 @@ def decompose(
             goal = with_limits(goal, options.max_vertices, options.max_faces)
         root = Component(solid.manifold)
         views = Views()
-        tree = CutTree(root, make_policy(options.policy, views), workers)
+        tree = CutTree(root, make_policy(options.policy, views, _scale(goal)), workers)
         parts, goal = _parts(tree, goal, options, workers, clock)
         found = None
         if options.quality != "fast" and clock.stopped_by is None:
@@ -179,6 +181,11 @@ def decompose(
         trimesh.Trimesh(source.vertices, source.faces, process=False),
         goal.obstacles.in_input(solid.frame) if goal.obstacles is not None else None,
     )
+
+
+def _scale(criterion: Criterion) -> float | None:
+    """How far a hull may reach, where the criterion says so: what a learned policy looks at."""
+    return criterion.overhang if math.isfinite(criterion.overhang) else None
 
 
 def _prepared(options: Options, solid: Solid, workers: Workers, clock: Clock) -> Criterion:

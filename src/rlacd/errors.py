@@ -33,3 +33,7 @@ class OutputError(RlacdError, OSError):
 
 class MissingExtraError(RlacdError, ImportError):
     """A feature needs an optional dependency that is not installed."""
+
+
+class WeightsError(RlacdError, ValueError):
+    """A file with a learned policy's weights is missing, damaged, or made for something else."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from rlacd.criteria import NavigableSpace
 from rlacd.errors import OptionError
-from rlacd.policies import POLICIES
+from rlacd.policies import POLICIES, is_policy
 
 DEFAULT_RESOLUTION = 100
 """Cells along the longest side of the grid on which repair looks for rooms that nothing can enter."""
@@ -81,7 +81,7 @@ class Options:
         self._as_integer("max_faces", 4, None, "at least 4 (a tetrahedron)", None)
         _require(isinstance(self.merge, (bool, np.bool_)), "merge", self.merge, "True or False")
         object.__setattr__(self, "merge", bool(self.merge))
-        _require(self.policy in POLICIES, "policy", self.policy, "one of " + ", ".join(POLICIES))
+        _require(is_policy(self.policy), "policy", self.policy, f"one of {', '.join(POLICIES)}, or an .onnx file")
         self._as_integer("resolution", 1, MAX_RESOLUTION, f"between 1 and {MAX_RESOLUTION}")
         self._as_integer("seed", 0, MAX_SEED, "between 0 and 2**63 - 1")
         self._as_integer("threads", 1, MAX_THREADS, f"between 1 and {MAX_THREADS}", None)

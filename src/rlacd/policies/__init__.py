@@ -12,37 +12,55 @@ POLICIES = (
     *(f"greedy-{score}" for score in SCORES),
     *(f"greedy-{score}{EDGES}" for score in SCORES),
     "navacd",
+    "learned",
 )
 """Names that `make_policy` knows."""
 
+WEIGHTS_ENDING = ".onnx"
+"""A policy's name that ends so is the path of a network to use in place of the shipped one."""
 
-def make_policy(name: str, views: Views | None = None) -> Policy:
+
+def is_policy(name: object) -> bool:
+    """Tell whether `make_policy` knows the name."""
+    return isinstance(name, str) and (name in POLICIES or name.endswith(WEIGHTS_ENDING))
+
+
+def make_policy(name: str, views: Views | None = None, scale: float | None = None) -> Policy:
     """Build the policy called `name`.
 
     ``greedy`` looks at 150 planes and those of four concave edges, and takes the one with the least p-norm of excess
     volumes; ``greedy-SCORE`` takes the one with the least SCORE of the 150 alone, ``greedy-SCORE+edges`` of the 150 and
     those of the edges (SCORE ``hull-sum`` is the paper's baseline); ``navacd`` takes the least sum of hull volumes of
-    three planes and those of four concave edges.
+    three planes and those of four concave edges; ``learned``, or the path of an ONNX file, ranks all these planes by
+    the parts that the component is expected to end in.
 
     Parameters
     ----------
     name : str
     views : Views, optional
         Sweeps over the 150 planes and those of four concave edges, shared with others.
+    scale : float, optional
+        The criterion's length in the frame, such as the concavity threshold; learned policies look at it.
 
     Raises
     ------
     KeyError
         No policy has this name.
+    WeightsError
+        The network cannot be loaded.
     """
     if name == "greedy":
         return Greedy(views=views)
     if name == "navacd":
         return NavACD()
+    if name == "learned" or name.endswith(WEIGHTS_ENDING):
+        from rlacd.policies.learned import Learned  # onnxruntime takes a while to import
+
+        return Learned(None if name == "learned" else name, scale)
     family, _, score = name.partition("-")
     if family == "greedy" and score.removesuffix(EDGES) in SCORES:
         return Greedy(score.removesuffix(EDGES), concave_edges=CONCAVE_EDGES if score.endswith(EDGES) else 0)
     raise KeyError(name)
 
 
-__all__ = ["POLICIES", "Greedy", "NavACD", "Policy", "make_policy"]
+__all__ = ["POLICIES", "Greedy", "NavACD", "Policy", "is_policy", "make_policy"]

@@ -1,0 +1,36 @@
+"""``python -m rlacd.learn.guide MESHES WORK``: train a guide from scratch, or go on with a run."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import MISSING, fields
+from pathlib import Path
+
+from rlacd.errors import RlacdError
+from rlacd.learn.guide.train import TrainOptions, train
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; 1 with one sentence on standard error when it cannot."""
+    about = "Train a guide from scratch, or go on with a run."
+    parser = argparse.ArgumentParser(prog="python -m rlacd.learn.guide", description=about)
+    for option in fields(TrainOptions):
+        text = option.metadata["help"]
+        if option.default is MISSING:
+            parser.add_argument(option.name, type=Path, help=text)
+        else:
+            flag = "--" + option.name.replace("_", "-")
+            parser.add_argument(flag, type=type(option.default), default=option.default, help=f"{text} (%(default)s)")
+    given = vars(parser.parse_args(arguments))
+    try:
+        print(train(TrainOptions(**given), say=lambda line: print(line, flush=True)))
+    except RlacdError as error:
+        print(f"Error: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,71 @@
+"""Writing the network for deployment (ONNX) and for further training (safetensors)."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from pathlib import Path
+from typing import Any
+
+import onnx
+import torch
+from safetensors.torch import load_file, save_file
+
+from rlacd.learn.guide.network import Ensemble, GuideNetwork
+from rlacd.planes.candidates import OFFSETS_PER_AXIS
+from rlacd.policies.features import COMPONENT_FEATURES, DIRECTIONS, EDGE_PLANES, PLANE_FEATURES, VERSION
+
+
+def export(network: Ensemble, path: Path, about: dict[str, Any]) -> None:
+    """Write ``path`` (ONNX) and the weights beside it (``.safetensors``).
+
+    Parameters
+    ----------
+    network : Ensemble
+    path : Path
+        Ends in ``.onnx``.
+    about : dict
+        Goes into both files' metadata as JSON: what the policy has to know (see `rlacd.policies.learned`), and where
+        the weights come from.
+    """
+    about = {"kind": "guide", "features": VERSION, "per_axis": OFFSETS_PER_AXIS, "width": network.width, **about}
+    network = network.eval()
+    example = (
+        torch.zeros(2, DIRECTIONS, PLANE_FEATURES, OFFSETS_PER_AXIS),
+        torch.zeros(2, EDGE_PLANES, PLANE_FEATURES),
+        torch.zeros(2, COMPONENT_FEATURES),
+    )
+    batch, per_axis = torch.export.Dim("batch", min=1), torch.export.Dim("per_axis", min=2)
+    shapes = {"planes": {0: batch, 3: per_axis}, "edges": {0: batch}, "component": {0: batch}}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        program = torch.onnx.export(
+            network,
+            example,
+            dynamo=True,
+            verbose=False,
+            input_names=["planes", "edges", "component"],
+            output_names=["q", "q_edges", "value"],
+            dynamic_shapes=shapes,
+        )
+    assert program is not None
+    model = program.model_proto
+    for entry in list(model.metadata_props):
+        model.metadata_props.remove(entry)
+    for node in model.graph.node:  # traces of the exporter: source lines of the machine it ran on
+        del node.metadata_props[:]
+        node.doc_string = ""
+    onnx.helper.set_model_props(model, {"rlacd": json.dumps(about, sort_keys=True)})
+    onnx.checker.check_model(model)
+    path.write_bytes(model.SerializeToString(deterministic=True))
+    save_file(network.state_dict(), path.with_suffix(".safetensors"), {"rlacd": json.dumps(about, sort_keys=True)})
+
+
+def load_network(path: Path) -> Ensemble:
+    """Read the network back from its ``.safetensors``."""
+    state = load_file(path)
+    width = state["members.0.plane.weight"].shape[0]
+    members = {key.split(".")[1] for key in state}
+    network = Ensemble([GuideNetwork(width) for _ in members])
+    network.load_state_dict(state)
+    return network.eval()

@@ -1,0 +1,187 @@
+"""The learned policy: a small network ranks the planes of the sweep by the parts it expects to be left in the end.
+
+The network (see `rlacd.learn.guide`) is run by onnxruntime, on one thread: several components at a time share the
+processors already.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnxruntime
+
+from rlacd.errors import WeightsError
+from rlacd.planes.sweep import Sweep, sweep
+from rlacd.policies.features import VERSION, candidates_of, features, measures, tables
+from rlacd.policies.greedy import cheapest, excess_norm
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.component import Component, Plane
+
+SHIPPED = "guide.onnx"
+"""The weights in `rlacd.weights`."""
+
+INPUTS = ["planes", "edges", "component"]
+OUTPUTS = ["q", "q_edges", "value"]
+
+NOTHING = 1e-9
+"""Least greedy score, relative to the hull."""
+
+USUAL_SCALE = 0.05
+"""Scale for criteria that have none: the usual concavity threshold."""
+
+
+@dataclass(frozen=True)
+class About:
+    """What the metadata of a weights file say.
+
+    Attributes
+    ----------
+    per_axis : int
+        Planes along each direction.
+    scales : tuple of float
+        Least and greatest scale met in training; others are taken to be the nearest of the two.
+    blend : float
+        Weight of the greedy score beside the network's prediction.
+    """
+
+    per_axis: int
+    scales: tuple[float, float]
+    blend: float
+
+
+class Guide:
+    """The network, ready to be asked.
+
+    Parameters
+    ----------
+    weights : path, optional
+        An ONNX file exported by ``python -m rlacd.learn.guide``; the shipped one by default.
+
+    Raises
+    ------
+    WeightsError
+        The file is missing, damaged, or no guide of this version.
+    """
+
+    def __init__(self, weights: str | os.PathLike[str] | None = None) -> None:
+        name, content = _read(weights)
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = options.inter_op_num_threads = 1
+        options.log_severity_level = 4
+        try:
+            self._session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+        except Exception as error:  # onnxruntime's own exceptions have no public base
+            raise WeightsError(f"{name} is damaged or no ONNX file; export the policy again.") from error
+        self.about = _about(name, self._session.get_modelmeta().custom_metadata_map.get("rlacd"))
+        signature = [[v.name for v in self._session.get_inputs()], [v.name for v in self._session.get_outputs()]]
+        if signature != [INPUTS, OUTPUTS]:
+            raise WeightsError(f"{name} is no guide network; export the policy again.")
+
+    def log_parts(self, component: Component, swept: Sweep, scale: float, per_axis: int) -> FloatArray:
+        """Predict, for every plane of a component's sweep, log(parts the component ends in, merged)."""
+        grid, edges = tables(swept, per_axis)
+        scales = np.clip(np.array([scale]), *self.about.scales)
+        inputs = features(grid[None], edges[None], measures(component)[None], scales)
+        outputs = self._session.run(["q", "q_edges"], dict(zip(INPUTS, inputs, strict=True)))
+        q: FloatArray = np.concatenate(outputs, axis=1)[0, : len(swept.candidates)].astype(np.float64)
+        return q
+
+
+def guided_cost(
+    guide: Guide, component: Component, swept: Sweep, scale: float, per_axis: int, blend: float | None = None
+) -> FloatArray:
+    """Cost of every plane of a sweep: log(parts expected) + blend * log(greedy score), both up to a constant.
+
+    The greedy score counts what the network cannot know: it has been told of few planes of a component what they end
+    in, and the best of 150 guesses is one that is wrong.
+    """
+    blend = guide.about.blend if blend is None else blend
+    greedy = np.log(excess_norm(swept) + NOTHING * component.hull.volume) / 1.3
+    return guide.log_parts(component, swept, scale, per_axis) + blend * greedy
+
+
+class Learned:
+    """The plane of least cost by the network and the greedy score together.
+
+    Parameters
+    ----------
+    weights : path, optional
+        The network; the shipped one by default.
+    scale : float, optional
+        The criterion's length, such as the concavity threshold, in the frame.
+    blend : float, optional
+        Weight of the greedy score; what the weights file says by default.
+
+    Raises
+    ------
+    WeightsError
+        The network cannot be loaded.
+    """
+
+    def __init__(
+        self,
+        weights: str | os.PathLike[str] | None = None,
+        scale: float | None = None,
+        blend: float | None = None,
+    ) -> None:
+        self._guide = load_guide(weights)
+        self._scale = USUAL_SCALE if scale is None else scale
+        self._blend = blend
+
+    def choose(self, component: Component, threads: int = 1) -> Plane | None:
+        """Choose the plane to cut a component by; None when every candidate misses it or shaves off a film."""
+        per_axis = self._guide.about.per_axis
+        swept = sweep(component, candidates_of(component, per_axis), threads)
+        return cheapest(swept, guided_cost(self._guide, component, swept, self._scale, per_axis, self._blend))
+
+
+@lru_cache(maxsize=4)
+def _cached(weights: str | None) -> Guide:
+    return Guide(weights)
+
+
+def load_guide(weights: str | os.PathLike[str] | None = None) -> Guide:
+    """Get the guide of a file; the last few are kept.
+
+    Raises
+    ------
+    WeightsError
+        The network cannot be loaded.
+    """
+    return _cached(None if weights is None else os.fspath(weights))
+
+
+def _read(weights: str | os.PathLike[str] | None) -> tuple[str, bytes]:
+    try:
+        if weights is None:
+            return f"The shipped policy {SHIPPED}", files("rlacd.weights").joinpath(SHIPPED).read_bytes()
+        return str(weights), Path(weights).read_bytes()
+    except (OSError, ModuleNotFoundError) as error:
+        name = SHIPPED if weights is None else weights
+        raise WeightsError(
+            f"The policy {name} cannot be read ({error}); reinstall rlacd or give another path."
+        ) from error
+
+
+def _about(name: str, metadata: str | None) -> About:
+    try:
+        about: dict[str, Any] = json.loads(metadata or "{}")
+        if about.get("kind") != "guide":
+            raise WeightsError(f"{name} is not a policy of rlacd: it does not say that it is a guide; export it again.")
+        if about["features"] != VERSION:
+            raise WeightsError(
+                f"{name} was made for version {about['features']} of the features, not for {VERSION}; train it again."
+            )
+        least, greatest = (float(s) for s in about["scales"])
+        return About(int(about["per_axis"]), (least, greatest), float(about["blend"]))
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        if isinstance(error, WeightsError):
+            raise
+        raise WeightsError(f"The metadata of {name} are damaged; export the policy again.") from error

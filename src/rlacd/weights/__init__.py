@@ -1,0 +1,1 @@
+"""The shipped weights; see README.md beside them."""
