@@ -28,8 +28,8 @@ struct BallSources {
   std::vector<Vec3> seeds;  // ... or from here
 };
 
-// Every place of the space's boundary where a ball would touch the hull is within this share of that ball's radius of
-// a centre, plus the distance between candidates, about the pitch.
+// Centres are no closer than this share of the radius of the smaller ball; a place of the boundary is no farther from
+// one than that and the way from there to the next candidate, which is about half the pitch.
 constexpr double kBallSpacing = 0.45;
 
 Balls spread_balls(const Surface& surface, const NavigableField& field, const BallSources& sources, double pitch,
