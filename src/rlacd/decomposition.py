@@ -54,6 +54,9 @@ class Decomposition:
             surface lies from the hulls' surface.
         ``scale`` : float
             What one unit of the input measures in that frame: divide a length by it to have it in the input's unit.
+        ``search`` : dict or None
+            What the search of a quality level has done: ``level``, ``steps``, ``accepted``, ``seconds``, whether it was
+            ``exhausted``, and the parts of the ``first_pass``, of the best of the ``portfolio``, and at its end.
         ``seconds`` : dict
             Wall time of each stage, and their ``total``.
         ``repair`` : list of dict

@@ -107,6 +107,7 @@ def search(
     clock: Clock,
     seed: int,
     most_parts: int | None = None,
+    rankings: Sequence[Ranking] | None = None,
 ) -> tuple[list[Part], Account]:
     """Look for fewer parts, or as many with less volume in their hulls.
 
@@ -127,6 +128,8 @@ def search(
     seed : int
     most_parts : int, optional
         Where the parts are so few and do not meet the criterion, look for parts that come closer to it instead.
+    rankings : sequence of Ranking, optional
+        Each cuts the whole solid anew, and they take turns in neighbourhoods; the scores of `PORTFOLIO` by default.
 
     Returns
     -------
@@ -138,7 +141,7 @@ def search(
     start = time.perf_counter()
     pace = Pace(clock, bounds.seconds, len(parts))
     steps = math.inf if bounds.steps is None else bounds.steps
-    rankings = [by_score(score) for score in PORTFOLIO]
+    rankings = rankings or [by_score(score) for score in PORTFOLIO]
     near_views = Views(PLANES_PER_AXIS, CONCAVE_EDGES)
     best = list(parts)
     if most_parts is not None and not all(workers.map(criterion.is_met, best)):

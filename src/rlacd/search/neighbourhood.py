@@ -52,7 +52,7 @@ SAME = 1e-6
 """Hulls whose volumes differ by less than this share are as good as each other."""
 
 
-REMEMBERED = 1000
+REMEMBERED = 256
 """Reunited clusters that are kept for their next first planes."""
 
 Cluster: TypeAlias = tuple[int, ...]

@@ -17,8 +17,8 @@ from rlacd.solid.component import Component
 OVERLAP = 2e-9
 """How far touching faces are moved: above rounding (1e-16), below what gluing takes for touching (1e-8)."""
 
-PRESERVED = 1e-4
-"""The reunited solid's volume differs from the sum of its components by no more than this share of it."""
+LOST = 4 * OVERLAP
+"""The reunited solid's volume differs from that of its components by no more than a film of this thickness on them."""
 
 
 def reunite(components: Sequence[Component]) -> Component | None:
@@ -33,7 +33,8 @@ def reunite(components: Sequence[Component]) -> Component | None:
         return components[0]
     united = Manifold.batch_boolean([_overlapping(i, components) for i in range(len(components))], OpType.Add)
     volume = sum(component.volume for component in components)
-    if united.is_empty() or abs(united.volume() - volume) > PRESERVED * volume:
+    area = sum(_native.mesh_area(component.vertices, component.faces) for component in components)
+    if united.is_empty() or abs(united.volume() - volume) > LOST * area:
         return None
     try:
         return Component(united)
