@@ -129,7 +129,7 @@ def test_the_network_keeps_the_symmetries_of_space() -> None:
 def test_onnx_and_torch_agree_and_the_weights_survive(tmp_path: Path) -> None:
     network = random_network()
     path = tmp_path / "guide.onnx"
-    export(network, path, {"scales": [0.02, 0.1], "blend": 0.5})
+    export(network, path, {"scales": [0.02, 0.1], "blend": 0.5, "edge_bonus": 0.1})
     guide, component = Guide(path), Component(chair())
     assert guide.about.blend == 0.5
     with torch.no_grad():

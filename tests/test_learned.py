@@ -87,10 +87,12 @@ def test_scales_never_met_in_training_are_taken_to_be_the_nearest() -> None:
     np.testing.assert_array_equal(below, at)
 
 
-def test_the_shipped_policy_cuts_a_chair_into_its_six_boxes() -> None:
-    mesh = chair().to_mesh64()
+@pytest.mark.parametrize("shift", [0.0, 0.35])
+def test_the_shipped_policy_cuts_an_l_and_a_t_in_two(shift: float) -> None:
+    cube = manifold3d.Manifold.cube
+    mesh = (cube((1.0, 1.0, 0.3)) + cube((0.3, 1.0, 1.0)).translate((shift, 0, 0))).to_mesh64()
     found = rlacd.decompose((mesh.vert_properties[:, :3], mesh.tri_verts), policy="learned", threads=1)
-    assert len(found) == 6
+    assert len(found) == 2
     assert found.report["concavity"]["max"] <= 0.05
 
 
@@ -123,7 +125,14 @@ def onnx_file(path: Path, **metadata: str) -> Path:
     return path
 
 
-ABOUT: dict[str, Any] = {"kind": "guide", "features": 2, "per_axis": 25, "scales": [0.02, 0.1], "blend": 1}
+ABOUT: dict[str, Any] = {
+    "kind": "guide",
+    "features": 2,
+    "per_axis": 25,
+    "scales": [0.02, 0.1],
+    "blend": 1,
+    "edge_bonus": 0,
+}
 
 
 def bad_weights(tmp_path: Path, kind: str) -> Path:

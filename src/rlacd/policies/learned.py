@@ -19,7 +19,7 @@ import onnxruntime
 
 from rlacd.errors import WeightsError
 from rlacd.planes.sweep import Sweep, sweep
-from rlacd.policies.features import VERSION, candidates_of, features, measures, tables
+from rlacd.policies.features import DIRECTIONS, VERSION, candidates_of, features, measures, tables
 from rlacd.policies.greedy import cheapest, excess_norm
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
@@ -29,6 +29,9 @@ SHIPPED = "guide.onnx"
 
 INPUTS = ["planes", "edges", "component"]
 OUTPUTS = ["q", "q_edges", "value"]
+
+DECIMALS = 4
+"""Predictions are rounded to these, so that planes which mirror each other cost the same."""
 
 NOTHING = 1e-9
 """Least greedy score, relative to the hull."""
@@ -49,11 +52,15 @@ class About:
         Least and greatest scale met in training; others are taken to be the nearest of the two.
     blend : float
         Weight of the greedy score beside the network's prediction.
+    edge_bonus : float
+        Taken off the logarithm of the cost of concave edges' planes: few of them were labelled, which makes the
+        network's predictions for them timid.
     """
 
     per_axis: int
     scales: tuple[float, float]
     blend: float
+    edge_bonus: float
 
 
 class Guide:
@@ -97,14 +104,18 @@ class Guide:
 def guided_cost(
     guide: Guide, component: Component, swept: Sweep, scale: float, per_axis: int, blend: float | None = None
 ) -> FloatArray:
-    """Cost of every plane of a sweep: log(parts expected) + blend * log(greedy score), both up to a constant.
+    """Cost of every plane of a sweep: parts expected * greedy score ** blend, a little less for concave edges' planes.
 
     The greedy score counts what the network cannot know: it has been told of few planes of a component what they end
     in, and the best of 150 guesses is one that is wrong.
     """
     blend = guide.about.blend if blend is None else blend
-    greedy = np.log(excess_norm(swept) + NOTHING * component.hull.volume) / 1.3
-    return guide.log_parts(component, swept, scale, per_axis) + blend * greedy
+    greedy = (excess_norm(swept) / component.hull.volume**1.3 + NOTHING) ** (1 / 1.3)
+    log_parts = guide.log_parts(component, swept, scale, per_axis)
+    log_parts[DIRECTIONS * per_axis :] -= guide.about.edge_bonus
+    parts = np.exp(np.round(log_parts, DECIMALS))
+    cost: FloatArray = parts * greedy**blend
+    return cost
 
 
 class Learned:
@@ -180,7 +191,7 @@ def _about(name: str, metadata: str | None) -> About:
                 f"{name} was made for version {about['features']} of the features, not for {VERSION}; train it again."
             )
         least, greatest = (float(s) for s in about["scales"])
-        return About(int(about["per_axis"]), (least, greatest), float(about["blend"]))
+        return About(int(about["per_axis"]), (least, greatest), float(about["blend"]), float(about["edge_bonus"]))
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         if isinstance(error, WeightsError):
             raise

@@ -58,7 +58,9 @@ def export(network: Ensemble, path: Path, about: dict[str, Any]) -> None:
     onnx.helper.set_model_props(model, {"rlacd": json.dumps(about, sort_keys=True)})
     onnx.checker.check_model(model)
     path.write_bytes(model.SerializeToString(deterministic=True))
-    save_file(network.state_dict(), path.with_suffix(".safetensors"), {"rlacd": json.dumps(about, sort_keys=True)})
+    weights = path.with_suffix(".safetensors")
+    save_file(network.state_dict(), weights, {"rlacd": json.dumps(about, sort_keys=True)})
+    weights.chmod(0o644)  # it is written for its owner only
 
 
 def load_network(path: Path) -> Ensemble:

@@ -48,10 +48,11 @@ class TrainOptions:
     max_bytes: int = field(default=16_000, metadata={"help": "larger files are left out"})
     held_out: int = field(default=60, metadata={"help": "meshes to deploy on and never to learn from"})
     epochs: int = field(default=12, metadata={"help": "passes over the labels"})
-    members: int = field(default=3, metadata={"help": "networks whose mean is taken"})
+    members: int = field(default=2, metadata={"help": "networks whose mean is taken"})
     width: int = field(default=24, metadata={"help": "channels of a network"})
     listwise: float = field(default=0.3, metadata={"help": "weight of the listwise loss"})
-    blend: float = field(default=0.7, metadata={"help": "weight of the greedy score beside the network"})
+    blend: float = field(default=1.0, metadata={"help": "weight of the greedy score beside the network"})
+    edge_bonus: float = field(default=0.1, metadata={"help": "taken off log(cost) of concave edges' planes"})
     threshold: float = field(default=0.05, metadata={"help": "concavity that networks are deployed at"})
 
 
@@ -140,6 +141,7 @@ def _fit_round(options: TrainOptions, number: int, say: Callable[[str], None]) -
     about = {
         "scales": SCALES,
         "blend": options.blend,
+        "edge_bonus": options.edge_bonus,
         "criterion": "concavity",
         "labels": int(data.known.sum()),
         "round": number,
