@@ -1,0 +1,168 @@
+"""Actors: episodes of cutting on solid after solid, described for the learner by features.
+
+An actor's state is never pickled: it is the recipe of its episode (solid, turn, cuts so far) and of its generator, and
+is rebuilt from that bit for bit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rlacd.criteria import Concavity
+from rlacd.errors import TrainingError
+from rlacd.learn.encoders import Encoder, describe
+from rlacd.learn.mdp import Cutting, Reward
+from rlacd.learn.meshes import TURNS, Solids
+from rlacd.learn.observe import Float32Array, observe
+from rlacd.learn.options import TrainOptions
+from rlacd.solid.arrays import BoolArray
+from rlacd.solid.component import Component
+
+TRIES = 1000
+"""So many solids in a row without anything to cut, and there is nothing to learn on."""
+
+
+@dataclass(frozen=True, eq=False)
+class Described:
+    """Components for the learner.
+
+    Attributes
+    ----------
+    features : float32 [C, D]
+    masks : bool [C, A]
+    fill : float64 [C]
+        Share of the hull that the solid fills: 1 - fill is all the volume that cutting can save.
+    """
+
+    features: Float32Array
+    masks: BoolArray
+    fill: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """What a cut has led to, for the learner.
+
+    Attributes
+    ----------
+    reward : Reward
+    children : Described
+        The unfinished ones, which join the frontier at its end.
+    discounts : list of float
+        Of those.
+    parts : int
+        Components of the solid now.
+    ended : str
+        "" while the episode goes on; else "terminal", "stuck" or "cap".
+    fresh : Described or None
+        The frontier of the next episode, when this one has ended.
+    largest : int
+        Index of the component to cut next.
+    """
+
+    reward: Reward
+    children: Described
+    discounts: list[float]
+    parts: int
+    ended: str
+    fresh: Described | None
+    largest: int
+
+
+class Actor:
+    """Cuts one solid after another.
+
+    Parameters
+    ----------
+    solids : Solids
+    names : tuple of str
+        The meshes to choose from.
+    encoder : Encoder
+    options : TrainOptions
+    seed : numpy.random.SeedSequence
+        Of the generator that draws solids and turns.
+    """
+
+    def __init__(
+        self, solids: Solids, names: tuple[str, ...], encoder: Encoder, options: TrainOptions, number: int
+    ) -> None:
+        self._solids, self._names, self._encoder, self._options = solids, names, encoder, options
+        self._criterion = Concavity(options.threshold)
+        self._rng = np.random.default_rng([options.seed, 1, number])
+        self._episode: dict[str, Any] = {}
+        self._cutting: Cutting
+
+    def start(self) -> tuple[Described, int]:
+        """Begin an episode on the next solid; returns its frontier, and which component to cut first."""
+        for _ in range(TRIES):
+            name = self._names[int(self._rng.integers(len(self._names)))]
+            axis = int(self._rng.integers(3))
+            degrees = TURNS[int(self._rng.integers(len(TURNS)))] if self._options.rotate else 0.0
+            if self._begin(name, axis, degrees):
+                return self._describe(self._cutting.frontier), self._cutting.largest()
+        raise TrainingError(
+            f"none of {TRIES} solids drawn from {len(self._names)} meshes needs a cut; give other meshes, or a smaller "
+            "threshold."
+        )
+
+    def step(self, index: int, plane: int) -> Step:
+        """Cut component `index` of the frontier by candidate `plane`; begins the next episode when this one ends."""
+        cutting = self._cutting
+        component = cutting.frontier[index]
+        cut = cutting.cut(index, cutting.candidates(component).plane(plane))
+        self._episode["cuts"].append([index, plane])
+        children = self._describe(cut.unfinished)
+        parts, ended = cutting.count, self._ended()
+        fresh, largest = self.start() if ended else (None, cutting.largest())
+        return Step(cut.reward, children, cut.discounts, parts, ended, fresh, largest)
+
+    def recipe(self) -> dict[str, Any]:
+        """Say, as plain JSON values, how to come to where this actor is."""
+        return {"generator": self._rng.bit_generator.state, **self._episode}
+
+    def restore(self, recipe: dict[str, Any]) -> int:
+        """Come to where `recipe` was told; returns which component to cut next."""
+        if not self._begin(recipe["name"], recipe["axis"], recipe["degrees"]):
+            raise TrainingError(f"{recipe['name']} is not the mesh it was; train again from the beginning.")
+        for index, plane in recipe["cuts"]:
+            component = self._cutting.frontier[index]
+            self._cutting.cut(index, self._cutting.candidates(component).plane(plane))
+        self._episode["cuts"] = [list(cut) for cut in recipe["cuts"]]
+        self._rng.bit_generator.state = recipe["generator"]
+        return self._cutting.largest()
+
+    def _begin(self, name: str, axis: int, degrees: float) -> bool:
+        solid = self._solids.get(name, axis, degrees)
+        if solid is None:
+            return False
+        cutting = Cutting(solid, self._criterion)
+        if cutting.over or cutting.count > self._options.max_parts:
+            return False
+        self._cutting = cutting
+        self._episode = {"name": name, "axis": axis, "degrees": degrees, "cuts": []}
+        return True
+
+    def _ended(self) -> str:
+        if self._cutting.over:
+            return "terminal" if self._cutting.terminal else "stuck"
+        capped = len(self._episode["cuts"]) >= self._options.max_cuts or self._cutting.count >= self._options.max_parts
+        return "cap" if capped else ""
+
+    def _describe(self, components: list[Component]) -> Described:
+        return describe_components(self._cutting, components, self._encoder, self._options)
+
+
+def describe_components(
+    cutting: Cutting, components: list[Component], encoder: Encoder, options: TrainOptions
+) -> Described:
+    """Describe components of a frontier for the learner."""
+    if not components:
+        none = np.empty(0)
+        return Described(np.empty((0, 0), np.float32), np.empty((0, 0), bool), none)
+    seen = [observe(c, cutting.candidates(c), options.threshold, options.points) for c in components]
+    features = describe(encoder, seen, options.scale_input)
+    fill = np.array([c.volume / c.hull.volume for c in components])
+    return Described(features, np.stack([o.mask for o in seen]), fill)
