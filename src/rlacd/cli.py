@@ -18,6 +18,7 @@ import typer
 
 from rlacd import __version__
 from rlacd.errors import OptionError, OutputError, RlacdError
+from rlacd.train_command import train_command
 
 STDOUT = Path("-")
 _SPELLED = {"reachable-only": "everywhere", "seeds": "seed-point", "closed-planes": "closed-plane"}
@@ -446,6 +447,9 @@ def info(
 
         facts = describe(mesh)
         typer.echo(to_json(facts) if as_json else printable(describe_text(facts)), nl=False)
+
+
+app.command("train", epilog=EPILOG)(train_command(lambda: _exit_codes()))
 
 
 def _output_name(mesh: Path, output: str | None) -> str:

@@ -102,7 +102,7 @@ class Training:
         self.network = QNetwork(self.inputs, self.unit).to(self.device)
         self.target = QNetwork(self.inputs, self.unit).to(self.device)
         self.target.copy_from(self.network)
-        self.optimizer = torch.optim.Adam(self.network.parameters(), lr=options.learning_rate)
+        self.optimizer = torch.optim.Adam(self.network.parameters(), lr=options.learning_rate, fused=True)
         self.replay = Replay(options.replay, self.inputs, PLANES, options.priority, options.priority_correction)
         self.rng = np.random.default_rng([options.seed, 0])
         self.solids = Solids(meshes, run / "solids")
