@@ -121,6 +121,7 @@ PRESETS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
         "paper": {},
         "two-cores": {
             "batch": 64,
+            "learn_every": 2,
             "learning_rate": 3e-4,
             "iterations": 300_000,
             "warmup": 5_000,
@@ -129,6 +130,7 @@ PRESETS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
         },
         "informed": {
             "batch": 64,
+            "learn_every": 2,
             "learning_rate": 3e-4,
             "iterations": 300_000,
             "warmup": 5_000,

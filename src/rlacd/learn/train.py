@@ -329,9 +329,10 @@ MAY_CHANGE = frozenset({"iterations", "checkpoint_seconds", "device", "workers",
 
 def _require_same_options(before: dict[str, Any], now: TrainOptions) -> None:
     for name, value in dataclasses.asdict(now).items():
-        if name not in MAY_CHANGE and before.get(name) != value:
+        was = before.get(name, getattr(TrainOptions, name))  # the run may be older than the option
+        if name not in MAY_CHANGE and was != value:
             raise OptionError(
-                f"{name} is {value!r}, but was {before.get(name)!r} when the run began; "
+                f"{name} is {value!r}, but was {was!r} when the run began; "
                 "resume with the same options, or begin another run."
             )
 
