@@ -449,9 +449,6 @@ def info(
         typer.echo(to_json(facts) if as_json else printable(describe_text(facts)), nl=False)
 
 
-app.command("train", epilog=EPILOG)(train_command(lambda: _exit_codes()))
-
-
 def _output_name(mesh: Path, output: str | None) -> str:
     if output == str(STDOUT):
         raise OptionError("hulls cannot be written to stdout; give -o a file name, and use - with --report only.")
@@ -532,3 +529,6 @@ def _fail(message: object, code: ExitCode) -> None:
 
 def _first_line(error: Exception) -> str:
     return (str(error).strip().splitlines() or ["no message"])[0]
+
+
+app.command("train", epilog=EPILOG)(train_command(_exit_codes))

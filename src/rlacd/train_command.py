@@ -68,6 +68,8 @@ def _learn() -> Callable[..., Path]:
         from rlacd.learn.train import train
     except ModuleNotFoundError as error:
         if (error.name or "").split(".")[0] in EXTRA:
-            raise MissingExtraError("training needs an extra: run  pip install 'rlacd[train]'  and try again.") from error
+            raise MissingExtraError(
+                "training needs an extra: run  pip install 'rlacd[train]'  and try again."
+            ) from error
         raise
     return train

@@ -6,6 +6,7 @@ is rebuilt from that bit for bit.
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,15 +15,13 @@ import numpy as np
 from rlacd.criteria import Concavity
 from rlacd.errors import TrainingError
 from rlacd.learn.encoders import Encoder, describe
+from rlacd.learn.episodes import Episodes, Start
 from rlacd.learn.mdp import Cutting, Reward
-from rlacd.learn.meshes import TURNS, Solids
+from rlacd.learn.meshes import Solids
 from rlacd.learn.observe import Float32Array, observe
 from rlacd.learn.options import TrainOptions
 from rlacd.solid.arrays import BoolArray
 from rlacd.solid.component import Component
-
-TRIES = 1000
-"""So many solids in a row without anything to cut, and there is nothing to learn on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,41 +78,37 @@ class Actor:
     ----------
     solids : Solids
     names : tuple of str
-        The meshes to choose from.
+        The meshes to draw from.
     encoder : Encoder
     options : TrainOptions
-    seed : numpy.random.SeedSequence
-        Of the generator that draws solids and turns.
+    number : int
+        Of this actor; each draws its own sequence of solids.
     """
 
     def __init__(
         self, solids: Solids, names: tuple[str, ...], encoder: Encoder, options: TrainOptions, number: int
     ) -> None:
-        self._solids, self._names, self._encoder, self._options = solids, names, encoder, options
-        self._criterion = Concavity(options.threshold)
+        self._encoder, self._options = encoder, options
+        self._episodes = Episodes(
+            solids, names, Concavity(options.threshold), options.rotate, options.max_cuts, options.max_parts
+        )
         self._rng = np.random.default_rng([options.seed, 1, number])
-        self._episode: dict[str, Any] = {}
+        self._start: Start
         self._cutting: Cutting
+        self._cuts: list[tuple[int, int]] = []
 
     def start(self) -> tuple[Described, int]:
         """Begin an episode on the next solid; returns its frontier, and which component to cut first."""
-        for _ in range(TRIES):
-            name = self._names[int(self._rng.integers(len(self._names)))]
-            axis = int(self._rng.integers(3))
-            degrees = TURNS[int(self._rng.integers(len(TURNS)))] if self._options.rotate else 0.0
-            if self._begin(name, axis, degrees):
-                return self._describe(self._cutting.frontier), self._cutting.largest()
-        raise TrainingError(
-            f"none of {TRIES} solids drawn from {len(self._names)} meshes needs a cut; give other meshes, or a smaller "
-            "threshold."
-        )
+        self._start, self._cutting = self._episodes.draw(self._rng)
+        self._cuts = []
+        return self._describe(self._cutting.frontier), self._cutting.largest()
 
     def step(self, index: int, plane: int) -> Step:
         """Cut component `index` of the frontier by candidate `plane`; begins the next episode when this one ends."""
         cutting = self._cutting
         component = cutting.frontier[index]
         cut = cutting.cut(index, cutting.candidates(component).plane(plane))
-        self._episode["cuts"].append([index, plane])
+        self._cuts.append((index, plane))
         children = self._describe(cut.unfinished)
         parts, ended = cutting.count, self._ended()
         fresh, largest = self.start() if ended else (None, cutting.largest())
@@ -121,35 +116,25 @@ class Actor:
 
     def recipe(self) -> dict[str, Any]:
         """Say, as plain JSON values, how to come to where this actor is."""
-        return {"generator": self._rng.bit_generator.state, **self._episode}
+        return {"generator": self._rng.bit_generator.state, **dataclasses.asdict(self._start), "cuts": self._cuts}
 
     def restore(self, recipe: dict[str, Any]) -> int:
         """Come to where `recipe` was told; returns which component to cut next."""
-        if not self._begin(recipe["name"], recipe["axis"], recipe["degrees"]):
-            raise TrainingError(f"{recipe['name']} is not the mesh it was; train again from the beginning.")
-        for index, plane in recipe["cuts"]:
-            component = self._cutting.frontier[index]
-            self._cutting.cut(index, self._cutting.candidates(component).plane(plane))
-        self._episode["cuts"] = [list(cut) for cut in recipe["cuts"]]
-        self._rng.bit_generator.state = recipe["generator"]
-        return self._cutting.largest()
-
-    def _begin(self, name: str, axis: int, degrees: float) -> bool:
-        solid = self._solids.get(name, axis, degrees)
-        if solid is None:
-            return False
-        cutting = Cutting(solid, self._criterion)
-        if cutting.over or cutting.count > self._options.max_parts:
-            return False
+        self._start = Start(recipe["name"], recipe["axis"], recipe["degrees"])
+        cutting = self._episodes.begin(self._start)
+        if cutting is None:
+            raise TrainingError(f"{self._start.name} is not the mesh it was; train again from the beginning.")
+        self._cuts = [(int(index), int(plane)) for index, plane in recipe["cuts"]]
+        for index, plane in self._cuts:
+            cutting.cut(index, cutting.candidates(cutting.frontier[index]).plane(plane))
         self._cutting = cutting
-        self._episode = {"name": name, "axis": axis, "degrees": degrees, "cuts": []}
-        return True
+        self._rng.bit_generator.state = recipe["generator"]
+        return cutting.largest()
 
     def _ended(self) -> str:
         if self._cutting.over:
             return "terminal" if self._cutting.terminal else "stuck"
-        capped = len(self._episode["cuts"]) >= self._options.max_cuts or self._cutting.count >= self._options.max_parts
-        return "cap" if capped else ""
+        return "cap" if self._episodes.is_capped(self._cutting, len(self._cuts)) else ""
 
     def _describe(self, components: list[Component]) -> Described:
         return describe_components(self._cutting, components, self._encoder, self._options)

@@ -54,8 +54,11 @@ def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
     try:
         shutil.rmtree(fresh, ignore_errors=True)
         fresh.mkdir(parents=True)
-        save_file({name: t.detach().cpu().contiguous() for name, t in checkpoint.weights.items()}, fresh / "weights.safetensors")
-        np.savez(fresh / "replay.npz", **checkpoint.replay)
+        save_file(
+            {name: t.detach().cpu().contiguous() for name, t in checkpoint.weights.items()},
+            fresh / "weights.safetensors",
+        )
+        np.savez(fresh / "replay.npz", allow_pickle=False, **checkpoint.replay)
         (fresh / "state.json").write_text(json.dumps({"format": FORMAT, **checkpoint.state}))
         for path in fresh.iterdir():
             with open(path, "rb") as file:
@@ -66,7 +69,9 @@ def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
         fresh.rename(folder)
         shutil.rmtree(old, ignore_errors=True)
     except OSError as error:
-        raise OutputError(f"the checkpoint {folder} cannot be written ({error}); free some space and use --resume.") from error
+        raise OutputError(
+            f"the checkpoint {folder} cannot be written ({error}); free some space and use --resume."
+        ) from error
 
 
 def load_checkpoint(folder: Path) -> Checkpoint | None:

@@ -47,5 +47,3 @@ class Curves:
         """Write what TensorBoard still holds back."""
         if self._board is not None:
             self._board.close()
-
-

@@ -83,7 +83,9 @@ def export_policy(
         expected = module(*example).numpy()
     found = OnnxQ(path).run(*(x.numpy() for x in example))
     if not np.allclose(found, expected, rtol=1e-3, atol=1e-3 * network.unit):
-        raise TrainingError(f"{path} does not compute what the network does; report it with the versions of torch and onnxruntime.")
+        raise TrainingError(
+            f"{path} does not compute what the network does; report it with the versions of torch and onnxruntime."
+        )
     save_file({k: v.contiguous() for k, v in network.state_dict().items()}, path.with_suffix(".safetensors"))
     about = {"inputs": list(INPUTS), "unit": network.unit, "options": dataclasses.asdict(options)}
     path.with_suffix(".json").write_text(json.dumps(about, indent=1))
@@ -106,4 +108,5 @@ class OnnxQ:
 
     def __call__(self, seen: Observation) -> Float32Array:
         """Values [150] of one observed component."""
-        return self.run(seen.points[None], seen.directions[None], seen.scale[None])[0]
+        values: Float32Array = self.run(seen.points[None], seen.directions[None], seen.scale[None])[0]
+        return values

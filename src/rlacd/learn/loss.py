@@ -1,8 +1,8 @@
 """The dual-state Bellman loss: a cut leads to two states at once, and the values of both count.
 
 Values are additive over components, so the target of Q(p, m) is the reward and the discounted values of everything the
-cut leaves to be done (eq. 8): r + gamma_l V(m_l) + gamma_r V(m_r). Connected pieces of a side stand for the side. Soft
-Q-learning (Haarnoja et al., "Reinforcement Learning with Deep Energy-Based Policies", ICML 2017) makes V a soft maximum.
+cut leaves to be done (eq. 8): r + gamma_l V(m_l) + gamma_r V(m_r). Connected pieces of a side stand for it. Soft
+Q-learning (Haarnoja et al., "Reinforcement Learning with Deep Energy-Based Policies", 2017) makes V a soft maximum.
 """
 
 from __future__ import annotations

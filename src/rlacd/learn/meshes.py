@@ -9,8 +9,10 @@ from pathlib import Path
 
 import numpy as np
 from manifold3d import Manifold, Mesh64
+from numpy.typing import NDArray
 
 from rlacd.errors import RlacdError, TrainingError
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component
 from rlacd.solid.frame import Frame
 from rlacd.solid.load import load_mesh
@@ -75,15 +77,16 @@ class Solids:
     ----------
     folder : Path
         Of the meshes.
-    cache : Path
-        A folder of this class's own; several processes may share it.
+    cache : Path, optional
+        A folder of this class's own; several processes may share it. Without, solids are kept in memory only.
     """
 
-    def __init__(self, folder: Path, cache: Path) -> None:
+    def __init__(self, folder: Path, cache: Path | None = None) -> None:
         self._folder = folder
         self._cache = cache
         self._held: dict[str, Manifold | None] = {}
-        cache.mkdir(parents=True, exist_ok=True)
+        if cache is not None:
+            cache.mkdir(parents=True, exist_ok=True)
 
     def get(self, name: str, axis: int = 0, degrees: float = 0.0) -> Component | None:
         """Get a solid turned about a coordinate axis, in its frame; None when it cannot be repaired."""
@@ -95,18 +98,19 @@ class Solids:
         return Component(_framed(solid.rotate([degrees if i == axis else 0.0 for i in range(3)])) if degrees else solid)
 
     def _load(self, name: str) -> Manifold | None:
-        kept = self._cache / f"{hashlib.sha256(name.encode()).hexdigest()[:24]}.npz"
-        if kept.exists():
+        kept = None if self._cache is None else self._cache / f"{hashlib.sha256(name.encode()).hexdigest()[:24]}.npz"
+        if kept is not None and kept.exists():
             with np.load(kept, allow_pickle=False) as arrays:
                 vertices, faces = arrays["vertices"], arrays["faces"]
         else:
             vertices, faces = self._repaired(name)
+        if kept is not None and not kept.exists():
             partial = kept.with_suffix(f".{os.getpid()}.npz")
             np.savez(partial, vertices=vertices, faces=faces)
             os.replace(partial, kept)
         return Manifold(Mesh64(vertices, faces)) if len(faces) else None
 
-    def _repaired(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+    def _repaired(self, name: str) -> tuple[FloatArray, NDArray[np.uint64]]:
         try:
             solid = repair(load_mesh(self._folder / name), threads=1).manifold
             Component(solid)

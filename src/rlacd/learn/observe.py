@@ -1,4 +1,4 @@
-"""What a policy may know of a component: points of its surface and of its hull, the candidate planes, which are valid."""
+"""What a policy may know of a component: points of its surface and of its hull, its candidate planes, and their use."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd import _native
-from rlacd.criteria import Criterion
 from rlacd.criteria.concavity import volume_radius
 from rlacd.planes.candidates import Candidates, axis_and_principal
 from rlacd.planes.sweep import SLIVER
@@ -97,8 +96,3 @@ def valid_planes(component: Component, candidates: Candidates) -> BoolArray:
 def candidates_of(component: Component) -> Candidates:
     """Get the paper's 150 planes: those every policy here chooses among."""
     return axis_and_principal(component)
-
-
-def threshold_of(criterion: Criterion) -> float:
-    """Get the length that a criterion compares with, to tell the network what is small."""
-    return criterion.overhang

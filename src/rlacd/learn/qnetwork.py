@@ -28,9 +28,7 @@ class QNetwork(nn.Module):
     outputs : int
     """
 
-    def __init__(
-        self, inputs: int, unit: float = 1.0, hidden: Sequence[int] = HIDDEN, outputs: int = PLANES
-    ) -> None:
+    def __init__(self, inputs: int, unit: float = 1.0, hidden: Sequence[int] = HIDDEN, outputs: int = PLANES) -> None:
         super().__init__()
         self.unit = unit
         layers: list[nn.Module] = []

@@ -147,12 +147,12 @@ class Replay:
             raise RlacdError("there is nothing to learn from yet; let `warmup` be at least 1.")
         if self._tree is None:
             index = rng.integers(self._count, size=count)
-            weights = np.ones(count, dtype=np.float32)
+            weights: Float32Array = np.ones(count, dtype=np.float32)
         else:
             index = self._tree.draw((np.arange(count) + rng.random(count)) / count)
             share = self._tree.get(index) / self._tree.total
-            weights = (share * self._count) ** -self._correction
-            weights = (weights / weights.max()).astype(np.float32)
+            rarity = (share * self._count) ** -self._correction
+            weights = (rarity / rarity.max()).astype(np.float32)
         children = [self._children[i] for i in index]
         rows = np.concatenate(children)
         return Batch(

@@ -97,7 +97,7 @@ class Training:
         self.device = _device(options.device)
         self.encoder = make_encoder(options.encoder)
         self.inputs = self.encoder.dim + (SCALE_INPUTS if options.scale_input else 0)
-        self.unit = max(options.volume_reward, options.finish_reward, 1e-9)
+        self.unit = max(options.volume_reward, options.finish_reward, 10 * options.cut_cost, 1e-9)
         torch.manual_seed(options.seed)
         self.network = QNetwork(self.inputs, self.unit).to(self.device)
         self.target = QNetwork(self.inputs, self.unit).to(self.device)
@@ -183,7 +183,8 @@ class Training:
     def reward(self, terms: Reward) -> float:
         """r = lambda_1 r_1 + lambda_2 r_2, as the component's own decision process sees it."""
         finished = terms.finished if self.options.finish_counts == "solid" else terms.sides_finished
-        return self.options.volume_reward * terms.saved + self.options.finish_reward * finished
+        earned = self.options.volume_reward * terms.saved + self.options.finish_reward * finished
+        return earned - self.options.cut_cost
 
     def learn(self) -> None:
         """Take a gradient step on the dual-state Bellman loss of a batch."""
@@ -193,6 +194,8 @@ class Training:
             q = self.target(self._tensor(batch.child_features))
             values = soft_value(q, self._tensor(batch.child_masks), options.temperature)
             if options.value_bound:
+                # Nothing is ever worse than to cut until the episode is broken off.
+                values = values.clamp_min(-options.cut_cost * options.max_cuts)
                 values = torch.minimum(values, self._tensor(batch.child_bounds))
             target = dual_state_target(
                 self._tensor(batch.rewards), values, self._tensor(batch.child_discounts), self._tensor(batch.owner)
@@ -299,7 +302,7 @@ class Training:
         self.curves.close()
 
     def _keep(self, described: Described) -> list[int]:
-        bounds = self.options.volume_reward * (1 - described.fill) + self.options.finish_reward
+        bounds = self.options.volume_reward * (1 - described.fill) + self.options.finish_reward - self.options.cut_cost
         return [
             self.replay.add_component(features, mask, bound)
             for features, mask, bound in zip(described.features, described.masks, bounds, strict=True)
