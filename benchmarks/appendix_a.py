@@ -51,7 +51,7 @@ def main() -> None:
     parser.add_argument("picture", type=Path)
     parser.add_argument("--count", type=int, default=12)
     parser.add_argument("--depth", type=int, default=4)
-    parser.add_argument("--steps", type=int, default=300_000)
+    parser.add_argument("--steps", type=int, default=1_000_000)
     given = parser.parse_args()
 
     import matplotlib

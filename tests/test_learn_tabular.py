@@ -99,7 +99,7 @@ def test_with_loops_q_learning_converges_where_discounts_add_up_to_less_than_one
     process = process_of(real_roots, alike=True, static_discount=static_discount)
     exact = process.solve()
     assert exact is not None
-    history = q_learning(process, 100_000, np.random.default_rng(0), every=1000)
+    history = q_learning(process, 300_000, np.random.default_rng(0), every=1000)
     assert error(process, exact, history[-1]) < 0.05 * np.abs(exact).max()
     assert error(process, exact, history[-1]) < 0.2 * error(process, exact, history[1])
 

@@ -216,7 +216,7 @@ def process_of(
 
 
 def q_learning(
-    process: Process, steps: int, rng: np.random.Generator, *, every: int = 1000, rate: float = 0.7
+    process: Process, steps: int, rng: np.random.Generator, *, every: int = 1000, rate: float = 0.51
 ) -> list[FloatArray]:
     """Learn Q from samples one at a time, all pairs alike; the step size is (visits of the pair) ** -rate.
 
