@@ -18,6 +18,7 @@ import typer
 
 from rlacd import __version__
 from rlacd.errors import OptionError, OutputError, RlacdError
+from rlacd.train_command import train_command
 
 STDOUT = Path("-")
 _SPELLED = {"reachable-only": "everywhere", "seeds": "seed-point", "closed-planes": "closed-plane"}
@@ -528,3 +529,6 @@ def _fail(message: object, code: ExitCode) -> None:
 
 def _first_line(error: Exception) -> str:
     return (str(error).strip().splitlines() or ["no message"])[0]
+
+
+app.command("train", epilog=EPILOG)(train_command(_exit_codes))

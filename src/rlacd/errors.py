@@ -31,6 +31,10 @@ class OutputError(RlacdError, OSError):
     """The result cannot be written where it was asked for."""
 
 
+class TrainingError(RlacdError, RuntimeError):
+    """Training cannot start or go on: no usable meshes, a damaged checkpoint, a worker that died."""
+
+
 class MissingExtraError(RlacdError, ImportError):
     """A feature needs an optional dependency that is not installed."""
 

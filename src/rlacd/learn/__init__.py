@@ -1,0 +1,1 @@
+"""Learning which plane to cut by (extra `train`); nothing outside imports this room but the command `rlacd train`."""

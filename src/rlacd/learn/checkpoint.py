@@ -1,0 +1,120 @@
+"""Checkpoints: a folder that holds all of a run's state, replaced as a whole, read without pickle.
+
+``weights.safetensors`` holds the networks and Adam's moments, ``replay.npz`` the buffer, ``state.json`` the rest.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from safetensors import SafetensorError
+from safetensors.torch import load_file, save_file
+from torch import Tensor
+
+from rlacd.errors import OutputError, TrainingError
+
+FORMAT = 1
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """The state of a run between two rounds.
+
+    Attributes
+    ----------
+    weights : dict of Tensor
+    replay : dict of ndarray
+    state : dict
+        Plain JSON values.
+    """
+
+    weights: Mapping[str, Tensor]
+    replay: Mapping[str, NDArray[Any]]
+    state: Mapping[str, Any]
+
+
+def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
+    """Write a checkpoint; whenever the process dies, a whole one is left: the new or, if it got so far, the old.
+
+    Raises
+    ------
+    OutputError
+        The disk is full or the folder cannot be written.
+    """
+    fresh, old = folder.with_name(folder.name + ".new"), folder.with_name(folder.name + ".old")
+    try:
+        shutil.rmtree(fresh, ignore_errors=True)
+        fresh.mkdir(parents=True)
+        save_file(
+            {name: t.detach().cpu().contiguous() for name, t in checkpoint.weights.items()},
+            fresh / "weights.safetensors",
+        )
+        np.savez(fresh / "replay.npz", allow_pickle=False, **checkpoint.replay)
+        (fresh / "state.json").write_text(json.dumps({"format": FORMAT, **checkpoint.state}))
+        for path in fresh.iterdir():
+            with open(path, "rb") as file:
+                os.fsync(file.fileno())
+        shutil.rmtree(old, ignore_errors=True)
+        if folder.exists():
+            folder.rename(old)
+        fresh.rename(folder)
+        shutil.rmtree(old, ignore_errors=True)
+    except OSError as error:
+        raise OutputError(
+            f"the checkpoint {folder} cannot be written ({error}); free some space and use --resume."
+        ) from error
+
+
+def load_checkpoint(folder: Path) -> Checkpoint | None:
+    """Read a checkpoint; None where there is none.
+
+    Raises
+    ------
+    TrainingError
+        It is damaged, or was written by another version.
+    """
+    if not folder.exists():  # the process died between the two renames
+        folder = folder.with_name(folder.name + ".old")
+    if not folder.exists():
+        return None
+    try:
+        state = json.loads((folder / "state.json").read_text())
+        weights = load_file(folder / "weights.safetensors")
+        with np.load(folder / "replay.npz", allow_pickle=False) as arrays:
+            replay = {name: arrays[name] for name in arrays.files}
+        if state["format"] != FORMAT:
+            raise TrainingError(f"{folder} has format {state['format']}, not {FORMAT}; train again from the beginning.")
+    except (OSError, ValueError, KeyError, SafetensorError) as error:
+        if isinstance(error, TrainingError):
+            raise
+        raise TrainingError(f"the checkpoint {folder} is damaged ({error}); remove it to train again.") from error
+    return Checkpoint(weights, replay, state)
+
+
+def adam_state(optimizer: torch.optim.Adam) -> dict[str, Tensor]:
+    """Get Adam's moments and counts, by name."""
+    parameters = optimizer.param_groups[0]["params"]
+    return {
+        f"adam.{i}.{key}": value
+        for i, parameter in enumerate(parameters)
+        for key, value in optimizer.state.get(parameter, {}).items()
+    }
+
+
+def restore_adam(optimizer: torch.optim.Adam, weights: Mapping[str, Tensor]) -> None:
+    """Take over what `adam_state` returned."""
+    state: dict[int, dict[str, Tensor]] = {}
+    for name, value in weights.items():
+        if name.startswith("adam."):
+            _, i, key = name.split(".", 2)
+            state.setdefault(int(i), {})[key] = value
+    optimizer.load_state_dict({"state": state, "param_groups": optimizer.state_dict()["param_groups"]})

@@ -1,0 +1,49 @@
+"""The curves of a run: a line of JSON a point, and the same for TensorBoard."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+from torch.utils.tensorboard import SummaryWriter
+
+
+class Curves:
+    """Curves that a resumed run goes on with where its checkpoint was, as if it had never been interrupted.
+
+    Parameters
+    ----------
+    run : Path
+        ``curves.jsonl`` and ``tensorboard/`` are put there.
+    """
+
+    def __init__(self, run: Path) -> None:
+        self._folder = run
+        self._path = run / "curves.jsonl"
+        self._board: SummaryWriter | None = None
+
+    def restart(self, cuts: int) -> None:
+        """Forget the points after `cuts`: they will be made again."""
+        kept = []
+        if self._path.exists():
+            lines = self._path.read_text().splitlines(keepends=True)
+            kept = [line for line in lines if line.endswith("\n") and json.loads(line)["cuts"] <= cuts]
+        if cuts == 0:
+            kept = []
+        self._path.write_text("".join(kept))
+        self._board = SummaryWriter(str(self._folder / "tensorboard"), purge_step=cuts + 1)
+
+    def add(self, cuts: int, values: Mapping[str, float], seconds: float) -> None:
+        """Add a point to each of several curves."""
+        with open(self._path, "a") as file:
+            file.write(json.dumps({"cuts": cuts, **values, "seconds": round(seconds, 3)}) + "\n")
+        if self._board is not None:
+            for name, value in {**values, "seconds": seconds}.items():
+                group = "validation/" + name[11:] if name.startswith("validation_") else "training/" + name
+                self._board.add_scalar(group, value, cuts)
+
+    def close(self) -> None:
+        """Write what TensorBoard still holds back."""
+        if self._board is not None:
+            self._board.close()

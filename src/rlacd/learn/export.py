@@ -1,0 +1,112 @@
+"""The trained policy as files: ONNX to run, safetensors to train on, JSON to tell what it is."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import logging
+import warnings
+from pathlib import Path
+
+import numpy as np
+import onnxruntime
+import torch
+from safetensors.torch import save_file
+from torch import Tensor, nn
+
+from rlacd.errors import TrainingError
+from rlacd.learn.encoders import PointNetEncoder, ProfileEncoder
+from rlacd.learn.observe import SCALE_INPUTS, Float32Array, Observation
+from rlacd.learn.options import TrainOptions
+from rlacd.learn.qnetwork import QNetwork
+
+INPUTS = ("points", "directions", "scale")
+
+OPSET = 18
+
+
+class PointsToValues(nn.Module):
+    """Encoder and Q network in one: from an `Observation` to the values of its planes."""
+
+    def __init__(self, encoder: nn.Module, network: QNetwork, scale_input: bool) -> None:
+        super().__init__()
+        self.encoder = encoder
+        self.network = network
+        self.scale_input = scale_input
+
+    def forward(self, points: Tensor, directions: Tensor, scale: Tensor) -> Tensor:
+        """Values [B, 150] of points [B, 2, N, 3], directions [B, 6, 3] and scale [B, 3]."""
+        features = self.encoder(points, directions)
+        if self.scale_input:
+            features = torch.cat([features, scale], dim=1)
+        else:  # the input stays in the graph, so that all exported policies are asked alike
+            features = features + 0 * scale.sum(dim=1, keepdim=True)
+        values: Tensor = self.network(features)
+        return values
+
+
+def export_policy(
+    path: Path, encoder: ProfileEncoder | PointNetEncoder, network: QNetwork, options: TrainOptions
+) -> Path:
+    """Write ``path`` (ONNX: points, directions, scale -> values), and beside it ``.safetensors`` and ``.json``.
+
+    The exported file is run once and compared with torch.
+
+    Raises
+    ------
+    TrainingError
+        onnxruntime does not compute what torch does.
+    """
+    module = PointsToValues(encoder, network.cpu(), options.scale_input).eval()
+    generator = torch.Generator().manual_seed(0)
+    example = (
+        torch.rand(2, 2, options.points, 3, generator=generator) * 2 - 1,
+        torch.eye(3).repeat(2, 2, 1),
+        torch.rand(2, SCALE_INPUTS, generator=generator),
+    )
+    logging.getLogger("torch.onnx").setLevel(logging.ERROR)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the exporter's own deprecations
+        program = torch.onnx.export(
+            module,
+            example,
+            dynamo=True,
+            verbose=False,
+            input_names=list(INPUTS),
+            output_names=["values"],
+            dynamic_shapes=tuple({0: torch.export.Dim("batch")} for _ in INPUTS),
+            opset_version=OPSET,
+        )
+    assert program is not None
+    program.save(str(path), external_data=False)
+    with torch.inference_mode():
+        expected = module(*example).numpy()
+    found = OnnxQ(path).run(*(x.numpy() for x in example))
+    if not np.allclose(found, expected, rtol=1e-3, atol=1e-3 * network.unit):
+        raise TrainingError(
+            f"{path} does not compute what the network does; report it with the versions of torch and onnxruntime."
+        )
+    save_file({k: v.contiguous() for k, v in network.state_dict().items()}, path.with_suffix(".safetensors"))
+    about = {"inputs": list(INPUTS), "unit": network.unit, "options": dataclasses.asdict(options)}
+    path.with_suffix(".json").write_text(json.dumps(about, indent=1))
+    return path
+
+
+class OnnxQ:
+    """An exported policy, run by onnxruntime on one thread; give it to `rlacd.learn.qpolicy.QPolicy`."""
+
+    def __init__(self, path: Path) -> None:
+        settings = onnxruntime.SessionOptions()
+        settings.intra_op_num_threads = settings.inter_op_num_threads = 1
+        self._session = onnxruntime.InferenceSession(str(path), settings, providers=["CPUExecutionProvider"])
+
+    def run(self, points: Float32Array, directions: Float32Array, scale: Float32Array) -> Float32Array:
+        """Values [B, 150]."""
+        given = dict(zip(INPUTS, (points, directions, scale), strict=True))
+        values: Float32Array = self._session.run(["values"], given)[0]
+        return values
+
+    def __call__(self, seen: Observation) -> Float32Array:
+        """Values [150] of one observed component."""
+        values: Float32Array = self.run(seen.points[None], seen.directions[None], seen.scale[None])[0]
+        return values

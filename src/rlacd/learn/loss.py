@@ -1,0 +1,67 @@
+"""The dual-state Bellman loss: a cut leads to two states at once, and the values of both count.
+
+Values are additive over components, so the target of Q(p, m) is the reward and the discounted values of everything the
+cut leaves to be done (eq. 8): r + gamma_l V(m_l) + gamma_r V(m_r). Connected pieces of a side stand for it. Soft
+Q-learning (Haarnoja et al., "Reinforcement Learning with Deep Energy-Based Policies", 2017) makes V a soft maximum.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+
+def soft_value(q: Tensor, mask: Tensor, temperature: float) -> Tensor:
+    """V [B] = T log sum_p exp(Q(p) / T) over the planes in `mask` [B, A]; T = 0 gives the maximum (eq. 7).
+
+    Every row needs a valid plane.
+    """
+    q = q.masked_fill(~mask, -torch.inf)
+    if temperature == 0:
+        return q.amax(dim=1)
+    return temperature * torch.logsumexp(q / temperature, dim=1)
+
+
+def boltzmann(q: Tensor, mask: Tensor, temperature: float) -> Tensor:
+    """Probabilities [B, A] in proportion to exp(Q(p) / T) over valid planes; T = 0 puts all on the first best."""
+    q = q.masked_fill(~mask, -torch.inf)
+    if temperature == 0:
+        return torch.nn.functional.one_hot(q.argmax(dim=1), q.shape[1]).to(q.dtype)
+    return torch.softmax(q / temperature, dim=1)
+
+
+def dual_state_target(reward: Tensor, values: Tensor, discounts: Tensor, owner: Tensor) -> Tensor:
+    """Right-hand side of eq. 8 [B]: each reward, plus the discounted values of what its cut left unfinished.
+
+    Parameters
+    ----------
+    reward : float32 [B]
+    values, discounts : float32 [C]
+        Of all unfinished children of the batch. Finished ones have no value left and are not listed.
+    owner : int64 [C]
+        The transition that each belongs to.
+    """
+    return reward.index_add(0, owner, discounts * values)
+
+
+def bellman_loss(q: Tensor, planes: Tensor, target: Tensor, weight: Tensor, unit: float) -> tuple[Tensor, Tensor]:
+    """Half the mean weighted squared error of Q(p, m), in units of `unit`.
+
+    Parameters
+    ----------
+    q : float32 [B, A]
+    planes : int64 [B]
+        The planes that were taken.
+    target : float32 [B]
+    weight : float32 [B]
+        Importance weights of prioritised replay; ones otherwise.
+
+    Returns
+    -------
+    loss : float32 scalar
+    error : float32 [B]
+        Temporal-difference errors, in units of `unit`, detached.
+    """
+    taken = q.gather(1, planes[:, None])[:, 0]
+    error = (taken - target) / unit
+    return 0.5 * (weight * error.square()).mean(), error.detach()

@@ -1,0 +1,181 @@
+"""The decision process: a solid's unfinished components, the cuts that can be made, and the reward of each.
+
+The components, planes, splitting and criterion are those of `rlacd.decompose` (see `rlacd.cut`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from rlacd.criteria import Criterion
+from rlacd.cut import is_shaving
+from rlacd.learn.observe import candidates_of, valid_planes
+from rlacd.planes.candidates import Candidates
+from rlacd.solid.component import Component, Plane
+
+
+@dataclass(frozen=True)
+class Reward:
+    """The two terms of a cut's reward, not weighted.
+
+    Attributes
+    ----------
+    saved : float
+        Eq. 2, relative to the component's own hull: (|CH(m_i)| - the sum of |CH| over what it falls into) / |CH(m_i)|.
+        It is the reward of the decision process whose solid is m_i, which is how a partial observation sees it.
+    share : float
+        |CH(m_i)| / |CH(m)|, m the whole solid: `share` times `saved` is eq. 2 itself.
+    finished : float
+        Eq. 3: 1 / (1 + log(|M'| - 1)) when this cut leaves every component of the solid finished, else 0.
+    sides_finished : float
+        The same for the process whose solid is m_i: what it falls into is finished.
+    """
+
+    saved: float
+    share: float
+    finished: float
+    sides_finished: float
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """What a cut has led to.
+
+    Attributes
+    ----------
+    unfinished : list of Component
+        Connected, not yet meeting the criterion, with a valid plane left: they join the frontier.
+    discounts : list of float
+        Eq. 9 for each of those: |CH(child)| / |CH(component)|; they never add up to more than 1.
+    finished : list of Component
+        They meet the criterion.
+    stuck : list of Component
+        They do not, and no valid plane is left.
+    made : bool
+        False when the plane has left nothing on one side, or only a shaving: the component is then `stuck`.
+    """
+
+    reward: Reward
+    unfinished: list[Component]
+    discounts: list[float]
+    finished: list[Component]
+    stuck: list[Component]
+    made: bool
+
+
+@dataclass
+class Settled:
+    """Components sorted by what can be done with them."""
+
+    unfinished: list[Component] = field(default_factory=list)
+    finished: list[Component] = field(default_factory=list)
+    stuck: list[Component] = field(default_factory=list)
+
+    @property
+    def all(self) -> list[Component]:
+        """All of them."""
+        return self.unfinished + self.finished + self.stuck
+
+
+def terminal_reward(parts: int) -> float:
+    """Eq. 3 of a decomposition into `parts` >= 1 finished components: 1 / (1 + log(parts - 1)), at most 1."""
+    return 1 / (1 + math.log(max(parts - 1, 1)))
+
+
+class Cutting:
+    """One solid on its way to parts.
+
+    The state is the *frontier*, connected components that do not meet the criterion, and the parts done so far. Every
+    unfinished component has to be cut sooner or later, and what becomes of it does not depend on the others, so the
+    process does not ask which comes first.
+
+    Parameters
+    ----------
+    solid : Component
+    criterion : Criterion
+        When a component is finished.
+    """
+
+    def __init__(self, solid: Component, criterion: Criterion) -> None:
+        self._criterion = criterion
+        self._volume = solid.hull.volume
+        self._candidates: dict[Component, Candidates] = {}
+        settled = self._settle(solid, None)
+        self.frontier: list[Component] = settled.unfinished
+        self.finished: list[Component] = settled.finished
+        self.stuck: list[Component] = settled.stuck
+
+    @property
+    def count(self) -> int:
+        """Components in all, |M|."""
+        return len(self.frontier) + len(self.finished) + len(self.stuck)
+
+    @property
+    def over(self) -> bool:
+        """Nothing is left to cut."""
+        return not self.frontier
+
+    @property
+    def terminal(self) -> bool:
+        """Every component meets the criterion."""
+        return not self.frontier and not self.stuck
+
+    def candidates(self, component: Component) -> Candidates:
+        """Get the planes that a component of the frontier can be cut by."""
+        if component not in self._candidates:
+            self._candidates[component] = candidates_of(component)
+        return self._candidates[component]
+
+    def largest(self) -> int:
+        """Index in the frontier of the component with the largest hull: coarse cuts come first."""
+        return max(range(len(self.frontier)), key=lambda i: self.frontier[i].hull.volume)
+
+    def cut(self, index: int, plane: Plane) -> Cut:
+        """Cut component `index` of the frontier by a plane."""
+        component = self.frontier.pop(index)
+        self._candidates.pop(component, None)
+        settled, made = self._fall_apart(component, plane)
+        self.frontier += settled.unfinished
+        self.finished += settled.finished
+        self.stuck += settled.stuck
+        own, children = component.hull.volume, [child.hull.volume for child in settled.all] if made else []
+        reward = Reward(
+            saved=(own - sum(children)) / own if made else 0.0,
+            share=own / self._volume,
+            finished=terminal_reward(self.count) if self.terminal else 0.0,
+            sides_finished=terminal_reward(len(children)) if made and len(settled.finished) == len(children) else 0.0,
+        )
+        # Hulls of connected pieces may overlap, two links of a chain do; the value must not grow by that.
+        whole = max(own, sum(children))
+        discounts = [child.hull.volume / whole for child in settled.unfinished]
+        return Cut(reward, settled.unfinished, discounts, settled.finished, settled.stuck, made)
+
+    def _fall_apart(self, component: Component, plane: Plane) -> tuple[Settled, bool]:
+        below, above = component.cut(plane)
+        if below is None or above is None:
+            return Settled(stuck=[component]), False
+        sides = [(a, b) for a, b in ((below, above), (above, below)) if not is_shaving(a, b)]
+        settled = [self._settle(side, across) for side, across in sides]
+        return _together(settled), True
+
+    def _settle(self, component: Component, across: Component | None) -> Settled:
+        """Judge a component, split it if it has to be cut, and judge its pieces."""
+        if self._criterion.is_met(component):
+            return Settled(finished=[component])
+        pieces = component.pieces()
+        if len(pieces) > 1:
+            kept = [piece for piece in pieces if across is None or not is_shaving(piece, across)]
+            return _together([self._settle(piece, across) for piece in kept])
+        if valid_planes(component, self.candidates(component)).any():
+            return Settled(unfinished=[component])
+        return Settled(stuck=[component])
+
+
+def _together(all_settled: Sequence[Settled]) -> Settled:
+    return Settled(
+        [c for settled in all_settled for c in settled.unfinished],
+        [c for settled in all_settled for c in settled.finished],
+        [c for settled in all_settled for c in settled.stuck],
+    )

@@ -1,0 +1,98 @@
+"""What a policy may know of a component: points of its surface and of its hull, its candidate planes, and their use."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rlacd import _native
+from rlacd.criteria.concavity import volume_radius
+from rlacd.planes.candidates import Candidates, axis_and_principal
+from rlacd.planes.sweep import SLIVER
+from rlacd.solid.arrays import BoolArray
+from rlacd.solid.component import Component
+
+Float32Array = NDArray[np.float32]
+
+SCALE_INPUTS = 3
+"""Numbers in `Observation.scale`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """The partial observation s(m) of one component.
+
+    Attributes
+    ----------
+    points : float32 [2, N, 3]
+        Points of the component's surface and of its hull's, in the component's own frame: its bounding box centred,
+        the longest side 2.
+    directions : float32 [6, 3]
+        Unit normals of the candidate planes: the coordinate axes, then the principal ones.
+    scale : float32 [3]
+        What that frame hides: log2 of the component's size in the solid's frame, 0.3 R_v over the threshold, and the
+        share of its hull that it fills.
+    mask : bool [150]
+        The planes that may be taken.
+    """
+
+    points: Float32Array
+    directions: Float32Array
+    scale: Float32Array
+    mask: BoolArray
+
+
+def observe(component: Component, candidates: Candidates, threshold: float, count: int, seed: int = 0) -> Observation:
+    """Observe a component; the same component and seed give the same points.
+
+    Parameters
+    ----------
+    candidates : Candidates
+        Of this component, as by `axis_and_principal`.
+    threshold : float
+        The criterion's, in the solid's frame.
+    count : int
+        Points on each of the two surfaces.
+    """
+    lower, upper = component.box
+    radius = float((upper - lower).max()) / 2
+    hull = component.hull
+    points = np.stack(
+        [
+            _native.sample_surface(component.vertices, component.faces, count, seed)[0],
+            _native.sample_surface(hull.vertices, hull.faces, count, seed)[0],
+        ]
+    )
+    relative = 0.3 * volume_radius(component.volume, hull.volume) / threshold
+    scale = np.array([np.log2(radius), relative, component.volume / hull.volume], dtype=np.float32)
+    return Observation(
+        ((points - (lower + upper) / 2) / radius).astype(np.float32),
+        candidates.directions.astype(np.float32),
+        scale,
+        valid_planes(component, candidates),
+    )
+
+
+def valid_planes(component: Component, candidates: Candidates) -> BoolArray:
+    """Tell which candidates [K * M] leave no side thinner than 2 % of the component's extent.
+
+    The component is connected, so each plane within its extent meets it, and the sides are as thick as the plane is
+    far from the ends: no sweep is needed. It is a little stricter than `Sweep.valid`, which compares a side with its
+    own extent. Where nothing is left, as in a thin sheet, sides of a hundredth of that are valid.
+    """
+    heights = component.hull.vertices @ candidates.directions.T
+    lower, upper = heights.min(axis=0), heights.max(axis=0)
+    extent = float((upper - lower).max())
+    thinner = np.minimum(candidates.offsets - lower[:, None], upper[:, None] - candidates.offsets).ravel()
+    for sliver in (SLIVER, SLIVER / 100):
+        valid: BoolArray = thinner > sliver * extent
+        if valid.any():
+            break
+    return valid
+
+
+def candidates_of(component: Component) -> Candidates:
+    """Get the paper's 150 planes: those every policy here chooses among."""
+    return axis_and_principal(component)

@@ -1,0 +1,68 @@
+"""Deciding by a Q network: which of the 150 planes, alone or as the paper deploys it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rlacd.learn.observe import Float32Array, Observation, candidates_of, observe
+from rlacd.planes.candidates import Candidates
+from rlacd.planes.concave_edges import concave_edge_planes
+from rlacd.planes.sweep import sweep
+from rlacd.policies.greedy import cheapest, hull_sum
+from rlacd.solid.component import Component, Plane
+
+QFunction = Callable[[Observation], Float32Array]
+"""Values [150] of the planes of an observed component."""
+
+
+class QPolicy:
+    """Takes the plane of greatest value, or the least hull sum among the best ones (the paper's deployment).
+
+    Parameters
+    ----------
+    values : callable
+        The Q network: in torch (`rlacd.learn.validate`) or as exported (`rlacd.learn.export.OnnxQ`).
+    threshold : float
+        The criterion's.
+    points : int
+        Points on each of the two surfaces.
+    shortlist : int
+        So many best planes go on; of them the one with the least sum of hull volumes is taken (paper: 10).
+    concave_edges : int
+        The planes of so many concave edges join them (paper: 4, three planes each).
+    """
+
+    def __init__(
+        self, values: QFunction, threshold: float, points: int = 2048, shortlist: int = 1, concave_edges: int = 0
+    ) -> None:
+        self._values = values
+        self._threshold = threshold
+        self._points = points
+        self._shortlist = shortlist
+        self._concave_edges = concave_edges
+
+    def choose(self, component: Component, threads: int = 1) -> Plane | None:
+        """Choose the plane to cut a component by; None when no candidate is valid."""
+        candidates = candidates_of(component)
+        seen = observe(component, candidates, self._threshold, self._points)
+        if not seen.mask.any():
+            return None
+        best = best_planes(self._values(seen), seen.mask, self._shortlist)
+        if len(best) == 1 and not self._concave_edges:
+            return candidates.plane(int(best[0]))
+        directions = candidates.directions[best // candidates.offsets.shape[1]]
+        short = Candidates(directions, candidates.offsets.ravel()[best][:, None])
+        if self._concave_edges:
+            short = Candidates.joined(short, concave_edge_planes(component, self._concave_edges))
+        scored = sweep(component, short, threads)
+        return cheapest(scored, hull_sum(scored)) or candidates.plane(int(best[0]))
+
+
+def best_planes(values: Float32Array, mask: NDArray[np.bool_], count: int) -> NDArray[np.intp]:
+    """Indices of up to `count` valid planes of greatest value, the greatest first; equal ones in their order."""
+    order = np.argsort(-np.where(mask, values, -np.inf), kind="stable")
+    kept: NDArray[np.intp] = order[: min(count, int(mask.sum()))]
+    return kept

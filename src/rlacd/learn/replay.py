@@ -1,0 +1,222 @@
+"""The replay buffer: transitions of single components, by their features.
+
+A component's features are kept once, as a row in half precision, though a transition starts from it and another led
+to it; rows that no transition in the buffer needs any more are used again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rlacd.errors import RlacdError
+from rlacd.learn.observe import Float32Array
+from rlacd.learn.sumtree import SumTree
+from rlacd.solid.arrays import BoolArray
+
+LEAST_PRIORITY = 1e-3
+"""Added to every error, so that no transition is lost for good."""
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """B transitions and the C components they left unfinished.
+
+    Attributes
+    ----------
+    index : int64 [B]
+        Where in the buffer, for `Replay.set_errors`.
+    features : float32 [B, D]
+    planes : int64 [B]
+    rewards : float32 [B]
+    weights : float32 [B]
+        Importance weights, at most 1.
+    child_features : float32 [C, D]
+    child_masks : bool [C, A]
+        Never all False.
+    child_discounts, child_bounds : float32 [C]
+        gamma, and what `Replay.add_component` was told their value cannot exceed.
+    owner : int64 [C]
+        Row of the batch that each child belongs to.
+    """
+
+    index: NDArray[np.int64]
+    features: Float32Array
+    planes: NDArray[np.int64]
+    rewards: Float32Array
+    weights: Float32Array
+    child_features: Float32Array
+    child_masks: BoolArray
+    child_discounts: Float32Array
+    child_bounds: Float32Array
+    owner: NDArray[np.int64]
+
+
+class Replay:
+    """A ring of transitions.
+
+    Parameters
+    ----------
+    capacity : int
+        Transitions kept.
+    dim : int
+        Features a component.
+    actions : int
+        Planes a component.
+    priority : float
+        Exponent of prioritised replay (Schaul et al. 2016); 0 draws uniformly.
+    correction : float
+        Exponent of its importance weights.
+    """
+
+    def __init__(self, capacity: int, dim: int, actions: int, priority: float = 0.0, correction: float = 0.4) -> None:
+        self.capacity, self.dim, self.actions = capacity, dim, actions
+        self._priority, self._correction = priority, correction
+        self._tree = SumTree(capacity) if priority > 0 else None
+        self._greatest = 1.0
+        self._features = np.zeros((64, dim), dtype=np.float16)
+        self._masks = np.zeros((64, (actions + 7) // 8), dtype=np.uint8)
+        self._bounds = np.zeros(64, dtype=np.float32)
+        self._users = np.zeros(64, dtype=np.int32)
+        self._free = list(range(63, -1, -1))
+        self._states = np.zeros(capacity, dtype=np.int64)
+        self._planes = np.zeros(capacity, dtype=np.int64)
+        self._rewards = np.zeros(capacity, dtype=np.float32)
+        self._children: list[NDArray[np.int64]] = [np.empty(0, np.int64)] * capacity
+        self._discounts: list[Float32Array] = [np.empty(0, np.float32)] * capacity
+        self._next = 0
+        self._count = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    @property
+    def components(self) -> int:
+        """Rows of features in use."""
+        return len(self._users) - len(self._free)
+
+    def add_component(self, features: Float32Array, mask: BoolArray, bound: float = np.inf) -> int:
+        """Keep a component's features [D] and valid planes [A]; the row stays until `release`, and as long as a
+        transition needs it.
+        """
+        if not self._free:
+            self._grow()
+        row = self._free.pop()
+        self._features[row], self._masks[row], self._bounds[row] = features, np.packbits(mask), bound
+        self._users[row] = 1
+        return row
+
+    def release(self, row: int) -> None:
+        """Say that nobody outside the buffer will name this row again."""
+        self._users[row] -= 1
+        if self._users[row] == 0:
+            self._free.append(row)
+
+    def features(self, rows: Sequence[int]) -> Float32Array:
+        """Features [len(rows), D]."""
+        return self._features[np.asarray(rows, dtype=np.int64)].astype(np.float32)
+
+    def masks(self, rows: Sequence[int]) -> BoolArray:
+        """Valid planes [len(rows), A]."""
+        packed = self._masks[np.asarray(rows, dtype=np.int64)]
+        return np.unpackbits(packed, axis=1, count=self.actions).astype(bool)
+
+    def add(self, state: int, plane: int, reward: float, children: Sequence[int], discounts: Sequence[float]) -> None:
+        """Add a transition between rows; the oldest one leaves a full buffer."""
+        i = self._next
+        for row in (state, *children):
+            self._users[row] += 1
+        if self._count == self.capacity:
+            for row in (int(self._states[i]), *self._children[i].tolist()):
+                self.release(row)
+        self._states[i], self._planes[i], self._rewards[i] = state, plane, reward
+        self._children[i] = np.asarray(children, dtype=np.int64)
+        self._discounts[i] = np.asarray(discounts, dtype=np.float32)
+        if self._tree is not None:
+            self._tree.set(np.array([i]), np.array([self._greatest]))
+        self._next = (i + 1) % self.capacity
+        self._count = min(self._count + 1, self.capacity)
+
+    def sample(self, count: int, rng: np.random.Generator) -> Batch:
+        """Draw `count` transitions, with replacement."""
+        if self._count == 0:
+            raise RlacdError("there is nothing to learn from yet; let `warmup` be at least 1.")
+        if self._tree is None:
+            index = rng.integers(self._count, size=count)
+            weights: Float32Array = np.ones(count, dtype=np.float32)
+        else:
+            index = self._tree.draw((np.arange(count) + rng.random(count)) / count)
+            share = self._tree.get(index) / self._tree.total
+            rarity = (share * self._count) ** -self._correction
+            weights = (rarity / rarity.max()).astype(np.float32)
+        children = [self._children[i] for i in index]
+        rows = np.concatenate(children)
+        return Batch(
+            index,
+            self._features[self._states[index]].astype(np.float32),
+            self._planes[index],
+            self._rewards[index],
+            weights,
+            self._features[rows].astype(np.float32),
+            self.masks(rows),  # type: ignore[arg-type]
+            np.concatenate([self._discounts[i] for i in index]),
+            self._bounds[rows],
+            np.repeat(np.arange(count), [len(c) for c in children]),
+        )
+
+    def set_errors(self, index: NDArray[np.int64], errors: Float32Array) -> None:
+        """Set the priorities of transitions to their temporal-difference errors; no matter where draws are uniform."""
+        if self._tree is None:
+            return
+        priorities = (np.abs(errors).astype(np.float64) + LEAST_PRIORITY) ** self._priority
+        self._greatest = max(self._greatest, float(priorities.max()))
+        self._tree.set(index, priorities)
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Everything as arrays, for a checkpoint."""
+        children, discounts = self._children[: self._count], self._discounts[: self._count]
+        return {
+            "features": self._features,
+            "masks": self._masks,
+            "bounds": self._bounds,
+            "users": self._users,
+            "free": np.array(self._free, dtype=np.int64),
+            "states": self._states[: self._count],
+            "planes": self._planes[: self._count],
+            "rewards": self._rewards[: self._count],
+            "children": np.concatenate([np.empty(0, np.int64), *children]),
+            "discounts": np.concatenate([np.empty(0, np.float32), *discounts]),
+            "counts": np.array([len(c) for c in children], dtype=np.int64),
+            "priorities": self._tree.get(np.arange(self._count)) if self._tree is not None else np.empty(0),
+            "cursor": np.array([self._next, self._count], dtype=np.int64),
+            "greatest": np.array([self._greatest]),
+        }
+
+    def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Take over what `state` returned of a buffer with the same parameters."""
+        self._features, self._masks = state["features"].copy(), state["masks"].copy()
+        self._bounds, self._users = state["bounds"].copy(), state["users"].copy()
+        self._free = state["free"].tolist()
+        self._next, self._count = (int(x) for x in state["cursor"])
+        self._greatest = float(state["greatest"][0])
+        self._states[: self._count] = state["states"]
+        self._planes[: self._count] = state["planes"]
+        self._rewards[: self._count] = state["rewards"]
+        ends = np.cumsum(state["counts"])[:-1]
+        if self._count:
+            self._children[: self._count] = np.split(state["children"], ends)
+            self._discounts[: self._count] = np.split(state["discounts"], ends)
+        if self._tree is not None:
+            self._tree.set(np.arange(self._count), state["priorities"])
+
+    def _grow(self) -> None:
+        size = len(self._users)
+        self._features = np.concatenate([self._features, np.zeros_like(self._features)])
+        self._masks = np.concatenate([self._masks, np.zeros_like(self._masks)])
+        self._bounds = np.concatenate([self._bounds, np.zeros_like(self._bounds)])
+        self._users = np.concatenate([self._users, np.zeros_like(self._users)])
+        self._free = list(range(2 * size - 1, size - 1, -1))

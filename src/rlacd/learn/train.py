@@ -1,0 +1,371 @@
+"""RL-ACD's training, from top to bottom as the paper tells it: cut, remember, learn from what a cut left behind.
+
+Deep soft Q-learning on the dual-state Bellman equation (`rlacd.learn.loss`), with components as states
+(`rlacd.learn.mdp`). On CPU the same meshes, options and seed give the same weights bit for bit, whether the run was
+interrupted or not: a checkpoint holds everything that decides what comes next.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from rlacd.criteria import Concavity
+from rlacd.errors import OptionError, TrainingError
+from rlacd.learn.actor import Described, Step
+from rlacd.learn.actors import ActorSetting, make_actors
+from rlacd.learn.checkpoint import Checkpoint, adam_state, load_checkpoint, restore_adam, save_checkpoint
+from rlacd.learn.curves import Curves
+from rlacd.learn.encoders import make_encoder
+from rlacd.learn.export import export_policy
+from rlacd.learn.loss import bellman_loss, boltzmann, dual_state_target, soft_value
+from rlacd.learn.mdp import Reward
+from rlacd.learn.meshes import MeshList, Solids, list_meshes
+from rlacd.learn.observe import SCALE_INPUTS
+from rlacd.learn.options import TrainOptions
+from rlacd.learn.qnetwork import PLANES, QNetwork
+from rlacd.learn.replay import Replay
+from rlacd.learn.validate import Score, count_parts, torch_policy
+from rlacd.policies import Greedy
+
+Say = Callable[[str], None]
+
+
+def train(meshes: Path, run: Path, options: TrainOptions, *, resume: bool = False, say: Say = print) -> Path:
+    """Train a Q network on a folder of meshes.
+
+    Parameters
+    ----------
+    meshes : Path
+        Folder of mesh files, searched to any depth.
+    run : Path
+        Folder for the curves (``curves.jsonl``, ``tensorboard/``), the checkpoint and the exported policy.
+    options : TrainOptions
+    resume : bool
+        Go on from the checkpoint in `run`, exactly; without one, start.
+    say : callable
+        Takes a line of progress.
+
+    Returns
+    -------
+    Path
+        The exported policy, ``run/policy.onnx``.
+
+    Raises
+    ------
+    OptionError
+        `run` holds another run, or the options do not fit the one to be resumed.
+    TrainingError
+        There are no usable meshes, the checkpoint is damaged, or a worker died.
+    """
+    torch.set_num_threads(options.threads)
+    checkpoint = load_checkpoint(run / "checkpoint")
+    if checkpoint is not None and not resume:
+        raise OptionError(f"{run} holds a run already; use --resume to go on with it, or another folder.")
+    listed = _mesh_list(meshes, run, options)
+    say(
+        f"{len(listed.training)} meshes to learn on, {len(listed.validation)} to validate with; "
+        f"{listed.unreadable} cannot be read, {listed.too_large} are too large"
+    )
+    training = Training(meshes, run, options, listed, say)
+    try:
+        if checkpoint is None:
+            training.begin()
+        else:
+            training.restore(checkpoint)
+            say(f"resuming at cut {training.cuts}")
+        training.run()
+        return training.export()
+    finally:
+        training.close()
+
+
+class Training:
+    """The state of a run, and the loop."""
+
+    def __init__(self, meshes: Path, run: Path, options: TrainOptions, listed: MeshList, say: Say) -> None:
+        self.options = options
+        self.folder = run
+        self.say = say
+        self.device = _device(options.device)
+        self.encoder = make_encoder(options.encoder)
+        self.inputs = self.encoder.dim + (SCALE_INPUTS if options.scale_input else 0)
+        self.unit = max(options.volume_reward, options.finish_reward, 10 * options.cut_cost, 1e-9)
+        torch.manual_seed(options.seed)
+        self.network = QNetwork(self.inputs, self.unit).to(self.device)
+        self.target = QNetwork(self.inputs, self.unit).to(self.device)
+        self.target.copy_from(self.network)
+        self.optimizer = torch.optim.Adam(self.network.parameters(), lr=options.learning_rate, fused=True)
+        self.replay = Replay(options.replay, self.inputs, PLANES, options.priority, options.priority_correction)
+        self.rng = np.random.default_rng([options.seed, 0])
+        self.solids = Solids(meshes, run / "solids")
+        self.listed = listed
+        self.actors = make_actors(ActorSetting(meshes, run / "solids", listed.training, options))
+        self.frontiers: list[list[int]] = []  # rows in the replay buffer of each actor's unfinished components
+        self.largest: list[int] = []
+        self.cuts = 0
+        self.learned = 0
+        self.seconds = 0.0
+        self.sums: dict[str, float] = {}
+        self.best = np.inf
+        self.baseline: Score | None = None
+        self.curves = Curves(run)
+
+    # The algorithm
+
+    def run(self) -> None:
+        """Cut and learn until the last iteration."""
+        options, started, saved, before = self.options, time.perf_counter(), time.perf_counter(), self.seconds
+        while self.cuts < options.iterations:
+            cuts_before = self.cuts
+            actions = self.act()
+            for k, step in enumerate(self.actors.step(actions)):
+                self.remember(k, actions[k], step)
+            self.cuts += len(actions)
+            for _ in range(self.cuts // options.learn_every - cuts_before // options.learn_every):
+                if self.cuts > options.warmup:
+                    self.learn()
+            self.seconds = before + time.perf_counter() - started
+            if self._passed(cuts_before, options.log_every):
+                self.log()
+            if self.listed.validation and self._passed(cuts_before, options.validate_every):
+                self.validate()
+            if time.perf_counter() - saved >= options.checkpoint_seconds:
+                self.save()
+                saved = time.perf_counter()
+        self.save()
+
+    def act(self) -> list[tuple[int, int]]:
+        """Choose for each actor its largest component, and a plane: at random, or by the Boltzmann policy."""
+        options = self.options
+        rows = [frontier[i] for frontier, i in zip(self.frontiers, self.largest, strict=True)]
+        masks = self.replay.masks(rows)
+        if self.cuts < options.warmup:
+            chances = masks / masks.sum(axis=1, keepdims=True)
+        else:
+            epsilon = options.epsilon * options.epsilon_decay ** ((self.cuts - options.warmup) // 1000)
+            with torch.inference_mode():
+                q = self.network(self._tensor(self.replay.features(rows)))
+                policy = boltzmann(q, self._tensor(masks), options.temperature).double().cpu().numpy()
+            chances = epsilon * masks / masks.sum(axis=1, keepdims=True) + (1 - epsilon) * policy
+            self._add("value", float(q.masked_fill(~self._tensor(masks), -torch.inf).amax(dim=1).mean()))
+        return [(i, _draw(p, self.rng)) for i, p in zip(self.largest, chances, strict=True)]
+
+    def remember(self, k: int, action: tuple[int, int], step: Step) -> None:
+        """Put what actor `k` did into the replay buffer."""
+        index, plane = action
+        state = self.frontiers[k].pop(index)
+        children = self._keep(step.children)
+        discounts = step.discounts
+        if self.options.discount == "static":
+            discounts = [self.options.static_discount] * len(children)
+        reward = self.reward(step.reward)
+        self.replay.add(state, plane, reward, children, discounts)
+        self.replay.release(state)
+        self.frontiers[k] += children
+        self._add("reward", reward)
+        if step.ended:
+            for row in self.frontiers[k]:
+                self.replay.release(row)
+            assert step.fresh is not None
+            self.frontiers[k] = self._keep(step.fresh)
+            self._add("episode_parts", step.parts)
+            self._add(f"ended_{step.ended}", 1.0)
+        self.largest[k] = step.largest
+
+    def reward(self, terms: Reward) -> float:
+        """r = lambda_1 r_1 + lambda_2 r_2, as the component's own decision process sees it."""
+        finished = terms.finished if self.options.finish_counts == "solid" else terms.sides_finished
+        earned = self.options.volume_reward * terms.saved + self.options.finish_reward * finished
+        return earned - self.options.cut_cost
+
+    def learn(self) -> None:
+        """Take a gradient step on the dual-state Bellman loss of a batch."""
+        options = self.options
+        batch = self.replay.sample(options.batch, self.rng)
+        with torch.no_grad():
+            q = self.target(self._tensor(batch.child_features))
+            values = soft_value(q, self._tensor(batch.child_masks), options.temperature)
+            if options.value_bound:
+                # Nothing is ever worse than to cut until the episode is broken off.
+                values = values.clamp_min(-options.cut_cost * options.max_cuts)
+                values = torch.minimum(values, self._tensor(batch.child_bounds))
+            target = dual_state_target(
+                self._tensor(batch.rewards), values, self._tensor(batch.child_discounts), self._tensor(batch.owner)
+            )
+        q = self.network(self._tensor(batch.features))
+        loss, errors = bellman_loss(q, self._tensor(batch.planes), target, self._tensor(batch.weights), self.unit)
+        self.optimizer.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        self.optimizer.step()
+        self.replay.set_errors(batch.index, errors.cpu().numpy())
+        self.learned += 1
+        if self.learned % options.target_every == 0:
+            self.target.copy_from(self.network)
+        self._add("loss", float(loss.detach()))
+        self._add("target", float(target.mean()))
+
+    # What is told of it
+
+    def log(self) -> None:
+        """Write a point of the curves: means since the last one."""
+        counts = {name[2:]: n for name, n in self.sums.items() if name.startswith("n ")}
+        means = {name: self.sums[name] / n for name, n in counts.items() if not name.startswith("ended_")}
+        means |= {name: self.sums[name] for name in counts if name.startswith("ended_")}
+        self.sums = {}
+        self.curves.add(self.cuts, {**means, "replay": len(self.replay)}, self.seconds)
+        self.say(f"cut {self.cuts}  " + "  ".join(f"{k} {v:.4g}" for k, v in means.items()) + f"  {self.seconds:.0f} s")
+
+    def validate(self) -> None:
+        """Count the parts of the held-out solids; the network with the fewest after merging is kept as the best."""
+        criterion = Concavity(self.options.threshold)
+        solids = [s for name in self.listed.validation if (s := self.solids.get(name)) is not None]
+        if not solids:
+            raise TrainingError("none of the meshes held out for validation can be repaired; hold out more.")
+        if self.baseline is None:
+            self.baseline = count_parts(Greedy("hull-sum"), solids, criterion)
+        score = count_parts(torch_policy(self.network, self.encoder, self.options), solids, criterion)
+        short = torch_policy(self.network, self.encoder, self.options, shortlist=10)
+        deployed = count_parts(short, solids, criterion).against(self.baseline)
+        values = score.against(self.baseline) | {f"deployed_{k}": v for k, v in deployed.items()}
+        self.curves.add(self.cuts, {f"validation_{k}": v for k, v in values.items()}, self.seconds)
+        self.say(f"cut {self.cuts}  validation: " + "  ".join(f"{k} {v:.3f}" for k, v in values.items()))
+        if values["merged_ratio"] <= self.best:
+            self.best = values["merged_ratio"]
+            self._save_weights("best.safetensors")
+
+    # Beginning, ending, going on
+
+    def begin(self) -> None:
+        """Begin the first episodes."""
+        started = self.actors.start()
+        self.frontiers = [self._keep(described) for described, _ in started]
+        self.largest = [largest for _, largest in started]
+        self.curves.restart(0)
+
+    def save(self) -> None:
+        """Write a checkpoint."""
+        weights = {f"network.{k}": v for k, v in self.network.state_dict().items()}
+        weights |= {f"target.{k}": v for k, v in self.target.state_dict().items()}
+        weights |= adam_state(self.optimizer)
+        state = {
+            "options": dataclasses.asdict(self.options),
+            "cuts": self.cuts,
+            "learned": self.learned,
+            "seconds": self.seconds,
+            "sums": self.sums,
+            "best": self.best,
+            "baseline": None if self.baseline is None else dataclasses.asdict(self.baseline),
+            "generator": self.rng.bit_generator.state,
+            "frontiers": self.frontiers,
+            "actors": self.actors.recipes(),
+        }
+        save_checkpoint(self.folder / "checkpoint", Checkpoint(weights, self.replay.state(), state))
+
+    def restore(self, checkpoint: Checkpoint) -> None:
+        """Go back to where a checkpoint was written."""
+        state = checkpoint.state
+        _require_same_options(state["options"], self.options)
+        for name, network in (("network.", self.network), ("target.", self.target)):
+            network.load_state_dict({k[len(name) :]: v for k, v in checkpoint.weights.items() if k.startswith(name)})
+        restore_adam(self.optimizer, checkpoint.weights)
+        self.replay.restore(checkpoint.replay)
+        self.cuts, self.learned, self.seconds = state["cuts"], state["learned"], state["seconds"]
+        self.sums, self.best = dict(state["sums"]), state["best"]
+        self.baseline = None if state["baseline"] is None else Score(**state["baseline"])
+        self.rng.bit_generator.state = state["generator"]
+        self.frontiers = [list(rows) for rows in state["frontiers"]]
+        self.largest = self.actors.restore(state["actors"])
+        self.curves.restart(self.cuts)
+
+    def export(self) -> Path:
+        """Export the best network, or the last one where none was validated."""
+        from safetensors.torch import load_file
+
+        best = self.folder / "best.safetensors"
+        if not best.exists():
+            self._save_weights("best.safetensors")
+        network = QNetwork(self.inputs, self.unit)
+        network.load_state_dict(load_file(best))
+        return export_policy(self.folder / "policy.onnx", make_encoder(self.options.encoder), network, self.options)
+
+    def close(self) -> None:
+        """End the actors and the curves."""
+        self.actors.close()
+        self.curves.close()
+
+    def _keep(self, described: Described) -> list[int]:
+        bounds = self.options.volume_reward * (1 - described.fill) + self.options.finish_reward - self.options.cut_cost
+        return [
+            self.replay.add_component(features, mask, bound)
+            for features, mask, bound in zip(described.features, described.masks, bounds, strict=True)
+        ]
+
+    def _tensor(self, array: np.ndarray) -> torch.Tensor:
+        return torch.from_numpy(array).to(self.device)
+
+    def _add(self, name: str, value: float) -> None:
+        self.sums[name] = self.sums.get(name, 0.0) + value
+        self.sums[f"n {name}"] = self.sums.get(f"n {name}", 0) + 1
+
+    def _passed(self, before: int, every: int) -> bool:
+        return self.cuts // every > before // every
+
+    def _save_weights(self, name: str) -> None:
+        from safetensors.torch import save_file
+
+        partial = self.folder / (name + ".new")
+        save_file({k: v.detach().cpu().contiguous() for k, v in self.network.state_dict().items()}, partial)
+        partial.replace(self.folder / name)
+
+
+MAY_CHANGE = frozenset({"iterations", "checkpoint_seconds", "device", "workers", "threads"})
+"""Options that a resumed run may be given anew: how long it goes on, and where it runs."""
+
+
+def _require_same_options(before: dict[str, Any], now: TrainOptions) -> None:
+    for name, value in dataclasses.asdict(now).items():
+        was = before.get(name, getattr(TrainOptions, name))  # the run may be older than the option
+        if name not in MAY_CHANGE and was != value:
+            raise OptionError(
+                f"{name} is {value!r}, but was {was!r} when the run began; "
+                "resume with the same options, or begin another run."
+            )
+
+
+def _mesh_list(meshes: Path, run: Path, options: TrainOptions) -> MeshList:
+    """List the meshes when a run begins; later it is read again from the run, so that new files change nothing."""
+    kept = run / "meshes.json"
+    if kept.exists():
+        listed = json.loads(kept.read_text())
+        return MeshList(tuple(listed.pop("training")), tuple(listed.pop("validation")), **listed)
+    if not meshes.is_dir():
+        raise TrainingError(f"there is no folder {meshes}; give one that holds meshes.")
+    listed = list_meshes(meshes, options.max_faces, options.validation, options.seed)
+    run.mkdir(parents=True, exist_ok=True)
+    kept.write_text(json.dumps(dataclasses.asdict(listed), indent=1))
+    (run / "options.json").write_text(json.dumps(dataclasses.asdict(options), indent=1))
+    return listed
+
+
+def _draw(chances: np.ndarray, rng: np.random.Generator) -> int:
+    accumulated = np.cumsum(chances)
+    return int(np.searchsorted(accumulated, rng.random() * accumulated[-1], side="right"))
+
+
+def _device(name: str) -> torch.device:
+    if name == "cuda" and not torch.cuda.is_available():
+        raise OptionError("device is 'cuda', but torch finds no GPU; use cpu, or install torch for CUDA.")
+    if name == "auto":
+        name = "cuda" if torch.cuda.is_available() else "cpu"
+    return torch.device(name)
+
+
+__all__: Sequence[str] = ("Training", "train")

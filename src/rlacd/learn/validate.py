@@ -1,0 +1,77 @@
+"""How good a Q network is at what it is for: how many parts its cuts leave of solids it never learned on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+
+from rlacd.clock import Clock
+from rlacd.criteria import Concavity
+from rlacd.cut import CutTree
+from rlacd.finish import drop_slivers, merge_parts
+from rlacd.learn.encoders import Encoder, describe
+from rlacd.learn.observe import Float32Array, Observation
+from rlacd.learn.options import TrainOptions
+from rlacd.learn.qnetwork import QNetwork
+from rlacd.learn.qpolicy import QPolicy
+from rlacd.policies import Policy
+from rlacd.progress import Progress
+from rlacd.solid.component import Component
+from rlacd.workers import Workers
+
+MOST_PARTS = 150
+"""A policy that makes more of one solid is stopped there: early in training some never end."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """Parts of each solid: after cutting, and after merging."""
+
+    raw: list[int]
+    merged: list[int]
+
+    def against(self, other: Score) -> dict[str, float]:
+        """Get this score's mean counts, and their geometric means relative to another policy's."""
+        return {
+            "parts": sum(self.raw) / len(self.raw),
+            "merged": sum(self.merged) / len(self.merged),
+            "parts_ratio": _mean_ratio(self.raw, other.raw),
+            "merged_ratio": _mean_ratio(self.merged, other.merged),
+        }
+
+
+def count_parts(policy: Policy, solids: Sequence[Component], criterion: Concavity) -> Score:
+    """Decompose solids and count, on one thread."""
+    raw, merged = [], []
+    with Workers(1) as workers:
+        for solid in solids:
+            clock = Clock(progress=_few_enough)
+            done, left = CutTree(solid, policy, workers).cut_until(criterion, clock)
+            parts = drop_slivers([*done, *left], workers, suspects=left)
+            raw.append(len(parts))
+            merged.append(len(merge_parts(parts, criterion, workers, Clock())))
+    return Score(raw, merged)
+
+
+def torch_policy(network: QNetwork, encoder: Encoder, options: TrainOptions, **deployment: int) -> QPolicy:
+    """Make a policy of the network as it is now; `deployment` is `QPolicy`'s shortlist and concave_edges."""
+    device = next(network.parameters()).device
+
+    def values(seen: Observation) -> Float32Array:
+        features = torch.from_numpy(describe(encoder, [seen], options.scale_input)).to(device)
+        with torch.inference_mode():
+            q: Float32Array = network(features)[0].cpu().numpy()
+        return q
+
+    return QPolicy(values, options.threshold, options.points, **deployment)
+
+
+def _few_enough(progress: Progress) -> bool:
+    return progress.parts <= MOST_PARTS
+
+
+def _mean_ratio(counts: Sequence[int], others: Sequence[int]) -> float:
+    return math.exp(sum(math.log(max(a, 1) / max(b, 1)) for a, b in zip(counts, others, strict=True)) / len(counts))

@@ -1,0 +1,220 @@
+"""The decision process: the same components as `decompose` under the same policy, and the paper's rewards."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("gymnasium", reason="needs the extra train")
+pytest.importorskip("torch", reason="needs the extra train")
+
+import gymnasium
+from gymnasium.utils.env_checker import check_env
+
+import rlacd.learn.env
+from rlacd.clock import Clock
+from rlacd.criteria import Concavity
+from rlacd.cut import CutTree
+from rlacd.errors import TrainingError
+from rlacd.learn.encoders import Encoder, describe, make_encoder
+from rlacd.learn.mdp import Cutting, terminal_reward
+from rlacd.learn.meshes import Solids, list_meshes
+from rlacd.learn.observe import observe, valid_planes
+from rlacd.planes.candidates import axis_and_principal
+from rlacd.planes.sweep import sweep
+from rlacd.solid.component import Component
+from rlacd.solid.load import load_mesh
+from rlacd.solid.repair import repair
+from rlacd.workers import Workers
+from tests.learning import GreedyOverMask, greedy_plane, small_solids, write_meshes
+
+CRITERION = Concavity(0.04)
+
+
+@pytest.fixture
+def meshes(tmp_path: Path) -> Path:
+    return write_meshes(tmp_path / "meshes")
+
+
+def real_solids(corpus: Path, count: int) -> list[Component]:
+    with open(corpus / "index.csv") as file:
+        small = [r["file"] for r in csv.DictReader(file) if r["split"] == "train" and 60 < int(r["faces"]) < 250]
+    return [Component(repair(load_mesh(corpus / name)).manifold) for name in small[:: len(small) // count][:count]]
+
+
+def volumes(components: list[Component]) -> list[tuple[float, float]]:
+    return sorted((c.volume, c.hull.volume) for c in components)
+
+
+def cut_greedily(cutting: Cutting) -> list[float]:
+    """Cut to the end; the rewards r_1 on the way."""
+    saved = []
+    while not cutting.over:
+        index = cutting.largest()
+        component = cutting.frontier[index]
+        number = greedy_plane(component)
+        assert number is not None
+        reward = cutting.cut(index, cutting.candidates(component).plane(number)).reward
+        saved.append(reward.share * reward.saved)
+    return saved
+
+
+def check_same_as_decompose(solid: Component) -> None:
+    with Workers(1) as workers:
+        done, left = CutTree(solid, GreedyOverMask(), workers).cut_until(CRITERION, Clock())
+    cutting = Cutting(solid, CRITERION)
+    start = sum(c.hull.volume for c in cutting.frontier + cutting.finished + cutting.stuck)
+    saved = cut_greedily(cutting)
+    assert volumes(cutting.finished) == volumes(done)
+    assert volumes(cutting.stuck) == volumes(left)
+    end = sum(c.hull.volume for c in cutting.finished + cutting.stuck)
+    assert sum(saved) == pytest.approx((start - end) / solid.hull.volume, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", small_solids())
+def test_the_same_policy_reaches_the_same_components_as_decompose(name: str) -> None:
+    check_same_as_decompose(Component(small_solids()[name]))
+
+
+@pytest.mark.slow
+def test_the_same_policy_reaches_the_same_components_of_real_meshes(corpus: Path) -> None:
+    for solid in real_solids(corpus, 6):
+        check_same_as_decompose(solid)
+
+
+def test_reward_of_an_angle_by_hand() -> None:
+    solid = Component(small_solids()["angle"])  # two boxes, 2 x 1 x 0.3 and 0.3 x 1 x 1.2 on top of it
+    cutting = Cutting(solid, CRITERION)
+    plane = rlacd.solid.component.Plane((0.0, 0.0, 1.0), 0.3)
+    cut = cutting.cut(0, plane)
+    hull = (2 * 1.5 - (2 - 0.3) * (1.5 - 0.3) / 2) * 1.0
+    assert solid.hull.volume == pytest.approx(hull)
+    assert cut.reward.saved == pytest.approx((hull - 0.6 - 0.36) / hull)
+    assert cut.reward.finished == cut.reward.sides_finished == 1
+    assert cutting.terminal
+    assert (cut.unfinished, cut.discounts, len(cut.finished)) == ([], [], 2)
+
+
+def test_terminal_reward_falls_with_the_number_of_parts() -> None:
+    assert terminal_reward(2) == 1
+    assert terminal_reward(3) == pytest.approx(1 / (1 + math.log(2)))
+    assert terminal_reward(11) == pytest.approx(1 / (1 + math.log(10)))
+
+
+def test_discounts_are_shares_of_the_hull_and_never_exceed_one() -> None:
+    cutting = Cutting(Component(small_solids()["table"]), CRITERION)
+    while not cutting.over:
+        component = cutting.frontier[0]
+        cut = cutting.cut(0, cutting.candidates(component).plane(12))
+        whole = max(component.hull.volume, sum(c.hull.volume for c in cut.unfinished + cut.finished + cut.stuck))
+        assert cut.discounts == [pytest.approx(c.hull.volume / whole) for c in cut.unfinished]
+        assert sum(cut.discounts) <= 1
+
+
+def test_valid_planes_need_no_sweep_and_are_valid_by_it(corpus: Path) -> None:
+    differ = total = 0
+    for solid in real_solids(corpus, 5):
+        for piece in solid.pieces():
+            candidates = axis_and_principal(piece)
+            cheap, exact = valid_planes(piece, candidates), sweep(piece, candidates).valid()
+            assert not exact.any() or not (cheap & ~exact).any()
+            differ += int((cheap != exact).sum())
+            total += len(exact)
+    assert differ < 0.05 * total
+
+
+def test_the_environment_keeps_gymnasiums_promises(meshes: Path) -> None:
+    env = gymnasium.make("rlacd/Cut-v0", meshes=meshes, points=32, max_parts=12)
+    check_env(env.unwrapped, skip_render_check=True)
+
+
+def test_the_environment_pays_eq_2_and_3_and_ends_with_finished_components(meshes: Path) -> None:
+    env = gymnasium.make("rlacd/Cut-v0", meshes=meshes, points=32, rotate=False)
+    for seed in range(6):
+        observed, info = env.reset(seed=seed)
+        cutting, done, total, paid = env.unwrapped.cutting, False, 0.0, 0.0
+        whole = sum(c.hull.volume for c in cutting.frontier + cutting.finished)
+        while not done:
+            assert observed["taken"].sum() == len(cutting.frontier)
+            number = greedy_plane(cutting.frontier[0])
+            assert info["action_mask"][0, number]
+            observed, reward, terminated, truncated, info = env.step(np.array([0, number]))
+            assert reward == pytest.approx(1000 * info["saved"] + 1000 * info["finished"])
+            total, paid, done = total + info["saved"], paid + info["finished"], terminated or truncated
+        assert info["terminal"]
+        parts = cutting.finished
+        assert info["parts"] == len(parts)
+        assert all(CRITERION.is_met(part) for part in parts)
+        assert paid == terminal_reward(len(parts))
+        share = (whole - sum(p.hull.volume for p in parts)) / Solids(meshes).get(info["mesh"]).hull.volume
+        assert total == pytest.approx(share)
+
+
+def test_masked_actions_cut_nothing_and_episodes_are_capped(meshes: Path) -> None:
+    env = gymnasium.make("rlacd/Cut-v0", meshes=meshes, points=32, max_cuts=3)
+    _, info = env.reset(seed=0)
+    slot, plane = np.argwhere(~info["action_mask"])[-1]
+    for cut in range(3):
+        _, reward, terminated, truncated, after = env.step(np.array([slot, plane]))
+        assert (reward, terminated, after["parts"], after["made"]) == (0, False, info["parts"], False)
+        assert truncated == (cut == 2)
+
+
+def test_the_same_seed_gives_the_same_episode(meshes: Path) -> None:
+    runs = []
+    for _ in range(2):
+        env = gymnasium.make("rlacd/Cut-v0", meshes=meshes, points=32)
+        observed, info = env.reset(seed=5)
+        slot, plane = np.argwhere(info["action_mask"])[7]
+        runs.append([observed, env.step(np.array([slot, plane]))[0]])
+    for one, other in zip(*runs, strict=True):
+        assert all(np.array_equal(one[key], other[key]) for key in one)
+
+
+def test_unreadable_meshes_are_left_out_and_counted(meshes: Path) -> None:
+    listed = list_meshes(meshes, max_faces=1000, validation=2, seed=0)
+    assert listed.unreadable == 1
+    assert len(listed.training) == 3
+    assert len(listed.validation) == 2
+    assert "deeper/table.ply" in listed.training + listed.validation
+    assert list_meshes(meshes, max_faces=12, validation=0, seed=0).training == ("box.ply",)
+
+
+def test_folders_without_anything_to_learn_are_one_clear_error(tmp_path: Path, meshes: Path) -> None:
+    with pytest.raises(TrainingError, match="holds 0 meshes"):
+        gymnasium.make("rlacd/Cut-v0", meshes=tmp_path / "none")
+    env = gymnasium.make("rlacd/Cut-v0", meshes=meshes, max_faces=12)
+    with pytest.raises(TrainingError, match="needs a cut"):
+        env.reset(seed=0)
+
+
+@pytest.mark.parametrize("name", ["profile", "pointnet"])
+def test_encoders_keep_the_protocol_and_ignore_size_and_place(name: str) -> None:
+    encoder = make_encoder(name)
+    assert isinstance(encoder, Encoder)
+    solid = small_solids()["table"]
+    both = [Component(solid), Component(solid.scale([0.25] * 3).translate([0.5, -0.25, 2]))]
+    seen = [observe(c, axis_and_principal(c), 0.04, 512) for c in both]
+    features = describe(encoder, seen, scale_input=False)
+    assert features.shape == (2, encoder.dim)
+    assert features[0] == pytest.approx(features[1], abs=0.05)
+    assert seen[1].scale[0] == pytest.approx(seen[0].scale[0] - 2)
+    assert describe(encoder, seen, scale_input=True).shape == (2, encoder.dim + 3)
+
+
+def test_profiles_count_points_between_the_planes() -> None:
+    component = Component(small_solids()["table"])
+    candidates = axis_and_principal(component)
+    seen = observe(component, candidates, 0.04, 2048)
+    profile = describe(make_encoder("profile"), [seen], scale_input=False).reshape(6, 2, 2, 26)
+    lower, upper = component.box
+    world = seen.points * (upper - lower).max() / 2 + (lower + upper) / 2
+    for k in (0, 2):
+        for surface in (0, 1):
+            slab = np.searchsorted(candidates.offsets[k], world[surface] @ candidates.directions[k])
+            share = np.bincount(slab, minlength=26) / 2048
+            assert np.abs(profile[k, 0, surface] / 26 - share).sum() < 0.02

@@ -1,0 +1,303 @@
+"""A training run: exactly repeatable, exactly resumable, exported as it is, and clear about what is wrong."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from rlacd.cli import app
+from rlacd.errors import MissingExtraError, OptionError, TrainingError
+from rlacd.learn.options import PRESETS, TrainOptions
+from tests.learning import write_meshes
+
+TINY: dict[str, Any] = {
+    "iterations": 120,
+    "warmup": 30,
+    "batch": 8,
+    "points": 64,
+    "max_faces": 500,
+    "environments": 2,
+    "validation": 1,
+    "validate_every": 60,
+    "log_every": 20,
+    "target_every": 10,
+    "max_parts": 12,
+    "replay": 50,
+    "checkpoint_seconds": 0.0,
+}
+
+
+@pytest.fixture
+def meshes(tmp_path: Path) -> Path:
+    return write_meshes(tmp_path / "meshes")
+
+
+def run(meshes: Path, folder: Path, resume: bool = False, **changes: Any) -> Path:
+    pytest.importorskip("torch", reason="needs the extra train")
+    from rlacd.learn.train import train
+
+    return train(meshes, folder, TrainOptions(**{**TINY, **changes}), resume=resume, say=lambda line: None)
+
+
+def weights(folder: Path) -> bytes:
+    return (folder / "checkpoint" / "weights.safetensors").read_bytes()
+
+
+def curves(folder: Path) -> list[dict[str, float]]:
+    points = [json.loads(line) for line in (folder / "curves.jsonl").read_text().splitlines()]
+    return [{k: v for k, v in point.items() if k != "seconds"} for point in points]
+
+
+def assert_same_run(one: Path, other: Path) -> None:
+    assert weights(one) == weights(other)
+    assert curves(one) == curves(other)
+    assert (one / "best.safetensors").read_bytes() == (other / "best.safetensors").read_bytes()
+
+
+def test_presets_are_valid_and_the_papers_is_the_papers() -> None:
+    for name in PRESETS:
+        assert isinstance(TrainOptions.preset(name), TrainOptions)
+    paper = TrainOptions.preset("paper")
+    assert (paper.threshold, paper.volume_reward, paper.finish_reward) == (0.04, 1000, 1000)
+    assert (paper.replay, paper.iterations, paper.warmup) == (100_000, 1_000_000, 10_000)
+    assert (paper.epsilon, paper.epsilon_decay, paper.points, paper.priority) == (0.2, 0.99, 2048, 0)
+    assert (paper.discount, paper.finish_counts, paper.rotate) == ("hull", "solid", True)
+    assert not paper.scale_input
+    assert not paper.value_bound
+    assert TrainOptions.preset("quick", seed=3).seed == 3
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("batch", 0),
+        ("batch", 2.5),
+        ("threshold", 0.0),
+        ("threshold", float("nan")),
+        ("epsilon", 1.1),
+        ("discount", "both"),
+        ("rotate", 1),
+        ("seed", -1),
+        ("workers", 5),
+    ],
+)
+def test_options_out_of_range_are_said(name: str, value: Any) -> None:
+    with pytest.raises(OptionError, match=f"{name} is"):
+        TrainOptions(**{name: value})
+
+
+def test_unknown_presets_and_options_are_said() -> None:
+    with pytest.raises(OptionError, match="preset is 'best'"):
+        TrainOptions.preset("best")
+    with pytest.raises(OptionError, match="no option 'speed'"):
+        TrainOptions.preset("quick", speed=1)
+
+
+def test_every_option_has_help_and_the_command_line_shows_it() -> None:
+    shown = CliRunner().invoke(app, ["train", "--help"], env={"COLUMNS": "400", "NO_COLOR": "1"})
+    assert shown.exit_code == 0
+    for option in dataclasses.fields(TrainOptions):
+        assert f"--{option.name.replace('_', '-')}" in shown.output
+        assert option.metadata["help"].split(";")[0][:30] in shown.output
+
+
+def test_without_the_extra_the_command_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in list(sys.modules):
+        if name.startswith("rlacd.learn.train"):
+            monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "torch", None)
+    result = CliRunner().invoke(app, ["train", str(tmp_path), "--run", str(tmp_path / "run")])
+    assert result.exit_code == 2
+    assert "rlacd[train]" in result.output
+    assert "Traceback" not in result.output
+    assert issubclass(MissingExtraError, ImportError)
+
+
+def test_the_main_job_does_not_load_torch() -> None:
+    code = "import sys, rlacd, rlacd.cli; sys.exit('torch' in sys.modules or 'gymnasium' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_the_same_seed_gives_the_same_weights_and_another_does_not(meshes: Path, tmp_path: Path) -> None:
+    for name, seed in (("a", 0), ("b", 0), ("c", 1)):
+        run(meshes, tmp_path / name, seed=seed, validation=0)
+    assert weights(tmp_path / "a") == weights(tmp_path / "b")
+    assert curves(tmp_path / "a") == curves(tmp_path / "b")
+    assert weights(tmp_path / "a") != weights(tmp_path / "c")
+
+
+@pytest.mark.parametrize("priority", [0.0, 0.6])
+def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, tmp_path: Path, priority: float) -> None:
+    run(meshes, tmp_path / "whole", priority=priority)
+    run(meshes, tmp_path / "halves", priority=priority, iterations=70)
+    run(meshes, tmp_path / "halves", priority=priority, resume=True)
+    assert_same_run(tmp_path / "whole", tmp_path / "halves")
+
+
+@pytest.mark.slow
+def test_a_killed_run_resumes_exactly(meshes: Path, tmp_path: Path) -> None:
+    whole, killed = tmp_path / "whole", tmp_path / "killed"
+    run(meshes, whole, iterations=400)
+    given = [f"--{k.replace('_', '-')}={v}" for k, v in {**TINY, "iterations": 400, "workers": 2}.items()]
+    command = [sys.executable, "-c", "from rlacd.cli import main; main()", "train", str(meshes), "--run", str(killed)]
+    process = subprocess.Popen([*command, *given], stdout=subprocess.DEVNULL)
+    deadline = time.monotonic() + 120
+    while not (killed / "best.safetensors").exists() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    assert not (killed / "policy.onnx").exists()
+    run(meshes, killed, iterations=400, resume=True)
+    assert_same_run(whole, killed)
+
+
+@pytest.mark.slow
+def test_worker_processes_change_nothing(meshes: Path, tmp_path: Path) -> None:
+    run(meshes, tmp_path / "alone")
+    run(meshes, tmp_path / "spread", workers=2)
+    assert_same_run(tmp_path / "alone", tmp_path / "spread")
+
+
+@pytest.mark.slow
+def test_a_worker_that_dies_is_one_clear_error(meshes: Path, tmp_path: Path) -> None:
+    pytest.importorskip("torch", reason="needs the extra train")
+    from rlacd.learn.actors import ActorSetting, ProcessActors
+
+    options = TrainOptions(**{**TINY, "workers": 2})
+    actors = ProcessActors(ActorSetting(meshes, tmp_path / "cache", ("angle.ply", "cross.ply"), options))
+    try:
+        actors.start()
+        actors._processes[1].kill()
+        actors._processes[1].join()
+        with pytest.raises(TrainingError, match=r"a worker process died.*--resume"):
+            actors.step([(0, 12), (0, 12)])
+    finally:
+        actors.close()
+
+
+def test_the_exported_policy_computes_what_torch_does(meshes: Path, tmp_path: Path) -> None:
+    pytest.importorskip("torch", reason="needs the extra train")
+    import torch
+
+    from rlacd.learn.encoders import make_encoder
+    from rlacd.learn.export import OnnxQ, PointsToValues, export_policy
+    from rlacd.learn.observe import observe
+    from rlacd.learn.qnetwork import QNetwork
+    from rlacd.planes.candidates import axis_and_principal
+    from rlacd.solid.component import Component
+    from tests.learning import small_solids
+
+    for name, scale_input in (("profile", True), ("pointnet", False)):
+        encoder = make_encoder(name)
+        torch.manual_seed(0)
+        network = QNetwork(encoder.dim + 3 * scale_input, 1000.0)
+        options = TrainOptions(encoder=name, scale_input=scale_input, points=256)
+        path = export_policy(tmp_path / f"{name}.onnx", encoder, network, options)
+        module, exported = PointsToValues(encoder, network, scale_input), OnnxQ(path)
+        components = [Component(solid) for solid in small_solids().values()]
+        seen = [observe(c, axis_and_principal(c), 0.04, 256) for c in components]
+        arrays = [np.stack([getattr(o, field) for o in seen]) for field in ("points", "directions", "scale")]
+        with torch.inference_mode():
+            expected = module(*(torch.from_numpy(a) for a in arrays)).numpy()
+        assert exported.run(*arrays) == pytest.approx(expected, rel=1e-3, abs=0.5)
+        assert exported(seen[1]) == pytest.approx(expected[1], rel=1e-3, abs=0.5)
+
+
+def test_a_run_ends_with_a_policy_that_decomposes(meshes: Path, tmp_path: Path) -> None:
+    path = run(meshes, tmp_path / "run")
+    from rlacd.clock import Clock
+    from rlacd.criteria import Concavity
+    from rlacd.cut import CutTree
+    from rlacd.learn.export import OnnxQ
+    from rlacd.learn.qpolicy import QPolicy
+    from rlacd.solid.component import Component
+    from rlacd.workers import Workers
+    from tests.learning import small_solids
+
+    about = json.loads(path.with_suffix(".json").read_text())
+    assert about["options"] == dataclasses.asdict(TrainOptions(**TINY))
+    policy = QPolicy(OnnxQ(path), 0.04, about["options"]["points"], shortlist=10, concave_edges=4)
+    with Workers(1) as workers:
+        solid = Component(small_solids()["cross"])
+        done, left = CutTree(solid, policy, workers).cut_until(Concavity(0.04), Clock())
+    assert len(done) == 3  # concave edges are among the planes, and the least hull sum is perfect here
+    assert left == []
+
+
+def test_a_run_is_not_overwritten_and_not_resumed_with_other_options(meshes: Path, tmp_path: Path) -> None:
+    run(meshes, tmp_path / "run", iterations=40, validation=0)
+    with pytest.raises(OptionError, match="holds a run already"):
+        run(meshes, tmp_path / "run", validation=0)
+    with pytest.raises(OptionError, match="batch is 9, but was 8"):
+        run(meshes, tmp_path / "run", resume=True, batch=9, validation=0)
+
+
+def test_damaged_checkpoints_and_folders_without_meshes_are_said(meshes: Path, tmp_path: Path) -> None:
+    run(meshes, tmp_path / "run", iterations=40, validation=0)
+    broken = tmp_path / "run" / "checkpoint" / "weights.safetensors"
+    broken.write_bytes(broken.read_bytes()[:1000])
+    with pytest.raises(TrainingError, match="is damaged"):
+        run(meshes, tmp_path / "run", resume=True, validation=0)
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(TrainingError, match="holds 0 meshes"):
+        run(tmp_path / "empty", tmp_path / "other")
+    with pytest.raises(TrainingError, match="there is no folder"):
+        run(tmp_path / "nowhere", tmp_path / "another")
+
+
+def test_a_checkpoint_half_written_leaves_the_one_before(meshes: Path, tmp_path: Path) -> None:
+    run(meshes, tmp_path / "whole", validation=0)
+    cut_short = tmp_path / "short"
+    run(meshes, cut_short, iterations=70, validation=0)
+    # As after a crash between the two renames, with a newer checkpoint not yet complete.
+    (cut_short / "checkpoint").rename(cut_short / "checkpoint.old")
+    (cut_short / "checkpoint.new").mkdir()
+    (cut_short / "checkpoint.new" / "state.json").write_text("{")
+    run(meshes, cut_short, resume=True, validation=0)
+    assert weights(tmp_path / "whole") == weights(cut_short)
+
+
+@pytest.mark.slow
+def test_training_on_one_solid_learns_to_finish_it(tmp_path: Path) -> None:
+    """A cross falls into three parts, if its arms are cut off where they begin; values count the cuts to come."""
+    meshes = write_meshes(tmp_path / "meshes")
+    for other in ("angle", "apart", "box", "broken", "deeper/table"):
+        (meshes / f"{other}.ply").unlink()
+    changes = {
+        "threshold": 0.15,
+        "iterations": 1500,
+        "warmup": 500,
+        "batch": 32,
+        "validation": 0,
+        "rotate": False,
+        "replay": 5000,
+        "max_cuts": 8,
+        "temperature": 0.0,
+        "volume_reward": 0.0,
+        "finish_reward": 0.0,
+        "cut_cost": 100.0,
+        "discount": "static",
+        "static_discount": 1.0,
+        "value_bound": True,
+        "learning_rate": 3e-4,
+        "target_every": 100,
+        "epsilon": 0.1,
+        "checkpoint_seconds": 1000.0,
+        "log_every": 250,
+    }
+    run(meshes, tmp_path / "run", **changes)
+    found = curves(tmp_path / "run")
+    assert found[0]["episode_parts"] > 8
+    assert found[-1]["episode_parts"] < 5
+    assert -200 <= found[-1]["value"] <= -100  # two cuts from the cross, one from what the first one leaves
