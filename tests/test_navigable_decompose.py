@@ -96,13 +96,13 @@ def test_seeds_open_a_sealed_room() -> None:
     assert len(rlacd.decompose(house(door=0), criterion=space)) > 6
 
 
-@pytest.mark.parametrize("ball", [0.95, 1.05])
+@pytest.mark.parametrize("ball", [0.9, 1.1])
 def test_the_hole_of_a_torus_is_free_exactly_when_the_ball_fits(ball: float) -> None:
     torus = trimesh.creation.torus(0.75, 0.25, major_sections=96, minor_sections=64)  # a hole of radius 0.5
     size, tolerance = 2.0, 0.02
     result = rlacd.decompose(torus, criterion=rlacd.NavigableSpace((0.5 - tolerance) * ball / size, tolerance / size))
     assert result.balls is not None
-    in_the_hole = np.linalg.norm(result.balls.centres, axis=1).min() < 0.15
+    in_the_hole = np.linalg.norm(result.balls.centres, axis=1).min() < 0.27
     assert in_the_hole == (ball < 1)
 
 
