@@ -233,6 +233,7 @@ def test_cancelling_a_search_keeps_what_it_has_reached(corpus: Path) -> None:
     result = rlacd.decompose(corpus / SHAPES[0], quality="best", search_steps=1000, progress=stop)
     assert result.report["stopped_by"] == "cancel"
     assert result.report["concavity"]["max"] <= 0.05
+    assert any("search for fewer hulls early" in warning for warning in result.report["warnings"])
     assert 8 <= result.report["search"]["steps"] < 1000
     counts = [progress.parts for progress in told if progress.stage == "search"]
     assert counts == sorted(counts, reverse=True)

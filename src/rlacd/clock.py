@@ -26,6 +26,7 @@ class Clock:
     def __init__(self, timeout: float | None = None, progress: ProgressCallback | None = None) -> None:
         self.seconds: dict[str, float] = {}
         self.stopped_by: StoppedBy | None = None
+        self.stopped_in: str | None = None
         self._timeout = timeout
         self._progress = progress
         self._start = time.perf_counter()
@@ -63,6 +64,8 @@ class Clock:
                 self.stopped_by = "timeout"
             elif told_to_stop:
                 self.stopped_by = "cancel"
+            if self.stopped_by is not None:
+                self.stopped_in = self._stage
         return self.stopped_by is None
 
     def nothing_left_to_stop(self) -> None:

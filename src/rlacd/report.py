@@ -64,6 +64,8 @@ def _early_end(clock: Clock) -> list[str]:
     if clock.stopped_by is None:
         return []
     reason = {"timeout": "the timeout ended", "cancel": "the caller ended"}[clock.stopped_by]
+    if clock.stopped_in == "search":
+        return [f"{reason.capitalize()} the search for fewer hulls early; those found so far are valid."]
     return [f"Incomplete: {reason} the work early; the hulls cover the solid but are coarser than asked for."]
 
 

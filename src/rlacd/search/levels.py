@@ -143,7 +143,8 @@ def search(
     steps = math.inf if bounds.steps is None else bounds.steps
     rankings = rankings or [by_score(score) for score in PORTFOLIO]
     near_views = Views(PLANES_PER_AXIS, CONCAVE_EDGES)
-    best = list(parts)
+    # What the finish would drop must not count, or a level could end with more hulls than the one below it.
+    best = parts = drop_slivers(parts, workers)
     if most_parts is not None and not all(workers.map(criterion.is_met, best)):
         if len(best) <= most_parts:
             outcome = tighten(
@@ -205,4 +206,4 @@ def _whole(tree: CutTree, criterion: Criterion, workers: Workers, pace: Pace, mo
     if not all(workers.map(criterion.is_met, [part for part in left if part in parts])):
         return None
     merged = merge_parts(parts, criterion, workers, pace)
-    return None if pace.is_over else merged
+    return None if pace.is_over else drop_slivers(merged, workers)
