@@ -29,6 +29,9 @@ assert set(PORTFOLIO) <= set(SCORES)
 HOPELESS = 5
 """A pass that makes so many times more pieces than there are parts will not have fewer of them after merging."""
 
+ROUNDS = 3
+"""The search goes around so many times from every pass of the portfolio, with other chances, if there is time."""
+
 PLANES_PER_AXIS = 12
 """Neighbourhoods are small: half the planes are as good in them, and twice as fast."""
 
@@ -154,9 +157,9 @@ def search(
             outcome = Outcome(best, 0, 0, True)
         from_portfolio = len(parts)
     else:
-        best = _best_of_portfolio(root, best, criterion, rankings, views, workers, pace)
-        from_portfolio = len(best)
-        outcome = Neighbourhood(best, criterion, rankings, near_views, workers, seed).run(pace, steps)
+        starts = _portfolio(root, best, criterion, rankings, views, workers, pace)
+        from_portfolio = len(starts[0])
+        outcome = _from_all(starts, criterion, rankings, near_views, workers, pace, steps, seed)
     account = Account(
         level=name,
         seconds=time.perf_counter() - start,
@@ -170,7 +173,7 @@ def search(
     return outcome.parts, account
 
 
-def _best_of_portfolio(
+def _portfolio(
     root: Component,
     parts: list[Part],
     criterion: Criterion,
@@ -178,18 +181,45 @@ def _best_of_portfolio(
     views: Views,
     workers: Workers,
     pace: Pace,
-) -> list[Part]:
-    """The given parts, or those of the whole solid cut by another ranking where they are better."""
+) -> list[list[Part]]:
+    """The given parts, and those of the whole solid cut by other rankings; the best first."""
     divisions = Divisions()
+    found = [parts]
     for ranking in rankings:
         if pace.is_over or len(parts) == 1:
             break
         tree = CutTree(root, Ranked(ranking, views), workers, divisions)
         other = _whole(tree, criterion, workers, pace, most=HOPELESS * len(parts))
-        if other is not None and cost(other) < cost(parts):
-            parts = other
-            pace.parts = len(parts)
-    return parts
+        if other is not None and all(cost(other) != cost(known) for known in found):
+            found.append(other)
+            pace.parts = min(pace.parts, len(other))
+    return sorted(found, key=cost)
+
+
+def _from_all(
+    starts: Sequence[list[Part]],
+    criterion: Criterion,
+    rankings: Sequence[Ranking],
+    views: Views,
+    workers: Workers,
+    pace: Pace,
+    steps: float,
+    seed: int,
+) -> Outcome:
+    """Search around the best start; when nothing is left to try there, around the next, and all over again."""
+    best = starts[0]
+    total = accepted = 0
+    exhausted = False
+    for number in range(ROUNDS * len(starts)):
+        state = Neighbourhood(starts[number % len(starts)], criterion, rankings, views, workers, seed + number)
+        outcome = state.run(pace, steps - total)
+        total += outcome.steps
+        accepted += outcome.accepted
+        exhausted = outcome.exhausted
+        best = min(best, outcome.parts, key=cost)
+        if not exhausted:
+            break
+    return Outcome(best, total, accepted, exhausted)
 
 
 def cost(parts: Sequence[Part]) -> tuple[int, float]:

@@ -156,7 +156,7 @@ class Neighbourhood:
                 steps += 1
                 accepted += self._take(trial, found)
                 pace.steps += 1
-                pace.parts = len(self._alive)
+                pace.parts = min(pace.parts, len(self._alive))
                 if pace.is_over:
                     break
         exhausted = not any(map(self._is_open, self._queue))
