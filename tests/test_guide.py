@@ -34,7 +34,7 @@ from rlacd.workers import Workers  # noqa: E402
 from tests.test_learned import chair, seen  # noqa: E402
 
 
-def greedy_cost(component: Component, swept: Sweep, per_axis: int) -> np.ndarray:
+def greedy_cost(component: Component, swept: Sweep) -> np.ndarray:
     return excess_norm(swept)
 
 
@@ -136,10 +136,10 @@ def test_onnx_and_torch_agree_and_the_weights_survive(tmp_path: Path) -> None:
         q, q_edges, _ = network(*(torch.from_numpy(x)[None] for x in seen(chair())))
         again = load_network(path.with_suffix(".safetensors"))(*(torch.from_numpy(x)[None] for x in seen(chair())))
     swept = sweep(component, candidates_of(component, 25))
-    theirs = guide.log_parts(component, swept, 0.05, 25)
+    theirs = guide.log_parts(component, swept, 0.05)
     np.testing.assert_allclose(theirs, torch.cat([q, q_edges], 1)[0, : len(theirs)].numpy(), atol=1e-5)
     torch.testing.assert_close(again[0], q)
-    coarse = guide.log_parts(component, sweep(component, candidates_of(component, 12)), 0.05, 12)
+    coarse = guide.log_parts(component, sweep(component, candidates_of(component, 12)), 0.05)
     assert np.isfinite(coarse).all()
 
 

@@ -14,6 +14,7 @@ import pytest
 import rlacd
 from rlacd.errors import WeightsError
 from rlacd.planes.sweep import sweep
+from rlacd.planes.views import Views
 from rlacd.policies import make_policy
 from rlacd.policies.features import MIRRORED, candidates_of, features, measures, tables
 from rlacd.policies.learned import Guide, Learned
@@ -34,7 +35,7 @@ def chair() -> manifold3d.Manifold:
 
 def seen(solid: manifold3d.Manifold, scale: float = 0.05) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     component = Component(solid)
-    grid, edges = tables(sweep(component, candidates_of(component, PER_AXIS)), PER_AXIS)
+    grid, edges = tables(sweep(component, candidates_of(component, PER_AXIS)))
     planes, singles, whole = features(grid[None], edges[None], measures(component)[None], np.array([scale]))
     return planes[0], singles[0], whole[0]
 
@@ -73,7 +74,7 @@ def test_turning_the_solid_permutes_the_features_of_the_coordinate_axes() -> Non
 def test_the_shipped_policy_ranks_every_plane_it_looks_at() -> None:
     guide, component = Guide(), Component(chair())
     swept = sweep(component, candidates_of(component, PER_AXIS))
-    q = guide.log_parts(component, swept, 0.05, PER_AXIS)
+    q = guide.log_parts(component, swept, 0.05)
     assert q.shape == (len(swept.candidates),)
     assert np.isfinite(q).all()
     assert 0 < np.exp(q[swept.valid()]).min() < 30
@@ -83,8 +84,18 @@ def test_scales_never_met_in_training_are_taken_to_be_the_nearest() -> None:
     guide, component = Guide(), Component(chair())
     swept = sweep(component, candidates_of(component, PER_AXIS))
     least = guide.about.scales[0]
-    below, at = (guide.log_parts(component, swept, scale, PER_AXIS) for scale in (least / 10, least))
+    below, at = (guide.log_parts(component, swept, scale) for scale in (least / 10, least))
     np.testing.assert_array_equal(below, at)
+
+
+def test_shared_sweeps_change_nothing_and_coarser_ones_can_be_ranked() -> None:
+    component = Component(chair())
+    assert Learned(views=Views()).choose(component) == Learned().choose(component)
+    coarse = Views(12, 4).of(component)
+    cost = Learned().rank(component, coarse)
+    assert cost.shape == (len(coarse.candidates),)
+    assert np.isfinite(cost).all()
+    assert (cost > 0).all()
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.35])

@@ -56,7 +56,7 @@ def make_policy(name: str, views: Views | None = None, scale: float | None = Non
     if name == "learned" or name.endswith(WEIGHTS_ENDING):
         from rlacd.policies.learned import Learned  # onnxruntime takes a while to import
 
-        return Learned(None if name == "learned" else name, scale)
+        return Learned(None if name == "learned" else name, scale, views=views)
     family, _, score = name.partition("-")
     if family == "greedy" and score.removesuffix(EDGES) in SCORES:
         return Greedy(score.removesuffix(EDGES), concave_edges=CONCAVE_EDGES if score.endswith(EDGES) else 0)

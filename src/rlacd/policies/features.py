@@ -57,7 +57,13 @@ def candidates_of(component: Component, per_axis: int) -> Candidates:
     return Candidates.joined(axis_and_principal(component, per_axis), concave_edge_planes(component, CONCAVE_EDGES))
 
 
-def tables(s: Sweep, per_axis: int) -> tuple[FloatArray, FloatArray]:
+def planes_per_axis(s: Sweep) -> int:
+    """Count the planes along each of the six directions of a sweep over `candidates_of`: the first ones are all x."""
+    other = (s.candidates.directions != s.candidates.directions[0]).any(axis=1)
+    return int(np.argmax(other))
+
+
+def tables(s: Sweep) -> tuple[FloatArray, FloatArray]:
     """Get a sweep over `candidates_of` as arrays, their columns in the order of `SWEEP_COLUMNS`.
 
     Returns
@@ -66,6 +72,7 @@ def tables(s: Sweep, per_axis: int) -> tuple[FloatArray, FloatArray]:
     edges : float64 [12, 10]
         Planes of concave edges; zeros, as for a plane that misses the solid, where there are fewer.
     """
+    per_axis = planes_per_axis(s)
     table = np.stack([getattr(s, name) for name in SWEEP_COLUMNS], axis=-1)
     planes = DIRECTIONS * per_axis
     edges = np.zeros((EDGE_PLANES, len(SWEEP_COLUMNS)))

@@ -18,8 +18,9 @@ import numpy as np
 import onnxruntime
 
 from rlacd.errors import WeightsError
-from rlacd.planes.sweep import Sweep, sweep
-from rlacd.policies.features import DIRECTIONS, VERSION, candidates_of, features, measures, tables
+from rlacd.planes.sweep import Sweep
+from rlacd.planes.views import Views
+from rlacd.policies.features import CONCAVE_EDGES, DIRECTIONS, VERSION, features, measures, planes_per_axis, tables
 from rlacd.policies.greedy import cheapest, excess_norm
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
@@ -91,9 +92,9 @@ class Guide:
         if signature != [INPUTS, OUTPUTS]:
             raise WeightsError(f"{name} is no guide network; export the policy again.")
 
-    def log_parts(self, component: Component, swept: Sweep, scale: float, per_axis: int) -> FloatArray:
+    def log_parts(self, component: Component, swept: Sweep, scale: float) -> FloatArray:
         """Predict, for every plane of a component's sweep, log(parts the component ends in, merged)."""
-        grid, edges = tables(swept, per_axis)
+        grid, edges = tables(swept)
         scales = np.clip(np.array([scale]), *self.about.scales)
         inputs = features(grid[None], edges[None], measures(component)[None], scales)
         outputs = self._session.run(["q", "q_edges"], dict(zip(INPUTS, inputs, strict=True)))
@@ -102,7 +103,7 @@ class Guide:
 
 
 def guided_cost(
-    guide: Guide, component: Component, swept: Sweep, scale: float, per_axis: int, blend: float | None = None
+    guide: Guide, component: Component, swept: Sweep, scale: float, blend: float | None = None
 ) -> FloatArray:
     """Cost of every plane of a sweep: parts expected * greedy score ** blend, a little less for concave edges' planes.
 
@@ -111,8 +112,8 @@ def guided_cost(
     """
     blend = guide.about.blend if blend is None else blend
     greedy = (excess_norm(swept) / component.hull.volume**1.3 + NOTHING) ** (1 / 1.3)
-    log_parts = guide.log_parts(component, swept, scale, per_axis)
-    log_parts[DIRECTIONS * per_axis :] -= guide.about.edge_bonus
+    log_parts = guide.log_parts(component, swept, scale)
+    log_parts[DIRECTIONS * planes_per_axis(swept) :] -= guide.about.edge_bonus
     parts = np.exp(np.round(log_parts, DECIMALS))
     cost: FloatArray = parts * greedy**blend
     return cost
@@ -129,6 +130,8 @@ class Learned:
         The criterion's length, such as the concavity threshold, in the frame.
     blend : float, optional
         Weight of the greedy score; what the weights file says by default.
+    views : Views, optional
+        Where the sweeps come from, to share them with others; decides about the planes then.
 
     Raises
     ------
@@ -141,16 +144,21 @@ class Learned:
         weights: str | os.PathLike[str] | None = None,
         scale: float | None = None,
         blend: float | None = None,
+        views: Views | None = None,
     ) -> None:
         self._guide = load_guide(weights)
+        self._views = views or Views(self._guide.about.per_axis, CONCAVE_EDGES)
         self._scale = USUAL_SCALE if scale is None else scale
         self._blend = blend
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None when every candidate misses it or shaves off a film."""
-        per_axis = self._guide.about.per_axis
-        swept = sweep(component, candidates_of(component, per_axis), threads)
-        return cheapest(swept, guided_cost(self._guide, component, swept, self._scale, per_axis, self._blend))
+        swept = self._views.of(component, threads)
+        return cheapest(swept, self.rank(component, swept))
+
+    def rank(self, component: Component, swept: Sweep) -> FloatArray:
+        """Cost of every plane of a component's sweep over axes and concave edges, whatever its planes per axis."""
+        return guided_cost(self._guide, component, swept, self._scale, self._blend)
 
 
 @lru_cache(maxsize=4)

@@ -111,7 +111,7 @@ def _add(labels: Labels, rollouts: Rollouts, state: State, planes: list[int], mo
     labels.state += [len(labels.scale)] * len(planes)
     labels.parts += [worst + 1 if count is None else count for count in counts]
     labels.given_up += [count is None for count in counts]
-    grid, edges = tables(state.sweep, OFFSETS_PER_AXIS)
+    grid, edges = tables(state.sweep)
     labels.grid.append(grid)
     labels.edges.append(edges)
     labels.whole.append(measures(state.component))
@@ -121,7 +121,7 @@ def _add(labels: Labels, rollouts: Rollouts, state: State, planes: list[int], mo
 def _candidates(state: State, cost: Cost, rng: np.random.Generator) -> list[int]:
     """The policy's plane, the best of its ranking and of each greedy score, and some that are drawn."""
     planes: list[int] = []
-    costs = cost(state.component, state.sweep, OFFSETS_PER_AXIS)
+    costs = cost(state.component, state.sweep)
     scores = [score(state.sweep) for score in (excess_norm, hull_sum, max_excess)]
     noisy = np.log(scores[0] + 1e-12) + rng.gumbel(size=len(costs))
     drawn = rng.random(len(costs))

@@ -22,8 +22,8 @@ from rlacd.solid.arrays import BoolArray, FloatArray
 from rlacd.solid.component import Component
 from rlacd.workers import Workers
 
-Cost = Callable[[Component, Sweep, int], FloatArray]
-"""A policy: the cost of every plane of a component's sweep, given the planes per axis; the least valid one is taken."""
+Cost = Callable[[Component, Sweep], FloatArray]
+"""A policy: the cost of every plane of a component's sweep; the valid one of least cost is taken."""
 
 COARSE = slice(1, None, 2)
 """Rollouts try every second plane of a direction: half the work, for a few percent more parts."""
@@ -60,7 +60,7 @@ class State:
         """Choose a plane by the full sweep; -1 when none is valid."""
         if not self.valid.any():
             return -1
-        costs = cost(self.component, self.sweep, OFFSETS_PER_AXIS)
+        costs = cost(self.component, self.sweep)
         return int(np.argmin(np.where(self.valid, costs, np.inf)))
 
     def choose_coarsely(self, cost: Cost) -> int:
@@ -73,7 +73,7 @@ class State:
         valid = valid_planes(scored)
         if not valid.any():
             return -1
-        costs = cost(self.component, scored, grid.shape[1])
+        costs = cost(self.component, scored)
         return int(numbers[np.argmin(np.where(valid, costs, np.inf))])
 
 

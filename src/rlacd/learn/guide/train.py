@@ -112,8 +112,8 @@ def _label_round(
 def _cost(guide: Guide | None, threshold: float) -> Cost:
     """The policy whose choices are labelled: greedy at first, then the last network's."""
     if guide is None:
-        return lambda component, swept, per_axis: excess_norm(swept)
-    return lambda component, swept, per_axis: guided_cost(guide, component, swept, threshold, per_axis)
+        return lambda component, swept: excess_norm(swept)
+    return lambda component, swept: guided_cost(guide, component, swept, threshold)
 
 
 def _fit_round(options: TrainOptions, number: int, say: Callable[[str], None]) -> Path:
