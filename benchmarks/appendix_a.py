@@ -51,7 +51,7 @@ def main() -> None:
     parser.add_argument("picture", type=Path)
     parser.add_argument("--count", type=int, default=12)
     parser.add_argument("--depth", type=int, default=4)
-    parser.add_argument("--steps", type=int, default=1_000_000)
+    parser.add_argument("--steps", type=int, default=300_000)
     given = parser.parse_args()
 
     import matplotlib
@@ -61,21 +61,24 @@ def main() -> None:
 
     roots = trees(given.meshes, given.count, given.depth)
     figure, (left, right) = pyplot.subplots(1, 2, figsize=(9, 3.4), layout="constrained")
-    every = given.steps // 100
+    every = given.steps // 300
     for name, discount in DISCOUNTS.items():
         process = process_of(roots, alike=True, static_discount=discount)
         exact = process.solve()
         history = q_learning(process, given.steps, np.random.default_rng(0), every=every)
         at = every * np.arange(len(history))
-        left.plot(at, [min(np.abs(q).max(), 1e12) for q in history], label=name)
+        size = np.array([np.abs(q).max() for q in history])
+        left.plot(at[size < 1e12], size[size < 1e12], label=name)
         line = f"{name}: {process.states} states, greatest |Q| {np.abs(history[-1]).max():.4g}"
         if exact is not None:
             error = [np.abs(q - exact)[process.possible].max() for q in history]
             right.plot(at, error, label=name, color=left.lines[-1].get_color())
             line += f", greatest |Q*| {np.abs(exact).max():.4g}, error {error[-1]:.4g}"
         print(line + ("" if exact is not None else ", dynamic programming diverges"))
-    left.set(yscale="log", xlabel="steps of Q-learning", ylabel="greatest |Q|", title="all discounts")
-    right.set(yscale="log", xlabel="steps of Q-learning", ylabel="greatest |Q − Q*|", title="where Q* exists")
+    left.set(xscale="log", yscale="log", xlabel="steps of Q-learning", ylabel="greatest |Q|", title="all discounts")
+    right.set(
+        xscale="log", yscale="log", xlabel="steps of Q-learning", ylabel="greatest |Q − Q*|", title="where Q* exists"
+    )
     left.legend(fontsize=7)
     figure.savefig(given.picture, dpi=90)
 

@@ -124,7 +124,7 @@ def test_valid_planes_need_no_sweep_and_are_valid_by_it(corpus: Path) -> None:
             assert not exact.any() or not (cheap & ~exact).any()
             differ += int((cheap != exact).sum())
             total += len(exact)
-    assert differ < 0.05 * total
+    assert differ < 0.1 * total
 
 
 def test_the_environment_keeps_gymnasiums_promises(meshes: Path) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from rlacd.criteria import Criterion
-from rlacd.cut import is_shaving
+from rlacd.cut import Divisions
 from rlacd.learn.observe import candidates_of, valid_planes
 from rlacd.planes.candidates import Candidates
 from rlacd.solid.component import Component, Plane
@@ -102,7 +102,8 @@ class Cutting:
         self._criterion = criterion
         self._volume = solid.hull.volume
         self._candidates: dict[Component, Candidates] = {}
-        settled = self._settle(solid, None)
+        self._divisions = Divisions()
+        settled = self._settle(solid)
         self.frontier: list[Component] = settled.unfinished
         self.finished: list[Component] = settled.finished
         self.stuck: list[Component] = settled.stuck
@@ -153,21 +154,18 @@ class Cutting:
         return Cut(reward, settled.unfinished, discounts, settled.finished, settled.stuck, made)
 
     def _fall_apart(self, component: Component, plane: Plane) -> tuple[Settled, bool]:
-        below, above = component.cut(plane)
-        if below is None or above is None:
+        sides = self._divisions.sides(component, plane)
+        if not sides:
             return Settled(stuck=[component]), False
-        sides = [(a, b) for a, b in ((below, above), (above, below)) if not is_shaving(a, b)]
-        settled = [self._settle(side, across) for side, across in sides]
-        return _together(settled), True
+        return _together([self._settle(side) for side in sides]), True
 
-    def _settle(self, component: Component, across: Component | None) -> Settled:
+    def _settle(self, component: Component) -> Settled:
         """Judge a component, split it if it has to be cut, and judge its pieces."""
         if self._criterion.is_met(component):
             return Settled(finished=[component])
-        pieces = component.pieces()
-        if len(pieces) > 1:
-            kept = [piece for piece in pieces if across is None or not is_shaving(piece, across)]
-            return _together([self._settle(piece, across) for piece in kept])
+        pieces = self._divisions.pieces(component)
+        if pieces != [component]:
+            return _together([self._settle(piece) for piece in pieces])
         if valid_planes(component, self.candidates(component)).any():
             return Settled(unfinished=[component])
         return Settled(stuck=[component])

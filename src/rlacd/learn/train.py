@@ -326,8 +326,10 @@ class Training:
         partial.replace(self.folder / name)
 
 
-MAY_CHANGE = frozenset({"iterations", "checkpoint_seconds", "device", "workers", "threads"})
-"""Options that a resumed run may be given anew: how long it goes on, and where it runs."""
+MAY_CHANGE = frozenset(
+    {"iterations", "checkpoint_seconds", "log_every", "validate_every", "device", "workers", "threads"}
+)
+"""Options that a resumed run may be given anew: how long it goes on, what it tells, and where it runs."""
 
 
 def _require_same_options(before: dict[str, Any], now: TrainOptions) -> None:

@@ -18,12 +18,12 @@ from rlacd.learn.options import TrainOptions
 from rlacd.learn.qnetwork import QNetwork
 from rlacd.learn.qpolicy import QPolicy
 from rlacd.policies import Policy
-from rlacd.progress import Progress
 from rlacd.solid.component import Component
 from rlacd.workers import Workers
 
-MOST_PARTS = 150
-"""A policy that makes more of one solid is stopped there: early in training some never end."""
+MOST_PARTS = 64
+"""A policy that makes more of one solid is stopped there: early in training some never end. Its counts are then too
+small, not too large."""
 
 
 @dataclass(frozen=True)
@@ -48,8 +48,7 @@ def count_parts(policy: Policy, solids: Sequence[Component], criterion: Concavit
     raw, merged = [], []
     with Workers(1) as workers:
         for solid in solids:
-            clock = Clock(progress=_few_enough)
-            done, left = CutTree(solid, policy, workers).cut_until(criterion, clock)
+            done, left = CutTree(solid, policy, workers).cut_until(criterion, Clock(), most=MOST_PARTS)
             parts = drop_slivers([*done, *left], workers, suspects=left)
             raw.append(len(parts))
             merged.append(len(merge_parts(parts, criterion, workers, Clock())))
@@ -67,10 +66,6 @@ def torch_policy(network: QNetwork, encoder: Encoder, options: TrainOptions, **d
         return q
 
     return QPolicy(values, options.threshold, options.points, **deployment)
-
-
-def _few_enough(progress: Progress) -> bool:
-    return progress.parts <= MOST_PARTS
 
 
 def _mean_ratio(counts: Sequence[int], others: Sequence[int]) -> float:
