@@ -29,22 +29,23 @@ class Climb {
   Climb(const NavigableField& field, Vec3 x, const NavigableField::Value& value)
       : field_(field), start_(x), x_(x), value_(value) {}
 
+  // What is nearest somewhere else too may be in the way.
+  void beware(Vec3 there, const NavigableField::Value& value_there) { see(there, value_there); }
+
   // Pushed off whatever is too near, as often as it takes.
   bool by_pushing(double farthest) {
     for (int push = 0; push < kPushes && !is_there(); ++push) {
-      count_ = 0;
       see(x_, value_);
-      if (!move(farthest)) return false;
+      if (!move((field_.level() - value_.value) * value_.uphill, farthest)) return false;
     }
     return is_there();
   }
 
-  // The first step goes into the crease between what is nearest there and here.
-  bool into_crease(Vec3 there, const NavigableField::Value& value_there, double farthest) {
-    see(there, value_there);
+  // The first step goes into the crease between what is nearest here and what to beware of.
+  bool into_crease(double farthest) {
     for (int step = 0; step == 0 || (step < kSteps && !is_there()); ++step) {
       see(x_, value_);
-      if (!move(farthest)) return false;
+      if (!move(correction(), farthest)) return false;
     }
     return is_there();
   }
@@ -52,22 +53,29 @@ class Climb {
   Vec3 at() const { return x_; }
   const NavigableField::Value& value() const { return value_; }
 
-  // 0 on a smooth place; in a crease, the more the sides disagree; most in a corner of three.
-  double sharpness(double slack) {
-    Vec3 near[kMost];
-    int count = 0;
+  // 0 on a smooth place; in a crease, the more the sides disagree, 2 between two that face each other; in a corner of
+  // three, as if they disagreed a little more. Sides that face each other need not quite be touched at the same time.
+  double sharpness() {
     see(x_, value_);
-    for (int i = 0; i < count_; ++i)
-      if (std::fabs(value_at(seen_[i])) <= slack) near[count++] = seen_[i].uphill;
-    double sharpest = 0;
-    for (int a = 0; a < count; ++a)
-      for (int b = 0; b < a; ++b) sharpest = std::max(sharpest, 1 - dot(near[a], near[b]));
-    if (count == 3) sharpest += 2 * std::fabs(dot(cross(near[0], near[1]), near[2]));
+    const double exactly = kTouched * field_.radius(), nearly = kNearlyTouched * field_.radius();
+    double off[kMost], sharpest = 0;
+    for (int a = 0; a < count_; ++a) {
+      off[a] = std::fabs(value_at(seen_[a]));
+      for (int b = 0; b < a; ++b) {
+        const double disagreement = 1 - dot(seen_[a].uphill, seen_[b].uphill);
+        if (std::max(off[a], off[b]) <= (disagreement > kFacing ? nearly : exactly))
+          sharpest = std::max(sharpest, disagreement);
+      }
+    }
+    if (count_ == 3 && std::max({off[0], off[1], off[2]}) <= exactly)
+      sharpest = std::max(sharpest, kCorner * std::fabs(dot(cross(seen_[0].uphill, seen_[1].uphill), seen_[2].uphill)));
     return sharpest;
   }
 
  private:
   static constexpr int kMost = 3, kSteps = 8, kPushes = 32;
+  static constexpr double kCorner = 1.5, kFacing = 1.8;
+  static constexpr double kTouched = 0.02, kNearlyTouched = 0.1;  // shares of the radius
   static constexpr double kSame = 0.97;
   struct Seen {
     Vec3 level;  // a point of the plane on which this is at the level
@@ -82,8 +90,8 @@ class Climb {
     return true;
   }
 
-  bool move(double farthest) {
-    x_ = x_ + correction();
+  bool move(Vec3 step, double farthest) {
+    x_ = x_ + step;
     if (!(max_abs(x_ - start_) <= farthest)) return false;
     value_ = field_.room_near(x_, value_.slot);
     return true;
@@ -191,8 +199,8 @@ class Spreading {
         if (crossed.room.value >= field_.level())
           all[2 * i] = down_from(crossed);
         else if (other != nullptr)  // elsewhere a cell above the level comes to the same place
-          all[2 * i] = up_from(crossed);
-        if (other != nullptr) all[2 * i + 1] = between(crossed, *other);
+          all[2 * i] = up_from(crossed, *other, false);
+        if (other != nullptr) all[2 * i + 1] = up_from(crossed, *other, true);
       }
     });
     all.erase(std::remove_if(all.begin(), all.end(), [](const Candidate& c) { return !(c.radius > 0); }), all.end());
@@ -215,19 +223,13 @@ class Spreading {
     return candidate(crossed, grid_.centre(crossed.cell) - (room.value - field_.level()) * room.uphill, room, 0);
   }
 
-  Candidate up_from(const ClearanceGrid::Crossed& crossed) const {
+  Candidate up_from(const ClearanceGrid::Crossed& crossed, const ClearanceGrid::Crossed& other,
+                    bool into_crease) const {
     Climb climb(field_, grid_.centre(crossed.cell), crossed.room);
-    return climb.by_pushing(2 * grid_.pitch) ? candidate(crossed, climb) : Candidate{};
-  }
-
-  Candidate between(const ClearanceGrid::Crossed& crossed, const ClearanceGrid::Crossed& other) const {
-    Climb climb(field_, grid_.centre(crossed.cell), crossed.room);
-    const bool found = climb.into_crease(grid_.centre(other.cell), other.room, 2 * grid_.pitch);
-    return found ? candidate(crossed, climb) : Candidate{};
-  }
-
-  Candidate candidate(const ClearanceGrid::Crossed& crossed, Climb& climb) const {
-    return candidate(crossed, climb.at(), climb.value(), climb.sharpness(0.02 * field_.radius()));
+    climb.beware(grid_.centre(other.cell), other.room);
+    const double farthest = 2 * grid_.pitch;
+    if (!(into_crease ? climb.into_crease(farthest) : climb.by_pushing(farthest))) return {};
+    return candidate(crossed, climb.at(), climb.value(), climb.sharpness());
   }
 
   // The ball around a point on the boundary; none where it would not touch the hull.
