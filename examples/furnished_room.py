@@ -66,7 +66,7 @@ def main() -> None:
         name = f"room_radius_{round(100 * radius)}_percent"
         result.save(folder / f"{name}.glb")
         result.save_balls(folder / f"{name}_balls.glb")
-        result.picture(folder / f"{name}.png")
+        result.picture(folder / f"{name}.png", width=1200)
         print(f"{name}: {result}")
 
 
