@@ -186,6 +186,25 @@ Mesh glue(const Mesh& a, const Mesh& b) {
   return out;
 }
 
+namespace {
+
+// Whether a triangle of one solid and an opposite one of the other have more in common than an edge.
+bool share_area(const Facet& facet, const Facet& other) {
+  if (!overlap(facet.box, other.box) || !facet.touches(other)) return false;
+  Polygon common = {facet.project(facet.corner[0]), facet.project(facet.corner[1]), facet.project(facet.corner[2])};
+  const Point2 outline[3] = {facet.project(other.corner[0]), facet.project(other.corner[2]),
+                             facet.project(other.corner[1])};
+  Polygon inside, outside;
+  for (int e = 0; e < 3; ++e) {
+    split(common, outline[e], outline[(e + 1) % 3], inside, outside);
+    if (inside.size() < 3 || is_film(inside)) return false;
+    common = inside;
+  }
+  return true;
+}
+
+}  // namespace
+
 std::vector<Vec3> outward_where_touching(const Mesh& a, const Mesh& b) {
   const Box box_a = box_of(a), box_b = box_of(b);
   const std::vector<Facet> others = facets_within(b, box_a);
@@ -193,10 +212,8 @@ std::vector<Vec3> outward_where_touching(const Mesh& a, const Mesh& b) {
   for (const Triangle& face : a.faces) {
     const Facet facet(a, face);
     if (facet.height <= kCoincident || !overlap(facet.box, box_b)) continue;
-    const bool touching = std::any_of(others.begin(), others.end(), [&](const Facet& other) {
-      return overlap(facet.box, other.box) && facet.touches(other);
-    });
-    if (!touching) continue;
+    if (std::none_of(others.begin(), others.end(), [&](const Facet& other) { return share_area(facet, other); }))
+      continue;
     for (const std::int32_t corner : face) {
       Vec3& sum = outward[static_cast<std::size_t>(corner)];
       const double lacking = 1 - dot(sum, facet.normal);

@@ -12,10 +12,17 @@ import numpy as np
 from manifold3d import Manifold, Mesh64, OpType
 
 from rlacd import _native
-from rlacd.solid.component import Component
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.component import Component, Part
+
+TOUCHING = 1e-8
+"""Distance at which faces count as touching (see native/glue.hpp)."""
 
 OVERLAP = 2e-9
-"""How far touching faces are moved: above rounding (1e-16), below what gluing takes for touching (1e-8)."""
+"""How far touching faces are moved: above rounding (1e-16), below `TOUCHING`."""
+
+CRUMBS = 5 * OVERLAP
+"""Edges shorter than this are what overlapping has left; they go again, so that triangles do not pile up."""
 
 LOST = 4 * OVERLAP
 """The reunited solid's volume differs from that of its components by no more than a film of this thickness on them."""
@@ -36,10 +43,18 @@ def reunite(components: Sequence[Component]) -> Component | None:
     area = sum(_native.mesh_area(component.vertices, component.faces) for component in components)
     if united.is_empty() or abs(united.volume() - volume) > LOST * area:
         return None
+    clean = united.simplify(CRUMBS)
+    if abs(clean.volume() - volume) <= LOST * area:
+        united = clean
     try:
         return Component(united)
     except ValueError:
         return None
+
+
+def touch(first: Part, second: Part) -> bool:
+    """Tell whether two parts touch face to face."""
+    return _boxes_meet(first, second) and bool(_outward(first, second).any())
 
 
 def _overlapping(which: int, components: Sequence[Component]) -> Manifold:
@@ -48,11 +63,15 @@ def _overlapping(which: int, components: Sequence[Component]) -> Manifold:
     outward = np.zeros_like(component.vertices)
     for other in (*components[:which], *components[which + 1 :]):
         if _boxes_meet(component, other):
-            outward += _native.outward_where_touching(component.vertices, component.faces, other.vertices, other.faces)
+            outward += _outward(component, other)
     if not outward.any():
         return component.manifold
     return Manifold(Mesh64(component.vertices + OVERLAP * outward, component.faces.astype(np.uint64)))
 
 
-def _boxes_meet(a: Component, b: Component) -> bool:
-    return bool((np.maximum(a.box[0], b.box[0]) <= np.minimum(a.box[1], b.box[1]) + OVERLAP).all())
+def _outward(part: Part, other: Part) -> FloatArray:
+    return _native.outward_where_touching(part.vertices, part.faces, other.vertices, other.faces)
+
+
+def _boxes_meet(a: Part, b: Part) -> bool:
+    return bool((np.maximum(a.box[0], b.box[0]) <= np.minimum(a.box[1], b.box[1]) + TOUCHING).all())
