@@ -79,7 +79,7 @@ def main() -> None:
     right.set(
         xscale="log", yscale="log", xlabel="steps of Q-learning", ylabel="greatest |Q − Q*|", title="where Q* exists"
     )
-    left.legend(fontsize=7)
+    left.legend(fontsize=6, loc="center right")
     figure.savefig(given.picture, dpi=90)
 
 

@@ -78,8 +78,9 @@ def test_shares_of_the_hull_make_the_return_the_volume_saved(roots: list[Node]) 
     assert root_values(roots, 0.0) == pytest.approx(expected)
 
 
-def test_q_learning_converges_to_dynamic_programming_on_trees(roots: list[Node]) -> None:
-    process = process_of(roots, alike=False)
+@pytest.mark.parametrize("static_discount", [None, 0.99])
+def test_q_learning_converges_to_dynamic_programming_on_trees(roots: list[Node], static_discount: float | None) -> None:
+    process = process_of(roots, alike=False, static_discount=static_discount)
     exact = process.solve()
     assert exact is not None
     # Every sample is certain, so steps of size 1 are allowed and the answer is exact.
