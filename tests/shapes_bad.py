@@ -18,7 +18,7 @@ def arrays(mesh: trimesh.Trimesh) -> Mesh:
 
 
 def ell() -> Mesh:
-    """Two boxes that overlap in an L; three hulls at the usual threshold."""
+    """Two boxes that cross; cut along its diagonals, four hulls without any excess."""
     return arrays(trimesh.util.concatenate([creation.box((2, 0.4, 0.4)), creation.box((0.4, 0.4, 2))]))
 
 

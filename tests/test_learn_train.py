@@ -231,7 +231,9 @@ def test_a_run_ends_with_a_policy_that_decomposes(meshes: Path, tmp_path: Path) 
     with Workers(1) as workers:
         solid = Component(small_solids()["cross"])
         done, left = CutTree(solid, policy, workers).cut_until(Concavity(0.04), Clock())
-    assert len(done) == 3  # concave edges are among the planes, and the least hull sum is perfect here
+    # Concave edges are among the planes, and the least hull sum is perfect here: three boxes, or four quarters.
+    assert 3 <= len(done) <= 4
+    assert all(component.hull.volume == pytest.approx(component.volume) for component in done)
     assert left == []
 
 
