@@ -231,7 +231,9 @@ def test_a_run_ends_with_a_policy_that_decomposes(meshes: Path, tmp_path: Path) 
     with Workers(1) as workers:
         solid = Component(small_solids()["cross"])
         done, left = CutTree(solid, policy, workers).cut_until(Concavity(0.04), Clock())
-    assert len(done) == 3  # concave edges are among the planes, and the least hull sum is perfect here
+    # Planes of concave edges are asked too, and the least hull sum finds them: no volume is left to save.
+    assert sum(c.hull.volume for c in done) == pytest.approx(solid.volume)
+    assert 3 <= len(done) <= 4
     assert left == []
 
 
