@@ -86,7 +86,7 @@ class CutTree:
         Parameters
         ----------
         most : float
-            Give up as soon as there are more components than this.
+            Give up as soon as it is clear that there will be more components than this.
 
         Returns
         -------
@@ -104,7 +104,7 @@ class CutTree:
             unmet = [c for c, met in zip(frontier, verdicts, strict=True) if not met]
             if not clock.step(len(done), None, len(done) + len(left) + len(unmet)):
                 return done, left + unmet
-            if len(done) + len(left) + len(unmet) > most:
+            if len(done) + len(left) + 2 * len(unmet) > most:  # each becomes two at least
                 return done, left + unmet
             self._divide([c for c in unmet if c not in self._children])
             frontier = []

@@ -160,7 +160,17 @@ def decompose(
             bounds = level(options.quality, options.budget, options.search_steps)
             with clock.stage("search"):
                 parts, found = search(
-                    root, parts, goal, options.quality, bounds, views, workers, clock, options.seed, options.max_hulls
+                    root,
+                    parts,
+                    goal,
+                    options.quality,
+                    bounds,
+                    views,
+                    workers,
+                    clock,
+                    options.seed,
+                    options.max_hulls,
+                    first=options.policy,
                 )
         clock.nothing_left_to_stop()
         with clock.stage("finish"):

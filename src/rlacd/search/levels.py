@@ -26,6 +26,9 @@ PORTFOLIO = ("excess-norm", "hull-sum", "max-excess")
 
 assert set(PORTFOLIO) <= set(SCORES)
 
+SHARE = 1 / 8
+"""Cutting the whole solid anew may take about this share of the seconds; the neighbourhoods make more of them."""
+
 HOPELESS = 5
 """A pass that makes so many times more pieces than there are parts will not have fewer of them after merging."""
 
@@ -35,8 +38,8 @@ ROUNDS = 3
 PLANES_PER_AXIS = 12
 """Neighbourhoods are small: half the planes are as good in them, and twice as fast."""
 
-CONCAVE_EDGES = 0
-"""Planes of concave edges are found in the first pass; in neighbourhoods they cost more than they bring."""
+CONCAVE_EDGES = 2
+"""As many again cost more than they bring in neighbourhoods."""
 
 
 @dataclass(frozen=True)
@@ -111,6 +114,7 @@ def search(
     seed: int,
     most_parts: int | None = None,
     rankings: Sequence[Ranking] | None = None,
+    first: str = "",
 ) -> tuple[list[Part], Account]:
     """Look for fewer parts, or as many with less volume in their hulls.
 
@@ -132,7 +136,10 @@ def search(
     most_parts : int, optional
         Where the parts are so few and do not meet the criterion, look for parts that come closer to it instead.
     rankings : sequence of Ranking, optional
-        Each cuts the whole solid anew, and they take turns in neighbourhoods; the scores of `PORTFOLIO` by default.
+        Each cuts the whole solid anew, where that takes little time, and neighbourhoods; the scores of `PORTFOLIO` by
+        default.
+    first : str
+        The policy of the first pass, which need not be repeated.
 
     Returns
     -------
@@ -157,7 +164,10 @@ def search(
             outcome = Outcome(best, 0, 0, True)
         from_portfolio = len(parts)
     else:
-        starts = _portfolio(root, best, criterion, rankings, views, workers, pace)
+        starts = [best]
+        if _seconds_of_a_pass(clock) <= SHARE * pace.left:
+            others = rankings[1:] if first == "greedy" else rankings  # the first score is that policy's own
+            starts = _portfolio(root, best, criterion, others, views, workers, pace)
         from_portfolio = len(starts[0])
         outcome = _from_all(starts, criterion, rankings, near_views, workers, pace, steps, seed)
     account = Account(
@@ -171,6 +181,10 @@ def search(
         exhausted=outcome.exhausted,
     )
     return outcome.parts, account
+
+
+def _seconds_of_a_pass(clock: Clock) -> float:
+    return clock.seconds.get("cut", 0.0) + clock.seconds.get("merge", 0.0)
 
 
 def _portfolio(

@@ -35,6 +35,11 @@ class Pace(Clock):
         """Whether the work has to stop, for this clock or for the other."""
         return self._outer.stopped_by is not None or time.perf_counter() >= self._end
 
+    @property
+    def left(self) -> float:
+        """Seconds left on this clock; infinite where it never runs out."""
+        return self._end - time.perf_counter()
+
     def step(self, done: int, total: int | None, parts: int) -> bool:
         """Report to the other clock; True when the work may go on."""
         return self._outer.step(self.steps, None, self.parts) and not self.is_over

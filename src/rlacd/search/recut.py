@@ -1,0 +1,97 @@
+"""One step of the search: a few parts become one solid again, are cut differently, and merged with what is around."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rlacd.clock import Clock
+from rlacd.criteria.criterion import Criterion
+from rlacd.cut import CutTree
+from rlacd.finish.merge import merge_parts
+from rlacd.policies import Policy
+from rlacd.solid.component import Part
+from rlacd.solid.reunite import reunite
+from rlacd.workers import Workers
+
+SLACK = 1
+"""Merging may make up for so many pieces more than the parts there were; it seldom does for more."""
+
+TIGHTER = 1e-4
+"""As many parts are better only if their hulls are smaller by this share; otherwise the search would tread water."""
+
+LOST = 1e-6
+"""No more than this share of the solid may be lost (see the shavings of `rlacd.cut`)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Exchange:
+    """Parts to take out of a decomposition and better ones to put in."""
+
+    out: tuple[Part, ...]
+    into: tuple[Part, ...]
+
+    @property
+    def gain(self) -> int:
+        """How many parts fewer there are."""
+        return len(self.out) - len(self.into)
+
+
+def recut(
+    parts: Sequence[Part],
+    around: Sequence[Part],
+    policy: Policy,
+    criterion: Criterion,
+    seconds: float,
+) -> Exchange | None:
+    """Cut some parts anew, and merge the pieces with each other and with the parts around.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+        Parts that hang together.
+    around : sequence of Part
+        Parts that touch them.
+    policy : Policy
+        Chooses the planes.
+    criterion : Criterion
+        Every new part meets it.
+    seconds : float
+        Give up after this time; infinite to be independent of it.
+
+    Returns
+    -------
+    Exchange or None
+        None when that gives neither fewer parts nor as many with smaller hulls.
+    """
+    alone, clock = Workers(1), Clock(seconds if math.isfinite(seconds) else None)
+    solid = reunite([member for part in parts for member in part.members])
+    if solid is None:
+        return None
+    pieces, left = CutTree(solid, policy, alone).cut_until(criterion, clock, len(parts) + SLACK)
+    if left or sum(piece.volume for piece in pieces) < (1 - LOST) * solid.volume:
+        return None
+    if _volumes(pieces) == _volumes(parts):  # cut as before: what could be merged with these was merged
+        return None
+    merged = merge_parts(pieces, criterion, alone, clock, beside=around)
+    if clock.stopped_by is not None:
+        return None
+    untouched = {id(part) for part in around} & {id(part) for part in merged}
+    exchange = Exchange(
+        (*parts, *(part for part in around if id(part) not in untouched)),
+        tuple(part for part in merged if id(part) not in untouched),
+    )
+    tighter = hull_volume(exchange.into) < (1 - TIGHTER) * hull_volume(exchange.out)
+    return exchange if exchange.gain > 0 or (exchange.gain == 0 and tighter) else None
+
+
+def _volumes(parts: Sequence[Part]) -> list[int]:
+    """Shares of the whole, in millionths: two ways to divide a solid that agree in them are the same."""
+    whole = sum(part.volume for part in parts)
+    return sorted(round(1e6 * part.volume / whole) for part in parts)
+
+
+def hull_volume(parts: Sequence[Part]) -> float:
+    """Add up the volumes of the parts' hulls."""
+    return sum(part.hull.volume for part in parts)
