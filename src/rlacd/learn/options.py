@@ -130,26 +130,22 @@ class TrainOptions:
         return cls(**{**PRESETS[name], **changes})
 
 
+_TWO_CORES: Mapping[str, Any] = {
+    "batch": 64,
+    "learn_every": 2,
+    "learning_rate": 3e-4,
+    "iterations": 300_000,
+    "warmup": 5_000,
+    "max_faces": 700,
+    "validate_every": 5_000,
+}
+
 PRESETS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
     {
         "paper": {},
-        "two-cores": {
-            "batch": 64,
-            "learn_every": 2,
-            "learning_rate": 3e-4,
-            "iterations": 300_000,
-            "warmup": 5_000,
-            "max_faces": 700,
-            "validate_every": 5_000,
-        },
+        "two-cores": _TWO_CORES,
         "counting": {
-            "batch": 64,
-            "learn_every": 2,
-            "learning_rate": 3e-4,
-            "iterations": 300_000,
-            "warmup": 5_000,
-            "max_faces": 700,
-            "validate_every": 5_000,
+            **_TWO_CORES,
             "scale_input": True,
             "volume_reward": 0.0,
             "finish_reward": 0.0,
