@@ -2,6 +2,7 @@
 #include <nanobind/nanobind.h>
 
 namespace rlacd {
+void bind_concave_edges(nanobind::module_& m);
 void bind_concavity(nanobind::module_& m);
 void bind_distance(nanobind::module_& m);
 void bind_glue(nanobind::module_& m);
@@ -15,6 +16,7 @@ void bind_union(nanobind::module_& m);
 NB_MODULE(_native, m) {
   m.doc() =
       "C++ kernels of rlacd. Arrays are float64 points [N, 3] and int32 faces [F, 3]; the GIL is released inside.";
+  rlacd::bind_concave_edges(m);
   rlacd::bind_concavity(m);
   rlacd::bind_distance(m);
   rlacd::bind_glue(m);

@@ -14,13 +14,16 @@ from manifold3d import Manifold
 from scipy.spatial.transform import Rotation
 
 import rlacd
+from rlacd import _native
 from rlacd.planes.candidates import Candidates
-from rlacd.planes.concave_edges import FLAT, HAIR, REFLEX, concave_edge_planes, concave_edges, reflex_edges
+from rlacd.planes.concave_edges import concave_edge_planes, concave_edges, reflex_edges
 from rlacd.policies import Greedy, NavACD, Policy
 from rlacd.policies.navacd import mid_planes
 from rlacd.solid.component import Component, Plane
 from rlacd.solid.load import load_mesh
 from rlacd.solid.repair import repair
+from tests import reference_concave_edges as reference
+from tests.reference_concave_edges import FLAT, HAIR, REFLEX
 from tests.shapes import Floats, box, to_manifold
 
 
@@ -98,6 +101,40 @@ def test_reflex_edges_are_those_that_trimesh_finds(name: str) -> None:
     assert edge_sets(found.ends) == edge_sets(mesh.face_adjacency_edges[reflex])
     assert sorted(found.angle) == pytest.approx(sorted(mesh.face_adjacency_angles[reflex]), abs=1e-6)
     assert np.allclose(found.normals, mesh.face_normals[found.faces], atol=1e-9)
+
+
+def assert_as_the_reference(component: Component, count: int = 4) -> None:
+    ours, theirs = reflex_edges(component), reference.reflex_edges(component)
+    assert np.array_equal(ours.ends, theirs.ends)
+    assert np.array_equal(ours.faces, theirs.faces)
+    assert np.array_equal(ours.normals, theirs.normals)
+    assert ours.angle == pytest.approx(theirs.angle, abs=1e-14)
+    chosen, expected = concave_edges(component, count), reference.concave_edges(component, count)
+    assert np.array_equal(chosen.ends, expected.ends)
+    planes, asked = concave_edge_planes(component, count), reference.concave_edge_planes(component, count)
+    assert planes.directions == pytest.approx(asked.directions, abs=1e-12)
+    assert planes.offsets == pytest.approx(asked.offsets, abs=1e-12)
+
+
+@pytest.mark.parametrize("count", [0, 1, 4, 30])
+@pytest.mark.parametrize("name", SOLIDS)
+def test_edges_and_planes_are_those_of_the_reference(name: str, count: int) -> None:
+    assert_as_the_reference(Component(SOLIDS[name]()), count)
+
+
+def test_edges_that_more_than_two_faces_share_are_left_out() -> None:
+    """Two prisms that touch along an edge: which of its faces belong together is not said."""
+    vertices = np.array([(0, 0, 0), (0, 0, 1), (1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0)], dtype=np.float64)
+    fan = np.array([(0, 1, 2), (1, 0, 3), (0, 1, 4), (1, 0, 5)], dtype=np.int32)
+    assert len(_native.reflex_edges(vertices, fan)[0]) == 0
+    assert len(_native.reflex_edges(vertices, fan[:2])[0]) == 1
+    assert len(_native.reflex_edges(vertices, fan[[0, 2]])[0]) == 0, "both run the same way"
+
+
+def test_faces_out_of_range_are_refused() -> None:
+    vertices, faces = np.zeros((3, 3)), np.array([(0, 1, 3)], dtype=np.int32)
+    with pytest.raises(ValueError, match="out of range"):
+        _native.reflex_edges(vertices, faces)
 
 
 CONVEX: dict[str, Callable[[], Manifold]] = {

@@ -12,6 +12,15 @@ def mesh_area(vertices: FloatArray, faces: IntArray) -> float: ...
 def sweep(
     vertices: FloatArray, faces: IntArray, directions: FloatArray, offsets: FloatArray, threads: int = 0
 ) -> FloatArray: ...
+def reflex_edges(
+    vertices: FloatArray, faces: IntArray
+) -> tuple[IntArray, IntArray, FloatArray, FloatArray]: ...  # [E, 2], [E, 2], [E, 6], [E]
+def concave_edges(
+    vertices: FloatArray, faces: IntArray, hull_vertices: FloatArray, hull_faces: IntArray, count: int
+) -> tuple[IntArray, IntArray, FloatArray, FloatArray]: ...
+def concave_edge_planes(
+    vertices: FloatArray, faces: IntArray, hull_vertices: FloatArray, hull_faces: IntArray, count: int
+) -> tuple[FloatArray, FloatArray]: ...  # [K, 3], [K]
 def glue(
     vertices_a: FloatArray, faces_a: IntArray, vertices_b: FloatArray, faces_b: IntArray
 ) -> tuple[FloatArray, IntArray]: ...
