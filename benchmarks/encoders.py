@@ -19,7 +19,7 @@ from rlacd.criteria import Concavity
 from rlacd.learn.encoders import describe, make_encoder
 from rlacd.learn.episodes import Episodes
 from rlacd.learn.meshes import Solids, list_meshes
-from rlacd.learn.observe import Observation, observe
+from rlacd.policies.observe import Observation, observe
 from rlacd.learn.qnetwork import QNetwork
 from rlacd.planes.sweep import sweep
 

@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 from manifold3d import Manifold
 
-from rlacd.learn.observe import valid_planes
+from rlacd.policies.observe import valid_planes
 from rlacd.planes.candidates import axis_and_principal
 from rlacd.planes.sweep import sweep
 from rlacd.solid.component import Component, Plane

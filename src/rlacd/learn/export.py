@@ -16,7 +16,7 @@ from torch import Tensor, nn
 
 from rlacd.errors import TrainingError
 from rlacd.learn.encoders import PointNetEncoder, ProfileEncoder
-from rlacd.learn.observe import SCALE_INPUTS, Float32Array, Observation
+from rlacd.policies.observe import SCALE_INPUTS, Float32Array, Observation
 from rlacd.learn.options import TrainOptions
 from rlacd.learn.qnetwork import QNetwork
 
@@ -93,7 +93,7 @@ def export_policy(
 
 
 class OnnxQ:
-    """An exported policy, run by onnxruntime on one thread; give it to `rlacd.learn.qpolicy.QPolicy`."""
+    """An exported policy, run by onnxruntime on one thread; give it to `rlacd.policies.qpolicy.QPolicy`."""
 
     def __init__(self, path: Path) -> None:
         settings = onnxruntime.SessionOptions()

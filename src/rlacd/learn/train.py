@@ -28,7 +28,7 @@ from rlacd.learn.export import export_policy
 from rlacd.learn.loss import bellman_loss, boltzmann, dual_state_target, soft_value
 from rlacd.learn.mdp import Reward
 from rlacd.learn.meshes import MeshList, Solids, list_meshes
-from rlacd.learn.observe import SCALE_INPUTS
+from rlacd.policies.observe import SCALE_INPUTS
 from rlacd.learn.options import TrainOptions
 from rlacd.learn.qnetwork import PLANES, QNetwork
 from rlacd.learn.replay import Replay

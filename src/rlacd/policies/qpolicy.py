@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from rlacd.learn.observe import Float32Array, Observation, candidates_of, observe
+from rlacd.policies.observe import Float32Array, Observation, candidates_of, observe
 from rlacd.planes.candidates import Candidates
 from rlacd.planes.concave_edges import concave_edge_planes
 from rlacd.planes.sweep import sweep
