@@ -9,20 +9,40 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-import onnxruntime
+import onnx
 import torch
+from onnxscript import FLOAT, INT64, script
+from onnxscript import opset18 as op
 from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from rlacd.errors import TrainingError
-from rlacd.learn.encoders import PointNetEncoder, ProfileEncoder
-from rlacd.policies.observe import SCALE_INPUTS, Float32Array, Observation
+from rlacd.learn.encoders import I2PMAEEncoder, PointNetEncoder, ProfileEncoder
 from rlacd.learn.options import TrainOptions
 from rlacd.learn.qnetwork import QNetwork
-
-INPUTS = ("points", "directions", "scale")
+from rlacd.policies.observe import SCALE_INPUTS
+from rlacd.policies.q_network import INPUTS, KIND, METADATA, OnnxQ
 
 OPSET = 18
+
+
+@script()
+def _farthest_points(points: FLOAT["B", "N", 3], count: int) -> INT64["B", "count"]:  # noqa: F821
+    """`rlacd.learn.encoders.point_groups.farthest_points` as an ONNX loop: the same products, sums and ties."""
+    axes = op.Transpose(points, perm=[2, 0, 1])
+    first = op.CastLike(op.ReduceMin(op.Mul(points, 0.0), [1, 2], keepdims=0), op.Constant(value_int=0))
+    last = op.Unsqueeze(first, [1])
+    chosen = op.Identity(last)
+    nearest = op.Add(op.Mul(op.ReduceMax(points, [2], keepdims=0), 0.0), 3.0e38)
+    for _ in range(op.Sub(op.Constant(value_int=count), 1)):
+        index = op.Expand(op.Unsqueeze(last, [0]), op.Constant(value_ints=[3, 1, 1]))
+        gaps = op.Sub(axes, op.GatherElements(axes, index, axis=2))
+        squares = op.Mul(gaps, gaps)
+        x, y, z = op.Split(squares, num_outputs=3, axis=0)
+        nearest = op.Min(nearest, op.Squeeze(op.Add(op.Add(x, y), z), [0]))
+        last = op.ArgMax(nearest, axis=1, keepdims=1)
+        chosen = op.Concat(chosen, last, axis=1)
+    return chosen
 
 
 class PointsToValues(nn.Module):
@@ -46,7 +66,7 @@ class PointsToValues(nn.Module):
 
 
 def export_policy(
-    path: Path, encoder: ProfileEncoder | PointNetEncoder, network: QNetwork, options: TrainOptions
+    path: Path, encoder: ProfileEncoder | PointNetEncoder | I2PMAEEncoder, network: QNetwork, options: TrainOptions
 ) -> Path:
     """Write ``path`` (ONNX: points, directions, scale -> values), and beside it ``.safetensors`` and ``.json``.
 
@@ -57,7 +77,7 @@ def export_policy(
     TrainingError
         onnxruntime does not compute what torch does.
     """
-    module = PointsToValues(encoder, network.cpu(), options.scale_input).eval()
+    module = PointsToValues(encoder.cpu(), network.cpu(), options.scale_input).eval()
     generator = torch.Generator().manual_seed(0)
     example = (
         torch.rand(2, 2, options.points, 3, generator=generator) * 2 - 1,
@@ -76,9 +96,10 @@ def export_policy(
             output_names=["values"],
             dynamic_shapes=tuple({0: torch.export.Dim("batch")} for _ in INPUTS),
             opset_version=OPSET,
+            custom_translation_table={torch.ops.rlacd.farthest_points.default: _farthest_points},
         )
     assert program is not None
-    program.save(str(path), external_data=False)
+    _write(path, program.model_proto, options)
     with torch.inference_mode():
         expected = module(*example).numpy()
     found = OnnxQ(path).run(*(x.numpy() for x in example))
@@ -92,21 +113,13 @@ def export_policy(
     return path
 
 
-class OnnxQ:
-    """An exported policy, run by onnxruntime on one thread; give it to `rlacd.policies.qpolicy.QPolicy`."""
-
-    def __init__(self, path: Path) -> None:
-        settings = onnxruntime.SessionOptions()
-        settings.intra_op_num_threads = settings.inter_op_num_threads = 1
-        self._session = onnxruntime.InferenceSession(str(path), settings, providers=["CPUExecutionProvider"])
-
-    def run(self, points: Float32Array, directions: Float32Array, scale: Float32Array) -> Float32Array:
-        """Values [B, 150]."""
-        given = dict(zip(INPUTS, (points, directions, scale), strict=True))
-        values: Float32Array = self._session.run(["values"], given)[0]
-        return values
-
-    def __call__(self, seen: Observation) -> Float32Array:
-        """Values [150] of one observed component."""
-        values: Float32Array = self.run(seen.points[None], seen.directions[None], seen.scale[None])[0]
-        return values
+def _write(path: Path, model: onnx.ModelProto, options: TrainOptions) -> None:
+    del model.metadata_props[:]
+    for graph in (model.graph, *model.functions):
+        for node in graph.node:  # traces of the exporter: source lines of the machine it ran on
+            del node.metadata_props[:]
+            node.doc_string = ""
+    about = {"kind": KIND, "points": options.points, "threshold": options.threshold}
+    onnx.helper.set_model_props(model, {METADATA: json.dumps(about, sort_keys=True)})
+    onnx.checker.check_model(model)
+    path.write_bytes(model.SerializeToString(deterministic=True))

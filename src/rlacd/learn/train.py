@@ -23,7 +23,8 @@ from rlacd.learn.actor import Described, Step
 from rlacd.learn.actors import ActorSetting, make_actors
 from rlacd.learn.checkpoint import Checkpoint, adam_state, load_checkpoint, restore_adam, save_checkpoint
 from rlacd.learn.curves import Curves
-from rlacd.learn.encoders import make_encoder
+from rlacd.learn.device import pick_device
+from rlacd.learn.encoders import I2PMAEEncoder, make_encoder
 from rlacd.learn.export import export_policy
 from rlacd.learn.loss import bellman_loss, boltzmann, dual_state_target, soft_value
 from rlacd.learn.mdp import Reward
@@ -94,8 +95,8 @@ class Training:
         self.options = options
         self.folder = run
         self.say = say
-        self.device = _device(options.device)
-        self.encoder = make_encoder(options.encoder)
+        self.device = pick_device(options.device)
+        self.encoder = make_encoder(options.encoder, options.encoder_weights, self.device)
         self.inputs = self.encoder.dim + (SCALE_INPUTS if options.scale_input else 0)
         self.unit = max(options.volume_reward, options.finish_reward, 10 * options.cut_cost, 1e-9)
         torch.manual_seed(options.seed)
@@ -360,14 +361,6 @@ def _mesh_list(meshes: Path, run: Path, options: TrainOptions) -> MeshList:
 def _draw(chances: np.ndarray, rng: np.random.Generator) -> int:
     accumulated = np.cumsum(chances)
     return int(np.searchsorted(accumulated, rng.random() * accumulated[-1], side="right"))
-
-
-def _device(name: str) -> torch.device:
-    if name == "cuda" and not torch.cuda.is_available():
-        raise OptionError("device is 'cuda', but torch finds no GPU; use cpu, or install torch for CUDA.")
-    if name == "auto":
-        name = "cuda" if torch.cuda.is_available() else "cpu"
-    return torch.device(name)
 
 
 __all__: Sequence[str] = ("Training", "train")

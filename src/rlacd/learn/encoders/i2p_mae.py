@@ -247,4 +247,4 @@ def _affine(layer: nn.Module, rows: Tensor) -> Tensor:
 
 def _run(mlp: nn.Sequential, hidden: Tensor) -> Tensor:
     """What follows a shared MLP's first layer."""
-    return _affine(mlp[3], F.relu(mlp[1](hidden)))
+    return _affine(mlp[3], F.relu(mlp[1](hidden), inplace=True))
