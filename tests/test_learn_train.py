@@ -200,9 +200,9 @@ def test_the_exported_policy_computes_what_torch_does(meshes: Path, tmp_path: Pa
 
     from rlacd.learn.encoders import make_encoder
     from rlacd.learn.export import PointsToValues, export_policy
-    from rlacd.policies.observe import observe
     from rlacd.learn.qnetwork import QNetwork
     from rlacd.planes.candidates import axis_and_principal
+    from rlacd.policies.observe import observe
     from rlacd.policies.q_network import OnnxQ
     from rlacd.solid.component import Component
     from tests.learning import small_solids

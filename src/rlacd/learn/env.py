@@ -19,8 +19,8 @@ from rlacd.criteria import Concavity
 from rlacd.learn.episodes import Episodes
 from rlacd.learn.mdp import Cutting, Reward
 from rlacd.learn.meshes import Solids, list_meshes
-from rlacd.policies.observe import Observation, observe
 from rlacd.planes.candidates import OFFSETS_PER_AXIS
+from rlacd.policies.observe import Observation, observe
 from rlacd.solid.arrays import BoolArray
 from rlacd.solid.component import Component
 

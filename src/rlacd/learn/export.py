@@ -11,38 +11,18 @@ from pathlib import Path
 import numpy as np
 import onnx
 import torch
-from onnxscript import FLOAT, INT64, script
-from onnxscript import opset18 as op
 from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from rlacd.errors import TrainingError
-from rlacd.learn.encoders import I2PMAEEncoder, PointNetEncoder, ProfileEncoder
+from rlacd.learn import onnx_operators
+from rlacd.learn.encoders import AnyEncoder
 from rlacd.learn.options import TrainOptions
 from rlacd.learn.qnetwork import QNetwork
 from rlacd.policies.observe import SCALE_INPUTS
 from rlacd.policies.q_network import INPUTS, KIND, METADATA, OnnxQ
 
 OPSET = 18
-
-
-@script()
-def _farthest_points(points: FLOAT["B", "N", 3], count: int) -> INT64["B", "count"]:  # noqa: F821
-    """`rlacd.learn.encoders.point_groups.farthest_points` as an ONNX loop: the same products, sums and ties."""
-    axes = op.Transpose(points, perm=[2, 0, 1])
-    first = op.CastLike(op.ReduceMin(op.Mul(points, 0.0), [1, 2], keepdims=0), op.Constant(value_int=0))
-    last = op.Unsqueeze(first, [1])
-    chosen = op.Identity(last)
-    nearest = op.Add(op.Mul(op.ReduceMax(points, [2], keepdims=0), 0.0), 3.0e38)
-    for _ in range(op.Sub(op.Constant(value_int=count), 1)):
-        index = op.Expand(op.Unsqueeze(last, [0]), op.Constant(value_ints=[3, 1, 1]))
-        gaps = op.Sub(axes, op.GatherElements(axes, index, axis=2))
-        squares = op.Mul(gaps, gaps)
-        x, y, z = op.Split(squares, num_outputs=3, axis=0)
-        nearest = op.Min(nearest, op.Squeeze(op.Add(op.Add(x, y), z), [0]))
-        last = op.ArgMax(nearest, axis=1, keepdims=1)
-        chosen = op.Concat(chosen, last, axis=1)
-    return chosen
 
 
 class PointsToValues(nn.Module):
@@ -65,9 +45,7 @@ class PointsToValues(nn.Module):
         return values
 
 
-def export_policy(
-    path: Path, encoder: ProfileEncoder | PointNetEncoder | I2PMAEEncoder, network: QNetwork, options: TrainOptions
-) -> Path:
+def export_policy(path: Path, encoder: AnyEncoder, network: QNetwork, options: TrainOptions) -> Path:
     """Write ``path`` (ONNX: points, directions, scale -> values), and beside it ``.safetensors`` and ``.json``.
 
     The exported file is run once and compared with torch.
@@ -84,7 +62,8 @@ def export_policy(
         torch.eye(3).repeat(2, 2, 1),
         torch.rand(2, SCALE_INPUTS, generator=generator),
     )
-    logging.getLogger("torch.onnx").setLevel(logging.ERROR)
+    for name in ("torch.onnx", "onnxscript"):
+        logging.getLogger(name).setLevel(logging.ERROR)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the exporter's own deprecations
         program = torch.onnx.export(
@@ -96,7 +75,7 @@ def export_policy(
             output_names=["values"],
             dynamic_shapes=tuple({0: torch.export.Dim("batch")} for _ in INPUTS),
             opset_version=OPSET,
-            custom_translation_table={torch.ops.rlacd.farthest_points.default: _farthest_points},
+            custom_translation_table={torch.ops.rlacd.farthest_points.default: onnx_operators.farthest_points},
         )
     assert program is not None
     _write(path, program.model_proto, options)

@@ -41,7 +41,12 @@ class TrainOptions:
 
     # What the network sees
     encoder: str = option(
-        "profile", "What describes a component: a name in rlacd.learn.encoders.", one_of=("profile", "pointnet", "i2p-mae")
+        "profile",
+        "What describes a component: counts between the planes, random features, or the paper's pretrained I2P-MAE.",
+        one_of=("profile", "pointnet", "i2p-mae"),
+    )
+    encoder_weights: str = option(
+        "", "The file of i2p-mae's weights: the published checkpoint, or one that `rlacd pretrain` made."
     )
     points: int = option(
         2048, "Points on the surface of a component, and as many on its hull (paper).", least=16, most=65536
@@ -119,7 +124,7 @@ _TWO_CORES: Mapping[str, Any] = {
 
 PRESETS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
     {
-        "paper": {},
+        "paper": {"encoder": "i2p-mae"},
         "two-cores": _TWO_CORES,
         "counting": {
             **_TWO_CORES,

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rlacd.policies.observe import Float32Array, Observation, candidates_of, observe
 from rlacd.planes.candidates import Candidates
 from rlacd.planes.concave_edges import concave_edge_planes
 from rlacd.planes.sweep import sweep
 from rlacd.policies.greedy import cheapest, hull_sum
 from rlacd.policies.navacd import CONCAVE_EDGES
+from rlacd.policies.observe import Float32Array, Observation, candidates_of, observe
 from rlacd.solid.component import Component, Plane
 
 if TYPE_CHECKING:

@@ -2,8 +2,17 @@
 
 from rlacd.learn.encoders.encoder import Encoder, describe
 from rlacd.learn.encoders.i2p_mae import I2PMAEEncoder
-from rlacd.learn.encoders.named import I2P_MAE, make_encoder
+from rlacd.learn.encoders.named import I2P_MAE, AnyEncoder, make_encoder
 from rlacd.learn.encoders.pointnet import PointNetEncoder
 from rlacd.learn.encoders.profile import ProfileEncoder
 
-__all__ = ["I2P_MAE", "Encoder", "I2PMAEEncoder", "PointNetEncoder", "ProfileEncoder", "describe", "make_encoder"]
+__all__ = [
+    "I2P_MAE",
+    "AnyEncoder",
+    "Encoder",
+    "I2PMAEEncoder",
+    "PointNetEncoder",
+    "ProfileEncoder",
+    "describe",
+    "make_encoder",
+]

@@ -14,6 +14,7 @@ from torch import Tensor
 
 from rlacd.policies.observe import Float32Array, Observation
 
+
 @runtime_checkable
 class Encoder(Protocol):
     """What the training asks of an encoder; a `torch.nn.Module` with a `dim` is one."""

@@ -74,14 +74,12 @@ class GroupEmbedding(nn.Module):
     def forward(self, members: Tensor) -> Tensor:
         """Tokens [M, C'] of groups [M, K, C]."""
         groups, size, _ = members.shape
-        inner = _run(self.first_conv, _affine(self.first_conv[0], members.flatten(0, 1)))
-        inner = inner.unflatten(0, (groups, size))
-        # The layer sees (group's maximum, member). It is linear, so the maximum's half is computed once a group.
-        layer = self.second_conv[0]
-        of_group, of_member = layer.weight[:, :, 0].chunk(2, dim=1)
-        hidden = F.linear(inner, of_member) + F.linear(inner.amax(dim=1), of_group, layer.bias)[:, None]
-        tokens = _run(self.second_conv, hidden.flatten(0, 1)).unflatten(0, (groups, size))
-        return tokens.amax(dim=1)
+        first, second = _matrix(self.first_conv[0]), _matrix(self.second_conv[0])
+        inner = _rest(self.first_conv, F.linear(members.flatten(0, 1), *first)).reshape(groups, size, -1)
+        # The second layer sees (group's maximum, member). It is linear: the maximum's half is computed once a group.
+        of_group, of_member = second[0].chunk(2, dim=1)
+        hidden = F.linear(inner, of_member) + F.linear(inner.amax(dim=1), of_group, second[1])[:, None]
+        return _rest(self.second_conv, hidden.flatten(0, 1)).reshape(groups, size, -1).amax(dim=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +148,7 @@ class HierarchicalEncoder(nn.Module):
         for i, (scale, seen) in enumerate(zip(scales, seen_below(scales, top), strict=True)):
             members = scale.offsets if tokens is None else gather(tokens, scale.members)
             batch, groups = members.shape[:2]
-            embedded = self.token_embed[i](members.flatten(0, 1)).unflatten(0, (batch, groups))
+            embedded = self.token_embed[i](members.flatten(0, 1)).reshape(batch, groups, -1)
             positions = self.encoder_pos_embeds[i](scale.centers)
             tokens = self.encoder_blocks[i](embedded, positions, seen[:, None, None] > 0)
         normed: Tensor = self.encoder_norms[-1](tokens)
@@ -214,15 +212,17 @@ class I2PMAEEncoder(nn.Module):
         On a processor components are encoded one by one: what is known already, or comes along in the same call, then
         changes no bit.
         """
-        device = self.h_encoder.encoder_norms[-1].weight.device
+        device = next(self.parameters()).device
+        at_once = 1 if device.type == "cpu" else AT_ONCE
         keys = [hashlib.sha256(cloud.cpu().contiguous().numpy().tobytes()).digest() for cloud in points]
-        unknown = {key: i for i, key in enumerate(keys) if key not in self._known}
-        for rows in torch.tensor(list(unknown.values()), dtype=torch.long).split(1 if device.type == "cpu" else AT_ONCE):
+        unknown = list({key: i for i, key in enumerate(keys) if key not in self._known}.values())
+        for first in range(0, len(unknown), at_once):
+            rows = unknown[first : first + at_once]
             found = self(points[rows].to(device), directions[rows].to(device)).cpu()
-            self._known.update(zip((keys[i] for i in rows.tolist()), found, strict=True))
-        features = torch.stack([self._known[key] for key in keys])
+            self._known.update(zip((keys[i] for i in rows), found, strict=True))
         for key in keys:
             self._known.move_to_end(key)
+        features = torch.stack([self._known[key] for key in keys])
         while len(self._known) > REMEMBERED:
             self._known.popitem(last=False)
         return features
@@ -239,12 +239,12 @@ def _shared_mlp(inputs: int, inner: int, outputs: int) -> nn.Sequential:
     return nn.Sequential(nn.Conv1d(inputs, inner, 1), nn.BatchNorm1d(inner), nn.ReLU(), nn.Conv1d(inner, outputs, 1))
 
 
-def _affine(layer: nn.Module, rows: Tensor) -> Tensor:
-    """Apply a convolution of width one to rows [M, C]: much faster than to sequences of length K."""
+def _matrix(layer: nn.Module) -> tuple[Tensor, Tensor | None]:
+    """Weight and bias of a convolution of width one, to apply to rows: much faster than to sequences of K."""
     assert isinstance(layer, nn.Conv1d)
-    return F.linear(rows, layer.weight[:, :, 0], layer.bias)
+    return layer.weight[:, :, 0], layer.bias
 
 
-def _run(mlp: nn.Sequential, hidden: Tensor) -> Tensor:
+def _rest(mlp: nn.Sequential, hidden: Tensor) -> Tensor:
     """What follows a shared MLP's first layer."""
-    return _affine(mlp[3], F.relu(mlp[1](hidden), inplace=True))
+    return F.linear(F.relu(mlp[1](hidden), inplace=True), *_matrix(mlp[3]))

@@ -11,14 +11,14 @@ from rlacd.learn.encoders.i2p_mae import I2PMAEEncoder
 from rlacd.learn.encoders.pointnet import PointNetEncoder
 from rlacd.learn.encoders.profile import ProfileEncoder
 
+AnyEncoder = ProfileEncoder | PointNetEncoder | I2PMAEEncoder
+
 I2P_MAE = "i2p-mae"
 
 PUBLISHED = "https://github.com/ZrrSkywalker/I2P-MAE"
 
 
-def make_encoder(
-    name: str, weights: str | Path = "", device: torch.device | str = "cpu"
-) -> ProfileEncoder | PointNetEncoder | I2PMAEEncoder:
+def make_encoder(name: str, weights: str | Path = "", device: torch.device | str = "cpu") -> AnyEncoder:
     """Build the encoder called `name`.
 
     Parameters

@@ -54,7 +54,7 @@ def nearest_points(points: Tensor, centers: Tensor, count: int) -> Tensor:
 def gather(values: Tensor, index: Tensor) -> Tensor:
     """Get ``values[b, index[b, ...]]``, [B, ..., C], of values [B, N, C] by an index [B, ...] of any shape."""
     flat = index.flatten(1)[:, :, None].expand(-1, -1, values.shape[-1])
-    return values.gather(1, flat).unflatten(1, index.shape[1:])
+    return values.gather(1, flat).reshape(*index.shape, values.shape[-1])
 
 
 def _sum_of_squares(gaps: Tensor) -> Tensor:

@@ -23,6 +23,9 @@ METADATA = "rlacd"
 WRAPPERS = ("base_model", "model", "state_dict")
 """Entries under which checkpoints keep the state; the published one has the first."""
 
+FIRST = "h_encoder.token_embed.0.first_conv.0.weight"
+"""The first parameter of the encoder."""
+
 HARMLESS = [np.dtype, np.dtypes.Float64DType, np.dtypes.Float32DType, np.dtypes.Int64DType]
 """Kinds of numpy numbers, which checkpoints hold as their score; beyond torch's own list nothing else is let in."""
 
@@ -83,8 +86,8 @@ def load_weights(path: Path) -> Weights:
     except (SafetensorError, pickle.UnpicklingError, RuntimeError, ValueError, EOFError, KeyError, OSError) as error:
         reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:160].rstrip(".")
         raise WeightsError(
-            f"{path} is damaged, cut short or no file of weights ({reason}): h_encoder.token_embed.0.first_conv.0.weight "
-            "and all that should follow are missing; fetch or make it again."
+            f"{path} is damaged, cut short or no file of weights ({reason}): {FIRST} and all that should follow it are "
+            "missing; fetch or make it again."
         ) from error
     return Weights(path, {name.removeprefix("module."): value for name, value in state.items()}, sizes)
 
@@ -111,7 +114,7 @@ def _metadata(about: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _read_safetensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
-    with safe_open(path, "pt") as file:  # type: ignore[no-untyped-call]
+    with safe_open(path, "pt") as file:
         about = json.loads((file.metadata() or {}).get(METADATA, "{}"))
         sizes = {name: tuple(v) if isinstance(v, list) else v for name, v in about.get("sizes", {}).items()}
         return {name: file.get_tensor(name) for name in file.keys()}, sizes  # noqa: SIM118

@@ -84,7 +84,7 @@ def _write(folder: Path, names: Sequence[str], kept: Path, listing: Path) -> Non
     for name in names:
         try:
             mesh = load_mesh(folder / name)
-            points = _native.sample_surface(mesh.vertices, mesh.faces, KEPT, 0)[0]
+            points = _native.sample_surface(mesh.vertices, mesh.faces.astype(np.int32), KEPT, 0)[0]
         except (RlacdError, ValueError):
             continue
         if np.ptp(points, axis=0).max() > 0:
@@ -102,5 +102,3 @@ def _turn(axis: int, degrees: float) -> np.ndarray:
     i, j = (axis + 1) % 3, (axis + 2) % 3
     matrix[i, i], matrix[i, j], matrix[j, i], matrix[j, j] = cos, -sin, sin, cos
     return matrix
-
-

@@ -26,7 +26,7 @@ class PretrainOptions:
     stretch: float = option(1.5, "Stretch it along each axis by up to this factor (paper).", least=1, most=4)
     steps: int = option(20_000, "Gradient steps.", least=1)
     batch: int = option(64, "Clouds a step.", least=2)
-    learning_rate: float = option(1e-3, "Of AdamW, at its greatest; it rises at first, then falls as a cosine.", least=0)
+    learning_rate: float = option(1e-3, "Of AdamW, at its greatest: it rises, then falls as a cosine.", least=0)
     rise: float = option(0.05, "Share of the steps in which it rises.", least=0, most=1)
     weight_decay: float = option(0.05, "Of AdamW (paper).", least=0)
     max_faces: int = option(200_000, "Leave out meshes with more triangles than this.", least=4)
