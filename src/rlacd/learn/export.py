@@ -62,23 +62,9 @@ def export_policy(path: Path, encoder: AnyEncoder, network: QNetwork, options: T
         torch.eye(3).repeat(2, 2, 1),
         torch.rand(2, SCALE_INPUTS, generator=generator),
     )
-    for name in ("torch.onnx", "onnxscript"):
-        logging.getLogger(name).setLevel(logging.ERROR)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the exporter's own deprecations
-        program = torch.onnx.export(
-            module,
-            example,
-            dynamo=True,
-            verbose=False,
-            input_names=list(INPUTS),
-            output_names=["values"],
-            dynamic_shapes=tuple({0: torch.export.Dim("batch")} for _ in INPUTS),
-            opset_version=OPSET,
-            custom_translation_table={torch.ops.rlacd.farthest_points.default: onnx_operators.farthest_points},
-        )
-    assert program is not None
-    _write(path, program.model_proto, options)
+    model = to_onnx(module, example, INPUTS, "values")
+    _describe(model, options)
+    path.write_bytes(model.SerializeToString(deterministic=True))
     with torch.inference_mode():
         expected = module(*example).numpy()
     found = OnnxQ(path).run(*(x.numpy() for x in example))
@@ -92,13 +78,45 @@ def export_policy(path: Path, encoder: AnyEncoder, network: QNetwork, options: T
     return path
 
 
-def _write(path: Path, model: onnx.ModelProto, options: TrainOptions) -> None:
+def to_onnx(module: nn.Module, example: tuple[Tensor, ...], inputs: tuple[str, ...], output: str) -> onnx.ModelProto:
+    """Translate a module of tensors [B, ...] to one tensor [B, ...], for any B; nothing of this machine goes along.
+
+    Parameters
+    ----------
+    module : torch.nn.Module
+    example : tuple of Tensor
+        Inputs of the shapes to come, but for B, which should be 2 here.
+    inputs : tuple of str
+    output : str
+        Their names in the graph.
+    """
+    for name in ("torch.onnx", "onnxscript"):
+        logging.getLogger(name).setLevel(logging.ERROR)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the exporter's own deprecations
+        program = torch.onnx.export(
+            module,
+            example,
+            dynamo=True,
+            verbose=False,
+            input_names=list(inputs),
+            output_names=[output],
+            dynamic_shapes=tuple({0: torch.export.Dim("batch")} for _ in inputs),
+            opset_version=OPSET,
+            custom_translation_table={torch.ops.rlacd.farthest_points.default: onnx_operators.farthest_points},
+        )
+    assert program is not None
+    model = program.model_proto
     del model.metadata_props[:]
     for graph in (model.graph, *model.functions):
         for node in graph.node:  # traces of the exporter: source lines of the machine it ran on
             del node.metadata_props[:]
             node.doc_string = ""
+    onnx.checker.check_model(model)
+    return model
+
+
+def _describe(model: onnx.ModelProto, options: TrainOptions) -> None:
+    """Say in the metadata what the policy has to know; see `rlacd.policies.q_network`."""
     about = {"kind": KIND, "points": options.points, "threshold": options.threshold}
     onnx.helper.set_model_props(model, {METADATA: json.dumps(about, sort_keys=True)})
-    onnx.checker.check_model(model)
-    path.write_bytes(model.SerializeToString(deterministic=True))

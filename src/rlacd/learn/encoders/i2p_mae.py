@@ -14,18 +14,24 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from rlacd.errors import OptionError
+from rlacd.errors import OptionError, WeightsError
 from rlacd.learn.encoders.point_groups import farthest_points, gather, nearest_points
 from rlacd.learn.encoders.transformer import Blocks, position_embedding
 from rlacd.learn.encoders.weights_file import load_weights
 
 REMEMBERED = 8192
 """Components whose features are kept: the same solids come back in every episode and validation."""
+
+SCALES = 3
+
+LARGEST = 65536
+"""No size is larger than this."""
 
 AT_ONCE = 16
 """Components encoded side by side on a GPU."""
@@ -51,6 +57,33 @@ class Sizes:
     depth: int = 5
     heads: int = 6
     embedding: int = 256
+
+    @classmethod
+    def from_plain(cls, plain: Mapping[str, Any]) -> Sizes:
+        """Make them of plain JSON values; what is not given is as published.
+
+        Raises
+        ------
+        ValueError
+            They are no sizes of an encoder.
+        """
+        known = {field.name for field in dataclasses.fields(cls)}
+        given: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in plain.items()}
+        sizes = cls(**given) if set(given) <= known else None
+        if sizes is None or not sizes._possible():
+            raise ValueError("its sizes are damaged")
+        return sizes
+
+    def _possible(self) -> bool:
+        lists, numbers = (self.groups, self.neighbors, self.widths), (self.depth, self.heads, self.embedding)
+        if not all(isinstance(values, tuple) and len(values) == SCALES for values in lists):
+            return False
+        if not all(type(n) is int and 1 <= n <= LARGEST for n in (*sum(lists, ()), *numbers)) or self.embedding < 2:
+            return False
+        above = zip(self.groups, self.groups[1:], self.neighbors[1:], strict=False)
+        if not all(count <= before and members <= before for before, count, members in above):
+            return False
+        return all(width % self.heads == 0 for width in self.widths)
 
 
 SIZES: Mapping[str, Sizes] = MappingProxyType(
@@ -183,7 +216,11 @@ class I2PMAEEncoder(nn.Module):
             The file is missing, damaged, or not of this encoder: the first parameter that is missing is named.
         """
         weights = load_weights(Path(path))
-        encoder = cls(Sizes(**weights.sizes))
+        try:
+            sizes = Sizes.from_plain(weights.sizes)
+        except ValueError as error:
+            raise WeightsError(f"{path} is no file of weights: {error}; make it again.") from error
+        encoder = cls(sizes)
         encoder.load_state_dict(weights.fitted(encoder.state_dict()))
         return encoder
 

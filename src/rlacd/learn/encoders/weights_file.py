@@ -116,8 +116,9 @@ def _metadata(about: Mapping[str, Any]) -> dict[str, str]:
 def _read_safetensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     with safe_open(path, "pt") as file:
         about = json.loads((file.metadata() or {}).get(METADATA, "{}"))
-        sizes = {name: tuple(v) if isinstance(v, list) else v for name, v in about.get("sizes", {}).items()}
-        return {name: file.get_tensor(name) for name in file.keys()}, sizes  # noqa: SIM118
+        if not isinstance(about, dict) or not isinstance(about.get("sizes", {}), dict):
+            raise ValueError("its metadata are damaged")
+        return {name: file.get_tensor(name) for name in file.keys()}, about.get("sizes", {})  # noqa: SIM118
 
 
 def _read_torch(path: Path) -> dict[str, Tensor]:

@@ -2,8 +2,9 @@
 
 Most groups of the coarsest scale are hidden, and of the finer scales those that no seen group has as a member. The
 encoder sees the rest. A light decoder then says, for each hidden group of the scale before the last, where its members
-lie around its centre; the loss is the Chamfer distance to where they do. I2P-MAE's other half, which chooses and
-paints by what networks of 2-D pictures know, is not here.
+lie around its centre; the loss is the Chamfer distance to where they do. It is told in squares of the distance that a
+cloud's members have from their centres in the mean: to say that all lie at the centre costs 2. I2P-MAE's other half,
+which chooses and paints by what networks of 2-D pictures know, is not here.
 
 Source: Zhang et al., "Point-M2AE", NeurIPS 2022, and "I2P-MAE", CVPR 2023.
 """
@@ -58,8 +59,12 @@ class MaskedAutoencoder(nn.Module):
         scales = pyramid.pyramid(clouds)
         seen = seen_below(scales, seen_groups(chances, hidden))
         tokens = encode_seen(pyramid, scales, seen)
-        out = self._decode(scales, seen, tokens)[seen[-2] == 0]
-        return chamfer(self.members(out).unflatten(-1, (-1, 3)), scales[-2].offsets[seen[-2] == 0])
+        unseen = seen[-2] == 0
+        found = self.members(self._decode(scales, seen, tokens)[unseen]).unflatten(-1, (-1, 3))
+        # In the clouds' own unit the members lie so close together that to say "all at the centre" is where it ends.
+        true = scales[-2].offsets
+        unit = true.square().sum(-1).mean(dim=(1, 2)).sqrt()
+        return chamfer(found, (true / unit[:, None, None, None])[unseen])
 
     def _decode(self, scales: list[Scale], seen: list[Tensor], tokens: list[Tensor]) -> Tensor:
         """Tokens [B, G, C] of the scale before the last, seen or not."""
