@@ -19,9 +19,9 @@ from rlacd.criteria import Concavity
 from rlacd.learn.encoders import describe, make_encoder
 from rlacd.learn.episodes import Episodes
 from rlacd.learn.meshes import Solids, list_meshes
-from rlacd.learn.observe import Observation, observe
 from rlacd.learn.qnetwork import QNetwork
 from rlacd.planes.sweep import sweep
+from rlacd.policies.observe import Observation, observe
 
 Labelled = tuple[list[Observation], np.ndarray]
 

@@ -8,9 +8,9 @@ import numpy as np
 import trimesh
 from manifold3d import Manifold
 
-from rlacd.learn.observe import valid_planes
 from rlacd.planes.candidates import axis_and_principal
 from rlacd.planes.sweep import sweep
+from rlacd.policies.observe import valid_planes
 from rlacd.solid.component import Component, Plane
 from tests.shapes import box, from_manifold
 

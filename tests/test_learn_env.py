@@ -23,9 +23,9 @@ from rlacd.errors import TrainingError
 from rlacd.learn.encoders import Encoder, describe, make_encoder
 from rlacd.learn.mdp import Cutting, terminal_reward
 from rlacd.learn.meshes import Solids, list_meshes
-from rlacd.learn.observe import observe, valid_planes
 from rlacd.planes.candidates import axis_and_principal
 from rlacd.planes.sweep import sweep
+from rlacd.policies.observe import observe, valid_planes
 from rlacd.solid.component import Component
 from rlacd.solid.load import load_mesh
 from rlacd.solid.repair import repair

@@ -199,10 +199,11 @@ def test_the_exported_policy_computes_what_torch_does(meshes: Path, tmp_path: Pa
     import torch
 
     from rlacd.learn.encoders import make_encoder
-    from rlacd.learn.export import OnnxQ, PointsToValues, export_policy
-    from rlacd.learn.observe import observe
+    from rlacd.learn.export import PointsToValues, export_policy
     from rlacd.learn.qnetwork import QNetwork
     from rlacd.planes.candidates import axis_and_principal
+    from rlacd.policies.observe import observe
+    from rlacd.policies.q_network import OnnxQ
     from rlacd.solid.component import Component
     from tests.learning import small_solids
 
@@ -228,8 +229,8 @@ def test_a_run_ends_with_a_policy_that_decomposes(meshes: Path, tmp_path: Path) 
     from rlacd.clock import Clock
     from rlacd.criteria import Concavity
     from rlacd.cut import CutTree
-    from rlacd.learn.export import OnnxQ
-    from rlacd.learn.qpolicy import QPolicy
+    from rlacd.policies.q_network import OnnxQ
+    from rlacd.policies.qpolicy import QPolicy
     from rlacd.solid.component import Component
     from rlacd.workers import Workers
     from tests.learning import small_solids

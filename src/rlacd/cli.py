@@ -18,7 +18,7 @@ import typer
 
 from rlacd import __version__
 from rlacd.errors import OptionError, OutputError, RlacdError
-from rlacd.train_command import train_command
+from rlacd.train_command import pretrain_command, train_command
 
 STDOUT = Path("-")
 _SPELLED = {"reachable-only": "everywhere", "seeds": "seed-point", "closed-planes": "closed-plane"}
@@ -532,3 +532,4 @@ def _first_line(error: Exception) -> str:
 
 
 app.command("train", epilog=EPILOG)(train_command(_exit_codes))
+app.command("pretrain", epilog=EPILOG)(pretrain_command(_exit_codes))

@@ -1,8 +1,9 @@
-"""The command `rlacd train`: its options are the fields of `TrainOptions`, and their help is the fields' own."""
+"""The commands `rlacd train` and `rlacd pretrain`: their options, and their help, are the fields of a dataclass."""
 
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import inspect
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -13,63 +14,119 @@ import typer
 
 from rlacd.errors import MissingExtraError, OptionError
 from rlacd.learn.options import PRESETS, TrainOptions
+from rlacd.learn.pretrain.options import PretrainOptions
 
 EXTRA = ("torch", "gymnasium", "tensorboard", "safetensors", "onnx", "onnxscript", "onnxruntime")
 
-HELP = """Train a policy that chooses cuts, by the paper's reinforcement learning.
+ExitCodes = Callable[[], AbstractContextManager[None]]
+Parameters = dict[str, tuple[Any, Any]]
+"""Of a command: name to default and annotation."""
+
+DEFAULT_PRESET = "two-cores"
+
+TRAIN_HELP = """Train a policy that chooses cuts, by the paper's reinforcement learning.
 
 \b
 [bold]Examples[/bold]
   rlacd train meshes/ --run run/ --preset quick
-  rlacd train meshes/ --run run/ --preset two-cores --seed 1
-  rlacd train meshes/ --run run/ --preset two-cores --seed 1 --resume
+  rlacd train meshes/ --run run/ --seed 1
+  rlacd train meshes/ --run run/ --seed 1 --resume
+  rlacd train meshes/ --run run/ --preset paper --encoder-weights i2p_mae.pth
   tensorboard --logdir run/tensorboard
 
-The run's folder gets the curves, a checkpoint to --resume from, and in the end policy.onnx. A preset sets all options;
-those given beside it change it.
+The run's folder gets the curves, a checkpoint to --resume from, and in the end policy.onnx, which decompose takes as
+--policy. A preset sets all options; those given beside it change it.
 """
 
+PRETRAIN_HELP = """Make weights for --encoder i2p-mae out of a folder of meshes, without any labels.
 
-def train_command(exit_codes: Callable[[], AbstractContextManager[None]]) -> Callable[..., None]:
-    """Build the command; `exit_codes` turns errors into a sentence and an exit code."""
+Most of a point cloud is hidden, and the encoder learns to say what was there (the 3-D half of I2P-MAE).
+
+\b
+[bold]Examples[/bold]
+  rlacd pretrain meshes/ --out weights.safetensors
+  rlacd pretrain meshes/ --out weights.safetensors --resume
+  rlacd pretrain meshes/ --out small.safetensors --size small --points 1024 --batch 32 --steps 1000
+  rlacd train meshes/ --run run/ --encoder i2p-mae --encoder-weights weights.safetensors
+
+Beside the weights a folder, weights.run, gets the curves and a checkpoint to --resume from.
+"""
+
+MESHES = (inspect.Parameter.empty, Annotated[Path, typer.Argument(help="A folder of meshes, of any depth.")])
+RESUME = (False, Annotated[bool, typer.Option("--resume", help="Go on from the run's last checkpoint.")])
+
+
+def train_command(exit_codes: ExitCodes) -> Callable[..., None]:
+    """Build `rlacd train`; `exit_codes` turns errors into a sentence and an exit code."""
 
     def train(**given: Any) -> None:
         with exit_codes():
             meshes, run, preset, resume = (given.pop(name) for name in ("meshes", "run", "preset", "resume"))
-            options = TrainOptions.preset(preset, **{k: v for k, v in given.items() if v is not None})
+            options = TrainOptions.preset(preset, **_chosen(given))
             if run.exists() and not run.is_dir():
                 raise OptionError(f"--run {run} is a file; give a folder.")
-            _learn()(meshes, run, options, resume=resume, say=typer.echo)
+            _learn("rlacd.learn.train", "train")(meshes, run, options, resume=resume, say=typer.echo)
 
-    parameters: dict[str, tuple[Any, Any]] = {
-        "meshes": (inspect.Parameter.empty, Annotated[Path, typer.Argument(help="A folder of meshes, of any depth.")]),
+    own: Parameters = {
+        "meshes": MESHES,
         "run": (inspect.Parameter.empty, Annotated[Path, typer.Option("--run", "-o", help="A folder for this run.")]),
-        "preset": ("paper", Annotated[str, typer.Option(help=f"One of {', '.join(PRESETS)}.")]),
-        "resume": (False, Annotated[bool, typer.Option("--resume", help="Go on from the run's last checkpoint.")]),
+        "preset": (DEFAULT_PRESET, Annotated[str, typer.Option(help=f"One of {', '.join(PRESETS)}.")]),
+        "resume": RESUME,
     }
-    for option in dataclasses.fields(TrainOptions):
-        default = str(option.default).lower() if isinstance(option.default, bool) else option.default
-        text = f"{option.metadata['help']} [dim]\\[paper: {default}][/dim]"
-        kind = type(option.default)
-        parameters[option.name] = (None, Annotated[kind | None, typer.Option(help=text, show_default=False)])
-    train.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+    return _command(train, TRAIN_HELP, own | _parameters(TrainOptions, "without a preset: "))
+
+
+def pretrain_command(exit_codes: ExitCodes) -> Callable[..., None]:
+    """Build `rlacd pretrain`; `exit_codes` turns errors into a sentence and an exit code."""
+
+    def pretrain(**given: Any) -> None:
+        with exit_codes():
+            meshes, out, resume = (given.pop(name) for name in ("meshes", "out", "resume"))
+            options = PretrainOptions(**_chosen(given))
+            _learn("rlacd.learn.pretrain.run", "pretrain")(meshes, out, options, resume=resume, say=typer.echo)
+            typer.echo(f"{out}: give it to  rlacd train --encoder i2p-mae --encoder-weights")
+
+    out = typer.Option("--out", "-o", metavar="FILE.safetensors", help="Where the weights go.")
+    own: Parameters = {"meshes": MESHES, "out": (inspect.Parameter.empty, Annotated[Path, out]), "resume": RESUME}
+    return _command(pretrain, PRETRAIN_HELP, own | _parameters(PretrainOptions, "default: "))
+
+
+def _command(run: Callable[..., None], text: str, parameters: Parameters) -> Callable[..., None]:
+    """Give a function the parameters, as typer looks them up, and the help."""
+    run.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
         [
             inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
             for name, (default, annotation) in parameters.items()
         ]
     )
-    train.__annotations__ = {name: annotation for name, (_, annotation) in parameters.items()}
-    train.__doc__ = HELP
-    return train
+    run.__annotations__ = {name: annotation for name, (_, annotation) in parameters.items()}
+    run.__doc__ = text
+    return run
 
 
-def _learn() -> Callable[..., Path]:
+def _parameters(options: type[Any], note: str) -> Parameters:
+    """Make a parameter of each field; None where it is not given."""
+    parameters: Parameters = {}
+    for option in dataclasses.fields(options):
+        default = str(option.default).lower() if isinstance(option.default, bool) else option.default
+        shown = "none" if default == "" else default
+        text = f"{option.metadata['help']} [dim]\\[{note}{shown}][/dim]"
+        kind = type(option.default)
+        parameters[option.name] = (None, Annotated[kind | None, typer.Option(help=text, show_default=False)])
+    return parameters
+
+
+def _chosen(given: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in given.items() if value is not None}
+
+
+def _learn(module: str, name: str) -> Callable[..., Path]:
     try:
-        from rlacd.learn.train import train
+        run: Callable[..., Path] = getattr(importlib.import_module(module), name)
     except ModuleNotFoundError as error:
         if (error.name or "").split(".")[0] in EXTRA:
             raise MissingExtraError(
                 "training needs an extra: run  pip install 'rlacd[train]'  and try again."
             ) from error
         raise
-    return train
+    return run

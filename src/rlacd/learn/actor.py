@@ -18,8 +18,8 @@ from rlacd.learn.encoders import Encoder, describe
 from rlacd.learn.episodes import Episodes, Start
 from rlacd.learn.mdp import Cutting, Reward
 from rlacd.learn.meshes import Solids
-from rlacd.learn.observe import Float32Array, observe
 from rlacd.learn.options import TrainOptions
+from rlacd.policies.observe import Float32Array, observe
 from rlacd.solid.arrays import BoolArray
 from rlacd.solid.component import Component
 

@@ -46,11 +46,13 @@ class ActorSetting:
 
     def make(self, numbers: Sequence[int]) -> list[Actor]:
         """Make some of the actors."""
+        from rlacd.learn.device import pick_device
         from rlacd.learn.encoders import make_encoder
         from rlacd.learn.meshes import Solids
 
-        solids, encoder = Solids(self.folder, self.cache), make_encoder(self.options.encoder)
-        return [Actor(solids, self.names, encoder, self.options, number) for number in numbers]
+        options, solids = self.options, Solids(self.folder, self.cache)
+        encoder = make_encoder(options.encoder, options.encoder_weights, pick_device(options.device))
+        return [Actor(solids, self.names, encoder, options, number) for number in numbers]
 
 
 class LocalActors:

@@ -16,32 +16,35 @@ class Curves:
     ----------
     run : Path
         ``curves.jsonl`` and ``tensorboard/`` are put there.
+    counted : str
+        What the points are counted by.
     """
 
-    def __init__(self, run: Path) -> None:
+    def __init__(self, run: Path, counted: str = "cuts") -> None:
         self._folder = run
+        self._counted = counted
         self._path = run / "curves.jsonl"
         self._board: SummaryWriter | None = None
 
-    def restart(self, cuts: int) -> None:
-        """Forget the points after `cuts`: they will be made again."""
+    def restart(self, count: int) -> None:
+        """Forget the points after `count`: they will be made again."""
         kept = []
         if self._path.exists():
             lines = self._path.read_text().splitlines(keepends=True)
-            kept = [line for line in lines if line.endswith("\n") and json.loads(line)["cuts"] <= cuts]
-        if cuts == 0:
+            kept = [line for line in lines if line.endswith("\n") and json.loads(line)[self._counted] <= count]
+        if count == 0:
             kept = []
         self._path.write_text("".join(kept))
-        self._board = SummaryWriter(str(self._folder / "tensorboard"), purge_step=cuts + 1)
+        self._board = SummaryWriter(str(self._folder / "tensorboard"), purge_step=count + 1)
 
-    def add(self, cuts: int, values: Mapping[str, float], seconds: float) -> None:
+    def add(self, count: int, values: Mapping[str, float], seconds: float) -> None:
         """Add a point to each of several curves."""
         with open(self._path, "a") as file:
-            file.write(json.dumps({"cuts": cuts, **values, "seconds": round(seconds, 3)}) + "\n")
+            file.write(json.dumps({self._counted: count, **values, "seconds": round(seconds, 3)}) + "\n")
         if self._board is not None:
             for name, value in {**values, "seconds": seconds}.items():
                 group = "validation/" + name[11:] if name.startswith("validation_") else "training/" + name
-                self._board.add_scalar(group, value, cuts)
+                self._board.add_scalar(group, value, count)
 
     def close(self) -> None:
         """Write what TensorBoard still holds back."""

@@ -19,8 +19,8 @@ from rlacd.criteria import Concavity
 from rlacd.learn.episodes import Episodes
 from rlacd.learn.mdp import Cutting, Reward
 from rlacd.learn.meshes import Solids, list_meshes
-from rlacd.learn.observe import Observation, observe
 from rlacd.planes.candidates import OFFSETS_PER_AXIS
+from rlacd.policies.observe import Observation, observe
 from rlacd.solid.arrays import BoolArray
 from rlacd.solid.component import Component
 
@@ -39,7 +39,7 @@ class CutEnv(gymnasium.Env[_Observed, NDArray[np.int64]]):
 
     - ``points`` float32 [S, 2, N, 3]: of the component's surface and of its hull's, in its own frame;
     - ``directions`` float32 [S, 6, 3]: normals of its candidate planes;
-    - ``scale`` float32 [S, 3]: see `rlacd.learn.observe.Observation`;
+    - ``scale`` float32 [S, 3]: see `rlacd.policies.observe.Observation`;
     - ``taken`` int8 [S]: 1 where there is a component.
 
     The action is a slot and one of its 150 planes. Planes that ``info["action_mask"]`` [S, 150] does not allow cut

@@ -9,18 +9,18 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-import onnxruntime
+import onnx
 import torch
 from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from rlacd.errors import TrainingError
-from rlacd.learn.encoders import PointNetEncoder, ProfileEncoder
-from rlacd.learn.observe import SCALE_INPUTS, Float32Array, Observation
+from rlacd.learn import onnx_operators
+from rlacd.learn.encoders import AnyEncoder
 from rlacd.learn.options import TrainOptions
 from rlacd.learn.qnetwork import QNetwork
-
-INPUTS = ("points", "directions", "scale")
+from rlacd.policies.observe import SCALE_INPUTS
+from rlacd.policies.q_network import INPUTS, KIND, METADATA, OnnxQ
 
 OPSET = 18
 
@@ -45,9 +45,7 @@ class PointsToValues(nn.Module):
         return values
 
 
-def export_policy(
-    path: Path, encoder: ProfileEncoder | PointNetEncoder, network: QNetwork, options: TrainOptions
-) -> Path:
+def export_policy(path: Path, encoder: AnyEncoder, network: QNetwork, options: TrainOptions) -> Path:
     """Write ``path`` (ONNX: points, directions, scale -> values), and beside it ``.safetensors`` and ``.json``.
 
     The exported file is run once and compared with torch.
@@ -57,28 +55,16 @@ def export_policy(
     TrainingError
         onnxruntime does not compute what torch does.
     """
-    module = PointsToValues(encoder, network.cpu(), options.scale_input).eval()
+    module = PointsToValues(encoder.cpu(), network.cpu(), options.scale_input).eval()
     generator = torch.Generator().manual_seed(0)
     example = (
         torch.rand(2, 2, options.points, 3, generator=generator) * 2 - 1,
         torch.eye(3).repeat(2, 2, 1),
         torch.rand(2, SCALE_INPUTS, generator=generator),
     )
-    logging.getLogger("torch.onnx").setLevel(logging.ERROR)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the exporter's own deprecations
-        program = torch.onnx.export(
-            module,
-            example,
-            dynamo=True,
-            verbose=False,
-            input_names=list(INPUTS),
-            output_names=["values"],
-            dynamic_shapes=tuple({0: torch.export.Dim("batch")} for _ in INPUTS),
-            opset_version=OPSET,
-        )
-    assert program is not None
-    program.save(str(path), external_data=False)
+    model = to_onnx(module, example, INPUTS, "values")
+    _describe(model, options)
+    path.write_bytes(model.SerializeToString(deterministic=True))
     with torch.inference_mode():
         expected = module(*example).numpy()
     found = OnnxQ(path).run(*(x.numpy() for x in example))
@@ -92,21 +78,45 @@ def export_policy(
     return path
 
 
-class OnnxQ:
-    """An exported policy, run by onnxruntime on one thread; give it to `rlacd.learn.qpolicy.QPolicy`."""
+def to_onnx(module: nn.Module, example: tuple[Tensor, ...], inputs: tuple[str, ...], output: str) -> onnx.ModelProto:
+    """Translate a module of tensors [B, ...] to one tensor [B, ...], for any B; nothing of this machine goes along.
 
-    def __init__(self, path: Path) -> None:
-        settings = onnxruntime.SessionOptions()
-        settings.intra_op_num_threads = settings.inter_op_num_threads = 1
-        self._session = onnxruntime.InferenceSession(str(path), settings, providers=["CPUExecutionProvider"])
+    Parameters
+    ----------
+    module : torch.nn.Module
+    example : tuple of Tensor
+        Inputs of the shapes to come, but for B, which should be 2 here.
+    inputs : tuple of str
+    output : str
+        Their names in the graph.
+    """
+    for name in ("torch.onnx", "onnxscript"):
+        logging.getLogger(name).setLevel(logging.ERROR)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the exporter's own deprecations
+        program = torch.onnx.export(
+            module,
+            example,
+            dynamo=True,
+            verbose=False,
+            input_names=list(inputs),
+            output_names=[output],
+            dynamic_shapes=tuple({0: torch.export.Dim("batch")} for _ in inputs),
+            opset_version=OPSET,
+            custom_translation_table={torch.ops.rlacd.farthest_points.default: onnx_operators.farthest_points},
+        )
+    assert program is not None
+    model = program.model_proto
+    del model.metadata_props[:]
+    for graph in (model.graph, *model.functions):
+        for node in graph.node:  # traces of the exporter: source lines of the machine it ran on
+            del node.metadata_props[:]
+            node.doc_string = ""
+    onnx.checker.check_model(model)
+    return model
 
-    def run(self, points: Float32Array, directions: Float32Array, scale: Float32Array) -> Float32Array:
-        """Values [B, 150]."""
-        given = dict(zip(INPUTS, (points, directions, scale), strict=True))
-        values: Float32Array = self._session.run(["values"], given)[0]
-        return values
 
-    def __call__(self, seen: Observation) -> Float32Array:
-        """Values [150] of one observed component."""
-        values: Float32Array = self.run(seen.points[None], seen.directions[None], seen.scale[None])[0]
-        return values
+def _describe(model: onnx.ModelProto, options: TrainOptions) -> None:
+    """Say in the metadata what the policy has to know; see `rlacd.policies.q_network`."""
+    about = {"kind": KIND, "points": options.points, "threshold": options.threshold}
+    onnx.helper.set_model_props(model, {METADATA: json.dumps(about, sort_keys=True)})

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 
 from rlacd.criteria import Criterion
 from rlacd.cut import Divisions
-from rlacd.learn.observe import candidates_of, valid_planes
 from rlacd.planes.candidates import Candidates
+from rlacd.policies.observe import candidates_of, valid_planes
 from rlacd.solid.component import Component, Plane
 
 

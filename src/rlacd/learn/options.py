@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
 from rlacd.errors import OptionError
-
-
-def _option(
-    default: Any, text: str, *, least: float = -math.inf, most: float = math.inf, one_of: tuple[str, ...] = ()
-) -> Any:
-    """Declare a field with its help and its range; ``(paper)`` in the help marks values the paper states."""
-    return field(default=default, metadata={"help": text, "least": least, "most": most, "one_of": one_of})
+from rlacd.learn.fields import check_fields, option, refuse_unknown
 
 
 @dataclass(frozen=True)
@@ -32,82 +25,73 @@ class TrainOptions:
     """
 
     # The decision process
-    threshold: float = _option(0.04, "Concavity at which a component is finished (paper: 4 %).", least=0.001, most=1)
-    volume_reward: float = _option(1000.0, "Weight of the reward for hull volume saved, lambda 1 (paper).", least=0)
-    finish_reward: float = _option(1000.0, "Weight of the reward for finishing, lambda 2 (paper).", least=0)
-    cut_cost: float = _option(0.0, "Reward every cut costs (the paper: none).", least=0)
-    finish_counts: str = _option(
+    threshold: float = option(0.04, "Concavity at which a component is finished (paper: 4 %).", least=0.001, most=1)
+    volume_reward: float = option(1000.0, "Weight of the reward for hull volume saved, lambda 1 (paper).", least=0)
+    finish_reward: float = option(1000.0, "Weight of the reward for finishing, lambda 2 (paper).", least=0)
+    cut_cost: float = option(0.0, "Reward every cut costs (the paper: none).", least=0)
+    finish_counts: str = option(
         "solid",
         "What has to be finished for that reward: the whole solid (paper, eq. 3), or the component's own two sides.",
         one_of=("solid", "component"),
     )
-    max_cuts: int = _option(64, "Cuts after which an episode is broken off.", least=1)
-    max_parts: int = _option(64, "Components after which an episode is broken off.", least=2)
-    rotate: bool = _option(True, "Turn each solid about a random axis by 0, 45, 90 or 180 degrees (paper).")
-    max_faces: int = _option(2000, "Leave out meshes with more triangles than this.", least=4)
+    max_cuts: int = option(64, "Cuts after which an episode is broken off.", least=1)
+    max_parts: int = option(64, "Components after which an episode is broken off.", least=2)
+    rotate: bool = option(True, "Turn each solid about a random axis by 0, 45, 90 or 180 degrees (paper).")
+    max_faces: int = option(2000, "Leave out meshes with more triangles than this.", least=4)
 
     # What the network sees
-    encoder: str = _option(
-        "profile", "What describes a component: a name in rlacd.learn.encoders.", one_of=("profile", "pointnet")
+    encoder: str = option(
+        "profile",
+        "What describes a component: counts between the planes, random features, or the paper's pretrained I2P-MAE.",
+        one_of=("profile", "pointnet", "i2p-mae"),
     )
-    points: int = _option(
+    encoder_weights: str = option(
+        "", "The file of i2p-mae's weights: the published checkpoint, or one that `rlacd pretrain` made."
+    )
+    points: int = option(
         2048, "Points on the surface of a component, and as many on its hull (paper).", least=16, most=65536
     )
-    scale_input: bool = _option(False, "Tell the network how large the component is, too (the paper does not).")
+    scale_input: bool = option(False, "Tell the network how large the component is, too (the paper does not).")
 
     # Soft Q-learning
-    iterations: int = _option(1_000_000, "Cuts made, each followed by learning (paper: 1e6).", least=1)
-    warmup: int = _option(10_000, "First cuts, made at random without learning (paper: 1e4).", least=0)
-    batch: int = _option(256, "Transitions a gradient step.", least=1)
-    learn_every: int = _option(1, "Cuts between gradient steps.", least=1)
-    learning_rate: float = _option(1e-4, "Of Adam.", least=0)
-    temperature: float = _option(
+    iterations: int = option(1_000_000, "Cuts made, each followed by learning (paper: 1e6).", least=1)
+    warmup: int = option(10_000, "First cuts, made at random without learning (paper: 1e4).", least=0)
+    batch: int = option(256, "Transitions a gradient step.", least=1)
+    learn_every: int = option(1, "Cuts between gradient steps.", least=1)
+    learning_rate: float = option(1e-4, "Of Adam.", least=0)
+    temperature: float = option(
         5.0, "Of the Boltzmann policy and the soft value, in rewards; 0 is plain Q-learning.", least=0
     )
-    discount: str = _option(
+    discount: str = option(
         "hull",
         "What the values of the sides are weighted by: their share of the hull volume (paper, eq. 9), or a constant.",
         one_of=("hull", "static"),
     )
-    static_discount: float = _option(0.99, "That constant, for each side.", least=0, most=1)
-    value_bound: bool = _option(
+    static_discount: float = option(0.99, "That constant, for each side.", least=0, most=1)
+    value_bound: bool = option(
         False,
         "Bound values by what can still be earned: hull volume, finishing, less one cut's cost (not paper).",
     )
-    target_every: int = _option(1000, "Gradient steps between copies to the target network.", least=1)
-    epsilon: float = _option(0.2, "Share of random cuts at first (paper).", least=0, most=1)
-    epsilon_decay: float = _option(0.99, "Factor on it every 1000 cuts (paper).", least=0, most=1)
-    replay: int = _option(100_000, "Transitions kept (paper).", least=1)
-    priority: float = _option(0.0, "Exponent of prioritised replay; 0 draws uniformly (paper).", least=0, most=1)
-    priority_correction: float = _option(0.4, "Exponent of its importance weights.", least=0, most=1)
+    target_every: int = option(1000, "Gradient steps between copies to the target network.", least=1)
+    epsilon: float = option(0.2, "Share of random cuts at first (paper).", least=0, most=1)
+    epsilon_decay: float = option(0.99, "Factor on it every 1000 cuts (paper).", least=0, most=1)
+    replay: int = option(100_000, "Transitions kept (paper).", least=1)
+    priority: float = option(0.0, "Exponent of prioritised replay; 0 draws uniformly (paper).", least=0, most=1)
+    priority_correction: float = option(0.4, "Exponent of its importance weights.", least=0, most=1)
 
     # The run
-    seed: int = _option(0, "The same seed, meshes and options give the same weights on CPU.", least=0, most=2**63 - 1)
-    environments: int = _option(4, "Solids cut side by side.", least=1, most=4096)
-    workers: int = _option(0, "Processes they are spread over; 0 cuts in the training process.", least=0, most=1024)
-    threads: int = _option(1, "Threads of the training process.", least=1, most=1024)
-    device: str = _option("auto", "cpu, cuda, or auto: a GPU when there is one.", one_of=("auto", "cpu", "cuda"))
-    log_every: int = _option(500, "Cuts between points of the curves.", least=1)
-    validate_every: int = _option(10_000, "Cuts between validations.", least=1)
-    validation: int = _option(16, "Meshes held out for validation.", least=0)
-    checkpoint_seconds: float = _option(300.0, "Seconds between checkpoints.", least=0)
+    seed: int = option(0, "The same seed, meshes and options give the same weights on CPU.", least=0, most=2**63 - 1)
+    environments: int = option(4, "Solids cut side by side.", least=1, most=4096)
+    workers: int = option(0, "Processes they are spread over; 0 cuts in the training process.", least=0, most=1024)
+    threads: int = option(1, "Threads of the training process.", least=1, most=1024)
+    device: str = option("auto", "cpu, cuda, or auto: a GPU when there is one.", one_of=("auto", "cpu", "cuda"))
+    log_every: int = option(500, "Cuts between points of the curves.", least=1)
+    validate_every: int = option(10_000, "Cuts between validations.", least=1)
+    validation: int = option(16, "Meshes held out for validation.", least=0)
+    checkpoint_seconds: float = option(300.0, "Seconds between checkpoints.", least=0)
 
     def __post_init__(self) -> None:
-        for option in dataclasses.fields(self):
-            given = getattr(self, option.name)
-            kind = type(option.default)
-            ok = isinstance(given, kind) if kind is not float else isinstance(given, (int, float))
-            if not ok or (kind is not bool and isinstance(given, bool)):
-                raise OptionError(f"{option.name} is {given!r}; it has to be of type {kind.__name__}.")
-            if kind in (int, float) and not option.metadata["least"] <= given <= option.metadata["most"]:
-                raise OptionError(
-                    f"{option.name} is {given!r}; it has to be between {option.metadata['least']} "
-                    f"and {option.metadata['most']}."
-                )
-            if option.metadata["one_of"] and given not in option.metadata["one_of"]:
-                raise OptionError(
-                    f"{option.name} is {given!r}; it has to be one of {', '.join(option.metadata['one_of'])}."
-                )
+        check_fields(self)
         if self.workers > self.environments:
             raise OptionError(f"workers is {self.workers}; it has to be at most environments, {self.environments}.")
         if self.discount == "hull" and not math.isfinite(self.volume_reward + self.finish_reward):
@@ -124,9 +108,7 @@ class TrainOptions:
         """
         if name not in PRESETS:
             raise OptionError(f"preset is {name!r}; it has to be one of {', '.join(PRESETS)}.")
-        known = {option.name for option in dataclasses.fields(cls)}
-        for unknown in sorted(set(changes) - known):
-            raise OptionError(f"there is no option {unknown!r}; see `rlacd train --help`.")
+        refuse_unknown(cls, changes, "train")
         return cls(**{**PRESETS[name], **changes})
 
 
@@ -142,7 +124,7 @@ _TWO_CORES: Mapping[str, Any] = {
 
 PRESETS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
     {
-        "paper": {},
+        "paper": {"encoder": "i2p-mae"},
         "two-cores": _TWO_CORES,
         "counting": {
             **_TWO_CORES,

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd.errors import RlacdError
-from rlacd.learn.observe import Float32Array
 from rlacd.learn.sumtree import SumTree
+from rlacd.policies.observe import Float32Array
 from rlacd.solid.arrays import BoolArray
 
 LEAST_PRIORITY = 1e-3

@@ -23,17 +23,18 @@ from rlacd.learn.actor import Described, Step
 from rlacd.learn.actors import ActorSetting, make_actors
 from rlacd.learn.checkpoint import Checkpoint, adam_state, load_checkpoint, restore_adam, save_checkpoint
 from rlacd.learn.curves import Curves
-from rlacd.learn.encoders import make_encoder
+from rlacd.learn.device import pick_device
+from rlacd.learn.encoders import AnyEncoder, I2PMAEEncoder, make_encoder
 from rlacd.learn.export import export_policy
 from rlacd.learn.loss import bellman_loss, boltzmann, dual_state_target, soft_value
 from rlacd.learn.mdp import Reward
 from rlacd.learn.meshes import MeshList, Solids, list_meshes
-from rlacd.learn.observe import SCALE_INPUTS
 from rlacd.learn.options import TrainOptions
 from rlacd.learn.qnetwork import PLANES, QNetwork
 from rlacd.learn.replay import Replay
 from rlacd.learn.validate import Score, count_parts, torch_policy
 from rlacd.policies import Greedy
+from rlacd.policies.observe import SCALE_INPUTS
 
 Say = Callable[[str], None]
 
@@ -69,12 +70,13 @@ def train(meshes: Path, run: Path, options: TrainOptions, *, resume: bool = Fals
     checkpoint = load_checkpoint(run / "checkpoint")
     if checkpoint is not None and not resume:
         raise OptionError(f"{run} holds a run already; use --resume to go on with it, or another folder.")
+    encoder = _encoder(options)
     listed = _mesh_list(meshes, run, options)
     say(
         f"{len(listed.training)} meshes to learn on, {len(listed.validation)} to validate with; "
         f"{listed.unreadable} cannot be read, {listed.too_large} are too large"
     )
-    training = Training(meshes, run, options, listed, say)
+    training = Training(meshes, run, options, listed, encoder, say)
     try:
         if checkpoint is None:
             training.begin()
@@ -90,12 +92,14 @@ def train(meshes: Path, run: Path, options: TrainOptions, *, resume: bool = Fals
 class Training:
     """The state of a run, and the loop."""
 
-    def __init__(self, meshes: Path, run: Path, options: TrainOptions, listed: MeshList, say: Say) -> None:
+    def __init__(
+        self, meshes: Path, run: Path, options: TrainOptions, listed: MeshList, encoder: AnyEncoder, say: Say
+    ) -> None:
         self.options = options
         self.folder = run
         self.say = say
-        self.device = _device(options.device)
-        self.encoder = make_encoder(options.encoder)
+        self.device = pick_device(options.device)
+        self.encoder = encoder
         self.inputs = self.encoder.dim + (SCALE_INPUTS if options.scale_input else 0)
         self.unit = max(options.volume_reward, options.finish_reward, 10 * options.cut_cost, 1e-9)
         torch.manual_seed(options.seed)
@@ -257,6 +261,7 @@ class Training:
         weights |= adam_state(self.optimizer)
         state = {
             "options": dataclasses.asdict(self.options),
+            "encoder": _digest(self.encoder),
             "cuts": self.cuts,
             "learned": self.learned,
             "seconds": self.seconds,
@@ -273,6 +278,11 @@ class Training:
         """Go back to where a checkpoint was written."""
         state = checkpoint.state
         _require_same_options(state["options"], self.options)
+        if state.get("encoder", "") != _digest(self.encoder):
+            raise OptionError(
+                f"{self.options.encoder_weights} holds other weights than the run began with; give the same "
+                "--encoder-weights, or begin another run."
+            )
         for name, network in (("network.", self.network), ("target.", self.target)):
             network.load_state_dict({k[len(name) :]: v for k, v in checkpoint.weights.items() if k.startswith(name)})
         restore_adam(self.optimizer, checkpoint.weights)
@@ -294,7 +304,7 @@ class Training:
             self._save_weights("best.safetensors")
         network = QNetwork(self.inputs, self.unit)
         network.load_state_dict(load_file(best))
-        return export_policy(self.folder / "policy.onnx", make_encoder(self.options.encoder), network, self.options)
+        return export_policy(self.folder / "policy.onnx", self.encoder, network, self.options)
 
     def close(self) -> None:
         """End the actors and the curves."""
@@ -327,9 +337,27 @@ class Training:
 
 
 MAY_CHANGE = frozenset(
-    {"iterations", "checkpoint_seconds", "log_every", "validate_every", "device", "workers", "threads"}
+    {
+        "iterations",
+        "checkpoint_seconds",
+        "log_every",
+        "validate_every",
+        "device",
+        "workers",
+        "threads",
+        "encoder_weights",
+    }
 )
-"""Options that a resumed run may be given anew: how long it goes on, what it tells, and where it runs."""
+"""Options that a resumed run may be given anew: how long it goes on, what it tells, where it and its files are."""
+
+
+def _encoder(options: TrainOptions) -> AnyEncoder:
+    return make_encoder(options.encoder, options.encoder_weights, pick_device(options.device))
+
+
+def _digest(encoder: AnyEncoder) -> str:
+    """Identify an encoder's weights; those without a file always have the same."""
+    return encoder.digest() if isinstance(encoder, I2PMAEEncoder) else ""
 
 
 def _require_same_options(before: dict[str, Any], now: TrainOptions) -> None:
@@ -360,14 +388,6 @@ def _mesh_list(meshes: Path, run: Path, options: TrainOptions) -> MeshList:
 def _draw(chances: np.ndarray, rng: np.random.Generator) -> int:
     accumulated = np.cumsum(chances)
     return int(np.searchsorted(accumulated, rng.random() * accumulated[-1], side="right"))
-
-
-def _device(name: str) -> torch.device:
-    if name == "cuda" and not torch.cuda.is_available():
-        raise OptionError("device is 'cuda', but torch finds no GPU; use cpu, or install torch for CUDA.")
-    if name == "auto":
-        name = "cuda" if torch.cuda.is_available() else "cpu"
-    return torch.device(name)
 
 
 __all__: Sequence[str] = ("Training", "train")

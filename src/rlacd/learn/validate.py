@@ -13,11 +13,11 @@ from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.finish import drop_slivers, merge_parts
 from rlacd.learn.encoders import Encoder, describe
-from rlacd.learn.observe import Float32Array, Observation
 from rlacd.learn.options import TrainOptions
 from rlacd.learn.qnetwork import QNetwork
-from rlacd.learn.qpolicy import QPolicy
 from rlacd.policies import Policy
+from rlacd.policies.observe import Float32Array, Observation
+from rlacd.policies.qpolicy import QPolicy
 from rlacd.solid.component import Component
 from rlacd.workers import Workers
 

@@ -4,6 +4,7 @@ from rlacd.planes.views import Views
 from rlacd.policies.greedy import SCORES, Greedy
 from rlacd.policies.navacd import CONCAVE_EDGES, NavACD
 from rlacd.policies.policy import Policy
+from rlacd.policies.qpolicy import QPolicy
 
 EDGES = "+edges"
 
@@ -32,7 +33,8 @@ def make_policy(name: str, views: Views | None = None, scale: float | None = Non
     volumes; ``greedy-SCORE`` takes the one with the least SCORE of the 150 alone, ``greedy-SCORE+edges`` of the 150 and
     those of the edges (SCORE ``hull-sum`` is the paper's baseline); ``navacd`` takes the least sum of hull volumes of
     three planes and those of four concave edges; ``learned``, or the path of an ONNX file, ranks all these planes by
-    the parts that the component is expected to end in.
+    the parts that the component is expected to end in. Where that file is a Q network, as ``rlacd train`` exports it,
+    the paper's rule holds instead: of the network's ten best planes and those of four concave edges the least sum.
 
     Parameters
     ----------
@@ -53,6 +55,12 @@ def make_policy(name: str, views: Views | None = None, scale: float | None = Non
         return Greedy(views=views)
     if name == "navacd":
         return NavACD()
+    if name.endswith(WEIGHTS_ENDING):
+        from rlacd.policies.q_network import load_q_network
+
+        q_network = load_q_network(name)
+        if q_network is not None:
+            return QPolicy.deployed(q_network, scale)
     if name == "learned" or name.endswith(WEIGHTS_ENDING):
         from rlacd.policies.learned import Learned  # onnxruntime takes a while to import
 

@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rlacd.learn.observe import Float32Array, Observation, candidates_of, observe
 from rlacd.planes.candidates import Candidates
 from rlacd.planes.concave_edges import concave_edge_planes
 from rlacd.planes.sweep import sweep
 from rlacd.policies.greedy import cheapest, hull_sum
+from rlacd.policies.navacd import CONCAVE_EDGES
+from rlacd.policies.observe import Float32Array, Observation, candidates_of, observe
 from rlacd.solid.component import Component, Plane
+
+if TYPE_CHECKING:
+    from rlacd.policies.q_network import OnnxQ  # onnxruntime takes a while to import
+
+SHORTLIST = 10
+"""Planes of greatest value among which the paper takes the one with the least sum of hull volumes."""
 
 QFunction = Callable[[Observation], Float32Array]
 """Values [150] of the planes of an observed component."""
@@ -24,7 +32,7 @@ class QPolicy:
     Parameters
     ----------
     values : callable
-        The Q network: in torch (`rlacd.learn.validate`) or as exported (`rlacd.learn.export.OnnxQ`).
+        The Q network: in torch (`rlacd.learn.validate`) or as exported (`rlacd.policies.q_network.OnnxQ`).
     threshold : float
         The criterion's.
     points : int
@@ -43,6 +51,12 @@ class QPolicy:
         self._points = points
         self._shortlist = shortlist
         self._concave_edges = concave_edges
+
+    @classmethod
+    def deployed(cls, network: OnnxQ, scale: float | None = None) -> QPolicy:
+        """Use an exported network as the paper does; `scale` is the criterion's length, if it has one."""
+        threshold = network.threshold if scale is None else scale
+        return cls(network, threshold, network.points, SHORTLIST, CONCAVE_EDGES)
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None when no candidate is valid."""

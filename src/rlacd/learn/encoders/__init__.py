@@ -1,0 +1,18 @@
+"""What describes a component to the Q network: an encoder by name, and the features it gives."""
+
+from rlacd.learn.encoders.encoder import Encoder, describe
+from rlacd.learn.encoders.i2p_mae import I2PMAEEncoder
+from rlacd.learn.encoders.named import I2P_MAE, AnyEncoder, make_encoder
+from rlacd.learn.encoders.pointnet import PointNetEncoder
+from rlacd.learn.encoders.profile import ProfileEncoder
+
+__all__ = [
+    "I2P_MAE",
+    "AnyEncoder",
+    "Encoder",
+    "I2PMAEEncoder",
+    "PointNetEncoder",
+    "ProfileEncoder",
+    "describe",
+    "make_encoder",
+]

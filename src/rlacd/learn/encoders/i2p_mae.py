@@ -1,0 +1,287 @@
+"""I2P-MAE's point encoder, the paper's F(m): a pyramid of transformers over ever fewer, ever wider point groups.
+
+Source: Zhang et al., "Learning 3D Representations from 2D Pre-trained Models via Image-to-Point Masked Autoencoders",
+CVPR 2023; the pyramid is Point-M2AE's (NeurIPS 2022). Parameters are named as in the published checkpoint.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from collections import OrderedDict
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor, nn
+
+from rlacd.errors import OptionError, WeightsError
+from rlacd.learn.encoders.point_groups import farthest_points, gather, nearest_points
+from rlacd.learn.encoders.transformer import Blocks, position_embedding
+from rlacd.learn.encoders.weights_file import load_weights
+
+REMEMBERED = 8192
+"""Components whose features are kept: the same solids come back in every episode and validation."""
+
+SCALES = 3
+
+LARGEST = 65536
+"""No size is larger than this."""
+
+AT_ONCE = 16
+"""Components encoded side by side on a GPU."""
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """The sizes of the pyramid, finest scale first; the defaults are those of the published checkpoint.
+
+    Attributes
+    ----------
+    groups, neighbors, widths : tuple of int
+        Per scale: point groups, members of each, and channels of its token.
+    depth, heads : int
+        Transformer blocks of a scale, and heads of each.
+    embedding : int
+        Channels a point has within its group, before the group becomes a token.
+    """
+
+    groups: tuple[int, ...] = (512, 256, 64)
+    neighbors: tuple[int, ...] = (16, 8, 8)
+    widths: tuple[int, ...] = (96, 192, 384)
+    depth: int = 5
+    heads: int = 6
+    embedding: int = 256
+
+    @classmethod
+    def from_plain(cls, plain: Mapping[str, Any]) -> Sizes:
+        """Make them of plain JSON values; what is not given is as published.
+
+        Raises
+        ------
+        ValueError
+            They are no sizes of an encoder.
+        """
+        known = {field.name for field in dataclasses.fields(cls)}
+        given: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in plain.items()}
+        sizes = cls(**given) if set(given) <= known else None
+        if sizes is None or not sizes._possible():
+            raise ValueError("its sizes are damaged")
+        return sizes
+
+    def _possible(self) -> bool:
+        lists, numbers = (self.groups, self.neighbors, self.widths), (self.depth, self.heads, self.embedding)
+        if not all(isinstance(values, tuple) and len(values) == SCALES for values in lists):
+            return False
+        if not all(type(n) is int and 1 <= n <= LARGEST for n in (*sum(lists, ()), *numbers)) or self.embedding < 2:
+            return False
+        above = zip(self.groups, self.groups[1:], self.neighbors[1:], strict=False)
+        if not all(count <= before and members <= before for before, count, members in above):
+            return False
+        return all(width % self.heads == 0 for width in self.widths)
+
+
+SIZES: Mapping[str, Sizes] = MappingProxyType(
+    {
+        "published": Sizes(),
+        "small": Sizes((256, 128, 32), (16, 8, 8), (48, 96, 192), depth=2, heads=6, embedding=64),
+        "tiny": Sizes((32, 16, 8), (8, 4, 4), (12, 24, 48), depth=1, heads=2, embedding=16),
+    }
+)
+"""Named sizes: the paper's, one for a processor, one to try things out."""
+
+
+class GroupEmbedding(nn.Module):
+    """A shared MLP over the members of a group, with the group's maximum told to each, and its maximum in the end."""
+
+    def __init__(self, inputs: int, first: int, inner: int, second: int, outputs: int) -> None:
+        super().__init__()
+        self.first_conv = _shared_mlp(inputs, first, inner)
+        self.second_conv = _shared_mlp(2 * inner, second, outputs)
+
+    def forward(self, members: Tensor) -> Tensor:
+        """Tokens [M, C'] of groups [M, K, C]."""
+        groups, size, _ = members.shape
+        first, second = _matrix(self.first_conv[0]), _matrix(self.second_conv[0])
+        inner = _rest(self.first_conv, F.linear(members.flatten(0, 1), *first)).reshape(groups, size, -1)
+        # The second layer sees (group's maximum, member). It is linear: the maximum's half is computed once a group.
+        of_group, of_member = second[0].chunk(2, dim=1)
+        hidden = F.linear(inner, of_member) + F.linear(inner.amax(dim=1), of_group, second[1])[:, None]
+        return _rest(self.second_conv, hidden.flatten(0, 1)).reshape(groups, size, -1).amax(dim=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Scale:
+    """The point groups of one scale.
+
+    Attributes
+    ----------
+    centers : float32 [B, G, 3]
+    members : int64 [B, G, K]
+        Indices of the nearest centres of the scale before (of points, in the first).
+    offsets : float32 [B, G, K, 3]
+        Where they lie, seen from the centre.
+    """
+
+    centers: Tensor
+    members: Tensor
+    offsets: Tensor
+
+
+def seen_below(scales: list[Scale], top: Tensor) -> list[Tensor]:
+    """Tell for every scale which groups are seen, 1 or 0 [B, G], by those of the last scale that are.
+
+    A group is seen when it is a member of a seen group of the next scale; the others are not attended to, in use just
+    as in pretraining. In use all groups of the last scale are seen, but now and then one of a finer scale is nobody's
+    member: the published weights never met it.
+    """
+    seen = [top]
+    for below, above in pairwise(reversed(scales)):
+        of_members = seen[0][:, :, None].expand(below.members.shape).flatten(1)
+        hidden = top.new_zeros(above.centers.shape[:2])
+        seen.insert(0, hidden.scatter_reduce(1, below.members.flatten(1), of_members, "amax"))
+    return seen
+
+
+class HierarchicalEncoder(nn.Module):
+    """The pyramid; what it does is in `I2PMAEEncoder.features`, with parts hidden in `rlacd.learn.pretrain`."""
+
+    def __init__(self, sizes: Sizes) -> None:
+        super().__init__()
+        self.sizes = sizes
+        inner = sizes.embedding
+        embeddings = [GroupEmbedding(3, inner // 2, inner, 2 * inner, sizes.widths[0])]
+        for before, width in pairwise(sizes.widths):
+            embeddings.append(GroupEmbedding(before, before, before, width, width))
+        self.token_embed = nn.ModuleList(embeddings)
+        self.encoder_pos_embeds = nn.ModuleList(position_embedding(width) for width in sizes.widths)
+        self.encoder_blocks = nn.ModuleList(Blocks(width, sizes.heads, sizes.depth) for width in sizes.widths)
+        self.encoder_norms = nn.ModuleList(nn.LayerNorm(width) for width in sizes.widths)
+
+    def pyramid(self, points: Tensor) -> list[Scale]:
+        """Group points [B, N, 3]; each scale's centres are chosen among the centres of the one before."""
+        scales = []
+        for count, size in zip(self.sizes.groups, self.sizes.neighbors, strict=True):
+            centers = gather(points, farthest_points(points, count))
+            members = nearest_points(points, centers, size)
+            scales.append(Scale(centers, members, gather(points, members) - centers[:, :, None]))
+            points = centers
+        return scales
+
+    def forward(self, points: Tensor) -> Tensor:
+        """Tokens [B, G, C] of the last scale of points [B, N, 3]."""
+        scales = self.pyramid(points)
+        top = points.new_ones(scales[-1].centers.shape[:2])
+        tokens: Tensor | None = None
+        for i, (scale, seen) in enumerate(zip(scales, seen_below(scales, top), strict=True)):
+            members = scale.offsets if tokens is None else gather(tokens, scale.members)
+            batch, groups = members.shape[:2]
+            embedded = self.token_embed[i](members.flatten(0, 1)).reshape(batch, groups, -1)
+            positions = self.encoder_pos_embeds[i](scale.centers)
+            tokens = self.encoder_blocks[i](embedded, positions, seen[:, None, None] > 0)
+        normed: Tensor = self.encoder_norms[-1](tokens)
+        return normed
+
+
+class I2PMAEEncoder(nn.Module):
+    """The frozen encoder: 384 features of a component and 384 of its hull.
+
+    Parameters
+    ----------
+    sizes : Sizes
+    """
+
+    def __init__(self, sizes: Sizes = SIZES["published"]) -> None:
+        super().__init__()
+        self.sizes = sizes
+        self.dim = 2 * sizes.widths[-1]
+        self.h_encoder = HierarchicalEncoder(sizes)
+        self._known: OrderedDict[bytes, Tensor] = OrderedDict()
+        self.eval().requires_grad_(False)
+
+    @classmethod
+    def from_checkpoint(cls, path: str | Path) -> I2PMAEEncoder:
+        """Read the published checkpoint (``.pth``), or weights that ``rlacd pretrain`` made (``.safetensors``).
+
+        Only tensors are read, never arbitrary pickle; what the file holds beside the encoder is left alone.
+
+        Raises
+        ------
+        WeightsError
+            The file is missing, damaged, or not of this encoder: the first parameter that is missing is named.
+        """
+        weights = load_weights(Path(path))
+        try:
+            sizes = Sizes.from_plain(weights.sizes)
+        except ValueError as error:
+            raise WeightsError(f"{path} is no file of weights: {error}; make it again.") from error
+        encoder = cls(sizes)
+        encoder.load_state_dict(weights.fitted(encoder.state_dict()))
+        return encoder
+
+    def features(self, clouds: Tensor) -> Tensor:
+        """Describe point clouds as they are: float32 [B, N, 3] to [B, 384]."""
+        if clouds.shape[1] < self.sizes.groups[0]:
+            raise OptionError(
+                f"there are {clouds.shape[1]} points; this encoder needs at least {self.sizes.groups[0]} (--points)."
+            )
+        tokens: Tensor = self.h_encoder(clouds)
+        return tokens.amax(dim=1)
+
+    def forward(self, points: Tensor, directions: Tensor) -> Tensor:
+        """See `Encoder.encode`; the directions are not looked at.
+
+        Component and hull are brought into the unit ball together, since the clouds of the pretraining fill it.
+        """
+        batch, _, count, _ = points.shape
+        radius = points.square().sum(-1).amax(dim=(1, 2)).sqrt().clamp_min(1e-12)
+        clouds = (points / radius[:, None, None, None]).reshape(2 * batch, count, 3)
+        return self.features(clouds).reshape(batch, self.dim)
+
+    def encode(self, points: Tensor, directions: Tensor) -> Tensor:
+        """See `Encoder.encode`; features come back on the processor, and are remembered.
+
+        On a processor components are encoded one by one: what is known already, or comes along in the same call, then
+        changes no bit.
+        """
+        device = next(self.parameters()).device
+        at_once = 1 if device.type == "cpu" else AT_ONCE
+        keys = [hashlib.sha256(cloud.cpu().contiguous().numpy().tobytes()).digest() for cloud in points]
+        unknown = list({key: i for i, key in enumerate(keys) if key not in self._known}.values())
+        for first in range(0, len(unknown), at_once):
+            rows = unknown[first : first + at_once]
+            found = self(points[rows].to(device), directions[rows].to(device)).cpu()
+            self._known.update(zip((keys[i] for i in rows), found, strict=True))
+        for key in keys:
+            self._known.move_to_end(key)
+        features = torch.stack([self._known[key] for key in keys])
+        while len(self._known) > REMEMBERED:
+            self._known.popitem(last=False)
+        return features
+
+    def digest(self) -> str:
+        """Identify sizes and weights, wherever they are and whatever file they came from."""
+        found = hashlib.sha256(repr(dataclasses.astuple(self.sizes)).encode())
+        for name, value in sorted(self.state_dict().items()):
+            found.update(name.encode() + value.cpu().contiguous().numpy().tobytes())
+        return found.hexdigest()
+
+
+def _shared_mlp(inputs: int, inner: int, outputs: int) -> nn.Sequential:
+    return nn.Sequential(nn.Conv1d(inputs, inner, 1), nn.BatchNorm1d(inner), nn.ReLU(), nn.Conv1d(inner, outputs, 1))
+
+
+def _matrix(layer: nn.Module) -> tuple[Tensor, Tensor | None]:
+    """Weight and bias of a convolution of width one, to apply to rows: much faster than to sequences of K."""
+    assert isinstance(layer, nn.Conv1d)
+    return layer.weight[:, :, 0], layer.bias
+
+
+def _rest(mlp: nn.Sequential, hidden: Tensor) -> Tensor:
+    """What follows a shared MLP's first layer."""
+    return F.linear(F.relu(mlp[1](hidden), inplace=True), *_matrix(mlp[3]))

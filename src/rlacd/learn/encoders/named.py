@@ -1,0 +1,52 @@
+"""Encoders by the names that the command line knows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import torch
+
+from rlacd.errors import OptionError
+from rlacd.learn.encoders.i2p_mae import I2PMAEEncoder
+from rlacd.learn.encoders.pointnet import PointNetEncoder
+from rlacd.learn.encoders.profile import ProfileEncoder
+
+AnyEncoder = ProfileEncoder | PointNetEncoder | I2PMAEEncoder
+
+I2P_MAE = "i2p-mae"
+
+PUBLISHED = "https://github.com/ZrrSkywalker/I2P-MAE"
+
+
+def make_encoder(name: str, weights: str | Path = "", device: torch.device | str = "cpu") -> AnyEncoder:
+    """Build the encoder called `name`.
+
+    Parameters
+    ----------
+    name : str
+        ``profile``, ``pointnet`` or ``i2p-mae``.
+    weights : path
+        For ``i2p-mae``: the published checkpoint, or a file made by ``rlacd pretrain``.
+    device : torch.device
+        Where ``i2p-mae`` runs; the light ones stay where the points are.
+
+    Raises
+    ------
+    OptionError
+        There is none of this name, it needs weights and has none, or has no use for them.
+    WeightsError
+        The file of weights cannot be used.
+    """
+    if name == I2P_MAE:
+        if not str(weights):
+            raise OptionError(
+                f"encoder {I2P_MAE} needs weights: give --encoder-weights FILE, the pre-trained checkpoint that "
+                f"{PUBLISHED} links to or one that `rlacd pretrain` makes of your meshes, or use --encoder profile, "
+                "which needs none."
+            )
+        return I2PMAEEncoder.from_checkpoint(weights).to(device)
+    if name not in ("profile", "pointnet"):
+        raise OptionError(f"encoder is {name!r}; it has to be profile, pointnet or {I2P_MAE}.")
+    if str(weights):
+        raise OptionError(f"encoder {name} takes no weights; leave --encoder-weights out, or use --encoder {I2P_MAE}.")
+    return ProfileEncoder() if name == "profile" else PointNetEncoder()

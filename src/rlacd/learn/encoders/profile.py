@@ -1,0 +1,43 @@
+"""The light default: how component and hull are spread along the candidate planes' own directions."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+SLABS = 26
+"""Slabs between and beyond the 25 planes along each direction."""
+
+
+class ProfileEncoder(nn.Module):
+    """How component and hull are spread along the candidate planes' own directions; nothing learned.
+
+    Along each of the 6 directions the extent is divided into the 26 slabs that the 25 planes bound. Per slab: the share
+    of the component's surface in it, the same of the hull's, and the root mean square distance of both from the middle
+    of the component's box across the direction. A plane between two slabs that differ much is a promising cut; a slab
+    where component and hull agree is convex there. This is the light default: features line up with the planes that
+    the values are asked for, which an order-free set encoder first has to learn (docs/experiments.md compares).
+    """
+
+    dim = 6 * SLABS * 4
+
+    def forward(self, points: Tensor, directions: Tensor) -> Tensor:
+        """See `Encoder.encode`."""
+        batch, surfaces, count, _ = points.shape
+        heights = torch.einsum("bsnc,bdc->bsdn", points, directions)
+        lower = heights.amin(dim=(1, 3), keepdim=True)
+        extent = heights.amax(dim=(1, 3), keepdim=True) - lower
+        slab = ((heights - lower) * (SLABS / extent.clamp_min(1e-12))).long().clamp(0, SLABS - 1)
+        # |x|^2 - (n.x)^2 is the squared distance from the axis through the centre.
+        across = (points.square().sum(-1)[:, :, None] - heights.square()).clamp_min(0)
+        empty = heights.new_zeros(batch, surfaces, 6, SLABS)
+        number = empty.scatter_add(3, slab, torch.ones_like(heights))
+        spread = empty.scatter_add(3, slab, across)
+        share = number * (SLABS / count)
+        distance = (spread / number.clamp_min(1)).sqrt()
+        return torch.stack([share, distance], dim=2).transpose(1, 3).reshape(batch, self.dim)
+
+    def encode(self, points: Tensor, directions: Tensor) -> Tensor:
+        """See `Encoder.encode`."""
+        features: Tensor = self(points, directions)
+        return features

@@ -1,0 +1,134 @@
+"""Files of encoder weights: the published checkpoint, and our own; read as tensors, never as arbitrary pickle."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+from torch import Tensor
+
+from rlacd.errors import OutputError, WeightsError
+
+METADATA = "rlacd"
+"""Key of a safetensors file's metadata under which our own JSON stands."""
+
+WRAPPERS = ("base_model", "model", "state_dict")
+"""Entries under which checkpoints keep the state; the published one has the first."""
+
+FIRST = "h_encoder.token_embed.0.first_conv.0.weight"
+"""The first parameter of the encoder."""
+
+HARMLESS = [np.dtype, np.dtypes.Float64DType, np.dtypes.Float32DType, np.dtypes.Int64DType]
+"""Kinds of numpy numbers, which checkpoints hold as their score; beyond torch's own list nothing else is let in."""
+
+
+@dataclass(frozen=True)
+class Weights:
+    """What a file holds.
+
+    Attributes
+    ----------
+    path : Path
+    state : dict of Tensor
+    sizes : dict
+        The sizes that the file states; none in the published one.
+    """
+
+    path: Path
+    state: Mapping[str, Tensor]
+    sizes: Mapping[str, Any]
+
+    def fitted(self, expected: Mapping[str, Tensor]) -> dict[str, Tensor]:
+        """Get the tensors that an encoder expects.
+
+        Raises
+        ------
+        WeightsError
+            The first that is missing, of another shape, or not finite.
+        """
+        for name, wanted in expected.items():
+            found = self.state.get(name)
+            if found is None:
+                raise WeightsError(
+                    f"{self.path} is no I2P-MAE checkpoint: {name} is missing; give the published pre-trained file, "
+                    "or one made by `rlacd pretrain`."
+                )
+            if found.shape != wanted.shape:
+                raise WeightsError(
+                    f"{self.path} is no I2P-MAE checkpoint of this size: {name} has shape {list(found.shape)}, "
+                    f"not {list(wanted.shape)}."
+                )
+            if not torch.isfinite(found).all():
+                raise WeightsError(f"{self.path} is damaged: {name} holds values that are not finite.")
+        return {name: self.state[name].to(wanted.dtype) for name, wanted in expected.items()}
+
+
+def load_weights(path: Path) -> Weights:
+    """Read a file of weights; keys may stand below ``base_model`` and begin with ``module.``.
+
+    Raises
+    ------
+    WeightsError
+        The file is missing, damaged, or holds something else than tensors by name.
+    """
+    if not path.is_file():
+        raise WeightsError(f"there is no file {path}; give the weights that --encoder-weights shall read.")
+    try:
+        state, sizes = _read_safetensors(path) if path.suffix == ".safetensors" else (_read_torch(path), {})
+    except (SafetensorError, pickle.UnpicklingError, RuntimeError, ValueError, EOFError, KeyError, OSError) as error:
+        reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:160].rstrip(".")
+        raise WeightsError(
+            f"{path} is damaged, cut short or no file of weights ({reason}): {FIRST} and all that should follow it are "
+            "missing; fetch or make it again."
+        ) from error
+    return Weights(path, {name.removeprefix("module."): value for name, value in state.items()}, sizes)
+
+
+def save_weights(path: Path, state: Mapping[str, Tensor], about: Mapping[str, Any]) -> None:
+    """Write a safetensors file as a whole; `about` goes into its metadata as JSON, ``about["sizes"]`` is read back.
+
+    Raises
+    ------
+    OutputError
+        It cannot be written.
+    """
+    partial = path.with_name(path.name + ".new")
+    try:
+        save_file({name: value.detach().cpu().contiguous() for name, value in state.items()}, partial, _metadata(about))
+        partial.chmod(0o644)  # it is written for its owner only
+        partial.replace(path)
+    except (OSError, SafetensorError) as error:
+        raise OutputError(f"{path} cannot be written ({error}); choose another place.") from error
+
+
+def _metadata(about: Mapping[str, Any]) -> dict[str, str]:
+    return {METADATA: json.dumps(about, sort_keys=True)}
+
+
+def _read_safetensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
+    with safe_open(path, "pt") as file:
+        about = json.loads((file.metadata() or {}).get(METADATA, "{}"))
+        if not isinstance(about, dict) or not isinstance(about.get("sizes", {}), dict):
+            raise ValueError("its metadata are damaged")
+        return {name: file.get_tensor(name) for name in file.keys()}, about.get("sizes", {})  # noqa: SIM118
+
+
+def _read_torch(path: Path) -> dict[str, Tensor]:
+    scalar = np.float64(0).__reduce__()[0]
+    harmless: list[Any] = [*HARMLESS, *((scalar, f"numpy.{core}.multiarray.scalar") for core in ("core", "_core"))]
+    with torch.serialization.safe_globals(harmless):
+        held = torch.load(path, map_location="cpu", weights_only=True)
+    for wrapper in WRAPPERS:
+        if isinstance(held, dict) and isinstance(held.get(wrapper), dict):
+            held = held[wrapper]
+    if not isinstance(held, dict):
+        raise ValueError(f"it holds a {type(held).__name__}")
+    return {str(name): value for name, value in held.items() if isinstance(value, Tensor)}

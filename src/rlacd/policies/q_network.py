@@ -1,0 +1,110 @@
+"""A Q network with its encoder as one ONNX file, run by onnxruntime (`rlacd.learn.export` writes it)."""
+
+from __future__ import annotations
+
+import json
+import os
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import onnxruntime
+
+from rlacd.errors import WeightsError
+from rlacd.policies.observe import Float32Array, Observation
+
+KIND = "q"
+"""What the metadata of such a file say that it is."""
+
+INPUTS = ("points", "directions", "scale")
+
+OUTPUTS = ("values",)
+
+METADATA = "rlacd"
+"""Key of the metadata under which our own JSON stands."""
+
+
+class OnnxQ:
+    """An exported Q network on one thread: several components at a time share the processors already.
+
+    Parameters
+    ----------
+    path : path
+
+    Attributes
+    ----------
+    points : int
+        Points on each of the two surfaces that it was trained with.
+    threshold : float
+        Concavity that it was trained for.
+
+    Raises
+    ------
+    WeightsError
+        The file is missing, damaged, or no Q network of this version.
+    """
+
+    points: int
+    threshold: float
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        try:
+            self._session = _opened(path)
+        except OSError as error:
+            raise WeightsError(f"The policy {path} cannot be read ({error}); give another path.") from error
+        except Exception as error:  # onnxruntime's own exceptions have no public base
+            raise WeightsError(f"{path} is damaged or no ONNX file; export the policy again.") from error
+        signature = [
+            tuple(v.name for v in given) for given in (self._session.get_inputs(), self._session.get_outputs())
+        ]
+        about = _about(self._session)
+        if about.get("kind") != KIND or signature != [INPUTS, OUTPUTS]:
+            raise WeightsError(f"{path} is no Q network of rlacd; export the policy again.")
+        try:
+            self.points, self.threshold = int(about["points"]), float(about["threshold"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise WeightsError(f"The metadata of {path} are damaged; export the policy again.") from error
+
+    def run(self, points: Float32Array, directions: Float32Array, scale: Float32Array) -> Float32Array:
+        """Values [B, 150] of points [B, 2, N, 3], directions [B, 6, 3] and scale [B, 3]."""
+        given = dict(zip(INPUTS, (points, directions, scale), strict=True))
+        values: Float32Array = self._session.run(list(OUTPUTS), given)[0]
+        return values
+
+    def __call__(self, seen: Observation) -> Float32Array:
+        """Values [150] of one observed component."""
+        values: Float32Array = self.run(seen.points[None], seen.directions[None], seen.scale[None])[0]
+        return values
+
+
+@lru_cache(maxsize=2)
+def load_q_network(path: str) -> OnnxQ | None:
+    """Get the Q network of a file, the last two are kept; None where the file says that it is something else.
+
+    Raises
+    ------
+    WeightsError
+        It is a Q network, but not of this version.
+    """
+    try:
+        kind = _about(_opened(path, optimized=False)).get("kind")
+    except Exception:  # whoever else reads policies says what is wrong with the file
+        return None
+    return OnnxQ(path) if kind == KIND else None
+
+
+def _opened(path: str | os.PathLike[str], optimized: bool = True) -> onnxruntime.InferenceSession:
+    settings = onnxruntime.SessionOptions()
+    settings.intra_op_num_threads = settings.inter_op_num_threads = 1
+    settings.log_severity_level = 4
+    if not optimized:
+        settings.graph_optimization_level = onnxruntime.GraphOptimizationLevel.ORT_DISABLE_ALL
+    return onnxruntime.InferenceSession(Path(path).read_bytes(), settings, providers=["CPUExecutionProvider"])
+
+
+def _about(session: onnxruntime.InferenceSession) -> dict[str, Any]:
+    try:
+        about = json.loads(session.get_modelmeta().custom_metadata_map.get(METADATA, "{}"))
+    except ValueError:
+        return {}
+    return about if isinstance(about, dict) else {}

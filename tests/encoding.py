@@ -1,0 +1,40 @@
+"""Clouds, weights and trained networks of the I2P-MAE encoder, small enough for tests."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from rlacd.learn.encoders.i2p_mae import SIZES, I2PMAEEncoder
+from rlacd.learn.encoders.weights_file import save_weights
+
+TINY = SIZES["tiny"]
+
+
+def clouds(count: int, points: int = 128, seed: int = 0) -> torch.Tensor:
+    """Clouds [count, points, 3] in the unit ball, each of another shape."""
+    rng = np.random.default_rng(seed)
+    found = rng.standard_normal((count, points, 3)) * rng.uniform(0.2, 1, (count, 1, 3))
+    found /= np.linalg.norm(found, axis=2).max(axis=1)[:, None, None]
+    return torch.from_numpy(found.astype(np.float32))
+
+
+def tiny_encoder(seed: int = 0) -> I2PMAEEncoder:
+    """An encoder of the least size whose batch norms are no identities."""
+    torch.manual_seed(seed)
+    encoder = I2PMAEEncoder(TINY)
+    for name, value in encoder.state_dict().items():
+        if name.endswith("running_var"):
+            value.uniform_(0.5, 1.5)
+        elif name.endswith("running_mean"):
+            value.normal_(0, 0.1)
+    return encoder
+
+
+def write_tiny_weights(path: Path, seed: int = 0) -> Path:
+    """Its weights as a file."""
+    save_weights(path, tiny_encoder(seed).state_dict(), {"sizes": dataclasses.asdict(TINY)})
+    return path

@@ -1,0 +1,315 @@
+"""The I2P-MAE encoder: the official features to the digit, in torch and ONNX, and clear words about unusable files."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import cKDTree
+from typer.testing import CliRunner
+
+from rlacd.cli import app
+from rlacd.errors import OptionError, WeightsError
+
+pytest.importorskip("torch", reason="needs the extra train")
+
+import torch
+from safetensors.torch import save_file
+
+from rlacd.learn.encoders import Encoder, I2PMAEEncoder, describe, make_encoder
+from rlacd.learn.encoders.i2p_mae import HierarchicalEncoder, Sizes, seen_below
+from rlacd.learn.encoders.point_groups import farthest_points, gather, nearest_points
+from rlacd.planes.candidates import axis_and_principal
+from rlacd.policies.observe import observe
+from rlacd.solid.component import Component
+from tests.encoding import TINY, clouds, tiny_encoder, write_tiny_weights
+from tests.learning import small_solids, write_meshes
+
+
+@pytest.fixture(scope="session")
+def reference() -> Path:
+    """The folder of official features: $RLACD_I2P_MAE, or ../shared/i2p_mae beside the checkout."""
+    beside = Path(__file__).resolve().parents[2] / "shared" / "i2p_mae"
+    folder = Path(os.environ.get("RLACD_I2P_MAE", beside))
+    if not (folder / "reference_features.npz").is_file():
+        pytest.skip(f"no reference of the official encoder at {folder} (set RLACD_I2P_MAE)")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def stand_in(reference: Path) -> dict[str, torch.Tensor]:
+    """Weights of the published names and shapes."""
+    spec = importlib.util.spec_from_file_location("stand_in_weights", reference / "stand_in_weights.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    shapes = json.loads((reference / "parameter_shapes.json").read_text())
+    state = module.stand_in_state({name: tuple(shape) for name, shape in shapes.items()})
+    return {name: torch.from_numpy(np.asarray(value)) for name, value in state.items()}
+
+
+def published(state: dict[str, torch.Tensor], path: Path) -> Path:
+    """A checkpoint as it is published: wrapped, prefixed, and with more in it than the encoder."""
+    held = {f"module.{name}": value for name, value in state.items()} | {"module.h_decoder.0.bias": torch.zeros(3)}
+    torch.save({"base_model": held, "epoch": 300, "metrics": {"acc": np.float64(92.3)}}, path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def official(stand_in: dict[str, torch.Tensor], tmp_path_factory: pytest.TempPathFactory) -> I2PMAEEncoder:
+    return I2PMAEEncoder.from_checkpoint(published(stand_in, tmp_path_factory.mktemp("weights") / "i2p_mae.pth"))
+
+
+@pytest.fixture(scope="session")
+def features(reference: Path) -> tuple[torch.Tensor, np.ndarray]:
+    with np.load(reference / "reference_features.npz") as held:
+        return torch.from_numpy(held["points"]), held["features"]
+
+
+def test_names_and_shapes_are_the_published_ones(stand_in: dict[str, torch.Tensor], official: I2PMAEEncoder) -> None:
+    assert {k: v.shape for k, v in official.state_dict().items()} == {k: v.shape for k, v in stand_in.items()}
+    assert sum(p.numel() for p in official.parameters()) == 12_654_976
+    assert official.dim == 768
+    assert not any(p.requires_grad for p in official.parameters())
+
+
+def test_features_are_those_of_the_official_code(
+    official: I2PMAEEncoder, features: tuple[torch.Tensor, np.ndarray]
+) -> None:
+    points, expected = features
+    with torch.inference_mode():
+        assert np.abs(official.features(points).numpy() - expected).max() < 1e-4
+        for i in range(len(points)):
+            assert np.abs(official.features(points[i : i + 1]).numpy() - expected[i]).max() < 1e-4
+
+
+def test_a_safetensors_file_of_the_same_weights_gives_the_same(
+    stand_in: dict[str, torch.Tensor], official: I2PMAEEncoder, tmp_path: Path
+) -> None:
+    save_file(stand_in, tmp_path / "weights.safetensors")
+    assert I2PMAEEncoder.from_checkpoint(tmp_path / "weights.safetensors").digest() == official.digest()
+
+
+@pytest.mark.slow
+def test_onnxruntime_gives_the_features_of_the_official_code(
+    official: I2PMAEEncoder, features: tuple[torch.Tensor, np.ndarray]
+) -> None:
+    import onnxruntime
+
+    from rlacd.learn.export import to_onnx
+
+    class Features(torch.nn.Module):
+        def __init__(self) -> None:
+            super().__init__()
+            self.encoder = official
+
+        def forward(self, clouds: torch.Tensor) -> torch.Tensor:
+            return self.encoder.features(clouds)
+
+    points, expected = features
+    model = to_onnx(Features().eval(), (torch.randn(2, *points.shape[1:]),), ("clouds",), "features")
+    session = onnxruntime.InferenceSession(model.SerializeToString(), providers=["CPUExecutionProvider"])
+    assert np.abs(session.run(None, {"clouds": points.numpy()})[0] - expected).max() < 1e-3
+    for i in range(len(points)):
+        assert np.abs(session.run(None, {"clouds": points[i : i + 1].numpy()})[0] - expected[i]).max() < 1e-3
+
+
+# Grouping
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 3), st.integers(1, 40), st.booleans())
+def test_farthest_points_are_the_farthest(seed: int, batch: int, count: int, on_a_grid: bool) -> None:
+    rng = np.random.default_rng(seed)
+    points = rng.standard_normal((batch, 40, 3)).astype(np.float32)
+    if on_a_grid:  # many are equally far: the first one counts
+        points = np.round(points)
+    found = farthest_points(torch.from_numpy(points), count).numpy()
+    for cloud, chosen in zip(points.astype(np.float64), found, strict=True):
+        assert chosen[0] == 0
+        for i in range(1, count):
+            gaps = np.linalg.norm(cloud[:, None] - cloud[chosen[:i]], axis=2).min(axis=1)
+            assert gaps[chosen[i]] == pytest.approx(gaps.max(), rel=1e-6)
+            if on_a_grid:
+                assert chosen[i] == gaps.argmax()
+
+
+def test_nearest_points_are_the_nearest() -> None:
+    points = clouds(3, 200)
+    centers = clouds(3, 50, seed=1)
+    found = nearest_points(points, centers, 7)
+    for cloud, center, members in zip(points.numpy(), centers.numpy(), found.numpy(), strict=True):
+        expected = cKDTree(cloud).query(center, 7)[1]
+        assert np.array_equal(np.sort(members, axis=1), np.sort(expected, axis=1))
+    assert torch.equal(gather(points, found)[2, 5, 3], points[2, found[2, 5, 3]])
+
+
+def test_groups_that_are_nobodys_members_are_not_seen() -> None:
+    scales = HierarchicalEncoder(TINY).pyramid(clouds(4))
+    top = (torch.arange(TINY.groups[-1]) % 3 == 0).float().repeat(4, 1)
+    seen = seen_below(scales, top)
+    for cloud in range(4):
+        visible = set(range(0, TINY.groups[-1], 3))
+        for level in (2, 1, 0):
+            assert set(torch.nonzero(seen[level][cloud]).flatten().tolist()) == visible
+            visible = {m for group in visible for m in scales[level].members[cloud, group].tolist()}
+
+
+def test_what_is_nobodys_member_changes_nothing() -> None:
+    """A point that no group has among its nearest may move."""
+    encoder = tiny_encoder()
+    points = clouds(1, 400)
+    scales = encoder.h_encoder.pyramid(points)
+    used = set(scales[0].members.flatten().tolist())
+    unused = sorted(set(range(400)) - used)
+    moved = points.clone()
+    moved[0, unused[0]] += 1e-4
+    assert torch.equal(encoder.features(points), encoder.features(moved))
+
+
+# As an encoder of components
+
+
+def test_the_encoder_keeps_the_protocol_and_ignores_size_and_place() -> None:
+    encoder = tiny_encoder()
+    assert isinstance(encoder, Encoder)
+    solid = small_solids()["table"]
+    both = [Component(solid), Component(solid.scale([0.25] * 3).translate([0.5, -0.25, 2]))]
+    seen = [observe(c, axis_and_principal(c), 0.04, 512) for c in both]
+    features = describe(encoder, seen, scale_input=False)
+    assert features.shape == (2, encoder.dim)
+    assert features[0] == pytest.approx(features[1], abs=0.05)
+    other = Component(small_solids()["angle"])
+    unlike = describe(encoder, [observe(other, axis_and_principal(other), 0.04, 512)], scale_input=False)
+    assert np.abs(unlike[0] - features[0]).max() > 0.2
+
+
+def test_features_do_not_depend_on_what_comes_along_or_came_before() -> None:
+    points = clouds(6, 64).reshape(3, 2, 64, 3)
+    directions = torch.eye(3).repeat(3, 2, 1)
+    with torch.inference_mode():
+        together = tiny_encoder().encode(points, directions)
+        encoder = tiny_encoder()
+        alone = [encoder.encode(points[i : i + 1], directions[:1])[0] for i in (2, 0, 1)]
+        again = encoder.encode(points[[2, 2, 0]], directions)
+    assert torch.equal(together, torch.stack([alone[1], alone[2], alone[0]]))
+    assert torch.equal(again, together[[2, 2, 0]])
+
+
+def test_known_components_are_not_encoded_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    encoder = tiny_encoder()
+    points, directions = clouds(4, 64).reshape(2, 2, 64, 3), torch.eye(3).repeat(2, 2, 1)
+    first = encoder.encode(points, directions)
+    monkeypatch.setattr(encoder, "features", lambda clouds: pytest.fail("encoded again"))
+    assert torch.equal(encoder.encode(points, directions), first)
+
+
+def test_too_few_points_are_said() -> None:
+    with pytest.raises(OptionError, match="16 points; this encoder needs at least 32"):
+        tiny_encoder().features(clouds(1, 16))
+
+
+# Files
+
+
+def test_our_own_files_say_their_sizes(tmp_path: Path) -> None:
+    encoder = I2PMAEEncoder.from_checkpoint(write_tiny_weights(tmp_path / "tiny.safetensors"))
+    assert encoder.sizes == TINY
+    assert encoder.digest() == tiny_encoder().digest() != tiny_encoder(seed=1).digest()
+
+
+def test_the_first_missing_parameter_is_named(tmp_path: Path) -> None:
+    state = dict(I2PMAEEncoder(Sizes()).state_dict())
+    names = list(state)
+    for name in names[40:43]:
+        del state[name]
+    with pytest.raises(WeightsError, match=f"{names[40]} is missing"):
+        I2PMAEEncoder.from_checkpoint(published(state, tmp_path / "less.pth"))
+    with pytest.raises(WeightsError, match=f"{names[0]} is missing"):
+        I2PMAEEncoder.from_checkpoint(published({}, tmp_path / "none.pth"))
+
+
+def test_weights_of_another_size_or_not_finite_are_said(tmp_path: Path) -> None:
+    with pytest.raises(WeightsError, match=r"first_conv\.0\.weight has shape \[8, 3, 1\], not \[128, 3, 1\]"):
+        I2PMAEEncoder.from_checkpoint(published(dict(tiny_encoder().state_dict()), tmp_path / "other.pth"))
+    state = {k: v.clone() for k, v in I2PMAEEncoder(Sizes()).state_dict().items()}
+    state["h_encoder.encoder_norms.2.bias"][3] = torch.nan
+    with pytest.raises(WeightsError, match=r"encoder_norms\.2\.bias holds values that are not finite"):
+        I2PMAEEncoder.from_checkpoint(published(state, tmp_path / "nan.pth"))
+
+
+@pytest.mark.parametrize("ending", [".pth", ".safetensors"])
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.5, 0.999])
+def test_files_cut_short_are_one_error_that_names_the_first_parameter(
+    tmp_path: Path, ending: str, share: float
+) -> None:
+    path = tmp_path / f"weights{ending}"
+    if ending == ".pth":
+        published(dict(tiny_encoder().state_dict()), path)
+    else:
+        write_tiny_weights(path)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(WeightsError, match=r"h_encoder\.token_embed\.0\.first_conv\.0\.weight"):
+        I2PMAEEncoder.from_checkpoint(path)
+
+
+@pytest.mark.filterwarnings("ignore:Detected pickle protocol")
+@pytest.mark.parametrize("content", [b"hello", b"\x80\x04N.", pickle.dumps([1, 2]), b"PK\x05\x06" + 18 * b"\0"])
+@pytest.mark.parametrize("ending", [".pth", ".safetensors"])
+def test_files_of_something_else_are_said(tmp_path: Path, content: bytes, ending: str) -> None:
+    path = tmp_path / f"weights{ending}"
+    path.write_bytes(content)
+    with pytest.raises(WeightsError, match="no file of weights"):
+        I2PMAEEncoder.from_checkpoint(path)
+    with pytest.raises(WeightsError, match="there is no file"):
+        I2PMAEEncoder.from_checkpoint(tmp_path / "nowhere.pth")
+
+
+@pytest.mark.parametrize("sizes", [{"groups": [1]}, {"depth": "deep"}, {"layers": 3}, {"heads": 7}, [1], 3])
+def test_damaged_sizes_are_said(tmp_path: Path, sizes: object) -> None:
+    save_file(tiny_encoder().state_dict(), tmp_path / "w.safetensors", {"rlacd": json.dumps({"sizes": sizes})})
+    with pytest.raises(WeightsError, match=r"w\.safetensors"):
+        I2PMAEEncoder.from_checkpoint(tmp_path / "w.safetensors")
+
+
+class Harmful:
+    """Writes a file when it is unpickled."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return (Path.touch, (self.path,))
+
+
+def test_nothing_in_a_checkpoint_is_run(tmp_path: Path) -> None:
+    torch.save(
+        {"base_model": dict(tiny_encoder().state_dict()), "extra": Harmful(tmp_path / "ran")}, tmp_path / "w.pth"
+    )
+    with pytest.raises(WeightsError, match="no file of weights"):
+        I2PMAEEncoder.from_checkpoint(tmp_path / "w.pth")
+    assert not (tmp_path / "ran").exists()
+
+
+def test_without_weights_it_is_said_where_to_get_them(tmp_path: Path) -> None:
+    with pytest.raises(OptionError, match="takes no weights"):
+        make_encoder("profile", "weights.pth")
+    with pytest.raises(OptionError, match="has to be profile, pointnet or i2p-mae"):
+        make_encoder("best")
+    meshes = write_meshes(tmp_path / "meshes")
+    for asked in (["--encoder", "i2p-mae"], ["--preset", "paper"]):
+        shown = CliRunner().invoke(app, ["train", str(meshes), "--run", str(tmp_path / "run"), *asked])
+        assert shown.exit_code == 2
+        for word in ("--encoder-weights FILE", "https://", "rlacd pretrain", "--encoder profile"):
+            assert word in shown.output
+        assert "Traceback" not in shown.output
+        assert not (tmp_path / "run").exists()
