@@ -16,7 +16,7 @@ from rlacd.errors import MissingExtraError, OptionError, OutputError
 from rlacd.measure import Bench, Limits, Store, Task, find_meshes, make_method, tables, tuning
 from rlacd.measure.deployed import Deployment, decompose_as_deployed
 from rlacd.measure.store import load_hulls, save_hulls
-from rlacd.measure.tables import Spread, as_csv, common_meshes, comparison, failures, markdown, ratio_of_parts
+from rlacd.measure.tables import Spread, Table, as_csv, common_meshes, comparison, failures, ratio_of_parts
 from rlacd.measure.tuning import CLOSE, next_setting, tune
 from tests.shapes import box, from_manifold
 
@@ -262,7 +262,7 @@ class TestTables:
     def rows(self, *parts: int, failed: str | None = None) -> list[dict[str, Any]]:
         numbers = (*tables._AVERAGED, "invalid")
         rows: list[dict[str, Any]] = [
-            {"mesh": f"m{i}", "method": "x", "setting": 0.1, "parts": n, **dict.fromkeys(numbers, 1)}
+            {"mesh": f"m{i}", "method": "x", "setting": 0.1, **dict.fromkeys(numbers, 1), "parts": n}
             for i, n in enumerate(parts)
         ]
         if failed:
@@ -276,13 +276,13 @@ class TestTables:
     def test_a_mesh_that_one_fails_on_counts_for_none(self) -> None:
         a, b = self.rows(2, 4, 100), self.rows(3, 5, failed="m2")
         assert common_meshes([a, b]) == {"m0", "m1"}
-        text = comparison([("a", a), ("b", b)])
+        text = comparison([("a", a), ("b", b)]).markdown()
         assert "| a | 3.0 (4.0, ± 1.4) |" in text
         assert "| 1 of 3 |" in text
         assert "2 meshes that every method managed" in text
 
     def test_a_method_that_always_fails(self) -> None:
-        text = comparison([("a", self.rows(2)), ("b", self.rows(failed="m0"))])
+        text = comparison([("a", self.rows(2)), ("b", self.rows(failed="m0"))]).markdown()
         assert "| b | – |" in text
 
     def test_ratio(self) -> None:
@@ -300,4 +300,4 @@ class TestTables:
         assert read[1]["parts"] == ""
 
     def test_markdown_escapes_bars(self) -> None:
-        assert markdown(["a", "b"], [["x|y", 1]]) == "| a | b |\n|---|---:|\n| x\\|y | 1 |"
+        assert Table(["a", "b"], [["x|y", 1]]).markdown() == "| a | b |\n|---|---:|\n| x\\|y | 1 |"

@@ -63,13 +63,32 @@ def common_meshes(groups: Iterable[Sequence[Row]]) -> set[str]:
     return set.intersection(*sets) if sets else set()
 
 
-def markdown(header: Sequence[str], lines: Iterable[Sequence[object]]) -> str:
-    """Set a table in Markdown; the first column is left-aligned, the others right."""
-    rows = [" | ".join(str(cell).replace("|", "\\|") for cell in line) for line in lines]
-    return "\n".join([f"| {' | '.join(header)} |", f"|---|{'---:|' * (len(header) - 1)}", *(f"| {r} |" for r in rows)])
+@dataclass(frozen=True)
+class Table:
+    """A table: what its columns are called, and its lines.
+
+    Attributes
+    ----------
+    header : sequence of str
+    lines : sequence of sequences
+        As many cells as the header has; each is shown as ``str`` gives it.
+    note : str
+        A line below.
+    """
+
+    header: Sequence[str]
+    lines: Sequence[Sequence[object]]
+    note: str = ""
+
+    def markdown(self) -> str:
+        """Set it in Markdown; the first column is left-aligned, the others right."""
+        rows = [" | ".join(str(cell).replace("|", "\\|") for cell in line) for line in self.lines]
+        rule = f"|---|{'---:|' * (len(self.header) - 1)}"
+        text = "\n".join([f"| {' | '.join(self.header)} |", rule, *(f"| {row} |" for row in rows)])
+        return f"{text}\n\n{self.note}" if self.note else text
 
 
-def comparison(groups: Sequence[tuple[str, Sequence[Row]]]) -> str:
+def comparison(groups: Sequence[tuple[str, Sequence[Row]]]) -> Table:
     """Compare methods on the meshes that all of them managed: a line each, as in the paper's Table 1, and failures.
 
     Parameters
@@ -116,7 +135,7 @@ def comparison(groups: Sequence[tuple[str, Sequence[Row]]]) -> str:
                 f"{failed} of {len(rows)}",
             ]
         )
-    return markdown(header, lines) + f"\n\n{len(shared)} meshes that every method managed; mean (max, ± deviation)."
+    return Table(header, lines, f"{len(shared)} meshes that every method managed; mean (max, ± standard deviation).")
 
 
 _AVERAGED = (
