@@ -300,4 +300,4 @@ class TestTables:
         assert read[1]["parts"] == ""
 
     def test_markdown_escapes_bars(self) -> None:
-        assert Table(["a", "b"], [["x|y", 1]]).markdown() == "| a | b |\n|---|---:|\n| x\\|y | 1 |"
+        assert Table(["a", "|b|"], [["x|y", 1]]).markdown() == "| a | \\|b\\| |\n|---|---:|\n| x\\|y | 1 |"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rlacd.errors import MeshFileError, OptionError
+from rlacd.errors import MeshFileError, OptionError, OutputError
 
 if TYPE_CHECKING:
     from rlacd.measure import Bench
@@ -165,6 +165,44 @@ def bench_app(exit_codes: ExitCodes) -> typer.Typer:
             page = numbers_of_planes(bench, ranking, threshold, _counts(planes), _counts(edges))
             _save(bench, page, "paper-table-3")
 
+    def trained(name: str, about: str) -> None:
+        @app.command(name, help=about)
+        def run(
+            meshes: Meshes,
+            out: Out,
+            preset: Annotated[str, typer.Option(help="Of `rlacd train`.")] = "quick",
+            iterations: Annotated[int | None, typer.Option(help="Cuts an arm.", show_default=False)] = None,
+            seed: Annotated[int, typer.Option(min=0)] = 0,
+        ) -> None:
+            with exit_codes():
+                from rlacd.measure.arms import train_arms
+
+                _need_folder(meshes)
+                _make_folder(out)
+                page = train_arms(name, meshes, out, preset, iterations, seed, typer.echo)
+                _write(page, out, name)
+
+    trained("paper-rewards", "Train with other weights of the two rewards, and without each (4.5.3).")
+    trained("paper-encoding", "Train with a network that does not see the hull (4.5.2).")
+    trained("paper-curves", "Train with other discounts, and draw the curves (Fig. 7).")
+
+    @app.command("paper-discounts")
+    def discounts(
+        meshes: Meshes,
+        out: Out,
+        count: Annotated[int, typer.Option(min=1, help="Small meshes whose cut trees are grown.")] = 12,
+        depth: Annotated[int, typer.Option(min=1, help="Cuts deep.")] = 4,
+        steps: Annotated[int, typer.Option(min=1, help="Steps of Q-learning.")] = 300_000,
+    ) -> None:
+        """Find by tabular Q-learning on real cut trees which discounts converge (appendix A)."""
+        with exit_codes():
+            from rlacd.measure import find_meshes
+            from rlacd.measure.discounts import discounts_page
+
+            _need_folder(meshes)
+            _make_folder(out)
+            _write(discounts_page(meshes, find_meshes(meshes), count, depth, steps), out, "paper-discounts")
+
     return app
 
 
@@ -181,8 +219,7 @@ def _bench(
 ) -> Iterator[Bench]:
     from rlacd.measure import Bench, Limits, Store, find_meshes
 
-    if not meshes.is_dir():
-        raise MeshFileError(f"{meshes} is no folder; give the folder that holds the meshes.")
+    _need_folder(meshes)
     if listed is not None and not listed.is_file():
         raise MeshFileError(f"the list {listed} does not exist; give a file with one mesh a line.")
     names = find_meshes(meshes, listed)[:first]
@@ -198,13 +235,29 @@ def _bench(
         store.close()
 
 
+def _need_folder(meshes: Path) -> None:
+    if not meshes.is_dir():
+        raise MeshFileError(f"{meshes} is no folder; give the folder that holds the meshes.")
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot make the folder {folder} ({error.strerror}); choose another one.") from error
+
+
 def _save(bench: Bench, page: Page, name: str) -> None:
     from rlacd.measure.compare import save_csv
 
-    for path in page.save(bench.store.folder, name):
+    _write(page, bench.store.folder, name)
+    save_csv(bench, bench.store.folder)
+
+
+def _write(page: Page, folder: Path, name: str) -> None:
+    for path in page.save(folder, name):
         if path.suffix in (".md", ".html"):
             typer.echo(f"wrote {path}")
-    save_csv(bench, bench.store.folder)
 
 
 def _names(given: str | None, usual: tuple[str, ...]) -> list[str]:

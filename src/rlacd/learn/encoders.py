@@ -106,7 +106,26 @@ class PointNetEncoder(nn.Module):
         return features
 
 
-def make_encoder(name: str) -> ProfileEncoder | PointNetEncoder:
+class WithoutHull(nn.Module):
+    """Another encoder that is shown the component's own points in place of its hull's (the paper's 4.5.2)."""
+
+    def __init__(self, encoder: ProfileEncoder) -> None:
+        super().__init__()
+        self.encoder = encoder
+        self.dim = encoder.dim
+
+    def forward(self, points: Tensor, directions: Tensor) -> Tensor:
+        """See `Encoder.encode`."""
+        features: Tensor = self.encoder(points[:, :1].expand_as(points), directions)
+        return features
+
+    def encode(self, points: Tensor, directions: Tensor) -> Tensor:
+        """See `Encoder.encode`."""
+        features: Tensor = self(points, directions)
+        return features
+
+
+def make_encoder(name: str) -> ProfileEncoder | PointNetEncoder | WithoutHull:
     """Build the encoder called `name`.
 
     Raises
@@ -116,9 +135,11 @@ def make_encoder(name: str) -> ProfileEncoder | PointNetEncoder:
     """
     if name == "profile":
         return ProfileEncoder()
+    if name == "profile-without-hull":
+        return WithoutHull(ProfileEncoder())
     if name == "pointnet":
         return PointNetEncoder()
-    raise OptionError(f"encoder is {name!r}; it has to be profile or pointnet.")
+    raise OptionError(f"encoder is {name!r}; it has to be profile, profile-without-hull or pointnet.")
 
 
 def describe(encoder: Encoder, observations: list[Observation], scale_input: bool) -> Float32Array:

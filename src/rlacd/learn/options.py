@@ -48,7 +48,9 @@ class TrainOptions:
 
     # What the network sees
     encoder: str = _option(
-        "profile", "What describes a component: a name in rlacd.learn.encoders.", one_of=("profile", "pointnet")
+        "profile",
+        "What describes a component: a name in rlacd.learn.encoders.",
+        one_of=("profile", "profile-without-hull", "pointnet"),
     )
     points: int = _option(
         2048, "Points on the surface of a component, and as many on its hull (paper).", least=16, most=65536

@@ -25,8 +25,10 @@ class Curve:
     y: Sequence[float]
 
 
-def curves_chart(curves: Iterable[Curve], x: str, y: str, *, log_x: bool = False, log_y: bool = False) -> bytes:
-    """Draw curves with a marker at every point, as SVG.
+def curves_chart(
+    curves: Iterable[Curve], x: str, y: str, *, log_x: bool = False, log_y: bool = False, markers: bool = True
+) -> bytes:
+    """Draw curves, with a marker at every point where wanted, as SVG.
 
     Raises
     ------
@@ -36,7 +38,8 @@ def curves_chart(curves: Iterable[Curve], x: str, y: str, *, log_x: bool = False
     figure, axes = _figure()
     for number, curve in enumerate(curves):
         points = sorted(zip(curve.x, curve.y, strict=True))
-        axes.plot(*zip(*points, strict=True), marker=_MARKERS[number % len(_MARKERS)], label=curve.label)
+        marker = _MARKERS[number % len(_MARKERS)] if markers else ""
+        axes.plot([p[0] for p in points], [p[1] for p in points], marker=marker, label=curve.label)
     axes.set(xlabel=x, ylabel=y, xscale="log" if log_x else "linear", yscale="log" if log_y else "linear")
     _plain_numbers(axes, log_x, log_y)
     axes.legend(fontsize=7, frameon=False)

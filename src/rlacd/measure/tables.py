@@ -82,9 +82,11 @@ class Table:
 
     def markdown(self) -> str:
         """Set it in Markdown; the first column is left-aligned, the others right."""
-        rows = [" | ".join(str(cell).replace("|", "\\|") for cell in line) for line in self.lines]
+        header, *rows = (
+            " | ".join(str(cell).replace("|", "\\|") for cell in line) for line in (self.header, *self.lines)
+        )
         rule = f"|---|{'---:|' * (len(self.header) - 1)}"
-        text = "\n".join([f"| {' | '.join(self.header)} |", rule, *(f"| {row} |" for row in rows)])
+        text = "\n".join([f"| {header} |", rule, *(f"| {row} |" for row in rows)])
         return f"{text}\n\n{self.note}" if self.note else text
 
 
