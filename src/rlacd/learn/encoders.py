@@ -106,26 +106,15 @@ class PointNetEncoder(nn.Module):
         return features
 
 
-class WithoutHull(nn.Module):
-    """Another encoder that is shown the component's own points in place of its hull's (the paper's 4.5.2)."""
-
-    def __init__(self, encoder: ProfileEncoder) -> None:
-        super().__init__()
-        self.encoder = encoder
-        self.dim = encoder.dim
+class ProfileWithoutHull(ProfileEncoder):
+    """The same of the component's own points in place of its hull's: what the hull is worth (the paper's 4.5.2)."""
 
     def forward(self, points: Tensor, directions: Tensor) -> Tensor:
         """See `Encoder.encode`."""
-        features: Tensor = self.encoder(points[:, :1].expand_as(points), directions)
-        return features
-
-    def encode(self, points: Tensor, directions: Tensor) -> Tensor:
-        """See `Encoder.encode`."""
-        features: Tensor = self(points, directions)
-        return features
+        return super().forward(points[:, :1].expand_as(points), directions)
 
 
-def make_encoder(name: str) -> ProfileEncoder | PointNetEncoder | WithoutHull:
+def make_encoder(name: str) -> ProfileEncoder | PointNetEncoder:
     """Build the encoder called `name`.
 
     Raises
@@ -136,7 +125,7 @@ def make_encoder(name: str) -> ProfileEncoder | PointNetEncoder | WithoutHull:
     if name == "profile":
         return ProfileEncoder()
     if name == "profile-without-hull":
-        return WithoutHull(ProfileEncoder())
+        return ProfileWithoutHull()
     if name == "pointnet":
         return PointNetEncoder()
     raise OptionError(f"encoder is {name!r}; it has to be profile, profile-without-hull or pointnet.")
