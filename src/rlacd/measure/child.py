@@ -1,4 +1,4 @@
-"""The process in which a tool runs, or its hulls are measured: ``python -m rlacd.measure.child``, one task each.
+"""The process in which a tool runs and its hulls are measured: ``python -m rlacd.measure.child``, one task each.
 
 Whatever a tool does (crash, hang, eat all memory, print to stdout) happens here; what is to be known is in a file.
 """
@@ -75,10 +75,9 @@ def main() -> None:
         resource.setrlimit(resource.RLIMIT_AS, (task["memory"], task["memory"]))
     place = (Path(task["mesh"]), task["method"], task["setting"], task["threads"], Path(task["hulls"]))
     try:
-        if task["do"] == "run":
+        if not place[-1].exists():
             run_method(*place)
-        else:
-            Path(task["answer"]).write_text(json.dumps(measure_hulls(*place)))
+        Path(task["answer"]).write_text(json.dumps(measure_hulls(*place)))
     except MemoryError:
         sys.exit("out of memory")
     except Exception as error:

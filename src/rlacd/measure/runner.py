@@ -26,7 +26,7 @@ class Limits:
     Attributes
     ----------
     seconds : float
-        Wall time, for running a method and for measuring its hulls each.
+        Wall time of a process: for running a method, and again for measuring its hulls where that is not done yet.
     memory : int
         Bytes of address space, on Linux; 0 for no limit.
     threads : int
@@ -85,21 +85,19 @@ class Bench:
     def _finish(self, task: Task) -> Row:
         row: Row = {"mesh": task.mesh, "method": task.method, "setting": task.setting}
         hulls = self.store.hulls_of(task)
-        failure = None if hulls.exists() else self._child("run", task, hulls, None)
-        if failure is not None:
-            row["error"] = failure
-        else:
-            with tempfile.TemporaryDirectory() as folder:
-                answer = Path(folder) / "answer.json"
-                failure = self._child("measure", task, hulls, answer)
-                row |= {"error": f"measuring: {failure}"} if failure else json.loads(answer.read_text())
+        with tempfile.TemporaryDirectory() as folder:
+            answer = Path(folder) / "answer.json"
+            failure = self._child(task, hulls, answer)
+            if failure is not None and hulls.exists():  # the tool has done its work; measuring has limits of its own
+                failure = self._child(task, hulls, answer)
+                failure = failure and f"measuring: {failure}"
+            row |= {"error": failure} if failure else json.loads(answer.read_text())
         self.store.add(row)
         return row
 
-    def _child(self, what: str, task: Task, hulls: Path, answer: Path | None) -> str | None:
-        """Run one process; None, or what went wrong with it."""
+    def _child(self, task: Task, hulls: Path, answer: Path) -> str | None:
+        """Run one process, which makes the hulls unless they are there; None, or what went wrong with it."""
         order = {
-            "do": what,
             "mesh": str(self.meshes / task.mesh),
             "method": task.method,
             "setting": task.setting,

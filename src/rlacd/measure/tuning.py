@@ -15,7 +15,7 @@ from rlacd.measure.methods import Method, make_method
 from rlacd.measure.runner import Bench
 from rlacd.measure.store import Row
 
-CLOSE = 0.01
+CLOSE = 0.02
 """The mean D_h may be this share of the target away from it."""
 
 TRIES = 8
