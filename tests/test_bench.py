@@ -83,6 +83,17 @@ class TestMethods:
         assert all(f.shape[1] == 3 and f.max() < len(v) for v, f in hulls)
 
 
+@pytest.mark.slow
+def test_coacd_on_its_own_example(corpus: Path, tmp_path: Path) -> None:
+    """Version 1.0.14 has been seen to make 47 and 48 parts of SnowFlake at 0.05."""
+    pytest.importorskip("coacd")
+    bench = Bench(corpus, ["test/coacd_examples/SnowFlake.ply"], Store(tmp_path), say=lambda _: None)
+    (row,) = bench.run("coacd", 0.05)
+    assert 45 <= row["parts"] <= 50
+    assert row["hausdorff"] < 0.06
+    assert row["empty"] == 0
+
+
 class TestDeployment:
     def test_words(self) -> None:
         words = ["no-principal", "ap=7", "excess", "ce=0"]

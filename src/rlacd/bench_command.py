@@ -60,6 +60,7 @@ def bench_app(exit_codes: ExitCodes) -> typer.Typer:
         methods: Methods = None,
         threshold: Threshold = 0.05,
         pictures: Annotated[int, typer.Option(min=0, help="Draw so many meshes by every method.")] = 8,
+        up: Annotated[str, typer.Option(help="The axis that points up in the pictures: x, y or z.")] = "z",
         limit: Seconds = 600.0,
         memory: Memory = 12.0,
         threads: Threads = 1,
@@ -74,8 +75,10 @@ def bench_app(exit_codes: ExitCodes) -> typer.Typer:
         with exit_codes(), _bench(meshes, out, listed, first, limit, memory, threads, jobs) as bench:
             from rlacd.measure.compare import DEFAULT_METHODS, at_settings, compare_page
 
+            if up not in ("x", "y", "z"):
+                raise OptionError(f"--up is {up!r}; it has to be x, y or z.")
             entries = at_settings(bench, _names(methods, DEFAULT_METHODS), threshold)
-            _save(bench, compare_page(bench, "Side by side", entries, pictures), "compare")
+            _save(bench, compare_page(bench, "Side by side", entries, pictures, up), "compare")
 
     def equal(name: str, title: str, about: str) -> None:
         @app.command(name, help=about)

@@ -60,7 +60,7 @@ def at_settings(bench: Bench, methods: Sequence[str], threshold: float | None = 
     return entries
 
 
-def compare_page(bench: Bench, title: str, entries: Sequence[Entry], pictures: int = 0) -> Page:
+def compare_page(bench: Bench, title: str, entries: Sequence[Entry], pictures: int = 0, up: str = "z") -> Page:
     """Put what the entries have in common into a page: table, trade-off, mesh by mesh, failures, pictures."""
     page = Page(title, [about(bench)])
     groups = [(entry.label, entry.rows) for entry in entries]
@@ -74,7 +74,7 @@ def compare_page(bench: Bench, title: str, entries: Sequence[Entry], pictures: i
         page.add(*trade_off(entries, shared), Heading("Mesh by mesh"), mesh_by_mesh(entries))
     page.add(Heading("Failures"), Text(failures(row for entry in entries for row in entry.rows)))
     if pictures:
-        page.add(Heading("Pictures"), *sheets(bench, entries, bench.names[:pictures]))
+        page.add(Heading("Pictures"), *sheets(bench, entries, bench.names[:pictures], up))
     return page
 
 
@@ -163,7 +163,7 @@ def _means(point: Point, shared: set[str]) -> tuple[float, float, float]:
     return tuple(_mean(point.rows, shared, key) for key in ("hausdorff", "parts", "cpu"))  # type: ignore[return-value]
 
 
-def sheets(bench: Bench, entries: Sequence[Entry], meshes: Sequence[str]) -> list[Figure | Text]:
+def sheets(bench: Bench, entries: Sequence[Entry], meshes: Sequence[str], up: str = "z") -> list[Figure | Text]:
     """Draw each mesh by every method that managed it."""
     drawn: list[Figure | Text] = []
     for mesh in meshes:
@@ -173,9 +173,9 @@ def sheets(bench: Bench, entries: Sequence[Entry], meshes: Sequence[str]) -> lis
             path = bench.store.hulls_of(Task(mesh, entry.method, entry.setting))
             if row is not None and path.exists():
                 managed.append((entry.label, load_hulls(path)[0], row))
-        up = "y" if Path(mesh).suffix.lower() in (".glb", ".gltf") else "z"
+        axis = "y" if Path(mesh).suffix.lower() in (".glb", ".gltf") else up
         try:
-            content = draw_sheet(bench.meshes / mesh, managed, up)
+            content = draw_sheet(bench.meshes / mesh, managed, axis)
         except MissingExtraError as error:
             return [Text(f"No pictures: {error}")]
         drawn.append(Figure(f"{Path(mesh).stem}.png", content, mesh))
