@@ -17,6 +17,7 @@ from typing import Annotated, Any
 import typer
 
 from rlacd import __version__
+from rlacd.bench_command import bench_app
 from rlacd.errors import OptionError, OutputError, RlacdError
 from rlacd.train_command import pretrain_command, train_command
 
@@ -533,3 +534,4 @@ def _first_line(error: Exception) -> str:
 
 app.command("train", epilog=EPILOG)(train_command(_exit_codes))
 app.command("pretrain", epilog=EPILOG)(pretrain_command(_exit_codes))
+app.add_typer(bench_app(_exit_codes), name="bench")

@@ -43,7 +43,7 @@ class TrainOptions:
     encoder: str = option(
         "profile",
         "What describes a component: counts between the planes, random features, or the paper's pretrained I2P-MAE.",
-        one_of=("profile", "pointnet", "i2p-mae"),
+        one_of=("profile", "profile-without-hull", "pointnet", "i2p-mae"),
     )
     encoder_weights: str = option(
         "", "The file of i2p-mae's weights: the published checkpoint, or one that `rlacd pretrain` made."

@@ -4,7 +4,7 @@ from rlacd.learn.encoders.encoder import Encoder, describe
 from rlacd.learn.encoders.i2p_mae import I2PMAEEncoder
 from rlacd.learn.encoders.named import I2P_MAE, AnyEncoder, make_encoder
 from rlacd.learn.encoders.pointnet import PointNetEncoder
-from rlacd.learn.encoders.profile import ProfileEncoder
+from rlacd.learn.encoders.profile import ProfileEncoder, ProfileWithoutHull
 
 __all__ = [
     "I2P_MAE",
@@ -13,6 +13,7 @@ __all__ = [
     "I2PMAEEncoder",
     "PointNetEncoder",
     "ProfileEncoder",
+    "ProfileWithoutHull",
     "describe",
     "make_encoder",
 ]

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import torch
 
 from rlacd.errors import OptionError
 from rlacd.learn.encoders.i2p_mae import I2PMAEEncoder
 from rlacd.learn.encoders.pointnet import PointNetEncoder
-from rlacd.learn.encoders.profile import ProfileEncoder
+from rlacd.learn.encoders.profile import ProfileEncoder, ProfileWithoutHull
 
 AnyEncoder = ProfileEncoder | PointNetEncoder | I2PMAEEncoder
 
 I2P_MAE = "i2p-mae"
+
+_LIGHT: Mapping[str, type[ProfileEncoder] | type[PointNetEncoder]] = MappingProxyType(
+    {"profile": ProfileEncoder, "profile-without-hull": ProfileWithoutHull, "pointnet": PointNetEncoder}
+)
 
 PUBLISHED = "https://github.com/ZrrSkywalker/I2P-MAE"
 
@@ -24,7 +30,7 @@ def make_encoder(name: str, weights: str | Path = "", device: torch.device | str
     Parameters
     ----------
     name : str
-        ``profile``, ``pointnet`` or ``i2p-mae``.
+        ``profile``, ``profile-without-hull``, ``pointnet`` or ``i2p-mae``.
     weights : path
         For ``i2p-mae``: the published checkpoint, or a file made by ``rlacd pretrain``.
     device : torch.device
@@ -45,8 +51,8 @@ def make_encoder(name: str, weights: str | Path = "", device: torch.device | str
                 "which needs none."
             )
         return I2PMAEEncoder.from_checkpoint(weights).to(device)
-    if name not in ("profile", "pointnet"):
-        raise OptionError(f"encoder is {name!r}; it has to be profile, pointnet or {I2P_MAE}.")
+    if name not in _LIGHT:
+        raise OptionError(f"encoder is {name!r}; it has to be {', '.join(_LIGHT)} or {I2P_MAE}.")
     if str(weights):
         raise OptionError(f"encoder {name} takes no weights; leave --encoder-weights out, or use --encoder {I2P_MAE}.")
-    return ProfileEncoder() if name == "profile" else PointNetEncoder()
+    return _LIGHT[name]()

@@ -41,3 +41,11 @@ class ProfileEncoder(nn.Module):
         """See `Encoder.encode`."""
         features: Tensor = self(points, directions)
         return features
+
+
+class ProfileWithoutHull(ProfileEncoder):
+    """The same of the component's own points in place of its hull's: what the hull is worth (the paper's 4.5.2)."""
+
+    def forward(self, points: Tensor, directions: Tensor) -> Tensor:
+        """See `Encoder.encode`."""
+        return super().forward(points[:, :1].expand_as(points), directions)

@@ -1,0 +1,281 @@
+"""The commands `rlacd bench ...`: side by side with other tools, and the paper's experiments."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rlacd.errors import MeshFileError, OptionError, OutputError
+
+if TYPE_CHECKING:
+    from rlacd.measure import Bench
+    from rlacd.measure.page import Page
+
+ExitCodes = Callable[[], AbstractContextManager[None]]
+
+HELP = """Compare decompositions by other tools and by rlacd: fewer, tighter hulls, and how long they take.
+
+Every mesh and method runs in a process of its own, with limits; results are kept in a folder and never computed twice,
+so a run can be stopped and started again. Pages are written as Markdown and HTML, all numbers as CSV.
+
+\b
+[bold]Methods[/bold]
+  coacd                          CoACD (its number: concavity threshold)
+  vhacdx, vhacdx:hulls           V-HACD 4 (volume error in percent; most hulls)
+  greedy, learned, navacd, ...   policies of rlacd (concavity threshold); :balanced or :best searches,
+                                 :space asks for navigable space (tolerance)
+  planes[:ap=N][:ce=N][:no-spatial][:no-principal][:learned|:excess]
+                                 the paper's deployment, its kinds and numbers of planes left free
+"""
+
+Meshes = Annotated[Path, typer.Argument(help="A folder of meshes, of any depth.", show_default=False)]
+Out = Annotated[Path, typer.Option("--out", "-o", help="A folder for results, pages and pictures.")]
+Listed = Annotated[
+    Path | None, typer.Option("--list", help="A file with one mesh a line, relative to the folder; default: all.")
+]
+Most = Annotated[int | None, typer.Option("--first", min=1, help="Only so many of the meshes.", show_default=False)]
+Methods = Annotated[str | None, typer.Option(help="Separated by commas.", show_default=False)]
+Seconds = Annotated[float, typer.Option("--limit", min=0.1, help="Seconds a method may take for one mesh.")]
+Memory = Annotated[float, typer.Option(min=0.0, help="GB a process may use (Linux); 0: no limit.")]
+Threads = Annotated[int, typer.Option(min=1, help="Threads of each process.")]
+Jobs = Annotated[int, typer.Option(min=1, help="Processes at a time.")]
+Threshold = Annotated[float, typer.Option("--threshold", "-t", help="Concavity threshold.")]
+Ranking = Annotated[str, typer.Option(help="What ranks the planes along the axes: learned or excess.")]
+
+
+def bench_app(exit_codes: ExitCodes) -> typer.Typer:
+    """Build the commands; `exit_codes` turns errors into a sentence and an exit code."""
+    app = typer.Typer(help=HELP, no_args_is_help=True, rich_markup_mode="rich")
+
+    @app.command()
+    def compare(
+        meshes: Meshes,
+        out: Out,
+        listed: Listed = None,
+        first: Most = None,
+        methods: Methods = None,
+        threshold: Threshold = 0.05,
+        pictures: Annotated[int, typer.Option(min=0, help="Draw so many meshes by every method.")] = 8,
+        up: Annotated[str, typer.Option(help="The axis that points up in the pictures: x, y or z.")] = "z",
+        limit: Seconds = 600.0,
+        memory: Memory = 12.0,
+        threads: Threads = 1,
+        jobs: Jobs = 1,
+    ) -> None:
+        """Compare methods at their own numbers; those with a concavity threshold all at the same.
+
+        \b
+        [bold]Example[/bold]
+          rlacd bench compare meshes/ --out run/ --jobs 2
+        """
+        with exit_codes(), _bench(meshes, out, listed, first, limit, memory, threads, jobs) as bench:
+            from rlacd.measure.compare import DEFAULT_METHODS, at_settings, compare_page
+
+            if up not in ("x", "y", "z"):
+                raise OptionError(f"--up is {up!r}; it has to be x, y or z.")
+            entries = at_settings(bench, _names(methods, DEFAULT_METHODS), threshold)
+            _save(bench, compare_page(bench, "Side by side", entries, pictures, up), "compare")
+
+    def equal(name: str, title: str, about: str) -> None:
+        @app.command(name, help=about)
+        def run(
+            meshes: Meshes,
+            out: Out,
+            listed: Listed = None,
+            first: Most = None,
+            methods: Methods = None,
+            at: Annotated[list[float] | None, typer.Option(help="Mean D_h to tune to; may be repeated.")] = None,
+            limit: Seconds = 600.0,
+            memory: Memory = 12.0,
+            threads: Threads = 1,
+            jobs: Jobs = 1,
+        ) -> None:
+            with exit_codes(), _bench(meshes, out, listed, first, limit, memory, threads, jobs) as bench:
+                from rlacd.measure.experiments import TABLE_1_METHODS, TARGETS, equal_accuracy
+
+                page = equal_accuracy(bench, _names(methods, TABLE_1_METHODS), at or TARGETS, title)
+                _save(bench, page, name)
+
+    equal("paper-table-1", "Equal accuracy (Table 1)", "Tune every method to the same mean D_h, then compare (4.4.1).")
+    equal(
+        "paper-greedy",
+        "Greedy against the policy (4.4.3)",
+        "The same with --methods greedy-hull-sum,greedy,learned: one step ahead against the learned ranking (4.4.3).",
+    )
+    equal("paper-table-4", "Other meshes (Table 4)", "Table 1 on a folder of meshes the policy has seen nothing like.")
+
+    @app.command("paper-vhacd")
+    def vhacd(
+        meshes: Meshes,
+        out: Out,
+        listed: Listed = None,
+        first: Most = None,
+        reference: Annotated[str, typer.Option(help="The method whose number of hulls V-HACD is given.")] = "greedy",
+        threshold: Threshold = 0.05,
+        limit: Seconds = 600.0,
+        memory: Memory = 12.0,
+        threads: Threads = 1,
+        jobs: Jobs = 1,
+    ) -> None:
+        """Give V-HACD as many hulls as rlacd made of each mesh, and compare how tight they are (4.4.2)."""
+        with exit_codes(), _bench(meshes, out, listed, first, limit, memory, threads, jobs) as bench:
+            from rlacd.measure.experiments import vhacd_at_equal_parts
+
+            _save(bench, vhacd_at_equal_parts(bench, reference, threshold), "paper-vhacd")
+
+    @app.command("paper-table-2")
+    def table_2(
+        meshes: Meshes,
+        out: Out,
+        listed: Listed = None,
+        first: Most = None,
+        ranking: Ranking = "learned",
+        threshold: Threshold = 0.05,
+        limit: Seconds = 600.0,
+        memory: Memory = 12.0,
+        threads: Threads = 1,
+        jobs: Jobs = 1,
+    ) -> None:
+        """Leave out spatial planes, PCA planes, planes of concave edges (Table 2)."""
+        with exit_codes(), _bench(meshes, out, listed, first, limit, memory, threads, jobs) as bench:
+            from rlacd.measure.experiments import kinds_of_planes
+
+            _save(bench, kinds_of_planes(bench, ranking, threshold), "paper-table-2")
+
+    @app.command("paper-table-3")
+    def table_3(
+        meshes: Meshes,
+        out: Out,
+        listed: Listed = None,
+        first: Most = None,
+        planes: Annotated[str, typer.Option(help="#AP: ranked planes that go on.")] = "1,5,10,25,50,150",
+        edges: Annotated[str, typer.Option(help="#CE: concave edges asked.")] = "0,1,4,16,64",
+        ranking: Ranking = "learned",
+        threshold: Threshold = 0.05,
+        limit: Seconds = 600.0,
+        memory: Memory = 12.0,
+        threads: Threads = 1,
+        jobs: Jobs = 1,
+    ) -> None:
+        """Vary the numbers of planes and of concave edges (Table 3)."""
+        with exit_codes(), _bench(meshes, out, listed, first, limit, memory, threads, jobs) as bench:
+            from rlacd.measure.experiments import numbers_of_planes
+
+            page = numbers_of_planes(bench, ranking, threshold, _counts(planes), _counts(edges))
+            _save(bench, page, "paper-table-3")
+
+    def trained(name: str, about: str) -> None:
+        @app.command(name, help=about)
+        def run(
+            meshes: Meshes,
+            out: Out,
+            preset: Annotated[str, typer.Option(help="Of `rlacd train`.")] = "quick",
+            iterations: Annotated[int | None, typer.Option(help="Cuts an arm.", show_default=False)] = None,
+            seed: Annotated[int, typer.Option(min=0)] = 0,
+        ) -> None:
+            with exit_codes():
+                from rlacd.measure.arms import train_arms
+
+                _need_folder(meshes)
+                _make_folder(out)
+                page = train_arms(name, meshes, out, preset, iterations, seed, typer.echo)
+                _write(page, out, name)
+
+    trained("paper-rewards", "Train with other weights of the two rewards, and without each (4.5.3).")
+    trained("paper-encoding", "Train with a network that does not see the hull (4.5.2).")
+    trained("paper-curves", "Train with other discounts, and draw the curves (Fig. 7).")
+
+    @app.command("paper-discounts")
+    def discounts(
+        meshes: Meshes,
+        out: Out,
+        count: Annotated[int, typer.Option(min=1, help="Small meshes whose cut trees are grown.")] = 12,
+        depth: Annotated[int, typer.Option(min=1, help="Cuts deep.")] = 4,
+        steps: Annotated[int, typer.Option(min=1, help="Steps of Q-learning.")] = 300_000,
+    ) -> None:
+        """Find by tabular Q-learning on real cut trees which discounts converge (appendix A)."""
+        with exit_codes():
+            from rlacd.measure import find_meshes
+            from rlacd.measure.discounts import discounts_page
+
+            _need_folder(meshes)
+            _make_folder(out)
+            _write(discounts_page(meshes, find_meshes(meshes), count, depth, steps), out, "paper-discounts")
+
+    return app
+
+
+@contextmanager
+def _bench(
+    meshes: Path,
+    out: Path,
+    listed: Path | None,
+    first: int | None,
+    limit: float,
+    memory: float,
+    threads: int,
+    jobs: int,
+) -> Iterator[Bench]:
+    from rlacd.measure import Bench, Limits, Store, find_meshes
+
+    _need_folder(meshes)
+    if listed is not None and not listed.is_file():
+        raise MeshFileError(f"the list {listed} does not exist; give a file with one mesh a line.")
+    names = find_meshes(meshes, listed)[:first]
+    missing = [name for name in names if not (meshes / name).is_file()]
+    if missing:
+        raise MeshFileError(f"{len(missing)} of the meshes listed, such as {missing[0]}, are not in {meshes}.")
+    if not names:
+        raise MeshFileError(f"there are no meshes in {meshes}.")
+    store = Store(out)
+    try:
+        yield Bench(meshes, names, store, Limits(limit, int(memory * 2**30), threads, jobs), typer.echo)
+    finally:
+        store.close()
+
+
+def _need_folder(meshes: Path) -> None:
+    if not meshes.is_dir():
+        raise MeshFileError(f"{meshes} is no folder; give the folder that holds the meshes.")
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot make the folder {folder} ({error.strerror}); choose another one.") from error
+
+
+def _save(bench: Bench, page: Page, name: str) -> None:
+    from rlacd.measure.compare import save_csv
+
+    _write(page, bench.store.folder, name)
+    save_csv(bench, bench.store.folder)
+
+
+def _write(page: Page, folder: Path, name: str) -> None:
+    for path in page.save(folder, name):
+        if path.suffix in (".md", ".html"):
+            typer.echo(f"wrote {path}")
+
+
+def _names(given: str | None, usual: tuple[str, ...]) -> list[str]:
+    from rlacd.measure import make_method
+
+    names = list(usual) if given is None else [word.strip() for word in given.split(",") if word.strip()]
+    if not names:
+        raise OptionError("--methods is empty; name at least one.")
+    for name in names:
+        make_method(name)  # unknown or missing ones are told before any work
+    return list(dict.fromkeys(names))
+
+
+def _counts(text: str) -> list[int]:
+    words = [word.strip() for word in text.split(",") if word.strip()]
+    if not all(word.isdecimal() for word in words):
+        raise OptionError(f"{text!r} should be whole numbers with commas between.")
+    return [int(word) for word in words]

@@ -1,0 +1,88 @@
+"""The process in which a tool runs and its hulls are measured: ``python -m rlacd.measure.child``, one task each.
+
+Whatever a tool does (crash, hang, eat all memory, print to stdout) happens here; what is to be known is in a file.
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from rlacd.measure.methods import make_method
+from rlacd.measure.metrics import measure
+from rlacd.measure.store import Row, load_hulls, save_hulls
+from rlacd.solid.load import load_mesh
+from rlacd.solid.repair import repair
+
+_CUBE = np.array([(x, y, z) for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+_CUBE_FACES = np.array(
+    [
+        *[(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1)],
+        *[(2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)],
+    ],
+    dtype=np.int32,
+)
+
+
+def run_method(mesh: Path, name: str, setting: float, threads: int, hulls: Path) -> None:
+    """Run a method on a mesh file and keep hulls, seconds and memory.
+
+    The clock runs from arrays in memory to arrays in memory: libraries are loaded before, by a cube.
+    """
+    method = make_method(name)
+    source = load_mesh(mesh)
+    method.run(_CUBE, _CUBE_FACES, setting, threads)
+    before = _peak_mb()
+    wall, cpu = time.perf_counter(), time.process_time()
+    found = method.run(source.vertices, source.faces.astype(np.int32), setting, threads)
+    seconds, cpu_seconds = time.perf_counter() - wall, time.process_time() - cpu
+    account = {
+        "version": method.version,
+        "input_faces": len(source.faces),
+        "threads": threads,
+        "wall": seconds,
+        "cpu": cpu_seconds,
+        "peak_mb": _peak_mb(),
+        "loaded_mb": before,
+    }
+    save_hulls(hulls, found, account)
+
+
+def measure_hulls(mesh: Path, name: str, setting: float, threads: int, hulls: Path) -> Row:
+    """Measure what `run_method` kept."""
+    found, account = load_hulls(hulls)
+    if not found:
+        return {**account, "error": "returned no hulls"}
+    solid = repair(load_mesh(mesh), threads=threads)
+    promised = make_method(name).concavity(setting)
+    return {**account, **measure(solid, found, promised, threads).as_plain()}
+
+
+def _peak_mb() -> float:
+    unit = 2**20 if sys.platform == "darwin" else 2**10
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
+
+
+def main() -> None:
+    """Do the task that the one argument, JSON, describes; the answer goes to the file it names."""
+    task = json.loads(sys.argv[1])
+    if task["memory"] and sys.platform == "linux":
+        resource.setrlimit(resource.RLIMIT_AS, (task["memory"], task["memory"]))
+    place = (Path(task["mesh"]), task["method"], task["setting"], task["threads"], Path(task["hulls"]))
+    try:
+        if not place[-1].exists():
+            run_method(*place)
+        Path(task["answer"]).write_text(json.dumps(measure_hulls(*place)))
+    except MemoryError:
+        sys.exit("out of memory")
+    except Exception as error:
+        sys.exit(f"{type(error).__name__}: {error}")
+
+
+if __name__ == "__main__":
+    main()

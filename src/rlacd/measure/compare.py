@@ -1,0 +1,202 @@
+"""What a comparison shows: each method at a number of its own, at equal accuracy, and over a sweep of numbers."""
+
+from __future__ import annotations
+
+import csv
+import io
+import platform
+import statistics
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from rlacd.errors import MissingExtraError
+from rlacd.formats import write_file
+from rlacd.measure.charts import Curve, curves_chart, pareto_chart
+from rlacd.measure.methods import make_method
+from rlacd.measure.page import Figure, Heading, Page, Text
+from rlacd.measure.runner import Bench
+from rlacd.measure.sheets import draw_sheet
+from rlacd.measure.store import Row, Task, load_hulls
+from rlacd.measure.tables import Table, as_csv, common_meshes, comparison, failures, ratio_of_parts
+from rlacd.measure.tuning import Point, known_curve
+
+DEFAULT_METHODS = (
+    "coacd",
+    "vhacdx:hulls",
+    "navacd",
+    "greedy",
+    "learned",
+    "greedy:balanced",
+    "learned:balanced",
+    "greedy:best",
+    "learned:best",
+)
+"""All that `rlacd bench compare` runs unless told otherwise."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A method at one number, on every mesh."""
+
+    method: str
+    setting: float
+    rows: list[Row]
+
+    @property
+    def label(self) -> str:
+        """The method and its number."""
+        return f"{self.method} @ {self.setting:g}"
+
+
+def at_settings(bench: Bench, methods: Sequence[str], threshold: float | None = None) -> list[Entry]:
+    """Run methods, each at its tool's default number, or those that have a threshold at the one given."""
+    entries = []
+    for name in methods:
+        method = make_method(name)
+        setting = threshold if threshold is not None and method.setting == "threshold" else method.default
+        entries.append(Entry(name, setting, bench.run(name, setting)))
+    return entries
+
+
+def compare_page(bench: Bench, title: str, entries: Sequence[Entry], pictures: int = 0, up: str = "z") -> Page:
+    """Put what the entries have in common into a page: table, trade-off, mesh by mesh, failures, pictures."""
+    page = Page(title, [about(bench)])
+    groups = [(entry.label, entry.rows) for entry in entries]
+    page.add(comparison(groups))
+    shared = common_meshes(rows for _, rows in groups)
+    if shared:
+        reference = entries[0]
+        ratios = [[e.label, ratio_of_parts(e.rows, reference.rows)] for e in entries[1:]]
+        if ratios:
+            page.add(Table(["method", f"parts / {reference.label}"], ratios, "Geometric mean a mesh ± standard error."))
+        page.add(*trade_off(entries, shared), Heading("Mesh by mesh"), mesh_by_mesh(entries))
+    page.add(Heading("Failures"), Text(failures(row for entry in entries for row in entry.rows)))
+    if pictures:
+        page.add(Heading("Pictures"), *sheets(bench, entries, bench.names[:pictures], up))
+    return page
+
+
+def about(bench: Bench) -> Text:
+    """Say what was measured on what."""
+    versions = sorted({f"{_package(r['method'])} {r['version']}" for r in bench.store.rows() if "version" in r})
+    limits = bench.limits
+    return Text(
+        f"{len(bench.names)} meshes; {', '.join(versions)}; {limits.threads} thread{'s' * (limits.threads != 1)} each, "
+        f"{limits.jobs} at a time, at most {limits.seconds:g} s each; {machine()}, Python {platform.python_version()}. "
+        "Lengths where the longest side of the input is 2. D_h is the two-sided Hausdorff distance between the input's "
+        "surface and the surface of the union of the hulls; over and under are its two directions. Concavity is "
+        "decided by bounds on the repaired input inside each hull. CPU seconds are those of all threads, from arrays "
+        "in memory to hulls in memory."
+    )
+
+
+@lru_cache(maxsize=1)
+def machine() -> str:
+    """What the processor is called."""
+    try:
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
+
+
+def trade_off(entries: Sequence[Entry], shared: set[str]) -> list[Figure]:
+    """Plot mean parts against mean CPU seconds."""
+    points = [
+        (entry.label, _mean(entry.rows, shared, "cpu"), _mean(entry.rows, shared, "parts"))
+        for entry in entries
+        if shared
+    ]
+    drawn = pareto_chart(points, "mean CPU seconds", "mean parts")
+    return [Figure("pareto.svg", drawn, "Fewer parts and less time are better; the line joins what nothing beats.")]
+
+
+def mesh_by_mesh(entries: Sequence[Entry]) -> Table:
+    """Parts and D_h of each method on each mesh."""
+    by_mesh = {entry.label: {row["mesh"]: row for row in entry.rows} for entry in entries}
+    lines = []
+    for mesh in [row["mesh"] for row in entries[0].rows]:
+        cells = [f"{_cell(by_mesh[entry.label].get(mesh))}" for entry in entries]
+        lines.append([Path(mesh).stem, *cells])
+    return Table(["mesh", *(entry.label for entry in entries)], lines, "#P / D_h / CPU seconds.")
+
+
+def _cell(row: Row | None) -> str:
+    if row is None or "error" in row:
+        return "failed"
+    return f"{row['parts']} / {row['hausdorff']:.3f} / {row['cpu']:.2f}"
+
+
+def _mean(rows: Sequence[Row], shared: set[str], key: str) -> float:
+    return statistics.fmean(row[key] for row in rows if row["mesh"] in shared)
+
+
+def _package(method: str) -> str:
+    base = method.partition(":")[0]
+    return base if base in ("coacd", "vhacdx") else "rlacd"
+
+
+def curve_chart(bench: Bench, methods: Sequence[str]) -> tuple[Figure, Table]:
+    """Plot mean parts against mean D_h over all numbers at which a method has done every mesh."""
+    lines: list[list[object]] = []
+    drawn = []
+    for method in methods:
+        points = [point for point in known_curve(bench, method) if point.good]
+        shared = common_meshes(point.rows for point in points)
+        values = [(p.setting, *_means(p, shared)) for p in points if shared]
+        if values:
+            drawn.append(Curve(method, [v[1] for v in values], [v[2] for v in values]))
+        lines += [
+            [method, f"{setting:g}", f"{hausdorff:.3f}", f"{parts:.1f}", f"{cpu:.2f}"]
+            for setting, hausdorff, parts, cpu in values
+        ]
+    chart = curves_chart(drawn, "mean D_h", "mean parts", log_y=True)
+    table = Table(["method", "number", "mean D_h", "mean #P", "mean CPU s"], lines)
+    return Figure("curves.svg", chart, "Parts against accuracy; lower left is better."), table
+
+
+def _means(point: Point, shared: set[str]) -> tuple[float, float, float]:
+    return tuple(_mean(point.rows, shared, key) for key in ("hausdorff", "parts", "cpu"))  # type: ignore[return-value]
+
+
+def sheets(bench: Bench, entries: Sequence[Entry], meshes: Sequence[str], up: str = "z") -> list[Figure | Text]:
+    """Draw each mesh by every method that managed it."""
+    drawn: list[Figure | Text] = []
+    for mesh in meshes:
+        managed = []
+        for entry in entries:
+            row = next((row for row in entry.rows if row["mesh"] == mesh and "error" not in row), None)
+            path = bench.store.hulls_of(Task(mesh, entry.method, entry.setting))
+            if row is not None and path.exists():
+                managed.append((entry.label, load_hulls(path)[0], row))
+        axis = "y" if Path(mesh).suffix.lower() in (".glb", ".gltf") else up
+        try:
+            content = draw_sheet(bench.meshes / mesh, managed, axis)
+        except MissingExtraError as error:
+            return [Text(f"No pictures: {error}")]
+        drawn.append(Figure(f"{Path(mesh).stem}.png", content, mesh))
+    return drawn
+
+
+def save_csv(bench: Bench, folder: Path) -> None:
+    """Write every row the store has as ``results.csv``.
+
+    Raises
+    ------
+    OutputError
+        The folder cannot be written to.
+    """
+    write_file(folder / "results.csv", as_csv(bench.store.rows()).encode())
+
+
+def table_csv(table: Table) -> str:
+    """A table as CSV."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(table.header)
+    writer.writerows(table.lines)
+    return text.getvalue()

@@ -1,0 +1,146 @@
+"""The paper's deployment with its numbers left free: which planes there are, how many are asked, how they are ranked.
+
+A ranking takes its best planes of those along the axes, planes of concave edges join them, and of all these the one
+with the least sum of hull volumes cuts. The paper's Tables 2 and 3 leave out kinds of planes and vary the two numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rlacd.clock import Clock
+from rlacd.criteria import Concavity
+from rlacd.cut import CutTree
+from rlacd.errors import OptionError
+from rlacd.finish import drop_slivers, limit_part, merge_parts
+from rlacd.planes.candidates import OFFSETS_PER_AXIS, Candidates
+from rlacd.planes.concave_edges import concave_edge_planes
+from rlacd.planes.sweep import SLIVER, sweep
+from rlacd.policies.features import candidates_of
+from rlacd.policies.greedy import cheapest, excess_norm, hull_sum
+from rlacd.policies.learned import Learned
+from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.component import Component, Plane
+from rlacd.solid.hull import Hull
+from rlacd.solid.load import load_mesh
+from rlacd.solid.repair import repair
+from rlacd.workers import Workers
+
+RANKINGS = ("learned", "excess")
+
+
+@dataclass(frozen=True)
+class Deployment:
+    """What may be varied.
+
+    Attributes
+    ----------
+    ranking : str
+        "learned": the shipped network; "excess": the greedy score ``rlacd.policies.greedy.excess_norm``.
+    planes : int
+        So many of the best ranked planes along the axes go on (the paper's #AP).
+    edges : int
+        The planes of so many concave edges join them (the paper's #CE, three planes each).
+    spatial, principal : bool
+        Whether the planes along x, y, z and along the principal axes exist.
+    """
+
+    ranking: str = "learned"
+    planes: int = 10
+    edges: int = 4
+    spatial: bool = True
+    principal: bool = True
+
+    def __post_init__(self) -> None:
+        if self.ranking not in RANKINGS:
+            raise OptionError(f"ranking is {self.ranking!r}; it has to be one of {', '.join(RANKINGS)}.")
+        if self.planes < 0 or self.edges < 0:
+            raise OptionError("planes and edges have to be at least 0.")
+        if not (self.edges or (self.planes and (self.spatial or self.principal))):
+            raise OptionError("no planes are left; ask for some along the axes or of concave edges.")
+
+    @classmethod
+    def parse(cls, words: Sequence[str]) -> Deployment:
+        """Read ``ap=10``, ``ce=4``, ``no-spatial``, ``no-principal`` and a ranking, in any order.
+
+        Raises
+        ------
+        OptionError
+            A word is none of these.
+        """
+        given: dict[str, object] = {}
+        for word in words:
+            key, _, value = word.partition("=")
+            if key in ("ap", "ce") and value.isdecimal():
+                given["planes" if key == "ap" else "edges"] = int(value)
+            elif word in ("no-spatial", "no-principal"):
+                given[word.removeprefix("no-")] = False
+            elif word in RANKINGS:
+                given["ranking"] = word
+            else:
+                raise OptionError(
+                    f"planes:{word} is not known; there are ap=N, ce=N, no-spatial, no-principal, "
+                    f"{' and '.join(RANKINGS)}."
+                )
+        return cls(**given)  # type: ignore[arg-type]
+
+
+class Deployed:
+    """A policy: the least hull sum among the best ranked planes along the axes and those of concave edges.
+
+    Parameters
+    ----------
+    deployment : Deployment
+    threshold : float
+        The criterion's; the network looks at it.
+    """
+
+    def __init__(self, deployment: Deployment, threshold: float) -> None:
+        self._of = deployment
+        self._learned = Learned(scale=threshold) if deployment.ranking == "learned" else None
+
+    def choose(self, component: Component, threads: int = 1) -> Plane | None:
+        """Choose the plane to cut a component by; None when no candidate is valid."""
+        blocks = [self._best_along_axes(component, threads), concave_edge_planes(component, self._of.edges)]
+        blocks = [block for block in blocks if len(block)]
+        if not blocks:
+            return None
+        scored = sweep(component, Candidates.joined(*blocks), threads)
+        return cheapest(scored, hull_sum(scored))
+
+    def _best_along_axes(self, component: Component, threads: int) -> Candidates:
+        """The best ranked valid planes along those axes that there are."""
+        swept = sweep(
+            component, candidates_of(component, OFFSETS_PER_AXIS), threads
+        )  # all that the network wants to see
+        kinds = np.repeat([self._of.spatial, self._of.principal], 3 * OFFSETS_PER_AXIS)
+        exists = np.concatenate([kinds, np.zeros(len(swept.candidates) - len(kinds), dtype=bool)])
+        valid = next((v for s in (SLIVER, SLIVER / 100) if (v := exists & swept.valid(s)).any()), exists & False)
+        cost = excess_norm(swept) if self._learned is None else self._learned.rank(component, swept)
+        ranked = np.argsort(np.where(valid, cost, np.inf), kind="stable")
+        best = np.sort(ranked[: min(self._of.planes, int(valid.sum()))])  # of planes that cost the same, the first cuts
+        return Candidates(swept.candidates.directions[best], swept.candidates.offsets[best])
+
+
+def decompose_as_deployed(
+    deployment: Deployment, vertices: FloatArray, faces: IntArray, threshold: float, threads: int
+) -> list[tuple[FloatArray, IntArray]]:
+    """Decompose a mesh [V, 3], [F, 3] until each part has at most the concavity `threshold`, then merge.
+
+    Returns
+    -------
+    list of (vertices, faces)
+        In the input's frame and unit.
+    """
+    solid = repair(load_mesh((vertices, faces)), threads=threads)
+    criterion, clock = Concavity(threshold), Clock()
+    with Workers(threads) as workers:
+        tree = CutTree(Component(solid.manifold), Deployed(deployment, threshold), workers)
+        done, left = tree.cut_until(criterion, clock)
+        parts = drop_slivers([*done, *left], workers, suspects=left)
+        parts = drop_slivers(merge_parts(parts, criterion, workers, clock), workers)
+    there = [Hull.of(solid.frame.to_input(limit_part(part, None, None).hull.vertices)) for part in parts]
+    return [(hull.vertices, hull.faces) for hull in there if hull is not None]

@@ -1,0 +1,132 @@
+"""The paper's experiments that need no training, each from a folder of meshes to a page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rlacd.errors import OptionError
+from rlacd.measure.compare import Entry, about, curve_chart, mesh_by_mesh, trade_off
+from rlacd.measure.page import Heading, Page, Text
+from rlacd.measure.runner import Bench
+from rlacd.measure.store import Row, Task
+from rlacd.measure.tables import Table, common_meshes, comparison, failures, ratio_of_parts
+from rlacd.measure.tuning import Point, tune
+
+TARGETS = (0.15, 0.10)
+"""The paper's two accuracies."""
+
+TABLE_1_METHODS = ("coacd", "vhacdx", "navacd:space", "navacd", "greedy-hull-sum", "greedy", "learned")
+
+APART = 0.05
+"""A method whose mean D_h cannot be brought this close to the target, relative to it, is marked."""
+
+PAPER_TABLE_1 = Table(
+    ["method (paper, 305 models of ShapeNet)", "#P at 0.15", "s", "#P at 0.10", "s"],
+    [
+        ["RL-ACD", 6.0, 1.3, 25.9, 3.6],
+        ["greedy over all planes", "–", "–", 28.3, 13.2],
+        ["NavACD", 6.9, 0.3, 30.5, 1.3],
+        ["CoACD", 10.7, 21.9, 44.2, 52.3],
+    ],
+    "As published; 16-core CPU and RTX 3090. Other meshes than here: compare the ratios.",
+)
+
+
+def equal_accuracy(bench: Bench, methods: Sequence[str], targets: Sequence[float], title: str) -> Page:
+    """Tune each method to the same mean D_h and compare (4.4, Tables 1 and 4)."""
+    page = Page(title, [about(bench)])
+    everything: list[Row] = []
+    for target in targets:
+        tuned = [(method, tune(bench, method, target)) for method in methods]
+        entries = [Entry(method, point.setting, point.rows) for method, point in tuned]
+        everything += [row for entry in entries for row in entry.rows]
+        page.add(Heading(f"Mean D_h {target:g}"), comparison([(_label(m, p, target), p.rows) for m, p in tuned]))
+        shared = common_meshes(entry.rows for entry in entries)
+        if shared:
+            figure = trade_off(entries, shared)[0]
+            page.add(type(figure)(f"pareto_{target:g}.svg", figure.content, figure.caption))
+            page.add(_ratios(entries), mesh_by_mesh(entries))
+    page.add(Heading("Parts against D_h"), *curve_chart(bench, methods))
+    page.add(Heading("The paper's numbers"), PAPER_TABLE_1)
+    page.add(Heading("Failures"), Text(failures(everything)))
+    return page
+
+
+def _label(method: str, point: Point, target: float) -> str:
+    missed = " (target out of reach)" if not abs(point.hausdorff - target) <= APART * target else ""
+    return f"{method} @ {point.setting:g}{missed}"
+
+
+def _ratios(entries: Sequence[Entry]) -> Table:
+    reference = entries[-1]
+    lines = [[entry.label, ratio_of_parts(entry.rows, reference.rows)] for entry in entries[:-1]]
+    return Table(["method", f"parts / {reference.label}"], lines, "Geometric mean a mesh ± standard error.")
+
+
+def vhacd_at_equal_parts(bench: Bench, reference: str, setting: float) -> Page:
+    """V-HACD, asked for as many hulls as the reference made of each mesh (4.4.2)."""
+    ours = bench.run(reference, setting)
+    counts = {row["mesh"]: row["parts"] for row in ours if "error" not in row}
+    theirs = bench.run_tasks([Task(mesh, "vhacdx:hulls", float(n)) for mesh, n in counts.items()])
+    entries = [Entry(reference, setting, ours), Entry("vhacdx:hulls", setting, theirs)]
+    page = Page("V-HACD at equal part count", [about(bench)])
+    page.add(comparison([(entries[0].label, ours), (f"vhacdx, at most as many hulls as {reference}", theirs)]))
+    lines = []
+    for row in theirs:
+        own = next(r for r in ours if r["mesh"] == row["mesh"])
+        cells = ["failed"] * 3 if "error" in row else [row["parts"], _three(row["hausdorff"]), _two(row["volume"])]
+        lines.append([row["mesh"], own["parts"], _three(own["hausdorff"]), _two(own["volume"]), *cells])
+    header = ["mesh", f"#P {reference}", "D_h", "Σ hull / solid", "#P V-HACD", "D_h", "Σ hull / solid"]
+    page.add(Heading("Mesh by mesh"), Table(header, lines))
+    page.add(Heading("Failures"), Text(failures([*ours, *theirs])))
+    return page
+
+
+def _three(x: float) -> str:
+    return f"{x:.3f}"
+
+
+def _two(x: float) -> str:
+    return f"{x:.2f}"
+
+
+TABLE_2_ARMS = {
+    "all planes": "planes",
+    "without spatial planes": "planes:no-spatial",
+    "without PCA planes": "planes:no-principal",
+    "without concave edges' planes": "planes:ce=0",
+}
+
+
+def kinds_of_planes(bench: Bench, ranking: str, setting: float) -> Page:
+    """Leave out one kind of planes at a time (Table 2)."""
+    arms = {label: f"{name}:{ranking}" for label, name in TABLE_2_ARMS.items()}
+    return _arms(bench, "Kinds of planes (Table 2)", arms, setting)
+
+
+def numbers_of_planes(bench: Bench, ranking: str, setting: float, planes: Sequence[int], edges: Sequence[int]) -> Page:
+    """Vary how many ranked planes (#AP) and concave edges (#CE) are asked, one at a time (Table 3)."""
+    if not planes and not edges:
+        raise OptionError("there is nothing to vary; give numbers of planes or of edges.")
+    arms = {f"#AP {n}, #CE 4": f"planes:ap={n}:{ranking}" for n in planes}
+    arms |= {f"#AP 10, #CE {n}": f"planes:ce={n}:{ranking}" for n in edges}
+    first = {"#AP 10, #CE 4": f"planes:{ranking}"}
+    arms = {**first, **{label: name for label, name in arms.items() if label not in first}}
+    return _arms(bench, "Numbers of planes (Table 3)", arms, setting)
+
+
+def _arms(bench: Bench, title: str, arms: dict[str, str], setting: float) -> Page:
+    rows = {label: bench.run(name, setting) for label, name in arms.items()}
+    page = Page(title, [about(bench)])
+    page.add(
+        Text(
+            "The ranking's best planes along the axes (#AP) and those of concave edges (#CE, three each) are cut for "
+            f"real as far as the sum of hull volumes goes, and the least is taken; concavity threshold {setting:g}."
+        ),
+        comparison(list(rows.items())),
+    )
+    reference = next(iter(arms))
+    lines = [[label, ratio_of_parts(some, rows[reference])] for label, some in rows.items() if label != reference]
+    page.add(Table(["", f"parts / {reference}"], lines, "Geometric mean a mesh ± standard error."))
+    page.add(Heading("Failures"), Text(failures([row for some in rows.values() for row in some])))
+    return page

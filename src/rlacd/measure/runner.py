@@ -1,0 +1,149 @@
+"""Every mesh by every method, each in a process of its own, with limits; what is finished is not done again."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from rlacd.measure.store import Row, Store, Task
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a task may take.
+
+    Attributes
+    ----------
+    seconds : float
+        Wall time of a process: for running a method, and again for measuring its hulls where that is not done yet.
+    memory : int
+        Bytes of address space, on Linux; 0 for no limit.
+    threads : int
+        Threads of each process.
+    jobs : int
+        Processes at a time.
+    """
+
+    seconds: float = 600.0
+    memory: int = 12 * 2**30
+    threads: int = 1
+    jobs: int = 1
+
+
+class Bench:
+    """A folder of meshes, a folder of results, and the limits.
+
+    Parameters
+    ----------
+    meshes : Path
+        What the names of meshes are relative to.
+    names : sequence of str
+        The meshes.
+    store : Store
+    limits : Limits
+    say : callable
+        Takes a line of progress.
+    """
+
+    def __init__(
+        self, meshes: Path, names: Sequence[str], store: Store, limits: Limits | None = None, say: Say = print
+    ) -> None:
+        self.meshes = meshes
+        self.names = list(names)
+        self.store = store
+        self.limits = limits or Limits()
+        self._say = say
+
+    def run(self, method: str, setting: float) -> list[Row]:
+        """All meshes by one method; in the order of the names."""
+        return self.run_tasks([Task(name, method, setting) for name in self.names])
+
+    def run_tasks(self, tasks: Iterable[Task]) -> list[Row]:
+        """Do what is not done yet, and return the rows of all tasks in their order."""
+        tasks = list(tasks)
+        waiting = [task for task in dict.fromkeys(tasks) if self.store.get(task) is None]
+        pool = ThreadPoolExecutor(self.limits.jobs)
+        try:
+            for number, row in enumerate(pool.map(self._finish, waiting), 1):
+                what = row.get("error") or f"{row['parts']} parts, {row['cpu']:.1f} s, D_h {row['hausdorff']:.3f}"
+                self._say(f"{number}/{len(waiting)} {row['mesh']}  {row['method']} {row['setting']:g}  {what}")
+        finally:
+            pool.shutdown(cancel_futures=True)
+        return [found for task in tasks if (found := self.store.get(task)) is not None]
+
+    def _finish(self, task: Task) -> Row:
+        row: Row = {"mesh": task.mesh, "method": task.method, "setting": task.setting}
+        hulls = self.store.hulls_of(task)
+        with tempfile.TemporaryDirectory() as folder:
+            answer = Path(folder) / "answer.json"
+            failure = self._child(task, hulls, answer)
+            if failure is not None and hulls.exists():  # the tool has done its work; measuring has limits of its own
+                failure = self._child(task, hulls, answer)
+                failure = failure and f"measuring: {failure}"
+            row |= {"error": failure} if failure else json.loads(answer.read_text())
+        self.store.add(row)
+        return row
+
+    def _child(self, task: Task, hulls: Path, answer: Path) -> str | None:
+        """Run one process, which makes the hulls unless they are there; None, or what went wrong with it."""
+        order = {
+            "mesh": str(self.meshes / task.mesh),
+            "method": task.method,
+            "setting": task.setting,
+            "threads": self.limits.threads,
+            "memory": self.limits.memory,
+            "hulls": str(hulls),
+            "answer": str(answer),
+        }
+        environment = {**os.environ, "OMP_NUM_THREADS": str(self.limits.threads)}
+        command = [sys.executable, "-m", "rlacd.measure.child", json.dumps(order)]
+        with subprocess.Popen(
+            command,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            start_new_session=True,
+        ) as process:
+            try:
+                _, complaint = process.communicate(timeout=self.limits.seconds)
+            except subprocess.TimeoutExpired:
+                _kill(process)
+                return f"more than {self.limits.seconds:g} s"
+            except BaseException:
+                _kill(process)
+                raise
+        last = (complaint.decode(errors="replace").strip().splitlines() or [""])[-1][-300:]
+        if process.returncode < 0:
+            return f"died of {signal.Signals(-process.returncode).name} {last}".strip()
+        return (last or f"exit code {process.returncode}") if process.returncode else None
+
+
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    """End a process and those it started: it leads a group of its own."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.communicate()
+
+
+def find_meshes(folder: Path, listed: Path | None = None) -> list[str]:
+    """Names of the meshes in a folder of any depth, or those of a list, one a line.
+
+    ShapeNetCore, HumanBody and COSEG are read as they are distributed: a folder of folders. Of ShapeNetCore v2, which
+    keeps a ``models/model_normalized.obj`` in each, voxels and screenshots are passed over.
+    """
+    if listed is not None:
+        return [line for line in listed.read_text().splitlines() if line.strip() and not line.startswith("#")]
+    endings = {".ply", ".obj", ".stl", ".off", ".glb", ".gltf", ".dae", ".3mf"}
+    return sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.suffix.lower() in endings)

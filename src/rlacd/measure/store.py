@@ -1,0 +1,152 @@
+"""Results on disk: a line of JSON a mesh, method and number, and the hulls beside it, so that nothing is made twice."""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import threading
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from rlacd.errors import OutputError
+from rlacd.measure.methods import RawHull
+
+Row: TypeAlias = dict[str, Any]
+"""A finished task: ``mesh``, ``method``, ``setting``; ``error``, or what was measured."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """One mesh, one method and its number.
+
+    Attributes
+    ----------
+    mesh : str
+        Path relative to the folder of meshes.
+    method : str
+        A name that `make_method` knows.
+    setting : float
+        The method's number.
+    """
+
+    mesh: str
+    method: str
+    setting: float
+
+    @property
+    def key(self) -> tuple[str, str, float]:
+        """What tells it from other tasks."""
+        return self.mesh, self.method, self.setting
+
+    @property
+    def file_name(self) -> str:
+        """A name for its hulls."""
+        digest = hashlib.sha256(repr(self.key).encode()).hexdigest()[:16]
+        return f"{Path(self.mesh).stem[:40]}-{digest}.npz"
+
+
+class Store:
+    """A folder of results: ``results.jsonl`` and ``hulls/``.
+
+    Parameters
+    ----------
+    folder : Path
+        Made if it is not there.
+
+    Raises
+    ------
+    OutputError
+        The folder cannot be made or written to, another run is writing to it, or a line of it is damaged.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._lines = folder / "results.jsonl"
+        self._lock = threading.Lock()
+        try:
+            (folder / "hulls").mkdir(parents=True, exist_ok=True)
+            self._held = self._lines.open("a")
+        except OSError as error:
+            raise OutputError(f"cannot write results to {folder} ({error.strerror}); choose another folder.") from error
+        try:
+            fcntl.flock(self._held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            self._held.close()
+            raise OutputError(f"another run is writing to {folder}; wait for it or choose another folder.") from error
+        self._rows = {_key(row): row for row in _whole_lines(self._lines)}
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def get(self, task: Task) -> Row | None:
+        """The row of a task, if it is finished."""
+        return self._rows.get(task.key)
+
+    def rows(self) -> list[Row]:
+        """All rows, in the order in which they were finished."""
+        return list(self._rows.values())
+
+    def add(self, row: Row) -> None:
+        """Write a row; one of the same task is replaced."""
+        with self._lock:
+            line = json.dumps(row, allow_nan=False) + "\n"
+            self._held.write(line)
+            self._held.flush()
+            os.fsync(self._held.fileno())
+            self._rows[_key(row)] = row
+
+    def close(self) -> None:
+        """Let others write to the folder."""
+        self._held.close()
+
+    def hulls_of(self, task: Task) -> Path:
+        """Where the hulls of a task are, or will be."""
+        return self.folder / "hulls" / task.file_name
+
+
+def save_hulls(path: Path, hulls: Sequence[RawHull], account: Row) -> None:
+    """Write hulls and what is known of how they were made; the file appears whole or not at all."""
+    temporary = path.with_suffix(".part.npz")
+    np.savez_compressed(
+        temporary,
+        vertices=np.concatenate([np.empty((0, 3)), *(v for v, _ in hulls)]),
+        faces=np.concatenate([np.empty((0, 3), dtype=np.int32), *(f for _, f in hulls)]),
+        counts=np.array([(len(v), len(f)) for v, f in hulls], dtype=np.int64).reshape(-1, 2),
+        account=np.array(json.dumps(account)),
+    )
+    temporary.replace(path)
+
+
+def load_hulls(path: Path) -> tuple[list[RawHull], Row]:
+    """Read what `save_hulls` wrote."""
+    with np.load(path, allow_pickle=False) as file:
+        ends = np.cumsum(file["counts"], axis=0)
+        vertices = np.split(file["vertices"], ends[:, 0])[:-1]  # nothing is left after the last
+        faces = np.split(file["faces"], ends[:, 1])[:-1]
+        account: Row = json.loads(str(file["account"]))
+    return list(zip(vertices, faces, strict=True)), account
+
+
+def _key(row: Row) -> tuple[str, str, float]:
+    return row["mesh"], row["method"], float(row["setting"])
+
+
+def _whole_lines(path: Path) -> Iterable[Row]:
+    """The rows of a file; what a killed run left of its last line is cut off."""
+    content = path.read_bytes()
+    whole = content.rfind(b"\n") + 1
+    if whole < len(content):
+        os.truncate(path, whole)
+    for number, line in enumerate(content[:whole].splitlines(), 1):
+        try:
+            row: Row = json.loads(line)
+            _key(row)
+        except (ValueError, KeyError, TypeError) as error:
+            raise OutputError(f"line {number} of {path} is damaged ({error}); delete the line.") from error
+        yield row

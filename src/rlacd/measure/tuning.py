@@ -1,0 +1,133 @@
+"""Equal accuracy: for each method the one number at which the mean D_h over a set of meshes is the one asked for.
+
+This is the protocol of RL-ACD (4.4): a tool that makes fewer hulls may only be looser, so the tools are compared where
+they are equally tight.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rlacd.errors import OptionError
+from rlacd.measure.methods import Method, make_method
+from rlacd.measure.runner import Bench
+from rlacd.measure.store import Row
+
+CLOSE = 0.02
+"""The mean D_h may be this share of the target away from it."""
+
+TRIES = 8
+"""Numbers tried at most, beyond those already known."""
+
+STRIDE = 1.6
+"""How much the number changes where the target is not bracketed yet."""
+
+RANGES = {"threshold": (0.005, 1.0), "tolerance": (0.005, 1.0), "percent": (0.01, 100.0), "hulls": (1.0, 1024.0)}
+"""Numbers that make sense, by what they mean."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """One number of a method, over the whole set of meshes.
+
+    Attributes
+    ----------
+    setting : float
+    rows : list of Row
+        Every mesh, the failed ones included.
+    """
+
+    setting: float
+    rows: list[Row]
+
+    @property
+    def good(self) -> list[Row]:
+        """The meshes that did not fail."""
+        return [row for row in self.rows if "error" not in row]
+
+    @property
+    def hausdorff(self) -> float:
+        """Mean D_h; nan where all failed."""
+        good = self.good
+        return sum(row["hausdorff"] for row in good) / len(good) if good else math.nan
+
+
+def curve(bench: Bench, method: str, settings: Sequence[float]) -> list[Point]:
+    """Run a method at several numbers."""
+    return [Point(setting, bench.run(method, setting)) for setting in settings]
+
+
+def known_curve(bench: Bench, method: str) -> list[Point]:
+    """The numbers at which the store holds every mesh of the set, in ascending order."""
+    by_setting: dict[float, dict[str, Row]] = {}
+    for row in bench.store.rows():
+        if row["method"] == method:
+            by_setting.setdefault(row["setting"], {})[row["mesh"]] = row
+    whole = [s for s, rows in by_setting.items() if all(name in rows for name in bench.names)]
+    return [Point(s, [by_setting[s][name] for name in bench.names]) for s in sorted(whole)]
+
+
+def tune(bench: Bench, method: str, target: float) -> Point:
+    """Find the number at which a method's mean D_h is the target, to within `CLOSE`.
+
+    What the store knows is where the search begins: between two numbers whose means lie on both sides, the next one is
+    interpolated; regula falsi, with bisection where that is slow.
+
+    Raises
+    ------
+    OptionError
+        The target is not positive.
+
+    Returns
+    -------
+    Point
+        The closest one found; of a method that cannot come close, too.
+    """
+    if not target > 0:
+        raise OptionError(f"the mean D_h to reach is {target}; it has to be positive.")
+    tool = make_method(method)
+    points = known_curve(bench, method)
+    for attempt in range(TRIES):
+        usable = [p for p in points if not math.isnan(p.hausdorff)]
+        if any(abs(p.hausdorff - target) <= CLOSE * target for p in usable) or (points and not usable):
+            break
+        setting = next_setting(tool, [(p.setting, p.hausdorff) for p in usable], target, attempt)
+        if setting is None or any(p.setting == setting for p in points):
+            break
+        points.append(Point(setting, bench.run(method, setting)))
+        points.sort(key=lambda p: p.setting)
+    if not points:
+        raise OptionError("there are no meshes to tune on.")
+    return min(points, key=lambda p: math.inf if math.isnan(p.hausdorff) else abs(p.hausdorff - target))
+
+
+def next_setting(tool: Method, known: Sequence[tuple[float, float]], target: float, attempt: int) -> float | None:
+    """Choose the number to try next, from known (number, mean D_h); None when there is none left to try."""
+    lowest, highest = RANGES[tool.setting]
+    if not known:
+        return _rounded(tool, target if tool.setting in ("threshold", "tolerance") else tool.default)
+    sign = -1 if tool.falls else 1
+    looser = [(s, d) for s, d in known if d > target]
+    tighter = [(s, d) for s, d in known if d < target]
+    if looser and tighter:
+        # Mean D_h need not be monotone: the two closest in number that enclose the target are taken.
+        (a, da), (b, db) = min(
+            ((t, loose) for t in tighter for loose in looser), key=lambda p: abs(math.log(p[0][0] / p[1][0]))
+        )
+        share = 0.5 if attempt % 3 == 2 else (target - da) / (db - da)
+        return _rounded(tool, math.exp(math.log(a) + share * math.log(b / a)))
+    if looser:
+        outermost = min(sign * s for s, _ in looser) * sign
+        wanted = outermost / STRIDE**sign
+    else:
+        outermost = max(sign * s for s, _ in tighter) * sign
+        wanted = outermost * STRIDE**sign
+    wanted = min(max(wanted, lowest), highest)
+    return None if wanted == outermost else _rounded(tool, wanted)
+
+
+def _rounded(tool: Method, number: float) -> float:
+    """Three digits: numbers that people can repeat."""
+    return float(round(number)) if tool.setting == "hulls" else float(f"{number:.3g}")

@@ -1,0 +1,185 @@
+"""What `rlacd.measure` says of hulls, against shapes with known answers and against an independent reference."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import manifold3d
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import rlacd
+from rlacd.errors import OptionError
+from rlacd.measure import Metrics, measure
+from rlacd.measure.metrics import COVERED, SAMPLES, TOLERANCE, is_valid
+from rlacd.solid.load import load_mesh
+from rlacd.solid.repair import repair
+from tests.shapes import Closed, box, dense, from_manifold, point_to_triangles, to_manifold
+
+# The input of most tests: its longest side is 2 and it is centred, so that lengths are the frame's.
+SLAB = ((-1.0, -0.5, -0.25), (1.0, 0.5, 0.25))
+
+
+def hulls_of(*solids: Any) -> list[tuple[Any, Any]]:
+    return [(mesh.vertices, mesh.faces) for mesh in map(from_manifold, solids)]
+
+
+def measured(shape: Any, *solids: Any, promised: float | None = None) -> Metrics:
+    mesh = from_manifold(shape)
+    return measure(repair(load_mesh((mesh.vertices, mesh.faces))), hulls_of(*solids), promised)
+
+
+def near(value: float, truth: float) -> bool:
+    return truth - 1e-6 <= value <= truth + TOLERANCE + 1e-6
+
+
+def test_two_touching_boxes_are_the_box() -> None:
+    found = measured(box(*SLAB), box(SLAB[0], (0.3, 0.5, 0.25)), box((0.3, -0.5, -0.25), SLAB[1]))
+    assert found.parts == 2
+    assert near(found.hausdorff, 0)  # 0.25 if the faces where they touch counted
+    assert near(found.concavity, 0)
+    assert found.volume == pytest.approx(1)
+    assert (found.uncovered, found.invalid, found.empty) == (0, 0, 0)
+
+
+@pytest.mark.parametrize("gap", [1e-7, 1e-5, 5e-4])
+def test_a_crack_of_a_cut_is_no_surface(gap: float) -> None:
+    halves = box(SLAB[0], (0.3 - gap / 2, 0.5, 0.25)), box((0.3 + gap / 2, -0.5, -0.25), SLAB[1])
+    assert measured(box(*SLAB), *halves).over < 2 * TOLERANCE
+
+
+def test_a_wide_gap_is_surface() -> None:
+    found = measured(box(*SLAB), box(SLAB[0], (0.2, 0.5, 0.25)), box((0.4, -0.5, -0.25), SLAB[1]))
+    assert near(found.over, 0.25)  # the middle of the walls of the gap
+    assert near(found.under, 0.1)
+
+
+def test_a_box_in_a_box_counts_its_volume_twice_and_no_surface() -> None:
+    found = measured(box(*SLAB), box(*SLAB), box((-0.2, -0.2, -0.2), (0.2, 0.2, 0.2)))
+    assert near(found.hausdorff, 0)
+    assert found.volume == pytest.approx(1.064)
+    assert near(found.concavity, 0)  # the inner box is wholly solid
+
+
+def test_a_missing_part() -> None:
+    found = measured(box(*SLAB), box(SLAB[0], (0.5, 0.5, 0.25)))
+    assert near(found.under, 0.5)
+    assert near(found.over, 0.25)  # the new wall's middle
+    assert near(found.hausdorff, 0.5)
+    assert found.volume == pytest.approx(0.75)
+    area = 2 * (2 * 1 + 2 * 0.5 + 1 * 0.5)
+    missing = 2 * (0.5 * 1 + 0.5 * 0.5) + 1 * 0.5
+    assert found.uncovered == pytest.approx(missing / area, abs=4 * 0.5 / SAMPLES**0.5 + COVERED)
+
+
+@pytest.mark.parametrize("by", [0.01, 0.1])
+def test_a_fattened_hull(by: float) -> None:
+    fat = tuple(x - by for x in SLAB[0]), tuple(x + by for x in SLAB[1])
+    found = measured(box(*SLAB), box(*fat), promised=0.02)  # type: ignore[arg-type]
+    assert near(found.over, by * 3**0.5)
+    assert near(found.under, 0)
+    assert found.volume == pytest.approx((2 + 2 * by) * (1 + 2 * by) * (0.5 + 2 * by))
+    added = 3 * ((2 + 2 * by) * (1 + 2 * by) * (0.5 + 2 * by) - 1) / (4 * np.pi)
+    assert near(found.concavity, max(by * 3**0.5, 0.3 * added ** (1 / 3)))
+    assert found.exceeding == (found.concavity > 0.021)
+
+
+def test_a_hull_of_an_l_spans_its_corner() -> None:
+    shape = box((-1, -1, 0), (1, 0, 0.2)) + box((-1, 0, 0), (0, 1, 0.2))
+    found = measured(shape, shape.hull(), promised=0.05)
+    # Farthest of the hull's slanted face from the L is its edge's middle: (0.5, 0.5), as far from both arms.
+    assert near(found.over, 0.5)
+    assert near(found.concavity, 0.5)
+    assert found.exceeding == 1
+
+
+def test_hulls_that_hold_nothing_are_counted_and_measured() -> None:
+    found = measured(box(*SLAB), box(*SLAB), box((1.5, 0, 0), (1.7, 0.1, 0.1)))
+    assert found.empty == 1
+    assert near(found.over, np.linalg.norm([0.7]))
+
+
+def test_numbers_do_not_depend_on_the_unit_and_the_place() -> None:
+    def at(scale: float, shift: float) -> Metrics:
+        def there(solid: Any) -> Any:
+            return solid.scale((scale, scale, scale)).translate((shift, shift, shift))
+
+        return measured(there(box(*SLAB)), there(box(SLAB[0], (0.5, 0.5, 0.3))), promised=0.05)
+
+    one, other = at(1, 0).as_plain(), at(1000, 10).as_plain()
+    assert one == pytest.approx(other, abs=1e-3)
+
+
+def test_nothing_to_measure_is_an_error() -> None:
+    mesh = from_manifold(box(*SLAB))
+    solid = repair(load_mesh((mesh.vertices, mesh.faces)))
+    flat = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], dtype=np.float64)
+    with pytest.raises(OptionError, match="nothing to measure"):
+        measure(solid, [(flat, np.array([[0, 1, 2]], dtype=np.int32))])
+
+
+def test_invalid_hulls_are_counted() -> None:
+    good = from_manifold(box(*SLAB))
+    assert is_valid(good.vertices, good.faces)
+    soup = good.vertices[good.faces].reshape(-1, 3)
+    assert is_valid(soup, np.arange(len(soup)).reshape(-1, 3)), "triangles with corners of their own"
+    assert not is_valid(good.vertices, good.faces[:, ::-1]), "inside out"
+    assert not is_valid(good.vertices, good.faces[1:]), "open"
+    assert not is_valid(good.vertices, np.vstack([good.faces[:-1], good.faces[-1:, ::-1]])), "one face turned"
+    dented = from_manifold(box(*SLAB) - box((0.2, 0.2, 0.1), (0.4, 0.4, 1.0)))
+    assert not is_valid(dented.vertices, dented.faces), "not convex"
+    assert not is_valid(np.full_like(good.vertices, np.nan), good.faces)
+    assert not is_valid(good.vertices, good.faces + 1), "corners that do not exist"
+    flat = good.vertices * (1, 1, 0)
+    assert not is_valid(flat, good.faces), "no volume"
+
+
+boxes = st.tuples(*[st.floats(-1.2, 1.0)] * 3, *[st.floats(0.1, 1.0)] * 3)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(boxes, min_size=1, max_size=4))
+def test_distances_agree_with_a_boolean_union_and_samples(some: list[tuple[float, ...]]) -> None:
+    """The surface of the union as the mesh boolean makes it, and brute force over dense samples of both."""
+    shape = box((-1, -1, -1), (1, 0, 0.2)) + box((-1, -1, 0), (0, 0.5, 1))
+    solids = [box(b[:3], tuple(x + s for x, s in zip(b[:3], b[3:], strict=True))) for b in some]  # type: ignore[arg-type]
+    found = measured(shape, *solids)
+    union = from_manifold(manifold3d.Manifold.batch_boolean(solids, manifold3d.OpType.Add))
+    surface = from_manifold(shape)
+    over = point_to_triangles(dense(union, 6000), surface.vertices, surface.faces).max()
+    points = dense(surface, 6000)
+    inside = np.any([((points >= b[:3]) & (points <= np.add(b[:3], b[3:]))).all(axis=1) for b in some], axis=0)
+    away = np.where(inside, 0, point_to_triangles(points, union.vertices, union.faces))
+    spacing = 0.1  # of the samples, about
+    assert over - 2e-3 <= found.over <= over + spacing
+    assert away.max() - 2e-3 <= found.under <= away.max() + spacing
+    assert found.uncovered == pytest.approx((away > COVERED).mean(), abs=0.03)
+    assert found.hausdorff == max(found.over, found.under)
+
+
+def test_the_report_of_a_decomposition_says_the_same(corpus: Path) -> None:
+    path = corpus / "test/vhacd/ob_chair_gothic.ply"
+    result = rlacd.decompose(path, threads=1)
+    found = measure(repair(load_mesh(path)), [(h.vertices, h.faces) for h in result], 0.05)
+    assert found.parts == result.report["parts"]
+    assert found.faces == result.report["faces"]
+    assert found.over == pytest.approx(result.report["hausdorff"]["over"], abs=3e-3)
+    assert found.under == pytest.approx(result.report["hausdorff"]["under"], abs=3e-3)
+    assert found.exceeding == found.invalid == found.empty == 0
+    # What of the solid lies in a hull may be more than the part it was made for, so this is no less by definition.
+    assert found.concavity <= result.report["concavity"]["max"] + 2 * TOLERANCE
+
+
+def test_the_union_is_the_solid_where_the_parts_are_exact() -> None:
+    """Volume of a boolean union, distances and shares tell the same story: nothing added, nothing missing."""
+    cross = box((-1, -0.2, -0.2), (1, 0.2, 0.2)) + box((-0.2, -1, -0.2), (0.2, 1, 0.2))
+    arms = [box((-1, -0.2, -0.2), (1, 0.2, 0.2)), box((-0.2, -1, -0.2), (0.2, 1, 0.2))]
+    found = measured(cross, *arms)
+    assert near(found.hausdorff, 0)
+    assert found.uncovered == 0
+    assert found.volume == pytest.approx((2 * 2 * 0.4 * 0.4) / cross.volume())
+    closed: Closed = from_manifold(cross)
+    assert to_manifold(closed.vertices, closed.faces).volume() == pytest.approx(cross.volume())
