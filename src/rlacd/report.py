@@ -15,6 +15,7 @@ from rlacd.criteria import Criterion
 from rlacd.options import Options
 from rlacd.solid.component import Part
 from rlacd.solid.distance import hull_distances
+from rlacd.solid.mass import mass_of
 from rlacd.solid.solid import Solid
 from rlacd.workers import Workers
 
@@ -35,6 +36,7 @@ def make_report(
     errors = workers.map(criterion.error, parts)
     account = criterion.account(errors)
     over = under = None
+    mass = mass_of(solid)
     vertices, faces = solid.surface
     if len(faces):  # a cloud of points has no surface
         distances = hull_distances([part.hull for part in parts], vertices, faces, threads=workers.threads)
@@ -50,6 +52,7 @@ def make_report(
         **account.entries,
         "hausdorff": {"over": over, "under": under},
         "scale": solid.frame.scale,
+        "mass": {"volume_m": mass.volume_m, "centre_m": mass.centre_m.tolist(), "inertia_m": mass.inertia_m.tolist()},
         "repair": [asdict(body) for body in solid.bodies],
         "warnings": [
             *solid.warnings,
