@@ -131,6 +131,6 @@ def save_hulls(
 
 
 def file_stem(name: str) -> str:
-    """Make a file's name of any name: a mesh may be called anything, a file may not, and its name is counted in bytes."""
+    """Make a file's name of any name: a file may not be called anything, and its name is counted in bytes."""
     plain = re.sub(r'[\x00-\x1f/\\:*?"<>|]', "_", name).strip(". ")
     return plain.encode(errors="replace")[:150].decode(errors="ignore").strip(". ") or "mesh"

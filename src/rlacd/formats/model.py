@@ -1,4 +1,4 @@
-"""What a simulator or an engine is told of a body: hulls to collide with, a mesh to look at, mass, and which way is up."""
+"""What a simulator or an engine is told of a body: hulls to collide with, a mesh to look at, mass, which way is up."""
 
 from __future__ import annotations
 
@@ -99,7 +99,9 @@ def model_of(result: Decomposition, *, density: float = DENSITY, up: str = "z") 
 def check_model_options(density: float, up: str) -> None:
     """Raise OptionError unless `density` is a positive number and `up` is x, y or z."""
     if not (isinstance(density, (int, float, np.number)) and 0 < density < math.inf):
-        raise OptionError(f"density is {density!r}; it has to be a positive mass per cubic unit, such as 1000 for water.")
+        raise OptionError(
+            f"density is {density!r}; it has to be a positive mass per cubic unit, such as 1000 for water."
+        )
     if up not in TO_Z_UP:
         raise OptionError(f"{up!r} is no axis that can point up; choose x, y or z.")
 

@@ -112,7 +112,9 @@ def _model_target(text: str, file_format: str) -> Target:
     place = Path(text)
     endings = [f".{ending}" for ending in MODELS[file_format]]
     if text.endswith(SEPARATORS) or place.suffix.lower() not in endings:
-        raise OptionError(f"the format {file_format} needs a file whose name ends in {' or '.join(endings)}, not {text}.")
+        raise OptionError(
+            f"the format {file_format} needs a file whose name ends in {' or '.join(endings)}, not {text}."
+        )
     check_file(place)
     if file_format == "usd":
         require_usd()

@@ -21,7 +21,10 @@ def encode_urdf(model: Model, hulls: list[MeshFile], visual: MeshFile | None, fo
     etree.SubElement(
         inertial,
         "inertia",
-        {f"i{a}{b}": numbers([model.mass.inertia_m[axes[a], axes[b]]]) for a, b in ("xx", "xy", "xz", "yy", "yz", "zz")},
+        {
+            f"i{a}{b}": numbers([model.mass.inertia_m[axes[a], axes[b]]])
+            for a, b in ("xx", "xy", "xz", "yy", "yz", "zz")
+        },
     )
 
     def add(kind: str, file: MeshFile, name: str) -> None:
