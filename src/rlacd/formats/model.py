@@ -133,7 +133,9 @@ def mesh_files(model: Model, stem: str) -> tuple[list[MeshFile], MeshFile | None
                 f"cannot write {hull_name(index)} for a simulator: it is too thin for single precision; "
                 "scale the mesh, or write .obj, .ply or .stl."
             )
-        hulls.append(MeshFile(f"{stem}_{index:03d}.obj", encode_plain_obj(placed[0]), placed[1]))
+        rounded, shift = placed
+        exact = rounded if shift.any() else hull  # readers that keep double precision get it where they can
+        hulls.append(MeshFile(f"{stem}_{index:03d}.obj", encode_plain_obj(exact), shift))
     if model.visual is None:
         return hulls, None
     visual, shift = placed_mesh(model.visual)
