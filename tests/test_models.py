@@ -19,7 +19,7 @@ from rlacd.formats import MODELS, save
 from tests.hulls import assert_convex_hull, hull_of, moved, random_hull
 from tests.models import TABLE_VOLUME, Rest, decomposed_table, fall_in_bullet, fall_in_drake, fall_in_mujoco
 
-AWKWARD = "ein Tisch – 机 & \"co\" <1>"
+AWKWARD = 'ein Tisch – 机 & "co" <1>'
 """Blanks, quotes, XML's own marks, and letters of other scripts."""
 
 

@@ -16,7 +16,7 @@ from rlacd.solid.hull import Hull
 
 def ball() -> trimesh.Trimesh:
     """A sphere of many triangles: far above every limit."""
-    return trimesh.creation.icosphere(subdivisions=4)
+    return trimesh.creation.icosphere(subdivisions=3)
 
 
 @pytest.mark.parametrize("name", PRESETS)
@@ -34,9 +34,8 @@ def test_round_bodies_are_brought_inside_the_limits(name: str) -> None:
 def test_real_objects_are_what_a_gpu_takes(corpus: Path) -> None:
     """The rule of PhysX for each hull: 64 vertices and polygons, 32 corners a polygon, 32 polygons a corner."""
     names = (corpus / "quick.txt").read_text().split()
-    for name in names[:8]:
-        path = corpus / "test" / name
-        result = rlacd.decompose(path if path.is_file() else corpus / name, preset="physx-gpu", threads=1)
+    for name in names[:6]:
+        result = rlacd.decompose(corpus / name, preset="physx-gpu", threads=1)
         thin = 0
         for hull in result:
             corners = [len(set(hull.faces[facet].ravel())) for facet in hull.facets]
