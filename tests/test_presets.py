@@ -16,7 +16,7 @@ from rlacd.solid.hull import Hull
 
 def ball() -> trimesh.Trimesh:
     """A sphere of many triangles: far above every limit."""
-    return trimesh.creation.icosphere(subdivisions=3)
+    return trimesh.creation.icosphere(subdivisions=2)
 
 
 @pytest.mark.parametrize("name", PRESETS)
