@@ -14,9 +14,12 @@ from rlacd.errors import (
     OutputError,
     RlacdError,
 )
+from rlacd.presets import PRESETS, Preset
 from rlacd.progress import Progress
+from rlacd.robots import Rewritten, rewrite_robot
 
 __all__ = [
+    "PRESETS",
     "Decomposition",
     "EmptyMeshError",
     "MeshDataError",
@@ -26,8 +29,11 @@ __all__ = [
     "NavigableSpace",
     "OptionError",
     "OutputError",
+    "Preset",
     "Progress",
+    "Rewritten",
     "RlacdError",
     "__version__",
     "decompose",
+    "rewrite_robot",
 ]

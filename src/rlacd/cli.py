@@ -22,6 +22,7 @@ from rlacd.errors import OptionError, OutputError, RlacdError
 from rlacd.train_command import pretrain_command, train_command
 
 STDOUT = Path("-")
+ROBOTS = (".urdf", ".xml")
 _SPELLED = {"reachable-only": "everywhere", "seeds": "seed-point", "closed-planes": "closed-plane"}
 
 
@@ -108,7 +109,9 @@ def decompose(
     mesh: Annotated[
         Path,
         typer.Argument(
-            metavar="IN", help="The mesh: obj, stl, ply, off, glb, gltf, dae, 3mf. It need not be closed or clean."
+            metavar="IN",
+            help="The mesh: obj, stl, ply, off, glb, gltf, dae, 3mf. It need not be closed or clean. "
+            "Or a robot, .urdf or .xml (MJCF), whose collision meshes are to be replaced.",
         ),
     ],
     output: Annotated[
@@ -119,8 +122,9 @@ def decompose(
             metavar="OUT",
             rich_help_panel=OUTPUT,
             help="Where the hulls go: .glb, .obj, .ply or .stl for one file with a node, group or solid a hull; "
+            ".xml (MJCF), .urdf, .sdf, .usd, .usda or .usdc for a body with mass, looks and hulls; "
             "an existing folder, or a name ending in /, for one file a hull. An older file is replaced. "
-            "[dim]\\[default: IN_hulls.glb, beside IN][/dim]",
+            "[dim]\\[default: IN_hulls beside IN, .glb or what --preset says][/dim]",
             show_default=False,
         ),
     ] = None,
@@ -130,7 +134,25 @@ def decompose(
             "--format",
             metavar="EXT",
             rich_help_panel=OUTPUT,
-            help="The format of the files in a folder: obj, glb, ply or stl. [dim]\\[default: obj][/dim]",
+            help="The format of the files in a folder: obj, glb, ply or stl [dim]\\[default: obj][/dim]; or unreal or "
+            "godot, for a .glb with the mesh and hulls named for that engine.",
+            show_default=False,
+        ),
+    ] = None,
+    density: Annotated[
+        float | None,
+        typer.Option(
+            rich_help_panel=OUTPUT,
+            help="Mass per cubic unit, for formats that hold masses. [dim]\\[default: 1000][/dim]",
+            show_default=False,
+        ),
+    ] = None,
+    package_dir: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=FOLDER",
+            rich_help_panel=OUTPUT,
+            help="Where a robot's package://NAME/ is; a FOLDER alone may be read and holds packages. May be repeated.",
             show_default=False,
         ),
     ] = None,
@@ -163,7 +185,7 @@ def decompose(
         typer.Option(
             metavar="AXIS",
             rich_help_panel=OUTPUT,
-            help="The axis of the mesh that points up in the picture: x, y or z. "
+            help="The axis of the mesh that points up, for the picture and for MJCF, SDF and USD: x, y or z. "
             "[dim]\\[default: y for glb and gltf, else z][/dim]",
             show_default=False,
         ),
@@ -249,6 +271,16 @@ def decompose(
             rich_help_panel=SPACE,
             help="A plane that balls do not cross, such as the ground 0,0,1,0: they stay where the normal X,Y,Z "
             "points, D its distance from the origin; may be repeated.",
+            show_default=False,
+        ),
+    ] = None,
+    preset: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ENGINE",
+            rich_help_panel=LIMITS,
+            help="The limits, and the format, of an engine: mujoco, physx, physx-gpu, unity, unreal, newton or bullet. "
+            "Other options go before it.",
             show_default=False,
         ),
     ] = None,
@@ -358,18 +390,28 @@ def decompose(
       rlacd decompose chair.glb -o chair_hulls.obj --threshold 0.02
       rlacd decompose chair.glb -o hulls/ --format stl --max-vertices 64
       rlacd decompose arm.dae -o arm.glb --picture arm.png --report - | jq .parts
+      rlacd decompose chair.glb -o chair.xml --preset mujoco
+      rlacd decompose robot.urdf -o robot_acd.urdf
       rlacd decompose house.glb --criterion navigable --radius-m 0.3 --tolerance-m 0.05
 
     Ctrl-C once stops gracefully and writes what is reached; twice quits at once.
     """
     with _exit_codes():
         from rlacd.criteria import NavigableSpace
-        from rlacd.formats import check_balls, check_file, hull_target, write_file
+        from rlacd.formats import check_balls, check_file, check_model_options, hull_target, write_file
         from rlacd.show import check_picture, draw_picture
 
-        place = _output_name(mesh, output)
+        place, folder_format = _output_name(mesh, output, folder_format, preset)
         _check_output(mesh, {"-o": Path(place), "--report": report, "--picture": picture, "--balls": balls})
-        hull_target(place, folder_format)
+        robot = mesh.suffix.lower() in ROBOTS
+        written = {"density": density, "up": up or _usual_up(mesh)}
+        if robot:
+            _check_robot({"--picture": picture, "--balls": balls, "--format": folder_format, "--density": density})
+        else:
+            check_model_options(**_chosen({"density": 1.0, **_chosen(written)}))
+            hull_target(place, folder_format)
+            if package_dir:
+                raise OptionError("--package-dir belongs to robots: a .urdf or .xml file as input.")
         if report is not None and report != STDOUT:
             check_file(report)
         if picture is not None:
@@ -408,14 +450,18 @@ def decompose(
             "quality": quality and quality.value,
             "budget": budget,
             "search_steps": search_steps,
+            "preset": preset,
         }
+        if robot:
+            _rewrite(mesh, place, package_dir or [], report, quiet, _chosen(given))
+            return
 
         from rlacd.decompose import decompose as run
         from rlacd.terminal import Watch, say, summary, to_json
 
         with Watch(quiet=quiet) as watch:
             result = run(mesh, **_chosen(given), progress=watch)
-        result.save(place, file_format=folder_format)
+        result.save(place, file_format=folder_format, **_chosen(written))
         if not quiet:
             say(summary(result, place))
         if report == STDOUT:
@@ -450,10 +496,51 @@ def info(
         typer.echo(to_json(facts) if as_json else printable(describe_text(facts)), nl=False)
 
 
-def _output_name(mesh: Path, output: str | None) -> str:
+def _output_name(mesh: Path, output: str | None, file_format: str | None, preset: str | None) -> tuple[str, str | None]:
+    """Where to write and in which format, as far as a preset or the input decides that."""
+    from rlacd.formats import MODELS
+    from rlacd.presets import find_preset
+
     if output == str(STDOUT):
         raise OptionError("hulls cannot be written to stdout; give -o a file name, and use - with --report only.")
-    return str(mesh.parent / f"{mesh.stem or 'mesh'}_hulls.glb") if output is None else output
+    engine = None if preset is None else find_preset(preset)
+    if output is None:
+        ending = ".glb" if engine is None else engine.ending
+        if mesh.suffix.lower() in ROBOTS:
+            ending = mesh.suffix
+        elif file_format in MODELS:
+            ending = f".{MODELS[file_format][0]}"
+        output = str(mesh.parent / f"{mesh.stem or 'mesh'}_hulls{ending}")
+    if engine is not None and engine.file_format is not None and file_format is None:
+        fits = Path(output).suffix.lower().lstrip(".") in MODELS[engine.file_format]
+        file_format = engine.file_format if fits else None
+    return output, file_format
+
+
+def _check_robot(given: dict[str, object]) -> None:
+    for option, value in given.items():
+        if value is not None:
+            raise OptionError(f"{option} belongs to a single mesh; leave it out for a robot.")
+
+
+def _rewrite(
+    robot: Path, place: str, packages: list[str], report: Path | None, quiet: bool, options: dict[str, Any]
+) -> None:
+    from rlacd.formats import write_file
+    from rlacd.robots import rewrite_robot
+    from rlacd.terminal import Watch, rewrite_summary, say, to_json
+
+    with Watch(quiet=quiet) as watch:
+        done = rewrite_robot(robot, place, package_dirs=packages, **options, progress=watch)
+    if not quiet:
+        say(rewrite_summary(done))
+    told = to_json({str(mesh.path): mesh.result.report for mesh in done.meshes})
+    if report == STDOUT:
+        typer.echo(told, nl=False)
+    elif report is not None:
+        write_file(report, told.encode())
+    if not done.complete:
+        raise typer.Exit(ExitCode.STOPPED_EARLY)
 
 
 def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:

@@ -57,6 +57,7 @@ def decompose(
     quality: str = "fast",
     budget: float | None = None,
     search_steps: int | None = None,
+    preset: str | None = None,
     progress: ProgressCallback | None = None,
 ) -> Decomposition:
     """Decompose a mesh into few convex hulls that fit it tightly.
@@ -101,6 +102,10 @@ def decompose(
     search_steps : int, optional
         Steps the search may take instead (about 10 to 20 a second on one core); 24 with ``balanced``. The result
         depends on nothing else.
+    preset : str, optional
+        The engine the hulls are for: ``mujoco``, ``physx``, ``physx-gpu``, ``unity``, ``unreal``, ``newton`` or
+        ``bullet``. Its limits hold where `max_vertices` and `max_faces` are not given, and ``report["warnings"]`` says
+        what it will not take; see `rlacd.PRESETS`.
     progress : callable, optional
         Called with a `Progress` between steps; when it returns False, the decomposition reached so far is returned.
 
@@ -132,6 +137,7 @@ def decompose(
         quality=quality,
         budget=budget,
         search_steps=search_steps,
+        preset=preset,
     )
     if progress is not None and not callable(progress):
         raise OptionError(f"progress is {progress!r}; it has to be a function that takes a `rlacd.Progress`.")

@@ -54,6 +54,9 @@ class Decomposition:
             surface lies from the hulls' surface.
         ``scale`` : float
             What one unit of the input measures in that frame: divide a length by it to have it in the input's unit.
+        ``mass`` : dict
+            Of the repaired solid at density one, in the input's unit: ``volume_m``, ``centre_m`` and, about that
+            centre, ``inertia_m`` (3 by 3).
         ``search`` : dict or None
             What the search of a quality level has done: ``level``, ``steps``, ``accepted``, ``seconds``, whether it was
             ``exhausted``, and the parts of the ``first_pass``, of the best of the ``portfolio``, and at its end.
@@ -79,17 +82,32 @@ class Decomposition:
         """What the input is called: ``report["name"]``."""
         return str(self.report.get("name") or "mesh")
 
-    def save(self, path: str | os.PathLike[str], *, file_format: str | None = None) -> Path:
-        """Write the hulls to one file, or one file a hull to a folder; never leaves a half-written file.
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        file_format: str | None = None,
+        density: float = 1000.0,
+        up: Axis = "z",
+    ) -> Path:
+        """Write the hulls to one file, to a folder, or as a model; never leaves a half-written file.
 
         Parameters
         ----------
         path : path-like
             ``*.glb``, ``*.obj``, ``*.ply`` or ``*.stl`` for one file with a node, group or solid a hull
             (``hull_000``, ...). An existing folder, text ending in ``/``, or a name without ending given with a
-            `file_format`, for one file a hull.
+            `file_format`, for one file a hull. ``*.xml`` (MJCF), ``*.urdf``, ``*.sdf``, ``*.usd``, ``*.usda`` or
+            ``*.usdc`` for a body with mass, the input to look at and the hulls to collide with; the first three keep
+            their meshes in a folder beside them, ``chair_mjcf`` for ``chair.xml``.
         file_format : str, optional
-            The format inside a folder: ``"obj"`` (default), ``"glb"``, ``"ply"`` or ``"stl"``.
+            The format inside a folder: ``"obj"`` (default), ``"glb"``, ``"ply"`` or ``"stl"``. Or ``"unreal"`` or
+            ``"godot"``, for a ``*.glb`` (or, with unreal, ``*.obj``) with the input and hulls named as those engines
+            expect.
+        density : float
+            Mass per cubic unit of the input: models say how heavy the repaired input is.
+        up : {"x", "y", "z"}
+            The axis of the input that points up (y in files from glTF): MJCF and SDF stand the body up, USD says so.
 
         Returns
         -------
@@ -99,13 +117,16 @@ class Decomposition:
         Raises
         ------
         OutputError
-            The ending is unknown, or the place cannot be written to.
+            The ending is unknown, the place cannot be written to, or a hull is too thin for single precision where the
+            format knows nothing else.
         OptionError
-            `file_format` is unknown, or given for a path that is not a folder.
+            `file_format` is unknown or does not go with `path`; `density` or `up` is out of range.
+        MissingExtraError
+            USD was asked for and the extra ``usd`` is not installed.
         """
-        from rlacd.formats import save_hulls
+        from rlacd.formats import save
 
-        return save_hulls(self.hulls, path, stem=self.name, file_format=file_format)
+        return save(self, path, file_format=file_format, density=density, up=up)
 
     def save_balls(self, path: str | os.PathLike[str]) -> Path:
         """Write the balls that no hull touches.

@@ -14,6 +14,7 @@ import numpy as np
 from rlacd.criteria import NavigableSpace
 from rlacd.errors import OptionError
 from rlacd.policies import POLICIES, is_policy
+from rlacd.presets import find_preset
 
 DEFAULT_RESOLUTION = 100
 """Cells along the longest side of the grid on which repair looks for rooms that nothing can enter."""
@@ -63,8 +64,14 @@ class Options:
     quality: str = "fast"
     budget: float | None = None
     search_steps: int | None = None
+    preset: str | None = None
 
     def __post_init__(self) -> None:
+        if self.preset is not None:
+            engine = find_preset(self.preset)
+            for name in ("max_vertices", "max_faces"):
+                if getattr(self, name) is None:
+                    object.__setattr__(self, name, getattr(engine, name))
         _require(
             self.criterion == CONCAVITY or isinstance(self.criterion, NavigableSpace),
             "criterion",

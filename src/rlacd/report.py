@@ -13,8 +13,11 @@ from rlacd._version import __version__
 from rlacd.clock import Clock
 from rlacd.criteria import Criterion
 from rlacd.options import Options
+from rlacd.presets import find_preset
 from rlacd.solid.component import Part
 from rlacd.solid.distance import hull_distances
+from rlacd.solid.hull import Hull
+from rlacd.solid.mass import mass_of
 from rlacd.solid.solid import Solid
 from rlacd.workers import Workers
 
@@ -35,6 +38,7 @@ def make_report(
     errors = workers.map(criterion.error, parts)
     account = criterion.account(errors)
     over = under = None
+    mass = mass_of(solid)
     vertices, faces = solid.surface
     if len(faces):  # a cloud of points has no surface
         distances = hull_distances([part.hull for part in parts], vertices, faces, threads=workers.threads)
@@ -50,12 +54,19 @@ def make_report(
         **account.entries,
         "hausdorff": {"over": over, "under": under},
         "scale": solid.frame.scale,
+        "mass": {"volume_m": mass.volume_m, "centre_m": mass.centre_m.tolist(), "inertia_m": mass.inertia_m.tolist()},
         "repair": [asdict(body) for body in solid.bodies],
         "warnings": [
             *solid.warnings,
             *_early_end(clock),
             *account.warnings,
-            *_shortcomings(len(hulls), over, under, options, criterion.overhang if not account.warnings else math.inf),
+            *_shortcomings(
+                [part.hull for part in parts],
+                over,
+                under,
+                options,
+                criterion.overhang if not account.warnings else math.inf,
+            ),
         ],
     }
 
@@ -69,10 +80,12 @@ def _early_end(clock: Clock) -> list[str]:
     return [f"Incomplete: {reason} the work early; the hulls cover the solid but are coarser than asked for."]
 
 
-def _shortcomings(count: int, over: float | None, under: float | None, options: Options, overhang: float) -> list[str]:
-    sentences = []
-    if options.max_hulls is not None and count > options.max_hulls:
-        sentences.append(f"{count} hulls are left, more than the {options.max_hulls} asked for.")
+def _shortcomings(
+    hulls: Sequence[Hull], over: float | None, under: float | None, options: Options, overhang: float
+) -> list[str]:
+    sentences = [] if options.preset is None else find_preset(options.preset).shortcomings(hulls)
+    if options.max_hulls is not None and len(hulls) > options.max_hulls:
+        sentences.append(f"{len(hulls)} hulls are left, more than the {options.max_hulls} asked for.")
     if under is not None and under > HONEST_WITHIN:
         sentences.append(
             f"Some of the input's surface lies {under:.4g} from the hulls: the repair gave up what could not be made "

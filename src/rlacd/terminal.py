@@ -7,7 +7,7 @@ import math
 import signal
 import threading
 from types import FrameType, TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 from rich.console import Console
@@ -16,6 +16,9 @@ from rich.progress import Progress as Bars
 
 from rlacd.decomposition import Decomposition
 from rlacd.progress import Progress
+
+if TYPE_CHECKING:
+    from rlacd.robots import Rewritten
 
 
 def say(text: str) -> None:
@@ -78,10 +81,23 @@ def summary(result: Decomposition, written: str) -> str:
     """Tell in a few lines what came out, how good it is, and what the user should know."""
     report = result.report
     triangles = sum(len(hull.faces) for hull in result)
-    lines = [f"{written}: {len(result)} hull{'s' * (len(result) != 1)}, {triangles} triangles{_time(report)}"]
+    lines = [f"{written}: {_count(len(result))}, {triangles} triangles{_time(report)}"]
     lines += [f"  {fit}" for fit in [_fit(report)] if fit]
     lines += [f"  warning: {warning}" for warning in report.get("warnings", [])]
     return "\n".join(lines)
+
+
+def rewrite_summary(done: Rewritten) -> str:
+    """Tell the same of a robot: its meshes, each with its number of hulls."""
+    total = sum(len(mesh.files) for mesh in done.meshes)
+    lines = [f"{done.path}: {len(done.meshes)} meshes, {total} hulls in {done.folder}"]
+    lines += [f"  {mesh.path.name}: {_count(len(mesh.files))}; {_fit(mesh.result.report)}" for mesh in done.meshes]
+    lines += [f"  warning: {warning}" for warning in done.warnings]
+    return "\n".join(lines)
+
+
+def _count(hulls: int) -> str:
+    return f"{hulls} hull{'s' * (hulls != 1)}"
 
 
 def to_json(value: Any) -> str:

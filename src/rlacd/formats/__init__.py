@@ -1,4 +1,4 @@
-"""Hulls as files: GLB, OBJ, PLY, STL, or a folder with one file a hull."""
+"""Hulls as files: GLB, OBJ, PLY, STL, a folder with one file a hull, or a model for a simulator or an engine."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import trimesh
 
@@ -13,19 +14,77 @@ from rlacd.errors import OutputError
 from rlacd.formats.atomic import write_file
 from rlacd.formats.balls import check_balls, save_balls
 from rlacd.formats.encode import ENCODERS
-from rlacd.formats.folder import write_folder
-from rlacd.formats.target import FORMATS, Target, check_file, hull_target
+from rlacd.formats.engines import encode_godot, encode_unreal
+from rlacd.formats.folder import check_names, write_folder
+from rlacd.formats.mjcf import encode_mjcf
+from rlacd.formats.model import DENSITY, Model, check_model_options, mesh_files, model_of
+from rlacd.formats.sdf import encode_sdf
+from rlacd.formats.target import FORMATS, MODELS, WITH_MESHES, Target, check_file, hull_target, mesh_folder
+from rlacd.formats.urdf import encode_urdf
+from rlacd.formats.usd import encode_usd
+
+if TYPE_CHECKING:
+    from rlacd.decomposition import Decomposition
 
 __all__ = [
+    "DENSITY",
     "FORMATS",
+    "MODELS",
     "Target",
     "check_balls",
     "check_file",
+    "check_model_options",
+    "file_stem",
     "hull_target",
+    "save",
     "save_balls",
     "save_hulls",
     "write_file",
 ]
+
+
+_WITH_MESHES = {"mjcf": encode_mjcf, "urdf": encode_urdf, "sdf": encode_sdf}
+_ONE_FILE = {"usd": encode_usd, "unreal": encode_unreal, "godot": encode_godot}
+
+
+def save(
+    result: Decomposition,
+    path: str | os.PathLike[str],
+    *,
+    file_format: str | None = None,
+    density: float = DENSITY,
+    up: str = "z",
+) -> Path:
+    """Write a decomposition; see `rlacd.Decomposition.save`.
+
+    Raises
+    ------
+    OutputError, OptionError
+        As for `hull_target` and `model_of`, and for a disk that fails while writing.
+    MissingExtraError
+        The format needs an extra that is not installed.
+    """
+    check_model_options(density, up)
+    target = hull_target(path, file_format)
+    if target.file_format not in MODELS:
+        return save_hulls(result.hulls, path, stem=result.name, file_format=file_format)
+    model = model_of(result, density=density, up=up)
+    if target.file_format in WITH_MESHES:
+        _save_with_meshes(model, target)
+    else:
+        encode = _ONE_FILE[target.file_format]
+        write_file(target.path, encode(model, target.path.suffix.lower().lstrip(".")))
+    return target.path
+
+
+def _save_with_meshes(model: Model, target: Target) -> None:
+    folder = mesh_folder(target.path, target.file_format)
+    stem = file_stem(model.name)
+    hulls, visual = mesh_files(model, stem)
+    files = {file.name: file.data for file in (*([] if visual is None else [visual]), *hulls)}
+    check_names(folder, stem, list(files))
+    described = _WITH_MESHES[target.file_format](model, hulls, visual, folder.name)
+    write_folder(folder, stem, files, then=lambda: write_file(target.path, described))
 
 
 def save_hulls(
@@ -63,7 +122,7 @@ def save_hulls(
     target = hull_target(path, file_format)
     encode = ENCODERS[target.file_format]
     if target.is_folder:
-        stem = _file_stem(stem)
+        stem = file_stem(stem)
         files = {f"{stem}_{i:03d}.{target.file_format}": encode([hull]) for i, hull in enumerate(hulls)}
         write_folder(target.path, stem, files)
     else:
@@ -71,7 +130,7 @@ def save_hulls(
     return target.path
 
 
-def _file_stem(name: str) -> str:
-    # A mesh may be called anything; a file may not, and file systems count its name in bytes.
+def file_stem(name: str) -> str:
+    """Make a file's name of any name: a file may not be called anything, and its name is counted in bytes."""
     plain = re.sub(r'[\x00-\x1f/\\:*?"<>|]', "_", name).strip(". ")
     return plain.encode(errors="replace")[:150].decode(errors="ignore").strip(". ") or "mesh"

@@ -8,15 +8,22 @@ again after rounding to float32.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TypeAlias
 
 import numpy as np
 import trimesh
 
 from rlacd.errors import OutputError
 from rlacd.formats.palette import hull_colors, linear_from_srgb
-from rlacd.formats.single_precision import rounded_hull
+from rlacd.formats.single_precision import placed_hull, placed_mesh, rounded_hull
 
 GENERATOR = "rlacd"
+
+FloatArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+Color: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
+
+VISUAL_COLOR: Color = np.array([180, 182, 186], dtype=np.uint8)
+"""The input beside its hulls: grey, since its own colours are not carried over."""
 
 
 def hull_name(index: int) -> str:
@@ -24,8 +31,12 @@ def hull_name(index: int) -> str:
     return f"hull_{index:03d}"
 
 
-def encode_glb(hulls: Sequence[trimesh.Trimesh]) -> bytes:
-    """Binary glTF 2.0 with a node, a mesh and a material a hull.
+def encode_glb(
+    hulls: Sequence[trimesh.Trimesh],
+    names: Sequence[str] | None = None,
+    visual: tuple[str, trimesh.Trimesh] | None = None,
+) -> bytes:
+    """Binary glTF 2.0 with a node, a mesh and a material a hull, called `names`, after one for the `visual`.
 
     Positions in glTF are float32. A hull whose shape that would ruin, because it lies far from the origin, is stored
     about its own centre and its node carries the translation; all others are stored in place, for readers that ignore
@@ -37,42 +48,59 @@ def encode_glb(hulls: Sequence[trimesh.Trimesh]) -> bytes:
         A hull is too thin for its size for float32 even about its own centre.
     """
     scene = trimesh.Scene()
-    for index, (hull, color) in enumerate(zip(hulls, hull_colors(len(hulls)), strict=True)):
-        name = hull_name(index)
-        shift = np.zeros(3)
-        rounded = rounded_hull(hull)
-        if rounded is None:
-            shift = hull.bounds.mean(axis=0)
-            rounded = rounded_hull(hull, shift)
-        if rounded is None:
+
+    def add(name: str, mesh: trimesh.Trimesh, shift: FloatArray, color: Color) -> None:
+        material = trimesh.visual.material.PBRMaterial(
+            name=name, baseColorFactor=_gltf_color(color), metallicFactor=0.0, roughnessFactor=0.8
+        )
+        mesh.visual = trimesh.visual.TextureVisuals(material=material)
+        placement = trimesh.transformations.translation_matrix(shift)
+        scene.add_geometry(mesh, node_name=name, geom_name=name, transform=placement)
+
+    if visual is not None:
+        add(visual[0], *placed_mesh(visual[1]), VISUAL_COLOR)
+    names = names or [hull_name(index) for index in range(len(hulls))]
+    for name, hull, color in zip(names, hulls, hull_colors(len(hulls)), strict=True):
+        placed = placed_hull(hull)
+        if placed is None:
             raise OutputError(
                 f"cannot write {name} as GLB: it is too thin for single precision; "
                 "write .obj, .ply or .stl, which keep double precision."
             )
-        rounded.visual = trimesh.visual.TextureVisuals(
-            material=trimesh.visual.material.PBRMaterial(
-                name=name, baseColorFactor=_gltf_color(color), metallicFactor=0.0, roughnessFactor=0.8
-            )
-        )
-        placement = trimesh.transformations.translation_matrix(shift)
-        scene.add_geometry(rounded, node_name=name, geom_name=name, transform=placement)
+        add(name, *placed, color)
     return bytes(scene.export(file_type="glb"))
 
 
-def encode_obj(hulls: Sequence[trimesh.Trimesh]) -> bytes:
+def encode_obj(
+    hulls: Sequence[trimesh.Trimesh],
+    names: Sequence[str] | None = None,
+    visual: tuple[str, trimesh.Trimesh] | None = None,
+) -> bytes:
     """Wavefront OBJ with an object a hull, its colour on every vertex, and every digit of the coordinates.
 
     trimesh's writer prints a fixed number of decimals, which erases small meshes; the shortest text that reads back
-    to the same float64 does not.
+    to the same float64 does not. Hulls are called `names` and follow the `visual`, if there is one.
     """
+    names = names or [hull_name(index) for index in range(len(hulls))]
+    objects = list(zip(names, hulls, hull_colors(len(hulls)), strict=True))
+    if visual is not None:
+        objects.insert(0, (*visual, VISUAL_COLOR))
     lines = [f"# {GENERATOR}: {len(hulls)} convex hulls"]
     first = 1
-    for index, (hull, color) in enumerate(zip(hulls, hull_colors(len(hulls)), strict=True)):
+    for name, mesh, color in objects:
         tint = " ".join(f"{channel / 255.0:.3f}" for channel in color)
-        lines.append(f"o {hull_name(index)}")
-        lines += [f"v {x!r} {y!r} {z!r} {tint}" for x, y, z in hull.vertices.tolist()]
-        lines += [f"f {a} {b} {c}" for a, b, c in (hull.faces + first).tolist()]
-        first += len(hull.vertices)
+        lines.append(f"o {name}")
+        lines += [f"v {x!r} {y!r} {z!r} {tint}" for x, y, z in mesh.vertices.tolist()]
+        lines += [f"f {a} {b} {c}" for a, b, c in (mesh.faces + first).tolist()]
+        first += len(mesh.vertices)
+    return ("\n".join(lines) + "\n").encode()
+
+
+def encode_plain_obj(mesh: trimesh.Trimesh) -> bytes:
+    """One mesh as Wavefront OBJ that every reader takes: no object, no colours, every digit."""
+    lines = [f"# {GENERATOR}"]
+    lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist()]
+    lines += [f"f {a} {b} {c}" for a, b, c in (mesh.faces + 1).tolist()]
     return ("\n".join(lines) + "\n").encode("ascii")
 
 
@@ -130,6 +158,6 @@ ENCODERS: dict[str, Callable[[Sequence[trimesh.Trimesh]], bytes]] = {
 }
 
 
-def _gltf_color(srgb: np.ndarray[tuple[int], np.dtype[np.uint8]]) -> list[float]:
+def _gltf_color(srgb: Color) -> list[float]:
     # glTF wants base colours in linear light.
     return [*linear_from_srgb(srgb).tolist(), 1.0]

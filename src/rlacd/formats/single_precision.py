@@ -12,6 +12,9 @@ from rlacd._native import convex_hull, mesh_volume
 # loses much more, or all of it, when float32 has no digits left for its thickness.
 VOLUME_TOLERANCE = 1e-3
 
+STEP = 1e-4
+"""Of a visible mesh's size."""
+
 
 def rounded_hull(hull: trimesh.Trimesh, shift: npt.ArrayLike = (0.0, 0.0, 0.0)) -> trimesh.Trimesh | None:
     """Round the vertices of ``hull - shift`` to float32 and take their convex hull again.
@@ -41,6 +44,32 @@ def rounded_hull(hull: trimesh.Trimesh, shift: npt.ArrayLike = (0.0, 0.0, 0.0)) 
     rounded = trimesh.Trimesh(points[indices], faces, process=False, validate=False)
     before, after = (_volume(mesh) for mesh in (hull, rounded))
     return rounded if abs(after - before) <= VOLUME_TOLERANCE * before else None
+
+
+def placed_hull(hull: trimesh.Trimesh) -> tuple[trimesh.Trimesh, npt.NDArray[np.float64]] | None:
+    """Round a hull to float32 where it lies or, where that would ruin it, about its own centre.
+
+    Returns
+    -------
+    (trimesh.Trimesh, shift [3]) or None
+        The hull is the mesh moved by the shift, which is zero wherever that will do. None if it is too thin for its
+        size even about its own centre.
+    """
+    shift = np.zeros(3)
+    rounded = rounded_hull(hull)
+    if rounded is None:
+        shift = hull.bounds.mean(axis=0)
+        rounded = rounded_hull(hull, shift)
+    return None if rounded is None else (rounded, shift)
+
+
+def placed_mesh(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, npt.NDArray[np.float64]]:
+    """Do the same for a mesh to look at, where a change below `STEP` of its size cannot be seen."""
+    used = mesh.vertices[np.unique(mesh.faces)]
+    lower, upper = used.min(axis=0), used.max(axis=0)
+    step = np.abs([lower, upper]).max() * np.finfo(np.float32).eps
+    shift = np.zeros(3) if step <= STEP * (upper - lower).max() else lower / 2 + upper / 2
+    return trimesh.Trimesh(mesh.vertices - shift, mesh.faces, process=False), shift
 
 
 def _volume(mesh: trimesh.Trimesh) -> float:

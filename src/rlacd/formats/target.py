@@ -8,15 +8,43 @@ from pathlib import Path
 
 from rlacd.errors import OptionError, OutputError
 from rlacd.formats.atomic import output_errors
+from rlacd.formats.usd import require_usd
 
 FORMATS = ("glb", "obj", "ply", "stl")
+"""Hulls and nothing else; also what the files of a folder may be."""
+
+MODELS: dict[str, tuple[str, ...]] = {
+    "mjcf": ("xml",),
+    "urdf": ("urdf",),
+    "sdf": ("sdf",),
+    "usd": ("usd", "usda", "usdc"),
+    "unreal": ("glb", "obj"),
+    "godot": ("glb",),
+}
+"""Hulls with the mesh they stand for, in a simulator's or an engine's own words, and the endings of each."""
+
+_MODEL_OF = {ending: name for name, endings in MODELS.items() for ending in endings if ending not in FORMATS}
+
+WITH_MESHES = ("mjcf", "urdf", "sdf")
+"""Models that name mesh files beside them."""
+
 FOLDER_FORMAT = "obj"
 SEPARATORS = tuple(mark for mark in (os.sep, os.altsep) if mark)
 
 
 @dataclass(frozen=True)
 class Target:
-    """A checked place for hulls: one file, or a folder that gets one file a hull."""
+    """A checked place for hulls: one file, or a folder that gets one file a hull.
+
+    Attributes
+    ----------
+    path
+        The file or folder.
+    file_format
+        One of `FORMATS` or of `MODELS`.
+    is_folder
+        Whether `path` is a folder.
+    """
 
     path: Path
     file_format: str
@@ -47,8 +75,14 @@ def hull_target(path: str | os.PathLike[str], file_format: str | None = None) ->
     place = Path(text)
     ending = place.suffix.lower().lstrip(".")
     wanted = None if file_format is None else file_format.lower().lstrip(".")
+    if wanted in _MODEL_OF:
+        wanted = _MODEL_OF[wanted]
+    if wanted in MODELS:
+        return _model_target(text, wanted)
     if wanted is not None and wanted not in FORMATS:
-        raise OptionError(f"unknown format {file_format!r}; use one of {', '.join(FORMATS)}.")
+        raise OptionError(f"unknown format {file_format!r}; use one of {', '.join((*FORMATS, *MODELS))}.")
+    if wanted is None and ending in _MODEL_OF and not text.endswith(SEPARATORS):
+        return _model_target(text, _MODEL_OF[ending])
 
     with output_errors(place):
         is_folder = text.endswith(SEPARATORS) or (place.is_dir() and ending not in FORMATS) or (wanted and not ending)
@@ -57,13 +91,36 @@ def hull_target(path: str | os.PathLike[str], file_format: str | None = None) ->
             return Target(place, wanted or FOLDER_FORMAT, is_folder=True)
 
     if ending not in FORMATS:
-        known = ", ".join(f".{name}" for name in FORMATS)
+        known = ", ".join(f".{name}" for name in (*FORMATS, *_MODEL_OF))
         said = f"the ending .{ending} of {place}" if ending else f"{place} without an ending"
         raise OutputError(f"cannot write {said}; use one of {known}, or end the name with / for a folder.")
     if wanted not in (None, ending):
         raise OptionError(f"the format {wanted} contradicts the name {place}; give one of the two, or a folder.")
     check_file(place)
     return Target(place, ending, is_folder=False)
+
+
+def mesh_folder(path: Path, file_format: str) -> Path:
+    """Where a model that is not one file keeps its meshes: ``chair.urdf`` in ``chair_urdf``.
+
+    The format is part of the name, so that two models of one thing do not take each other's meshes.
+    """
+    return path.with_name(f"{path.stem}_{file_format}")
+
+
+def _model_target(text: str, file_format: str) -> Target:
+    place = Path(text)
+    endings = [f".{ending}" for ending in MODELS[file_format]]
+    if text.endswith(SEPARATORS) or place.suffix.lower() not in endings:
+        raise OptionError(
+            f"the format {file_format} needs a file whose name ends in {' or '.join(endings)}, not {text}."
+        )
+    check_file(place)
+    if file_format == "usd":
+        require_usd()
+    if file_format in WITH_MESHES:
+        _check_folder(mesh_folder(place, file_format))
+    return Target(place, file_format, is_folder=False)
 
 
 def check_file(path: Path) -> None:

@@ -1,0 +1,120 @@
+"""CoACD's Python interface (coacd 1.0.14), decomposed by rlacd.
+
+``import coacd`` becomes ``from rlacd.compat import coacd``; the rest of a program stays as it is.
+"""
+
+from __future__ import annotations
+
+import inspect
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rlacd.compat.unused import say_unused
+from rlacd.decompose import decompose
+from rlacd.errors import OptionError
+from rlacd.options import DEFAULT_THRESHOLD, MIN_THRESHOLD
+
+__all__ = ["Mesh", "run_coacd", "set_log_level"]
+
+_UNUSED = {
+    "preprocess_mode": "what is not closed is repaired, and nothing else is touched",
+    "preprocess_resolution": "repair does not sample the mesh",
+    "resolution": "distances are bounded, not sampled",
+    "mcts_nodes": "there is no tree search; rlacd.decompose(quality='best') searches",
+    "mcts_iterations": "there is no tree search; rlacd.decompose(quality='best') searches",
+    "mcts_max_depth": "there is no tree search; rlacd.decompose(quality='best') searches",
+    "pca": "planes along the principal axes are among the candidates anyway",
+    "extrude": "hulls may overlap, and parts are not grown",
+    "extrude_margin": "hulls may overlap, and parts are not grown",
+}
+
+
+class Mesh:
+    """Vertices ``[V, 3]`` and triangles ``[F, 3]``, as CoACD takes them."""
+
+    def __init__(self, vertices: npt.ArrayLike = (), indices: npt.ArrayLike = ()) -> None:
+        self.vertices = np.ascontiguousarray(vertices, dtype=np.double).reshape(-1, 3)
+        self.indices = np.ascontiguousarray(indices, dtype=np.int32).reshape(-1, 3)
+
+
+def run_coacd(
+    mesh: Any,
+    threshold: float = 0.05,
+    max_convex_hull: int = -1,
+    preprocess_mode: str = "auto",
+    preprocess_resolution: int = 50,
+    resolution: int = 2000,
+    mcts_nodes: int = 20,
+    mcts_iterations: int = 150,
+    mcts_max_depth: int = 3,
+    pca: bool = False,
+    merge: bool = True,
+    decimate: bool = False,
+    max_ch_vertex: int = 256,
+    extrude: bool = False,
+    extrude_margin: float = 0.01,
+    apx_mode: str = "ch",
+    seed: int = 0,
+    real_metric: bool = False,
+) -> list[list[npt.NDArray[Any]]]:
+    """Decompose a mesh as ``coacd.run_coacd`` does: same arguments, same defaults, same kind of result.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Or anything with ``vertices`` and ``indices``, such as CoACD's own.
+    threshold : float
+        Concavity, in CoACD's measure and frame, or in the mesh's unit with `real_metric`.
+    max_convex_hull : int
+        No more hulls than this; -1 is no limit.
+    merge : bool
+        Unite parts again where one hull will do.
+    decimate, max_ch_vertex
+        With `decimate`, no hull has more than `max_ch_vertex` vertices.
+    apx_mode : {"ch", "box"}
+        Convex hulls, or the axis-parallel boxes around them.
+    seed : int
+        The same seed gives the same bytes.
+    real_metric : bool
+        Whether `threshold` is in the mesh's unit.
+    preprocess_mode, preprocess_resolution, resolution, mcts_nodes, mcts_iterations, mcts_max_depth, pca, extrude, \
+extrude_margin
+        Accepted; a warning says once why they do nothing.
+
+    Returns
+    -------
+    list of [vertices, indices]
+        float64 ``[V, 3]`` and int32 ``[F, 3]`` of each hull.
+
+    Raises
+    ------
+    MeshError
+        There is nothing to decompose.
+    OptionError
+        An option is out of range.
+    """
+    given = locals()
+    say_unused("run_coacd", given, _defaults(), _UNUSED)
+    if apx_mode not in ("ch", "box"):
+        raise OptionError(f"apx_mode is {apx_mode!r}; it has to be 'ch' or 'box'.")
+    result = decompose(
+        (mesh.vertices, mesh.indices),
+        threshold=DEFAULT_THRESHOLD if real_metric else max(threshold, MIN_THRESHOLD),
+        threshold_m=threshold if real_metric else None,
+        max_hulls=None if max_convex_hull < 1 else max_convex_hull,
+        max_vertices=max_ch_vertex if decimate else None,
+        merge=merge,
+        seed=seed,
+    )
+    hulls = [hull.bounding_box for hull in result] if apx_mode == "box" else list(result)
+    return [[np.array(hull.vertices, dtype=np.float64), np.array(hull.faces, dtype=np.int32)] for hull in hulls]
+
+
+def set_log_level(level: str) -> None:
+    """Accept CoACD's log levels; nothing is logged here."""
+
+
+def _defaults() -> dict[str, Any]:
+    return {name: parameter.default for name, parameter in inspect.signature(run_coacd).parameters.items()}

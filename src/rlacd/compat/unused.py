@@ -1,0 +1,23 @@
+"""Say once, per function and option, that an option given to a stand-in does nothing here."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from typing import Any
+
+_SAID: set[tuple[str, str]] = set()
+
+
+class UnusedOptionWarning(UserWarning):
+    """An option of the other tool that has no meaning in rlacd."""
+
+
+def say_unused(
+    function: str, given: Mapping[str, Any], defaults: Mapping[str, Any], reasons: Mapping[str, str]
+) -> None:
+    """Warn of the options in `reasons` whose value is not the default, each once in the life of the program."""
+    for name, reason in reasons.items():
+        if given[name] != defaults[name] and (function, name) not in _SAID:
+            _SAID.add((function, name))
+            warnings.warn(f"{function}: {name} does nothing in rlacd: {reason}.", UnusedOptionWarning, stacklevel=3)

@@ -1,0 +1,92 @@
+"""The interface of vhacdx 0.1.1, the V-HACD that trimesh uses, decomposed by rlacd.
+
+``from vhacdx import compute_vhacd`` becomes ``from rlacd.compat.vhacd import compute_vhacd``.
+"""
+
+from __future__ import annotations
+
+import inspect
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rlacd.compat.unused import say_unused
+from rlacd.decompose import decompose
+from rlacd.errors import MeshDataError
+
+__all__ = ["compute_vhacd"]
+
+_UNUSED = {
+    "resolution": "nothing is turned into voxels; rlacd.decompose(threshold=...) sets how tight hulls are",
+    "minimumVolumePercentErrorAllowed": "tightness is a distance; see rlacd.decompose(threshold=...)",
+    "maxRecursionDepth": "parts are cut until they are tight",
+    "shrinkWrap": "hulls lie on the mesh's own vertices",
+    "fillMode": "what is not closed is repaired",
+    "minEdgeLength": "nothing is turned into voxels",
+    "findBestPlane": "the best plane is always looked for",
+}
+
+
+def compute_vhacd(
+    points: npt.ArrayLike,
+    faces: npt.ArrayLike,
+    maxConvexHulls: int = 64,
+    resolution: int = 400000,
+    minimumVolumePercentErrorAllowed: float = 1.0,
+    maxRecursionDepth: int = 10,
+    shrinkWrap: bool = True,
+    fillMode: str = "flood",
+    maxNumVerticesPerCH: int = 64,
+    asyncACD: bool = True,
+    minEdgeLength: int = 2,
+    findBestPlane: bool = False,
+) -> list[tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32]]]:
+    """Decompose a mesh as ``vhacdx.compute_vhacd`` does: same arguments, same defaults, same kind of result.
+
+    Parameters
+    ----------
+    points : array-like [V, 3]
+        Vertices.
+    faces : array-like [F, 3] or flat
+        Triangles; or, as vhacdx takes them, one row of numbers ``3, a, b, c, 3, a, b, c, ...``.
+    maxConvexHulls : int
+        No more hulls than this.
+    maxNumVerticesPerCH : int
+        No more vertices a hull than this.
+    asyncACD : bool
+        Whether to use all processors; the result is the same.
+    resolution, minimumVolumePercentErrorAllowed, maxRecursionDepth, shrinkWrap, fillMode, minEdgeLength, findBestPlane
+        Accepted; a warning says once why they do nothing.
+
+    Returns
+    -------
+    list of (points, faces)
+        float64 ``[V, 3]`` and uint32 ``[F, 3]`` of each hull.
+
+    Raises
+    ------
+    MeshError
+        There is nothing to decompose, or the flat faces are not triangles.
+    OptionError
+        An option is out of range.
+    """
+    given = locals()
+    defaults = {name: parameter.default for name, parameter in inspect.signature(compute_vhacd).parameters.items()}
+    say_unused("compute_vhacd", given, defaults, _UNUSED)
+    result = decompose(
+        (np.asarray(points, dtype=np.float64), _triangles(faces)),
+        max_hulls=maxConvexHulls,
+        max_vertices=maxNumVerticesPerCH,
+        threads=None if asyncACD else 1,
+    )
+    return [(np.array(hull.vertices, dtype=np.float64), np.array(hull.faces, dtype=np.uint32)) for hull in result]
+
+
+def _triangles(faces: Any) -> npt.NDArray[np.int64]:
+    array = np.asarray(faces)
+    if array.ndim == 1:
+        if len(array) % 4 or (array[::4] != 3).any():
+            raise MeshDataError("flat faces are not of the form 3, a, b, c, 3, ...: triangulate the polygons first.")
+        array = array.reshape(-1, 4)[:, 1:]
+    return array.astype(np.int64)

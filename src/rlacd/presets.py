@@ -1,0 +1,99 @@
+"""What each engine takes: limits on its hulls, and the form it likes to read.
+
+The numbers are the engines' own where they have any:
+
+- PhysX: at most 255 vertices and polygons a convex mesh. On a GPU 64 of both, at most 32 corners a polygon and 32
+  polygons a corner, which 62 triangles cannot exceed, and an inscribed ball no smaller than 1/100 of the largest extent
+  (`PxConvexMeshDesc` and `PxConvexMeshCookingResult` in its reference).
+- Unity: 255 triangles a convex `MeshCollider`.
+- Newton: 64 vertices (`maxhullvert`), its default for meshes it imports.
+
+MuJoCo, Bullet and Unreal set none; there, every corner costs time in every contact, so 64 are a good limit, and 32 for
+Unreal, the most that its own tool for convex collision offers. Triangles stand for polygons, of which there are never
+more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rlacd.errors import OptionError
+from rlacd.finish.slivers import is_sliver
+from rlacd.solid.hull import Hull
+
+
+@dataclass(frozen=True)
+class Preset:
+    """One engine.
+
+    Attributes
+    ----------
+    engine
+        Its name in sentences.
+    max_vertices, max_faces
+        Limits on each hull; None is no limit.
+    ending
+        What its files end in.
+    file_format
+        The format, where the ending does not tell it.
+    slivers
+        Whether it takes hulls whose inscribed ball is smaller than 1/100 of their largest extent.
+    """
+
+    engine: str
+    max_vertices: int | None
+    max_faces: int | None
+    ending: str
+    file_format: str | None = None
+    slivers: bool = True
+
+    def shortcomings(self, hulls: Sequence[Hull]) -> list[str]:
+        """Check hulls against the limits: a sentence for each that is broken, none when all is well."""
+        said = []
+        for what, limit, counts in (
+            ("vertices", self.max_vertices, [len(hull.vertices) for hull in hulls]),
+            ("triangles", self.max_faces, [len(hull.faces) for hull in hulls]),
+        ):
+            over = [count for count in counts if limit is not None and count > limit]
+            if over:
+                said.append(
+                    f"{_hulls(len(over), 'has', 'have')} up to {max(over)} {what}, more than {limit}, the limit for "
+                    f"{self.engine}."
+                )
+        thin = 0 if self.slivers else sum(is_sliver(hull) for hull in hulls)
+        if thin:
+            said.append(
+                f"{_hulls(thin, 'is', 'are')} thinner than 1/100 of the largest extent, which {self.engine} refuses or "
+                "handles on the CPU: thicken the mesh there."
+            )
+        return said
+
+
+PRESETS: dict[str, Preset] = {
+    "mujoco": Preset("MuJoCo", 64, None, ".xml"),
+    "physx": Preset("PhysX", 255, 255, ".usd"),
+    "physx-gpu": Preset("PhysX on a GPU", 64, 62, ".usd", slivers=False),
+    "unity": Preset("Unity", 255, 255, ".obj"),
+    "unreal": Preset("Unreal", 32, None, ".glb", "unreal"),
+    "newton": Preset("Newton", 64, None, ".usd"),
+    "bullet": Preset("Bullet", 64, None, ".urdf"),
+}
+"""By the word that ``preset=`` and ``--preset`` take."""
+
+
+def find_preset(name: str) -> Preset:
+    """Look a preset up.
+
+    Raises
+    ------
+    OptionError
+        There is none of that name.
+    """
+    if name not in PRESETS:
+        raise OptionError(f"preset is {name!r}; it has to be one of {', '.join(PRESETS)}.")
+    return PRESETS[name]
+
+
+def _hulls(count: int, one: str, many: str) -> str:
+    return f"1 hull {one}" if count == 1 else f"{count} hulls {many}"

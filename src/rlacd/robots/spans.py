@@ -1,0 +1,145 @@
+"""XML with the place of every element in the file's bytes, so that a part can be replaced and the rest kept as it is.
+
+Input: the bytes of a file. Output: a tree of `Element`, and `replaced`, which puts new bytes in place of old ones.
+Python's expat is used because it tells byte positions, which lxml does not. A document type is refused, and with it
+every entity: no file can expand (the "billion laughs") or make another file or address be read.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.parsers import expat
+from xml.sax.saxutils import quoteattr
+
+from rlacd.errors import MeshFileError
+
+DEEPEST = 500
+"""Elements inside elements; robots have some fifty."""
+
+_ATTRIBUTE = re.compile(rb"""(\s+)([^\s=/>"']+)(\s*=\s*)("[^"]*"|'[^']*')""")
+
+
+_TAG = re.compile(rb"""<(?:[^"'>]|"[^"]*"|'[^']*')*>""")
+
+
+@dataclass(eq=False)
+class Element:
+    """An element and where it is: ``data[start:head]`` is its start tag, ``data[start:end]`` all of it."""
+
+    tag: str
+    attributes: dict[str, str]
+    parent: Element | None
+    start: int
+    head: int
+    end: int = 0
+    children: list[Element] = field(default_factory=list)
+
+    def walk(self) -> Iterator[Element]:
+        """Give this element and all below it, in the order of the file."""
+        yield self
+        for child in self.children:
+            yield from child.walk()
+
+    def named(self, *tags: str) -> Iterator[Element]:
+        """Give the children of one of these tags."""
+        return (child for child in self.children if child.tag in tags)
+
+
+@dataclass(frozen=True)
+class Document:
+    """A parsed file."""
+
+    path: Path
+    data: bytes
+    root: Element
+    encoding: str
+
+    def text(self, element: Element) -> bytes:
+        """Get the element's bytes."""
+        return self.data[element.start : element.end]
+
+    def indent(self, element: Element) -> bytes:
+        """Get the white space before the element, back to the line's end; nothing if something else is there."""
+        before = self.data[: element.start]
+        line = before[len(before.rstrip(b" \t\r\n")) :]
+        at = line.rfind(b"\n")
+        return line[at - (line[at - 1 : at] == b"\r") :] if at >= 0 else b""
+
+    def with_attributes(self, element: Element, values: Mapping[str, str]) -> bytes:
+        """Get the element's bytes with attributes set in its start tag, and all else as it is."""
+        head, rest = self.data[element.start : element.head], self.data[element.head : element.end]
+        left = {
+            name.encode(): quoteattr(value).encode(self.encoding, "xmlcharrefreplace") for name, value in values.items()
+        }
+        head = _ATTRIBUTE.sub(lambda m: m[1] + m[2] + m[3] + left.pop(m[2]) if m[2] in left else m[0], head)
+        close = b"/>" if head.endswith(b"/>") else b">"
+        kept = head[: -len(close)]
+        tail = kept[len(kept.rstrip()) :]
+        added = b"".join(b" " + name + b"=" + value for name, value in left.items())
+        return kept.rstrip() + added + tail + close + rest
+
+
+def parse(path: Path, data: bytes) -> Document:
+    """Parse a file.
+
+    Raises
+    ------
+    MeshFileError
+        It is not well-formed, has a document type, nests too deep, or is not in an encoding that holds ASCII as it is.
+    """
+    parser = expat.ParserCreate()
+    top: list[Element] = []
+    open_elements: list[Element] = []
+    said = ["utf-8"]
+
+    def refuse(*_: object) -> None:
+        raise MeshFileError(f"{path} has a document type (<!DOCTYPE>), which may hide anything: remove it.")
+
+    def declared(version: str, encoding: str | None, standalone: int) -> None:
+        said[0] = encoding or "utf-8"
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        at = parser.CurrentByteIndex
+        if len(open_elements) >= DEEPEST:
+            raise MeshFileError(f"{path} nests elements more than {DEEPEST} deep: that is no robot.")
+        element = Element(tag, attributes, open_elements[-1] if open_elements else None, at, _tag_end(data, at))
+        (open_elements[-1].children if open_elements else top).append(element)
+        open_elements.append(element)
+
+    def end(tag: str) -> None:
+        element = open_elements.pop()
+        at = parser.CurrentByteIndex
+        # An element without content has one tag, and expat reports both of its ends at or just behind its start.
+        element.end = element.head if data[element.head - 2 : element.head] == b"/>" else _tag_end(data, at)
+
+    parser.StartDoctypeDeclHandler = refuse
+    parser.XmlDeclHandler = declared
+    parser.StartElementHandler = start
+    parser.EndElementHandler = end
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in data[:200]:
+        raise MeshFileError(f"{path} is in UTF-16 or UTF-32: save it as UTF-8.")
+    try:
+        parser.Parse(data, True)
+    except expat.ExpatError as error:
+        raise MeshFileError(f"{path} is not well-formed XML ({error}): mend it first.") from error
+    except (LookupError, ValueError) as error:
+        raise MeshFileError(f"{path} is in an encoding that is not known here ({error}): save it as UTF-8.") from error
+    return Document(path, data, top[0], said[0])
+
+
+def replaced(data: bytes, edits: Sequence[tuple[int, int, bytes]]) -> bytes:
+    """Put the bytes of each edit ``(start, end, new)`` in place of ``data[start:end]``; edits do not overlap."""
+    pieces, at = [], 0
+    for start, end, new in sorted(edits, key=lambda edit: edit[:2]):
+        pieces += [data[at:start], new]
+        at = end
+    return b"".join([*pieces, data[at:]])
+
+
+def _tag_end(data: bytes, at: int) -> int:
+    """Find where the tag that starts at `at` ends; ``>`` inside quotes does not count."""
+    found = _TAG.match(data, at)  # always: expat reports a tag only once it has read all of it
+    return found.end() if found else len(data)

@@ -1,0 +1,53 @@
+"""What a solid of density one weighs and how its mass lies: volume, centre and inertia."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from trimesh.triangles import mass_properties
+
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.frame import Frame
+from rlacd.solid.solid import Solid
+
+
+@dataclass(frozen=True)
+class Mass:
+    """A body's mass, in the input's unit of length.
+
+    Attributes
+    ----------
+    volume_m
+        Its mass at density one.
+    centre_m
+        ``[3]``, the centre of mass.
+    inertia_m
+        ``[3, 3]`` at density one, about the centre, along the input's axes.
+    """
+
+    volume_m: float
+    centre_m: FloatArray
+    inertia_m: FloatArray
+
+    def scaled(self, density: float) -> Mass:
+        """Get the same body at another density."""
+        return Mass(self.volume_m * density, self.centre_m, self.inertia_m * density)
+
+
+def mass_of(solid: Solid) -> Mass:
+    """Integrate over a repaired input, which is closed whatever the input was."""
+    mesh = solid.manifold.to_mesh64()
+    return mass_of_triangles(mesh.vert_properties[:, :3][mesh.tri_verts], solid.frame)
+
+
+def mass_of_triangles(triangles: FloatArray, frame: Frame) -> Mass:
+    """Integrate over closed, outward triangles ``[F, 3, 3]`` in the frame."""
+    found = mass_properties(triangles)
+    unit = np.float64(1.0) / frame.scale
+    with np.errstate(over="ignore", under="ignore"):  # at the ends of float64, volumes have none
+        return Mass(
+            float(found["volume"] * unit**3),
+            frame.to_input(found["center_mass"][None])[0],
+            np.asarray(found["inertia"]) * unit**5,
+        )

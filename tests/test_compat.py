@@ -1,0 +1,143 @@
+"""Stand-ins: called as the originals are, they give what the originals give, as far as a program can tell."""
+
+from __future__ import annotations
+
+import inspect
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+import rlacd
+from rlacd.compat import coacd as our_coacd
+from rlacd.compat import unused
+from rlacd.compat.trimesh import convex_decomposition
+from rlacd.compat.unused import UnusedOptionWarning
+from rlacd.compat.vhacd import compute_vhacd
+from rlacd.errors import MeshDataError, OptionError
+from tests.hulls import assert_convex_hull
+from tests.models import table
+
+
+@pytest.fixture(autouse=True)
+def nothing_said_yet(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(unused, "_SAID", set())
+
+
+def triangles_with_threes(mesh: trimesh.Trimesh) -> np.ndarray:
+    return np.column_stack([np.full(len(mesh.faces), 3), mesh.faces]).ravel()
+
+
+# --- CoACD ------------------------------------------------------------------------------------------------------------
+
+
+def test_run_coacd_has_the_originals_signature() -> None:
+    coacd = pytest.importorskip("coacd", reason="the extra bench is not installed")
+    theirs, ours = (inspect.signature(function).parameters for function in (coacd.run_coacd, our_coacd.run_coacd))
+    assert [(p.name, p.default) for p in ours.values()] == [(p.name, p.default) for p in theirs.values()]
+
+
+def test_run_coacd_gives_the_originals_kind_of_result() -> None:
+    coacd = pytest.importorskip("coacd", reason="the extra bench is not installed")
+    mesh = table()
+    coacd.set_log_level("error")
+    our_coacd.set_log_level("error")
+    theirs = coacd.run_coacd(coacd.Mesh(mesh.vertices, mesh.faces), threshold=0.1)
+    for given in (coacd.Mesh(mesh.vertices, mesh.faces), our_coacd.Mesh(mesh.vertices, mesh.faces)):
+        ours = our_coacd.run_coacd(given, threshold=0.1)
+        assert type(ours) is type(theirs)
+        assert [type(part) for part in ours[0]] == [type(part) for part in theirs[0]]
+        assert [part.dtype for part in ours[0]] == [part.dtype for part in theirs[0]]
+        assert len(ours) <= len(theirs)
+        for vertices, faces in ours:
+            assert_convex_hull(trimesh.Trimesh(vertices, faces, process=False))
+
+
+def test_run_coacd_is_decompose() -> None:
+    mesh = our_coacd.Mesh(table().vertices, table().faces)
+    want = rlacd.decompose((mesh.vertices, mesh.indices), threshold=0.08, seed=3)
+    got = our_coacd.run_coacd(mesh, threshold=0.08, seed=3)
+    assert all(np.array_equal(hull.vertices, v) for hull, (v, _) in zip(want, got, strict=True))
+
+
+def test_options_of_coacd_that_mean_something_are_obeyed() -> None:
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    mesh = our_coacd.Mesh(ball.vertices, ball.faces)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ((vertices, _),) = our_coacd.run_coacd(mesh, decimate=True, max_ch_vertex=40, threshold=0.2)
+        assert len(vertices) <= 40
+        four = our_coacd.Mesh(table().vertices, table().faces)
+        assert len(our_coacd.run_coacd(four, max_convex_hull=3)) <= 3
+        assert len(our_coacd.run_coacd(four, threshold=0.15, real_metric=True)) < len(our_coacd.run_coacd(four))
+        for vertices, faces in our_coacd.run_coacd(four, apx_mode="box"):
+            box = trimesh.Trimesh(vertices, faces, process=False)
+            assert box.volume == pytest.approx(np.prod(box.extents))
+    with pytest.raises(OptionError, match="apx_mode"):
+        our_coacd.run_coacd(four, apx_mode="sphere")
+
+
+def test_options_without_meaning_are_said_once_each() -> None:
+    mesh = our_coacd.Mesh(table().vertices, table().faces)
+    given: dict[str, Any] = {"mcts_iterations": 500, "preprocess_mode": "off", "pca": True}
+    with pytest.warns(UnusedOptionWarning) as said:
+        our_coacd.run_coacd(mesh, **given)
+    assert sorted(str(warning.message).split()[1] for warning in said) == sorted(given)
+    assert {warning.filename for warning in said} == {__file__}, "it points to the caller's line"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        our_coacd.run_coacd(mesh, **given)
+
+
+# --- V-HACD and trimesh -----------------------------------------------------------------------------------------------
+
+
+def test_compute_vhacd_has_the_originals_signature() -> None:
+    vhacdx = pytest.importorskip("vhacdx", reason="the extra bench is not installed")
+    ours = inspect.signature(compute_vhacd).parameters
+    said = vhacdx.compute_vhacd.__doc__.splitlines()[0]
+    position = 0
+    for parameter in ours.values():
+        written = parameter.name if parameter.default is parameter.empty else f"{parameter.name}: "
+        position = said.index(written, position)
+        if parameter.default is not parameter.empty:
+            default = said[position:].split(" = ", 1)[1].split(", ")[0].split(")")[0]
+            assert default == repr(parameter.default)
+    assert said.count(" = ") == sum(p.default is not p.empty for p in ours.values())
+
+
+def test_compute_vhacd_gives_the_originals_kind_of_result() -> None:
+    vhacdx = pytest.importorskip("vhacdx", reason="the extra bench is not installed")
+    mesh = table()
+    faces = triangles_with_threes(mesh).astype(np.uint32)
+    theirs = vhacdx.compute_vhacd(mesh.vertices, faces, maxConvexHulls=6, resolution=10_000)
+    ours = compute_vhacd(mesh.vertices, faces, maxConvexHulls=6)
+    assert len(ours) <= 6
+    assert type(ours) is type(theirs)
+    assert type(ours[0]) is type(theirs[0])
+    assert [part.dtype for part in ours[0]] == [part.dtype for part in theirs[0]]
+    assert ours[0][1].shape[1] == theirs[0][1].shape[1] == 3
+    for vertices, triangles in ours:
+        assert_convex_hull(trimesh.Trimesh(vertices, triangles.astype(np.int64), process=False))
+
+
+def test_both_forms_of_faces_are_taken() -> None:
+    mesh = table()
+    flat, rows = (compute_vhacd(mesh.vertices, faces) for faces in (triangles_with_threes(mesh), mesh.faces))
+    assert all(np.array_equal(a, b) for a, b in zip([v for v, _ in flat], [v for v, _ in rows], strict=True))
+    with pytest.raises(MeshDataError, match="triangulate"):
+        compute_vhacd(mesh.vertices, [4, 0, 1, 2, 3])
+
+
+def test_trimesh_uses_rlacd_where_it_is_put(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(trimesh.decomposition, "convex_decomposition", convex_decomposition)
+    mesh = table()
+    parts = mesh.convex_decomposition(threshold=0.1)
+    want = rlacd.decompose(mesh, threshold=0.1)
+    assert len(parts) == len(want)
+    assert all(isinstance(part, trimesh.Trimesh) and part.is_convex for part in parts)
+    assert len(mesh.convex_decomposition(maxConvexHulls=3)) <= 3
+    with pytest.warns(UnusedOptionWarning, match="resolution"):
+        mesh.convex_decomposition(resolution=1000)

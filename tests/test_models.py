@@ -1,0 +1,356 @@
+"""Models: each is read, and where it is a simulator's own, simulated, by the program it is made for."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from lxml import etree
+
+import rlacd
+from rlacd.decomposition import Decomposition
+from rlacd.errors import MissingExtraError, OptionError, OutputError
+from rlacd.formats import MODELS, save
+from tests.hulls import assert_convex_hull, hull_of, moved, random_hull
+from tests.models import TABLE_VOLUME, Rest, decomposed_table, fall_in_bullet, fall_in_drake, fall_in_mujoco
+
+AWKWARD = 'ein Tisch – 机 & "co" <1>'
+"""Blanks, quotes, XML's own marks, and letters of other scripts."""
+
+
+@pytest.fixture(scope="module")
+def wooden() -> Decomposition:
+    return decomposed_table()
+
+
+def renamed(result: Decomposition, name: str, **changes: Any) -> Decomposition:
+    parts = {"hulls": result.hulls, "source": result.source, **changes}
+    return Decomposition(parts["hulls"], {**result.report, "name": name}, parts["source"])
+
+
+def assert_stands(rest: Rest, result: Decomposition, density: float = 1000.0) -> None:
+    """The table stands on its legs: it weighs what it should, every hull counts, and it neither sinks nor creeps."""
+    assert rest.mass == pytest.approx(TABLE_VOLUME * density, rel=1e-6)
+    assert rest.hulls == len(result)
+    assert abs(rest.lowest) < 2e-3
+    assert rest.speed < 1e-2
+
+
+# --- simulators -------------------------------------------------------------------------------------------------------
+
+
+def test_mujoco_simulates_mjcf(tmp_path: Path, wooden: Decomposition) -> None:
+    assert_stands(fall_in_mujoco(wooden.save(tmp_path / "table.xml")), wooden)
+
+
+def test_bullet_simulates_urdf(tmp_path: Path, wooden: Decomposition) -> None:
+    assert_stands(fall_in_bullet(wooden.save(tmp_path / "table.urdf")), wooden)
+
+
+def test_drake_simulates_sdf(tmp_path: Path, wooden: Decomposition) -> None:
+    assert_stands(fall_in_drake(wooden.save(tmp_path / "table.sdf")), wooden)
+
+
+def test_mujoco_and_drake_read_urdf_too(tmp_path: Path, wooden: Decomposition) -> None:
+    path = wooden.save(tmp_path / "table.urdf")
+    assert_stands(fall_in_drake(path), wooden)
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    model = mujoco.MjModel.from_xml_path(str(path))
+    assert int(model.geom_contype.astype(bool).sum()) == len(wooden)
+    assert model.ngeom == len(wooden) + 1, "the hulls and what is seen"
+
+
+def test_yourdfpy_reads_urdf(tmp_path: Path, wooden: Decomposition) -> None:
+    yourdfpy = pytest.importorskip("yourdfpy", reason="the extra sim is not installed")
+    path = wooden.save(tmp_path / "table.urdf")
+    robot = yourdfpy.URDF.load(
+        str(path), load_collision_meshes=True, build_collision_scene_graph=True, force_collision_mesh=False
+    )
+    assert robot.validate(), robot.errors
+    assert len(robot.collision_scene.geometry) == len(wooden)
+    assert robot.collision_scene.bounds == pytest.approx(wooden.source.bounds, abs=1e-9)
+    assert robot.scene.bounds == pytest.approx(wooden.source.bounds, abs=1e-9)
+
+
+@pytest.mark.parametrize("density", [8.0, 7850.0])
+def test_mass_and_inertia_are_those_of_the_solid(tmp_path: Path, wooden: Decomposition, density: float) -> None:
+    """Compared with trimesh's integrals over the closed input, which knows nothing of hulls."""
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    model = mujoco.MjModel.from_xml_path(str(wooden.save(tmp_path / "table.xml", density=density)))
+    table = wooden.source.copy()
+    table.density = density
+    assert model.body_mass[1] == pytest.approx(table.mass, rel=1e-6)
+    assert model.body_ipos[1] == pytest.approx(table.center_mass, abs=1e-6)
+    assert np.sort(model.body_inertia[1]) == pytest.approx(np.sort(table.principal_inertia_components), rel=1e-5)
+
+
+@pytest.mark.parametrize("up", ["x", "y", "z"])
+def test_bodies_stand_up_whatever_axis_points_up(tmp_path: Path, wooden: Decomposition, up: str) -> None:
+    order = {"x": [2, 0, 1], "y": [1, 2, 0], "z": [0, 1, 2]}[up]  # rows: which of the table's axes becomes x, y, z
+    lying = rlacd.decompose((wooden.source.vertices[:, order], wooden.source.faces), threads=1)
+    assert_stands(fall_in_mujoco(lying.save(tmp_path / "table.xml", up=up)), lying)
+    assert_stands(fall_in_drake(lying.save(tmp_path / "table.sdf", up=up)), lying)
+
+
+def test_real_objects_come_to_rest_everywhere(tmp_path: Path, corpus: Path) -> None:
+    chair = rlacd.decompose(corpus / "raw" / "chair_ivar_0668.obj", threads=1)
+    mujoco, bullet = (
+        fall(chair.save(tmp_path / f"chair.{ending}"), 4.0)
+        for fall, ending in ((fall_in_mujoco, "xml"), (fall_in_bullet, "urdf"))
+    )
+    assert mujoco.hulls == bullet.hulls == len(chair)
+    assert mujoco.mass == pytest.approx(bullet.mass)
+    assert mujoco.speed < 1e-2
+    assert abs(mujoco.lowest) < 5e-3
+
+
+# --- USD and engines --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ending", MODELS["usd"])
+def test_usd_opens_and_its_validators_find_nothing(tmp_path: Path, wooden: Decomposition, ending: str) -> None:
+    pytest.importorskip("pxr", reason="the extra usd is not installed")
+    from pxr import Usd, UsdGeom, UsdPhysics, UsdValidation
+
+    path = renamed(wooden, AWKWARD).save(tmp_path / f"table.{ending}", up="y")
+    stage = Usd.Stage.Open(str(path))
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    names = {validator.GetMetadata().name for validator in validators}
+    assert {"usdPhysicsValidators:ColliderChecker", "usdPhysicsValidators:RigidBodyChecker"} <= names
+    assert [error.GetMessage() for error in UsdValidation.ValidationContext(validators).Validate(stage)] == []
+
+    body = stage.GetDefaultPrim()
+    assert body.HasAPI(UsdPhysics.RigidBodyAPI)
+    assert UsdPhysics.MassAPI(body).GetMassAttr().Get() == pytest.approx(TABLE_VOLUME * 1000, rel=1e-6)
+    assert UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.y
+    meshes = [UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)]
+    hulls = [mesh for mesh in meshes if mesh.GetPrim().HasAPI(UsdPhysics.CollisionAPI)]
+    assert len(hulls) == len(wooden)
+    assert len(meshes) == len(hulls) + 1
+    for mesh, hull in zip(hulls, wooden, strict=True):
+        assert UsdPhysics.MeshCollisionAPI(mesh).GetApproximationAttr().Get() == "convexHull"
+        assert UsdGeom.Imageable(mesh).ComputePurpose() == "guide"
+        read = trimesh.Trimesh(
+            np.array(mesh.GetPointsAttr().Get(), dtype=np.float64),
+            np.array(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3),
+            process=False,
+        )
+        assert_convex_hull(read)
+        assert read.volume == pytest.approx(hull.volume, rel=1e-5)
+
+
+def test_usd_turns_the_inertia_the_right_way(tmp_path: Path) -> None:
+    """A lopsided body: rebuilding the tensor from principal axes and moments gives the solid's own."""
+    pytest.importorskip("pxr", reason="the extra usd is not installed")
+    from pxr import Usd, UsdPhysics
+
+    hull = hull_of(random_hull(5).vertices * [1.0, 2.0, 3.0] + [0.3, 0.2, 0.1])
+    path = rlacd.decompose(hull, threads=1).save(tmp_path / "rock.usda", density=1.0)
+    stage = Usd.Stage.Open(str(path))
+    api = UsdPhysics.MassAPI(stage.GetDefaultPrim())
+    turn = api.GetPrincipalAxesAttr().Get()
+    quaternion = [turn.GetReal(), *turn.GetImaginary()]
+    axes = trimesh.transformations.quaternion_matrix(quaternion)[:3, :3]
+    tensor = axes @ np.diag(np.array(api.GetDiagonalInertiaAttr().Get())) @ axes.T
+    assert tensor == pytest.approx(np.asarray(hull.moment_inertia), rel=1e-4, abs=1e-4 * hull.moment_inertia.max())
+    assert np.array(api.GetCenterOfMassAttr().Get()) == pytest.approx(hull.center_mass, abs=1e-5)
+
+
+@pytest.mark.parametrize("ending", MODELS["unreal"])
+def test_unreal_finds_the_hulls_of_the_mesh_by_name(tmp_path: Path, wooden: Decomposition, ending: str) -> None:
+    path = renamed(wooden, "my table").save(tmp_path / f"table.{ending}", file_format="unreal")
+    read = trimesh.load_scene(path, process=False, **({"split_objects": True} if ending == "obj" else {}))
+    assert sorted(read.geometry) == sorted(["my_table", *(f"UCX_my_table_{i:02d}" for i in range(len(wooden)))])
+    assert read.geometry["my_table"].volume == pytest.approx(TABLE_VOLUME, rel=1e-5)
+    for index, hull in enumerate(wooden):
+        assert_convex_hull(read.geometry[f"UCX_my_table_{index:02d}"])
+        assert read.geometry[f"UCX_my_table_{index:02d}"].volume == pytest.approx(hull.volume, rel=1e-5)
+
+
+def test_godot_finds_hulls_by_the_end_of_their_names(tmp_path: Path, wooden: Decomposition) -> None:
+    read = trimesh.load_scene(wooden.save(tmp_path / "table.glb", file_format="godot"), process=False)
+    nodes = {name for name in read.graph.nodes_geometry if name.endswith("-convcolonly")}
+    assert len(nodes) == len(wooden)
+    assert set(read.graph.nodes_geometry) - nodes == {"mesh"}
+
+
+# --- what is awkward --------------------------------------------------------------------------------------------------
+
+
+def test_any_name_goes_in_every_format(tmp_path: Path, wooden: Decomposition) -> None:
+    folder = tmp_path / "ein Ordner – 机"
+    folder.mkdir()
+    odd = renamed(wooden, AWKWARD)
+    assert_stands(fall_in_mujoco(odd.save(folder / "Tisch 机.xml")), wooden)
+    assert_stands(fall_in_bullet(odd.save(folder / "Tisch 机.urdf")), wooden)
+    assert_stands(fall_in_drake(odd.save(folder / "Tisch 机.sdf")), wooden)
+
+
+@pytest.mark.parametrize("name", ["\x07bell\nline", "\ud800", "￿", " ", "../../up", "x" * 400])
+def test_names_that_xml_or_disks_cannot_hold_are_made_plain(tmp_path: Path, wooden: Decomposition, name: str) -> None:
+    for ending in ("xml", "urdf", "sdf"):
+        path = renamed(wooden, name).save(tmp_path / f"out.{ending}")
+        etree.parse(str(path))
+    assert {path.name for path in tmp_path.iterdir()} == {
+        f"out{end}" for end in (".xml", ".urdf", ".sdf", "_mjcf", "_urdf", "_sdf")
+    }
+
+
+def test_a_body_of_500_hulls_is_simulated(tmp_path: Path) -> None:
+    spots = np.stack(np.meshgrid(np.arange(10), np.arange(10), np.arange(5)), axis=-1).reshape(-1, 3) * 0.05
+    cubes = [hull_of(trimesh.creation.box((0.04, 0.04, 0.04)).vertices + spot) for spot in spots]
+    many = Decomposition(cubes, {"name": "many"}, trimesh.util.concatenate(cubes))
+    for fall, ending in ((fall_in_mujoco, "xml"), (fall_in_bullet, "urdf")):
+        rest = fall(many.save(tmp_path / f"many.{ending}"), 0.15)
+        assert rest.hulls == 500
+        assert rest.mass == pytest.approx(500 * 0.04**3 * 1000)
+
+
+@pytest.mark.parametrize("ending", ["xml", "urdf"])
+def test_thin_tiny_and_far_bodies_load(tmp_path: Path, ending: str) -> None:
+    shapes = {
+        "thin": trimesh.creation.box((1.0, 1.0, 1e-4)),
+        "tiny": trimesh.creation.box((1e-4, 2e-4, 1e-4)),
+        "far": trimesh.creation.box((0.1, 0.1, 0.1), transform=trimesh.transformations.translation_matrix([5e5, 0, 9])),
+    }
+    for name, shape in shapes.items():
+        path = rlacd.decompose(shape, threads=1).save(tmp_path / f"{name}.{ending}")
+        rest = (fall_in_mujoco if ending == "xml" else loaded_in_bullet)(path, 0.0)
+        assert rest.hulls == 1
+
+
+def loaded_in_bullet(path: Path, _: float) -> Rest:
+    bullet = pytest.importorskip("pybullet", reason="the extra sim is not installed")
+    client = bullet.connect(bullet.DIRECT)
+    try:
+        body = bullet.loadURDF(str(path), physicsClientId=client)
+        return Rest(0.0, 0.0, 0.0, len(bullet.getCollisionShapeData(body, -1, physicsClientId=client)))
+    finally:
+        bullet.disconnect(client)
+
+
+def test_a_flat_mesh_to_look_at_is_no_obstacle(tmp_path: Path) -> None:
+    square = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]], process=False)
+    result = rlacd.decompose(square, threads=1)
+    assert fall_in_mujoco(result.save(tmp_path / "square.xml"), 0.1).hulls == len(result)
+    assert loaded_in_bullet(result.save(tmp_path / "square.urdf"), 0.0).hulls == len(result)
+
+
+@pytest.mark.parametrize("ending", ["xml", "urdf", "sdf", "usda"])
+def test_same_decomposition_same_bytes(tmp_path: Path, wooden: Decomposition, ending: str) -> None:
+    if ending == "usda":
+        pytest.importorskip("pxr", reason="the extra usd is not installed")
+    folders = []
+    for name in "ab":
+        (tmp_path / name).mkdir()
+        wooden.save(tmp_path / name / f"table.{ending}")
+        folders.append({p.relative_to(tmp_path / name): p.read_bytes() for p in (tmp_path / name).rglob("*.*")})
+    assert folders[0] == folders[1]
+
+
+# --- mistakes ---------------------------------------------------------------------------------------------------------
+
+
+def test_usd_without_its_extra_is_one_sentence_before_any_work(
+    tmp_path: Path, wooden: Decomposition, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pxr", None)
+    monkeypatch.setitem(sys.modules, "pxr.UsdPhysics", None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'rlacd\[usd\]'"):
+        wooden.save(tmp_path / "table.usd")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("path", "options", "error", "says"),
+    [
+        ("table.glb", {"file_format": "mjcf"}, OptionError, r"mjcf needs a file whose name ends in \.xml"),
+        ("table.stl", {"file_format": "unreal"}, OptionError, r"\.glb or \.obj"),
+        ("table/", {"file_format": "godot"}, OptionError, r"\.glb"),
+        ("table.xml", {"density": 0.0}, OptionError, "density is 0.0"),
+        ("table.xml", {"density": float("nan")}, OptionError, "density"),
+        ("table.xml", {"up": "w"}, OptionError, "no axis"),
+        ("no/table.xml", {}, OutputError, "does not exist; create it first"),
+        ("table.blend", {}, OutputError, r"\.xml, \.urdf, \.sdf, \.usd"),
+    ],
+)
+def test_mistakes_are_one_sentence(
+    tmp_path: Path, wooden: Decomposition, path: str, options: dict[str, Any], error: type[Exception], says: str
+) -> None:
+    with pytest.raises(error, match=says):
+        save(wooden, f"{tmp_path}/{path}", **options)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_others_put_in_the_folder_of_meshes_is_not_replaced(tmp_path: Path, wooden: Decomposition) -> None:
+    (tmp_path / "table_urdf").mkdir()
+    theirs = tmp_path / "table_urdf" / "mesh_000.obj"
+    theirs.write_text("mine")
+    with pytest.raises(OutputError, match=r"mesh_000\.obj: a file of that name is there that rlacd did not write"):
+        wooden.save(tmp_path / "table.urdf")
+    assert theirs.read_text() == "mine"
+    assert not (tmp_path / "table.urdf").exists()
+
+
+def test_a_file_where_the_folder_of_meshes_goes_is_refused(tmp_path: Path, wooden: Decomposition) -> None:
+    (tmp_path / "table_mjcf").write_text("mine")
+    with pytest.raises(OutputError, match="it is a file, not a folder"):
+        wooden.save(tmp_path / "table.xml")
+    assert (tmp_path / "table_mjcf").read_text() == "mine"
+
+
+def test_saving_again_replaces_model_and_meshes_and_nothing_else(tmp_path: Path, wooden: Decomposition) -> None:
+    wooden.save(tmp_path / "table.urdf")
+    (tmp_path / "table_urdf" / "notes.txt").write_text("mine")
+    renamed(wooden, "mesh", hulls=wooden.hulls[:1]).save(tmp_path / "table.urdf")
+    names = {path.name for path in (tmp_path / "table_urdf").iterdir()}
+    assert names == {"mesh_000.obj", "mesh_visual.obj", "mesh_hulls.json", "notes.txt"}
+    assert json.loads((tmp_path / "table_urdf" / "mesh_hulls.json").read_text())["files"] == [
+        "mesh_visual.obj",
+        "mesh_000.obj",
+    ]
+    assert (tmp_path / "table.urdf").read_text().count("<collision") == 1
+
+
+def test_a_failing_disk_leaves_the_older_model_with_its_meshes(
+    tmp_path: Path, wooden: Decomposition, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import rlacd.formats as formats
+
+    wooden.save(tmp_path / "table.xml")
+    before = (tmp_path / "table.xml").read_bytes()
+
+    def full(path: Path, data: bytes) -> None:
+        raise OutputError("the disk is full")
+
+    monkeypatch.setattr(formats, "write_file", full)
+    with pytest.raises(OutputError, match="full"):
+        renamed(wooden, "mesh", hulls=wooden.hulls[:1]).save(tmp_path / "table.xml")
+    assert (tmp_path / "table.xml").read_bytes() == before
+    assert fall_in_mujoco(tmp_path / "table.xml", 0.0).hulls == len(wooden), "every mesh it names is still there"
+
+
+def test_hulls_too_thin_for_simulators_are_said(tmp_path: Path) -> None:
+    plate = trimesh.creation.box((1.0, 1.0, 1e-9))
+    plate.apply_transform(trimesh.transformations.rotation_matrix(0.7, [1.0, 2.0, 3.0]))
+    thin = Decomposition([hull_of(plate.vertices)], {"name": "plate"}, plate)
+    for name in ("plate.xml", "plate.urdf", "plate.usda"):
+        with pytest.raises(OutputError, match=r"hull_000.*too thin for single precision"):
+            thin.save(tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_hulls_of_every_size_keep_their_shape_in_models(tmp_path: Path) -> None:
+    for scale in (1e-3, 1.0, 1e3):
+        hulls = [moved(random_hull(seed), scale, np.full(3, 1e3 * scale)) for seed in range(2)]
+        source = trimesh.util.concatenate(hulls)
+        path = Decomposition(hulls, {"name": "rocks"}, source).save(tmp_path / f"rocks{scale:g}.urdf")
+        for element, hull in zip(etree.parse(str(path)).iterfind(".//collision"), hulls, strict=True):
+            mesh = trimesh.load_mesh(path.parent / element.find("geometry/mesh").get("filename"), process=False)
+            mesh.apply_translation([float(word) for word in element.find("origin").get("xyz").split()])
+            assert mesh.bounds == pytest.approx(hull.bounds, abs=1e-3 * scale)

@@ -1,0 +1,448 @@
+"""Rewriting robots: every collision mesh becomes its hulls, every other byte stays, and simulators read the result."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from lxml import etree
+from typer.testing import CliRunner
+
+import rlacd
+from rlacd.cli import app
+from rlacd.errors import MeshFileError, OptionError, OutputError
+from tests.models import table
+
+EAR = """<?xml version="1.0"?>
+<!-- made by hand -->
+<robot name='ear'   >
+\t<link name="base">
+\t\t<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+\t\t<visual>
+\t\t\t<geometry><mesh filename="meshes/table.stl"/></geometry>
+\t\t</visual>
+\t\t<collision name="a &gt; b">
+\t\t\t<origin xyz="0 0 1"/><!-- kept > -->
+\t\t\t<geometry>
+\t\t\t\t<mesh scale="0.5 0.5 2"
+\t\t\t\t      filename = 'meshes/table.stl' />
+\t\t\t</geometry>
+\t\t</collision>
+\t\t<collision><geometry><box size="1 1 1"/></geometry></collision>
+\t</link>
+\t<joint name="j" type="fixed"><parent link="base"/><child link="tip"/></joint>
+\t<link name="tip"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+\t\t<collision><geometry><mesh filename="meshes/table.stl" scale="-1 1 1"/></geometry></collision>
+\t\t<collision><geometry><mesh filename="meshes/table.stl" scale="0.5 0.5 2"/></geometry></collision></link>
+</robot>   
+<!-- the end -->"""
+
+
+@pytest.fixture
+def ear(tmp_path: Path) -> Path:
+    """A robot with the awkward parts real ones have, its mesh beside it."""
+    (tmp_path / "meshes").mkdir()
+    table().export(tmp_path / "meshes" / "table.stl")
+    (tmp_path / "ear.urdf").write_text(EAR)
+    return tmp_path / "ear.urdf"
+
+
+def without_collision_meshes(text: str) -> str:
+    """Take out every collision that is a mesh, and the white space before all but the first of a run of them."""
+    blocks = re.compile(r"<collision\b(?:(?!</collision>).)*?<mesh.*?</collision>", re.DOTALL)
+    return re.sub(r"(?:@\s*)*@", "@", blocks.sub("@", text))
+
+
+def collisions(path: Path) -> list[trimesh.Trimesh]:
+    """Read the collision meshes of a URDF, scaled as it says."""
+    found = []
+    for mesh in etree.parse(str(path)).iterfind(".//collision/geometry/mesh"):
+        read = trimesh.load_mesh(path.parent / mesh.get("filename"), process=False)
+        scale = np.array([float(word) for word in mesh.get("scale", "1 1 1").split()])
+        faces = read.faces if scale.prod() > 0 else read.faces[:, ::-1]
+        found.append(trimesh.Trimesh(read.vertices * scale, faces, process=False))
+    return found
+
+
+# --- URDF -------------------------------------------------------------------------------------------------------------
+
+
+def test_a_urdf_keeps_every_byte_but_its_collision_meshes(ear: Path) -> None:
+    done = rlacd.rewrite_robot(ear, ear.with_name("out.urdf"), threads=1)
+    after = done.path.read_text()
+    assert without_collision_meshes(after) == without_collision_meshes(EAR)
+    assert after.count("<!-- kept > -->") == len(done.meshes[0].files), "what else is in a collision goes to each hull"
+    names = [element.get("name") for element in etree.parse(str(done.path)).iterfind(".//collision")]
+    count = len(done.meshes[0].files)
+    assert names[:count] == [f"a > b_{index:03d}" for index in range(count)]
+    assert done.warnings == []
+
+
+def test_hulls_fill_the_same_space_at_every_scale(ear: Path) -> None:
+    done = rlacd.rewrite_robot(ear, ear.with_name("out.urdf"), threads=1)
+    assert len(done.meshes) == 2, "one mesh at two scales; the one that is used twice is decomposed once"
+    hulls = collisions(done.path)
+    first, second = (len(mesh.files) for mesh in done.meshes)
+    groups = [hulls[:first], hulls[first : first + second], hulls[first + second :]]
+    for group, scale in zip(groups, ([0.5, 0.5, 2.0], [-1.0, 1.0, 1.0], [0.5, 0.5, 2.0]), strict=True):
+        want = table()
+        want.apply_transform(np.diag([*scale, 1.0]))
+        together = trimesh.util.concatenate(group)
+        assert together.bounds == pytest.approx(want.bounds, abs=1e-6)
+        assert all(hull.volume > 0 and hull.is_convex for hull in group)
+        assert sum(hull.volume for hull in group) == pytest.approx(want.volume, rel=0.02)
+
+
+def test_simulators_read_the_rewritten_urdf(ear: Path) -> None:
+    done = rlacd.rewrite_robot(ear, ear.with_name("out.urdf"), threads=1)
+    count = sum(len(mesh.files) for mesh in done.meshes) + len(done.meshes[0].files)
+    yourdfpy = pytest.importorskip("yourdfpy", reason="the extra sim is not installed")
+    robot = yourdfpy.URDF.load(
+        str(done.path), load_collision_meshes=True, build_collision_scene_graph=True, force_collision_mesh=False
+    )
+    assert len(robot.collision_scene.geometry) == count + 1, "the hulls and the box"
+    bullet = pytest.importorskip("pybullet", reason="the extra sim is not installed")
+    client = bullet.connect(bullet.DIRECT)
+    try:
+        body = bullet.loadURDF(str(done.path), physicsClientId=client)
+        shapes = [bullet.getCollisionShapeData(body, link, physicsClientId=client) for link in (-1, 0)]
+        assert sum(map(len, shapes)) == count + 1
+    finally:
+        bullet.disconnect(client)
+
+
+@pytest.mark.parametrize("robot", ["kuka_iiwa/model.urdf", "franka_panda/panda.urdf"])
+@pytest.mark.slow
+def test_real_robots_are_rewritten_and_simulated(tmp_path: Path, robot: str) -> None:
+    """The arms that come with pybullet; Panda's calls its folder of meshes a package."""
+    bullet = pytest.importorskip("pybullet", reason="the extra sim is not installed")
+    import pybullet_data
+
+    source = Path(pybullet_data.getDataPath()) / robot
+    done = rlacd.rewrite_robot(source, tmp_path / "arm.urdf", threshold=0.2, policy="navacd")
+    text, after = source.read_text(), done.path.read_text()
+    assert without_collision_meshes(after) == without_collision_meshes(text)
+    # Looks are named relative to the file, which moved: without them, what collides is what is read.
+    lean = re.sub(r"<visual.*?</visual>", "", after, flags=re.DOTALL)
+    done.path.write_text(lean)
+    client = bullet.connect(bullet.DIRECT)
+    try:
+        arm = bullet.loadURDF(str(done.path), useFixedBase=True, physicsClientId=client)
+        joints = bullet.getNumJoints(arm, physicsClientId=client)
+        shapes = [bullet.getCollisionShapeData(arm, link, physicsClientId=client) for link in range(-1, joints)]
+        assert sum(map(len, shapes)) == lean.count("<mesh")
+        for _ in range(24):
+            bullet.stepSimulation(physicsClientId=client)
+    finally:
+        bullet.disconnect(client)
+
+
+def test_packages_keep_their_name_in_the_new_references(tmp_path: Path) -> None:
+    package = tmp_path / "ws" / "ear_description"
+    (package / "meshes").mkdir(parents=True)
+    (package / "urdf").mkdir()
+    (package / "package.xml").write_text("<package><name>ear</name></package>")
+    table().export(package / "meshes" / "table.stl")
+    source = package / "urdf" / "ear.urdf"
+    source.write_text(EAR.replace("meshes/table", "package://ear/meshes/table"))
+    inside = rlacd.rewrite_robot(source, package / "urdf" / "out.urdf", threads=1)
+    assert 'package://ear/urdf/out_urdf/out_table_000.obj"' in inside.path.read_text()
+    outside = rlacd.rewrite_robot(source, tmp_path / "out.urdf", threads=1)
+    assert '"out_urdf/out_table_000.obj"' in outside.path.read_text()
+
+
+@pytest.mark.parametrize("how", ["option", "sibling", "ament", "ros"])
+def test_packages_are_found_where_robotics_people_keep_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str
+) -> None:
+    robot, parts = tmp_path / "src" / "bot" / "bot.urdf", tmp_path / "elsewhere" / "parts"
+    robot.parent.mkdir(parents=True)
+    if how == "sibling":
+        parts = tmp_path / "src" / "parts"
+    elif how == "ament":
+        parts = tmp_path / "install" / "share" / "parts"
+        monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "install"))
+    elif how == "ros":
+        monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "elsewhere"))
+    parts.mkdir(parents=True)
+    (parts / "package.xml").write_text("<package><name>parts</name></package>")
+    table().export(parts / "table.stl")
+    robot.write_text(EAR.replace("meshes/table", "package://parts/table"))
+    given = [f"parts={parts}"] if how == "option" else []
+    done = rlacd.rewrite_robot(robot, robot.with_name("out.urdf"), package_dirs=given, threads=1)
+    assert {mesh.path for mesh in done.meshes} == {parts / "table.stl"}
+
+
+def test_lengths_are_in_the_robots_unit(tmp_path: Path) -> None:
+    """A mesh in millimetres at scale 0.001: the tolerance is in metres."""
+    big = table()
+    big.apply_scale(1000.0)
+    big.export(tmp_path / "big.stl")
+    (tmp_path / "r.urdf").write_text(
+        '<robot name="r"><link name="l"><collision><geometry><mesh filename="big.stl" scale="0.001 0.001 0.001"/>'
+        "</geometry></collision></link></robot>"
+    )
+    done = rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "out.urdf", threshold_m=0.004, threads=1)
+    assert done.meshes[0].result.report["options"]["threshold"] == pytest.approx(0.004 * 2 / 0.4)
+    (hulls,) = [trimesh.util.concatenate(collisions(done.path))]
+    assert hulls.bounds == pytest.approx(table().bounds, abs=1e-6)
+
+
+def test_the_unit_of_collada_files_is_applied_as_ros_does(tmp_path: Path) -> None:
+    big = table()
+    big.apply_scale(100.0)
+    dae = big.export(file_type="dae")
+    text = dae.decode() if isinstance(dae, bytes) else dae
+    text = re.sub(r"<up_axis>", '<unit name="centimeter" meter="0.01"/><up_axis>', text)
+    (tmp_path / "table.dae").write_text(text)
+    (tmp_path / "r.urdf").write_text(
+        '<robot name="r"><link name="l"><collision><geometry><mesh filename="table.dae"/>'
+        "</geometry></collision></link></robot>"
+    )
+    done = rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "out.urdf", threads=1)
+    assert trimesh.util.concatenate(collisions(done.path)).bounds == pytest.approx(table().bounds, abs=1e-6)
+    assert "Y_UP" in done.warnings[0]
+
+
+def test_meshes_of_one_name_in_two_folders_do_not_clash(tmp_path: Path) -> None:
+    for folder, size in (("a", 1.0), ("b", 2.0)):
+        (tmp_path / folder).mkdir()
+        trimesh.creation.box((size, size, size)).export(tmp_path / folder / ("Arm.stl" if folder == "a" else "arm.stl"))
+    collision = "<collision><geometry><mesh filename='{}'/></geometry></collision>"
+    both = collision.format("a/Arm.stl") + collision.format("b/arm.stl")
+    (tmp_path / "r.urdf").write_text(f"<robot name='r'><link name='l'>{both}</link></robot>")
+    done = rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "out.urdf", threads=1)
+    assert [mesh.extents[0] for mesh in collisions(done.path)] == pytest.approx([1.0, 2.0])
+    assert len({name.lower() for mesh in done.meshes for name in mesh.files}) == 2
+
+
+def test_line_ends_and_encodings_are_kept(ear: Path) -> None:
+    data = EAR.replace('version="1.0"', 'version="1.0" encoding="iso-8859-1"').replace("made by", "für")
+    ear.write_bytes(data.replace("\n", "\r\n").encode("latin-1"))
+    done = rlacd.rewrite_robot(ear, ear.with_name("aus – 机.urdf"), threads=1)
+    after = done.path.read_bytes()
+    assert b"f\xfcr" in after
+    assert after.count(b"\n") == after.count(b"\r\n")
+    assert len(collisions(done.path)) > 3, "names that Latin-1 cannot hold are written as character references"
+
+
+def test_a_robot_is_rewritten_on_the_command_line(ear: Path) -> None:
+    run = CliRunner().invoke(app, ["decompose", str(ear), "--threads", "1", "--report", "-"])
+    assert run.exit_code == 0, run.output
+    assert ear.with_name("ear_hulls.urdf").is_file()
+    assert "2 meshes" in run.stderr
+    for words, says in (
+        (["-o", str(ear)], "overwrite the input"),
+        (["-o", str(ear.with_name("x.glb"))], "only be rewritten as another .urdf"),
+        (["--picture", "p.png"], "--picture belongs to a single mesh"),
+        (["--package-dir", "no/such"], "does not exist"),
+    ):
+        run = CliRunner().invoke(app, ["decompose", str(ear), *words])
+        assert run.exit_code == 2
+        assert says in " ".join(run.stderr.split())
+        assert run.stderr.count("\n") == 1
+
+
+def test_going_elsewhere_says_which_files_will_be_missed(ear: Path, tmp_path: Path) -> None:
+    (tmp_path / "far").mkdir()
+    done = rlacd.rewrite_robot(ear, tmp_path / "far" / "out.urdf", threads=1)
+    (warning,) = done.warnings
+    assert "meshes/table.stl" in warning
+
+
+# --- MJCF -------------------------------------------------------------------------------------------------------------
+
+ARM = """<mujoco model="arm">
+  <compiler angle="radian" meshdir="assets"/>
+  <default>
+    <default class="arm">
+      <geom type="mesh"/>
+      <default class="visual"><geom contype="0" conaffinity="0" group="2"/></default>
+      <default class="collision"><geom group="3" mass="3"/></default>
+    </default>
+    <mesh scale="0.5 0.5 0.5"/>
+  </default>
+  <asset>
+    <mesh file="table.stl"/>
+    <mesh name="big" file="table.stl" scale="1 1 1"/>
+    <mesh name="tetrahedron" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/>
+  </asset>
+  <worldbody>
+    <body name="upper" childclass="arm">
+      <freejoint/>
+      <geom class="visual" mesh="table"/>
+      <geom name="elbow" class="collision" mesh="table" pos="0 0 0.1"/> <!-- kept -->
+    </body>
+    <body name="lower" pos="2 0 0">
+      <freejoint/>
+      <geom name="both" type="mesh" mesh="big" rgba="1 0 0 1"/>
+      <geom type="mesh" mesh="tetrahedron" pos="0 0 1"/>
+      <geom type="sphere" size="0.1"/>
+    </body>
+  </worldbody>
+  <contact><exclude body1="upper" body2="lower"/></contact>
+  <sensor><user name="s" dim="1" objtype="geom" objname="elbow"/></sensor>
+</mujoco>
+"""
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Path:
+    (tmp_path / "assets").mkdir()
+    table().export(tmp_path / "assets" / "table.stl")
+    (tmp_path / "arm.xml").write_text(ARM)
+    return tmp_path / "arm.xml"
+
+
+def test_mujoco_reads_the_rewritten_mjcf(arm: Path) -> None:
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    before = mujoco.MjModel.from_xml_path(str(arm))
+    done = rlacd.rewrite_robot(arm, arm.with_name("out.xml"), threads=1)
+    after = mujoco.MjModel.from_xml_path(str(done.path))
+    table_hulls, big_hulls = (len(mesh.files) for mesh in done.meshes)
+    # "upper" swaps its collision geom for the hulls; "lower" keeps the red geom to look at, with hulls beside it.
+    assert after.ngeom == before.ngeom - 1 + table_hulls + big_hulls
+    assert int(after.geom_contype.astype(bool).sum()) == table_hulls + big_hulls + 2, "and tetrahedron and sphere"
+    upper = mujoco.mj_name2id(after, mujoco.mjtObj.mjOBJ_BODY, "upper")
+    assert after.body_mass[upper] == pytest.approx(before.body_mass[upper], rel=1e-5), "mass is shared out"
+    red = mujoco.mj_name2id(after, mujoco.mjtObj.mjOBJ_GEOM, "both_visual")
+    assert after.geom_contype[red] == after.geom_conaffinity[red] == 0
+    assert after.geom_rgba[red].tolist() == [1.0, 0.0, 0.0, 1.0]
+    data = mujoco.MjData(after)
+    for _ in range(20):
+        mujoco.mj_step(after, data)
+    assert np.isfinite(data.qpos).all()
+
+
+def test_hulls_lie_where_the_mesh_lay(arm: Path) -> None:
+    """MuJoCo moves every mesh into its own frame of inertia; placed by it, mesh and hulls still coincide."""
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    before = mujoco.MjModel.from_xml_path(str(arm))
+    after = mujoco.MjModel.from_xml_path(str(rlacd.rewrite_robot(arm, arm.with_name("out.xml"), threads=1).path))
+    assert bounds_of(mujoco, after, "upper") == pytest.approx(bounds_of(mujoco, before, "upper"), abs=1e-5)
+    assert bounds_of(mujoco, after, "lower") == pytest.approx(bounds_of(mujoco, before, "lower"), abs=1e-5)
+
+
+def bounds_of(mujoco: object, model: object, body: str) -> np.ndarray:
+    data = mujoco.MjData(model)  # type: ignore[attr-defined]
+    mujoco.mj_forward(model, data)  # type: ignore[attr-defined]
+    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body)  # type: ignore[attr-defined]
+    points = []
+    for geom in range(model.ngeom):  # type: ignore[attr-defined]
+        mesh = model.geom_dataid[geom]  # type: ignore[attr-defined]
+        if model.geom_bodyid[geom] != index or mesh < 0 or not model.geom_contype[geom]:  # type: ignore[attr-defined]
+            continue
+        first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]  # type: ignore[attr-defined]
+        vertices = model.mesh_vert[first : first + count]  # type: ignore[attr-defined]
+        points.append(vertices @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])
+    stacked = np.concatenate(points)
+    return np.array([stacked.min(axis=0), stacked.max(axis=0)])
+
+
+def test_an_mjcf_keeps_every_byte_but_meshes_and_their_geoms(arm: Path) -> None:
+    done = rlacd.rewrite_robot(arm, arm.with_name("out.xml"), threads=1)
+    before, after = ARM.splitlines(), done.path.read_text().splitlines()
+    changed = [line for line in difflib.ndiff(before, after) if line.startswith("- ")]
+    assert [line for line in changed if 'name="elbow"' not in line and 'name="both"' not in line] == []
+    new = [line[2:].strip() for line in difflib.ndiff(before, after) if line.startswith("+ ")]
+    assert all(line.startswith(("<mesh ", "<geom ")) for line in new)
+    assert sum(line.endswith("<!-- kept -->") for line in new) == 1
+    assert "<sensor> names" not in " ".join(done.warnings)
+    assert any("elbow" in warning and "<user>" in warning for warning in done.warnings)
+    assert any("lower" in warning and "mass" in warning for warning in done.warnings)
+    assert any("tetrahedron" in warning and "no file" in warning for warning in done.warnings)
+
+
+def test_what_is_included_is_said_to_be_left(arm: Path) -> None:
+    arm.write_text(ARM.replace("<worldbody>", '<include file="more.xml"/>\n  <worldbody>'))
+    done = rlacd.rewrite_robot(arm, arm.with_name("out.xml"), threads=1)
+    assert any("<include>" in warning for warning in done.warnings)
+
+
+# --- files that must not be trusted -----------------------------------------------------------------------------------
+
+BOMB = """<?xml version="1.0"?><!DOCTYPE r [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><robot name="&b;"/>"""
+STEAL = """<?xml version="1.0"?><!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]><robot name="r">&x;</robot>"""
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (BOMB, "document type"),
+        (STEAL, "document type"),
+        ("<robot><link></robot>", "not well-formed"),
+        ("", "not well-formed"),
+        ("<a>" * 2000 + "</a>" * 2000, "more than 500 deep"),
+        ('<robot xmlns:xacro="x"><xacro:macro name="m"/></robot>', "xacro"),
+        ("<robot name='r'><link name='l'/></robot>", "no collision mesh"),
+        ('<?xml version="1.0" encoding="klingon"?><robot/>', "klingon|encoding"),
+        ("<robot><link name='l'><collision><geometry><mesh/></geometry></collision></link></robot>", "no filename"),
+    ],
+)
+def test_bad_files_are_refused_in_one_sentence(tmp_path: Path, text: str, says: str) -> None:
+    (tmp_path / "r.urdf").write_text(text)
+    with pytest.raises(MeshFileError, match=says):
+        rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "out.urdf")
+    assert [path.name for path in tmp_path.iterdir()] == ["r.urdf"]
+
+
+@pytest.mark.parametrize(
+    "reference",
+    [
+        "../../outside.stl",
+        "{outside}",
+        "file://{outside}",
+        "package://r/../../outside.stl",
+        "package://../outside.stl",
+        "package://r/%2e%2e/%2e%2e/outside.stl",
+        "package:///outside.stl",
+        "..\\..\\outside.stl",
+        "http://example.org/a.stl",
+        "a\x7fb.stl",
+        "missing.stl",
+        "meshes",
+    ],
+)
+def test_a_robot_cannot_name_what_lies_outside_its_package(tmp_path: Path, reference: str) -> None:
+    outside = tmp_path / "outside.stl"
+    trimesh.creation.box().export(outside)
+    package = tmp_path / "deep" / "r"
+    (package / "meshes").mkdir(parents=True)
+    (package / "package.xml").write_text("<package><name>r</name></package>")
+    named = reference.format(outside=outside)
+    (package / "r.urdf").write_text(
+        f"<robot><link name='l'><collision><geometry><mesh filename='{named}'/></geometry></collision></link></robot>"
+    )
+    with pytest.raises(MeshFileError) as caught:
+        rlacd.rewrite_robot(package / "r.urdf", package / "out.urdf")
+    assert "\n" not in str(caught.value)
+    if "outside" in reference and "package" not in reference:
+        done = rlacd.rewrite_robot(package / "r.urdf", package / "out.urdf", package_dirs=[str(tmp_path)], threads=1)
+        assert done.meshes[0].path == outside, "unless the user allows it"
+
+
+@pytest.mark.parametrize("scale", ["0 1 1", "a b c", "1 1", "nan nan nan", "inf 1 1"])
+def test_scales_that_are_none_are_refused(ear: Path, scale: str) -> None:
+    ear.write_text(EAR.replace("-1 1 1", scale))
+    with pytest.raises(MeshFileError, match="not three numbers other than zero"):
+        rlacd.rewrite_robot(ear, ear.with_name("out.urdf"))
+
+
+def test_places_are_checked_before_the_work(ear: Path, tmp_path: Path) -> None:
+    with pytest.raises(OptionError, match="overwrite the input"):
+        rlacd.rewrite_robot(ear, ear)
+    with pytest.raises(OptionError, match=r"another \.urdf"):
+        rlacd.rewrite_robot(ear, tmp_path / "out.xml")
+    with pytest.raises(OutputError, match="does not exist"):
+        rlacd.rewrite_robot(ear, tmp_path / "no" / "out.urdf")
+    (tmp_path / "out_urdf").write_text("mine")
+    with pytest.raises(OutputError, match="it is a file"):
+        rlacd.rewrite_robot(ear, tmp_path / "out.urdf")
+    with pytest.raises(MeshFileError, match="is no robot"):
+        rlacd.rewrite_robot(ear.parent / "meshes" / "table.stl", tmp_path / "out.stl")
+    with pytest.raises(OptionError, match="threshold"):
+        rlacd.rewrite_robot(ear, tmp_path / "out2.urdf", threshold=-1.0)
