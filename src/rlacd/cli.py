@@ -19,6 +19,7 @@ import typer
 from rlacd import __version__
 from rlacd.errors import OptionError, OutputError, RlacdError
 from rlacd.train_command import train_command
+from rlacd.view_command import view_command
 
 STDOUT = Path("-")
 _SPELLED = {"reachable-only": "everywhere", "seeds": "seed-point", "closed-planes": "closed-plane"}
@@ -138,7 +139,8 @@ def decompose(
         typer.Option(
             metavar="FILE",
             rich_help_panel=OUTPUT,
-            help="Write everything measured as JSON; - writes it to stdout, and nothing else there.",
+            help="Write everything measured: as JSON, or as a page to look at if the name ends in .html; "
+            "- writes JSON to stdout, and nothing else there.",
         ),
     ] = None,
     picture: Annotated[
@@ -364,13 +366,14 @@ def decompose(
     with _exit_codes():
         from rlacd.criteria import NavigableSpace
         from rlacd.formats import check_balls, check_file, hull_target, write_file
-        from rlacd.show import check_picture, draw_picture
+        from rlacd.show import check_picture, check_up, draw_picture, is_html, save_report_page
 
         place = _output_name(mesh, output)
         _check_output(mesh, {"-o": Path(place), "--report": report, "--picture": picture, "--balls": balls})
         hull_target(place, folder_format)
         if report is not None and report != STDOUT:
             check_file(report)
+            check_up(up)
         if picture is not None:
             check_picture(picture, up=up)
         if balls is not None:
@@ -410,7 +413,8 @@ def decompose(
         }
 
         from rlacd.decompose import decompose as run
-        from rlacd.terminal import Watch, say, summary, to_json
+        from rlacd.plain_json import to_json
+        from rlacd.terminal import Watch, say, summary
 
         with Watch(quiet=quiet) as watch:
             result = run(mesh, **_chosen(given), progress=watch)
@@ -419,6 +423,8 @@ def decompose(
             say(summary(result, place))
         if report == STDOUT:
             typer.echo(to_json(result.report), nl=False)
+        elif report is not None and is_html(report):
+            save_report_page(result, report, up=up or _usual_up(mesh))
         elif report is not None:
             write_file(report, to_json(result.report).encode())
         if balls is not None:
@@ -443,7 +449,7 @@ def info(
     """
     with _exit_codes():
         from rlacd.describe import describe, describe_text
-        from rlacd.terminal import printable, to_json
+        from rlacd.plain_json import printable, to_json
 
         facts = describe(mesh)
         typer.echo(to_json(facts) if as_json else printable(describe_text(facts)), nl=False)
@@ -532,3 +538,4 @@ def _first_line(error: Exception) -> str:
 
 
 app.command("train", epilog=EPILOG)(train_command(_exit_codes))
+app.command("view", epilog=EPILOG)(view_command(_exit_codes))
