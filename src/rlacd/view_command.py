@@ -42,13 +42,15 @@ def view_command(exit_codes: Callable[[], AbstractContextManager[None]]) -> Call
             str | None,
             typer.Option(
                 metavar="AXIS",
-                help="The axis of the mesh that points up: x, y or z. [dim]\\[default: y for glb and gltf, else z][/dim]",
+                help="The axis of the mesh that points up. [dim]\\[default: y for glb and gltf, else z][/dim]",
                 show_default=False,
             ),
         ] = None,
         port: Annotated[
             int | None,
-            typer.Option(help="Where the page is served. [dim]\\[default: 8765, or any free one][/dim]", show_default=False),
+            typer.Option(
+                help="Where the page is served. [dim]\\[default: 8765, or any free one][/dim]", show_default=False
+            ),
         ] = None,
         threads: Annotated[int | None, typer.Option(help="Threads to use, all cores by default.")] = None,
         browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,

@@ -8,7 +8,7 @@ import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from rlacd.decomposition import Axis, Decomposition
+from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError
 from rlacd.formats import FORMATS
 from rlacd.plain_json import to_json
@@ -34,7 +34,7 @@ def offered() -> list[tuple[str, str]]:
     ]
 
 
-def download(decomposition: Decomposition, wanted: str, *, up: Axis = "z") -> Download:
+def download(decomposition: Decomposition, wanted: str, *, up: str = "z") -> Download:
     """Make one of the files `offered`.
 
     A format that writes several files comes zipped.
@@ -70,7 +70,9 @@ def _zipped(folder: Path, files: list[Path]) -> bytes:
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
         for path in files:
             # Without a date: the same hulls give the same bytes.
-            archive.writestr(zipfile.ZipInfo(path.relative_to(folder).as_posix()), path.read_bytes(), zipfile.ZIP_DEFLATED)
+            archive.writestr(
+                zipfile.ZipInfo(path.relative_to(folder).as_posix()), path.read_bytes(), zipfile.ZIP_DEFLATED
+            )
     return content.getvalue()
 
 

@@ -110,8 +110,8 @@ class _HalfSpaces:
 
     def holds(self, points: FloatArray) -> BoolArray:
         """Tell which points [N, 3] lie in the hull or within `TOUCH` of its planes."""
-        held: BoolArray = ((points >= self.lower - TOUCH) & (points <= self.upper + TOUCH)).all(axis=1)
+        held = np.all((points >= self.lower - TOUCH) & (points <= self.upper + TOUCH), axis=1)
         near = np.flatnonzero(held)
         if len(near):
-            held[near] = (points[near] @ self.normals.T <= self.offsets + TOUCH).all(axis=1)
-        return held
+            held[near] = np.all(points[near] @ self.normals.T <= self.offsets + TOUCH, axis=1)
+        return np.asarray(held)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rlacd._version import __version__
-from rlacd.decomposition import Axis, Decomposition
+from rlacd.decomposition import Decomposition
 from rlacd.errors import MissingExtraError, OutputError
 from rlacd.formats import check_file, write_file
 from rlacd.show.heat import heat_map
@@ -16,8 +16,8 @@ from rlacd.show.page import still_page
 from rlacd.show.picture import check_up, picture_bytes
 from rlacd.show.scene import heat_scene, scene
 
-HEAT_TRIANGLES = 25_000
-"""Of the error heat map in a file: a fraction of a megabyte."""
+HEAT_TRIANGLES = 16_000
+"""Of the error heat map in a file: half a megabyte or so."""
 
 PICTURE_WIDTH = 1500
 
@@ -46,7 +46,7 @@ def check_report_page(path: str | os.PathLike[str], up: str | None = None) -> Pa
 
 
 def save_report_page(
-    decomposition: Decomposition, path: str | os.PathLike[str], *, up: Axis = "z", picture: bool = True
+    decomposition: Decomposition, path: str | os.PathLike[str], *, up: str = "z", picture: bool = True
 ) -> Path:
     """Write a report as one self-contained HTML file.
 
@@ -61,7 +61,8 @@ def save_report_page(
     up : {"x", "y", "z"}
         The axis of the input that points up.
     picture : bool
-        Draw the picture into it too, which takes some seconds; it is left out where the extra ``view`` is not installed.
+        Draw the picture into it too, which takes some seconds. Where the extra ``view`` is not installed, it is left
+        out and a note says so.
 
     Returns
     -------
@@ -78,19 +79,20 @@ def save_report_page(
     return place
 
 
-def report_page(decomposition: Decomposition, *, up: Axis = "z", picture: bool = True) -> str:
+def report_page(decomposition: Decomposition, *, up: str = "z", picture: bool = True) -> str:
     """Build the text of the report; see `save_report_page`."""
     data: dict[str, Any] = {
         **scene(decomposition, up),
         "heat": heat_scene(heat_map(decomposition, triangles=HEAT_TRIANGLES), up),
-        "picture": _picture(decomposition, up) if picture else None,
+        **(_picture(decomposition, up) if picture else {}),
     }
     return still_page(f"{decomposition.name}: convex hulls", {"version": __version__}, data)
 
 
-def _picture(decomposition: Decomposition, up: Axis) -> str | None:
+def _picture(decomposition: Decomposition, up: str) -> dict[str, str]:
+    """The picture as an address, or a note why there is none."""
     try:
         png = picture_bytes(decomposition, width=PICTURE_WIDTH, up=up)
-    except MissingExtraError:
-        return None
-    return "data:image/png;base64," + base64.b64encode(png).decode("ascii")
+    except MissingExtraError as error:
+        return {"note": f"The picture is left out: {error}"}
+    return {"picture": "data:image/png;base64," + base64.b64encode(png).decode("ascii")}

@@ -27,7 +27,7 @@ PULL = 0.55  # how far hulls move apart: a hull's distance from the middle grows
 PAPER, INK, FADED = (255, 255, 255), (28, 30, 34), (120, 124, 132)
 TO_Z_UP = {  # rows: where the drawing's x, y, z axes come from
     "x": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
-    "y": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+    "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),  # +z, the front of glTF, is seen
     "z": np.eye(3),
 }
 

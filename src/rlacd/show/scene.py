@@ -12,23 +12,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rlacd.decomposition import Axis, Decomposition
+from rlacd.decomposition import Decomposition
 from rlacd.formats.palette import hull_colors
 from rlacd.show.heat import HeatMesh, frame_of
-from rlacd.show.picture import apart
+from rlacd.show.picture import TO_Z_UP, apart
 
-TO_Y_UP = {  # rows: where the page's x, y, z axes come from
-    "x": np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]),
-    "y": np.eye(3),
-    "z": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
-}
-"""Rotations, so that nothing is mirrored."""
+TO_Y_UP = {up: np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]) @ turn for up, turn in TO_Z_UP.items()}
+"""Rotations; the rows tell where the page's x, y, z axes come from."""
 
 SHOWN_BALLS = 4000
 """More balls than this are not drawn."""
 
 
-def scene(decomposition: Decomposition, up: Axis = "z") -> dict[str, Any]:
+def scene(decomposition: Decomposition, up: str = "z") -> dict[str, Any]:
     """Describe a decomposition for the page.
 
     Parameters
@@ -40,9 +36,10 @@ def scene(decomposition: Decomposition, up: Axis = "z") -> dict[str, Any]:
     Returns
     -------
     dict
-        ``name``; ``report`` as it is; ``input``, ``{vertices, faces}`` or None for a cloud of points; ``parts``, a list of
-        ``{vertices, faces, color, error, volume}`` with ``error`` what the criterion measures (or None) and ``volume``
-        in the normalised frame; ``balls``, ``{centres, radii, of}`` or None, ``of`` counting those not shown too.
+        ``name``; ``report`` as it is; ``input``, ``{vertices, faces}`` or None for a cloud of points; ``parts``, a list
+        of ``{vertices, faces, color, error, volume}`` with ``error`` what the criterion measures (or None) and
+        ``volume`` in the normalised frame; ``balls``, ``{centres, radii, shown, of}`` or None, with how many balls are
+        shown of how many.
     """
     frame, turn = frame_of(decomposition), TO_Y_UP[up].T
     source, report = decomposition.source, decomposition.report
@@ -74,7 +71,7 @@ def scene(decomposition: Decomposition, up: Axis = "z") -> dict[str, Any]:
     }
 
 
-def heat_scene(heat: list[HeatMesh], up: Axis = "z") -> dict[str, Any]:
+def heat_scene(heat: list[HeatMesh], up: str = "z") -> dict[str, Any]:
     """Describe an error heat map for the page.
 
     Returns

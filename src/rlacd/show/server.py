@@ -8,8 +8,8 @@
 ``POST /decompose``, ``POST /cancel``  JSON in, JSON out
 ====================================  ===========================================================================
 
-It listens on the loopback address alone. Pages of other sites are kept out: a request must name this server as its host,
-so that no foreign name can be pointed at it, and what changes anything must come from the viewer's own page.
+It listens on the loopback address alone. Pages of other sites are kept out: a request must name this server as its
+host, so that no foreign name can be pointed at it, and what changes anything must come from the viewer's own page.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import json
-import socket
 import threading
 import time
 import urllib.parse
@@ -28,7 +27,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
 from rlacd._version import __version__
-from rlacd.decomposition import Axis, Decomposition
+from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError, RlacdError
 from rlacd.plain_json import to_json
 from rlacd.show.downloads import download, offered
@@ -75,7 +74,7 @@ class ViewServer(ThreadingHTTPServer):
         *,
         port: int | None,
         options: dict[str, Any],
-        up: Axis,
+        up: str,
         accept: Callable[[dict[str, Any]], dict[str, Any]],
     ) -> None:
         self.session, self.up, self.accept = session, up, accept
@@ -161,7 +160,7 @@ class _Handler(BaseHTTPRequestHandler):
         """Turn errors into answers that the page shows."""
         try:
             yield
-        except (ConnectionError, socket.timeout):
+        except (TimeoutError, ConnectionError):
             self.close_connection = True
         except _Refused as error:
             self.close_connection = True  # what else was sent is not read
@@ -210,7 +209,8 @@ class _Handler(BaseHTTPRequestHandler):
         self.end_headers()
         self.close_connection = True
         for state in _calmly(self.server.session.changes()):
-            self.wfile.write(b": still here\n\n" if state is None else f"data: {json.dumps(asdict(state))}\n\n".encode())
+            told = ": still here" if state is None else f"data: {json.dumps(asdict(state))}"
+            self.wfile.write(f"{told}\n\n".encode())
             self.wfile.flush()
 
     def _send_file(self, wanted: str) -> None:

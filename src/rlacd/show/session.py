@@ -85,8 +85,8 @@ class Session:
     def decompose(self, options: dict[str, Any]) -> None:
         """Decompose with these options next, instead of what is under way."""
         with self._changed:
-            self._wanted = dict(options)
-            self._tell(replace(self._state, state="working", stage="load", done=0, total=None, parts=0, seconds=0.0, error=None))
+            self._wanted, self._stopped = dict(options), False
+            self._tell(State("working", run=self._state.run))
 
     def stop(self) -> None:
         """End the work under way and keep what it reached."""
@@ -100,11 +100,11 @@ class Session:
         self._thread.join(timeout=10.0)
 
     def changes(self, patience: float = 15.0) -> Iterator[State | None]:
-        """Yield the state now and after every change until the session is closed; None after `patience` quiet seconds."""
+        """Yield the state now and after every change until the session is closed; None after so many quiet seconds."""
         seen = -1
         while True:
             with self._changed:
-                news = self._changed.wait_for(lambda known=seen: self._count != known, timeout=patience)
+                news = self._count != seen or self._changed.wait(timeout=patience)
                 seen, state = self._count, self._state
             yield state if news else None
             if state.state == "closed":
@@ -116,7 +116,7 @@ class Session:
                 self._changed.wait_for(lambda: self._wanted is not None or self._state.state == "closed")
                 if self._state.state == "closed" or self._wanted is None:
                     return
-                options, self._wanted, self._stopped = self._wanted, None, False
+                options, self._wanted = self._wanted, None
             result, error = self._attempt(options)
             with self._changed:
                 if self._state.state == "closed":

@@ -9,11 +9,10 @@ import os
 import threading
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from rlacd.criteria import NavigableSpace
 from rlacd.decompose import decompose
-from rlacd.decomposition import Axis
 from rlacd.errors import OptionError
 from rlacd.options import CONCAVITY, DEFAULT_THRESHOLD, QUALITIES, Options
 from rlacd.show.picture import check_up
@@ -98,7 +97,7 @@ def open_viewer(
         An option is out of range, or the port is in use.
     """
     check_up(up)
-    axis = cast(Axis, up or ("y" if Path(mesh).suffix.lower() in (".glb", ".gltf") else "z"))
+    axis = up or ("y" if Path(mesh).suffix.lower() in (".glb", ".gltf") else "z")
     wishes = read_wishes(options or {})
     first = wishes.options()
     Options(threads=threads)

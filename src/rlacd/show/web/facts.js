@@ -46,11 +46,11 @@ export function fitTable(report) {
   const add = (name, value) => {
     if (value != null) rows.push([name, digits(value), digits(value / report.scale)]);
   };
-  add("Largest concavity of a part", report.concavity?.max);
-  add("Deepest intrusion into a ball", report.navigable?.intrusion?.max);
-  add("Hulls reach beyond the input by", report.hausdorff?.over);
-  add("Input reaches beyond the hulls by", report.hausdorff?.under);
-  return table("Fit", ["", "longest side is 2", "in the file's unit"], rows);
+  add("Largest concavity", report.concavity?.max);
+  add("Deepest intrusion", report.navigable?.intrusion?.max);
+  add("Hulls beyond the input", report.hausdorff?.over);
+  add("Input beyond the hulls", report.hausdorff?.under);
+  return table("Fit", ["", "longest side 2", "file's unit"], rows);
 }
 
 export function repairTable(report) {
@@ -69,7 +69,7 @@ export function repairTable(report) {
     `${before.toLocaleString("en")} → ${after.toLocaleString("en")}`,
     moved < 1e-9 ? "0" : digits(moved / report.scale),
   ]);
-  return table("Repair", ["", "bodies", "faces", "moved by up to"], rows);
+  return table("Repair", ["", "bodies", "faces", "moved"], rows);
 }
 
 export function timeTable(report) {

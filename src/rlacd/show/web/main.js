@@ -71,10 +71,10 @@ function show(scene) {
   if (look.heat.getAttribute("aria-pressed") === "true") showHeat(true);
 }
 
-const picture = (scene) =>
-  scene.picture
-    ? [make("figure", {}, make("img", { src: scene.picture, alt: "The input, its hulls, and the hulls pulled apart" }))]
-    : [];
+function picture({ picture: address, note }) {
+  if (note) return [make("p", { class: "note" }, note)];
+  return address ? [make("figure", {}, make("img", { src: address, alt: "The input, its hulls, and the hulls pulled apart" }))] : [];
+}
 
 async function showHeat(on) {
   stage?.set({ heat: on });
