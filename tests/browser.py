@@ -46,8 +46,8 @@ class Watched:
 
 
 @contextmanager
-def open_page(**options: Any) -> Iterator[Watched]:
-    """Open an empty page in a browser of its own; `options` are those of a browser context."""
+def open_browser() -> Iterator[Any]:
+    """Start Chromium; skips where there is none."""
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     path = chromium()
     # Containers run as root, where Chromium's sandbox does not start.
@@ -55,9 +55,19 @@ def open_page(**options: Any) -> Iterator[Watched]:
     with playwright.sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=path, args=[*WITHOUT_GPU, *alone])
         try:
-            yield Watched(browser.new_context(viewport={"width": 1366, "height": 768}, **options))
+            yield browser
         finally:
             browser.close()
+
+
+@contextmanager
+def open_page(browser: Any, **options: Any) -> Iterator[Watched]:
+    """Open an empty page that shares nothing with others; `options` are those of a browser context."""
+    context = browser.new_context(viewport={"width": 1366, "height": 768}, **options)
+    try:
+        yield Watched(context)
+    finally:
+        context.close()
 
 
 def pixels(page: Any) -> Any:
