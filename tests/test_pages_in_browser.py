@@ -201,6 +201,20 @@ def test_balls_come_with_navigable_space(seen: Watched) -> None:
     assert change(plain, pixels(page)) > 0.005
 
 
+def test_another_axis_can_point_up(seen: Watched) -> None:
+    page = seen.page
+    assert page.locator("#up input:checked").get_attribute("value") == "z"
+    looks = [pixels(page)]
+    for axis in "xyz":
+        page.check(f"#up input[value={axis}]")
+        settle(page)
+        looks.append(pixels(page))
+    assert min(change(a, b) for a, b in itertools.pairwise(looks)) > 0.05
+    page.locator("#up input[value=z]").blur()
+    assert change(looks[0], pixels(page)) < 0.001
+    assert "up=z" in page.locator("a[data-format='report.html']").get_attribute("href")
+
+
 def test_glass_and_ghosts_are_seen(seen: Watched) -> None:
     page = seen.page
     looks = [pixels(page)]

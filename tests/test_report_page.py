@@ -83,15 +83,14 @@ def test_the_page_holds_every_hull_every_number_and_the_input(result: Decomposit
     assert len(data["heat"]["parts"]) == len(result)
 
 
-@pytest.mark.parametrize("up", ["x", "y", "z"])
-def test_the_axis_that_points_up_does_and_nothing_is_mirrored(result: Decomposition, up: str) -> None:
-    axis = "xyz".index(up)
-    for part, hull in zip(scene(result, up)["parts"], result, strict=True):
-        height = hull.vertices[:, axis] * result.report["scale"]
-        drawn = points(part["vertices"])
-        assert np.ptp(drawn[:, 1]) == pytest.approx(np.ptp(height), abs=1e-6)
-        assert np.corrcoef(drawn[:, 1], height)[0, 1] > 0.999
-        assert trimesh.Trimesh(drawn, triangles(part["faces"]), process=False).volume > 0
+def test_the_scene_lies_about_the_origin_and_knows_its_up(result: Decomposition) -> None:
+    far = elbow()
+    far.apply_translation([1e6, -2e6, 3e6])
+    for drawn in (scene(result, "x"), scene(rlacd.decompose(far, threshold=0.05), "x")):
+        assert drawn["up"] == "x"
+        corners = np.concatenate([points(part["vertices"]) for part in drawn["parts"]])
+        assert corners.max(axis=0) == pytest.approx([1.0, 0.2, 0.5], abs=1e-6)
+        assert corners.min(axis=0) == pytest.approx([-1.0, -0.2, -0.5], abs=1e-6)
 
 
 def test_nothing_is_fetched(result: Decomposition) -> None:

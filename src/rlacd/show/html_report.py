@@ -83,7 +83,7 @@ def report_page(decomposition: Decomposition, *, up: str = "z", picture: bool = 
     """Build the text of the report; see `save_report_page`."""
     data: dict[str, Any] = {
         **scene(decomposition, up),
-        "heat": heat_scene(heat_map(decomposition, triangles=HEAT_TRIANGLES), up),
+        "heat": heat_scene(heat_map(decomposition, triangles=HEAT_TRIANGLES)),
         **(_picture(decomposition, up) if picture else {}),
     }
     return still_page(f"{decomposition.name}: convex hulls", {"version": __version__}, data)

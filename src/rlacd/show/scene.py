@@ -1,7 +1,6 @@
 """What the page draws: a decomposition as plain values, its arrays as base64 text.
 
-Positions are float32 in the normalised frame turned so that y points up, as glTF and three.js have it: small numbers
-about the origin, whatever the input's unit and place.
+Positions are float32 in the normalised frame: small numbers about the origin, whatever the input's unit and place.
 """
 
 from __future__ import annotations
@@ -15,10 +14,7 @@ from numpy.typing import ArrayLike
 from rlacd.decomposition import Decomposition
 from rlacd.formats.palette import hull_colors
 from rlacd.show.heat import HeatMesh, frame_of
-from rlacd.show.picture import TO_Z_UP, apart
-
-TO_Y_UP = {up: np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]) @ turn for up, turn in TO_Z_UP.items()}
-"""Rotations; the rows tell where the page's x, y, z axes come from."""
+from rlacd.show.picture import apart
 
 SHOWN_BALLS = 4000
 """More balls than this are not drawn."""
@@ -36,12 +32,12 @@ def scene(decomposition: Decomposition, up: str = "z") -> dict[str, Any]:
     Returns
     -------
     dict
-        ``name``; ``report`` as it is; ``input``, ``{vertices, faces}`` or None for a cloud of points; ``parts``, a list
-        of ``{vertices, faces, color, error, volume}`` with ``error`` what the criterion measures (or None) and
-        ``volume`` in the normalised frame; ``balls``, ``{centres, radii, shown, of}`` or None, with how many balls are
-        shown of how many.
+        ``name``; ``up``; ``report`` as it is; ``input``, ``{vertices, faces}`` or None for a cloud of points;
+        ``parts``, a list of ``{vertices, faces, color, error, volume}`` with ``error`` what the criterion measures (or
+        None) and ``volume`` in the normalised frame; ``balls``, ``{centres, radii, shown, of}`` or None, with how many
+        balls are shown of how many.
     """
-    frame, turn = frame_of(decomposition), TO_Y_UP[up].T
+    frame = frame_of(decomposition)
     source, report = decomposition.source, decomposition.report
     errors = _errors(report, len(decomposition))
     colors = hull_colors(len(decomposition))
@@ -49,18 +45,19 @@ def scene(decomposition: Decomposition, up: str = "z") -> dict[str, Any]:
     if decomposition.balls is not None and len(decomposition.balls):
         some = apart(decomposition.balls)
         balls = {
-            "centres": floats(frame.to_frame(some.centres[:SHOWN_BALLS]) @ turn),
+            "centres": floats(frame.to_frame(some.centres[:SHOWN_BALLS])),
             "radii": floats(some.radii[:SHOWN_BALLS] * frame.scale),
             "shown": min(len(some), SHOWN_BALLS),
             "of": len(decomposition.balls),
         }
     return {
         "name": decomposition.name,
+        "up": up,
         "report": report,
-        "input": _mesh(frame.to_frame(source.vertices) @ turn, source.faces) if len(source.faces) else None,
+        "input": _mesh(frame.to_frame(source.vertices), source.faces) if len(source.faces) else None,
         "parts": [
             {
-                **_mesh(frame.to_frame(hull.vertices) @ turn, hull.faces),
+                **_mesh(frame.to_frame(hull.vertices), hull.faces),
                 "color": "#" + bytes(color.tolist()).hex(),
                 "error": error,
                 "volume": float(hull.volume) * frame.scale**3,
@@ -71,7 +68,7 @@ def scene(decomposition: Decomposition, up: str = "z") -> dict[str, Any]:
     }
 
 
-def heat_scene(heat: list[HeatMesh], up: str = "z") -> dict[str, Any]:
+def heat_scene(heat: list[HeatMesh]) -> dict[str, Any]:
     """Describe an error heat map for the page.
 
     Returns
@@ -80,9 +77,7 @@ def heat_scene(heat: list[HeatMesh], up: str = "z") -> dict[str, Any]:
         ``parts``, a list of ``{vertices, faces, distance}``, and ``max``, the farthest spot in the normalised frame.
     """
     return {
-        "parts": [
-            {**_mesh(part.vertices @ TO_Y_UP[up].T, part.faces), "distance": floats(part.distance)} for part in heat
-        ],
+        "parts": [{**_mesh(part.vertices, part.faces), "distance": floats(part.distance)} for part in heat],
         "max": max((float(part.distance.max()) for part in heat), default=0.0),
     }
 

@@ -33,6 +33,7 @@ from rlacd.plain_json import to_json
 from rlacd.show.downloads import download, offered
 from rlacd.show.heat import heat_map
 from rlacd.show.page import live_page
+from rlacd.show.picture import check_up
 from rlacd.show.scene import heat_scene, scene
 from rlacd.show.session import Session, State
 
@@ -92,7 +93,7 @@ class ViewServer(ThreadingHTTPServer):
         """Give the error heat map as JSON; worked out once for a decomposition."""
         with self._heat_lock:
             if self._heat_of is None or self._heat_of[0] != run:
-                found = heat_scene(heat_map(decomposition), self.up)
+                found = heat_scene(heat_map(decomposition))
                 self._heat_of = run, to_json(found, indent=None).encode()
             return self._heat_of[1]
 
@@ -134,7 +135,7 @@ class _Handler(BaseHTTPRequestHandler):
             elif place.path == "/heat":
                 self._send(self.server.heat(*self._result()), "application/json")
             elif place.path == "/download":
-                self._send_file(query.get("format", [""])[0])
+                self._send_file(query.get("format", [""])[0], query.get("up", [self.server.up])[0])
             else:
                 self._send_json({"error": "there is nothing here."}, HTTPStatus.NOT_FOUND)
 
@@ -213,8 +214,9 @@ class _Handler(BaseHTTPRequestHandler):
             self.wfile.write(f"{told}\n\n".encode())
             self.wfile.flush()
 
-    def _send_file(self, wanted: str) -> None:
-        file = download(self._result()[1], wanted, up=self.server.up)
+    def _send_file(self, wanted: str, up: str) -> None:
+        check_up(up)
+        file = download(self._result()[1], wanted, up=up)
         plain = file.name.encode("ascii", "replace").decode().replace('"', "_").replace("\\", "_")
         exact = urllib.parse.quote(file.name.encode(errors="replace"))
         named = f"attachment; filename=\"{plain}\"; filename*=UTF-8''{exact}"

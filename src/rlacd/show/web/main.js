@@ -49,6 +49,7 @@ function pick(index) {
 }
 
 function show(scene) {
+  if (!shown) look.up.choose(scene.up, { silently: true });
   shown = scene;
   picked = null;
   heatOf = null;
@@ -108,6 +109,15 @@ function heatLegend(most, scale) {
   ];
 }
 
+function turn(axis) {
+  stage?.turn(axis);
+  for (const link of document.querySelectorAll("a[data-format]")) {
+    const place = new URL(link.href);
+    place.searchParams.set("up", axis); // the report is turned as well
+    link.href = place;
+  }
+}
+
 function say(text) {
   const trouble = at("trouble");
   trouble.textContent = text ?? "";
@@ -133,6 +143,13 @@ const look = {
     "solid",
     (mode) => stage?.set({ hulls: mode }),
   ),
+  up: choice(
+    "Up",
+    "up",
+    ["x", "y", "z"].map((axis) => [axis, axis, `The input's ${axis} axis points up`]),
+    null,
+    (axis) => turn(axis),
+  ),
   edges: toggle("edges", "Edges", true, "Edges of the hulls (E)", (on) => stage?.set({ edges: on })),
   heat: toggle("heat", "Error", false, "How far the hulls' surface lies from the input's (H)", showHeat),
   balls: toggle("balls", "Balls", false, "Balls that no hull touches (B)", (on) => stage?.set({ balls: on })),
@@ -140,6 +157,7 @@ const look = {
 at("toolbar").append(
   look.input,
   look.hulls,
+  look.up,
   make("label", { class: "explode" }, make("span", {}, "Pull apart"), explode),
   make("span", { class: "toggles" }, look.edges, look.heat, look.balls),
   make("button", { type: "button", id: "fit", title: "Show all (F)", onclick: () => stage?.fit() }, "Fit"),

@@ -7,6 +7,7 @@ const CREASE = 8; // degrees between facets from which their edge is drawn
 const HEAT = ["#eef1f4", "#fde3a7", "#f9b45e", "#e8703a", "#b92b42", "#641a4e"].map((hex) => new Color(hex));
 export const HEAT_COLORS = ["#eef1f4", "#fde3a7", "#f9b45e", "#e8703a", "#b92b42", "#641a4e"];
 const WALL = new Color("#c3c9d1");
+const [X, Y, Z, BACK] = [new Vector3(1, 0, 0), new Vector3(0, 1, 0), new Vector3(0, 0, 1), new Vector3(0, 0, -1)];
 
 export class Stage {
   /** `onHover(part or null, x, y)` and `onPick(part or null)` tell what the pointer does. */
@@ -17,6 +18,8 @@ export class Stage {
     this.camera = new Camera(canvas, () => this.draw());
     this.scene = new THREE.Scene();
     this.lights = this.#light();
+    this.root = new Group(); // turned so that the input's up is up
+    this.scene.add(this.root);
     this.input = null;
     this.parts = [];
     this.heat = null;
@@ -38,7 +41,14 @@ export class Stage {
     this.balls = scene.balls && this.#addBalls(scene.balls);
     this.hovered = this.picked = null;
     this.refresh();
-    if (first) this.fit(false);
+    if (first) this.turn(scene.up);
+  }
+
+  /** Let an axis of the input, "x", "y" or "z", point up; nothing is mirrored. */
+  turn(up) {
+    const [x, y, z] = { x: [Y, X, BACK], y: [X, Y, Z], z: [X, BACK, Y] }[up]; // where its axes go
+    this.root.quaternion.setFromRotationMatrix(new THREE.Matrix4().makeBasis(x, y, z));
+    this.fit(false);
   }
 
   /** Take over an error heat map, which belongs to the decomposition shown. */
@@ -74,8 +84,9 @@ export class Stage {
   }
 
   fit(again = true) {
-    const boxes = this.parts.map((part) => part.box.clone().translate(part.group.position));
-    this.camera.frame(boxes.flatMap(cornersOf), { again });
+    this.root.updateMatrixWorld(true);
+    const corners = this.parts.flatMap((part) => cornersOf(part.box).map((corner) => part.group.localToWorld(corner)));
+    if (corners.length) this.camera.frame(corners, { again });
     this.draw();
   }
 
@@ -125,7 +136,7 @@ export class Stage {
 
   #addLayers(mesh, color) {
     const layers = new Layers(geometryOf(mesh), new Color(color));
-    this.scene.add(layers);
+    this.root.add(layers);
     return layers;
   }
 
@@ -141,7 +152,7 @@ export class Stage {
     );
     edges.renderOrder = 4;
     group.add(layers, edges);
-    this.scene.add(group);
+    this.root.add(group);
     geometry.computeBoundingBox();
     return { group, layers, edges, line, centre: geometry.boundingBox.getCenter(new Vector3()), box: geometry.boundingBox };
   }
@@ -158,7 +169,7 @@ export class Stage {
       balls.setMatrixAt(i, matrix);
     });
     balls.renderOrder = 5;
-    this.scene.add(balls);
+    this.root.add(balls);
     return balls;
   }
 
@@ -169,7 +180,7 @@ export class Stage {
         node.geometry?.dispose();
         node.material?.dispose();
       });
-      this.scene.remove(thing);
+      this.root.remove(thing);
     }
     this.heat = this.balls = this.input = null;
     this.parts = [];

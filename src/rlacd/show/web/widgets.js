@@ -24,11 +24,11 @@ export function choice(label, name, options, chosen, onChange) {
     ),
   );
   const bar = make("fieldset", { class: "choice", id: name }, make("legend", {}, label), ...buttons);
-  bar.choose = (value) => {
+  bar.choose = (value, { silently = false } = {}) => {
     const input = bar.querySelector(`input[value="${value}"]`);
     if (input && !input.disabled && !input.checked) {
       input.checked = true;
-      onChange(value);
+      if (!silently) onChange(value);
     }
   };
   return bar;
