@@ -7,7 +7,8 @@ from pathlib import Path
 from sample import sample
 
 import rlacd
-from rlacd.terminal import summary, to_json
+from rlacd.plain_json import to_json
+from rlacd.terminal import summary
 
 
 def main() -> None:

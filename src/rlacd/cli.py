@@ -20,6 +20,7 @@ from rlacd import __version__
 from rlacd.bench_command import bench_app
 from rlacd.errors import OptionError, OutputError, RlacdError
 from rlacd.train_command import pretrain_command, train_command
+from rlacd.view_command import view_command
 
 STDOUT = Path("-")
 ROBOTS = (".urdf", ".xml")
@@ -161,7 +162,8 @@ def decompose(
         typer.Option(
             metavar="FILE",
             rich_help_panel=OUTPUT,
-            help="Write everything measured as JSON; - writes it to stdout, and nothing else there.",
+            help="Write everything measured: as JSON, or as a page to look at if the name ends in .html; "
+            "- writes JSON to stdout, and nothing else there.",
         ),
     ] = None,
     picture: Annotated[
@@ -399,7 +401,7 @@ def decompose(
     with _exit_codes():
         from rlacd.criteria import NavigableSpace
         from rlacd.formats import check_balls, check_file, check_model_options, hull_target, write_file
-        from rlacd.show import check_picture, draw_picture
+        from rlacd.show import check_picture, check_up, draw_picture, is_html, save_report_page
 
         place, folder_format = _output_name(mesh, output, folder_format, preset)
         _check_output(mesh, {"-o": Path(place), "--report": report, "--picture": picture, "--balls": balls})
@@ -414,6 +416,7 @@ def decompose(
                 raise OptionError("--package-dir belongs to robots: a .urdf or .xml file as input.")
         if report is not None and report != STDOUT:
             check_file(report)
+            check_up(up)
         if picture is not None:
             check_picture(picture, up=up)
         if balls is not None:
@@ -457,7 +460,8 @@ def decompose(
             return
 
         from rlacd.decompose import decompose as run
-        from rlacd.terminal import Watch, say, summary, to_json
+        from rlacd.plain_json import to_json
+        from rlacd.terminal import Watch, say, summary
 
         with Watch(quiet=quiet) as watch:
             result = run(mesh, **_chosen(given), progress=watch)
@@ -466,6 +470,8 @@ def decompose(
             say(summary(result, place))
         if report == STDOUT:
             typer.echo(to_json(result.report), nl=False)
+        elif report is not None and is_html(report):
+            save_report_page(result, report, up=up or _usual_up(mesh))
         elif report is not None:
             write_file(report, to_json(result.report).encode())
         if balls is not None:
@@ -490,7 +496,7 @@ def info(
     """
     with _exit_codes():
         from rlacd.describe import describe, describe_text
-        from rlacd.terminal import printable, to_json
+        from rlacd.plain_json import printable, to_json
 
         facts = describe(mesh)
         typer.echo(to_json(facts) if as_json else printable(describe_text(facts)), nl=False)
@@ -528,7 +534,8 @@ def _rewrite(
 ) -> None:
     from rlacd.formats import write_file
     from rlacd.robots import rewrite_robot
-    from rlacd.terminal import Watch, rewrite_summary, say, to_json
+    from rlacd.plain_json import to_json
+    from rlacd.terminal import Watch, rewrite_summary, say
 
     with Watch(quiet=quiet) as watch:
         done = rewrite_robot(robot, place, package_dirs=packages, **options, progress=watch)
@@ -622,3 +629,4 @@ def _first_line(error: Exception) -> str:
 app.command("train", epilog=EPILOG)(train_command(_exit_codes))
 app.command("pretrain", epilog=EPILOG)(pretrain_command(_exit_codes))
 app.add_typer(bench_app(_exit_codes), name="bench")
+app.command("view", epilog=EPILOG)(view_command(_exit_codes))

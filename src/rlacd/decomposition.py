@@ -182,6 +182,32 @@ class Decomposition:
 
         return draw_picture(self, path, width=width, up=up)
 
+    def save_report(self, path: str | os.PathLike[str], *, up: Axis = "z") -> Path:
+        """Write a page with a 3-D view of the hulls, what was measured and what was repaired; needs no network.
+
+        Parameters
+        ----------
+        path : path-like
+            Where to write; must end in ``.html``.
+        up : {"x", "y", "z"}
+            The axis of the input that points up; files from glTF have y.
+
+        Returns
+        -------
+        pathlib.Path
+            Where it was written.
+
+        Raises
+        ------
+        OutputError
+            The place cannot be written to.
+        OptionError
+            `up` is none of those above.
+        """
+        from rlacd.show import save_report_page
+
+        return save_report_page(self, path, up=up)
+
     def __len__(self) -> int:
         return len(self.hulls)
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
 import signal
 import threading
 from types import FrameType, TracebackType
@@ -100,16 +98,6 @@ def _count(hulls: int) -> str:
     return f"{hulls} hull{'s' * (hulls != 1)}"
 
 
-def to_json(value: Any) -> str:
-    """JSON that every parser reads: numbers that JSON does not know (NaN, infinity) become null."""
-    return printable(json.dumps(_plain(value), indent=2, ensure_ascii=False, allow_nan=False)) + "\n"
-
-
-def printable(text: str) -> str:
-    """Replace what UTF-8 cannot hold: Python keeps the odd bytes of a file name as surrogates."""
-    return text.encode(errors="replace").decode()
-
-
 def _time(report: dict[str, Any]) -> str:
     total = report.get("seconds", {}).get("total")
     reason = {None: "", "timeout": ", stopped by the timeout", "cancel": ", stopped by Ctrl-C"}[
@@ -139,13 +127,3 @@ def _fit(report: dict[str, Any]) -> str:
     if reach.get("under") is not None:
         words.append(f"input lies {reach['under']:.4f} from the hulls")
     return "; ".join(words)
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

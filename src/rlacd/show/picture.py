@@ -27,7 +27,7 @@ PULL = 0.55  # how far hulls move apart: a hull's distance from the middle grows
 PAPER, INK, FADED = (255, 255, 255), (28, 30, 34), (120, 124, 132)
 TO_Z_UP = {  # rows: where the drawing's x, y, z axes come from
     "x": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
-    "y": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+    "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),  # +z, the front of glTF, is seen
     "z": np.eye(3),
 }
 
@@ -45,14 +45,19 @@ def check_picture(path: str | os.PathLike[str], up: str | None = None) -> Path:
         `up` is no axis.
     """
     place = Path(path)
-    if up is not None and up not in TO_Z_UP:
-        raise OptionError(f"{up!r} is no axis that can point up; choose x, y or z.")
+    check_up(up)
     if place.suffix.lower() != ".png":
         raise OutputError(f"cannot write the picture {place}: it must end in .png; rename it.")
     check_file(place)
     for module in ("mitsuba", "PIL"):
         require_extra(module)
     return place
+
+
+def check_up(up: str | None) -> None:
+    """Raise `OptionError` if `up` is no axis; None leaves the choice to others."""
+    if up is not None and up not in TO_Z_UP:
+        raise OptionError(f"{up!r} is no axis that can point up; choose x, y or z.")
 
 
 def draw_picture(
@@ -93,6 +98,12 @@ def draw_picture(
         `width`, `samples` or `up` is out of range.
     """
     place = check_picture(path, up)
+    write_file(place, picture_bytes(decomposition, width=width, samples=samples, up=up))
+    return place
+
+
+def picture_bytes(decomposition: Decomposition, *, width: int = 1600, samples: int = 16, up: str = "z") -> bytes:
+    """Draw the picture as the bytes of a PNG file; see `draw_picture`."""
     if not 300 <= width <= 8000:
         raise OptionError(f"a picture cannot be {width} pixels wide; choose from 300 to 8000.")
     if samples < 1:
@@ -105,7 +116,7 @@ def draw_picture(
         ("pulled apart", _hull_bodies(decomposition, up, pull=PULL), None),
     ]
     if decomposition.balls is not None:
-        some = _apart(decomposition.balls)
+        some = apart(decomposition.balls)
         spheres = Spheres(some.centres @ TO_Z_UP[up].T, some.radii, BALL_COLOR)
         panels.insert(2, ("some of the balls they leave free", _hull_bodies(decomposition, up, pull=0.0), spheres))
     columns = 3 if len(panels) == 3 else 2
@@ -131,8 +142,7 @@ def draw_picture(
 
     encoded = io.BytesIO()
     sheet.save(encoded, format="PNG")
-    write_file(place, encoded.getvalue())
-    return place
+    return encoded.getvalue()
 
 
 def caption(decomposition: Decomposition) -> str:
@@ -154,8 +164,8 @@ def caption(decomposition: Decomposition) -> str:
     return "   ·   ".join(words)
 
 
-def _apart(balls: Balls) -> Balls:
-    """Some of the balls, the smallest first, that do not overlap: all of them would be one cloud."""
+def apart(balls: Balls) -> Balls:
+    """Choose balls that do not overlap, the smallest first: all of them would be one cloud."""
     order = np.argsort(balls.radii, kind="stable")
     tree = cKDTree(balls.centres)
     hidden = np.zeros(len(balls), dtype=bool)
@@ -164,8 +174,8 @@ def _apart(balls: Balls) -> Balls:
         if not hidden[i]:
             shown.append(int(i))
             near = np.array(tree.query_ball_point(balls.centres[i], balls.radii[i] + balls.radii.max()))
-            apart = np.linalg.norm(balls.centres[near] - balls.centres[i], axis=1)
-            hidden[near[apart < balls.radii[near] + balls.radii[i]]] = True
+            away = np.linalg.norm(balls.centres[near] - balls.centres[i], axis=1)
+            hidden[near[away < balls.radii[near] + balls.radii[i]]] = True
     return Balls(balls.centres[shown], balls.radii[shown])
 
 

@@ -1,0 +1,152 @@
+"""What the viewer works on: one mesh, decomposed again and again with other options.
+
+One thread does the work. Asking for other options ends the work that is under way and drops what it reached; stopping
+keeps it. Everybody else reads the state and waits for it to change.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+from rlacd.decomposition import Decomposition
+from rlacd.errors import RlacdError
+from rlacd.progress import Progress
+
+Run = Callable[..., Decomposition]
+"""Takes ``progress`` and the options, gives a decomposition: `rlacd.decompose` with the mesh bound."""
+
+
+@dataclass(frozen=True)
+class State:
+    """What a session is doing.
+
+    Attributes
+    ----------
+    state : "idle", "working" or "closed"
+    run : int or None
+        Number of the decomposition that can be had; None before the first.
+    stage, done, total, parts, seconds
+        Of the work under way; see `rlacd.progress.Progress`.
+    error : str or None
+        Why the work asked for last gave nothing.
+    """
+
+    state: str = "idle"
+    run: int | None = None
+    stage: str = "load"
+    done: int = 0
+    total: int | None = None
+    parts: int = 0
+    seconds: float = 0.0
+    error: str | None = None
+
+
+class Session:
+    """Decomposes on a thread of its own.
+
+    Parameters
+    ----------
+    run : callable
+        Called with ``progress`` and the options asked for.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self._changed = threading.Condition()
+        self._state = State()
+        self._count = 0  # changes of the state so far
+        self._wanted: dict[str, Any] | None = None
+        self._stopped = False
+        self._result: Decomposition | None = None
+        self._thread = threading.Thread(target=self._work, name="rlacd-view", daemon=True)
+        self._thread.start()
+
+    def __enter__(self) -> Session:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    @property
+    def state(self) -> State:
+        """What is being done now."""
+        with self._changed:
+            return self._state
+
+    @property
+    def result(self) -> tuple[int, Decomposition] | None:
+        """The last decomposition and its number; None before the first."""
+        with self._changed:
+            return None if self._result is None else (int(self._state.run or 0), self._result)
+
+    def decompose(self, options: dict[str, Any]) -> None:
+        """Decompose with these options next, instead of what is under way."""
+        with self._changed:
+            self._wanted, self._stopped = dict(options), False
+            self._tell(State("working", run=self._state.run))
+
+    def stop(self) -> None:
+        """End the work under way and keep what it reached."""
+        with self._changed:
+            self._stopped = True
+
+    def close(self) -> None:
+        """End the work, drop it, and let those who wait go."""
+        with self._changed:
+            self._tell(replace(self._state, state="closed"))
+        self._thread.join(timeout=10.0)
+
+    def changes(self, patience: float = 15.0) -> Iterator[State | None]:
+        """Yield the state now and after every change until the session is closed; None after so many quiet seconds."""
+        seen = -1
+        while True:
+            with self._changed:
+                news = self._count != seen or self._changed.wait(timeout=patience)
+                seen, state = self._count, self._state
+            yield state if news else None
+            if state.state == "closed":
+                return
+
+    def _work(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._wanted is not None or self._state.state == "closed")
+                if self._state.state == "closed" or self._wanted is None:
+                    return
+                options, self._wanted = self._wanted, None
+            result, error = self._attempt(options)
+            with self._changed:
+                if self._state.state == "closed":
+                    return
+                if self._wanted is not None:
+                    continue
+                if result is not None:
+                    self._result = result
+                run = self._state.run if result is None else (self._state.run or 0) + 1
+                self._tell(replace(self._state, state="idle", run=run, error=error))
+
+    def _attempt(self, options: dict[str, Any]) -> tuple[Decomposition | None, str | None]:
+        try:
+            return self._run(progress=self._follow, **options), None
+        except RlacdError as error:
+            return None, str(error)
+        except MemoryError:
+            return None, "there is not enough memory for this mesh; simplify it or use a larger machine."
+        except Exception as error:  # the viewer stays up, and says what happened
+            return None, f"a bug in rlacd ({type(error).__name__}: {error}); please report it."
+
+    def _follow(self, progress: Progress) -> bool:
+        with self._changed:
+            if self._wanted is not None or self._stopped or self._state.state == "closed":
+                return False
+            told = {name: getattr(progress, name) for name in ("stage", "done", "total", "parts", "seconds")}
+            self._tell(replace(self._state, **told))
+            return True
+
+    def _tell(self, state: State) -> None:
+        self._state = state
+        self._count += 1
+        self._changed.notify_all()

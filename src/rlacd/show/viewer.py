@@ -1,0 +1,164 @@
+"""The viewer: a session on a mesh, and the server that shows it."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import functools
+import os
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from rlacd.criteria import NavigableSpace
+from rlacd.decompose import decompose
+from rlacd.errors import OptionError
+from rlacd.options import CONCAVITY, DEFAULT_THRESHOLD, QUALITIES, Options
+from rlacd.show.picture import check_up
+from rlacd.show.server import ViewServer
+from rlacd.show.session import Session
+from rlacd.solid.load import load_mesh
+
+NAVIGABLE = "navigable"
+_SPACE = NavigableSpace()
+
+
+@dataclasses.dataclass(frozen=True)
+class Wishes:
+    """What the page's controls hold; see `rlacd.decompose` for the meaning of each."""
+
+    criterion: str = CONCAVITY
+    threshold: float = DEFAULT_THRESHOLD
+    radius: float = _SPACE.radius or 0.0
+    tolerance: float = _SPACE.tolerance or 0.0
+    quality: str = QUALITIES[0]
+    max_hulls: int | None = None
+    max_vertices: int | None = None
+
+    def options(self) -> dict[str, Any]:
+        """Get the options of `rlacd.decompose`.
+
+        Raises
+        ------
+        OptionError
+            A value is out of range.
+        """
+        if self.criterion not in (CONCAVITY, NAVIGABLE):
+            raise OptionError(f"criterion is {self.criterion!r}; it has to be {CONCAVITY} or {NAVIGABLE}.")
+        goal: dict[str, Any] = {"threshold": self.threshold}
+        if self.criterion == NAVIGABLE:
+            goal = {"criterion": NavigableSpace(radius=self.radius, tolerance=self.tolerance)}
+        options = {
+            **goal,
+            "quality": self.quality,
+            "max_hulls": self.max_hulls,
+            "max_vertices": self.max_vertices,
+        }
+        Options(**options)
+        return options
+
+
+@contextlib.contextmanager
+def open_viewer(
+    mesh: str | os.PathLike[str],
+    options: dict[str, Any] | None = None,
+    *,
+    up: str | None = None,
+    port: int | None = None,
+    threads: int | None = None,
+) -> Iterator[Viewer]:
+    """Serve a page that shows a mesh and its hulls, until the block ends.
+
+    The first decomposition begins at once. The page is for this machine alone and needs no network.
+
+    Parameters
+    ----------
+    mesh : path-like
+        Any file `rlacd.decompose` takes; it is read anew for every decomposition, so that changes to it are seen.
+    options : dict, optional
+        What the page's controls hold at first: fields of `Wishes`.
+    up : {"x", "y", "z"}, optional
+        The axis of the mesh that points up; y for glTF and z for all else by default.
+    port : int, optional
+        Where to listen; 8765, or any free one, by default.
+    threads : int, optional
+        Threads to use; all processors by default.
+
+    Yields
+    ------
+    Viewer
+
+    Raises
+    ------
+    MeshError
+        The file cannot be read or holds nothing usable.
+    OptionError
+        An option is out of range, or the port is in use.
+    """
+    check_up(up)
+    axis = up or ("y" if Path(mesh).suffix.lower() in (".glb", ".gltf") else "z")
+    wishes = read_wishes(options or {})
+    first = wishes.options()
+    Options(threads=threads)
+    name = Path(load_mesh(mesh).name).stem
+    with Session(functools.partial(decompose, mesh, threads=threads)) as session:
+        server = ViewServer(
+            session,
+            name,
+            port=port,
+            options=dataclasses.asdict(wishes),
+            up=axis,
+            accept=lambda given: read_wishes(given).options(),
+        )
+        thread = threading.Thread(target=server.serve_forever, args=(0.1,), name="rlacd-view-server", daemon=True)
+        thread.start()
+        session.decompose(first)
+        try:
+            yield Viewer(session, server, thread)
+        finally:
+            session.close()  # first, so that pages that follow it are let go
+            server.shutdown()
+            server.server_close()
+            thread.join()
+
+
+@dataclasses.dataclass(frozen=True)
+class Viewer:
+    """A viewer that is open.
+
+    Attributes
+    ----------
+    session : Session
+        What it works on.
+    """
+
+    session: Session
+    _server: ViewServer
+    _thread: threading.Thread
+
+    @property
+    def address(self) -> str:
+        """Where the page is."""
+        return self._server.address
+
+    def wait(self) -> None:
+        """Serve until Ctrl-C."""
+        with contextlib.suppress(KeyboardInterrupt):
+            while self._thread.is_alive():  # a wait without end would not hear Ctrl-C on Windows
+                self._thread.join(0.5)
+
+
+def read_wishes(given: dict[str, Any]) -> Wishes:
+    """Take what a page or a command line gave.
+
+    Raises
+    ------
+    OptionError
+        An option is unknown or not of its kind.
+    """
+    known = {field.name for field in dataclasses.fields(Wishes)}
+    for name in given:
+        if name not in known:
+            raise OptionError(f"{name!r} is no option of the viewer; choose from {', '.join(sorted(known))}.")
+    return Wishes(**given)

@@ -1,0 +1,296 @@
+"""The viewer and the report in a real browser: what is clicked is seen and true, and nothing is fetched."""
+
+from __future__ import annotations
+
+import itertools
+import re
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import trimesh
+
+import rlacd
+from rlacd.show.viewer import Viewer, open_viewer
+from tests.browser import Watched, change, open_browser, open_page, pixels
+
+pytestmark = pytest.mark.slow
+pytest.importorskip("PIL", reason="the extra view is not installed")
+
+
+@pytest.fixture(scope="module")
+def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A table: five boxes, five hulls."""
+    boxes = [((-1, -0.6, 0.9), (1, 0.6, 1))]
+    boxes += [((x, y, 0), (x + 0.12, y + 0.12, 0.9)) for x in (-1, 0.88) for y in (-0.6, 0.48)]
+    path = tmp_path_factory.mktemp("pages") / "table.stl"
+    trimesh.util.concatenate([trimesh.creation.box(bounds=bounds) for bounds in boxes]).export(path)
+    return path
+
+
+@pytest.fixture
+def viewer(mesh: Path) -> Iterator[Viewer]:
+    with open_viewer(mesh, {"threshold": 0.05}, port=0) as viewer:
+        yield viewer
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with open_browser() as browser:
+        yield browser
+
+
+@pytest.fixture
+def seen(viewer: Viewer, browser: Any) -> Iterator[Watched]:
+    with open_page(browser) as watched:
+        watched.page.goto(viewer.address)
+        wait_for_run(watched.page, 1)
+        yield watched
+        assert watched.complaints == []
+        assert watched.outside(viewer.address) == []
+
+
+def wait_for_run(page: Any, run: int) -> None:
+    page.wait_for_selector(f"body[data-run='{run}']")
+    settle(page)
+
+
+def settle(page: Any) -> None:
+    """Wait until what was asked for is drawn."""
+    page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+def rows(page: Any) -> int:
+    return int(page.locator("#parts tbody tr").count())
+
+
+def test_the_hulls_are_seen_and_listed(seen: Watched, viewer: Viewer) -> None:
+    page = seen.page
+    assert viewer.session.result is not None
+    faces = viewer.session.result[1].report["faces"]
+    assert page.title() == "table: 5 hulls"
+    assert page.locator("#name").inner_text() == "table"
+    assert page.locator("#summary").inner_text().startswith(f"5 hulls · {faces} triangles · concavity")
+    assert rows(page) == 5
+    colors = {tuple(color) for color in pixels(page).reshape(-1, 4)[::7].tolist()}
+    assert len(colors) > 50
+
+
+def test_the_explode_slider_pulls_the_hulls_apart(seen: Watched) -> None:
+    page = seen.page
+    together = pixels(page)
+    page.locator("#explode").focus()
+    for _ in range(60):
+        page.keyboard.press("ArrowRight")
+    settle(page)
+    assert float(page.locator("#explode").input_value()) == pytest.approx(0.6)
+    assert change(together, pixels(page)) > 0.02
+
+
+def test_another_threshold_decomposes_anew(seen: Watched, viewer: Viewer) -> None:
+    page = seen.page
+    before = pixels(page)
+    page.fill("#threshold-number", "1.9")
+    page.keyboard.press("Enter")
+    wait_for_run(page, 2)
+    assert page.title() == "table: 1 hull"
+    assert rows(page) == 1
+    assert change(before, pixels(page)) > 0.05
+    page.locator("#threshold").focus()
+    page.keyboard.press("Home")
+    wait_for_run(page, 3)
+    assert float(page.locator("#threshold-number").input_value()) == pytest.approx(0.01)
+    assert viewer.session.result is not None
+    assert rows(page) == len(viewer.session.result[1]) > 1
+    assert viewer.session.result[1].report["options"]["threshold"] == 0.01
+
+
+def test_a_bad_threshold_is_told_and_nothing_is_lost(seen: Watched) -> None:
+    page = seen.page
+    page.fill("#threshold-number", "-3")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#trouble:not([hidden])")
+    assert "threshold is -3" in page.locator("#trouble").inner_text()
+    assert rows(page) == 5
+    # The browser itself notes the refusal.
+    assert len(seen.complaints) == 1
+    assert "400" in seen.complaints.pop()
+
+
+@pytest.mark.parametrize("name", ["glb", "obj.zip", "report.html"])
+def test_files_are_downloaded(seen: Watched, name: str, tmp_path: Path) -> None:
+    with seen.page.expect_download() as found:
+        seen.page.click(f"a[data-format='{name}']")
+    assert found.value.suggested_filename.startswith("table_hulls")
+    path = tmp_path / found.value.suggested_filename
+    found.value.save_as(path)
+    if name == "glb":
+        assert len(trimesh.load_scene(path).geometry) == 5
+    elif name == "obj.zip":
+        assert sum(member.endswith(".obj") for member in zipfile.ZipFile(path).namelist()) == 5
+    else:
+        assert "<title>table: convex hulls</title>" in path.read_text(encoding="utf-8")
+
+
+def test_rows_and_hulls_point_at_each_other(seen: Watched) -> None:
+    page = seen.page
+    plain = pixels(page)
+    page.hover("[data-part='0']")
+    settle(page)
+    assert change(plain, pixels(page)) > 0.001
+    frame = page.locator("#canvas").bounding_box()
+    page.mouse.move(frame["x"] + frame["width"] / 2, frame["y"] + frame["height"] * 0.42)
+    page.wait_for_selector("#tooltip:not([hidden])")
+    part = re.match(r"hull (\d+)", page.locator("#tooltip").inner_text())
+    assert part is not None
+    assert page.locator("tr.hover").get_attribute("data-part") == str(int(part[1]))
+    page.mouse.down()
+    page.mouse.up()
+    assert page.locator("tr[aria-selected='true']").get_attribute("data-part") == str(int(part[1]))
+    settle(page)
+    assert change(plain, pixels(page)) > 0.02, "the others are ghosts"
+    page.keyboard.press("Escape")
+    assert page.locator("tr[aria-selected='true']").count() == 0
+
+
+def test_the_list_is_walked_and_sorted_by_keyboard(seen: Watched) -> None:
+    page = seen.page
+    page.locator("#parts tbody tr").first.focus()
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("End")
+    page.keyboard.press("Enter")
+    assert page.locator("tr[aria-selected='true']").get_attribute("data-part") == "4"
+    page.get_by_role("button", name="Volume").click()
+    shares = [float(text.split()[0]) for text in page.locator("#parts tbody td:nth-child(3)").all_inner_texts()]
+    assert shares == sorted(shares, reverse=True)
+    assert page.locator("th[aria-sort='descending']").inner_text().startswith("Volume")
+
+
+def test_the_heat_map_is_drawn_with_its_scale(seen: Watched) -> None:
+    page = seen.page
+    page.fill("#threshold-number", "1.9")
+    page.keyboard.press("Enter")
+    wait_for_run(page, 2)
+    page.locator("#canvas").focus()
+    plain = pixels(page)
+    page.keyboard.press("h")
+    page.wait_for_selector("#legend:not([hidden])")
+    settle(page)
+    assert change(plain, pixels(page)) > 0.05
+    most = float(page.locator("#legend .ends span").nth(1).inner_text())
+    assert 0.4 < most < 1.0
+    page.keyboard.press("h")
+    settle(page)
+    assert page.locator("#legend").is_hidden()
+    assert change(plain, pixels(page)) < 0.002
+
+
+def test_balls_come_with_navigable_space(seen: Watched) -> None:
+    page = seen.page
+    assert page.locator("#balls").is_hidden()
+    page.check("input[value=navigable]")
+    wait_for_run(page, 2)
+    assert page.locator("#threshold").is_hidden()
+    assert page.locator("#radius").is_visible()
+    assert "left free" in page.locator("#summary").inner_text()
+    plain = pixels(page)
+    page.locator("#balls").click()
+    settle(page)
+    assert change(plain, pixels(page)) > 0.005
+
+
+def test_another_axis_can_point_up(seen: Watched) -> None:
+    page = seen.page
+    assert page.locator("#up input:checked").get_attribute("value") == "z"
+    looks = [pixels(page)]
+    for axis in "xyz":
+        page.check(f"#up input[value={axis}]")
+        settle(page)
+        looks.append(pixels(page))
+    assert min(change(a, b) for a, b in itertools.pairwise(looks)) > 0.05
+    page.locator("#up input[value=z]").blur()
+    assert change(looks[0], pixels(page)) < 0.001
+    assert "up=z" in page.locator("a[data-format='report.html']").get_attribute("href")
+
+
+def test_glass_and_ghosts_are_seen(seen: Watched) -> None:
+    page = seen.page
+    looks = [pixels(page)]
+    page.keyboard.press("g")  # hulls off
+    page.keyboard.press("i")  # input solid
+    settle(page)
+    looks.append(pixels(page))
+    page.keyboard.press("g")  # hulls of glass
+    settle(page)
+    looks.append(pixels(page))
+    assert min(change(a, b) for a, b in itertools.pairwise(looks)) > 0.01
+
+
+def test_the_keyboard_turns_fits_and_helps(seen: Watched) -> None:
+    page = seen.page
+    before = pixels(page)
+    page.locator("#canvas").focus()
+    for _ in range(6):
+        page.keyboard.press("ArrowLeft")
+    settle(page)
+    assert change(before, pixels(page)) > 0.02
+    page.keyboard.press("?")
+    assert page.locator("#help").is_visible()
+    assert "pull apart" in page.locator("#help").inner_text()
+    page.keyboard.press("Escape")
+    assert page.locator("#help").is_hidden()
+
+
+def test_work_can_be_stopped(browser: Any, tmp_path: Path) -> None:
+    rough = trimesh.creation.icosphere(3)
+    rough.vertices *= [[1 + 0.2 * (i % 3)] for i in range(len(rough.vertices))]
+    rough.export(tmp_path / "rough.ply")
+    with open_viewer(tmp_path / "rough.ply", {"threshold": 0.3}, port=0) as viewer, open_page(browser) as watched:
+        page = watched.page
+        page.goto(viewer.address)
+        wait_for_run(page, 1)
+        page.fill("#threshold-number", "0.06")
+        page.check("input[value=best]")
+        page.wait_for_selector("#progress:not([hidden])")
+        page.wait_for_selector(".stage-name:has-text('part')")
+        page.click("#cancel")
+        page.wait_for_selector("#summary:has-text('stopped early')")
+        assert watched.complaints == []
+
+
+def test_a_server_that_stops_is_told(browser: Any, mesh: Path) -> None:
+    with open_page(browser) as watched:
+        with open_viewer(mesh, port=0) as viewer:
+            watched.page.goto(viewer.address)
+            wait_for_run(watched.page, 1)
+        watched.page.wait_for_selector("#trouble:not([hidden])")
+        assert "rlacd view" in watched.page.locator("#trouble").inner_text()
+
+
+@pytest.fixture(scope="module")
+def report(mesh: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    pytest.importorskip("mitsuba", reason="the extra view is not installed")
+    return rlacd.decompose(mesh, threshold=1.0).save_report(tmp_path_factory.mktemp("report") / "a report.html")
+
+
+def test_the_report_opens_from_disk_without_a_network(browser: Any, report: Path) -> None:
+    with open_page(browser, offline=True) as watched:
+        page = watched.page
+        page.goto(report.as_uri())
+        page.wait_for_selector("body[data-ready]")
+        settle(page)
+        assert page.locator("#name").inner_text() == "table"
+        assert rows(page) == 1
+        assert page.locator("#controls").count() == page.locator("#download").count() == 0
+        for title in ("Fit", "Repair", "Time", "Options"):
+            assert page.get_by_role("heading", name=title, exact=True).is_visible()
+        assert page.evaluate("document.querySelector('figure img').naturalWidth") > 1000
+        plain = pixels(page)
+        page.locator("#heat").click()
+        page.wait_for_selector("#legend:not([hidden])")
+        settle(page)
+        assert change(plain, pixels(page)) > 0.05
+        assert watched.complaints == []
+        assert watched.outside(report.as_uri()) == []

@@ -1,0 +1,174 @@
+"""The report: one file that holds everything, fetches nothing, and cannot be taken over by a mesh's name."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import html.parser
+import json
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+import rlacd
+from rlacd.decomposition import Decomposition
+from rlacd.errors import OptionError, OutputError
+from rlacd.show import check_report_page, save_report_page
+from rlacd.show.html_report import report_page
+from rlacd.show.page import MODULES
+from rlacd.show.scene import scene
+from tests.hulls import hull_of
+
+
+def elbow() -> trimesh.Trimesh:
+    beams = ([(0, 0, 0), (2, 0.4, 0.4)], [(0, 0, 0), (0.4, 0.4, 1)])
+    return trimesh.util.concatenate([trimesh.creation.box(bounds=bounds) for bounds in beams])
+
+
+@pytest.fixture(scope="module")
+def result() -> Decomposition:
+    return rlacd.decompose(elbow(), threshold=0.05)
+
+
+class Reader(html.parser.HTMLParser):
+    """Elements with their attributes and text, as a browser would see them."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.texts: list[tuple[str, dict[str, str | None], str]] = []
+        self.feed(page)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs)))
+
+    def handle_data(self, data: str) -> None:
+        if self.elements:
+            self.texts.append((*self.elements[-1], data))
+
+    def text_of(self, **wanted: str) -> str:
+        return next(text for _, attributes, text in self.texts if wanted.items() <= attributes.items())
+
+
+def payload(page: str) -> dict[str, Any]:
+    return json.loads(gzip.decompress(base64.b64decode(Reader(page).text_of(id="data"))))
+
+
+def points(text: str) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(text), dtype="<f4").reshape(-1, 3)
+
+
+def triangles(text: str) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(text), dtype="<u4").reshape(-1, 3)
+
+
+def test_the_page_holds_every_hull_every_number_and_the_input(result: Decomposition) -> None:
+    data = payload(report_page(result, up="z", picture=False))
+    assert data["report"] == json.loads(json.dumps(result.report))
+    assert len(data["parts"]) == len(result)
+    for part, hull, concavity in zip(data["parts"], result, result.report["concavity"]["per_part"], strict=True):
+        drawn = trimesh.Trimesh(points(part["vertices"]), triangles(part["faces"]), process=False)
+        assert drawn.volume == pytest.approx(part["volume"], rel=1e-4)
+        assert part["volume"] == pytest.approx(hull.volume * result.report["scale"] ** 3, rel=1e-9)
+        assert part["error"] == concavity
+        assert re.fullmatch("#[0-9a-f]{6}", part["color"])
+    assert len(triangles(data["input"]["faces"])) == len(elbow().faces)
+    assert np.ptp(points(data["input"]["vertices"]), axis=0).max() == pytest.approx(2.0, rel=1e-6)
+    assert len(data["heat"]["parts"]) == len(result)
+
+
+def test_the_scene_lies_about_the_origin_and_knows_its_up(result: Decomposition) -> None:
+    far = elbow()
+    far.apply_translation([1e6, -2e6, 3e6])
+    for drawn in (scene(result, "x"), scene(rlacd.decompose(far, threshold=0.05), "x")):
+        assert drawn["up"] == "x"
+        corners = np.concatenate([points(part["vertices"]) for part in drawn["parts"]])
+        assert corners.max(axis=0) == pytest.approx([1.0, 0.2, 0.5], abs=1e-6)
+        assert corners.min(axis=0) == pytest.approx([-1.0, -0.2, -0.5], abs=1e-6)
+
+
+def test_nothing_is_fetched(result: Decomposition) -> None:
+    reader = Reader(report_page(result, picture=False))
+    policy = next(a["content"] for tag, a in reader.elements if a.get("http-equiv") == "Content-Security-Policy")
+    assert policy is not None
+    assert "default-src 'none'" in policy
+    assert "connect-src 'none'" in policy
+    assert "http" not in policy
+    for tag, attributes in reader.elements:
+        for name in ("src", "href", "action"):
+            address = attributes.get(name)
+            assert address is None or address.startswith("data:"), (tag, address)
+
+
+def test_every_script_is_inside(result: Decomposition) -> None:
+    reader = Reader(report_page(result, picture=False))
+    imports = json.loads(reader.text_of(type="importmap"))["imports"]
+    scripts = [base64.b64decode(address.split(",")[1]).decode() for address in imports.values()]
+    wanted = {name for text in [*scripts, reader.text_of(type="module")] for name in re.findall(r'from "(.*?)"', text)}
+    assert wanted == set(imports) == {f"page/{name}" for name in MODULES}
+
+
+@pytest.mark.parametrize(
+    "name", ["</script><script>alert(1)</script>", "<img src=x onerror=alert(1)>", "{{main}}", "ünï☃"]
+)
+def test_a_name_stays_a_name(name: str) -> None:
+    cube = trimesh.creation.box()
+    page = report_page(Decomposition([hull_of(cube.vertices)], {"name": name, "scale": 2.0}, cube), picture=False)
+    usual = report_page(Decomposition([hull_of(cube.vertices)], {"name": "cube", "scale": 2.0}, cube), picture=False)
+    assert [tag for tag, _ in Reader(page).elements] == [tag for tag, _ in Reader(usual).elements]
+    assert payload(page)["name"] == name
+    title = next(text for tag, _, text in Reader(page).texts if tag == "title")
+    assert title == f"{name}: convex hulls"
+
+
+def test_the_same_result_gives_the_same_bytes(result: Decomposition, tmp_path: Path) -> None:
+    one, two = (save_report_page(result, tmp_path / name, picture=False) for name in ("a.html", "b.htm"))
+    assert one.read_bytes() == two.read_bytes()
+
+
+def test_numbers_that_json_does_not_know_become_null() -> None:
+    cube = trimesh.creation.box()
+    report = {"scale": 2.0, "hausdorff": {"over": float("inf"), "under": float("nan")}}
+    data = payload(report_page(Decomposition([hull_of(cube.vertices)], report, cube), picture=False))
+    assert data["report"]["hausdorff"] == {"over": None, "under": None}
+
+
+def test_a_cloud_of_points_and_balls_can_be_shown() -> None:
+    corners = np.array(trimesh.creation.box().vertices)
+    cloud = payload(report_page(rlacd.decompose((corners, np.empty((0, 3), dtype=np.int32))), picture=False))
+    assert cloud["input"] is None
+    assert cloud["heat"]["parts"] == []
+    space = rlacd.NavigableSpace(radius=0.05, tolerance=0.02)
+    free = rlacd.decompose(elbow(), criterion=space)
+    balls = payload(report_page(free, picture=False))["balls"]
+    assert free.balls is not None
+    assert 0 < balls["shown"] <= balls["of"] == len(free.balls)
+    assert len(points(balls["centres"])) == balls["shown"]
+
+
+def test_the_picture_is_inside_and_its_absence_is_said(
+    result: Decomposition, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mitsuba", reason="the extra view is not installed")
+    address = payload(result.save_report(tmp_path / "with.html").read_text(encoding="utf-8"))["picture"]
+    assert base64.b64decode(address.removeprefix("data:image/png;base64,")).startswith(b"\x89PNG")
+    monkeypatch.setitem(sys.modules, "mitsuba", None)
+    without = payload(result.save_report(tmp_path / "without.html").read_text(encoding="utf-8"))
+    assert "picture" not in without
+    assert "pip install 'rlacd[view]'" in without["note"]
+
+
+def test_bad_places_and_axes_are_refused(result: Decomposition, tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match=r"must end in \.html"):
+        check_report_page(tmp_path / "out.pdf")
+    with pytest.raises(OutputError, match="does not exist"):
+        result.save_report(tmp_path / "missing" / "out.html")
+    with pytest.raises(OptionError, match="x, y or z"):
+        save_report_page(result, tmp_path / "out.html", up="w")
+    assert list(tmp_path.iterdir()) == []

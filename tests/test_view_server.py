@@ -1,0 +1,321 @@
+"""The viewer's server as a browser meets it, without one: pages, progress, downloads, and who is turned away."""
+
+from __future__ import annotations
+
+import http.client
+import io
+import json
+import socket
+import threading
+import urllib.parse
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from typer.testing import CliRunner
+
+from rlacd.cli import app
+from rlacd.errors import MeshFileError, OptionError
+from rlacd.show.downloads import offered
+from rlacd.show.viewer import Viewer, Wishes, open_viewer, read_wishes
+
+PATIENCE = 60.0
+NAME = "an elbow 'n ümläut"
+
+
+@pytest.fixture(scope="module")
+def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    beams = ([(0, 0, 0), (2, 0.4, 0.4)], [(0, 0, 0), (0.4, 0.4, 2)])
+    path = tmp_path_factory.mktemp("view") / f"{NAME}.stl"
+    trimesh.util.concatenate([trimesh.creation.box(bounds=bounds) for bounds in beams]).export(path)
+    return path
+
+
+@pytest.fixture
+def viewer(mesh: Path) -> Iterator[Viewer]:
+    with open_viewer(mesh, {"threshold": 0.05}, port=0) as viewer:
+        yield viewer
+
+
+class Answer:
+    """What a request gave."""
+
+    def __init__(self, response: http.client.HTTPResponse) -> None:
+        self.status, self.headers, self.body = response.status, response.headers, response.read()
+
+    @property
+    def json(self) -> Any:
+        return json.loads(self.body)
+
+
+def ask(viewer: Viewer, method: str, path: str, body: Any = None, **headers: str) -> Answer:
+    place = urllib.parse.urlsplit(viewer.address)
+    connection = http.client.HTTPConnection(str(place.hostname), int(place.port or 0), timeout=PATIENCE)
+    try:
+        sent = body if isinstance(body, (bytes, type(None))) else json.dumps(body).encode()
+        kind = {"Content-Type": "application/json"} if method == "POST" else {}
+        connection.request(method, path, sent, {**kind, **{k.replace("_", "-"): v for k, v in headers.items()}})
+        return Answer(connection.getresponse())
+    finally:
+        connection.close()
+
+
+def events(viewer: Viewer) -> Iterator[dict[str, Any]]:
+    """States as the page gets them."""
+    place = urllib.parse.urlsplit(viewer.address)
+    connection = http.client.HTTPConnection(str(place.hostname), int(place.port or 0), timeout=PATIENCE)
+    connection.request("GET", "/events")
+    response = connection.getresponse()
+    assert response.headers["Content-Type"] == "text/event-stream"
+    try:
+        for line in response:
+            if line.startswith(b"data: "):
+                yield json.loads(line.removeprefix(b"data: "))
+    finally:
+        connection.close()
+
+
+def settled(viewer: Viewer, run: int) -> dict[str, Any]:
+    return next(state for state in events(viewer) if state["state"] == "idle" and state["run"] == run)
+
+
+def test_the_page_comes_with_its_controls(viewer: Viewer) -> None:
+    answer = ask(viewer, "GET", "/")
+    page = answer.body.decode()
+    assert answer.status == 200
+    assert answer.headers["Content-Type"].startswith("text/html")
+    assert "<title>an elbow &#x27;n ümläut</title>" in page
+    assert '"threshold":0.05' in page.replace(" ", "")
+    assert "connect-src 'self'" in page
+
+
+def test_hulls_come_with_progress_and_again_with_other_options(viewer: Viewer) -> None:
+    settled(viewer, run=1)
+    first = ask(viewer, "GET", "/scene").json
+    assert len(first["parts"]) == 2
+    assert ask(viewer, "POST", "/decompose", {"threshold": 1.9}).status == 202
+    assert settled(viewer, run=2)["error"] is None
+    second = ask(viewer, "GET", "/scene").json
+    assert len(second["parts"]) == 1
+    assert second["report"]["options"]["threshold"] == 1.9
+    stages = {state["stage"] for state in events_of_a_run(viewer, {"threshold": 0.05, "quality": "balanced"})}
+    assert stages <= {"load", "repair", "cut", "merge", "search", "finish", "measure"}
+
+
+def events_of_a_run(viewer: Viewer, options: dict[str, Any]) -> list[dict[str, Any]]:
+    states = events(viewer)
+    before = next(states)["run"]
+    assert ask(viewer, "POST", "/decompose", options).status == 202
+    seen = []
+    for state in states:
+        seen.append(state)
+        if state["run"] == before + 1:
+            return seen
+    raise AssertionError("the viewer closed")
+
+
+def test_navigable_space_has_balls(viewer: Viewer) -> None:
+    settled(viewer, run=1)
+    assert ask(viewer, "GET", "/scene").json["balls"] is None
+    ask(viewer, "POST", "/decompose", {"criterion": "navigable", "radius": 0.05, "tolerance": 0.02})
+    settled(viewer, run=2)
+    scene = ask(viewer, "GET", "/scene").json
+    assert scene["report"]["navigable"]["balls"] == scene["balls"]["of"] > 0
+
+
+def test_the_heat_map_belongs_to_the_hulls_shown(viewer: Viewer) -> None:
+    settled(viewer, run=1)
+    assert ask(viewer, "GET", "/heat").json["max"] == pytest.approx(0.0, abs=1e-6)
+    ask(viewer, "POST", "/decompose", {"threshold": 1.9})
+    settled(viewer, run=2)
+    heat = ask(viewer, "GET", "/heat").json
+    assert heat["max"] > 0.5
+    assert len(heat["parts"]) == 1
+
+
+def test_everything_offered_can_be_downloaded_and_read(viewer: Viewer) -> None:
+    settled(viewer, run=1)
+    volume = sum(hull.volume for hull in viewer.session.result[1])  # type: ignore[index]
+    for name, hint in offered():
+        answer = ask(viewer, "GET", f"/download?format={urllib.parse.quote(name)}")
+        assert answer.status == 200, (name, answer.body[:200])
+        assert hint
+        disposition = answer.headers["Content-Disposition"]
+        assert disposition.startswith("attachment; ")
+        exact = urllib.parse.unquote(disposition.split("filename*=UTF-8''")[1])
+        assert exact.startswith(f"{NAME}_hulls")
+        if name in ("glb", "obj", "ply", "stl"):
+            read = trimesh.load(io.BytesIO(answer.body), file_type=name, force="mesh")
+            assert read.volume == pytest.approx(volume, rel=1e-5)
+        elif name.endswith(".zip"):
+            with zipfile.ZipFile(io.BytesIO(answer.body)) as archive:
+                hulls = [member for member in archive.namelist() if member.endswith(name.removesuffix(".zip"))]
+                assert len(hulls) == 2
+        elif name == "report.json":
+            assert answer.json["parts"] == 2
+        elif name == "report.html":
+            assert b"connect-src 'none'" in answer.body
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"threshold": -1}, "threshold is -1"),
+        ({"threshold": "tight"}, "threshold is 'tight'"),
+        ({"criterion": "beauty"}, "concavity or navigable"),
+        ({"criterion": "navigable", "radius": 0}, "radius"),
+        ({"quality": "perfect"}, "quality"),
+        ({"max_hulls": 1.5}, "max_hulls"),
+        ({"mesh": "/etc/passwd"}, "'mesh' is no option of the viewer"),
+        ([], "no JSON object"),
+        (b"{", "no JSON object"),
+    ],
+)
+def test_bad_options_are_answered_in_a_sentence_and_change_nothing(viewer: Viewer, options: Any, says: str) -> None:
+    settled(viewer, run=1)
+    answer = ask(viewer, "POST", "/decompose", options)
+    assert answer.status == 400
+    assert says in answer.json["error"]
+    assert answer.json["error"].endswith(".")
+    assert viewer.session.state.state == "idle"
+    assert viewer.session.state.run == 1
+
+
+def test_what_is_not_there_is_said(viewer: Viewer) -> None:
+    settled(viewer, run=1)
+    assert ask(viewer, "GET", "/nothing").status == 404
+    assert ask(viewer, "POST", "/scene", {}).status == 404
+    answer = ask(viewer, "GET", "/download?format=../../etc/passwd")
+    assert answer.status == 400
+    assert "choose one of glb" in answer.json["error"]
+
+
+def test_pages_of_other_sites_are_turned_away(viewer: Viewer) -> None:
+    own = urllib.parse.urlsplit(viewer.address).netloc
+    options = {"threshold": 1.9}
+    settled(viewer, run=1)
+    assert ask(viewer, "GET", "/scene", Host="evil.example").status == 403
+    assert ask(viewer, "POST", "/decompose", options, Host="evil.example:80").status == 403
+    assert ask(viewer, "POST", "/decompose", options, Origin="http://evil.example").status == 403
+    assert ask(viewer, "POST", "/decompose", options, Origin="null").status == 403
+    assert ask(viewer, "POST", "/decompose", options, Content_Type="text/plain").status == 403
+    assert ask(viewer, "POST", "/decompose", {"x": "y" * 20_000}).status == 403
+    assert viewer.session.state.run == 1
+    assert ask(viewer, "POST", "/decompose", options, Origin=f"http://{own}").status == 202
+
+
+def test_nobody_else_can_reach_it(viewer: Viewer) -> None:
+    port = int(urllib.parse.urlsplit(viewer.address).port or 0)
+    assert urllib.parse.urlsplit(viewer.address).hostname == "127.0.0.1"
+    outward = [info[4][0] for info in socket.getaddrinfo(socket.gethostname(), port, socket.AF_INET)]
+    for address in outward:
+        if not address.startswith("127."):
+            with pytest.raises(OSError, match=r"refused|timed out|unreachable"):
+                socket.create_connection((address, port), timeout=2.0).close()
+
+
+def test_a_long_search_is_cancelled_and_keeps_what_it_has(mesh: Path, tmp_path: Path) -> None:
+    rough = trimesh.creation.icosphere(3)
+    rough.vertices *= 1 + 0.25 * np.random.default_rng(0).random((len(rough.vertices), 1))
+    rough.export(tmp_path / "rough.ply")
+    with open_viewer(tmp_path / "rough.ply", {"threshold": 0.3}, port=0) as viewer:
+        settled(viewer, run=1)
+        states = events(viewer)
+        ask(viewer, "POST", "/decompose", {"threshold": 0.06, "quality": "best"})
+        assert next(state for state in states if state["state"] == "working" and state["parts"] > 1)
+        assert ask(viewer, "POST", "/cancel", {}).status == 202
+        settled(viewer, run=2)
+        report = ask(viewer, "GET", "/scene").json["report"]
+        assert report["stopped_by"] == "cancel"
+        assert report["seconds"]["total"] < 60
+
+
+def test_the_file_is_read_anew_and_its_loss_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "cube.stl"
+    trimesh.creation.box().export(path)
+    with open_viewer(path, port=0) as viewer:
+        settled(viewer, run=1)
+        path.unlink()
+        ask(viewer, "POST", "/decompose", {})
+        state = next(state for state in events(viewer) if state["error"])
+        assert "cube.stl does not exist" in state["error"]
+        assert ask(viewer, "GET", "/scene").status == 200, "the hulls are still there"
+
+
+def test_closing_ends_every_thread_and_page(mesh: Path) -> None:
+    before = threading.active_count()
+    with open_viewer(mesh, port=0) as viewer:
+        states = events(viewer)
+        next(states)
+    assert [state["state"] for state in states][-1] == "closed"
+    for _ in range(100):
+        if threading.active_count() <= before:
+            break
+        threading.Event().wait(0.05)
+    assert threading.active_count() <= before
+
+
+def test_a_port_in_use_is_one_sentence(viewer: Viewer, mesh: Path) -> None:
+    port = int(urllib.parse.urlsplit(viewer.address).port or 0)
+    with (
+        pytest.raises(OptionError, match=f"port {port} is in use; choose another with --port"),
+        open_viewer(mesh, port=port),
+    ):
+        pass
+    with pytest.raises(OptionError, match="99999 is no port"), open_viewer(mesh, port=99_999):
+        pass
+
+
+def test_without_a_port_a_free_one_is_found(mesh: Path) -> None:
+    with open_viewer(mesh) as one, open_viewer(mesh) as two:
+        assert one.address != two.address
+        assert ask(two, "GET", "/").status == 200
+
+
+def test_mistakes_are_found_before_anything_is_served(mesh: Path, tmp_path: Path) -> None:
+    for error, arguments in [
+        (MeshFileError, {"mesh": tmp_path / "nothing.glb"}),
+        (OptionError, {"mesh": mesh, "up": "w"}),
+        (OptionError, {"mesh": mesh, "options": {"threshold": 9.0}}),
+        (OptionError, {"mesh": mesh, "options": {"criterion": "beauty"}}),
+        (OptionError, {"mesh": mesh, "threads": 0}),
+    ]:
+        with pytest.raises(error), open_viewer(**arguments):  # type: ignore[arg-type]
+            pass
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["{dir}/nothing.glb"], "does not exist"),
+        (["{dir}"], "is a folder"),
+        (["{mesh}", "--port", "99999"], "no port"),
+        (["{mesh}", "--up", "w"], "x, y or z"),
+        (["{mesh}", "--threshold", "-1"], "threshold is -1"),
+        (["{mesh}", "--criterion", "beauty"], "concavity or navigable"),
+    ],
+)
+def test_the_command_says_what_is_wrong_in_one_sentence(mesh: Path, words: list[str], says: str) -> None:
+    given = [word.format(dir=mesh.parent, mesh=mesh) for word in words]
+    run = CliRunner().invoke(app, ["view", "--no-browser", *given])
+    assert run.exit_code == 2
+    assert run.stderr.startswith("rlacd: ")
+    assert says in run.stderr
+    assert run.stderr.count("\n") == 1
+
+
+def test_the_controls_hold_the_defaults_of_the_command_line() -> None:
+    import inspect
+
+    import rlacd
+
+    signature = inspect.signature(rlacd.decompose)
+    wishes = Wishes()
+    for name in ("criterion", "threshold", "quality", "max_hulls", "max_vertices"):
+        assert getattr(wishes, name) == signature.parameters[name].default
+    assert (wishes.radius, wishes.tolerance) == (rlacd.NavigableSpace().radius, rlacd.NavigableSpace().tolerance)
+    assert read_wishes({}) == wishes

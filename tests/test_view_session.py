@@ -1,0 +1,152 @@
+"""The viewer's session: other options replace the work under way, stopping keeps it, errors leave what there was."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+import trimesh
+
+from rlacd.decomposition import Decomposition
+from rlacd.errors import MeshFileError
+from rlacd.progress import Progress, ProgressCallback
+from rlacd.show.session import Session, State
+from tests.hulls import hull_of
+
+PATIENCE = 20.0  # seconds until a test gives up
+
+
+class Work:
+    """Stands in for `rlacd.decompose`: works in steps that the test lets it take."""
+
+    def __init__(self) -> None:
+        self.began = threading.Semaphore(0)
+        self.steps = threading.Semaphore(0)
+        self.error: Exception | None = None
+
+    def __call__(self, *, progress: ProgressCallback, **options: Any) -> Decomposition:
+        self.began.release()
+        complete = True
+        for step in range(3):
+            assert self.steps.acquire(timeout=PATIENCE)
+            complete = progress(Progress("cut", step, 3, step + 1, 0.1)) is not False
+            if not complete:
+                break
+        if self.error is not None:
+            raise self.error
+        cube = trimesh.creation.box()
+        return Decomposition([hull_of(cube.vertices)], {"options": options, "complete": complete}, cube)
+
+    def wait_until_it_began(self) -> None:
+        assert self.began.acquire(timeout=PATIENCE)
+
+    def go_on(self, steps: int = 3) -> None:
+        self.steps.release(steps)
+
+
+@pytest.fixture
+def work() -> Work:
+    return Work()
+
+
+@pytest.fixture
+def session(work: Work) -> Iterator[Session]:
+    with Session(work) as session:
+        yield session
+        work.go_on(100)
+
+
+def until(session: Session, state: str, run: int | None = None) -> State:
+    for seen in session.changes(patience=PATIENCE):
+        assert seen is not None, f"nothing changed while waiting for {state}"
+        if seen.state == state and (run is None or seen.run == run):
+            return seen
+    raise AssertionError("the session was closed")
+
+
+def options_of(session: Session) -> dict[str, Any]:
+    assert session.result is not None
+    return session.result[1].report["options"]
+
+
+def test_it_begins_idle_with_nothing(session: Session) -> None:
+    assert session.state == State()
+    assert session.result is None
+
+
+def test_progress_and_then_the_result(session: Session, work: Work) -> None:
+    session.decompose({"threshold": 0.1})
+    work.wait_until_it_began()
+    work.go_on(2)
+    while (state := until(session, "working")).done < 1:
+        pass
+    assert (state.stage, state.total, state.parts, state.run) == ("cut", 3, 2, None)
+    work.go_on()
+    until(session, "idle", run=1)
+    assert options_of(session) == {"threshold": 0.1}
+
+
+def test_other_options_replace_the_work_under_way(session: Session, work: Work) -> None:
+    session.decompose({"threshold": 0.1})
+    work.wait_until_it_began()
+    session.decompose({"threshold": 0.2})
+    session.decompose({"threshold": 0.3})
+    work.go_on(100)
+    until(session, "idle", run=1)
+    assert options_of(session) == {"threshold": 0.3}, "what was reached with the first options is dropped"
+
+
+def test_stopping_keeps_what_is_reached(session: Session, work: Work) -> None:
+    session.decompose({})
+    work.wait_until_it_began()
+    session.stop()
+    work.go_on()
+    until(session, "idle", run=1)
+    assert session.result is not None
+    assert session.result[1].report["complete"] is False
+
+
+def test_stopping_does_not_reach_into_the_next_run(session: Session, work: Work) -> None:
+    session.stop()
+    session.decompose({})
+    work.go_on()
+    until(session, "idle", run=1)
+    assert session.result is not None
+    assert session.result[1].report["complete"] is True
+
+
+@pytest.mark.parametrize(
+    ("error", "says"),
+    [
+        (MeshFileError("cup.glb is empty; export it again."), "cup.glb is empty; export it again."),
+        (MemoryError(), "not enough memory"),
+        (RuntimeError("surprise"), "a bug in rlacd (RuntimeError: surprise)"),
+    ],
+)
+def test_an_error_is_said_and_what_there_was_stays(session: Session, work: Work, error: Exception, says: str) -> None:
+    session.decompose({"threshold": 0.1})
+    work.go_on()
+    until(session, "idle", run=1)
+    work.error = error
+    session.decompose({"threshold": 0.2})
+    work.go_on()
+    while (state := until(session, "idle")).error is None:
+        pass
+    assert says in str(state.error)
+    assert state.run == 1
+    assert options_of(session) == {"threshold": 0.1}
+    work.error = None
+    session.decompose({"threshold": 0.3})
+    work.go_on()
+    assert until(session, "idle", run=2).error is None
+
+
+def test_quiet_is_told_and_closing_lets_everyone_go(work: Work) -> None:
+    session = Session(work)
+    changes = session.changes(patience=0.01)
+    assert next(changes) == State()
+    assert next(changes) is None
+    session.close()
+    assert [state.state for state in changes if state is not None] == ["closed"]
