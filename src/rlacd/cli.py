@@ -408,6 +408,8 @@ def decompose(
         robot = mesh.suffix.lower() in ROBOTS
         written = {"density": density, "up": up or _usual_up(mesh)}
         if robot:
+            if report is not None and is_html(report):
+                raise OptionError("--report as a page belongs to a single mesh; for a robot give a .json file.")
             _check_robot({"--picture": picture, "--balls": balls, "--format": folder_format, "--density": density})
         else:
             check_model_options(**_chosen({"density": 1.0, **_chosen(written)}))
@@ -533,8 +535,8 @@ def _rewrite(
     robot: Path, place: str, packages: list[str], report: Path | None, quiet: bool, options: dict[str, Any]
 ) -> None:
     from rlacd.formats import write_file
-    from rlacd.robots import rewrite_robot
     from rlacd.plain_json import to_json
+    from rlacd.robots import rewrite_robot
     from rlacd.terminal import Watch, rewrite_summary, say
 
     with Watch(quiet=quiet) as watch:
