@@ -1,9 +1,17 @@
 // Python bindings of the convex hull and of mesh volume and area.
+#include <nanobind/stl/vector.h>
+
 #include "arrays.hpp"
 #include "hull.hpp"
 #include "parallel.hpp"
 
 namespace rlacd {
+
+namespace {
+
+constexpr std::size_t kPairsAThread = 8;  // starting a thread takes as long as some joint hulls of small parts
+
+}  // namespace
 
 void bind_hull(nb::module_& m) {
   m.def(
@@ -24,41 +32,43 @@ void bind_hull(nb::module_& m) {
       "oriented. rank < 3 (all points coplanar): no indices, no faces.");
   m.def(
       "joint_hull_volumes",
-      [](const PointsIn& array,
-         const nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>& starts,
+      [](const std::vector<PointsIn>& arrays,
          const nb::ndarray<const std::int32_t, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>& pairs, int threads) {
-        const std::vector<Vec3> points = to_points(array);
-        const std::vector<std::int32_t> start(starts.data(), starts.data() + starts.size());
-        const auto groups = static_cast<std::int32_t>(start.size()) - 1;
-        for (std::int32_t g = 0; g < groups; ++g)
-          if (start[g] < 0 || start[g] > start[g + 1]) throw std::invalid_argument("starts must ascend from 0");
-        if (groups < 0 || start.back() > static_cast<std::int32_t>(points.size()))
-          throw std::invalid_argument("starts must end at the number of points");
-        const std::size_t count = pairs.shape(0);
-        for (std::size_t i = 0; i < pairs.size(); ++i)
-          if (pairs.data()[i] < 0 || pairs.data()[i] >= groups) throw std::invalid_argument("pair out of range");
+        std::vector<std::vector<Vec3>> groups;
+        for (const PointsIn& array : arrays) groups.push_back(to_points(array));
         const std::vector<std::int32_t> pair(pairs.data(), pairs.data() + pairs.size());
-        std::vector<double> volumes(count);
+        for (const std::int32_t g : pair)
+          if (g < 0 || g >= static_cast<std::int64_t>(groups.size())) throw std::invalid_argument("pair out of range");
+        std::vector<double> volumes(pairs.shape(0));
         {
           nb::gil_scoped_release release;
-          parallel_for(count, threads, [&](std::size_t i) {
+          const auto worth_threads = static_cast<int>(1 + volumes.size() / kPairsAThread);
+          parallel_for(volumes.size(), std::min(resolve_threads(threads), worth_threads), [&](std::size_t i) {
             HullBuilder hull;
-            std::vector<Vec3> both;
-            for (const std::int32_t g : {pair[2 * i], pair[2 * i + 1]})
-              both.insert(both.end(), points.begin() + start[g], points.begin() + start[g + 1]);
+            std::vector<Vec3> both = groups[pair[2 * i]];
+            const std::vector<Vec3>& other = groups[pair[2 * i + 1]];
+            both.insert(both.end(), other.begin(), other.end());
             hull.add(both);
             volumes[i] = hull.volume();
           });
         }
         return to_array<double>(std::move(volumes));
       },
-      nb::arg("points"), nb::arg("starts"), nb::arg("pairs"), nb::arg("threads") = 0,
-      "Volumes [P] of the joint hulls of pairs [P, 2] of point groups; group g is points[starts[g]:starts[g + 1]].");
+      nb::arg("groups"), nb::arg("pairs"), nb::arg("threads") = 0,
+      "Volumes [P] of the joint hulls of pairs [P, 2] of point groups, a list of arrays [N, 3].");
   m.def(
-      "mesh_volume", [](const PointsIn& v, const FacesIn& f) { return mesh_volume(to_points(v), to_mesh(v, f).faces); },
+      "mesh_volume",
+      [](const PointsIn& v, const FacesIn& f) {
+        const Mesh mesh = to_mesh(v, f);
+        return mesh_volume(mesh.vertices, mesh.faces);
+      },
       nb::arg("vertices"), nb::arg("faces"), "Signed volume of a closed triangle mesh.");
   m.def(
-      "mesh_area", [](const PointsIn& v, const FacesIn& f) { return mesh_area(to_points(v), to_mesh(v, f).faces); },
+      "mesh_area",
+      [](const PointsIn& v, const FacesIn& f) {
+        const Mesh mesh = to_mesh(v, f);
+        return mesh_area(mesh.vertices, mesh.faces);
+      },
       nb::arg("vertices"), nb::arg("faces"), "Area of a triangle mesh.");
 }
 

@@ -32,12 +32,16 @@ void HullBuilder::clear() {
   insertion_ = 0;
 }
 
-bool HullBuilder::sees(const Facet& f, Vec3 p) const {
+inline bool HullBuilder::sees(const Facet& f, Vec3 p) const {
   const Vec3 offset = p - f.origin;
   const double h = dot(f.normal, offset);
   const double bound = f.error * max_abs(offset);
   if (h > bound) return true;
   if (h < -bound) return false;
+  return sees_exactly(f, p);
+}
+
+bool HullBuilder::sees_exactly(const Facet& f, Vec3 p) const {
   return orient3d_exact(points_[f.corner[0]], points_[f.corner[1]], points_[f.corner[2]], p) > 0;
 }
 
@@ -50,7 +54,6 @@ std::int32_t HullBuilder::new_facet(std::int32_t a, std::int32_t b, std::int32_t
   // Each component of the cross product is off by less than 6 u |ab||ac| and the dot product adds 3 terms of relative
   // error 5 u, all in the maximum norm: 40 u |ab||ac||p - a| covers their sum.
   f.error = 40 * kRoundoff * max_abs(ab) * max_abs(ac);
-  f.length = norm(f.normal);
   f.outside = -1;
   f.alive = true;
   f.mark = -1;
@@ -150,7 +153,7 @@ void HullBuilder::add(const std::vector<Vec3>& points) {
   // inradius r: nothing, unless the hull is flat. The inradius is at least volume / area.
   const bool fat = tolerance_ > 0 && volume() > kFat * area() * max_abs(extent_.upper - extent_.lower);
   const auto clearly = [this, fat](const Facet& f, Vec3 p) {
-    return (!fat || height(f, p) >= tolerance_ * f.length) && sees(f, p);
+    return (!fat || height(f, p) >= tolerance_ * norm(f.normal)) && sees(f, p);
   };
   for (auto i = first; i < static_cast<std::int32_t>(points_.size()); ++i) assign(i, alive, clearly);
   std::vector<std::int32_t> pending;

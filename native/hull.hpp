@@ -33,6 +33,7 @@ class HullBuilder {
   double volume() const;
   double area() const;
   const std::vector<Vec3>& points() const { return points_; }
+  const Box& extent() const { return extent_; }  // of all points
   std::vector<Triangle> triangles() const;
   std::vector<std::int32_t> corners() const;  // ascending: points that are corners of facets (rank 3), or all points
 
@@ -43,7 +44,6 @@ class HullBuilder {
     Vec3 normal;                // (b - a) x (c - a), not normalised
     Vec3 origin;                // corner a
     double error;               // |computed height - exact height| <= error * max_abs(p - a)
-    double length;              // of the normal
     std::int32_t outside;       // first point of the list that this facet is responsible for, -1 when none
     bool alive;
     std::int32_t mark;  // number of the last insertion that looked at this facet
@@ -51,6 +51,7 @@ class HullBuilder {
 
   double height(const Facet& f, Vec3 p) const { return dot(f.normal, p - f.origin); }
   bool sees(const Facet& f, Vec3 p) const;
+  bool sees_exactly(const Facet& f, Vec3 p) const;
   bool initialise();
   std::int32_t new_facet(std::int32_t a, std::int32_t b, std::int32_t c);
   template <class Sees>
@@ -64,7 +65,7 @@ class HullBuilder {
   std::vector<Facet> facets_;
   std::vector<std::int32_t> free_;
   std::vector<std::int32_t> next_outside_;  // linked lists of outside points, by point
-  Box extent_;                              // of all points
+  Box extent_;
   std::int32_t insertion_ = 0;
 
   struct HorizonEdge {

@@ -64,9 +64,10 @@ double mean_below(double s0, double s1, double s2, double d) {
   return (s0 + s1 + s2) / 3 - d - t * (s2 - d) / 3;
 }
 
-// Corners of the convex hull of a slab: crossings of its lower plane, vertices, crossings of its upper plane.
+// What a slab adds to the hulls: the corners of its own hull, but for those on the plane that it shares with the hull
+// so far, which are in it already.
 struct Slab {
-  std::vector<Vec3> lower, inside, upper;
+  std::vector<Vec3> to_below, to_above;
 };
 
 // Points that stick out of a hull by less than this, relative to the mesh, are rounding: the crossings of one long edge
@@ -137,18 +138,24 @@ class DirectionSweep {
     slabs_.resize(d_.size() + 1);
     HullBuilder hull(film_);
     for (std::size_t j = 0; j <= d_.size(); ++j) {
-      hull.clear();
-      if (j > 0) hull.add(crossings_[j - 1]);
-      const std::size_t first_inside = hull.points().size();
-      hull.add(inside_[j]);
-      const std::size_t first_upper = hull.points().size();
-      if (j < d_.size()) hull.add(crossings_[j]);
+      if (j == 1)
+        lowest_slab_ = std::move(hull), hull = HullBuilder(film_);
+      else
+        hull.clear();
+      std::vector<Vec3> points = j > 0 ? crossings_[j - 1] : std::vector<Vec3>();
+      const std::size_t first_inside = points.size();
+      points.insert(points.end(), inside_[j].begin(), inside_[j].end());
+      const std::size_t first_upper = points.size();
+      if (j < d_.size()) points.insert(points.end(), crossings_[j].begin(), crossings_[j].end());
+      hull.add(points);
+      if (d_.size() == 1) continue;  // each of the two slabs is a whole side: nothing grows from its corners
       for (const std::int32_t corner : hull.corners()) {
         const auto i = static_cast<std::size_t>(corner);
-        Slab& slab = slabs_[j];
-        (i < first_inside ? slab.lower : i < first_upper ? slab.inside : slab.upper).push_back(hull.points()[i]);
+        if (i >= first_inside) slabs_[j].to_below.push_back(points[i]);
+        if (i < first_upper) slabs_[j].to_above.push_back(points[i]);
       }
     }
+    highest_slab_ = std::move(hull);
   }
 
   void measure_solid() {
@@ -158,7 +165,9 @@ class DirectionSweep {
       const Vec3 a = mesh_.vertices[f[0]], b = mesh_.vertices[f[1]], c = mesh_.vertices[f[2]];
       const double flux = dot(n_, cross(b - a, c - a)) / 2;
       double s[3] = {s_[f[0]], s_[f[1]], s_[f[2]]};
-      std::sort(s, s + 3);
+      if (s[0] > s[1]) std::swap(s[0], s[1]);
+      if (s[1] > s[2]) std::swap(s[1], s[2]);
+      if (s[0] > s[1]) std::swap(s[0], s[1]);
       // A section is taken just above its plane, so a corner on the plane counts as below.
       std::size_t j = std::lower_bound(d_.begin(), d_.end(), s[0]) - d_.begin();
       for (; j < d_.size() && d_[j] < s[2]; ++j) {
@@ -202,20 +211,14 @@ class DirectionSweep {
   }
 
   void grow_hulls(bool below) {
-    HullBuilder hull(film_);
+    HullBuilder& hull = below ? lowest_slab_ : highest_slab_;
     const auto planes = static_cast<std::ptrdiff_t>(d_.size());
-    const std::ptrdiff_t step = below ? 1 : -1;
-    Box box;
-    for (std::ptrdiff_t j = below ? 0 : planes - 1; j >= 0 && j < planes; j += step) {
-      const Slab& slab = slabs_[below ? j : j + 1];
-      // The points on the plane that this slab shares with the hull so far are in it already.
-      for (const std::vector<Vec3>* points : {&slab.inside, below ? &slab.upper : &slab.lower}) {
-        hull.add(*points);
-        for (const Vec3 p : *points) box.extend(p);
-      }
-
+    const std::ptrdiff_t first = below ? 0 : planes - 1, step = below ? 1 : -1;
+    for (std::ptrdiff_t j = first; j >= 0 && j < planes; j += step) {
+      if (j != first) hull.add(below ? slabs_[j].to_below : slabs_[j + 1].to_above);
       const double thickness = below ? d_[j] - lowest_ : highest_ - d_[j];
-      const double extent = hull.points().empty() ? 0 : std::max(thickness, max_abs(box.upper - box.lower));
+      const double extent =
+          hull.points().empty() ? 0 : std::max(thickness, max_abs(hull.extent().upper - hull.extent().lower));
       PlaneScore& score = scores_[j];
       (below ? score.hull_below : score.hull_above) = hull.volume();
       (below ? score.thickness_below : score.thickness_above) = thickness;
@@ -237,6 +240,7 @@ class DirectionSweep {
   std::vector<std::vector<Vec3>> inside_;     // M + 1 slabs: their vertices
   std::vector<std::vector<Vec3>> crossings_;  // M planes: corners of the section's convex hull
   std::vector<Slab> slabs_;                   // M + 1 slabs
+  HullBuilder lowest_slab_, highest_slab_;    // which the hulls grow from
 };
 
 }  // namespace

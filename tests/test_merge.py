@@ -8,8 +8,10 @@ from manifold3d import Manifold
 
 from rlacd.clock import Clock
 from rlacd.criteria import Concavity
+from rlacd.criteria.navigable import Navigable, NavigableSpace
 from rlacd.finish import merge_parts, merge_to_count
-from rlacd.solid.component import Component, Plane
+from rlacd.solid.balls import Balls
+from rlacd.solid.component import Component, Part, Plane
 from rlacd.workers import Workers
 
 
@@ -86,6 +88,39 @@ def test_same_result_for_any_number_of_workers() -> None:
     assert len(results[0]) == len(results[1])
     for a, b in zip(*results, strict=True):
         assert np.array_equal(a.hull.vertices, b.hull.vertices)
+
+
+class Counting(Navigable):
+    """Counts what it is asked."""
+
+    asked = 0
+
+    def is_met(self, part: Part) -> bool:
+        self.asked += 1
+        return super().is_met(part)
+
+
+class Forgetful(Counting):
+    is_hereditary = False
+
+
+def test_what_a_ball_keeps_apart_is_not_asked_again() -> None:
+    """The result is the same as if every union were tested anew."""
+    random = np.random.default_rng(0)
+    ring = Manifold.cylinder(0.3, 1, 1, 40, True) - Manifold.cylinder(1, 0.8, 0.8, 40, True)
+    parts = pieces_of(ring, *(along((np.cos(a), np.sin(a), 0.1), 0.0) for a in np.linspace(0, np.pi, 9)))
+    asked = {Counting: 0, Forgetful: 0}
+    for _ in range(5):
+        balls = Balls(random.uniform(-1.2, 1.2, (24, 3)), random.uniform(0.02, 0.2, 24))
+        results = []
+        for kind in asked:
+            criterion = kind(NavigableSpace(), 0.02, 0.01, balls)
+            with Workers(1) as pool:
+                results.append(merge_parts(parts, criterion, pool, Clock()))
+            asked[kind] += criterion.asked
+        for a, b in zip(*results, strict=True):
+            assert np.array_equal(a.hull.vertices, b.hull.vertices)
+    assert asked[Counting] < 0.9 * asked[Forgetful]
 
 
 @pytest.mark.parametrize("count", [1, 2, 4])

@@ -85,6 +85,11 @@ class Concavity:
         """Twice the threshold: between parts farther apart, the middle of the hull's surface is too far from both."""
         return 2 * self.threshold
 
+    @property
+    def is_hereditary(self) -> bool:
+        """No: what is missing from a part's hull may be another part."""
+        return False
+
     def excludes(self, volume: float, hull_volume: float) -> bool:
         """Whether ``0.3 R_v`` alone exceeds the threshold."""
         return self.least_error(volume, hull_volume) > self.threshold

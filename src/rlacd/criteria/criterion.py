@@ -65,6 +65,10 @@ class Criterion(Protocol):
     def reach(self) -> float:
         """No union of two components farther apart than this can meet the criterion."""
 
+    @property
+    def is_hereditary(self) -> bool:
+        """Whether a part that does not meet the criterion cannot meet it together with others either."""
+
     def excludes(self, volume: float, hull_volume: float) -> bool:
         """Tell from the volumes alone that a part cannot meet the criterion (cheap, necessary)."""
 

@@ -235,6 +235,11 @@ class Navigable:
         """Twice radius and tolerance: through a wider gap between two parts a ball can come."""
         return 2 * (self.radius + self.tolerance)
 
+    @property
+    def is_hereditary(self) -> bool:
+        """Yes: a larger hull touches every ball that a smaller one inside it touches."""
+        return True
+
     def excludes(self, volume: float, hull_volume: float) -> bool:
         """Nothing: volumes say nothing about balls."""
         return False

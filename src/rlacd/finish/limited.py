@@ -37,6 +37,11 @@ class Limited:
         """The underlying criterion's."""
         return self.criterion.reach
 
+    @property
+    def is_hereditary(self) -> bool:
+        """No: limited hulls need not lie in each other where the exact ones do."""
+        return False
+
     def excludes(self, volume: float, hull_volume: float) -> bool:
         """Limiting a hull only adds volume, so the underlying bound holds."""
         return self.criterion.excludes(volume, hull_volume)

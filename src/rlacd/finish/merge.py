@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from rlacd import _native
 from rlacd.clock import Clock
 from rlacd.criteria.criterion import Criterion
-from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
 from rlacd.workers import Workers
 
 
-@dataclass(order=True, frozen=True)
-class _Pair:
+class _Pair(NamedTuple):
     cost: float  # volume of the joint hull - what the criterion counts as filled by each
     first: int
     second: int
@@ -45,8 +44,9 @@ def merge_parts(
     """
     alive: dict[int, Part] = dict(enumerate([*parts, *beside]))
     origin = {i: i for i in alive}
-    queue = _pairs(alive, list(range(len(parts))), criterion, workers)
+    queue = _pairs(alive, range(len(parts)), criterion, workers)
     heapq.heapify(queue)
+    refused: dict[int, set[int]] = {i: set() for i in alive}  # whom a part, or a piece of it, was not united with
     unions: dict[_Pair, Part | None] = {}  # verdicts on pairs that are back in the queue
     count = newest = len(alive)
     while queue and clock.step(count - len(alive), None, len(alive)):
@@ -58,11 +58,17 @@ def merge_parts(
         for taken, pair in enumerate(batch, start=1):
             union = unions.pop(pair)
             if union is None:
+                refused[pair.first].add(pair.second)
+                refused[pair.second].add(pair.first)
                 continue
             origin[newest] = min(origin[pair.first], origin[pair.second])
             del alive[pair.first], alive[pair.second]
             alive[newest] = union
-            for other in [*batch[taken:], *_pairs(alive, [newest], criterion, workers)]:
+            refused[newest] = refused.pop(pair.first) | refused.pop(pair.second) if criterion.is_hereditary else set()
+            for i in refused[newest] & alive.keys():
+                refused[i].add(newest)
+            asked = {i: part for i, part in alive.items() if i not in refused[newest]}
+            for other in [*batch[taken:], *_pairs(asked, [newest], criterion, workers)]:
                 heapq.heappush(queue, other)
             newest += 1
             break
@@ -84,7 +90,7 @@ def _unite(first: Part, second: Part, criterion: Criterion) -> Part | None:
     return union if criterion.is_met(union) else None
 
 
-def _pairs(alive: dict[int, Part], new: Sequence[int], criterion: Criterion, workers: Workers) -> list[_Pair]:
+def _pairs(alive: Mapping[int, Part], new: Sequence[int], criterion: Criterion, workers: Workers) -> list[_Pair]:
     """Pairs of a new part with any other that the criterion's reach and volume bound allow, and their costs."""
     return [
         _Pair(hull_volume - (criterion.filled(alive[first]) + criterion.filled(alive[second])), first, second)
@@ -94,25 +100,24 @@ def _pairs(alive: dict[int, Part], new: Sequence[int], criterion: Criterion, wor
 
 
 def neighbours(
-    alive: dict[int, Part], new: Sequence[int], reach: float, workers: Workers
+    alive: Mapping[int, Part], new: Sequence[int], reach: float, workers: Workers
 ) -> list[tuple[int, int, float, float]]:
     """Pairs of a new part with any other whose boxes lie within reach: (first, second, volume, joint hull's volume)."""
-    ids = np.array(list(alive), dtype=np.int64)
-    boxes = np.stack([alive[i].box for i in alive])
-    rows = np.flatnonzero(np.isin(ids, new))
-    gap = np.maximum(boxes[rows, None, 0] - boxes[None, :, 1], boxes[None, :, 0] - boxes[rows, None, 1])
-    k, other = np.nonzero(np.linalg.norm(np.maximum(gap, 0.0), axis=2) <= reach)
-    pairs = np.unique(np.sort(np.stack([rows[k], other], axis=1), axis=1), axis=0)
-    pairs = pairs[pairs[:, 0] < pairs[:, 1]]
-    if len(pairs) == 0:
-        return []
-    corners: list[FloatArray] = [alive[i].hull.vertices for i in alive]
-    starts = np.cumsum([0, *map(len, corners)], dtype=np.int32)
-    hulls = _native.joint_hull_volumes(np.concatenate(corners), starts, pairs.astype(np.int32), workers.threads)
-    solids = np.array([alive[i].volume for i in alive])[pairs].sum(axis=1)
+    ids, parts, among = list(alive), list(alive.values()), set(new)
+    is_new = np.array([i in among for i in ids])
+    rows = np.flatnonzero(is_new)
+    boxes = np.array([part.box for part in parts])
+    gap = np.maximum(boxes[rows, None, 0] - boxes[:, 1], boxes[:, 0] - boxes[rows, None, 1])
+    k, other = np.nonzero(np.sqrt(np.square(np.maximum(gap, 0.0)).sum(axis=2)) <= reach)
+    once = (rows[k] < other) | ~is_new[other]  # two new parts find each other twice
+    pairs = np.sort(np.stack([rows[k], other], axis=1)[once], axis=1)
+    pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+    used, place = np.unique(pairs, return_inverse=True)
+    corners = [parts[i].hull.vertices for i in used]
+    hulls = _native.joint_hull_volumes(corners, place.reshape(-1, 2).astype(np.int32), workers.threads)
     return [
-        (int(ids[i]), int(ids[j]), float(solid), float(hull))
-        for (i, j), solid, hull in zip(pairs, solids, hulls, strict=True)
+        (ids[i], ids[j], parts[i].volume + parts[j].volume, hull)
+        for (i, j), hull in zip(pairs.tolist(), hulls.tolist(), strict=True)
     ]
 
 
