@@ -17,7 +17,6 @@ turns a dozen exact faces into tens of thousands of approximate ones; steps 3 to
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -29,6 +28,7 @@ from rlacd.solid.load import InputMesh
 from rlacd.solid.repair_distance import SurfaceQuery, spread_points
 from rlacd.solid.repair_holes import MOST_FREE_EDGES, cap, close_cracks, free_edges, free_loops
 from rlacd.solid.repair_skin import skin
+from rlacd.solid.repair_soup import NO_AREA, Soup, hidden_faces, on_repeated_edge
 from rlacd.solid.repair_union import (
     hull_of_points,
     split_labels,
@@ -43,14 +43,11 @@ from rlacd.solid.topology import (
     BoolArray,
     Edges,
     IntArray,
-    Sides,
     bodies_of,
-    components,
     face_areas,
     first_of_doubled,
     merge_equal_vertices,
     nondegenerate,
-    sides_of,
     signed_tetrahedra,
 )
 
@@ -69,82 +66,12 @@ with a few holes is meant as a solid, a cup is not. The caps are reported."""
 
 _WELDS = (2e-5, 5e-4)
 _WRAP_ERROR = 4e-3
-_NO_AREA = 1e-14
-# Sheets of a body are thickened apart if they are at most this many, of at most this many faces in all.
-_MOST_PATCHES, _MOST_PATCHED = 100, 4000
-# Cosine of the angle between two faces below which a sheet is folded onto itself (20 degrees).
-_FOLD = 0.94
 # More sheets than this are not united one by one: it would take seconds, and cutting what comes out longer.
 _CROWD = 300
 # A solid may have a few faces sticking out of it, up to this share of its area.
 _FLAPS = 0.05
-# How far beside a face the winding number is asked for.
-_BESIDE = 2e-4
 # A closed body with less volume per area is flat: nothing could be cut from it.
 _FLAT = 1e-6
-
-
-@dataclass(frozen=True)
-class _Soup:
-    """Faces on their way through the steps; `body` numbers the body of each, from the input to the end."""
-
-    vertices: FloatArray
-    faces: IntArray
-    body: IntArray
-
-    @cached_property
-    def edges(self) -> Edges:
-        return Edges.of(self.faces, len(self.vertices))
-
-    @cached_property
-    def sides(self) -> Sides:
-        return sides_of(self.vertices, self.faces, self.edges)
-
-    @cached_property
-    def area(self) -> FloatArray:
-        return face_areas(self.vertices, self.faces)
-
-    def at_valence(self, marked: BoolArray) -> BoolArray:
-        """Return ``[F]`` whether a face has an edge of marked valence, given ``[E]`` marks."""
-        return np.asarray(marked[self.edges.of_halfedge].reshape(-1, 3).any(axis=1))
-
-    def body_of_side(self) -> IntArray:
-        """Return ``[C]`` the body of each side component."""
-        result = np.zeros(len(self.sides.volume), dtype=np.int64)
-        result[self.sides.label] = np.repeat(self.body, 2)
-        return result
-
-    def sheet_share(self, bodies: int) -> FloatArray:
-        """Return ``[bodies]`` the share of the area of each body that has no inside."""
-        sheet = np.bincount(self.body, self.area * self.sides.sheet, bodies)
-        share: FloatArray = sheet / np.maximum(np.bincount(self.body, self.area, bodies), _NO_AREA)
-        return share
-
-    def in_patches(self) -> _Soup:
-        """The same faces, come apart along folds and along every edge that more than two of them share.
-
-        Sheets that meet in an edge are thickened one by one and united afterwards: where all corners of a sheet lie on
-        others, or face both ways, no vertex would be left to give it thickness.
-        """
-        halfedge = np.argsort(self.edges.of_halfedge, kind="stable")
-        halfedge = halfedge[self.edges.valence[self.edges.of_halfedge[halfedge]] == 2].reshape(-1, 2)
-        across = [_across(self.vertices, self.faces, some) for some in halfedge.T]
-        halfedge = halfedge[np.einsum("ij,ij->i", *across) < _FOLD]
-        count, patch = components(len(self.faces), halfedge[:, 0] // 3, halfedge[:, 1] // 3)
-        # Layers of thousands of faces on each other take minutes to unite: there, thin spots are the lesser evil.
-        patches = np.unique(np.stack([self.body, patch], axis=1), axis=0)[:, 0]
-        tangled = (np.bincount(patches)[self.body] > _MOST_PATCHES) | (
-            np.bincount(self.body)[self.body] > _MOST_PATCHED
-        )
-        patch = np.where(tangled, count + self.body, patch)
-        count += int(self.body.max(initial=0)) + 1
-        key = self.faces * count + patch[:, None]
-        distinct, corner = np.unique(key, return_inverse=True)
-        return _Soup(self.vertices[distinct // max(count, 1)], corner.reshape(-1, 3), self.body)
-
-    def only(self, keep: BoolArray) -> _Soup:
-        """The marked faces."""
-        return _Soup(self.vertices, self.faces[keep], self.body[keep])
 
 
 def repair(mesh: InputMesh, *, resolution: int = 100, threads: int | None = None, keep_cavities: bool = False) -> Solid:
@@ -185,7 +112,7 @@ def repair(mesh: InputMesh, *, resolution: int = 100, threads: int | None = None
     faces = faces[first_of_doubled(faces, len(vertices))]
     surface = (vertices, np.ascontiguousarray(faces, dtype=np.int32))
 
-    if len(faces) == 0 or face_areas(vertices, faces).max() < _NO_AREA:
+    if len(faces) == 0 or face_areas(vertices, faces).max() < NO_AREA:
         warnings.append("no face has an area: the hull of the points stands in for the solid")
         solid = hull_of_points(points, HALF_THICKNESS)
         body = BodyRepair(0, "hull", len(mesh.faces), solid.num_tri(), 0.0)
@@ -227,7 +154,7 @@ class _Repair:
         self.by_room = np.zeros(self.bodies, dtype=bool)  # capped only because nothing can reach the cap
         self._note(body[(faces != surface.faces[origin]).any(axis=1)], "welded")
 
-        soup = _Soup(surface.vertices, faces, body)
+        soup = Soup(surface.vertices, faces, body)
         if self._is_oriented(soup):
             parts = self._as_they_are(soup)
         else:
@@ -265,7 +192,7 @@ class _Repair:
         """Where a ball of radius `GAP` can go around the input."""
         return Reach.of(self.input.vertices, self.input.faces, radius=GAP, resolution=self.resolution)
 
-    def _is_oriented(self, soup: _Soup) -> bool:
+    def _is_oriented(self, soup: Soup) -> bool:
         """Whether every edge joins two faces that run along it in opposite directions, and no body is flat."""
         if (soup.edges.valence != 2).any():
             return False
@@ -275,7 +202,7 @@ class _Repair:
         volume = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces))
         return bool((np.abs(volume) > 2 * _FLAT * np.bincount(soup.body, soup.area)).all())
 
-    def _as_they_are(self, soup: _Soup) -> list[tuple[Manifold, int]]:
+    def _as_they_are(self, soup: Soup) -> list[tuple[Manifold, int]]:
         """Take closed, oriented bodies over; what `_build` would come to, without looking at every side."""
         volume = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces))
         inward = volume < 0
@@ -285,7 +212,7 @@ class _Repair:
         solids = [to_manifold(v, f) for v, f in split_labels(soup.vertices, faces, soup.body)]
         return list(zip(solids, range(self.bodies), strict=True))
 
-    def _drop_hidden(self, soup: _Soup) -> _Soup:
+    def _drop_hidden(self, soup: Soup) -> Soup:
         """Drop faces that lie inside their own body, where that is what keeps the body from having an inside.
 
         Where parts meet in faces that overlap without matching, the order of faces around an edge is undecided, and one
@@ -299,14 +226,14 @@ class _Repair:
         hidden = np.zeros(len(soup.faces), dtype=bool)
         for body in np.flatnonzero(crowded & (share > _FLAPS)):
             some = np.flatnonzero(soup.body == body)
-            hidden[some] = _hidden_faces(soup.vertices, soup.faces[some])
+            hidden[some] = hidden_faces(soup.vertices, soup.faces[some])
         if not hidden.any():
             return soup
         better = soup.only(~hidden).sheet_share(self.bodies) < share / 2
         self._note(soup.body[hidden & better[soup.body]], "outer skin")
         return soup.only(~hidden | ~better[soup.body])
 
-    def _cap(self, soup: _Soup) -> _Soup:
+    def _cap(self, soup: Soup) -> Soup:
         """Cap the bodies all of whose holes can honestly be capped."""
         edges = free_edges(soup.faces, len(soup.vertices))
         loops = free_loops(edges) if len(edges) <= MOST_FREE_EDGES else []
@@ -331,10 +258,10 @@ class _Repair:
         chosen[soup.body[at_hole]] = True
         chosen[owner[on[far & ~(nearly_closed[owner[on]] & (distance <= HOLE))]]] = False
 
-        def capped() -> _Soup:
+        def capped() -> Soup:
             some = chosen[owner]
             faces, body = np.concatenate([soup.faces, caps[some]]), np.concatenate([soup.body, owner[some]])
-            return _Soup(soup.vertices, faces, body).only(first_of_doubled(faces, len(soup.vertices)))
+            return Soup(soup.vertices, faces, body).only(first_of_doubled(faces, len(soup.vertices)))
 
         # A cap is worth having only where it gives the body an inside: a strip whose cap lies on itself stays a sheet.
         trial = capped()
@@ -354,7 +281,7 @@ class _Repair:
             )
         return capped()
 
-    def _build(self, soup: _Soup) -> list[tuple[Manifold, int]]:
+    def _build(self, soup: Soup) -> list[tuple[Manifold, int]]:
         """Turn every body into closed solids; returns them, and the body each belongs to."""
         sides = soup.sides
         front, back = sides.label[0::2], sides.label[1::2]
@@ -376,7 +303,7 @@ class _Repair:
         mixed = np.bincount(soup.body[sheet], minlength=self.bodies) > 0
         return self._skins(soup.only(~sheet & (wall | ~mixed[soup.body]))) + self._skins(soup.only(sheet).in_patches())
 
-    def _skins(self, soup: _Soup) -> list[tuple[Manifold, int]]:
+    def _skins(self, soup: Soup) -> list[tuple[Manifold, int]]:
         """Build the outer side components of a soup; sheets and flat bodies get thickness."""
         if len(soup.faces) == 0:
             return []
@@ -393,7 +320,7 @@ class _Repair:
         # Where parts touch along an edge, their common outer skin runs through the edge twice. Their insides are plain:
         # build those, turned inside out, and let the union join them.
         pinched = np.zeros(self.bodies, dtype=bool)
-        pinched[soup.body_of_side()[label[_on_repeated_edge(faces, len(vertices))]]] = True
+        pinched[soup.body_of_side()[label[on_repeated_edge(faces, len(vertices))]]] = True
         # Only where the skin is one piece: volumes of crossing pieces do not add up to those of the insides.
         pinched &= np.bincount(soup.body_of_side(), sides.volume > 0, self.bodies) == 1
         pinched[soup.body[sides.sheet]] = False
@@ -409,7 +336,7 @@ class _Repair:
         return list(zip(solids, body.tolist(), strict=True))
 
     @staticmethod
-    def _skin(soup: _Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, IntArray, IntArray]:
+    def _skin(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, IntArray, IntArray]:
         """Build side components, sheets and flat ones with thickness."""
         front = soup.sides.label[0::2]
         thin = keep[front] & (soup.sides.sheet | flat[front])
@@ -419,7 +346,7 @@ class _Repair:
         """Return a solid of grid cells, drawn onto the input and simplified."""
         return to_manifold(*self.reach.wrap(cells, self.input, HALF_THICKNESS)).simplify(error)
 
-    def _wrap_crowds(self, soup: _Soup, parts: list[tuple[Manifold, int]]) -> list[tuple[Manifold, int]]:
+    def _wrap_crowds(self, soup: Soup, parts: list[tuple[Manifold, int]]) -> list[tuple[Manifold, int]]:
         """Wrap sheets by the hundred (leaves, feathers) as one body: what no ball of radius `GAP` can tell apart."""
         is_slab = self.step == STEPS.index("slab")
         if is_slab.sum() <= _CROWD:
@@ -435,7 +362,7 @@ class _Repair:
         self.faces_out[first] = wrap.num_tri()
         return [*((part, body) for part, body in parts if not is_slab[body]), (wrap, first)]
 
-    def _wrap_rooms(self, soup: _Soup, parts: list[tuple[Manifold, int]]) -> None:
+    def _wrap_rooms(self, soup: Soup, parts: list[tuple[Manifold, int]]) -> None:
         """Close rooms that sheets enclose but for gaps no ball of radius `GAP` passes."""
         is_slab = self.step == STEPS.index("slab")
         slabs = soup.only(is_slab[soup.body])
@@ -479,35 +406,3 @@ class _Repair:
         lost = np.flatnonzero(distance > 2 * HALF_THICKNESS)
         lost = lost[~solid.inside(points[lost])]
         np.maximum.at(self.deviation, self.body_of_input[changed[on[lost]]], distance[lost])
-
-
-def _across(vertices: FloatArray, faces: IntArray, halfedges: IntArray) -> FloatArray:
-    """Return the unit direction ``[N, 3]`` in which each halfedge's face leads away from it."""
-    face, corner = halfedges // 3, halfedges % 3
-    a, b, c = (vertices[faces[face, (corner + i) % 3]] for i in range(3))
-    along = (b - a) / np.maximum(np.linalg.norm(b - a, axis=1, keepdims=True), np.finfo(float).tiny)
-    away = c - a - np.einsum("ij,ij->i", c - a, along)[:, None] * along
-    return np.asarray(away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), np.finfo(float).tiny))
-
-
-def _on_repeated_edge(faces: IntArray, count: int) -> BoolArray:
-    """Return ``[F]`` which faces have a directed edge that another face has too."""
-    key = (faces * count + np.roll(faces, -1, axis=1)).ravel()
-    _, inverse, number = np.unique(key, return_inverse=True, return_counts=True)
-    result: BoolArray = (number[inverse.reshape(-1, 3)] > 1).any(axis=1)
-    return result
-
-
-def _hidden_faces(vertices: FloatArray, faces: IntArray) -> BoolArray:
-    """Return ``[F]`` which faces of one body it winds around on both sides."""
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    normal = np.cross(b - a, c - a)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
-    middle = (a + b + c) / 3
-    query = SurfaceQuery(vertices, faces)
-    beside = np.stack([query.winding(middle + _BESIDE * normal), query.winding(middle - _BESIDE * normal)])
-    if signed_tetrahedra(vertices, faces).sum() < 0:
-        beside = -beside
-    # On a skin the sides have 0 and 1; a wall inside has 0.5 and 1.5. A skin that lies double has 0 and 2.
-    result: BoolArray = (beside.mean(axis=0) > 0.75) & (beside.min(axis=0) > 0.25)
-    return result
