@@ -1,6 +1,6 @@
 """How well the saving of each candidate plane can be told from an encoder's features, and what encoding costs.
 
-    python benchmarks/encoders.py MESHES
+    python benchmarks/encoders.py MESHES [--encoder-weights I2P_MAE_FILE]
 
 The saving r_1 of all 150 planes is known from the sweep. The Q network's own architecture learns it from the features
 of some components, and is asked about components of other meshes.
@@ -16,7 +16,7 @@ import numpy as np
 import torch
 
 from rlacd.criteria import Concavity
-from rlacd.learn.encoders import describe, make_encoder
+from rlacd.learn.encoders import I2P_MAE, describe, make_encoder
 from rlacd.learn.episodes import Episodes
 from rlacd.learn.meshes import Solids, list_meshes
 from rlacd.learn.qnetwork import QNetwork
@@ -43,8 +43,8 @@ def components(episodes: Episodes, count: int, rng: np.random.Generator) -> Labe
     return seen, np.array(savings, dtype=np.float32)
 
 
-def learn(encoder_name: str, known: Labelled, unknown: Labelled, epochs: int) -> None:
-    encoder = make_encoder(encoder_name)
+def learn(encoder_name: str, weights: str, known: Labelled, unknown: Labelled, epochs: int) -> None:
+    encoder = make_encoder(encoder_name, weights)
     started = time.process_time()
     x, y = describe_all(encoder, known[0]), torch.from_numpy(known[1])
     cost = 1000 * (time.process_time() - started) / len(known[0])
@@ -80,6 +80,7 @@ def main() -> None:
     parser.add_argument("--known", type=int, default=2000)
     parser.add_argument("--unknown", type=int, default=500)
     parser.add_argument("--epochs", type=int, default=20)
+    parser.add_argument("--encoder-weights", help="Weights of i2p-mae; it is left out without.")
     given = parser.parse_args()
     torch.set_num_threads(1)
     listed = list_meshes(given.meshes, max_faces=500, validation=200, seed=0)
@@ -92,8 +93,9 @@ def main() -> None:
     same = np.where(valid, mean, -np.inf).argmax(axis=1)
     best = np.where(valid, unknown[1], -np.inf).max(axis=1).mean()
     print(f"always the same plane saves {unknown[1][np.arange(len(same)), same].mean() / best:.3f}")
-    for name in ("profile", "pointnet"):
-        learn(name, known, unknown, given.epochs)
+    encoders = {"profile": "", "pointnet": ""} | ({I2P_MAE: given.encoder_weights} if given.encoder_weights else {})
+    for name, weights in encoders.items():
+        learn(name, weights, known, unknown, given.epochs)
 
 
 if __name__ == "__main__":

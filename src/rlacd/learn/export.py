@@ -107,13 +107,26 @@ def to_onnx(module: nn.Module, example: tuple[Tensor, ...], inputs: tuple[str, .
         )
     assert program is not None
     model = program.model_proto
-    del model.metadata_props[:]
+    _without_traces(model)
     for graph in (model.graph, *model.functions):
-        for node in graph.node:  # traces of the exporter: source lines of the machine it ran on
-            del node.metadata_props[:]
-            node.doc_string = ""
+        _without_traces(graph)
     onnx.checker.check_model(model)
     return model
+
+
+def _without_traces(part: onnx.ModelProto | onnx.GraphProto | onnx.FunctionProto) -> None:
+    """Take out what the exporter says of its own run: source lines, with the paths of the machine it ran on."""
+    del part.metadata_props[:]
+    if isinstance(part, onnx.ModelProto):
+        return
+    for value in part.value_info:
+        del value.metadata_props[:]
+    for node in part.node:
+        del node.metadata_props[:]
+        node.doc_string = ""
+        for attribute in node.attribute:
+            if attribute.type == onnx.AttributeProto.GRAPH:  # the body of a loop
+                _without_traces(attribute.g)
 
 
 def _describe(model: onnx.ModelProto, options: TrainOptions) -> None:

@@ -352,7 +352,10 @@ MAY_CHANGE = frozenset(
 
 
 def _encoder(options: TrainOptions) -> AnyEncoder:
-    return make_encoder(options.encoder, options.encoder_weights, pick_device(options.device))
+    encoder = make_encoder(options.encoder, options.encoder_weights, pick_device(options.device))
+    if isinstance(encoder, I2PMAEEncoder):
+        encoder.require_points(options.points)
+    return encoder
 
 
 def _digest(encoder: AnyEncoder) -> str:

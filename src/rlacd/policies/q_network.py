@@ -62,6 +62,8 @@ class OnnxQ:
             raise WeightsError(f"{path} is no Q network of rlacd; export the policy again.")
         try:
             self.points, self.threshold = int(about["points"]), float(about["threshold"])
+            if self.points < 1 or not self.threshold > 0:
+                raise ValueError
         except (KeyError, TypeError, ValueError) as error:
             raise WeightsError(f"The metadata of {path} are damaged; export the policy again.") from error
 

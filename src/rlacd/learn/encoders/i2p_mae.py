@@ -226,12 +226,22 @@ class I2PMAEEncoder(nn.Module):
 
     def features(self, clouds: Tensor) -> Tensor:
         """Describe point clouds as they are: float32 [B, N, 3] to [B, 384]."""
-        if clouds.shape[1] < self.sizes.groups[0]:
-            raise OptionError(
-                f"there are {clouds.shape[1]} points; this encoder needs at least {self.sizes.groups[0]} (--points)."
-            )
+        self.require_points(clouds.shape[1])
         tokens: Tensor = self.h_encoder(clouds)
         return tokens.amax(dim=1)
+
+    def require_points(self, count: int) -> None:
+        """Make sure that clouds of so many points can be grouped.
+
+        Raises
+        ------
+        OptionError
+            They are too few.
+        """
+        if count < self.sizes.groups[0]:
+            raise OptionError(
+                f"there are {count} points; this encoder needs at least {self.sizes.groups[0]} (--points)."
+            )
 
     def forward(self, points: Tensor, directions: Tensor) -> Tensor:
         """See `Encoder.encode`; the directions are not looked at.
