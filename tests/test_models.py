@@ -52,6 +52,29 @@ def test_bullet_simulates_urdf(tmp_path: Path, wooden: Decomposition) -> None:
     assert_stands(fall_in_bullet(wooden.save(tmp_path / "table.urdf")), wooden)
 
 
+def test_bullet_reads_the_objects_of_one_mesh_as_hulls(tmp_path: Path, wooden: Decomposition) -> None:
+    """Under the table there is room for a ball, which there is not in its one convex hull."""
+    bullet = pytest.importorskip("pybullet", reason="the extra sim is not installed")
+    path = wooden.save(tmp_path / "table.urdf", one_mesh=True)
+    assert path.read_text().count("<collision") == 1
+    assert fall_in_bullet(path).speed < 1e-2
+    one = renamed(wooden, "one", hulls=[hull_of(wooden.source.vertices)])
+    client = bullet.connect(bullet.DIRECT)
+    try:
+        shape = bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=0.03, physicsClientId=client)
+        ball = bullet.createMultiBody(1, shape, basePosition=[0.2, 0.15, 0.09], physicsClientId=client)
+        gaps = []
+        for file in (path, one.save(tmp_path / "one.urdf", one_mesh=True)):
+            body = bullet.loadURDF(str(file), physicsClientId=client)
+            near = bullet.getClosestPoints(body, ball, distance=1.0, physicsClientId=client)
+            gaps.append(min(point[8] for point in near))
+            bullet.removeBody(body, physicsClientId=client)
+        assert gaps[0] > 0.03
+        assert gaps[1] < 0
+    finally:
+        bullet.disconnect(client)
+
+
 def test_drake_simulates_sdf(tmp_path: Path, wooden: Decomposition) -> None:
     assert_stands(fall_in_drake(wooden.save(tmp_path / "table.sdf")), wooden)
 
@@ -276,6 +299,7 @@ def test_usd_without_its_extra_is_one_sentence_before_any_work(
         ("table.xml", {"density": float("nan")}, OptionError, "density"),
         ("table.xml", {"up": "w"}, OptionError, "no axis"),
         ("no/table.xml", {}, OutputError, "does not exist; create it first"),
+        ("table.xml", {"one_mesh": True}, OptionError, r"one mesh for all hulls is for \.urdf"),
         ("table.blend", {}, OutputError, r"\.xml, \.urdf, \.sdf, \.usd"),
     ],
 )

@@ -54,6 +54,7 @@ def save(
     file_format: str | None = None,
     density: float = DENSITY,
     up: str = "z",
+    one_mesh: bool = False,
 ) -> Path:
     """Write a decomposition; see `rlacd.Decomposition.save`.
 
@@ -65,22 +66,22 @@ def save(
         The format needs an extra that is not installed.
     """
     check_model_options(density, up)
-    target = hull_target(path, file_format)
+    target = hull_target(path, file_format, one_mesh=one_mesh)
     if target.file_format not in MODELS:
         return save_hulls(result.hulls, path, stem=result.name, file_format=file_format)
     model = model_of(result, density=density, up=up)
     if target.file_format in WITH_MESHES:
-        _save_with_meshes(model, target)
+        _save_with_meshes(model, target, one_mesh)
     else:
         encode = _ONE_FILE[target.file_format]
         write_file(target.path, encode(model, target.path.suffix.lower().lstrip(".")))
     return target.path
 
 
-def _save_with_meshes(model: Model, target: Target) -> None:
+def _save_with_meshes(model: Model, target: Target, one_mesh: bool) -> None:
     folder = mesh_folder(target.path, target.file_format)
     stem = file_stem(model.name)
-    hulls, visual = mesh_files(model, stem)
+    hulls, visual = mesh_files(model, stem, one_mesh=one_mesh)
     files = {file.name: file.data for file in (*([] if visual is None else [visual]), *hulls)}
     check_names(folder, stem, list(files))
     described = _WITH_MESHES[target.file_format](model, hulls, visual, folder.name)

@@ -51,7 +51,7 @@ class Target:
     is_folder: bool
 
 
-def hull_target(path: str | os.PathLike[str], file_format: str | None = None) -> Target:
+def hull_target(path: str | os.PathLike[str], file_format: str | None = None, *, one_mesh: bool = False) -> Target:
     """Read `path` the way `Decomposition.save` does and check that it can be written to.
 
     Parameters
@@ -61,14 +61,23 @@ def hull_target(path: str | os.PathLike[str], file_format: str | None = None) ->
         anything else is one file, its format told by its ending.
     file_format : str, optional
         The format of the files in a folder.
+    one_mesh : bool
+        Whether a model is to have all its hulls in one mesh file; URDF alone can.
 
     Raises
     ------
     OutputError
         Unknown ending, missing parent folder, no permission, or a folder where a file is meant or the reverse.
     OptionError
-        `file_format` is unknown, or given for a single file with another ending.
+        `file_format` is unknown, or given for a single file with another ending; or `one_mesh` for anything but URDF.
     """
+    target = _target(path, file_format)
+    if one_mesh and target.file_format != "urdf":
+        raise OptionError(f"one mesh for all hulls is for .urdf files, not for {target.path}: leave it out.")
+    return target
+
+
+def _target(path: str | os.PathLike[str], file_format: str | None) -> Target:
     text = os.fspath(path)
     if not text:
         raise OutputError("the output has no name; give a file such as hulls.glb, or a folder such as hulls/.")

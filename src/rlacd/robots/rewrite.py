@@ -27,6 +27,7 @@ from rlacd.solid.hull import Hull
 from rlacd.solid.load import load_mesh
 
 ENDINGS = {".urdf": "urdf", ".xml": "mjcf"}
+ROOTS = {"urdf": "robot", "mjcf": "mujoco"}
 
 
 @dataclass(frozen=True)
@@ -108,6 +109,10 @@ def rewrite_robot(
     check_rewrite(source, place)
     kind = ENDINGS[source.suffix.lower()]
     document = parse(source, _read(source))
+    if document.root.tag != ROOTS[kind]:
+        raise MeshFileError(
+            f"{source} is no {kind.upper()}: it starts with <{document.root.tag}>, not <{ROOTS[kind]}>."
+        )
     references = References(source, package_dirs)
     folder = place.with_name(f"{place.stem}_{kind}")
     plan, warnings = _plan(document, kind, references, place, folder)
