@@ -19,7 +19,7 @@ from rlacd.formats.folder import check_names, write_folder
 from rlacd.formats.mjcf import encode_mjcf
 from rlacd.formats.model import DENSITY, Model, check_model_options, mesh_files, model_of
 from rlacd.formats.sdf import encode_sdf
-from rlacd.formats.target import FORMATS, MODELS, WITH_MESHES, Target, check_file, hull_target, mesh_folder
+from rlacd.formats.target import FORMATS, MODELS, WITH_MESHES, Target, check_file, check_name, hull_target, mesh_folder
 from rlacd.formats.urdf import encode_urdf
 from rlacd.formats.usd import encode_usd
 
@@ -34,6 +34,7 @@ __all__ = [
     "check_balls",
     "check_file",
     "check_model_options",
+    "check_name",
     "file_stem",
     "hull_target",
     "save",

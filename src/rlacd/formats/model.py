@@ -93,7 +93,10 @@ def model_of(result: Decomposition, *, density: float = DENSITY, up: str = "z") 
     if not (0 < mass.volume_m < math.inf and np.isfinite(mass.inertia_m).all()):
         raise OutputError(f"the mass of {result.name} at density {density:g} is {mass.volume_m:g}; scale the mesh.")
     visual = result.source if len(result.source.faces) else None
-    return Model(printable_name(result.name), result.hulls, visual, mass, up)
+    name = printable_name(result.name).replace("::", "_")  # which parts names in SDF
+    if name == "world" or re.fullmatch("__.*__", name):
+        name = f"body_{name.strip('_')}"  # simulators keep those names for themselves
+    return Model(name, result.hulls, visual, mass, up)
 
 
 def check_model_options(density: float, up: str) -> None:

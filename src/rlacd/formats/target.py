@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,6 +25,8 @@ MODELS: dict[str, tuple[str, ...]] = {
 """Hulls with the mesh they stand for, in a simulator's or an engine's own words, and the endings of each."""
 
 _MODEL_OF = {ending: name for name, endings in MODELS.items() for ending in endings if ending not in FORMATS}
+
+_UNWRITABLE = re.compile("[\x00-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
 
 WITH_MESHES = ("mjcf", "urdf", "sdf")
 """Models that name mesh files beside them."""
@@ -117,6 +120,12 @@ def mesh_folder(path: Path, file_format: str) -> Path:
     return path.with_name(f"{path.stem}_{file_format}")
 
 
+def check_name(path: Path) -> None:
+    """Raise OutputError if a file's name cannot be written down in XML, as that of its folder of meshes will be."""
+    if _UNWRITABLE.search(path.name):
+        raise OutputError(f"cannot write {str(path)!r}: XML cannot hold some marks of its name; choose another name.")
+
+
 def _model_target(text: str, file_format: str) -> Target:
     place = Path(text)
     endings = [f".{ending}" for ending in MODELS[file_format]]
@@ -128,6 +137,7 @@ def _model_target(text: str, file_format: str) -> Target:
     if file_format == "usd":
         require_usd()
     if file_format in WITH_MESHES:
+        check_name(place)
         _check_folder(mesh_folder(place, file_format))
     return Target(place, file_format, is_folder=False)
 

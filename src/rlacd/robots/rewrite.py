@@ -14,7 +14,7 @@ import trimesh
 from rlacd.decompose import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError, MeshFileError, OptionError, OutputError
-from rlacd.formats import check_file, file_stem, write_file
+from rlacd.formats import check_file, check_name, file_stem, write_file
 from rlacd.formats.encode import encode_plain_obj
 from rlacd.formats.folder import check_names, write_folder
 from rlacd.robots.collada import collada_unit
@@ -149,6 +149,7 @@ def check_rewrite(source: Path, place: Path) -> None:
         raise OptionError(f"{source} can only be rewritten as another {source.suffix}, not as {place}.")
     if os.path.realpath(source) == os.path.realpath(place):
         raise OptionError(f"{place} would overwrite the input; choose another name.")
+    check_name(place)
     check_file(place)
     folder = place.with_name(f"{place.stem}_{ENDINGS[source.suffix.lower()]}")
     if folder.exists() and not folder.is_dir():
