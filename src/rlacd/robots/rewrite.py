@@ -18,7 +18,7 @@ from rlacd.formats import check_file, check_name, file_stem, write_file
 from rlacd.formats.encode import encode_plain_obj
 from rlacd.formats.folder import check_names, write_folder
 from rlacd.robots.collada import collada_unit
-from rlacd.robots.mjcf import mesh_folder_of, plan_mjcf
+from rlacd.robots.mjcf import mesh_folder, plan_mjcf
 from rlacd.robots.plan import HullFile, MeshUse, Plan
 from rlacd.robots.references import References
 from rlacd.robots.spans import Document, parse, replaced
@@ -90,7 +90,8 @@ def rewrite_robot(
     package_dirs : sequence of str
         ``NAME=FOLDER`` says where a package is; ``FOLDER`` alone may be read and searched for packages.
     **options
-        Those of `rlacd.decompose`. Lengths such as `threshold_m` are in the robot's unit, behind the scale of a mesh.
+        Those of `rlacd.decompose`, for each mesh. Lengths such as `threshold_m` are in the robot's unit, behind the
+        scale of a mesh; a `timeout` is for each mesh.
 
     Returns
     -------
@@ -161,7 +162,7 @@ def _plan(document: Document, kind: str, references: References, place: Path, fo
         plan = plan_urdf(document, references, lambda old, hull: _reference(old, hull, references, folder))
     else:
         source = Path(os.path.abspath(document.path)).parent
-        within = os.path.relpath(mesh_folder_of(document), source)  # the same from the new file
+        within = os.path.relpath(mesh_folder(document), source)  # the same from the new file
         target = os.path.relpath(folder.absolute(), Path(os.path.abspath(place.absolute().parent / within)))
         plan = plan_mjcf(document, references, lambda old, hull: (Path(target) / hull).as_posix())
     warnings = list(plan.warnings)
