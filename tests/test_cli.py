@@ -293,3 +293,61 @@ def test_info_tells_bodies_and_repair(mesh: Path) -> None:
     assert len(facts["repair"]) == 2
     assert facts["solid"]["volume"] == pytest.approx(2 * 2.0 * 0.4**2 - 0.4**3, rel=1e-4)
     assert shell("info", mesh.with_name("nothing.glb")).returncode == 2
+
+
+# --- formats and presets ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("words", "written"),
+    [
+        (["--preset", "mujoco"], "ell_hulls.xml"),
+        (["--preset", "bullet"], "ell_hulls.urdf"),
+        (["--preset", "unity"], "ell_hulls.obj"),
+        (["--preset", "unreal"], "ell_hulls.glb"),
+        (["--format", "sdf"], "ell_hulls.sdf"),
+        (["--format", "godot"], "ell_hulls.glb"),
+        (["--preset", "unreal", "-o", "{dir}/out.obj"], "out.obj"),
+        (["--preset", "unreal", "-o", "{dir}/out.stl"], "out.stl"),
+        (["--preset", "mujoco", "-o", "{dir}/out.glb"], "out.glb"),
+    ],
+)
+def test_presets_and_formats_choose_the_file(mesh: Path, stand_in: StandIn, words: list[str], written: str) -> None:
+    run = rlacd("decompose", mesh, *(word.format(dir=mesh.parent) for word in words))
+    assert run.exit_code == 0, run.stderr
+    data = mesh.with_name(written).read_bytes()
+    unreal = "unreal" in words and not written.endswith(".stl")
+    assert (b"UCX_ell_00" in data) == unreal
+    assert (b"ell_000-convcolonly" in data) == ("godot" in words)
+    assert [call.get("preset") for call in stand_in.calls] == [words[1] if words[0] == "--preset" else None]
+
+
+def test_density_and_up_reach_the_model(mesh: Path, stand_in: StandIn) -> None:
+    place = mesh.with_name("out.sdf")
+    assert rlacd("decompose", mesh, "-o", place, "--density", 2, "--up", "y").exit_code == 0
+    text = place.read_text()
+    volume = hull_of(trimesh.load(mesh).vertices).volume
+    assert float(text.split("<mass>")[1].split("<")[0]) == pytest.approx(2 * volume, rel=1e-5)
+    assert "quat_xyzw" in text
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "says"),
+    [
+        (["--preset", "havok"], 2, "one of mujoco, physx"),
+        (["--density", "-1", "-o", "{dir}/out.xml"], 2, "density is -1.0"),
+        (["--format", "urdf", "-o", "{dir}/out.glb"], 2, "ends in .urdf"),
+        (["--one-mesh", "-o", "{dir}/out.xml"], 2, "is for .urdf"),
+        (["--package-dir", "a=b"], 2, "belongs to robots"),
+        (["-o", "{dir}/out.xml", "--up", "w"], 2, "x, y or z"),
+    ],
+)
+def test_mistakes_about_models_are_found_before_the_work(
+    mesh: Path, stand_in: StandIn, words: list[str], code: int, says: str
+) -> None:
+    run = rlacd("decompose", mesh, *(word.format(dir=mesh.parent) for word in words))
+    assert run.exit_code == code
+    assert says in " ".join(run.stderr.split())
+    assert run.stderr.count("\n") == 1
+    assert stand_in.calls == []
+    assert [path.name for path in mesh.parent.iterdir()] == ["ell.stl"]

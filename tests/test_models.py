@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -52,6 +53,29 @@ def test_bullet_simulates_urdf(tmp_path: Path, wooden: Decomposition) -> None:
     assert_stands(fall_in_bullet(wooden.save(tmp_path / "table.urdf")), wooden)
 
 
+def test_bullet_reads_the_objects_of_one_mesh_as_hulls(tmp_path: Path, wooden: Decomposition) -> None:
+    """Under the table there is room for a ball, which there is not in its one convex hull."""
+    bullet = pytest.importorskip("pybullet", reason="the extra sim is not installed")
+    path = wooden.save(tmp_path / "table.urdf", one_mesh=True)
+    assert path.read_text().count("<collision") == 1
+    assert fall_in_bullet(path).speed < 1e-2
+    one = renamed(wooden, "one", hulls=[hull_of(wooden.source.vertices)])
+    client = bullet.connect(bullet.DIRECT)
+    try:
+        shape = bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=0.03, physicsClientId=client)
+        ball = bullet.createMultiBody(1, shape, basePosition=[0.2, 0.15, 0.09], physicsClientId=client)
+        gaps = []
+        for file in (path, one.save(tmp_path / "one.urdf", one_mesh=True)):
+            body = bullet.loadURDF(str(file), physicsClientId=client)
+            near = bullet.getClosestPoints(body, ball, distance=1.0, physicsClientId=client)
+            gaps.append(min(point[8] for point in near))
+            bullet.removeBody(body, physicsClientId=client)
+        assert gaps[0] > 0.03
+        assert gaps[1] < 0
+    finally:
+        bullet.disconnect(client)
+
+
 def test_drake_simulates_sdf(tmp_path: Path, wooden: Decomposition) -> None:
     assert_stands(fall_in_drake(wooden.save(tmp_path / "table.sdf")), wooden)
 
@@ -97,6 +121,7 @@ def test_bodies_stand_up_whatever_axis_points_up(tmp_path: Path, wooden: Decompo
     assert_stands(fall_in_drake(lying.save(tmp_path / "table.sdf", up=up)), lying)
 
 
+@pytest.mark.slow
 def test_real_objects_come_to_rest_everywhere(tmp_path: Path, corpus: Path) -> None:
     chair = rlacd.decompose(corpus / "raw" / "chair_ivar_0668.obj", threads=1)
     mujoco, bullet = (
@@ -186,9 +211,21 @@ def test_any_name_goes_in_every_format(tmp_path: Path, wooden: Decomposition) ->
     folder = tmp_path / "ein Ordner – 机"
     folder.mkdir()
     odd = renamed(wooden, AWKWARD)
-    assert_stands(fall_in_mujoco(odd.save(folder / "Tisch 机.xml")), wooden)
-    assert_stands(fall_in_bullet(odd.save(folder / "Tisch 机.urdf")), wooden)
-    assert_stands(fall_in_drake(odd.save(folder / "Tisch 机.sdf")), wooden)
+    assert_stands(fall_in_mujoco(odd.save(folder / "Tisch 机 50%&#1.xml")), wooden)
+    assert_stands(fall_in_bullet(odd.save(folder / "Tisch 机 50%&#1.urdf")), wooden)
+    assert_stands(fall_in_drake(odd.save(folder / "Tisch 机 50%&#1.sdf")), wooden)
+
+
+@pytest.mark.parametrize("name", ["world", "main", "visual", "collision", "a::b", "__model__", "0", "ground"])
+def test_names_that_mean_something_to_simulators_are_no_trap(tmp_path: Path, wooden: Decomposition, name: str) -> None:
+    odd = renamed(wooden, name)
+    mujoco = fall_in_mujoco(odd.save(tmp_path / "a.xml"), 0.1) if name != "ground" else None
+    assert mujoco is None or mujoco.hulls == len(wooden)
+    assert fall_in_bullet(odd.save(tmp_path / "a.urdf"), 0.2).hulls == len(wooden)
+    for path in (odd.save(tmp_path / "b.sdf"), tmp_path / "a.urdf"):
+        rest = fall_in_drake(path, 0.1)
+        assert rest.hulls == len(wooden)
+        assert rest.mass == pytest.approx(TABLE_VOLUME * 1000, rel=1e-6)
 
 
 @pytest.mark.parametrize("name", ["\x07bell\nline", "\ud800", "￿", " ", "../../up", "x" * 400])
@@ -201,8 +238,9 @@ def test_names_that_xml_or_disks_cannot_hold_are_made_plain(tmp_path: Path, wood
     }
 
 
+@pytest.mark.slow
 def test_a_body_of_500_hulls_is_simulated(tmp_path: Path) -> None:
-    spots = np.stack(np.meshgrid(np.arange(10), np.arange(10), np.arange(5)), axis=-1).reshape(-1, 3) * 0.05
+    spots = np.stack(np.meshgrid(np.arange(5), np.arange(10), np.arange(10)), axis=-1).reshape(-1, 3) * 0.05
     cubes = [hull_of(trimesh.creation.box((0.04, 0.04, 0.04)).vertices + spot) for spot in spots]
     many = Decomposition(cubes, {"name": "many"}, trimesh.util.concatenate(cubes))
     for fall, ending in ((fall_in_mujoco, "xml"), (fall_in_bullet, "urdf")):
@@ -276,6 +314,7 @@ def test_usd_without_its_extra_is_one_sentence_before_any_work(
         ("table.xml", {"density": float("nan")}, OptionError, "density"),
         ("table.xml", {"up": "w"}, OptionError, "no axis"),
         ("no/table.xml", {}, OutputError, "does not exist; create it first"),
+        ("table.xml", {"one_mesh": True}, OptionError, r"one mesh for all hulls is for \.urdf"),
         ("table.blend", {}, OutputError, r"\.xml, \.urdf, \.sdf, \.usd"),
     ],
 )
@@ -285,6 +324,31 @@ def test_mistakes_are_one_sentence(
     with pytest.raises(error, match=says):
         save(wooden, f"{tmp_path}/{path}", **options)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["tab\tle", "ta\x01ble", "ta\udc80ble"])
+def test_names_of_files_that_xml_cannot_hold_are_refused(tmp_path: Path, wooden: Decomposition, name: str) -> None:
+    for ending in ("xml", "urdf", "sdf"):
+        with pytest.raises(OutputError, match="XML cannot hold"):
+            wooden.save(tmp_path / f"{name}.{ending}")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_folders_that_may_not_be_written_to_are_said_before_any_work(
+    tmp_path: Path, wooden: Decomposition, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Told by the operating system's own answer, since tests may run as root, who may write everywhere."""
+    (tmp_path / "table_urdf").mkdir()
+    access = os.access
+    closed = {tmp_path / "table_urdf"}
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path) not in closed and access(path, mode))
+    with pytest.raises(OutputError, match=r"cannot write into .*table_urdf: you may not"):
+        wooden.save(tmp_path / "table.urdf")
+    closed.add(tmp_path)
+    for ending in ("urdf", "usda", "glb"):
+        with pytest.raises(OutputError, match="you may not write to"):
+            wooden.save(tmp_path / f"table.{ending}")
+    assert [path.name for path in tmp_path.iterdir()] == ["table_urdf"]
 
 
 def test_what_others_put_in_the_folder_of_meshes_is_not_replaced(tmp_path: Path, wooden: Decomposition) -> None:

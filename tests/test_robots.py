@@ -379,6 +379,7 @@ STEAL = """<?xml version="1.0"?><!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/pass
         ("<a>" * 2000 + "</a>" * 2000, "more than 500 deep"),
         ('<robot xmlns:xacro="x"><xacro:macro name="m"/></robot>', "xacro"),
         ("<robot name='r'><link name='l'/></robot>", "no collision mesh"),
+        ("<sdf/>", "is no URDF: it starts with <sdf>"),
         ('<?xml version="1.0" encoding="klingon"?><robot/>', "klingon|encoding"),
         ("<robot><link name='l'><collision><geometry><mesh/></geometry></collision></link></robot>", "no filename"),
     ],

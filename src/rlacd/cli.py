@@ -148,6 +148,14 @@ def decompose(
             show_default=False,
         ),
     ] = None,
+    one_mesh: Annotated[
+        bool,
+        typer.Option(
+            "--one-mesh",
+            rich_help_panel=OUTPUT,
+            help="In a .urdf, one collision with all hulls as objects of its mesh, for Bullet.",
+        ),
+    ] = False,
     package_dir: Annotated[
         list[str] | None,
         typer.Option(
@@ -410,10 +418,11 @@ def decompose(
         if robot:
             if report is not None and is_html(report):
                 raise OptionError("--report as a page belongs to a single mesh; for a robot give a .json file.")
-            _check_robot({"--picture": picture, "--balls": balls, "--format": folder_format, "--density": density})
+            one_body = {"--picture": picture, "--balls": balls, "--format": folder_format, "--density": density}
+            _check_robot({**one_body, "--one-mesh": one_mesh or None})
         else:
             check_model_options(**_chosen({"density": 1.0, **_chosen(written)}))
-            hull_target(place, folder_format)
+            hull_target(place, folder_format, one_mesh=one_mesh)
             if package_dir:
                 raise OptionError("--package-dir belongs to robots: a .urdf or .xml file as input.")
         if report is not None and report != STDOUT:
@@ -467,7 +476,7 @@ def decompose(
 
         with Watch(quiet=quiet) as watch:
             result = run(mesh, **_chosen(given), progress=watch)
-        result.save(place, file_format=folder_format, **_chosen(written))
+        result.save(place, file_format=folder_format, one_mesh=one_mesh, **_chosen(written))
         if not quiet:
             say(summary(result, place))
         if report == STDOUT:

@@ -89,6 +89,7 @@ class Decomposition:
         file_format: str | None = None,
         density: float = 1000.0,
         up: Axis = "z",
+        one_mesh: bool = False,
     ) -> Path:
         """Write the hulls to one file, to a folder, or as a model; never leaves a half-written file.
 
@@ -108,6 +109,9 @@ class Decomposition:
             Mass per cubic unit of the input: models say how heavy the repaired input is.
         up : {"x", "y", "z"}
             The axis of the input that points up (y in files from glTF): MJCF and SDF stand the body up, USD says so.
+        one_mesh : bool
+            For URDF: one ``<collision>`` whose OBJ file has an object a hull, which Bullet reads as several shapes;
+            others take it for one.
 
         Returns
         -------
@@ -126,7 +130,7 @@ class Decomposition:
         """
         from rlacd.formats import save
 
-        return save(self, path, file_format=file_format, density=density, up=up)
+        return save(self, path, file_format=file_format, density=density, up=up, one_mesh=one_mesh)
 
     def save_balls(self, path: str | os.PathLike[str]) -> Path:
         """Write the balls that no hull touches.

@@ -19,7 +19,7 @@ from rlacd.formats.folder import check_names, write_folder
 from rlacd.formats.mjcf import encode_mjcf
 from rlacd.formats.model import DENSITY, Model, check_model_options, mesh_files, model_of
 from rlacd.formats.sdf import encode_sdf
-from rlacd.formats.target import FORMATS, MODELS, WITH_MESHES, Target, check_file, hull_target, mesh_folder
+from rlacd.formats.target import FORMATS, MODELS, WITH_MESHES, Target, check_file, check_name, hull_target, mesh_folder
 from rlacd.formats.urdf import encode_urdf
 from rlacd.formats.usd import encode_usd
 
@@ -34,6 +34,7 @@ __all__ = [
     "check_balls",
     "check_file",
     "check_model_options",
+    "check_name",
     "file_stem",
     "hull_target",
     "save",
@@ -54,6 +55,7 @@ def save(
     file_format: str | None = None,
     density: float = DENSITY,
     up: str = "z",
+    one_mesh: bool = False,
 ) -> Path:
     """Write a decomposition; see `rlacd.Decomposition.save`.
 
@@ -65,22 +67,22 @@ def save(
         The format needs an extra that is not installed.
     """
     check_model_options(density, up)
-    target = hull_target(path, file_format)
+    target = hull_target(path, file_format, one_mesh=one_mesh)
     if target.file_format not in MODELS:
         return save_hulls(result.hulls, path, stem=result.name, file_format=file_format)
     model = model_of(result, density=density, up=up)
     if target.file_format in WITH_MESHES:
-        _save_with_meshes(model, target)
+        _save_with_meshes(model, target, one_mesh)
     else:
         encode = _ONE_FILE[target.file_format]
         write_file(target.path, encode(model, target.path.suffix.lower().lstrip(".")))
     return target.path
 
 
-def _save_with_meshes(model: Model, target: Target) -> None:
+def _save_with_meshes(model: Model, target: Target, one_mesh: bool) -> None:
     folder = mesh_folder(target.path, target.file_format)
     stem = file_stem(model.name)
-    hulls, visual = mesh_files(model, stem)
+    hulls, visual = mesh_files(model, stem, one_mesh=one_mesh)
     files = {file.name: file.data for file in (*([] if visual is None else [visual]), *hulls)}
     check_names(folder, stem, list(files))
     described = _WITH_MESHES[target.file_format](model, hulls, visual, folder.name)

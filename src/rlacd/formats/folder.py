@@ -71,7 +71,7 @@ def _listed(listing: Path, stem: str) -> set[str]:
     """Hull files an earlier run wrote; only names of the form it writes, whatever the list says by now."""
     try:
         names = json.loads(listing.read_bytes())["files"]
-        ours = re.compile(re.escape(stem) + r"(_[^/\\]+)?_(\d{3,}|visual)\.(glb|obj|ply|stl)")
+        ours = re.compile(re.escape(stem) + r"(_[^/\\]+)?_(\d{3,}|visual|collision)\.(glb|obj|ply|stl)")
         return {name for name in names if ours.fullmatch(name)}
     except (OSError, ValueError, KeyError, TypeError):
         return set()  # No list, or one that somebody else made: then nothing here is known to be ours.

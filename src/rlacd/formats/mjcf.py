@@ -22,7 +22,7 @@ def encode_mjcf(model: Model, hulls: list[MeshFile], visual: MeshFile | None, fo
     if min(model.mass.volume_m, *np.linalg.eigvalsh(model.mass.inertia_m)) < LEAST_INERTIA:
         compiler.set("boundmass", repr(LEAST_INERTIA))
         compiler.set("boundinertia", repr(LEAST_INERTIA))
-    default = etree.SubElement(etree.SubElement(root, "default"), "default", {"class": model.name})
+    default = etree.SubElement(root, "default")
     looks = etree.SubElement(default, "default", {"class": "visual"})
     etree.SubElement(looks, "geom", type="mesh", contype="0", conaffinity="0", group="2")
     collides = etree.SubElement(default, "default", {"class": "collision"})

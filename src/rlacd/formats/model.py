@@ -12,7 +12,7 @@ import numpy as np
 import trimesh
 
 from rlacd.errors import OptionError, OutputError
-from rlacd.formats.encode import encode_plain_obj, hull_name
+from rlacd.formats.encode import encode_obj, encode_plain_obj, hull_name
 from rlacd.formats.single_precision import placed_hull, placed_mesh
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import Frame
@@ -93,7 +93,10 @@ def model_of(result: Decomposition, *, density: float = DENSITY, up: str = "z") 
     if not (0 < mass.volume_m < math.inf and np.isfinite(mass.inertia_m).all()):
         raise OutputError(f"the mass of {result.name} at density {density:g} is {mass.volume_m:g}; scale the mesh.")
     visual = result.source if len(result.source.faces) else None
-    return Model(printable_name(result.name), result.hulls, visual, mass, up)
+    name = printable_name(result.name).replace("::", "_")  # which parts names in SDF
+    if name == "world" or re.fullmatch("__.*__", name):
+        name = f"body_{name.strip('_')}"  # simulators keep those names for themselves
+    return Model(name, result.hulls, visual, mass, up)
 
 
 def check_model_options(density: float, up: str) -> None:
@@ -117,8 +120,10 @@ def node_name(name: str) -> str:
     return re.sub(r"\s+", "_", printable_name(name))
 
 
-def mesh_files(model: Model, stem: str) -> tuple[list[MeshFile], MeshFile | None]:
+def mesh_files(model: Model, stem: str, *, one_mesh: bool = False) -> tuple[list[MeshFile], MeshFile | None]:
     """Encode the hulls and the mesh to look at as OBJ files of their own, ``<stem>_000.obj`` and ``<stem>_visual.obj``.
+
+    With `one_mesh`, the hulls are the objects of a single file, ``<stem>_collision.obj``.
 
     Raises
     ------
@@ -136,6 +141,8 @@ def mesh_files(model: Model, stem: str) -> tuple[list[MeshFile], MeshFile | None
         rounded, shift = placed
         exact = rounded if shift.any() else hull  # readers that keep double precision get it where they can
         hulls.append(MeshFile(f"{stem}_{index:03d}.obj", encode_plain_obj(exact), shift))
+    if one_mesh:
+        hulls = [_one_file(model, f"{stem}_collision.obj", any(hull.shift.any() for hull in hulls))]
     if model.visual is None:
         return hulls, None
     visual, shift = placed_mesh(model.visual)
@@ -145,6 +152,13 @@ def mesh_files(model: Model, stem: str) -> tuple[list[MeshFile], MeshFile | None
 def numbers(values: Sequence[float] | FloatArray) -> str:
     """Write numbers with every digit, a blank between."""
     return " ".join(repr(float(value) + 0.0) for value in values)  # + 0.0: no negative zero
+
+
+def _one_file(model: Model, name: str, far: bool) -> MeshFile:
+    bounds = np.array([hull.bounds for hull in model.hulls])
+    shift = (bounds[:, 0].min(axis=0) + bounds[:, 1].max(axis=0)) / 2 if far else np.zeros(3)
+    moved = [trimesh.Trimesh(hull.vertices - shift, hull.faces, process=False) for hull in model.hulls]
+    return MeshFile(name, encode_obj(moved), shift)
 
 
 def _mass(result: Decomposition) -> Mass:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,6 +25,8 @@ MODELS: dict[str, tuple[str, ...]] = {
 """Hulls with the mesh they stand for, in a simulator's or an engine's own words, and the endings of each."""
 
 _MODEL_OF = {ending: name for name, endings in MODELS.items() for ending in endings if ending not in FORMATS}
+
+_UNWRITABLE = re.compile("[\x00-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
 
 WITH_MESHES = ("mjcf", "urdf", "sdf")
 """Models that name mesh files beside them."""
@@ -51,7 +54,7 @@ class Target:
     is_folder: bool
 
 
-def hull_target(path: str | os.PathLike[str], file_format: str | None = None) -> Target:
+def hull_target(path: str | os.PathLike[str], file_format: str | None = None, *, one_mesh: bool = False) -> Target:
     """Read `path` the way `Decomposition.save` does and check that it can be written to.
 
     Parameters
@@ -61,14 +64,23 @@ def hull_target(path: str | os.PathLike[str], file_format: str | None = None) ->
         anything else is one file, its format told by its ending.
     file_format : str, optional
         The format of the files in a folder.
+    one_mesh : bool
+        Whether a model is to have all its hulls in one mesh file; URDF alone can.
 
     Raises
     ------
     OutputError
         Unknown ending, missing parent folder, no permission, or a folder where a file is meant or the reverse.
     OptionError
-        `file_format` is unknown, or given for a single file with another ending.
+        `file_format` is unknown, or given for a single file with another ending; or `one_mesh` for anything but URDF.
     """
+    target = _target(path, file_format)
+    if one_mesh and target.file_format != "urdf":
+        raise OptionError(f"one mesh for all hulls is for .urdf files, not for {target.path}: leave it out.")
+    return target
+
+
+def _target(path: str | os.PathLike[str], file_format: str | None) -> Target:
     text = os.fspath(path)
     if not text:
         raise OutputError("the output has no name; give a file such as hulls.glb, or a folder such as hulls/.")
@@ -108,6 +120,12 @@ def mesh_folder(path: Path, file_format: str) -> Path:
     return path.with_name(f"{path.stem}_{file_format}")
 
 
+def check_name(path: Path) -> None:
+    """Raise OutputError if a file's name cannot be written down in XML, as that of its folder of meshes will be."""
+    if _UNWRITABLE.search(path.name):
+        raise OutputError(f"cannot write {str(path)!r}: XML cannot hold some marks of its name; choose another name.")
+
+
 def _model_target(text: str, file_format: str) -> Target:
     place = Path(text)
     endings = [f".{ending}" for ending in MODELS[file_format]]
@@ -119,6 +137,7 @@ def _model_target(text: str, file_format: str) -> Target:
     if file_format == "usd":
         require_usd()
     if file_format in WITH_MESHES:
+        check_name(place)
         _check_folder(mesh_folder(place, file_format))
     return Target(place, file_format, is_folder=False)
 

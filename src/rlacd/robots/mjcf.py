@@ -21,7 +21,8 @@ from rlacd.robots.urdf import read_scale
 
 HIDDEN_GROUP = "3"
 BODIES = ("worldbody", "body", "frame", "replicate")
-NAMED_ELSEWHERE = ("geom", "geom1", "geom2", "objname", "refname", "sidesite")
+NAMED_BY = {"geom1": None, "geom2": None, "objname": "objtype", "refname": "reftype"}
+"""Attributes that may name a geom, and those that then say so."""
 
 
 @dataclass
@@ -74,7 +75,7 @@ def plan_mjcf(document: Document, references: References, named: Callable[[str, 
     """Find the collision meshes of an MJCF file; parameters and errors as for `rlacd.robots.urdf.plan_urdf`."""
     root = document.root
     defaults = Defaults.of(root)
-    folder = _mesh_folder(document)
+    folder = mesh_folder(document)
     assets = {_mesh_name(mesh, defaults): mesh for mesh in _assets(root)}
     warnings = [
         f"What <{kind}> brings in is left as it is: rewrite that file too."
@@ -118,7 +119,7 @@ def plan_mjcf(document: Document, references: References, named: Callable[[str, 
     return Plan(list(dict.fromkeys(uses.values())), edit, relative, warnings)
 
 
-def mesh_folder_of(document: Document) -> Path:
+def mesh_folder(document: Document) -> Path:
     """Get the folder that mesh files are named from.
 
     Raises
@@ -126,7 +127,16 @@ def mesh_folder_of(document: Document) -> Path:
     MeshFileError
         The file asks for paths to be stripped from the names of its meshes.
     """
-    return _mesh_folder(document)
+    settings: dict[str, str] = {}
+    for compiler in document.root.named("compiler"):
+        settings.update(compiler.attributes)
+    if settings.get("strippath") == "true":
+        raise MeshFileError(
+            f'{document.path} has strippath="true", under which meshes cannot lie in a folder of their own: '
+            "remove it, and write the paths out."
+        )
+    named = settings.get("meshdir", settings.get("assetdir", ""))
+    return document.path.absolute().parent / named
 
 
 def _geom_edit(document: Document, geom: _Geom, names: list[str], hulls: list[HullFile]) -> tuple[int, int, bytes]:
@@ -198,19 +208,6 @@ def _mesh_name(mesh: Element, defaults: Defaults) -> str:
     return mesh.attributes.get("name") or Path(defaults.full(mesh).get("file", "")).stem
 
 
-def _mesh_folder(document: Document) -> Path:
-    settings: dict[str, str] = {}
-    for compiler in document.root.named("compiler"):
-        settings.update(compiler.attributes)
-    if settings.get("strippath") == "true":
-        raise MeshFileError(
-            f'{document.path} has strippath="true", under which meshes cannot lie in a folder of their own: '
-            "remove it, and write the paths out."
-        )
-    named = settings.get("meshdir", settings.get("assetdir", ""))
-    return document.path.absolute().parent / named
-
-
 def _fresh(name: str, count: int, taken: set[str]) -> list[str]:
     """Make names that nothing in the file has, from that of the mesh."""
     stem = name
@@ -222,11 +219,9 @@ def _fresh(name: str, count: int, taken: set[str]) -> list[str]:
 def _caveats(root: Element, geoms: list[_Geom]) -> Iterator[str]:
     names = {geom.element.attributes.get("name") for geom in geoms} - {None}
     for element in root.walk():
-        if element.tag == "geom":
-            continue
-        for attribute in NAMED_ELSEWHERE:
+        for attribute, kind in NAMED_BY.items():
             name = element.attributes.get(attribute)
-            if name in names:
+            if name in names and (kind is None or element.attributes.get(kind) == "geom"):
                 yield f"<{element.tag}> names the geom {name}: it now means the first of its hulls only."
     bodies = {
         geom.element.parent for geom in geoms if geom.element.parent is not None and "mass" not in geom.attributes

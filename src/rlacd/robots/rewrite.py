@@ -14,11 +14,11 @@ import trimesh
 from rlacd.decompose import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError, MeshFileError, OptionError, OutputError
-from rlacd.formats import check_file, file_stem, write_file
+from rlacd.formats import check_file, check_name, file_stem, write_file
 from rlacd.formats.encode import encode_plain_obj
 from rlacd.formats.folder import check_names, write_folder
 from rlacd.robots.collada import collada_unit
-from rlacd.robots.mjcf import mesh_folder_of, plan_mjcf
+from rlacd.robots.mjcf import mesh_folder, plan_mjcf
 from rlacd.robots.plan import HullFile, MeshUse, Plan
 from rlacd.robots.references import References
 from rlacd.robots.spans import Document, parse, replaced
@@ -27,6 +27,7 @@ from rlacd.solid.hull import Hull
 from rlacd.solid.load import load_mesh
 
 ENDINGS = {".urdf": "urdf", ".xml": "mjcf"}
+ROOTS = {"urdf": "robot", "mjcf": "mujoco"}
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,8 @@ def rewrite_robot(
     package_dirs : sequence of str
         ``NAME=FOLDER`` says where a package is; ``FOLDER`` alone may be read and searched for packages.
     **options
-        Those of `rlacd.decompose`. Lengths such as `threshold_m` are in the robot's unit, behind the scale of a mesh.
+        Those of `rlacd.decompose`, for each mesh. Lengths such as `threshold_m` are in the robot's unit, behind the
+        scale of a mesh; a `timeout` is for each mesh.
 
     Returns
     -------
@@ -108,6 +110,10 @@ def rewrite_robot(
     check_rewrite(source, place)
     kind = ENDINGS[source.suffix.lower()]
     document = parse(source, _read(source))
+    if document.root.tag != ROOTS[kind]:
+        raise MeshFileError(
+            f"{source} is no {kind.upper()}: it starts with <{document.root.tag}>, not <{ROOTS[kind]}>."
+        )
     references = References(source, package_dirs)
     folder = place.with_name(f"{place.stem}_{kind}")
     plan, warnings = _plan(document, kind, references, place, folder)
@@ -144,6 +150,7 @@ def check_rewrite(source: Path, place: Path) -> None:
         raise OptionError(f"{source} can only be rewritten as another {source.suffix}, not as {place}.")
     if os.path.realpath(source) == os.path.realpath(place):
         raise OptionError(f"{place} would overwrite the input; choose another name.")
+    check_name(place)
     check_file(place)
     folder = place.with_name(f"{place.stem}_{ENDINGS[source.suffix.lower()]}")
     if folder.exists() and not folder.is_dir():
@@ -155,7 +162,7 @@ def _plan(document: Document, kind: str, references: References, place: Path, fo
         plan = plan_urdf(document, references, lambda old, hull: _reference(old, hull, references, folder))
     else:
         source = Path(os.path.abspath(document.path)).parent
-        within = os.path.relpath(mesh_folder_of(document), source)  # the same from the new file
+        within = os.path.relpath(mesh_folder(document), source)  # the same from the new file
         target = os.path.relpath(folder.absolute(), Path(os.path.abspath(place.absolute().parent / within)))
         plan = plan_mjcf(document, references, lambda old, hull: (Path(target) / hull).as_posix())
     warnings = list(plan.warnings)
