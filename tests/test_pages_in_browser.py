@@ -14,7 +14,7 @@ import trimesh
 
 import rlacd
 from rlacd.show.viewer import Viewer, open_viewer
-from tests.browser import Watched, change, open_browser, open_page, pixels
+from tests.browser import Watched, change, open_browser, open_driver, open_page, pixels
 
 pytestmark = pytest.mark.slow
 pytest.importorskip("PIL", reason="the extra view is not installed")
@@ -37,8 +37,14 @@ def viewer(mesh: Path) -> Iterator[Viewer]:
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with open_browser() as browser:
+def driver() -> Iterator[Any]:
+    with open_driver() as driver:
+        yield driver
+
+
+@pytest.fixture(scope="module")
+def browser(driver: Any) -> Iterator[Any]:
+    with open_browser(driver) as browser:
         yield browser
 
 
@@ -268,6 +274,14 @@ def test_a_server_that_stops_is_told(browser: Any, mesh: Path) -> None:
             wait_for_run(watched.page, 1)
         watched.page.wait_for_selector("#trouble:not([hidden])")
         assert "rlacd view" in watched.page.locator("#trouble").inner_text()
+
+
+def test_a_browser_without_3d_graphics_still_lists_and_says_so(report: Path, driver: Any) -> None:
+    with open_browser(driver, "--disable-3d-apis") as poor, open_page(poor) as watched:
+        watched.page.goto(report.as_uri())
+        watched.page.wait_for_selector("body[data-ready]")
+        assert "cannot show 3-D graphics" in watched.page.locator("#trouble").inner_text()
+        assert rows(watched.page) == 1
 
 
 @pytest.fixture(scope="module")
