@@ -46,18 +46,24 @@ class Watched:
 
 
 @contextmanager
-def open_browser() -> Iterator[Any]:
-    """Start Chromium; skips where there is none."""
+def open_driver() -> Iterator[Any]:
+    """Start playwright, of which a process can have one at a time; skips where it is not installed."""
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    with playwright.sync_playwright() as driver:
+        yield driver
+
+
+@contextmanager
+def open_browser(driver: Any, *arguments: str) -> Iterator[Any]:
+    """Start Chromium, drawing in software unless told otherwise; skips where there is none."""
     path = chromium()
     # Containers run as root, where Chromium's sandbox does not start.
     alone = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
-    with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=path, args=[*WITHOUT_GPU, *alone])
-        try:
-            yield browser
-        finally:
-            browser.close()
+    browser = driver.chromium.launch(executable_path=path, args=[*(arguments or WITHOUT_GPU), *alone])
+    try:
+        yield browser
+    finally:
+        browser.close()
 
 
 @contextmanager

@@ -14,7 +14,7 @@ import trimesh
 
 import rlacd
 from rlacd.show.viewer import Viewer, open_viewer
-from tests.browser import Watched, change, open_browser, open_page, pixels
+from tests.browser import Watched, change, open_browser, open_driver, open_page, pixels
 
 pytestmark = pytest.mark.slow
 pytest.importorskip("PIL", reason="the extra view is not installed")
@@ -37,8 +37,14 @@ def viewer(mesh: Path) -> Iterator[Viewer]:
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with open_browser() as browser:
+def driver() -> Iterator[Any]:
+    with open_driver() as driver:
+        yield driver
+
+
+@pytest.fixture(scope="module")
+def browser(driver: Any) -> Iterator[Any]:
+    with open_browser(driver) as browser:
         yield browser
 
 
@@ -119,10 +125,10 @@ def test_a_bad_threshold_is_told_and_nothing_is_lost(seen: Watched) -> None:
     assert "400" in seen.complaints.pop()
 
 
-@pytest.mark.parametrize("name", ["glb", "obj.zip", "report.html"])
+@pytest.mark.parametrize("name", ["glb", "obj.zip", "mjcf", "report.html"])
 def test_files_are_downloaded(seen: Watched, name: str, tmp_path: Path) -> None:
     with seen.page.expect_download() as found:
-        seen.page.click(f"a[data-format='{name}']")
+        seen.page.click(f"button[data-format='{name}']")
     assert found.value.suggested_filename.startswith("table_hulls")
     path = tmp_path / found.value.suggested_filename
     found.value.save_as(path)
@@ -130,6 +136,8 @@ def test_files_are_downloaded(seen: Watched, name: str, tmp_path: Path) -> None:
         assert len(trimesh.load_scene(path).geometry) == 5
     elif name == "obj.zip":
         assert sum(member.endswith(".obj") for member in zipfile.ZipFile(path).namelist()) == 5
+    elif name == "mjcf":
+        assert "table.xml" in zipfile.ZipFile(path).namelist()
     else:
         assert "<title>table: convex hulls</title>" in path.read_text(encoding="utf-8")
 
@@ -212,7 +220,6 @@ def test_another_axis_can_point_up(seen: Watched) -> None:
     assert min(change(a, b) for a, b in itertools.pairwise(looks)) > 0.05
     page.locator("#up input[value=z]").blur()
     assert change(looks[0], pixels(page)) < 0.001
-    assert "up=z" in page.locator("a[data-format='report.html']").get_attribute("href")
 
 
 def test_glass_and_ghosts_are_seen(seen: Watched) -> None:
@@ -267,6 +274,14 @@ def test_a_server_that_stops_is_told(browser: Any, mesh: Path) -> None:
             wait_for_run(watched.page, 1)
         watched.page.wait_for_selector("#trouble:not([hidden])")
         assert "rlacd view" in watched.page.locator("#trouble").inner_text()
+
+
+def test_a_browser_without_3d_graphics_still_lists_and_says_so(report: Path, driver: Any) -> None:
+    with open_browser(driver, "--disable-3d-apis") as poor, open_page(poor) as watched:
+        watched.page.goto(report.as_uri())
+        watched.page.wait_for_selector("body[data-ready]")
+        assert "cannot show 3-D graphics" in watched.page.locator("#trouble").inner_text()
+        assert rows(watched.page) == 1
 
 
 @pytest.fixture(scope="module")

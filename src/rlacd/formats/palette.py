@@ -1,28 +1,38 @@
-"""Colours that tell neighbouring hulls apart, without end and always in the same order."""
+"""Colours that tell hulls apart, without end and always in the same order."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-# Successive multiples of the golden angle never come close to each other, so any run of hulls has well-spread hues;
-# three lightnesses keep hues that do return (the 8th, the 13th, ...) apart as well.
-GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
-FIRST_HUE = np.deg2rad(250.0)
-LIGHTNESS = np.array([0.70, 0.80, 0.62])
-CHROMA = 0.125
+# Found by a greedy search in Oklab (Ottosson 2020, https://bottosson.github.io/posts/oklab/): each next colour is the
+# one farthest from all before it, as those see it who see it least, of people with normal sight, protanopia,
+# deuteranopia and tritanopia (Machado et al. 2009, https://doi.org/10.1109/TVCG.2009.113); tests/test_palette.py.
+TELLABLE = bytes.fromhex("5899e0f8d05cb05315ec8781abd2fe8a5e97ad8b1c65f2c353c1c54b7f5fbdba42d26ea4")
+
+SHADES = 0.08  # how far the lightness of a colour's returns is spread
 
 
 def hull_colors(count: int) -> npt.NDArray[np.uint8]:
-    """Give `count` distinct colours as sRGB, uint8 [count, 3].
+    """Give `count` colours as sRGB, uint8 [count, 3].
 
-    They lie on circles of equal chroma in Oklab (Ottosson 2020, https://bottosson.github.io/posts/oklab/), so that no
-    hull looks more important than another. The first colours do not depend on `count`.
+    Twelve colours that colour-blind people can tell apart too, then the same again a little lighter or darker, and so
+    on without end: the first two hundred all differ. The first colours do not depend on `count`.
     """
+    twelve = oklab_from_linear(linear_from_srgb(np.frombuffer(TELLABLE, dtype=np.uint8).reshape(-1, 3)))
     index = np.arange(count)
-    hue = FIRST_HUE + index * GOLDEN_ANGLE
-    oklab = np.stack([LIGHTNESS[index % 3], CHROMA * np.cos(hue), CHROMA * np.sin(hue)], axis=1)
+    oklab = twelve[index % len(twelve)]
+    oklab[:, 0] += SHADES * _spread(index // len(twelve))
     return srgb_from_linear(linear_from_oklab(oklab))
+
+
+def _spread(index: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
+    """Numbers in (-1/2, 1/2), the first 0, that never return: van der Corput's sequence, whose halves alternate."""
+    reversed_bits, weight = np.zeros(len(index)), 0.5
+    while index.any():
+        reversed_bits += weight * (index % 2)
+        index, weight = index // 2, weight / 2
+    return np.where(reversed_bits >= 0.5, reversed_bits - 1.0, reversed_bits)
 
 
 def srgb_from_linear(linear: npt.NDArray[np.float64]) -> npt.NDArray[np.uint8]:
@@ -37,21 +47,29 @@ def linear_from_srgb(srgb: npt.NDArray[np.uint8]) -> npt.NDArray[np.float64]:
     return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
 
 
+_CONE_FROM_RGB = np.array(
+    [
+        [0.4122214708, 0.5363325363, 0.0514459929],
+        [0.2119034982, 0.6806995451, 0.1073969566],
+        [0.0883024619, 0.2817188376, 0.6299787005],
+    ]
+)
+_OKLAB_FROM_CONE_ROOT = np.array(
+    [
+        [0.2104542553, 0.7936177850, -0.0040720468],
+        [1.9779984951, -2.4285922050, 0.4505937099],
+        [0.0259040371, 0.7827717662, -0.8086757660],
+    ]
+)
+
+
+def oklab_from_linear(linear: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Oklab colours [N, 3] of linear sRGB [N, 3]."""
+    oklab: npt.NDArray[np.float64] = np.cbrt(linear @ _CONE_FROM_RGB.T) @ _OKLAB_FROM_CONE_ROOT.T
+    return oklab
+
+
 def linear_from_oklab(oklab: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """Linear sRGB [N, 3], clipped to [0, 1], of Oklab colours [N, 3]."""
-    to_cone_root = np.array(
-        [
-            [1.0, 0.3963377774, 0.2158037573],
-            [1.0, -0.1055613458, -0.0638541728],
-            [1.0, -0.0894841775, -1.2914855480],
-        ]
-    )
-    to_rgb = np.array(
-        [
-            [4.0767416621, -3.3077115913, 0.2309699292],
-            [-1.2684380046, 2.6097574011, -0.3413193965],
-            [-0.0041960863, -0.7034186147, 1.7076147010],
-        ]
-    )
-    linear: npt.NDArray[np.float64] = np.clip((oklab @ to_cone_root.T) ** 3 @ to_rgb.T, 0.0, 1.0)
-    return linear
+    cones = np.linalg.solve(_OKLAB_FROM_CONE_ROOT, oklab.T) ** 3
+    return np.clip(np.linalg.solve(_CONE_FROM_RGB, cones).T, 0.0, 1.0)

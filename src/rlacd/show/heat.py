@@ -68,14 +68,16 @@ def heat_map(decomposition: Decomposition, *, triangles: int = 60_000, threads: 
     area = sum(float(trimesh.triangles.area(corners[faces]).sum()) for corners, faces in hulls)
     edge = max(FINEST, float(np.sqrt(4.0 * area / max(triangles, 1))))
     solids = [_HalfSpaces.of(*hull) for hull in hulls]
+    lower, upper = np.array([solid.lower for solid in solids]), np.array([solid.upper for solid in solids])
     result = []
     for index, hull in enumerate(hulls):
         vertices, faces = trimesh.remesh.subdivide_to_size(*hull, edge, max_iter=40)
         vertices = np.ascontiguousarray(vertices, dtype=np.float64)
         distance = np.asarray(surface.distance(vertices, threads or 0), dtype=np.float64)
-        for other, solid in enumerate(solids):
+        meets = np.all((lower <= upper[index] + TOUCH) & (upper >= lower[index] - TOUCH), axis=1)
+        for other in np.flatnonzero(meets):
             if other != index:
-                distance[solid.holds(vertices)] = INNER
+                distance[solids[other].holds(vertices)] = INNER
         result.append(HeatMesh(vertices, np.asarray(faces, dtype=np.int32), distance))
     return result
 

@@ -15,6 +15,14 @@ export class Link {
   decompose = (options) => post("decompose", options);
 
   cancel = () => post("cancel", {});
+
+  /** A file's name and content. */
+  async file(format, up) {
+    const answer = await fetch(`download?${new URLSearchParams({ format, up })}`);
+    if (!answer.ok) throw new Error((await answer.json()).error);
+    const name = answer.headers.get("Content-Disposition").split("filename*=UTF-8''")[1];
+    return { name: decodeURIComponent(name), content: await answer.blob() };
+  }
 }
 
 async function get(name) {

@@ -65,6 +65,7 @@ function show(scene) {
   place.replaceChildren(...warnings(scene.report), ...picture(scene), make("div", { class: "tables" }, ...tables.filter(Boolean)));
   if (config.live) at("details").parentElement.querySelector("summary").dataset.warnings = plural(scene.report.warnings?.length ?? 0, "warning");
   look.balls.hidden = !scene.balls;
+  for (const button of document.querySelectorAll("[data-format^=balls]")) button.hidden = !scene.balls;
   if (scene.balls) {
     const { shown: some, of } = scene.balls;
     look.balls.title = `${some < of ? `${some} of the ` : ""}${plural(of, "ball")} that no hull touches, none over another (B)`;
@@ -109,15 +110,6 @@ function heatLegend(most, scale) {
   ];
 }
 
-function turn(axis) {
-  stage?.turn(axis);
-  for (const link of document.querySelectorAll("a[data-format]")) {
-    const place = new URL(link.href);
-    place.searchParams.set("up", axis); // the report is turned as well
-    link.href = place;
-  }
-}
-
 function say(text) {
   const trouble = at("trouble");
   trouble.textContent = text ?? "";
@@ -148,7 +140,7 @@ const look = {
     "up",
     ["x", "y", "z"].map((axis) => [axis, axis, `The input's ${axis} axis points up`]),
     null,
-    (axis) => turn(axis),
+    (axis) => stage?.turn(axis),
   ),
   edges: toggle("edges", "Edges", true, "Edges of the hulls (E)", (on) => stage?.set({ edges: on })),
   heat: toggle("heat", "Error", false, "How far the hulls' surface lies from the input's (H)", showHeat),
@@ -173,7 +165,7 @@ const downloads = config.live
       { id: "download", "aria-label": "Download" },
       make("h2", {}, "Download"),
       make("div", { class: "buttons" }, ...config.downloads.map(([name, hint]) =>
-        make("a", { class: "button", href: `download?format=${encodeURIComponent(name)}`, download: "", title: hint, "data-format": name }, name),
+        make("button", { type: "button", title: hint, "data-format": name, onclick: (event) => keep(name, event.target) }, name),
       )),
     )
   : null;
@@ -188,6 +180,21 @@ at("panel").append(
 
 const link = config.live ? new Link({ onState: follow, onLost: () => say("The viewer's server has stopped; start  rlacd view  again.") }) : null;
 at("cancel").addEventListener("click", stop);
+
+/** Download a file; some take seconds to make, which the button tells. */
+async function keep(format, button) {
+  say(null);
+  button.setAttribute("aria-busy", true);
+  try {
+    const { name, content } = await link.file(format, look.up.querySelector("input:checked").value);
+    const address = URL.createObjectURL(content);
+    make("a", { href: address, download: name }).click();
+    setTimeout(() => URL.revokeObjectURL(address), 60_000);
+  } catch (error) {
+    say(error.message);
+  }
+  button.removeAttribute("aria-busy");
+}
 
 async function ask(options) {
   say(null);

@@ -1,0 +1,70 @@
+"""The colours of hulls: told apart by everybody, also by people who see two primary colours only."""
+
+from __future__ import annotations
+
+import colorsys
+
+import numpy as np
+import pytest
+
+from rlacd.formats.palette import hull_colors, linear_from_oklab, linear_from_srgb, oklab_from_linear, srgb_from_linear
+
+# What is seen, in linear RGB: Machado, Oliveira & Fernandes 2009, severity 1.
+SIGHT = {
+    "normal": np.eye(3),
+    "protanopia": np.array(
+        [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]]
+    ),
+    "deuteranopia": np.array(
+        [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]
+    ),
+    "tritanopia": np.array(
+        [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]]
+    ),
+}
+JUST_SEEN = 0.02  # a difference in Oklab
+
+
+def as_seen(colors: np.ndarray, sight: str) -> np.ndarray:
+    return oklab_from_linear(np.clip(linear_from_srgb(colors) @ SIGHT[sight].T, 0.0, 1.0))
+
+
+def least_difference(colors: np.ndarray, sight: str) -> float:
+    seen = as_seen(colors, sight)
+    apart = np.linalg.norm(seen[:, None] - seen[None], axis=2)
+    return float(apart[np.triu_indices(len(colors), k=1)].min())
+
+
+@pytest.mark.parametrize("sight", SIGHT)
+@pytest.mark.parametrize(("count", "times"), [(4, 6.0), (8, 4.0), (12, 3.0)])
+def test_the_first_colours_are_told_apart_by_everybody(sight: str, count: int, times: float) -> None:
+    assert least_difference(hull_colors(count), sight) > times * JUST_SEEN
+
+
+@pytest.mark.parametrize("sight", SIGHT)
+def test_hulls_that_follow_each_other_are_told_apart_by_everybody(sight: str) -> None:
+    seen = as_seen(hull_colors(500), sight)
+    for step, times in ((1, 3.0), (2, 3.0), (3, 2.0)):
+        assert np.linalg.norm(seen[step:] - seen[:-step], axis=1).min() > times * JUST_SEEN
+
+
+def test_two_hundred_colours_differ_and_do_not_depend_on_the_count() -> None:
+    colors = hull_colors(200)
+    assert len(np.unique(colors, axis=0)) == 200
+    for count in (0, 1, 12, 13, 100):
+        assert np.array_equal(hull_colors(count), colors[:count])
+
+
+def test_every_colour_stands_out_from_white_paper_and_dark_ink() -> None:
+    lightness = as_seen(hull_colors(400), "normal")[:, 0]
+    assert lightness.min() > 0.45
+    assert lightness.max() < 0.93
+
+
+def test_oklab_and_back() -> None:
+    colors = np.random.default_rng(0).integers(0, 256, (200, 3)).astype(np.uint8)
+    assert np.array_equal(srgb_from_linear(linear_from_oklab(oklab_from_linear(linear_from_srgb(colors)))), colors)
+    grey = oklab_from_linear(linear_from_srgb(np.array([[128, 128, 128], [255, 255, 255]], dtype=np.uint8)))
+    assert grey[:, 1:] == pytest.approx(0.0, abs=1e-6)
+    assert grey[1, 0] == pytest.approx(1.0, abs=1e-6)
+    assert colorsys.rgb_to_hls(*(hull_colors(1)[0] / 255.0))[0] == pytest.approx(0.59, abs=0.02), "the first is blue"
