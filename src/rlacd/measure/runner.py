@@ -117,7 +117,7 @@ class Bench:
         }
         environment = {**os.environ, "OMP_NUM_THREADS": str(self.limits.threads)}
         command = [sys.executable, "-m", "rlacd.measure.child", json.dumps(order)]
-        # The child reads a pipe that nothing is written to: when this process dies the pipe ends, and so does the child.
+        # The child reads a pipe that nothing is written to: when this process dies, the pipe ends, and then the child.
         read_end, write_end = os.pipe()
         try:
             process = subprocess.Popen(
