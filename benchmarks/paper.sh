@@ -6,8 +6,7 @@ meshes=$1 list=$2 training=$3 run=$4
 
 rlacd bench compare "$meshes" --list "$list" --out "$run/quick" --jobs 2
 rlacd bench paper-table-1 "$meshes" --list "$list" --out "$run/quick" --jobs 2
-rlacd bench paper-greedy "$meshes" --list "$list" --out "$run/quick" --jobs 2 \
-    --methods greedy-hull-sum,navacd,greedy,learned
+rlacd bench paper-greedy "$meshes" --list "$list" --out "$run/quick" --jobs 2
 rlacd bench paper-vhacd "$meshes" --list "$list" --out "$run/quick" --jobs 2
 rlacd bench paper-table-2 "$meshes" --list "$list" --out "$run/quick" --jobs 2
 rlacd bench paper-table-3 "$meshes" --list "$list" --out "$run/quick" --jobs 2

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
+import signal
+import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -35,6 +39,30 @@ def meshes(tmp_path: Path) -> Path:
 
 def bench_of(meshes: Path, folder: Path, limits: Limits | None = None) -> Bench:
     return Bench(meshes, find_meshes(meshes), Store(folder), limits, say=lambda _: None)
+
+
+def wait_for_child(parent: int) -> int:
+    """The process that `parent` has started, once there is one; Linux only."""
+    for _ in range(600):
+        for status in Path("/proc").glob("[0-9]*/stat"):
+            with contextlib.suppress(OSError):
+                if int(status.read_text().rpartition(")")[2].split()[1]) == parent:
+                    time.sleep(1)  # let it begin
+                    return int(status.parent.name)
+        time.sleep(0.1)
+    raise AssertionError("no process was started")
+
+
+def wait_for_end(process: int) -> bool:
+    for _ in range(300):
+        try:
+            state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+        except OSError:
+            return True
+        if state == "Z":
+            return True
+        time.sleep(0.1)
+    return False
 
 
 class TestMethods:
@@ -204,6 +232,29 @@ class TestRunner:
         monkeypatch.setattr(sys, "executable", str(crasher))
         rows = bench_of(meshes, tmp_path / "run").run("greedy", 0.05)
         assert [row["error"] for row in rows] == ["died of SIGSEGV last words"] * 2
+
+    @pytest.mark.slow
+    @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+    def test_stopping_a_run_ends_its_processes_and_records_nothing(self, tmp_path: Path) -> None:
+        """Whether it is interrupted or killed: no process goes on, and what was running is done again next time."""
+        folder = tmp_path / "meshes"
+        folder.mkdir()
+        sphere = trimesh.creation.icosphere(subdivisions=6)  # keeps a method busy for long
+        for name in ("a.ply", "b.ply"):
+            trimesh.util.concatenate([sphere, sphere.copy().apply_translation((1.5, 0, 0))]).export(folder / name)
+        program = (
+            "import sys; from pathlib import Path; from rlacd.measure import Bench, Store, find_meshes;"
+            "m, o = map(Path, sys.argv[1:]);"
+            "Bench(m, find_meshes(m), Store(o)).run('greedy', 0.002)"
+        )
+        for number in (signal.SIGINT, signal.SIGKILL):
+            out = tmp_path / f"run-{number}"
+            with subprocess.Popen([sys.executable, "-c", program, folder, out], stderr=subprocess.DEVNULL) as run:
+                child = wait_for_child(run.pid)
+                run.send_signal(number)
+                run.wait(timeout=60)
+            assert wait_for_end(child)
+            assert (out / "results.jsonl").read_text() == ""
 
     def test_a_broken_mesh_is_recorded(self, meshes: Path, tmp_path: Path) -> None:
         (meshes / "broken.obj").write_text("this is no mesh")

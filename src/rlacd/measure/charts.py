@@ -53,7 +53,7 @@ def pareto_chart(points: Iterable[tuple[str, float, float]], x: str, y: str) -> 
     ----------
     points : iterable of (label, x, y)
     x, y : str
-        What the axes are; both are logarithmic.
+        What the axes are; x is logarithmic.
 
     Raises
     ------
@@ -67,9 +67,9 @@ def pareto_chart(points: Iterable[tuple[str, float, float]], x: str, y: str) -> 
     for number, (label, a, b) in enumerate(points):
         axes.plot([a], [b], linestyle="", marker=_MARKERS[number % len(_MARKERS)])
         axes.annotate(label, (a, b), textcoords="offset points", xytext=(6, 4), fontsize=7)
-    axes.set(xlabel=x, ylabel=y, xscale="log", yscale="log")
+    axes.set(xlabel=x, ylabel=y, xscale="log")
     axes.margins(0.15)
-    _plain_numbers(axes, True, True)
+    _plain_numbers(axes, True, False)
     return _svg(figure)
 
 
@@ -99,10 +99,11 @@ def _figure() -> tuple[Any, Any]:
 
 
 def _plain_numbers(axes: Any, x: bool, y: bool) -> None:
-    from matplotlib.ticker import FuncFormatter, NullFormatter
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     for wanted, axis in ((x, axes.xaxis), (y, axes.yaxis)):
         if wanted:
+            axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
             axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
             axis.set_minor_formatter(NullFormatter())
 

@@ -6,8 +6,10 @@ Whatever a tool does (crash, hang, eat all memory, print to stdout) happens here
 from __future__ import annotations
 
 import json
+import os
 import resource
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -68,8 +70,16 @@ def _peak_mb() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 
 
+def _end_with_parent() -> None:
+    """Stdin is a pipe that ends when the parent does, however that dies."""
+    while os.read(0, 1):
+        pass
+    os._exit(1)
+
+
 def main() -> None:
     """Do the task that the one argument, JSON, describes; the answer goes to the file it names."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     task = json.loads(sys.argv[1])
     if task["memory"] and sys.platform == "linux":
         resource.setrlimit(resource.RLIMIT_AS, (task["memory"], task["memory"]))

@@ -64,6 +64,8 @@ class Bench:
         self.store = store
         self.limits = limits or Limits()
         self._say = say
+        self._running: set[subprocess.Popen[bytes]] = set()
+        self._stopping = False
 
     def run(self, method: str, setting: float) -> list[Row]:
         """All meshes by one method; in the order of the names."""
@@ -73,11 +75,17 @@ class Bench:
         """Do what is not done yet, and return the rows of all tasks in their order."""
         tasks = list(tasks)
         waiting = [task for task in dict.fromkeys(tasks) if self.store.get(task) is None]
+        self._stopping = False
         pool = ThreadPoolExecutor(self.limits.jobs)
         try:
             for number, row in enumerate(pool.map(self._finish, waiting), 1):
                 what = row.get("error") or f"{row['parts']} parts, {row['cpu']:.1f} s, D_h {row['hausdorff']:.3f}"
                 self._say(f"{number}/{len(waiting)} {row['mesh']}  {row['method']} {row['setting']:g}  {what}")
+        except BaseException:
+            self._stopping = True  # what is killed now has not failed
+            for process in list(self._running):
+                _kill_group(process)
+            raise
         finally:
             pool.shutdown(cancel_futures=True)
         return [found for task in tasks if (found := self.store.get(task)) is not None]
@@ -92,7 +100,8 @@ class Bench:
                 failure = self._child(task, hulls, answer)
                 failure = failure and f"measuring: {failure}"
             row |= {"error": failure} if failure else json.loads(answer.read_text())
-        self.store.add(row)
+        if not self._stopping:
+            self.store.add(row)
         return row
 
     def _child(self, task: Task, hulls: Path, answer: Path) -> str | None:
@@ -108,33 +117,39 @@ class Bench:
         }
         environment = {**os.environ, "OMP_NUM_THREADS": str(self.limits.threads)}
         command = [sys.executable, "-m", "rlacd.measure.child", json.dumps(order)]
-        with subprocess.Popen(
-            command,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            start_new_session=True,
-        ) as process:
+        # The child reads a pipe that nothing is written to: when this process dies, the pipe ends, and then the child.
+        read_end, write_end = os.pipe()
+        try:
+            process = subprocess.Popen(
+                command,
+                env=environment,
+                stdin=read_end,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                start_new_session=True,
+            )
+            os.close(read_end)
+            self._running.add(process)
             try:
                 _, complaint = process.communicate(timeout=self.limits.seconds)
             except subprocess.TimeoutExpired:
-                _kill(process)
+                _kill_group(process)
+                process.communicate()
                 return f"more than {self.limits.seconds:g} s"
-            except BaseException:
-                _kill(process)
-                raise
+            finally:
+                self._running.discard(process)
+        finally:
+            os.close(write_end)
         last = (complaint.decode(errors="replace").strip().splitlines() or [""])[-1][-300:]
         if process.returncode < 0:
             return f"died of {signal.Signals(-process.returncode).name} {last}".strip()
         return (last or f"exit code {process.returncode}") if process.returncode else None
 
 
-def _kill(process: subprocess.Popen[bytes]) -> None:
+def _kill_group(process: subprocess.Popen[bytes]) -> None:
     """End a process and those it started: it leads a group of its own."""
     with contextlib.suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
-    process.communicate()
 
 
 def find_meshes(folder: Path, listed: Path | None = None) -> list[str]:

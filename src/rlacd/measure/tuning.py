@@ -118,13 +118,16 @@ def next_setting(tool: Method, known: Sequence[tuple[float, float]], target: flo
         )
         share = 0.5 if attempt % 3 == 2 else (target - da) / (db - da)
         return _rounded(tool, math.exp(math.log(a) + share * math.log(b / a)))
-    if looser:
-        outermost = min(sign * s for s, _ in looser) * sign
-        wanted = outermost / STRIDE**sign
-    else:
-        outermost = max(sign * s for s, _ in tighter) * sign
-        wanted = outermost * STRIDE**sign
-    wanted = min(max(wanted, lowest), highest)
+    # All on one side: on along the line through the two closest, a stride at most.
+    ordered = sorted(known, key=lambda k: abs(k[1] - target))
+    outermost = ordered[0][0]
+    step = math.log(STRIDE) * (sign if tighter else -sign)
+    if len(ordered) > 1 and ordered[0][1] != ordered[1][1] and ordered[0][0] != ordered[1][0]:
+        (a, da), (b, db) = ordered[:2]
+        wished = math.log(a / b) * (target - da) / (da - db)
+        if wished * step > 0:
+            step = math.copysign(min(abs(wished), abs(step)), step)
+    wanted = min(max(outermost * math.exp(step), lowest), highest)
     return None if wanted == outermost else _rounded(tool, wanted)
 
 
