@@ -91,7 +91,7 @@ def decompose_one(path: str, options: dict[str, Any]) -> dict[str, Any]:
         options = {**options, "criterion": rlacd.NavigableSpace(**space)}
     start = time.process_time()
     try:
-        result = rlacd.decompose(path, threads=1, **options)
+        result = rlacd.decompose(path, threads=1, **{"quality": "fast", **options})
     except rlacd.RlacdError as error:
         return {"error": f"{type(error).__name__}: {error}"}
     cpu = time.process_time() - start

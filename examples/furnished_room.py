@@ -62,7 +62,9 @@ def main() -> None:
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
     folder.mkdir(parents=True, exist_ok=True)
     for radius in (0.02, 0.10):
-        result = rlacd.decompose(room(), criterion=rlacd.NavigableSpace(radius, tolerance=0.01), policy="navacd")
+        result = rlacd.decompose(
+            room(), criterion=rlacd.NavigableSpace(radius, tolerance=0.01), policy="navacd", quality="fast"
+        )
         name = f"room_radius_{round(100 * radius)}_percent"
         result.save(folder / f"{name}.glb")
         result.save_balls(folder / f"{name}_balls.glb")

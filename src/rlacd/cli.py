@@ -369,7 +369,7 @@ def decompose(
         typer.Option(
             rich_help_panel=METHOD,
             help="How long to search for fewer hulls: fast not at all, balanced about a second, best until --budget "
-            "ends. [dim]\\[default: fast][/dim]",
+            "ends. [dim]\\[default: balanced; fast with --no-merge][/dim]",
             show_default=False,
         ),
     ] = None,

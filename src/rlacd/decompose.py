@@ -54,7 +54,7 @@ def decompose(
     seed: int = 0,
     threads: int | None = None,
     timeout: float | None = None,
-    quality: str = "fast",
+    quality: str | None = None,
     budget: float | None = None,
     search_steps: int | None = None,
     preset: str | None = None,
@@ -94,9 +94,9 @@ def decompose(
         Threads to use; all processors by default. The result does not depend on it.
     timeout : float, optional
         Seconds after which the decomposition reached so far is returned.
-    quality : str
-        ``fast``: one pass of cuts. ``balanced``: the best of several passes, then a short search for fewer parts.
-        ``best``: a long one. A level is never worse than the one before it: fewer hulls, or as many with less volume.
+    quality : str, optional
+        ``fast``: one pass of cuts. ``balanced``, the default where parts are merged: the best of several passes, then a
+        short search for fewer parts. ``best``: a long one. A level is never worse than the one before it: fewer hulls, or as many with less volume.
     budget : float, optional
         Seconds the search may take; 5 with ``best``. What is found in a time depends on the machine.
     search_steps : int, optional
@@ -162,6 +162,7 @@ def decompose(
         tree = CutTree(root, make_policy(options.policy, views, _scale(goal)), workers)
         parts, goal = _parts(tree, goal, options, workers, clock)
         found = None
+        assert options.quality is not None
         if options.quality != "fast" and clock.stopped_by is None:
             bounds = level(options.quality, options.budget, options.search_steps)
             with clock.stage("search"):

@@ -61,7 +61,7 @@ class Options:
     seed: int = 0
     threads: int | None = None
     timeout: float | None = None
-    quality: str = "fast"
+    quality: str | None = None
     budget: float | None = None
     search_steps: int | None = None
     preset: str | None = None
@@ -93,6 +93,8 @@ class Options:
         self._as_integer("seed", 0, MAX_SEED, "between 0 and 2**63 - 1")
         self._as_integer("threads", 1, MAX_THREADS, f"between 1 and {MAX_THREADS}", None)
         self._as_number("timeout", lambda x: 0 < x < math.inf, "a positive number of seconds", None)
+        if self.quality is None:  # searching means merging
+            object.__setattr__(self, "quality", "balanced" if self.merge else "fast")
         _require(self.quality in QUALITIES, "quality", self.quality, "one of " + ", ".join(QUALITIES))
         self._as_number("budget", lambda x: 0 < x < math.inf, "a positive number of seconds", None)
         self._as_integer("search_steps", 0, None, "at least 0", None)
@@ -100,7 +102,8 @@ class Options:
             unused = getattr(self, name) is not None and self.quality == "fast"
             _require(not unused, name, getattr(self, name), "left out with quality='fast', which does not search")
         if not self.merge:
-            _require(self.quality == "fast", "quality", self.quality, "'fast' without merge: searching means merging")
+            rule = "'fast', or left out, without merge: searching means merging"
+            _require(self.quality == "fast", "quality", self.quality, rule)
 
     def _as_number(self, name: str, allowed: Callable[[float], bool], rule: str, *absent: None) -> None:
         """Make the option a plain float, so that the report is plain too, whichever library its number came from."""
