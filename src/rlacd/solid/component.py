@@ -84,7 +84,7 @@ class Part:
     @cached_property
     def box(self) -> FloatArray:
         """Lower and upper corner of the bounding box [2, 3]."""
-        return np.stack([self.hull.vertices.min(axis=0), self.hull.vertices.max(axis=0)])
+        return np.array([self.hull.vertices.min(axis=0), self.hull.vertices.max(axis=0)])
 
     def with_hull(self, hull: Hull) -> Part:
         """Get the same solid with another hull around it."""
