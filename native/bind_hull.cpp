@@ -32,10 +32,8 @@ void bind_hull(nb::module_& m) {
       "oriented. rank < 3 (all points coplanar): no indices, no faces.");
   m.def(
       "joint_hull_volumes",
-      [](const std::vector<PointsIn>& arrays,
+      [](const std::vector<PointsIn>& groups,
          const nb::ndarray<const std::int32_t, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>& pairs, int threads) {
-        std::vector<std::vector<Vec3>> groups;
-        for (const PointsIn& array : arrays) groups.push_back(to_points(array));
         const std::vector<std::int32_t> pair(pairs.data(), pairs.data() + pairs.size());
         for (const std::int32_t g : pair)
           if (g < 0 || g >= static_cast<std::int64_t>(groups.size())) throw std::invalid_argument("pair out of range");
@@ -45,8 +43,8 @@ void bind_hull(nb::module_& m) {
           const auto worth_threads = static_cast<int>(1 + volumes.size() / kPairsAThread);
           parallel_for(volumes.size(), std::min(resolve_threads(threads), worth_threads), [&](std::size_t i) {
             HullBuilder hull;
-            std::vector<Vec3> both = groups[pair[2 * i]];
-            const std::vector<Vec3>& other = groups[pair[2 * i + 1]];
+            std::vector<Vec3> both = to_points(groups[pair[2 * i]]);
+            const std::vector<Vec3> other = to_points(groups[pair[2 * i + 1]]);
             both.insert(both.end(), other.begin(), other.end());
             hull.add(both);
             volumes[i] = hull.volume();

@@ -337,8 +337,8 @@ class Navigable:
         return settled
 
     def _is_small(self, part: Part) -> bool:
-        extent = np.ptp(part.hull.vertices, axis=0).max()
-        return bool(extent < (self.tolerance + self.allowance) / 2)
+        small = (self.tolerance + self.allowance) / 2
+        return part.hull.volume < small**3 and bool(np.ptp(part.hull.vertices, axis=0).max() < small)
 
     def _deepest(self, part: Part, least_radius: float) -> float:
         """Deepest intrusion into a ball larger than `least_radius`."""

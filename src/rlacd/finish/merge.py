@@ -112,9 +112,8 @@ def neighbours(
     once = (rows[k] < other) | ~is_new[other]  # two new parts find each other twice
     pairs = np.sort(np.stack([rows[k], other], axis=1)[once], axis=1)
     pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
-    used, place = np.unique(pairs, return_inverse=True)
-    corners = [parts[i].hull.vertices for i in used]
-    hulls = _native.joint_hull_volumes(corners, place.reshape(-1, 2).astype(np.int32), workers.threads)
+    corners = [part.hull.vertices for part in parts]
+    hulls = _native.joint_hull_volumes(corners, pairs.astype(np.int32), workers.threads)
     return [
         (ids[i], ids[j], parts[i].volume + parts[j].volume, hull)
         for (i, j), hull in zip(pairs.tolist(), hulls.tolist(), strict=True)

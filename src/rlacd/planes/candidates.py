@@ -64,5 +64,5 @@ def axis_and_principal(component: Component, per_axis: int = OFFSETS_PER_AXIS) -
 
 def _snapped(axes: FloatArray) -> FloatArray:
     nearest = np.eye(3)[np.abs(axes).argmax(axis=1)]
-    aligned = np.linalg.norm(np.cross(axes, nearest), axis=1) < SAME_AXIS
+    aligned = np.linalg.norm(np.where(nearest == 1, 0.0, axes), axis=1) < SAME_AXIS
     return np.where(aligned[:, None], nearest, axes)

@@ -84,7 +84,7 @@ class Part:
     @cached_property
     def box(self) -> FloatArray:
         """Lower and upper corner of the bounding box [2, 3]."""
-        return np.stack([self.hull.vertices.min(axis=0), self.hull.vertices.max(axis=0)])
+        return np.array([self.hull.vertices.min(axis=0), self.hull.vertices.max(axis=0)])
 
     def with_hull(self, hull: Hull) -> Part:
         """Get the same solid with another hull around it."""
@@ -175,11 +175,10 @@ class Component(Part):
         Eigenvectors of the second moments of the surface (exact over its triangles). Their signs are fixed by making
         the largest entry positive.
         """
-        corners = self.vertices[self.faces]
-        a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-        area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        a, b, c = (self.vertices[corner] for corner in self.faces.T)
+        area = np.sqrt(np.square(_cross(b - a, c - a)).sum(axis=1))
         area /= area.sum()
-        centroid = area @ (corners.mean(axis=1))
+        centroid = area @ ((a + b + c) / 3)
         a, b, c = a - centroid, b - centroid, c - centroid
         middle = a + b + c
         moments = sum((area[:, None] * x).T @ x for x in (a, b, c, middle))
@@ -212,6 +211,12 @@ class Component(Part):
         if cavities:
             shells = _enclose(shells, cavities)
         return [piece for m in shells if (piece := _component(m, self)) is not None]
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross products of rows [N, 3]; np.cross takes longer over its arguments than over a thousand products."""
+    (ax, ay, az), (bx, by, bz) = a.T, b.T
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
 
 _BLOCK = np.array(
