@@ -22,9 +22,12 @@ import torch
 from rlacd.learn.encoders import I2PMAEEncoder
 from rlacd.learn.pretrain.clouds import Clouds
 
-KINDS = frozenset(
-    ["barrel", "bed", "bench", "book", "bridge", "cabinet", "chair", "chest", "coin", "column", "couch", "crate", "door", "fence", "floor", "grass", "grenade", "gravestone", "house", "key", "kitchen", "lamp", "pipe", "pistol", "plate", "potion", "rock", "roof", "shelf", "shield", "sign", "skull", "sniper", "spikes", "stairs", "sword", "table", "tower", "tree", "wall", "window"]
-)
+WORDS = """
+    barrel bed bench book bridge cabinet chair chest coin column couch crate door fence floor grass grenade gravestone
+    house key kitchen lamp pipe pistol plate potion rock roof shelf shield sign skull sniper spikes stairs sword
+    table tower tree wall window
+"""
+KINDS = frozenset(WORDS.split())
 ALSO = {"pillar": "column", "sofa": "couch", "houses": "house", "rocks": "rock", "pipes": "pipe", "light": "lamp"}
 
 LEAST = 8
