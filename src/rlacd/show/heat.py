@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import manifold3d
 import numpy as np
 import trimesh
 
@@ -64,21 +65,20 @@ def heat_map(decomposition: Decomposition, *, triangles: int = 60_000, threads: 
         return []
     surface = _native.Surface(frame.to_frame(source.vertices), np.ascontiguousarray(source.faces, dtype=np.int32))
     hulls = [(frame.to_frame(hull.vertices), np.asarray(hull.faces)) for hull in decomposition]
-    # Equilateral triangles of edge h have the area sqrt(3)/4 h²; bisecting leaves edges between h/2 and h.
+    # Equilateral triangles of edge h have the area sqrt(3)/4 h²; there are more, since narrow facets have small ones.
     area = sum(float(trimesh.triangles.area(corners[faces]).sum()) for corners, faces in hulls)
     edge = max(FINEST, float(np.sqrt(4.0 * area / max(triangles, 1))))
     solids = [_HalfSpaces.of(*hull) for hull in hulls]
     lower, upper = np.array([solid.lower for solid in solids]), np.array([solid.upper for solid in solids])
     result = []
     for index, hull in enumerate(hulls):
-        vertices, faces = trimesh.remesh.subdivide_to_size(*hull, edge, max_iter=40)
-        vertices = np.ascontiguousarray(vertices, dtype=np.float64)
+        vertices, faces = _divided(*hull, edge)
         distance = np.asarray(surface.distance(vertices, threads or 0), dtype=np.float64)
         meets = np.all((lower <= upper[index] + TOUCH) & (upper >= lower[index] - TOUCH), axis=1)
         for other in np.flatnonzero(meets):
             if other != index:
                 distance[solids[other].holds(vertices)] = INNER
-        result.append(HeatMesh(vertices, np.asarray(faces, dtype=np.int32), distance))
+        result.append(HeatMesh(vertices, faces, distance))
     return result
 
 
@@ -89,6 +89,16 @@ def frame_of(decomposition: Decomposition) -> Frame:
         corners.append(np.asarray(decomposition.source.bounds, dtype=np.float64))
     around = Frame.of(np.concatenate(corners))
     return Frame(around.center, float(decomposition.report.get("scale", around.scale)))
+
+
+def _divided(vertices: FloatArray, faces: IntArray, edge: float) -> tuple[FloatArray, IntArray]:
+    """Divide a closed mesh until no edge is much longer than `edge`; its surface stays the same."""
+    solid = manifold3d.Manifold(manifold3d.Mesh64(vertices, faces.astype(np.uint64)))
+    fine = solid.refine_to_length(edge).to_mesh64()
+    if len(fine.tri_verts) < len(faces):  # too thin to be taken for a solid
+        return vertices, np.ascontiguousarray(faces, dtype=np.int32)
+    corners = np.ascontiguousarray(fine.vert_properties[:, :3], dtype=np.float64)
+    return corners, np.ascontiguousarray(fine.tri_verts, dtype=np.int32)
 
 
 @dataclass(frozen=True, eq=False)

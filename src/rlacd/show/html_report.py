@@ -17,7 +17,7 @@ from rlacd.show.picture import check_up, picture_bytes
 from rlacd.show.scene import heat_scene, scene
 
 HEAT_TRIANGLES = 16_000
-"""Of the error heat map in a file: half a megabyte or so."""
+"""Of the error heat map in a file, or a few times as many: half a megabyte or so."""
 
 PICTURE_WIDTH = 1500
 

@@ -3,7 +3,7 @@ import { floats, indices } from "page/arrays";
 import { Camera } from "page/camera";
 const { Box3, BufferAttribute, BufferGeometry, Color, Group, Mesh, MeshBasicMaterial, MeshLambertMaterial, Vector3 } = THREE;
 
-const CREASE = 8; // degrees between facets from which their edge is drawn
+const CREASE = 18; // degrees between facets from which their edge is drawn
 const HEAT = ["#eef1f4", "#fde3a7", "#f9b45e", "#e8703a", "#b92b42", "#641a4e"].map((hex) => new Color(hex));
 export const HEAT_COLORS = ["#eef1f4", "#fde3a7", "#f9b45e", "#e8703a", "#b92b42", "#641a4e"];
 const WALL = new Color("#c3c9d1");
