@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import platform
 import statistics
 from collections.abc import Sequence
@@ -191,12 +189,3 @@ def save_csv(bench: Bench, folder: Path) -> None:
         The folder cannot be written to.
     """
     write_file(folder / "results.csv", as_csv(bench.store.rows()).encode())
-
-
-def table_csv(table: Table) -> str:
-    """A table as CSV."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(table.header)
-    writer.writerows(table.lines)
-    return text.getvalue()

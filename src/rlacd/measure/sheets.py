@@ -20,7 +20,7 @@ from rlacd.solid.load import load_mesh
 PANEL = (340, 300)
 """Pixels of one picture."""
 
-COLUMNS = 4
+COLUMNS = 5
 FOOTER = 62
 HEADER = 40
 SAMPLES = 6
@@ -59,8 +59,8 @@ def draw_sheet(
         numbers = f"#P {row['parts']}   D_h {row['hausdorff']:.3f}   #F {row['faces']}   {row['cpu']:.2f} s"
         panels.append((label, numbers, bodies))
     width, height = PANEL
-    columns = min(COLUMNS, len(panels))
-    rows = math.ceil(len(panels) / columns)
+    rows = math.ceil(len(panels) / COLUMNS)
+    columns = math.ceil(len(panels) / rows)
     sheet = image.new("RGB", (columns * width, HEADER + rows * (height + FOOTER)), PAPER)
     _write(sheet, mesh.stem, (14, HEADER // 2), 20, INK, "lm")
     for number, (label, numbers, bodies) in enumerate(panels):

@@ -6,8 +6,9 @@ import csv
 import io
 import math
 import statistics
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 from rlacd.measure.store import Row
@@ -52,9 +53,9 @@ class Spread:
         """Of at least one value; the deviation is the sample's, 0 of one value."""
         return cls(statistics.fmean(values), max(values), statistics.stdev(values) if len(values) > 1 else 0.0)
 
-    def text(self, spell: Callable[[float], str]) -> str:
-        """Write it as in the paper: mean (max, ± deviation)."""
-        return f"{spell(self.mean)} ({spell(self.most)}, ± {spell(self.deviation)})"
+    def text(self, digits: int) -> str:
+        """Write it as in the paper: mean (max, ± deviation), so many digits after the point."""
+        return f"{self.mean:.{digits}f} ({self.most:.{digits}f}, ± {self.deviation:.{digits}f})"
 
 
 def common_meshes(groups: Iterable[Sequence[Row]]) -> set[str]:
@@ -98,61 +99,37 @@ def comparison(groups: Sequence[tuple[str, Sequence[Row]]]) -> Table:
     groups : sequence of (label, rows)
     """
     shared = common_meshes(rows for _, rows in groups)
-    header = [
-        "method",
-        "#P",
-        "#F",
-        "D_h",
-        "over",
-        "under",
-        "concavity",
-        "Σ hull / solid",
-        "uncovered",
-        "invalid hulls",
-        "CPU s",
-        "wall s",
-        "peak MB",
-        "failed",
-    ]
     lines = []
     for label, rows in groups:
         good = [row for row in rows if row["mesh"] in shared]
         failed = sum("error" in row for row in rows)
-        if not good:
-            lines.append([label, *["–"] * (len(header) - 2), f"{failed} of {len(rows)}"])
-            continue
-        column = {key: Spread.of([row[key] for row in good]) for key in _AVERAGED}
-        lines.append(
-            [
-                label,
-                column["parts"].text(one_digit),
-                column["faces"].text(whole),
-                *(column[key].text(three_digits) for key in ("hausdorff", "over", "under", "concavity")),
-                column["volume"].text(two_digits),
-                f"{100 * column['uncovered'].mean:.1f} %",
-                sum(row["invalid"] for row in good),
-                column["cpu"].text(two_digits),
-                column["wall"].text(two_digits),
-                whole(column["peak_mb"].most),
-                f"{failed} of {len(rows)}",
-            ]
-        )
-    return Table(header, lines, f"{len(shared)} meshes that every method managed; mean (max, ± standard deviation).")
+        cells = [show(good) if good else "–" for show in _SHOWN.values()]
+        lines.append([label, *cells, f"{failed} of {len(rows)}"])
+    note = f"{len(shared)} meshes that every method managed; mean (max, ± standard deviation)."
+    return Table(["method", *_SHOWN, "failed"], lines, note)
 
 
-_AVERAGED = (
-    "parts",
-    "faces",
-    "hausdorff",
-    "over",
-    "under",
-    "concavity",
-    "volume",
-    "uncovered",
-    "cpu",
-    "wall",
-    "peak_mb",
+def _spread(key: str, digits: int) -> Callable[[Sequence[Row]], str]:
+    return lambda rows: Spread.of([row[key] for row in rows]).text(digits)
+
+
+_SHOWN: Mapping[str, Callable[[Sequence[Row]], object]] = MappingProxyType(
+    {
+        "#P": _spread("parts", 1),
+        "#F": _spread("faces", 0),
+        "D_h": _spread("hausdorff", 3),
+        "over": _spread("over", 3),
+        "under": _spread("under", 3),
+        "concavity": _spread("concavity", 3),
+        "Σ hull / solid": _spread("volume", 2),
+        "uncovered": lambda rows: f"{100 * statistics.fmean(row['uncovered'] for row in rows):.1f} %",
+        "invalid hulls": lambda rows: sum(row["invalid"] for row in rows),
+        "CPU s": _spread("cpu", 2),
+        "wall s": _spread("wall", 2),
+        "peak MB": lambda rows: f"{max(row['peak_mb'] for row in rows):.0f}",
+    }
 )
+"""Columns of a comparison: what each says of the rows of one method."""
 
 
 def ratio_of_parts(rows: Sequence[Row], reference: Sequence[Row]) -> str:
@@ -184,23 +161,3 @@ def as_csv(rows: Iterable[Row]) -> str:
 
 def _plain(row: Row) -> dict[str, Any]:
     return {key: value for key, value in row.items() if value is not None}
-
-
-def whole(x: float) -> str:
-    """No digits after the point."""
-    return f"{x:.0f}"
-
-
-def one_digit(x: float) -> str:
-    """One digit after the point."""
-    return f"{x:.1f}"
-
-
-def two_digits(x: float) -> str:
-    """Two digits after the point."""
-    return f"{x:.2f}"
-
-
-def three_digits(x: float) -> str:
-    """Three digits after the point."""
-    return f"{x:.3f}"
