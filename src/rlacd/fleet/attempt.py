@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal
 
@@ -15,6 +15,9 @@ from rlacd.fleet.work import Work
 from rlacd.fleet.worker import Limits, Worker, WorkerDiedError
 
 Status = Literal["done", "fallback", "failed"]
+
+HULL_SECONDS = 60.0
+"""A hull takes milliseconds; a limit meant for decompositions is not to stand in its way."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +114,8 @@ def or_hull(outcome: Outcome, work: Work, task: Task, path: Path) -> Outcome:
     """Give a mesh that failed its convex hull instead, if it may have one and not even that fails."""
     if outcome.status != "failed" or outcome.unusable or not work.fallback:
         return outcome
-    with fresh(work.limits) as worker, contextlib.suppress(WorkerDiedError):
+    patient = replace(work.limits, seconds=max(work.limits.seconds, HULL_SECONDS))
+    with fresh(patient) as worker, contextlib.suppress(WorkerDiedError):
         hull = attempt(worker, work.order, task, path, hull_only=True)
         if hull.status == "done":
             timing = {**hull.timing, **outcome.timing}

@@ -190,7 +190,7 @@ class Batch:
             raise
         manifest.finish()
         timings.finish()
-        rows = [row for name in sorted(seen) if (row := manifest.get(name)) is not None]
+        rows = [found for name in sorted(seen) if (found := manifest.get(name)) is not None]
         summary.status = Counter(row["status"] for row in rows)
         summary.failures = [row for row in rows if row["status"] != "done"]
         summary.stopped = len(seen) < len(assets)

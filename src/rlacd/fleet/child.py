@@ -30,6 +30,8 @@ from rlacd.solid.load import load_mesh
 
 READY = b"ready"
 
+STAND_IN = "The convex hull of the whole mesh stands in for its decomposition."
+
 
 def make(
     order: Order, mesh: Path, stem: str, staging: Path, hull_only: bool
@@ -73,16 +75,19 @@ def _hull(order: Order, mesh: Path) -> Decomposition:
     """One hull around everything: a cloud of points has no shape but that."""
     source = load_mesh(mesh)
     used = source.vertices[np.unique(source.faces)] if len(source.faces) else source.vertices
-    limits = {name: order.arguments().get(name) for name in ("max_vertices", "max_faces", "preset", "threads")}
+    limits: dict[str, Any] = {
+        name: order.options.get(name) for name in ("max_vertices", "max_faces", "preset", "threads")
+    }
     around = decompose((used, np.empty((0, 3), dtype=np.int64)), max_hulls=1, **limits)
-    told = {"name": mesh.stem, "complete": False, "parts": len(around), "warnings": []}
-    told |= {what: around.report[what] for what in ("faces", "vertices")}
+    told = {what: around.report[what] for what in ("parts", "faces", "vertices")}
+    told |= {"name": mesh.stem, "complete": False, "warnings": [STAND_IN]}
     return Decomposition(around.hulls, told, trimesh.Trimesh(source.vertices, source.faces, process=False))
 
 
 def _summary(report: dict[str, Any]) -> dict[str, Any]:
     """What is the same whenever and wherever the mesh is decomposed."""
-    kept = {what: report[what] for what in ("parts", "faces", "vertices", "complete", "hausdorff") if what in report}
+    same = ("parts", "faces", "vertices", "complete", "hausdorff")
+    kept: dict[str, Any] = {what: report[what] for what in same if what in report}
     if "concavity" in report:
         kept["concavity"] = report["concavity"]["max"]
     if "navigable" in report:

@@ -12,7 +12,7 @@ from typing import Any
 
 from rlacd._version import __version__
 from rlacd.criteria import NavigableSpace
-from rlacd.errors import WeightsError
+from rlacd.errors import OptionError, WeightsError
 from rlacd.formats import DENSITY, FORMATS, MODELS, check_model_options, hull_target
 from rlacd.options import Options
 from rlacd.policies import make_policy
@@ -20,6 +20,7 @@ from rlacd.presets import find_preset
 
 WEIGHTS_ENDING = ".onnx"
 DEFAULT_FORMAT = "glb"
+FOLDER_FORMAT = "obj"
 
 
 @dataclass(frozen=True)
@@ -83,17 +84,7 @@ class Order:
         """
         checked = Options(**{"threads": 1, **options})
         make_policy(checked.policy)
-        preset = None if checked.preset is None else find_preset(checked.preset)
-        ending, wanted = f".{DEFAULT_FORMAT}", None
-        if folders:
-            ending, wanted = "", file_format or "obj"
-        elif file_format is not None:
-            wanted = file_format.lower().lstrip(".")
-            ending = f".{MODELS[wanted][0]}" if wanted in MODELS else f".{wanted}"
-        elif preset is not None:
-            ending, wanted = preset.ending, preset.file_format
-        if wanted is not None and f".{wanted}" == ending:
-            wanted = None
+        ending, wanted = _file_kind(file_format, folders, checked.preset)
         check_model_options(DENSITY if density is None else density, up or "z")
         with TemporaryDirectory() as folder:
             hull_target(f"{folder}/mesh{ending or '/'}", wanted)
@@ -151,6 +142,24 @@ class Order:
         return asdict(self)
 
 
+def _file_kind(file_format: str | None, folders: bool, preset: str | None) -> tuple[str, str | None]:
+    """Ending and format of what a mesh gets; no ending for a folder, no format where the ending tells it."""
+    wanted = None if file_format is None else file_format.lower().lstrip(".")
+    endings = [ending for of_model in MODELS.values() for ending in of_model]
+    if wanted is not None and wanted not in (*FORMATS, *MODELS, *endings):
+        raise OptionError(f"unknown format {file_format!r}; use one of {', '.join((*FORMATS, *MODELS))}.")
+    if folders:
+        if wanted not in (None, *FORMATS):
+            raise OptionError(f"{file_format} is no format for a folder a mesh; use one of {', '.join(FORMATS)}.")
+        return "", wanted or FOLDER_FORMAT
+    if wanted is None and preset is not None:
+        engine = find_preset(preset)
+        return engine.ending, engine.file_format
+    if wanted in MODELS:
+        return f".{MODELS[wanted][0]}", wanted
+    return f".{wanted or DEFAULT_FORMAT}", None
+
+
 def _weights(policy: str) -> str:
     digest = hashlib.sha256(files("rlacd.weights").joinpath("guide.onnx").read_bytes())
     if policy.endswith(WEIGHTS_ENDING):
@@ -159,6 +168,3 @@ def _weights(policy: str) -> str:
         except OSError as error:
             raise WeightsError(f"The policy {policy} cannot be read ({error}); give another path.") from error
     return digest.hexdigest()
-
-
-__all__ = ["FORMATS", "Order"]
