@@ -88,6 +88,19 @@ _OWN: Parameters = {
     "fallback": _option(True, bool, "--fallback/--no-fallback", help="Give meshes that fail their convex hull."),
     "folders": _option(False, bool, "--folders", help="A folder a mesh with one file a hull."),
     "redo": _option("none", str, metavar="WHICH", help="Make results again: none, those that failed (failed), or all."),
+    "folder_format": _option(
+        None,
+        str | None,
+        "--format",
+        metavar="EXT",
+        help="Of each result: glb, obj, ply, stl, mjcf, urdf, sdf, usd, unreal or godot. "
+        "[dim]\\[default: what --preset says, or glb][/dim]",
+        show_default=False,
+    ),
+    "threads": _option(None, int | None, help="Threads of each mesh. [dim]\\[default: 1][/dim]", show_default=False),
+    "timeout": _option(
+        None, float | None, metavar="SECONDS", help="After so long, keep what is reached of a mesh.", show_default=False
+    ),
     "dry_run": _option(False, bool, "--dry-run", help="Tell which meshes would be done, and write nothing."),
 }
 
@@ -100,19 +113,19 @@ def batch_command(
     def batch(**given: Any) -> None:
         with exit_codes():
             own = {name: given.pop(name) for name in _OWN}
+            quiet = given.pop("quiet")
             work = _batch(own, given)
             if own["dry_run"]:
                 _tell_plan(work)
             else:
-                _run(work, _engine(own), quiet=own["quiet"])
+                _run(work, _engine(own), quiet=quiet)
 
     hints = get_type_hints(decompose, include_extras=True)
     lent = {
         name: parameter.replace(annotation=hints[name], kind=inspect.Parameter.KEYWORD_ONLY)
         for name, parameter in inspect.signature(decompose).parameters.items()
-        if name not in NOT_HERE
+        if name not in NOT_HERE and name not in _OWN
     }
-    _OWN["quiet"] = lent.pop("quiet")
     parameters = {name: parameter.replace(name=name) for name, parameter in {**_OWN, **lent}.items()}
     batch.__signature__ = inspect.Signature(list(parameters.values()))  # type: ignore[attr-defined]
     batch.__annotations__ = {name: parameter.annotation for name, parameter in parameters.items()}

@@ -79,7 +79,7 @@ def find_assets(folder: Path, glob: str = EVERYTHING, leave_out: Path | None = N
     Raises
     ------
     MeshFileError
-        `folder` is not there, or is no folder.
+        `folder` is not there or no folder, or one in it cannot be looked into.
     """
     if not folder.is_dir():
         raise MeshFileError(f"{folder} is no folder; give the folder that holds the meshes.")
@@ -91,12 +91,16 @@ def find_assets(folder: Path, glob: str = EVERYTHING, leave_out: Path | None = N
 
 
 def _names(folder: Path, leave_out: Path | None) -> Iterator[str]:
-    for at, folders, files in os.walk(folder):
+    for at, folders, files in os.walk(folder, onerror=_refuse):
         here = Path(at)
         folders[:] = [f for f in folders if not f.startswith(".") and (here / f).resolve() != leave_out]
         for file in files:
             if not file.startswith(".") and PurePosixPath(file).suffix.lower() in ENDINGS:
                 yield (here / file).relative_to(folder).as_posix()
+
+
+def _refuse(error: OSError) -> None:
+    raise MeshFileError(f"{error.filename} cannot be looked into ({error.strerror}); check its permissions.") from error
 
 
 def _matches(name: str, glob: str) -> bool:
