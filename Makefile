@@ -21,7 +21,7 @@ $(VENV)/installed: $(VENV)/tools $(NATIVE_SOURCES)
 	touch $@
 
 $(VENV)/test-extras: $(VENV)/installed
-	$(RLACD_INSTALL) --editable '.[view,train,usd,sim,bench]' --group test
+	$(RLACD_INSTALL) --editable '.[view,train,usd,sim,bench,fleet]' --group test
 	touch $@
 
 demo: install

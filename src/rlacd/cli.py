@@ -1,7 +1,8 @@
 """The command line: one command a verb, nothing but wiring.
 
 Exit codes: 0 done; 1 a bug in rlacd; 2 bad input or option; 3 the output cannot be written; 4 stopped early (timeout or
-Ctrl-C), a valid decomposition was written; 130 interrupted at once, no file is left half-written.
+Ctrl-C), a valid decomposition was written; 5 a batch is done, but some meshes failed; 130 interrupted at once, no file
+is left half-written.
 """
 
 from __future__ import annotations
@@ -17,14 +18,15 @@ from typing import Annotated, Any
 import typer
 
 from rlacd import __version__
+from rlacd.batch_command import BATCH_EPILOG, batch_command
 from rlacd.bench_command import bench_app
+from rlacd.command_options import decompose_options
 from rlacd.errors import OptionError, OutputError, RlacdError
 from rlacd.train_command import pretrain_command, train_command
 from rlacd.view_command import view_command
 
 STDOUT = Path("-")
 ROBOTS = (".urdf", ".xml")
-_SPELLED = {"reachable-only": "everywhere", "seeds": "seed-point", "closed-planes": "closed-plane"}
 
 
 class ExitCode(IntEnum):
@@ -35,6 +37,7 @@ class ExitCode(IntEnum):
     BAD_INPUT = 2
     CANNOT_WRITE = 3
     STOPPED_EARLY = 4
+    SOME_FAILED = 5
     INTERRUPTED = 130
 
 
@@ -407,7 +410,6 @@ def decompose(
     Ctrl-C once stops gracefully and writes what is reached; twice quits at once.
     """
     with _exit_codes():
-        from rlacd.criteria import NavigableSpace
         from rlacd.formats import check_balls, check_file, check_model_options, hull_target, write_file
         from rlacd.show import check_picture, check_up, draw_picture, is_html, save_report_page
 
@@ -432,42 +434,37 @@ def decompose(
             check_picture(picture, up=up)
         if balls is not None:
             check_balls(balls)
-        space = _chosen(
+        if criterion != Criterion.NAVIGABLE and balls is not None:
+            raise OptionError("--balls needs --criterion navigable.")
+        options = decompose_options(
             {
+                "criterion": criterion,
                 "radius": radius,
                 "tolerance": tolerance,
                 "radius_m": radius_m,
                 "tolerance_m": tolerance_m,
                 "reachable_only": reachable_only,
-                "seeds": seed_point and [_numbers("--seed-point", text, 3) for text in seed_point],
-                "closed_planes": closed_plane and [_plane(text) for text in closed_plane],
+                "seed_point": seed_point,
+                "closed_plane": closed_plane,
+                "threshold": threshold,
+                "threshold_m": threshold_m,
+                "max_hulls": max_hulls,
+                "max_vertices": max_vertices,
+                "max_faces": max_faces,
+                "merge": merge,
+                "policy": policy,
+                "resolution": resolution,
+                "seed": seed,
+                "threads": threads,
+                "timeout": timeout,
+                "quality": quality,
+                "budget": budget,
+                "search_steps": search_steps,
+                "preset": preset,
             }
         )
-        if criterion != Criterion.NAVIGABLE and (space or balls):
-            option = "balls" if balls else next(iter(space)).replace("_", "-")
-            raise OptionError(f"--{_SPELLED.get(option, option)} needs --criterion navigable.")
-        if criterion == Criterion.NAVIGABLE and (threshold is not None or threshold_m is not None):
-            raise OptionError("--threshold belongs to --criterion concavity; give --radius and --tolerance instead.")
-        given = {
-            "criterion": NavigableSpace(**space) if criterion == Criterion.NAVIGABLE else None,
-            "threshold": threshold,
-            "threshold_m": threshold_m,
-            "max_hulls": max_hulls,
-            "max_vertices": max_vertices,
-            "max_faces": max_faces,
-            "merge": merge,
-            "policy": policy,
-            "resolution": resolution,
-            "seed": seed,
-            "threads": threads,
-            "timeout": timeout,
-            "quality": quality and quality.value,
-            "budget": budget,
-            "search_steps": search_steps,
-            "preset": preset,
-        }
         if robot:
-            _rewrite(mesh, place, package_dir or [], report, quiet, _chosen(given))
+            _rewrite(mesh, place, package_dir or [], report, quiet, options)
             return
 
         from rlacd.decompose import decompose as run
@@ -475,7 +472,7 @@ def decompose(
         from rlacd.terminal import Watch, say, summary
 
         with Watch(quiet=quiet) as watch:
-            result = run(mesh, **_chosen(given), progress=watch)
+            result = run(mesh, **options, progress=watch)
         result.save(place, file_format=folder_format, one_mesh=one_mesh, **_chosen(written))
         if not quiet:
             say(summary(result, place))
@@ -561,23 +558,6 @@ def _rewrite(
         raise typer.Exit(ExitCode.STOPPED_EARLY)
 
 
-def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
-    try:
-        values = tuple(float(word) for word in text.split(","))
-    except ValueError:
-        values = ()
-    if len(values) != count:
-        raise OptionError(
-            f"{option} is {text!r}; it takes {count} numbers with commas between, such as {'0,0,1,0'[: 2 * count - 1]}."
-        )
-    return values
-
-
-def _plane(text: str) -> tuple[tuple[float, ...], float]:
-    *normal, offset = _numbers("--closed-plane", text, 4)
-    return tuple(normal), offset
-
-
 def _check_output(mesh: Path, named: dict[str, Path | None]) -> None:
     """No file may be written twice, and the input never."""
     seen = {_same(mesh): "the input"}
@@ -641,3 +621,4 @@ app.command("train", epilog=EPILOG)(train_command(_exit_codes))
 app.command("pretrain", epilog=EPILOG)(pretrain_command(_exit_codes))
 app.add_typer(bench_app(_exit_codes), name="bench")
 app.command("view", epilog=EPILOG)(view_command(_exit_codes))
+app.command("batch", epilog=BATCH_EPILOG)(batch_command(_exit_codes, decompose))

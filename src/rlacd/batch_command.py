@@ -1,0 +1,196 @@
+"""The command `rlacd batch`: a folder of meshes at once, on this machine or on a cluster."""
+
+from __future__ import annotations
+
+import inspect
+import os
+import signal
+import threading
+from collections.abc import Callable
+from contextlib import AbstractContextManager, suppress
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+
+import typer
+
+from rlacd.command_options import decompose_options
+from rlacd.errors import OptionError
+
+if TYPE_CHECKING:
+    from rlacd.fleet import Batch
+    from rlacd.fleet.batch import Engine
+
+STOPPED_EARLY, SOME_FAILED = 4, 5
+
+HELP = """Decompose all meshes of a folder; what is done already is passed over.
+
+\b
+[bold]Examples[/bold]
+  rlacd batch assets/ -o hulls/
+  rlacd batch assets/ -o hulls/ --glob 'furniture/*.obj' --preset mujoco --jobs 8
+  rlacd batch assets/ -o hulls/ --dry-run
+  rlacd batch assets/ -o s3://bucket/hulls --ray auto
+
+A mesh whose process dies, hangs or needs too much memory is tried once more alone, and is then given its convex hull.
+OUT/manifest.jsonl tells what became of each mesh. Killed at any moment, the same command goes on where it was.
+Ctrl-C once finishes what is running; twice quits at once.
+"""
+
+BATCH_EPILOG = """\b
+[bold]Exit codes[/bold]
+  0    all done
+  1    a bug in rlacd (RLACD_DEBUG=1 shows the traceback)
+  2    bad option, or no meshes
+  3    the results cannot be written
+  4    stopped by Ctrl-C; run again to go on
+  5    all done, but some meshes failed or were given their convex hull
+  130  interrupted at once; no file is left half-written
+"""
+
+BATCH, NOT_HERE = "Batch", frozenset({"mesh", "output", "package_dir", "report", "picture", "balls"})
+"""NOT_HERE: what decompose takes and batch does not."""
+
+Parameters = dict[str, inspect.Parameter]
+
+
+def _option(default: Any, kind: Any, *names: str, **about: Any) -> inspect.Parameter:
+    option = typer.Option(*names, rich_help_panel=BATCH, **about)
+    annotation = Annotated[kind, option]
+    return inspect.Parameter("_", inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+
+
+_NEEDED = inspect.Parameter.empty
+
+_OWN: Parameters = {
+    "assets": inspect.Parameter(
+        "assets",
+        inspect.Parameter.KEYWORD_ONLY,
+        annotation=Annotated[Path, typer.Argument(metavar="ASSETS", help="A folder of meshes, of any depth.")],
+    ),
+    "out": _option(
+        _NEEDED,
+        str,
+        "--output",
+        "-o",
+        metavar="OUT",
+        help="A folder, or an address that fsspec knows: s3://bucket/path.",
+    ),
+    "glob": _option("**", str, help="Only these: 'chair_*.obj' in any folder, 'furniture/*' by the whole name."),
+    "jobs": _option(
+        None, int | None, min=1, help="Meshes at a time. [dim]\\[default: all cores][/dim]", show_default=False
+    ),
+    "ray": _option(None, str | None, metavar="ADDRESS", help="Use a Ray cluster: its address, auto, or local."),
+    "limit": _option(
+        600.0, float, metavar="SECONDS", min=0.1, help="What one mesh may take before its process is ended."
+    ),
+    "memory": _option(4.0, float, metavar="GB", min=0.0, help="What the process of a mesh may hold; 0: no limit."),
+    "fallback": _option(True, bool, "--fallback/--no-fallback", help="Give meshes that fail their convex hull."),
+    "folders": _option(False, bool, "--folders", help="A folder a mesh with one file a hull."),
+    "redo": _option("none", str, metavar="WHICH", help="Make results again: none, those that failed (failed), or all."),
+    "folder_format": _option(
+        None,
+        str | None,
+        "--format",
+        metavar="EXT",
+        help="Of each result: glb, obj, ply, stl, mjcf, urdf, sdf, usd, unreal or godot. "
+        "[dim]\\[default: what --preset says, or glb][/dim]",
+        show_default=False,
+    ),
+    "threads": _option(None, int | None, help="Threads of each mesh. [dim]\\[default: 1][/dim]", show_default=False),
+    "timeout": _option(
+        None, float | None, metavar="SECONDS", help="After so long, keep what is reached of a mesh.", show_default=False
+    ),
+    "dry_run": _option(False, bool, "--dry-run", help="Tell which meshes would be done, and write nothing."),
+}
+
+
+def batch_command(
+    exit_codes: Callable[[], AbstractContextManager[None]], decompose: Callable[..., None]
+) -> Callable[..., None]:
+    """Build the command; `exit_codes` turns errors into a sentence and an exit code, `decompose` lends its options."""
+
+    def batch(**given: Any) -> None:
+        with exit_codes():
+            own = {name: given.pop(name) for name in _OWN}
+            quiet = given.pop("quiet")
+            work = _batch(own, given)
+            if own["dry_run"]:
+                _tell_plan(work)
+            else:
+                _run(work, _engine(own), quiet=quiet)
+
+    hints = get_type_hints(decompose, include_extras=True)
+    lent = {
+        name: parameter.replace(annotation=hints[name], kind=inspect.Parameter.KEYWORD_ONLY)
+        for name, parameter in inspect.signature(decompose).parameters.items()
+        if name not in NOT_HERE and name not in _OWN
+    }
+    parameters = {name: parameter.replace(name=name) for name, parameter in {**_OWN, **lent}.items()}
+    batch.__signature__ = inspect.Signature(list(parameters.values()))  # type: ignore[attr-defined]
+    batch.__annotations__ = {name: parameter.annotation for name, parameter in parameters.items()}
+    batch.__doc__ = HELP
+    return batch
+
+
+def _batch(own: dict[str, Any], given: dict[str, Any]) -> Batch:
+    from rlacd.fleet import REDO, Batch, Limits, Order
+
+    if own["redo"] not in REDO:
+        raise OptionError(f"--redo is {own['redo']!r}; it has to be one of {', '.join(REDO)}.")
+    if own["out"] == "-":
+        raise OptionError("a batch cannot be written to stdout; give -o a folder.")
+    file_format, density, up = (given.pop(name) for name in ("folder_format", "density", "up"))
+    order = Order.of(decompose_options(given), file_format=file_format, folders=own["folders"], density=density, up=up)
+    limits = Limits(own["limit"], int(own["memory"] * 2**30))
+    return Batch(own["assets"], own["out"], order, limits, own["fallback"], own["glob"], own["redo"])
+
+
+def _engine(own: dict[str, Any]) -> Engine:
+    from rlacd.fleet import LocalEngine
+
+    if own["ray"] is None:
+        return LocalEngine(own["jobs"] or os.cpu_count() or 1)
+    from rlacd.fleet.on_ray import RayEngine
+
+    return RayEngine(own["ray"], own["jobs"])
+
+
+def _tell_plan(batch: Batch) -> None:
+    from rlacd.plain_json import printable
+    from rlacd.terminal import say
+
+    plan = batch.plan()
+    for asset, finished in plan:
+        if not finished:
+            typer.echo(printable(f"{asset.name} -> {asset.place}{batch.order.ending or '/'}"))
+    done = sum(finished for _, finished in plan)
+    say(f"{len(plan)} meshes: {done} done, {len(plan) - done} to do; nothing was written")
+
+
+def _run(batch: Batch, engine: Engine, *, quiet: bool) -> None:
+    from rlacd.batch_screen import Screen, summary_lines
+    from rlacd.terminal import say
+
+    stop = threading.Event()
+
+    def on_interrupt(number: int, frame: FrameType | None) -> None:
+        stop.set()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        say("stopping; what is running will be finished (Ctrl-C again to quit at once)")
+
+    previous: Any = None
+    with suppress(ValueError):  # not in the main thread: then nobody presses Ctrl-C
+        previous = signal.signal(signal.SIGINT, on_interrupt)
+    try:
+        with Screen(quiet=quiet) as screen:
+            summary = batch.run(engine, screen, stop)
+    finally:
+        if previous is not None:
+            signal.signal(signal.SIGINT, previous)
+    if not quiet:
+        say("\n".join(summary_lines(summary, batch.out)))
+    if summary.stopped:
+        raise typer.Exit(STOPPED_EARLY)
+    if summary.failures:
+        raise typer.Exit(SOME_FAILED)

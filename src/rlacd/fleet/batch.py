@@ -1,0 +1,238 @@
+"""Many meshes: what is finished is passed over, the rest is handed to an engine, and every outcome becomes a row."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, Protocol
+
+from rlacd.errors import MeshFileError, OptionError
+from rlacd.fleet.assets import EVERYTHING, Asset, content_hash, find_assets
+from rlacd.fleet.attempt import Outcome, Task
+from rlacd.fleet.ledger import Ledger, Row
+from rlacd.fleet.order import Order
+from rlacd.fleet.store import FolderStore, Store, open_store
+from rlacd.fleet.work import Work
+from rlacd.fleet.worker import Limits
+
+MANIFEST, TIMINGS = "manifest.jsonl", "timings.jsonl"
+
+Redo = Literal["none", "failed", "all"]
+REDO: tuple[Redo, ...] = ("none", "failed", "all")
+
+
+class Engine(Protocol):
+    """Where the work is done."""
+
+    def run(self, tasks: Iterator[Task], work: Work) -> Iterator[tuple[Task, Outcome]]:
+        """Do tasks in any order; what an outcome's ``files`` name is in the store by then.
+
+        No more tasks are taken from the iterator than can be worked on soon.
+        """
+
+    def close(self) -> None:
+        """End all work at once."""
+
+
+class Watcher(Protocol):
+    """Is told how the work goes on."""
+
+    def begin(self, meshes: int) -> None:
+        """So many meshes were found."""
+
+    def passed_over(self, asset: Asset) -> None:
+        """The mesh's result is there already."""
+
+    def finished(self, row: Row, timing: Row) -> None:
+        """A mesh has its row."""
+
+
+@dataclass
+class Summary:
+    """How a run went.
+
+    Attributes
+    ----------
+    meshes
+        How many were found.
+    passed_over
+        How many had their result already; whatever it is, it is counted in `status` too.
+    status
+        How many meshes there are of each status by now.
+    stopped
+        Whether the run was stopped before the last mesh.
+    seconds
+        Wall time.
+    failures
+        Rows of the meshes found that failed or were given their hull.
+    slowest
+        Names and seconds of the slowest meshes of this run.
+    """
+
+    meshes: int
+    passed_over: int = 0
+    status: Counter[str] = field(default_factory=Counter)
+    stopped: bool = False
+    seconds: float = 0.0
+    failures: list[Row] = field(default_factory=list)
+    slowest: list[tuple[str, float]] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Batch:
+    """A folder of meshes and where their results go.
+
+    Attributes
+    ----------
+    assets
+        Folder of the meshes.
+    out
+        Folder or address of the results.
+    order
+        What is done to each mesh.
+    limits
+        What each may take.
+    fallback
+        Whether a mesh that fails is given its convex hull.
+    glob
+        Which of the meshes; see `find_assets`.
+    redo
+        Which results are made again: none, those that failed, or all.
+    """
+
+    assets: Path
+    out: str
+    order: Order
+    limits: Limits = field(default_factory=Limits)
+    fallback: bool = True
+    glob: str = EVERYTHING
+    redo: Redo = "none"
+
+    def plan(self) -> list[tuple[Asset, bool]]:
+        """List all meshes, and whether the result of each is there; writes nothing.
+
+        Raises
+        ------
+        RlacdError
+            As for `run`.
+        """
+        assets, store = self._find(), open_store(self.out)
+        manifest = Ledger(store, MANIFEST)
+        return [(asset, self._task(asset, manifest, store)[1]) for asset in assets]
+
+    def run(self, engine: Engine, watcher: Watcher, stop: threading.Event | None = None) -> Summary:
+        """Do all meshes that are not done.
+
+        Parameters
+        ----------
+        engine : Engine
+        watcher : Watcher
+        stop : threading.Event, optional
+            Once it is set no further mesh is begun.
+
+        Returns
+        -------
+        Summary
+
+        Raises
+        ------
+        MeshFileError
+            There are no meshes.
+        OptionError
+            The results would lie among the meshes.
+        OutputError
+            The results cannot be written, or another run is writing there.
+        """
+        assets, store = self._find(), open_store(self.out)
+        store.open()
+        try:
+            work = Work(self.order, self.limits, self.fallback, self.out, store, stop or threading.Event())
+            return self._run(assets, work, engine, watcher)
+        finally:
+            engine.close()
+            store.close()
+
+    def _run(self, assets: list[Asset], work: Work, engine: Engine, watcher: Watcher) -> Summary:
+        summary, start = Summary(len(assets)), time.monotonic()
+        manifest, timings = Ledger(work.store, MANIFEST), Ledger(work.store, TIMINGS)
+        seen: list[str] = []
+
+        def waiting() -> Iterator[Task]:
+            for asset in assets:
+                if work.stop.is_set():
+                    return
+                task, finished = self._task(asset, manifest, work.store)
+                if finished:
+                    summary.passed_over += 1
+                    seen.append(asset.name)
+                    watcher.passed_over(asset)
+                else:
+                    yield task
+
+        watcher.begin(len(assets))
+        try:
+            for task, outcome in engine.run(waiting(), work):
+                row = self._row(task, outcome)
+                timing = {"mesh": task.asset.name, **outcome.timing}
+                timings.add(timing)
+                manifest.add(row)
+                seen.append(task.asset.name)
+                watcher.finished(row, timing)
+                spent = (task.asset.name, float(timing.get("seconds", 0.0)))
+                summary.slowest = sorted([*summary.slowest, spent], key=lambda entry: -entry[1])[:3]
+        except BaseException:
+            manifest.close()
+            timings.close()
+            raise
+        manifest.finish()
+        timings.finish()
+        rows = [found for name in sorted(seen) if (found := manifest.get(name)) is not None]
+        summary.status = Counter(row["status"] for row in rows)
+        summary.failures = [row for row in rows if row["status"] != "done"]
+        summary.stopped = len(seen) < len(assets)
+        summary.seconds = time.monotonic() - start
+        return summary
+
+    def _find(self) -> list[Asset]:
+        store = open_store(self.out)
+        here = store.folder if isinstance(store, FolderStore) else None
+        if here is not None and here.resolve() == self.assets.resolve():
+            raise OptionError(f"the results would lie among the meshes of {self.assets}; choose another folder.")
+        assets = find_assets(self.assets, self.glob, here)
+        if not assets:
+            which = "" if self.glob == EVERYTHING else f" whose name fits {self.glob!r}"
+            raise MeshFileError(
+                f"there is no mesh{which} in {self.assets}; give a folder with obj, stl, glb, ... files."
+            )
+        return assets
+
+    def _task(self, asset: Asset, manifest: Ledger, store: Store) -> tuple[Task, bool]:
+        """A mesh with the key of its result, and whether that is there."""
+        try:
+            content = content_hash(asset.files())
+        except MeshFileError as error:  # what is wrong with the file is then said by whoever loads it
+            content = str(error)
+        task = Task(asset, self.order.key(content, asset.name))
+        return task, self.redo != "all" and self._is_finished(task, manifest.get(asset.name), store)
+
+    def _is_finished(self, task: Task, row: Row | None, store: Store) -> bool:
+        if row is None or row["key"] != task.key or row["place"] != task.asset.place:
+            return False  # where a result is put depends on the meshes beside it
+        if row["status"] != "done" and (self.redo == "failed" or row["limits"] != self._refusal()):
+            return False
+        return all(store.size(name) == size for name, size in row["outputs"].items())
+
+    def _row(self, task: Task, outcome: Outcome) -> Row:
+        """All that does not differ from run to run."""
+        row: Row = {"mesh": task.asset.name, "status": outcome.status, "place": task.asset.place, "key": task.key}
+        if outcome.error is not None:
+            row |= {"error": outcome.error, "limits": self._refusal()}
+        return {**row, **outcome.report, "outputs": dict(sorted(outcome.outputs.items()))}
+
+    def _refusal(self) -> Row:
+        """On what a failure rests: with other limits it may be none."""
+        return {"seconds": self.limits.seconds, "memory": self.limits.memory, "fallback": self.fallback}

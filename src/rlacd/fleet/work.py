@@ -1,0 +1,38 @@
+"""What every task of a batch needs."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass, field
+
+from rlacd.fleet.order import Order
+from rlacd.fleet.store import Store
+from rlacd.fleet.worker import Limits
+
+
+@dataclass(frozen=True)
+class Work:
+    """What every task needs.
+
+    Attributes
+    ----------
+    order
+        What is done to a mesh.
+    limits
+        What it may take.
+    fallback
+        Whether a mesh that fails is given its convex hull.
+    out
+        Folder or address of the results.
+    store
+        The same, open.
+    stop
+        Once it is set no further mesh is begun.
+    """
+
+    order: Order
+    limits: Limits
+    fallback: bool
+    out: str
+    store: Store
+    stop: threading.Event = field(default_factory=threading.Event)

@@ -1,0 +1,306 @@
+"""`rlacd batch`: every mesh gets its row whatever the others do, and nothing finished is lost or done again."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+import trimesh
+from typer.testing import CliRunner, Result
+
+from rlacd.cli import app
+from tests.trouble import make_trouble, tree, write_ell
+
+TIMES = "timings.jsonl"
+
+
+def batch(*words: object) -> Result:
+    return CliRunner().invoke(app, ["batch", *(str(word) for word in words)])
+
+
+def rows(out: Path, name: str = "manifest.jsonl") -> dict[str, dict[str, Any]]:
+    return {row["mesh"]: row for row in map(json.loads, (out / name).read_text().splitlines())}
+
+
+@pytest.fixture
+def trouble(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
+    environment = make_trouble(tmp_path / "trouble")
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    return environment
+
+
+@pytest.fixture
+def assets(tmp_path: Path) -> Path:
+    folder = tmp_path / "assets"
+    for name, length in (("a.obj", 2.0), ("a.stl", 1.5), ("b/椅子.ply", 3.0)):
+        write_ell(folder / name, length)
+    return folder
+
+
+# --- what a run leaves ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_every_mesh_gets_hulls_and_a_row_and_is_not_done_again(assets: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    run = batch(assets, "-o", out, "--jobs", 2)
+    assert run.exit_code == 0, run.output
+    assert "3 of 3 meshes are done" in run.stderr
+    assert run.stdout == ""
+    assert set(tree(out, ".rlacd/lock")) == {"a.obj.glb", "a.stl.glb", "b/椅子.glb", "manifest.jsonl", TIMES}
+    told = rows(out)
+    assert list(told) == sorted(told)
+    for name, row in told.items():
+        hulls = trimesh.load_scene(out / next(iter(row["outputs"]))).geometry
+        assert row["status"] == "done"
+        assert row["parts"] == len(hulls) >= 2
+        assert row["concavity"] <= 0.05
+        assert rows(out, TIMES)[name]["seconds"] > 0
+
+    before = tree(out)
+    again = batch(assets, "-o", out)
+    assert again.exit_code == 0
+    assert "3 were done before" in again.stderr
+    assert tree(out) == before
+
+    write_ell(assets / "a.stl", 1.2)  # another mesh under the same name, a result that is gone, one that is cut off
+    (out / "b" / "椅子.glb").unlink()
+    third = batch(assets, "-o", out, "--jobs", 1)
+    assert third.exit_code == 0
+    assert "2 now" in third.stderr
+    assert (out / "b" / "椅子.glb").read_bytes() == before["b/椅子.glb"]
+    assert (out / "a.stl.glb").read_bytes() != before["a.stl.glb"]
+
+    (assets / "a.stl").unlink()  # now there is no need to tell the two apart by their endings
+    fourth = batch(assets, "-o", out, "--jobs", 1)
+    assert fourth.exit_code == 0
+    assert (out / "a.glb").read_bytes() == before["a.obj.glb"]
+    assert not (out / "a.obj.glb").exists()
+
+
+@pytest.mark.slow
+def test_a_batch_writes_what_decompose_writes(assets: Path, tmp_path: Path) -> None:
+    words = ["--preset", "mujoco", "--threshold", "0.1", "--density", "7"]
+    assert batch(assets, "-o", tmp_path / "out", "--glob", "b/*", *words).exit_code == 0
+    alone = tmp_path / "alone"
+    alone.mkdir()
+    run = CliRunner().invoke(app, ["decompose", str(assets / "b" / "椅子.ply"), "-o", str(alone / "椅子.xml"), *words])
+    assert run.exit_code == 0, run.output
+    assert tree(tmp_path / "out" / "b") == tree(alone)
+
+
+@pytest.mark.slow
+def test_a_folder_a_mesh(assets: Path, tmp_path: Path) -> None:
+    run = batch(assets, "-o", tmp_path / "out", "--glob", "a.stl", "--folders", "--format", "stl")
+    assert run.exit_code == 0, run.output
+    names = sorted(path.name for path in (tmp_path / "out" / "a.stl").iterdir())
+    assert names[:2] == ["a.stl_000.stl", "a.stl_001.stl"] or names[:2] == ["a_000.stl", "a_001.stl"]
+
+
+def test_a_dry_run_tells_and_writes_nothing(assets: Path, tmp_path: Path) -> None:
+    run = batch(assets, "-o", tmp_path / "out", "--dry-run", "--format", "urdf")
+    assert run.exit_code == 0
+    assert run.stdout.splitlines() == ["a.obj -> a.obj.urdf", "a.stl -> a.stl.urdf", "b/椅子.ply -> b/椅子.urdf"]
+    assert "3 meshes: 0 done, 3 to do" in run.stderr
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "says"),
+    [
+        (["{in}/no", "-o", "{in}/out"], 2, "no folder"),
+        (["{in}/empty", "-o", "{in}/out"], 2, "no mesh in"),
+        (["{in}", "-o", "{in}/out", "--glob", "*.fbx"], 2, "'*.fbx'"),
+        (["{in}", "-o", "{in}"], 2, "among the meshes"),
+        (["{in}", "-o", "{in}/a.obj"], 3, "a.obj"),
+        (["{in}", "-o", "-"], 2, "stdout"),
+        (["{in}", "-o", "{in}/out", "--redo", "some"], 2, "none, failed, all"),
+        (["{in}", "-o", "{in}/out", "--threshold", "-1"], 2, "threshold"),
+        (["{in}", "-o", "{in}/out", "--radius", "0.1"], 2, "--criterion navigable"),
+        (["{in}", "-o", "{in}/out", "--format", "fbx"], 2, "unknown format"),
+        (["{in}", "-o", "{in}/out", "--jobs", "0"], 2, "--jobs"),
+        (["{in}", "-o", "nowhere://x"], 2, "nowhere"),
+    ],
+)
+def test_mistakes_are_one_sentence_and_leave_nothing(assets: Path, words: list[str], code: int, says: str) -> None:
+    (assets / "empty").mkdir()
+    before = tree(assets)
+    run = batch(*(word.format(**{"in": assets}) for word in words))
+    assert run.exit_code == code, run.output
+    assert says in " ".join(run.stderr.split())
+    assert tree(assets) == before
+
+
+# --- trouble ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_no_mesh_stops_the_others(trouble: dict[str, str], tmp_path: Path) -> None:
+    assets, out = tmp_path / "assets", tmp_path / "out"
+    names = ["dies", "dies_once", "grows", "hangs", "prints", "bug", "well"]
+    for name in names:
+        write_ell(assets / f"{name}.obj")
+    (assets / "bad.obj").write_text("no mesh")
+    (assets / "gone.obj").symlink_to(assets / "nowhere")
+    (assets / "shut.obj").mkdir()
+    run = batch(assets, "-o", out, "--jobs", 2, "--limit", 40, "--memory", 1)
+    assert run.exit_code == 5, run.output
+    told = rows(out)
+    assert {name.removesuffix(".obj"): row["status"] for name, row in told.items()} == {
+        **dict.fromkeys(["dies", "grows", "hangs", "bug"], "fallback"),
+        **dict.fromkeys(["dies_once", "prints", "well"], "done"),
+        **dict.fromkeys(["bad", "gone"], "failed"),
+    }
+    assert told["dies.obj"]["error"] == "its process died of SIGSEGV"
+    assert told["hangs.obj"]["error"] == "it took more than 40 s"
+    assert told["grows.obj"]["error"] == "it needed more than 1 GB of memory"
+    assert "surprise" in told["bug.obj"]["error"]
+    assert "does not exist" in told["gone.obj"]["error"]
+    assert str(tmp_path) not in (out / "manifest.jsonl").read_text(), "a manifest is the same wherever the meshes lie"
+    assert told["well.obj"]["outputs"]
+    assert told["bad.obj"]["outputs"] == {}
+    hull = trimesh.load_scene(out / "dies.glb").geometry
+    assert len(hull) == 1
+    assert next(iter(hull.values())).bounds == pytest.approx(trimesh.load(assets / "well.obj").bounds, abs=1e-5)
+    times = rows(out, TIMES)
+    assert times["dies.obj"]["attempts"] == times["dies_once.obj"]["attempts"] == 2
+    assert "last words" in times["dies.obj"]["last_words"]
+    assert "attempts" not in times["well.obj"]
+
+    again = batch(assets, "-o", out, "--limit", 40, "--memory", 1)  # the same limits: it would end the same
+    assert (again.exit_code, "0 now" in again.stderr) == (5, True)
+    refused = batch(assets, "-o", out, "--limit", 40, "--memory", 1, "--no-fallback", "--glob", "dies.obj")
+    assert refused.exit_code == 5
+    assert rows(out)["dies.obj"]["status"] == "failed"
+    assert not (out / "dies.glb").exists()
+    os.environ["PYTHONPATH"] = ""  # the trouble is over
+    mended = batch(assets, "-o", out, "--redo", "failed", "--glob", "[dh]*.obj", "--jobs", 1)
+    assert mended.exit_code == 0, mended.output
+    assert rows(out)["dies.obj"]["status"] == rows(out)["hangs.obj"]["status"] == "done"
+    assert (out / "dies.glb").read_bytes() == (out / "well.glb").read_bytes()
+
+
+# --- killed and stopped -----------------------------------------------------------------------------------------------
+
+
+def start(assets: Path, out: Path, environment: dict[str, str], *words: object) -> subprocess.Popen[str]:
+    command = [sys.executable, "-c", "from rlacd.cli import main; main()", "batch", str(assets), "-o", str(out)]
+    return subprocess.Popen(
+        [*command, "--jobs", "2", *(str(word) for word in words)],
+        env={**os.environ, **environment},
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def wait_for_rows(out: Path, count: int, process: subprocess.Popen[str]) -> int:
+    journal = out / ".rlacd" / "manifest.jsonl"
+    while process.poll() is None:
+        found = journal.read_bytes().count(b"\n") if journal.exists() else 0
+        if found >= count:
+            return found
+        time.sleep(0.01)
+    pytest.fail(f"ended before it had {count} rows: {process.stderr.read() if process.stderr else ''}")
+
+
+@pytest.mark.slow
+def test_killed_again_and_again_it_ends_as_if_undisturbed(trouble: dict[str, str], tmp_path: Path) -> None:
+    assets = tmp_path / "assets"
+    for number in range(5):
+        write_ell(assets / f"slow_{number}.obj", 2.0 + number / 10)
+    for name in ("dies", "well"):
+        write_ell(assets / "deep" / f"{name}.stl")
+    (assets / "bad.stl").write_text("no mesh")
+    words = ["--preset", "bullet"]  # several files a mesh
+    plain = tmp_path / "plain"
+    assert start(assets, plain, trouble, *words).wait(timeout=300) == 5
+
+    out = tmp_path / "out"
+    for count in (0, 2, 5):
+        process = start(assets, out, trouble, *words)
+        if count:
+            wait_for_rows(out, count, process)
+        else:
+            time.sleep(3)
+        children = psutil.Process(process.pid).children(recursive=True)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        _, alive = psutil.wait_procs(children, timeout=30)
+        assert not alive, "workers end with the run that started them"
+    last = start(assets, out, trouble, *words)
+    assert last.wait(timeout=300) == 5
+    said = last.stderr.read() if last.stderr else ""
+    assert "0 were done before" not in said
+    assert tree(out, TIMES) == tree(plain, TIMES)
+    assert set(rows(out, TIMES)) >= set(rows(out)) - {"bad.stl"}
+
+
+@pytest.mark.slow
+def test_ctrl_c_finishes_what_is_running_and_the_next_run_goes_on(trouble: dict[str, str], tmp_path: Path) -> None:
+    assets, out = tmp_path / "assets", tmp_path / "out"
+    for number in range(6):
+        write_ell(assets / f"slow_{number}.obj", 2.0 + number / 10)
+    process = start(assets, out, {**trouble, "TROUBLE_SLOW": "3"})
+    wait_for_rows(out, 1, process)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=120)
+    assert process.returncode == 4, said
+    assert "stopped early" in said
+    done = rows(out)
+    assert 1 <= len(done) < 6
+    assert all((out / name).stat().st_size == size for row in done.values() for name, size in row["outputs"].items())
+    assert not (out / ".rlacd" / "manifest.jsonl").exists()
+    before = {name: (out / name).stat().st_mtime_ns for row in done.values() for name in row["outputs"]}
+    assert batch(assets, "-o", out, "--jobs", 2).exit_code == 0
+    assert len(rows(out)) == 6
+    assert all((out / name).stat().st_mtime_ns == then for name, then in before.items()), "none is made twice"
+
+
+@pytest.mark.slow
+def test_ctrl_c_twice_quits_at_once(trouble: dict[str, str], tmp_path: Path) -> None:
+    assets, out = tmp_path / "assets", tmp_path / "out"
+    write_ell(assets / "a.obj")
+    write_ell(assets / "hangs.obj")
+    process = start(assets, out, trouble)
+    wait_for_rows(out, 1, process)
+    process.send_signal(signal.SIGINT)
+    time.sleep(1)
+    assert process.poll() is None, "the first one waits for what is running"
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130, said
+    assert "Traceback" not in said
+    assert batch(assets, "-o", out, "--glob", "a.obj", "--dry-run").stderr.startswith("1 meshes: 1 done")
+
+
+@pytest.mark.slow
+def test_results_can_go_to_any_address(assets: Path) -> None:
+    fsspec = pytest.importorskip("fsspec", reason="the extra fleet is not installed")
+    memory = fsspec.filesystem("memory")
+    memory.store.clear()
+    assert batch(assets, "-o", "memory://bucket/hulls", "--jobs", 1).exit_code == 0
+    names = {"/bucket/hulls/a.obj.glb", "/bucket/hulls/a.stl.glb", "/bucket/hulls/b/椅子.glb"}
+    assert {name for name in memory.find("/bucket/hulls") if name.endswith(".glb")} == names
+    again = batch(assets, "-o", "memory://bucket/hulls")
+    assert (again.exit_code, "3 were done before" in again.stderr) == (0, True)
+
+
+@pytest.mark.slow
+def test_real_meshes_give_the_same_bytes_with_one_job_and_two(corpus: Path, tmp_path: Path) -> None:
+    assets = tmp_path / "assets"
+    assets.mkdir()
+    small = sorted((corpus / "test").glob("*.ply"), key=lambda path: (path.stat().st_size, path.name))[:8]
+    for path in small:
+        (assets / path.name).symlink_to(path)
+    for jobs in (1, 2):
+        assert batch(assets, "-o", tmp_path / f"out{jobs}", "--jobs", jobs).exit_code == 0
+    assert tree(tmp_path / "out1", TIMES) == tree(tmp_path / "out2", TIMES)

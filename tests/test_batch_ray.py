@@ -1,0 +1,107 @@
+"""`rlacd batch` over Ray: a real cluster of two nodes on this machine, one of which is killed."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rlacd.errors import OptionError
+from rlacd.fleet import Asset, Batch, Limits, LocalEngine, Order
+from tests.test_batch import TIMES, rows
+from tests.trouble import make_trouble, tree, write_ell
+
+ray = pytest.importorskip("ray", reason="the extra fleet is not installed")
+
+from ray.cluster_utils import Cluster  # noqa: E402
+
+from rlacd.fleet.on_ray import RayEngine  # noqa: E402
+
+pytestmark = pytest.mark.slow
+
+
+class Counter:
+    """Counts rows; at a number of them it does something."""
+
+    def __init__(self, at: int = -1, then: Any = None) -> None:
+        self.rows: list[dict[str, Any]] = []
+        self._at, self._then = at, then
+
+    def begin(self, meshes: int) -> None: ...
+
+    def passed_over(self, asset: Asset) -> None: ...
+
+    def finished(self, row: dict[str, Any], timing: dict[str, Any]) -> None:
+        self.rows.append(timing)
+        if len(self.rows) == self._at:
+            self._then()
+
+
+@pytest.fixture
+def trouble(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in {**make_trouble(tmp_path / "trouble"), "TROUBLE_SLOW": "2"}.items():
+        monkeypatch.setenv(name, value)
+
+
+@pytest.fixture
+def cluster(trouble: None) -> Iterator[Cluster]:
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
+    ray.init(address=cluster.address, log_to_driver=False, logging_level="ERROR")
+    yield cluster
+    ray.shutdown()
+    cluster.shutdown()
+
+
+def test_a_node_dies_half_way_and_the_results_are_those_of_one_machine(cluster: Cluster, tmp_path: Path) -> None:
+    assets = tmp_path / "assets"
+    for number in range(8):
+        write_ell(assets / f"slow_{number}.obj", 2.0 + number / 10)
+    write_ell(assets / "deep" / "dies.obj")
+    (assets / "bad.obj").write_text("no mesh")
+    doomed = cluster.add_node(num_cpus=1)
+    cluster.wait_for_nodes()
+    order, limits = Order.of({}, file_format="urdf"), Limits(seconds=120)
+
+    killing = threading.Thread(target=lambda: cluster.remove_node(doomed, allow_graceful=False))
+    counter = Counter(at=3, then=killing.start)
+    over_ray = Batch(assets, str(tmp_path / "ray"), order, limits).run(RayEngine("auto"), counter)
+    killing.join()
+    assert over_ray.status == {"done": 8, "fallback": 1, "failed": 1}
+    assert len({node["NodeID"] for node in ray.nodes() if node["Alive"]}) == 1
+
+    here = Batch(assets, str(tmp_path / "here"), order, limits).run(LocalEngine(1), Counter())
+    assert here.status == over_ray.status
+    assert tree(tmp_path / "ray", TIMES) == tree(tmp_path / "here", TIMES)
+    assert rows(tmp_path / "ray", TIMES)["deep/dies.obj"]["attempts"] == 2
+
+    again = Counter()
+    assert Batch(assets, str(tmp_path / "ray"), order, limits).run(RayEngine("auto"), again).passed_over == 10
+    assert again.rows == []
+
+
+def test_a_network_of_ones_own_and_a_shared_address_reach_the_nodes(
+    cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from importlib.resources import files
+
+    write_ell(tmp_path / "assets" / "a.obj")
+    policy = tmp_path / "own.onnx"
+    policy.write_bytes(files("rlacd.weights").joinpath("guide.onnx").read_bytes())
+    order = Order.of({"policy": str(policy), "threshold": 0.1})
+    # "local:" is fsspec's own word for files; unlike a plain folder it is taken for an address that all nodes reach.
+    out = f"local://{tmp_path}/shared"
+    summary = Batch(tmp_path / "assets", out, order).run(RayEngine("auto"), Counter())
+    assert summary.status == {"done": 1}
+    here = Batch(tmp_path / "assets", str(tmp_path / "here"), Order.of({"policy": "learned", "threshold": 0.1}))
+    assert here.run(LocalEngine(1), Counter()).status == {"done": 1}
+    assert (tmp_path / "shared" / "a.glb").read_bytes() == (tmp_path / "here" / "a.glb").read_bytes()
+
+
+def test_a_cluster_that_is_not_there_is_told() -> None:
+    with pytest.raises(OptionError, match="jobs belongs"):
+        RayEngine("auto", 2)
+    with pytest.raises(OptionError, match=r"no Ray cluster at 127\.0\.0\.1:1"):
+        RayEngine("127.0.0.1:1")

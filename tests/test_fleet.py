@@ -1,0 +1,271 @@
+"""What a batch rests on: names and keys of results, places for them, and the rows that tell what is done."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rlacd import NavigableSpace
+from rlacd.errors import MeshFileError, OptionError, OutputError, WeightsError
+from rlacd.fleet import Order, find_assets
+from rlacd.fleet.assets import _places, content_hash
+from rlacd.fleet.ledger import Ledger
+from rlacd.fleet.store import FolderStore, Store, open_store
+from tests.trouble import write_ell
+
+# --- which meshes, and what their results are called ------------------------------------------------------------------
+
+
+def touch(folder: Path, *names: str) -> None:
+    for name in names:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(b"x")
+
+
+def test_meshes_of_all_depths_are_found_in_order_and_nothing_else(tmp_path: Path) -> None:
+    touch(tmp_path, "b/椅子.OBJ", "a.stl", "notes.txt", ".hidden/c.obj", "b/.d.obj", "out/e.glb", "b/deep/er/f.3mf")
+    names = [asset.name for asset in find_assets(tmp_path, leave_out=tmp_path / "out")]
+    assert names == ["a.stl", "b/deep/er/f.3mf", "b/椅子.OBJ"]
+
+
+@pytest.mark.parametrize(
+    ("glob", "names"),
+    [
+        ("*.obj", ["a.obj", "x/a.obj", "x/y/b.obj"]),
+        ("**/*.obj", ["a.obj", "x/a.obj", "x/y/b.obj"]),
+        ("x/*", ["x/a.obj", "x/y/b.obj"]),
+        ("a.*", ["a.obj", "a.stl", "x/a.obj"]),
+        ("nothing", []),
+    ],
+)
+def test_a_glob_picks_by_the_last_part_or_the_whole_name(tmp_path: Path, glob: str, names: list[str]) -> None:
+    touch(tmp_path, "a.obj", "a.stl", "x/a.obj", "x/y/b.obj")
+    assert [asset.name for asset in find_assets(tmp_path, glob)] == names
+
+
+def test_what_a_result_is_called_does_not_depend_on_the_glob(tmp_path: Path) -> None:
+    touch(tmp_path, "a.obj", "a.stl", "b.obj")
+    everything = {asset.name: asset.place for asset in find_assets(tmp_path)}
+    assert everything == {"a.obj": "a.obj", "a.stl": "a.stl", "b.obj": "b"}
+    for glob in ("*.obj", "*.stl"):
+        assert all(everything[asset.name] == asset.place for asset in find_assets(tmp_path, glob))
+
+
+@given(st.sets(st.from_regex(r"([aA]/)?[aA](\.(obj|stl|STL)){1,3}", fullmatch=True), max_size=12))
+def test_no_two_results_share_a_name_on_any_disk(names: set[str]) -> None:
+    places = _places(sorted(names))
+    assert set(places) == names
+    assert len({place.casefold() for place in places.values()}) == len(names)
+
+
+def test_links_to_files_count_and_links_to_folders_do_not(tmp_path: Path) -> None:
+    touch(tmp_path, "real/a.obj")
+    (tmp_path / "link.obj").symlink_to(tmp_path / "real" / "a.obj")
+    (tmp_path / "round").symlink_to(tmp_path)
+    (tmp_path / "broken.obj").symlink_to(tmp_path / "nowhere")
+    assert [asset.name for asset in find_assets(tmp_path)] == ["broken.obj", "link.obj", "real/a.obj"]
+
+
+def test_a_missing_folder_is_told(tmp_path: Path) -> None:
+    with pytest.raises(MeshFileError, match="no folder"):
+        find_assets(tmp_path / "nothing")
+
+
+# --- the key of a result ----------------------------------------------------------------------------------------------
+
+
+def gltf(folder: Path, buffer: bytes) -> str:
+    mesh = trimesh.creation.box()
+    files = trimesh.exchange.gltf.export_gltf(trimesh.Scene(mesh), merge_buffers=True)
+    folder.mkdir(exist_ok=True)
+    for name, data in files.items():
+        (folder / name).write_bytes(data)
+    (folder / "gltf_buffer.bin").write_bytes(buffer)
+    (asset,) = find_assets(folder)
+    return content_hash(asset.files())
+
+
+def test_the_buffer_a_gltf_file_names_is_part_of_the_mesh(tmp_path: Path) -> None:
+    assert gltf(tmp_path, b"one") == gltf(tmp_path / "again", b"one")
+    shutil.rmtree(tmp_path / "again")
+    assert gltf(tmp_path, b"one") != gltf(tmp_path, b"two")
+
+
+def test_a_buffer_outside_the_folder_is_not_read(tmp_path: Path) -> None:
+    (tmp_path / "secret.bin").write_bytes(b"secret")
+    inside = tmp_path / "in"
+    inside.mkdir()
+    uris = ["../secret.bin", str(tmp_path / "secret.bin"), "data:,x", "b%20c.bin", "missing.bin"]
+    (inside / "m.gltf").write_text(json.dumps({"asset": {}, "buffers": [{"uri": uri} for uri in uris]}))
+    (inside / "b c.bin").write_bytes(b"b")
+    (asset,) = find_assets(inside)
+    assert list(asset.files()) == ["m.gltf", "b c.bin"]
+
+
+def test_all_that_decides_the_bytes_is_in_the_key_and_nothing_else(tmp_path: Path) -> None:
+    policies = [tmp_path / "here.onnx", tmp_path / "there" / "p.onnx"]
+    policies[1].parent.mkdir()
+    from importlib.resources import files
+
+    for policy in policies:
+        policy.write_bytes(files("rlacd.weights").joinpath("guide.onnx").read_bytes())
+
+    def key(content: str = "c", name: str = "a/chair.obj", **options: object) -> str:
+        kept = {what: options.pop(what) for what in ("file_format", "density", "up", "folders") if what in options}
+        return Order.of(options, **kept).key(content, name)  # type: ignore[arg-type]
+
+    same = [key(), key(threads=2), key(threshold=0.05), key(name="b/chair.obj"), key(file_format="glb"), key(up="z")]
+    assert len(set(same)) == 1
+    others = [
+        key("d"),
+        key(name="a/table.obj"),
+        key(threshold=0.04),
+        key(seed=1),
+        key(preset="mujoco"),
+        key(preset="unity"),
+        key(file_format="obj"),
+        key(file_format="obj", folders=True),
+        key(file_format="unreal"),
+        key(density=2.0),
+        key(up="y"),
+        key(policy="learned"),
+        key(criterion=NavigableSpace(0.1)),
+        key(criterion=NavigableSpace(0.2)),
+        key(criterion=NavigableSpace(0.2, seeds=[(1, 2, 3)])),
+        key(policy=str(policies[0])),
+    ]
+    assert len({*same, *others}) == 1 + len(others)
+    assert key(policy=str(policies[0])) == key(policy=str(policies[1])), "where the network lies is all the same"
+
+
+def test_an_order_survives_the_way_to_another_process() -> None:
+    space = NavigableSpace(0.1, 0.2, seeds=[(1, 2, 3)], closed_planes=[((0, 0, 1), 0)])
+    order = Order.of({"criterion": space, "max_vertices": 32}, file_format="urdf", density=2.0, up="y")
+    again = Order(**json.loads(json.dumps(order.as_plain())))
+    assert again.arguments()["criterion"] == space
+    assert again.key("c", "a.obj") == order.key("c", "a.obj")
+
+
+@pytest.mark.parametrize(
+    ("options", "kept", "error"),
+    [
+        ({"threshold": -1}, {}, OptionError),
+        ({"preset": "doom"}, {}, OptionError),
+        ({"policy": "nowhere.onnx"}, {}, WeightsError),
+        ({}, {"file_format": "fbx"}, OptionError),
+        ({}, {"file_format": "mjcf", "folders": True}, OptionError),
+        ({}, {"density": -1.0}, OptionError),
+        ({}, {"up": "w"}, OptionError),
+    ],
+)
+def test_mistakes_are_found_before_there_is_a_mesh(
+    options: dict[str, object], kept: dict[str, object], error: type[Exception]
+) -> None:
+    with pytest.raises(error):
+        Order.of(options, **kept)  # type: ignore[arg-type]
+
+
+# --- places for results -----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(params=["folder", "memory"])
+def store(request: pytest.FixtureRequest, tmp_path: Path) -> Store:
+    if request.param == "folder":
+        return open_store(str(tmp_path / "out"))
+    fsspec = pytest.importorskip("fsspec", reason="the extra fleet is not installed")
+    fsspec.filesystem("memory").store.clear()
+    return open_store("memory://bucket/out")
+
+
+def test_files_go_in_and_come_out(store: Store) -> None:
+    assert store.read("a/b.bin") is None
+    assert store.size("a/b.bin") is None
+    store.write("a/b.bin", b"one")
+    store.write("a/b.bin", b"three")
+    assert (store.read("a/b.bin"), store.size("a/b.bin")) == (b"three", 5)
+    store.remove("a/b.bin")
+    store.remove("a/b.bin")
+    assert store.read("a/b.bin") is None
+
+
+def test_rows_outlive_a_run_that_never_ended(store: Store) -> None:
+    first = Ledger(store, "m.jsonl")
+    first.add({"mesh": "b", "n": 1})
+    first.add({"mesh": "a", "n": 1})
+    first.add({"mesh": "b", "n": 2})
+    first.close()
+    second = Ledger(store, "m.jsonl")
+    assert second.rows() == [{"mesh": "a", "n": 1}, {"mesh": "b", "n": 2}]
+    second.add({"mesh": "c\udcff", "n": 3})
+    second.finish()
+    again = Ledger(store, "m.jsonl")
+    assert [row["mesh"] for row in again.rows()] == ["a", "b", "c\udcff"]
+    before = store.read("m.jsonl")
+    again.finish()
+    assert store.read("m.jsonl") == before
+
+
+def test_a_row_removes_the_files_only_its_forerunner_had(store: Store) -> None:
+    for name in ("a.obj", "a_000.obj", "a_001.obj"):
+        store.write(name, b"x")
+    ledger = Ledger(store, "m.jsonl")
+    ledger.add({"mesh": "a", "outputs": {"a.obj": 1, "a_000.obj": 1, "a_001.obj": 1}})
+    ledger.add({"mesh": "a", "outputs": {"a.obj": 1, "a_000.obj": 1}})
+    assert [store.size(name) for name in ("a.obj", "a_000.obj", "a_001.obj")] == [1, 1, None]
+
+
+def test_a_mesh_that_is_gone_cannot_claim_the_result_of_another(store: Store) -> None:
+    store.write("a.glb", b"x")
+    ledger = Ledger(store, "m.jsonl")
+    ledger.add({"mesh": "a.stl", "outputs": {"a.glb": 1}})
+    ledger.add({"mesh": "a.obj", "outputs": {"a.glb": 1}})
+    assert [row["mesh"] for row in ledger.rows()] == ["a.obj"]
+    ledger.add({"mesh": "a.stl", "outputs": {}})
+    assert store.size("a.glb") == 1
+
+
+def test_half_a_line_is_cut_off_and_a_damaged_one_is_told(tmp_path: Path) -> None:
+    store = FolderStore(tmp_path)
+    journal = tmp_path / ".rlacd" / "m.jsonl"
+    journal.parent.mkdir()
+    journal.write_bytes(b'{"mesh": "a"}\n{"mesh": "b')
+    ledger = Ledger(store, "m.jsonl")
+    assert [row["mesh"] for row in ledger.rows()] == ["a"]
+    ledger.add({"mesh": "c"})
+    ledger.close()
+    assert [row["mesh"] for row in Ledger(store, "m.jsonl").rows()] == ["a", "c"]
+    journal.write_bytes(b'{"mesh": "a"}\n{"mesh": 1}\n')
+    with pytest.raises(OutputError, match="line 2"):
+        Ledger(store, "m.jsonl")
+
+
+def test_two_runs_cannot_write_to_one_folder(tmp_path: Path) -> None:
+    first, second = FolderStore(tmp_path), FolderStore(tmp_path)
+    first.open()
+    with pytest.raises(OutputError, match="another run"):
+        second.open()
+    first.close()
+    second.open()
+    second.close()
+
+
+def test_opening_sweeps_up_what_a_killed_run_left(tmp_path: Path) -> None:
+    write_ell(tmp_path / "a" / "mesh.stl")
+    (tmp_path / "a" / ".rlacd-0123.tmp").write_bytes(b"half")
+    store = FolderStore(tmp_path)
+    store.open()
+    store.close()
+    assert sorted(os.listdir(tmp_path / "a")) == ["mesh.stl"]
+
+
+def test_an_address_nobody_knows_is_told() -> None:
+    pytest.importorskip("fsspec", reason="the extra fleet is not installed")
+    with pytest.raises(OptionError, match="gopher"):
+        open_store("gopher://bucket/out")
