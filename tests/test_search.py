@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -214,7 +215,7 @@ def test_the_same_hulls_for_any_number_of_threads(name: str, options: dict[str, 
 def test_levels_are_ordered(name: str, corpus: Path) -> None:
     fast, balanced, best = (
         rlacd.decompose(corpus / name, **options)
-        for options in ({}, {"quality": "balanced"}, {"quality": "best", "search_steps": 48})
+        for options in ({"quality": "fast"}, {}, {"quality": "best", "search_steps": 48})
     )
     assert len(best) <= len(balanced) <= len(fast)
     assert len(best) < len(fast)  # these shapes have something to gain
@@ -287,6 +288,14 @@ def test_cancelling_a_search_keeps_what_it_has_reached(corpus: Path) -> None:
 
 
 @pytest.mark.slow
+def test_time_does_not_make_the_best_level_worse_than_balanced(corpus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(LEVELS, "best", replace(LEVELS["best"], seconds=0.01))
+    balanced, best = (rlacd.decompose(corpus / SHAPES[0], quality=quality) for quality in ("balanced", "best"))
+    assert len(best) <= len(balanced)
+    assert best.report["search"]["steps"] >= balanced.report["search"]["steps"]
+
+
+@pytest.mark.slow
 def test_a_budget_ends_the_search_and_not_the_work(corpus: Path) -> None:
     result = rlacd.decompose(corpus / SHAPES[0], quality="best", budget=0.01)
     assert result.report["complete"]
@@ -315,8 +324,8 @@ def test_bounds_of_levels() -> None:
         {"quality": "best", "budget": math.inf},
         {"quality": "best", "search_steps": -1},
         {"quality": "best", "search_steps": 1.5},
-        {"budget": 1.0},
-        {"search_steps": 3},
+        {"quality": "fast", "budget": 1.0},
+        {"merge": False, "search_steps": 3},
         {"quality": "balanced", "merge": False},
     ],
 )

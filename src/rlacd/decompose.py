@@ -95,10 +95,12 @@ def decompose(
     timeout : float, optional
         Seconds after which the decomposition reached so far is returned.
     quality : str, optional
-        ``fast``: one pass of cuts. ``balanced``, the default where parts are merged: the best of several passes, then a
-        short search for fewer parts. ``best``: a long one. A level is never worse than the one before it: fewer hulls, or as many with less volume.
+        ``fast``: one pass of cuts. ``balanced``, the default where parts are merged: the best of several passes, then
+        a short search for fewer parts. ``best``: the same, and a long one. Each level is never worse than the one before
+        it: fewer hulls, or as many with less volume.
     budget : float, optional
-        Seconds the search may take; 5 with ``best``. What is found in a time depends on the machine.
+        Seconds the search may take instead, whatever is found until then; what that is depends on the machine. ``best``
+        has 5, and more where ``balanced`` takes longer.
     search_steps : int, optional
         Steps the search may take instead (about 10 to 20 a second on one core); 24 with ``balanced``. The result
         depends on nothing else.

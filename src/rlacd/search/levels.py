@@ -52,14 +52,24 @@ class Level:
         Trials of the neighbourhood search at most.
     seconds : float or None
         Wall time of the search at most.
+    least_steps : int
+        So much is searched even if the seconds do not suffice for it.
     """
 
     steps: int | None
     seconds: float | None
+    least_steps: int = 0
 
 
-LEVELS = {"fast": Level(0, None), "balanced": Level(24, None), "best": Level(None, 5.0)}
-"""What the levels mean when neither steps nor seconds are given."""
+BALANCED_STEPS = 24
+
+LEVELS = {
+    "fast": Level(0, None),
+    "balanced": Level(BALANCED_STEPS, None),
+    "best": Level(None, 5.0, least_steps=BALANCED_STEPS),
+}
+"""What the levels mean when neither steps nor seconds are given. Each goes through the states of the one before it, so
+that it is never worse."""
 
 
 def level(quality: str, seconds: float | None, steps: int | None) -> Level:
@@ -149,13 +159,14 @@ def search(
     account : Account
     """
     start = time.perf_counter()
-    pace = Pace(clock, bounds.seconds, len(parts))
     steps = math.inf if bounds.steps is None else bounds.steps
     rankings = rankings or [by_score(score) for score in PORTFOLIO]
     near_views = Views(PLANES_PER_AXIS, CONCAVE_EDGES)
     # What the finish would drop must not count, or a level could end with more hulls than the one below it.
     best = parts = drop_slivers(parts, workers)
-    if most_parts is not None and not all(workers.map(criterion.is_met, best)):
+    at_a_limit = most_parts is not None and not all(workers.map(criterion.is_met, best))
+    pace = Pace(clock, bounds.seconds, len(parts), 0 if at_a_limit else bounds.least_steps)
+    if most_parts is not None and at_a_limit:
         if len(best) <= most_parts:
             outcome = tighten(
                 root, best, criterion, most_parts, rankings, views, near_views, workers, pace, steps, seed

@@ -21,24 +21,27 @@ class Pace(Clock):
         Wall time that is left.
     parts : int
         Told to the other clock as the number of parts so far.
+    least_steps : int
+        Steps that may be made whatever time they take.
     """
 
-    def __init__(self, clock: Clock, seconds: float | None, parts: int) -> None:
+    def __init__(self, clock: Clock, seconds: float | None, parts: int, least_steps: int = 0) -> None:
         super().__init__()
         self._outer = clock
         self._end = math.inf if seconds is None else time.perf_counter() + seconds
         self.parts = parts
         self.steps = 0
+        self._least_steps = least_steps
 
     @property
     def is_over(self) -> bool:
         """Whether the work has to stop, for this clock or for the other."""
-        return self._outer.stopped_by is not None or time.perf_counter() >= self._end
+        return self._outer.stopped_by is not None or self.left <= 0
 
     @property
     def left(self) -> float:
         """Seconds left on this clock; infinite where it never runs out."""
-        return self._end - time.perf_counter()
+        return math.inf if self.steps < self._least_steps else self._end - time.perf_counter()
 
     def step(self, done: int, total: int | None, parts: int) -> bool:
         """Report to the other clock; True when the work may go on."""
