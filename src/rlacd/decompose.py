@@ -96,8 +96,8 @@ def decompose(
         Seconds after which the decomposition reached so far is returned.
     quality : str, optional
         ``fast``: one pass of cuts. ``balanced``, the default where parts are merged: the best of several passes, then
-        a short search for fewer parts. ``best``: the same, and a long one. Each level is never worse than the one before
-        it: fewer hulls, or as many with less volume.
+        a short search for fewer parts. ``best``: the same, and a long one. Each level is never worse than the one
+        before it: fewer hulls, or as many with less volume.
     budget : float, optional
         Seconds the search may take instead, whatever is found until then; what that is depends on the machine. ``best``
         has 5, and more where ``balanced`` takes longer.
