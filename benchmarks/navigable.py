@@ -25,25 +25,28 @@ from typing import Any
 import numpy as np
 
 SETTINGS = {"r2.5t5": (0.025, 0.05), "r5t1": (0.05, 0.01)}
-POLICIES = {
-    "navacd": "navacd",
-    "greedy-150": "greedy-hull-sum",
-    "greedy-162": "greedy-hull-sum+edges",
-    "greedy": "greedy",
+METHODS: dict[str, dict[str, Any]] = {
+    "navacd": {"policy": "navacd", "quality": "fast"},
+    "greedy-150": {"policy": "greedy-hull-sum", "quality": "fast"},
+    "greedy-162": {"policy": "greedy-hull-sum+edges", "quality": "fast"},
+    "greedy": {"quality": "fast"},
+    "learned": {"policy": "learned", "quality": "fast"},
+    "balanced": {"quality": "balanced"},
+    "best": {"quality": "best", "budget": 5.0},
 }
 COACD_CRACKS = 1e-3
 """CoACD's hulls leave cracks of some 1e-5 between them; narrower ones than this are closed, else their walls count."""
 
 
-def run_policy(path: Path, policy: str, setting: str, threads: int) -> dict[str, Any]:
+def run_ours(path: Path, method: str, setting: str, threads: int) -> dict[str, Any]:
     import rlacd
 
     space = rlacd.NavigableSpace(*SETTINGS[setting])
-    rlacd.decompose(path, criterion=space, policy=POLICIES[policy], quality="fast", threads=threads)
+    rlacd.decompose(path, criterion=space, threads=threads, **METHODS[method])
     seconds, cpu = [], []
     for _ in range(3):
         wall, used = time.perf_counter(), time.process_time()
-        result = rlacd.decompose(path, criterion=space, policy=POLICIES[policy], quality="fast", threads=threads)
+        result = rlacd.decompose(path, criterion=space, threads=threads, **METHODS[method])
         seconds.append(time.perf_counter() - wall)
         cpu.append(time.process_time() - used)
     report = result.report
@@ -90,7 +93,7 @@ def run_coacd(path: Path, threads: int) -> dict[str, Any]:
 
 def one(path: Path, method: str, setting: str, cores: list[int]) -> None:
     os.sched_setaffinity(0, cores)
-    row = run_coacd(path, len(cores)) if method == "coacd" else run_policy(path, method, setting, len(cores))
+    row = run_coacd(path, len(cores)) if method == "coacd" else run_ours(path, method, setting, len(cores))
     row["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(json.dumps(row))
 
@@ -118,7 +121,7 @@ def table(out: Path) -> None:
     rows = [json.loads(line) for line in out.read_text().splitlines()]
     groups = sorted(
         {(row["setting"], row["method"]) for row in rows},
-        key=lambda g: (g[0], list(POLICIES).index(g[1]) if g[1] in POLICIES else 9),
+        key=lambda g: (g[0], list(METHODS).index(g[1]) if g[1] in METHODS else 9),
     )
     print(
         "| setting | method | meshes | parts | mean | hull faces | over: mean / most | under: mean / most "
@@ -147,7 +150,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path, nargs="?")
     parser.add_argument("--list", type=Path, help="file with one mesh a line, relative to the folder; default: all")
     parser.add_argument("--out", type=Path, default=Path("navigable.jsonl"))
-    parser.add_argument("--methods", default=",".join(POLICIES), help="comma-separated; coacd is one of them")
+    parser.add_argument("--methods", default=",".join(METHODS), help="comma-separated; coacd is one of them")
     parser.add_argument("--cores", default="0,1", help="pin to these cores")
     parser.add_argument("--limit", type=float, default=600, help="seconds a mesh and method")
     parser.add_argument("--table", type=Path, help="print the table of a finished run")
