@@ -5,7 +5,10 @@ from __future__ import annotations
 import http.client
 import io
 import json
+import re
+import signal
 import socket
+import subprocess
 import sys
 import threading
 import urllib.parse
@@ -318,6 +321,25 @@ def test_the_command_says_what_is_wrong_in_one_sentence(mesh: Path, words: list[
     assert run.stderr.startswith("rlacd: ")
     assert says in run.stderr
     assert run.stderr.count("\n") == 1
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for one process")
+def test_the_command_tells_its_address_and_ends_with_ctrl_c(mesh: Path) -> None:
+    command = [sys.executable, "-c", "from rlacd.cli import main; main()", "view", str(mesh), "--no-browser"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stderr is not None
+            told = process.stderr.readline()
+            address = re.search(r"http://127\.0\.0\.1:(\d+)/", told)
+            assert address is not None, told
+            connection = http.client.HTTPConnection("127.0.0.1", int(address[1]), timeout=PATIENCE)
+            connection.request("GET", "/")
+            assert connection.getresponse().status == 200
+            process.send_signal(signal.SIGINT)
+            assert process.wait(timeout=PATIENCE) == 0
+            assert process.stderr.read() == ""
+        finally:
+            process.kill()
 
 
 def test_the_controls_hold_the_defaults_of_the_command_line() -> None:
