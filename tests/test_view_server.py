@@ -23,7 +23,9 @@ import trimesh
 from typer.testing import CliRunner
 
 from rlacd.cli import app
+from rlacd.criteria import NavigableSpace
 from rlacd.errors import MeshFileError, OptionError
+from rlacd.options import Options
 from rlacd.show.downloads import offered
 from rlacd.show.viewer import Viewer, Wishes, open_viewer, read_wishes
 
@@ -237,7 +239,7 @@ def test_a_long_search_is_cancelled_and_keeps_what_it_has(mesh: Path, tmp_path: 
     rough = trimesh.creation.icosphere(3)
     rough.vertices *= 1 + 0.25 * np.random.default_rng(0).random((len(rough.vertices), 1))
     rough.export(tmp_path / "rough.ply")
-    with open_viewer(tmp_path / "rough.ply", {"threshold": 0.3}, port=0) as viewer:
+    with open_viewer(tmp_path / "rough.ply", {"threshold": 0.3, "quality": "fast"}, port=0) as viewer:
         settled(viewer, run=1)
         states = events(viewer)
         ask(viewer, "POST", "/decompose", {"threshold": 0.06, "quality": "best"})
@@ -343,13 +345,8 @@ def test_the_command_tells_its_address_and_ends_with_ctrl_c(mesh: Path) -> None:
 
 
 def test_the_controls_hold_the_defaults_of_the_command_line() -> None:
-    import inspect
-
-    import rlacd
-
-    signature = inspect.signature(rlacd.decompose)
-    wishes = Wishes()
+    wishes, usual, space = Wishes(), Options(), NavigableSpace()
     for name in ("criterion", "threshold", "quality", "max_hulls", "max_vertices"):
-        assert getattr(wishes, name) == signature.parameters[name].default
-    assert (wishes.radius, wishes.tolerance) == (rlacd.NavigableSpace().radius, rlacd.NavigableSpace().tolerance)
+        assert getattr(wishes, name) == getattr(usual, name)
+    assert (wishes.radius, wishes.tolerance) == (space.radius, space.tolerance)
     assert read_wishes({}) == wishes
