@@ -32,7 +32,7 @@ def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def viewer(mesh: Path) -> Iterator[Viewer]:
-    with open_viewer(mesh, {"threshold": 0.05}, port=0) as viewer:
+    with open_viewer(mesh, {"quality": "fast"}, port=0) as viewer:
         yield viewer
 
 
@@ -254,7 +254,10 @@ def test_work_can_be_stopped(browser: Any, tmp_path: Path) -> None:
     rough = trimesh.creation.icosphere(3)
     rough.vertices *= [[1 + 0.2 * (i % 3)] for i in range(len(rough.vertices))]
     rough.export(tmp_path / "rough.ply")
-    with open_viewer(tmp_path / "rough.ply", {"threshold": 0.3}, port=0) as viewer, open_page(browser) as watched:
+    with (
+        open_viewer(tmp_path / "rough.ply", {"threshold": 0.3, "quality": "fast"}, port=0) as viewer,
+        open_page(browser) as watched,
+    ):
         page = watched.page
         page.goto(viewer.address)
         wait_for_run(page, 1)

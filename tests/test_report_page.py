@@ -14,8 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from typer.testing import CliRunner
 
 import rlacd
+from rlacd.cli import app
 from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError, OutputError
 from rlacd.show import check_report_page, save_report_page
@@ -162,6 +164,30 @@ def test_the_picture_is_inside_and_its_absence_is_said(
     without = payload(result.save_report(tmp_path / "without.html").read_text(encoding="utf-8"))
     assert "picture" not in without
     assert "pip install 'rlacd[view]'" in without["note"]
+
+
+@pytest.mark.parametrize(
+    ("name", "starts"), [("r.html", "<!doctype html>"), ("r.HTM", "<!doctype html>"), ("r.json", "{")]
+)
+def test_the_ending_tells_the_command_what_kind_of_report_is_meant(tmp_path: Path, name: str, starts: str) -> None:
+    elbow().export(tmp_path / "elbow.stl")
+    run = CliRunner().invoke(app, ["decompose", str(tmp_path / "elbow.stl"), "-q", "--report", str(tmp_path / name)])
+    assert (run.exit_code, run.output) == (0, "")
+    assert (tmp_path / name).read_text(encoding="utf-8").startswith(starts)
+
+
+def test_the_command_checks_the_report_before_the_work(tmp_path: Path) -> None:
+    elbow().export(tmp_path / "elbow.stl")
+    for words, says in [
+        (["--report", str(tmp_path / "no" / "r.html")], "does not exist"),
+        (["--up", "w"], "x, y or z"),
+    ]:
+        given = ["--report", str(tmp_path / "r.html"), *words]
+        run = CliRunner().invoke(app, ["decompose", str(tmp_path / "elbow.stl"), *given])
+        assert run.exit_code in (2, 3)
+        assert says in run.stderr
+        assert run.stderr.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["elbow.stl"]
 
 
 def test_bad_places_and_axes_are_refused(result: Decomposition, tmp_path: Path) -> None:

@@ -5,7 +5,10 @@ from __future__ import annotations
 import http.client
 import io
 import json
+import re
+import signal
 import socket
+import subprocess
 import sys
 import threading
 import urllib.parse
@@ -20,7 +23,9 @@ import trimesh
 from typer.testing import CliRunner
 
 from rlacd.cli import app
+from rlacd.criteria import NavigableSpace
 from rlacd.errors import MeshFileError, OptionError
+from rlacd.options import Options
 from rlacd.show.downloads import offered
 from rlacd.show.viewer import Viewer, Wishes, open_viewer, read_wishes
 
@@ -234,7 +239,7 @@ def test_a_long_search_is_cancelled_and_keeps_what_it_has(mesh: Path, tmp_path: 
     rough = trimesh.creation.icosphere(3)
     rough.vertices *= 1 + 0.25 * np.random.default_rng(0).random((len(rough.vertices), 1))
     rough.export(tmp_path / "rough.ply")
-    with open_viewer(tmp_path / "rough.ply", {"threshold": 0.3}, port=0) as viewer:
+    with open_viewer(tmp_path / "rough.ply", {"threshold": 0.3, "quality": "fast"}, port=0) as viewer:
         settled(viewer, run=1)
         states = events(viewer)
         ask(viewer, "POST", "/decompose", {"threshold": 0.06, "quality": "best"})
@@ -320,14 +325,28 @@ def test_the_command_says_what_is_wrong_in_one_sentence(mesh: Path, words: list[
     assert run.stderr.count("\n") == 1
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for one process")
+def test_the_command_tells_its_address_and_ends_with_ctrl_c(mesh: Path) -> None:
+    command = [sys.executable, "-c", "from rlacd.cli import main; main()", "view", str(mesh), "--no-browser"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stderr is not None
+            told = process.stderr.readline()
+            address = re.search(r"http://127\.0\.0\.1:(\d+)/", told)
+            assert address is not None, told
+            connection = http.client.HTTPConnection("127.0.0.1", int(address[1]), timeout=PATIENCE)
+            connection.request("GET", "/")
+            assert connection.getresponse().status == 200
+            process.send_signal(signal.SIGINT)
+            assert process.wait(timeout=PATIENCE) == 0
+            assert process.stderr.read() == ""
+        finally:
+            process.kill()
+
+
 def test_the_controls_hold_the_defaults_of_the_command_line() -> None:
-    import inspect
-
-    import rlacd
-
-    signature = inspect.signature(rlacd.decompose)
-    wishes = Wishes()
+    wishes, usual, space = Wishes(), Options(), NavigableSpace()
     for name in ("criterion", "threshold", "quality", "max_hulls", "max_vertices"):
-        assert getattr(wishes, name) == signature.parameters[name].default
-    assert (wishes.radius, wishes.tolerance) == (rlacd.NavigableSpace().radius, rlacd.NavigableSpace().tolerance)
+        assert getattr(wishes, name) == getattr(usual, name)
+    assert (wishes.radius, wishes.tolerance) == (space.radius, space.tolerance)
     assert read_wishes({}) == wishes

@@ -56,6 +56,7 @@ class Options:
             ("balanced", "Balanced", "About a second"),
             ("best", "Best", "Five seconds"),
         ],
+        default="balanced",
     )
     max_hulls: IntProperty(name="Most hulls", description="0 for any number", default=0, min=0, soft_max=64)
     max_vertices: IntProperty(

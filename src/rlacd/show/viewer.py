@@ -14,14 +14,14 @@ from typing import Any
 from rlacd.criteria import NavigableSpace
 from rlacd.decompose import decompose
 from rlacd.errors import OptionError
-from rlacd.options import CONCAVITY, DEFAULT_THRESHOLD, QUALITIES, Options
+from rlacd.options import CONCAVITY, QUALITIES, Options
 from rlacd.show.picture import check_up
 from rlacd.show.server import ViewServer
 from rlacd.show.session import Session
 from rlacd.solid.load import load_mesh
 
 NAVIGABLE = "navigable"
-_SPACE = NavigableSpace()
+_DEFAULTS, _SPACE = Options(), NavigableSpace()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -29,10 +29,10 @@ class Wishes:
     """What the page's controls hold; see `rlacd.decompose` for the meaning of each."""
 
     criterion: str = CONCAVITY
-    threshold: float = DEFAULT_THRESHOLD
+    threshold: float = _DEFAULTS.threshold
     radius: float = _SPACE.radius or 0.0
     tolerance: float = _SPACE.tolerance or 0.0
-    quality: str = QUALITIES[0]
+    quality: str = _DEFAULTS.quality or QUALITIES[0]
     max_hulls: int | None = None
     max_vertices: int | None = None
 
