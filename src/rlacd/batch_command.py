@@ -140,8 +140,9 @@ def _batch(own: dict[str, Any], given: dict[str, Any]) -> Batch:
         raise OptionError(f"--redo is {own['redo']!r}; it has to be one of {', '.join(REDO)}.")
     if own["out"] == "-":
         raise OptionError("a batch cannot be written to stdout; give -o a folder.")
-    file_format, density, up = (given.pop(name) for name in ("folder_format", "density", "up"))
-    order = Order.of(decompose_options(given), file_format=file_format, folders=own["folders"], density=density, up=up)
+    density, up = given.pop("density"), given.pop("up")
+    options = decompose_options({**given, "threads": own["threads"], "timeout": own["timeout"]})
+    order = Order.of(options, file_format=own["folder_format"], folders=own["folders"], density=density, up=up)
     limits = Limits(own["limit"], int(own["memory"] * 2**30))
     return Batch(own["assets"], own["out"], order, limits, own["fallback"], own["glob"], own["redo"])
 
