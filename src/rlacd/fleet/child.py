@@ -78,7 +78,7 @@ def _hull(order: Order, mesh: Path) -> Decomposition:
     limits: dict[str, Any] = {
         name: order.options.get(name) for name in ("max_vertices", "max_faces", "preset", "threads")
     }
-    around = decompose((used, np.empty((0, 3), dtype=np.int64)), max_hulls=1, **limits)
+    around = decompose((used, np.empty((0, 3), dtype=np.int64)), max_hulls=1, quality="fast", **limits)
     told = {what: around.report[what] for what in ("parts", "faces", "vertices")}
     told |= {"name": mesh.stem, "complete": False, "warnings": [STAND_IN]}
     return Decomposition(around.hulls, told, trimesh.Trimesh(source.vertices, source.faces, process=False))
