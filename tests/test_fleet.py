@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import inspect
 import json
 import os
 import shutil
@@ -13,12 +15,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rlacd import NavigableSpace
+from rlacd.cli import app
+from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError, OptionError, OutputError, WeightsError
 from rlacd.fleet import Order, find_assets
 from rlacd.fleet.assets import _places, content_hash
 from rlacd.fleet.ledger import Ledger
 from rlacd.fleet.store import FolderStore, Store, open_store
+from rlacd.options import Options
 from tests.trouble import write_ell
+
+NOT_OPTIONS = ("self", "path", "file_format")
 
 # --- which meshes, and what their results are called ------------------------------------------------------------------
 
@@ -117,8 +124,10 @@ def test_all_that_decides_the_bytes_is_in_the_key_and_nothing_else(tmp_path: Pat
     for policy in policies:
         policy.write_bytes(files("rlacd.weights").joinpath("guide.onnx").read_bytes())
 
+    written = ("file_format", "density", "up", "folders", "one_mesh")
+
     def key(content: str = "c", name: str = "a/chair.obj", **options: object) -> str:
-        kept = {what: options.pop(what) for what in ("file_format", "density", "up", "folders") if what in options}
+        kept = {what: options.pop(what) for what in written if what in options}
         return Order.of(options, **kept).key(content, name)  # type: ignore[arg-type]
 
     same = [key(), key(threads=2), key(threshold=0.05), key(name="b/chair.obj"), key(file_format="glb"), key(up="z")]
@@ -133,6 +142,8 @@ def test_all_that_decides_the_bytes_is_in_the_key_and_nothing_else(tmp_path: Pat
         key(file_format="obj"),
         key(file_format="obj", folders=True),
         key(file_format="unreal"),
+        key(file_format="urdf"),
+        key(file_format="urdf", one_mesh=True),
         key(density=2.0),
         key(up="y"),
         key(policy="learned"),
@@ -143,6 +154,14 @@ def test_all_that_decides_the_bytes_is_in_the_key_and_nothing_else(tmp_path: Pat
     ]
     assert len({*same, *others}) == 1 + len(others)
     assert key(policy=str(policies[0])) == key(policy=str(policies[1])), "where the network lies is all the same"
+
+
+def test_a_batch_takes_every_option_of_a_decomposition() -> None:
+    command = next(command for command in app.registered_commands if command.name == "batch").callback
+    assert command is not None
+    taken = set(inspect.signature(command).parameters)
+    assert taken >= {option.name for option in dataclasses.fields(Options)} - {"criterion"}
+    assert taken >= {name for name in inspect.signature(Decomposition.save).parameters if name not in NOT_OPTIONS}
 
 
 def test_an_order_survives_the_way_to_another_process() -> None:
@@ -163,6 +182,7 @@ def test_an_order_survives_the_way_to_another_process() -> None:
         ({}, {"file_format": "mjcf", "folders": True}, OptionError),
         ({}, {"density": -1.0}, OptionError),
         ({}, {"up": "w"}, OptionError),
+        ({}, {"one_mesh": True}, OptionError),
     ],
 )
 def test_mistakes_are_found_before_there_is_a_mesh(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from rlacd.command_options import decompose_options
+from rlacd.command_options import HOW, decompose_options
 from rlacd.errors import OptionError
 
 if TYPE_CHECKING:
@@ -48,8 +48,11 @@ BATCH_EPILOG = """\b
   130  interrupted at once; no file is left half-written
 """
 
-BATCH, NOT_HERE = "Batch", frozenset({"mesh", "output", "package_dir", "report", "picture", "balls"})
-"""NOT_HERE: what decompose takes and batch does not."""
+BATCH = "Batch"
+"""The panel of this command's own options."""
+
+WRITTEN = ("density", "up", "one_mesh")
+"""Options of decompose that say how hulls are written."""
 
 Parameters = dict[str, inspect.Parameter]
 
@@ -124,7 +127,7 @@ def batch_command(
     lent = {
         name: parameter.replace(annotation=hints[name], kind=inspect.Parameter.KEYWORD_ONLY)
         for name, parameter in inspect.signature(decompose).parameters.items()
-        if name not in NOT_HERE and name not in _OWN
+        if name in (*HOW, *WRITTEN, "quiet") and name not in _OWN
     }
     parameters = {name: parameter.replace(name=name) for name, parameter in {**_OWN, **lent}.items()}
     batch.__signature__ = inspect.Signature(list(parameters.values()))  # type: ignore[attr-defined]
@@ -140,8 +143,9 @@ def _batch(own: dict[str, Any], given: dict[str, Any]) -> Batch:
         raise OptionError(f"--redo is {own['redo']!r}; it has to be one of {', '.join(REDO)}.")
     if own["out"] == "-":
         raise OptionError("a batch cannot be written to stdout; give -o a folder.")
-    file_format, density, up = (given.pop(name) for name in ("folder_format", "density", "up"))
-    order = Order.of(decompose_options(given), file_format=file_format, folders=own["folders"], density=density, up=up)
+    written = {name: given.pop(name) for name in WRITTEN}
+    options = decompose_options({**given, "threads": own["threads"], "timeout": own["timeout"]})
+    order = Order.of(options, file_format=own["folder_format"], folders=own["folders"], **written)
     limits = Limits(own["limit"], int(own["memory"] * 2**30))
     return Batch(own["assets"], own["out"], order, limits, own["fallback"], own["glob"], own["redo"])
 

@@ -8,6 +8,13 @@ from rlacd.errors import OptionError
 
 NAVIGABLE = "navigable"
 _SPACE = ("radius", "tolerance", "radius_m", "tolerance_m", "reachable_only", "seed_point", "closed_plane")
+HOW = (
+    *("threshold", "threshold_m", "criterion", *_SPACE),
+    *("preset", "max_hulls", "max_vertices", "max_faces", "merge", "policy", "resolution", "seed", "threads"),
+    *("timeout", "quality", "budget", "search_steps"),
+)
+"""Parameters of the command ``decompose`` that say how to decompose."""
+
 _SPELLED = {"reachable-only": "everywhere"}
 
 

@@ -64,10 +64,11 @@ def make(
     result = _hull(order, mesh) if hull_only else decompose(mesh, **order.arguments())
     with TemporaryDirectory(dir=staging) as folder:
         place = f"{folder}/{stem}{order.ending or '/'}"
-        result.save(place, file_format=order.file_format, density=order.density, up=order.up_of(mesh.name))  # type: ignore[arg-type]
-        written = sorted(path for path in Path(folder).rglob("*") if path.is_file())
-        written.sort(key=lambda path: -len(path.relative_to(folder).parts))
-        files = {path.relative_to(folder).as_posix(): path.read_bytes() for path in written}
+        written: dict[str, Any] = {"density": order.density, "up": order.up_of(mesh.name), "one_mesh": order.one_mesh}
+        result.save(place, file_format=order.file_format, **written)
+        paths = sorted(path for path in Path(folder).rglob("*") if path.is_file())
+        paths.sort(key=lambda path: -len(path.relative_to(folder).parts))
+        files = {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
     return _summary(result.report), files
 
 
@@ -78,7 +79,7 @@ def _hull(order: Order, mesh: Path) -> Decomposition:
     limits: dict[str, Any] = {
         name: order.options.get(name) for name in ("max_vertices", "max_faces", "preset", "threads")
     }
-    around = decompose((used, np.empty((0, 3), dtype=np.int64)), max_hulls=1, **limits)
+    around = decompose((used, np.empty((0, 3), dtype=np.int64)), max_hulls=1, quality="fast", **limits)
     told = {what: around.report[what] for what in ("parts", "faces", "vertices")}
     told |= {"name": mesh.stem, "complete": False, "warnings": [STAND_IN]}
     return Decomposition(around.hulls, told, trimesh.Trimesh(source.vertices, source.faces, process=False))

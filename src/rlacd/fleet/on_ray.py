@@ -81,6 +81,9 @@ class RayEngine:
     def run(self, tasks: Iterator[Task], work: Work) -> Iterator[tuple[Task, Outcome]]:
         """See `rlacd.fleet.batch.Engine`."""
         ray = self._ray
+        most = max((node["Resources"].get("CPU", 0) for node in ray.nodes() if node["Alive"]), default=0)
+        if 0 < most < work.order.threads:
+            raise OptionError(f"no machine of the cluster has {work.order.threads} processors; ask for fewer threads.")
         setting = ray.put(_setting(work))
         remote = ray.remote(num_cpus=work.order.threads, max_retries=LOST, retry_exceptions=False)(_do)
         room, counted, more = 0, -RECOUNT, True

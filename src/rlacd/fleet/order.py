@@ -39,6 +39,8 @@ class Order:
         Mass per cubic unit, for formats that hold masses.
     up
         The axis that points up; None for y in files from glTF, else z.
+    one_mesh
+        Whether a model has all its hulls in one mesh file.
     weights
         Hash of the network that a policy's file holds, and of the one that ships.
     """
@@ -48,6 +50,7 @@ class Order:
     file_format: str | None = None
     density: float = DENSITY
     up: str | None = None
+    one_mesh: bool = False
     weights: str = ""
 
     @classmethod
@@ -59,6 +62,7 @@ class Order:
         folders: bool = False,
         density: float | None = None,
         up: str | None = None,
+        one_mesh: bool = False,
     ) -> Order:
         """Check everything that can be checked before there is a mesh.
 
@@ -70,7 +74,7 @@ class Order:
             A word that ``--format`` takes, or any ending of a file of hulls; what the preset says, or glb, by default.
         folders : bool
             A folder a mesh with one file a hull.
-        density, up
+        density, up, one_mesh
             As for `rlacd.Decomposition.save`.
 
         Raises
@@ -88,10 +92,13 @@ class Order:
         check_model_options(DENSITY if density is None else density, up or "z")
         with TemporaryDirectory() as folder:
             hull_target(f"{folder}/mesh{ending or '/'}", wanted)
+        if one_mesh and ending != ".urdf":
+            raise OptionError("one mesh for all hulls is for .urdf files; leave it out.")
         plain = {"threads": 1, **options}
         if isinstance(checked.criterion, NavigableSpace):
             plain["criterion"] = asdict(checked.criterion)
-        return cls(plain, ending, wanted, DENSITY if density is None else density, up, _weights(checked.policy))
+        weight = DENSITY if density is None else density
+        return cls(plain, ending, wanted, weight, up, one_mesh, _weights(checked.policy))
 
     @property
     def threads(self) -> int:
@@ -113,7 +120,7 @@ class Order:
             PurePosixPath(name).stem,  # models are called so
             self.weights,
             options,
-            [self.ending, self.file_format, self.density, self.up_of(name)],
+            [self.ending, self.file_format, self.density, self.up_of(name), self.one_mesh],
         ]
         return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
 

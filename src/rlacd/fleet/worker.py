@@ -10,7 +10,6 @@ import contextlib
 import json
 import multiprocessing
 import os
-import signal
 import socket
 import subprocess
 import sys
@@ -25,6 +24,7 @@ import psutil
 from rlacd.errors import OptionError
 from rlacd.fleet.child import READY
 from rlacd.fleet.order import Order
+from rlacd.fleet.process import end, why_it_ended
 
 LOOK = 0.05
 """Seconds between two looks at a process that is busy."""
@@ -189,19 +189,3 @@ class Worker:
         last_words = self._said.read().decode(errors="replace")[-500:].strip()
         self.close()
         return WorkerDiedError(f"its process {why_it_ended(code)}", last_words)
-
-
-def why_it_ended(code: int | None) -> str:
-    """Say what an exit status means: ``died of SIGSEGV``, ``ended with code 3``."""
-    if code is None:
-        return "closed its pipe"
-    if code < 0:
-        return f"died of {signal.Signals(-code).name}"
-    return f"ended with code {code}"
-
-
-def end(process: subprocess.Popen[bytes]) -> None:
-    """End a process and those it started: it leads a group of its own."""
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(process.pid, signal.SIGKILL)
-    process.wait()

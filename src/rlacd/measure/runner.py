@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
-import signal
 import subprocess
 import sys
 import tempfile
@@ -14,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+from rlacd.fleet.process import kill_group, why_it_ended
 from rlacd.measure.store import Row, Store, Task
 
 Say = Callable[[str], None]
@@ -84,7 +83,7 @@ class Bench:
         except BaseException:
             self._stopping = True  # what is killed now has not failed
             for process in list(self._running):
-                _kill_group(process)
+                kill_group(process)
             raise
         finally:
             pool.shutdown(cancel_futures=True)
@@ -133,7 +132,7 @@ class Bench:
             try:
                 _, complaint = process.communicate(timeout=self.limits.seconds)
             except subprocess.TimeoutExpired:
-                _kill_group(process)
+                kill_group(process)
                 process.communicate()
                 return f"more than {self.limits.seconds:g} s"
             finally:
@@ -142,14 +141,8 @@ class Bench:
             os.close(write_end)
         last = (complaint.decode(errors="replace").strip().splitlines() or [""])[-1][-300:]
         if process.returncode < 0:
-            return f"died of {signal.Signals(-process.returncode).name} {last}".strip()
-        return (last or f"exit code {process.returncode}") if process.returncode else None
-
-
-def _kill_group(process: subprocess.Popen[bytes]) -> None:
-    """End a process and those it started: it leads a group of its own."""
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(process.pid, signal.SIGKILL)
+            return f"{why_it_ended(process.returncode)} {last}".strip()
+        return (last or why_it_ended(process.returncode)) if process.returncode else None
 
 
 def find_meshes(folder: Path, listed: Path | None = None) -> list[str]:
