@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from trimesh.triangles import mass_properties
@@ -47,7 +48,15 @@ def mass_of_triangles(triangles: FloatArray, frame: Frame) -> Mass:
     unit = np.float64(1.0) / frame.scale
     with np.errstate(over="ignore", under="ignore"):  # at the ends of float64, volumes have none
         return Mass(
-            float(found["volume"] * unit**3),
+            float(_times(found["volume"], unit, 3)),
             frame.to_input(found["center_mass"][None])[0],
-            np.asarray(found["inertia"]) * unit**5,
+            _times(found["inertia"], unit, 5),
         )
+
+
+def _times(value: Any, unit: np.float64, power: int) -> FloatArray:
+    """Multiply step by step: a power of the unit may overflow, and zeros times infinity would be no number."""
+    result = np.asarray(value, dtype=np.float64)
+    for _ in range(power):
+        result = result * unit
+    return result
