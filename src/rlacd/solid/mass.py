@@ -55,8 +55,9 @@ def mass_of_triangles(triangles: FloatArray, frame: Frame) -> Mass:
 
 
 def _times(value: Any, unit: np.float64, power: int) -> FloatArray:
-    """Multiply step by step: a power of the unit may overflow, and zeros times infinity would be no number."""
+    """Multiply step by step, up to the greatest number there is: a power of the unit itself may be infinite."""
+    greatest = np.finfo(np.float64).max
     result = np.asarray(value, dtype=np.float64)
     for _ in range(power):
-        result = result * unit
+        result = np.clip(result * unit, -greatest, greatest)
     return result
