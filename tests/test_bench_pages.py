@@ -141,7 +141,7 @@ class TestCommands:
     @pytest.mark.slow
     def test_equal_accuracy(self, meshes: Path, tmp_path: Path) -> None:
         out = tmp_path / "run"
-        bench("paper-table-1", meshes, "-o", out, "--methods", "navacd,greedy", "--at", 0.3)
+        bench("paper-table-1", meshes, "-o", out, "--first", 1, "--methods", "navacd", "--at", 0.3)
         text = (out / "paper-table-1.md").read_text()
         assert "Mean D_h 0.3" in text
         assert (out / "curves.svg").exists()
