@@ -8,6 +8,7 @@ are written by the machine that made them; those for a folder come back, since a
 from __future__ import annotations
 
 import os
+import socket
 import time
 from collections.abc import Iterator
 from dataclasses import asdict
@@ -35,6 +36,10 @@ QUEUE = 2
 
 RECOUNT = 10.0
 """Seconds between two looks at how many processors there are."""
+
+
+ANSWER = 10.0
+"""Seconds in which a cluster has to answer."""
 
 
 class RayEngine:
@@ -65,6 +70,7 @@ class RayEngine:
             ) from error
         if jobs is not None and address != LOCAL:
             raise OptionError("--jobs belongs to one machine; a cluster knows how many processors it has.")
+        _require_answer(address)
         self._ray = ray
         self._ours = not ray.is_initialized()
         self._running: dict[Any, Task] = {}
@@ -123,6 +129,17 @@ class RayEngine:
             raise (cause if isinstance(cause, RlacdError) else error) from error
         except exceptions.RayError:
             return Outcome("failed", error=f"it was lost with its machine {LOST + 1} times")
+
+
+def _require_answer(address: str) -> None:
+    """Find out in seconds whether anyone is there; Ray itself tries for minutes."""
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if not (host and port.isdecimal()):
+        return
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), timeout=ANSWER).close()
+    except (OSError, OverflowError) as error:
+        raise OptionError(f"there is no Ray cluster at {address} ({error}); start one or use local.") from error
 
 
 def _setting(work: Work) -> dict[str, Any]:
