@@ -243,16 +243,20 @@ class TestRunner:
         for name in ("a.ply", "b.ply"):
             trimesh.util.concatenate([sphere, sphere.copy().apply_translation((1.5, 0, 0))]).export(folder / name)
         program = (
-            "import sys; from pathlib import Path; from rlacd.measure import Bench, Store, find_meshes;"
+            "import signal, sys; from pathlib import Path; from rlacd.measure import Bench, Store, find_meshes;"
+            "signal.signal(signal.SIGINT, signal.default_int_handler);"  # ignored by what runs in a shell's background
             "m, o = map(Path, sys.argv[1:]);"
             "Bench(m, find_meshes(m), Store(o)).run('greedy', 0.002)"
         )
         for number in (signal.SIGINT, signal.SIGKILL):
             out = tmp_path / f"run-{number}"
             with subprocess.Popen([sys.executable, "-c", program, folder, out], stderr=subprocess.DEVNULL) as run:
-                child = wait_for_child(run.pid)
-                run.send_signal(number)
-                run.wait(timeout=60)
+                try:
+                    child = wait_for_child(run.pid)
+                    run.send_signal(number)
+                    run.wait(timeout=60)
+                finally:
+                    run.kill()
             assert wait_for_end(child)
             assert (out / "results.jsonl").read_text() == ""
 
