@@ -12,6 +12,8 @@ from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import Frame
 from rlacd.solid.solid import Solid
 
+_GREATEST = np.finfo(np.float64).max
+
 
 @dataclass(frozen=True)
 class Mass:
@@ -45,8 +47,8 @@ def mass_of(solid: Solid) -> Mass:
 def mass_of_triangles(triangles: FloatArray, frame: Frame) -> Mass:
     """Integrate over closed, outward triangles ``[F, 3, 3]`` in the frame."""
     found = mass_properties(triangles)
-    unit = np.float64(1.0) / frame.scale
     with np.errstate(over="ignore", under="ignore"):  # at the ends of float64, volumes have none
+        unit = np.minimum(np.float64(1.0) / frame.scale, _GREATEST)
         return Mass(
             float(_times(found["volume"], unit, 3)),
             frame.to_input(found["center_mass"][None])[0],
@@ -56,8 +58,7 @@ def mass_of_triangles(triangles: FloatArray, frame: Frame) -> Mass:
 
 def _times(value: Any, unit: np.float64, power: int) -> FloatArray:
     """Multiply step by step, up to the greatest number there is: a power of the unit itself may be infinite."""
-    greatest = np.finfo(np.float64).max
     result = np.asarray(value, dtype=np.float64)
     for _ in range(power):
-        result = np.clip(result * unit, -greatest, greatest)
+        result = np.clip(result * unit, -_GREATEST, _GREATEST)
     return result
