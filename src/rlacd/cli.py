@@ -617,8 +617,8 @@ def _first_line(error: Exception) -> str:
     return (str(error).strip().splitlines() or ["no message"])[0]
 
 
-app.command("train", epilog=EPILOG)(train_command(_exit_codes))
-app.command("pretrain", epilog=EPILOG)(pretrain_command(_exit_codes))
-app.add_typer(bench_app(_exit_codes), name="bench")
 app.command("view", epilog=EPILOG)(view_command(_exit_codes))
 app.command("batch", epilog=BATCH_EPILOG)(batch_command(_exit_codes, decompose))
+app.add_typer(bench_app(_exit_codes), name="bench")
+app.command("train", epilog=EPILOG)(train_command(_exit_codes))
+app.command("pretrain", epilog=EPILOG)(pretrain_command(_exit_codes))
