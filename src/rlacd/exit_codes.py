@@ -1,0 +1,77 @@
+"""What a command tells the shell, and how every error becomes one sentence.
+
+Exit codes: 0 done; 1 a bug in rlacd; 2 bad input or option; 3 the output cannot be written; 4 stopped early (timeout or
+Ctrl-C), a valid decomposition was written; 5 a batch is done, but some meshes failed; 130 interrupted at once, no file
+is left half-written.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from collections.abc import Iterator
+from enum import IntEnum
+
+import typer
+
+from rlacd.errors import OutputError, RlacdError
+
+
+class ExitCode(IntEnum):
+    """What the command tells the shell."""
+
+    OK = 0
+    BUG = 1
+    BAD_INPUT = 2
+    CANNOT_WRITE = 3
+    STOPPED_EARLY = 4
+    SOME_FAILED = 5
+    INTERRUPTED = 130
+
+
+# \b keeps the lines of a paragraph apart in the help.
+EPILOG = """\b
+[bold]Exit codes[/bold]
+  0    done
+  1    a bug in rlacd (RLACD_DEBUG=1 shows the traceback)
+  2    bad input or bad option
+  3    the output cannot be written
+  4    stopped early by --timeout or Ctrl-C; a valid decomposition was written
+  130  interrupted at once; no file is left half-written
+"""
+
+
+@contextlib.contextmanager
+def exit_codes() -> Iterator[None]:
+    """Turn every error into one sentence on stderr and an exit code; RLACD_DEBUG=1 lets the traceback through."""
+    try:
+        yield
+    except (typer.Exit, typer.Abort, SystemExit):
+        raise
+    except KeyboardInterrupt:
+        _fail("interrupted; no file is left half-written.", ExitCode.INTERRUPTED)
+    except BrokenPipeError:
+        # The reader of stdout (head, jq) has left; say no more, not even when Python flushes at exit.
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+        raise typer.Exit(ExitCode.CANNOT_WRITE) from None
+    except OutputError as error:
+        _fail(error, ExitCode.CANNOT_WRITE)
+    except RlacdError as error:
+        _fail(error, ExitCode.BAD_INPUT)
+    except MemoryError:
+        _fail("there is not enough memory for this mesh; simplify it or use a larger machine.", ExitCode.BAD_INPUT)
+    except Exception as error:
+        message = f"a bug in rlacd ({type(error).__name__}: {_first_line(error)}); "
+        _fail(message + "run again with RLACD_DEBUG=1 for the traceback, and please report it.", ExitCode.BUG)
+
+
+def _fail(message: object, code: ExitCode) -> None:
+    if os.environ.get("RLACD_DEBUG") == "1":
+        raise
+    typer.echo(f"rlacd: {message}", err=True)
+    raise typer.Exit(code)
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).strip().splitlines() or ["no message"])[0]
