@@ -25,7 +25,7 @@ import rlacd
 PEG = np.array([0.0, 0.0, 0.3])
 """The middle of the peg, which points along y; metres."""
 
-SECONDS = 4.0
+SECONDS = 8.0
 
 
 @dataclass(frozen=True)

@@ -196,6 +196,7 @@ def test_progress_names_the_stages_and_counts_parts() -> None:
         "repair",
         "cut",
         "merge",
+        "search",
         "finish",
         "measure",
     ]

@@ -158,6 +158,7 @@ def test_a_killed_run_resumes_exactly(meshes: Path, tmp_path: Path) -> None:
     run(meshes, whole, iterations=400)
     given = [f"--{k.replace('_', '-')}={v}" for k, v in {**TINY, "iterations": 400, "workers": 2}.items()]
     command = [sys.executable, "-c", "from rlacd.cli import main; main()", "train", str(meshes), "--run", str(killed)]
+    command += ["--preset", "paper", "--encoder", "profile"]  # the defaults of TrainOptions
     process = subprocess.Popen([*command, *given], stdout=subprocess.DEVNULL)
     deadline = time.monotonic() + 120
     while not (killed / "best.safetensors").exists() and time.monotonic() < deadline:

@@ -261,7 +261,7 @@ def test_the_command_line_searches(corpus: Path, tmp_path: Path) -> None:
     assert report["search"]["steps"] <= 5
 
 
-@pytest.mark.parametrize("words", [["--quality", "better"], ["--budget", "3"], ["--quality", "best", "--budget", "-1"]])
+@pytest.mark.parametrize("words", [["--quality", "better"], ["--quality", "fast", "--budget", "3"], ["--quality", "best", "--budget", "-1"]])
 def test_the_command_line_refuses_bad_options(words: list[str], tmp_path: Path) -> None:
     mesh = tmp_path / "ball.ply"
     trimesh.creation.icosphere().export(mesh)

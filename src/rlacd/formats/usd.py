@@ -20,7 +20,8 @@ from rlacd.formats.single_precision import placed_hull, placed_mesh
 def require_usd() -> None:
     """Raise MissingExtraError, saying how to get it, unless USD can be imported."""
     try:
-        importlib.import_module("pxr.UsdPhysics")
+        for module in ("pxr", "pxr.UsdPhysics"):
+            importlib.import_module(module)
     except ImportError as error:
         raise MissingExtraError("USD needs an extra: run  pip install 'rlacd[usd]'  and try again.") from error
 
