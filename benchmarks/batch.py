@@ -1,9 +1,10 @@
 """What a batch costs beside its meshes: meshes a minute, processor time per task that is not the mesh's, memory.
 
     python benchmarks/batch.py MESHES --count 60 --jobs 1 --jobs 2
+    python benchmarks/batch.py MESHES --count 0 --jobs 2 --keep RESULTS
 
-MESHES is a folder; every n-th of its meshes by name is taken. Wall times are only worth something on a machine that
-does nothing else; processor times are nearly the same on a busy one.
+MESHES is a folder; every n-th of its meshes by name is taken, or all of them (0). Wall times are only worth something
+on a machine that does nothing else; processor times are nearly the same on a busy one.
 """
 
 from __future__ import annotations
@@ -50,20 +51,23 @@ def main(
     meshes: Path,
     count: int = 60,
     jobs: Annotated[list[int] | None, typer.Option()] = None,
+    keep: Annotated[Path | None, typer.Option(help="Keep the results here.")] = None,
     option: Annotated[list[str] | None, typer.Option(help="Of rlacd batch, such as --option=--quality=best.")] = None,
 ) -> None:
     assets = find_assets(meshes)
-    chosen = assets[:: max(1, len(assets) // count)][:count]
+    chosen = assets[:: max(1, len(assets) // count)][:count] if count else assets
     with tempfile.TemporaryDirectory() as folder:
         links = Path(folder, "meshes")
         links.mkdir()
         for asset in chosen:
-            (links / asset.path.name).symlink_to(asset.path.resolve())
+            link = links / asset.name
+            link.parent.mkdir(parents=True, exist_ok=True)
+            link.symlink_to(asset.path.resolve())
         print(f"{len(chosen)} meshes of {meshes}, {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}\n")
         print("| jobs | meshes/min | CPU s/mesh: median | mean | most | beside it, s/mesh | MB run | MB all |")
         print("|---|---|---|---|---|---|---|---|")
         for number in jobs or [1, 2]:
-            out = Path(folder, f"out{number}")
+            out = Path(keep or folder, f"jobs{number}")
             command = [sys.executable, "-c", "from rlacd.cli import main; main()", "batch", str(links), "-o", str(out)]
             command += ["--jobs", str(number), *(option or [])]
             wall, cpu, own, together = measured(command)
