@@ -13,21 +13,29 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
+from urllib.parse import unquote
 
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
-from trimesh.exchange.load import mesh_formats
 from trimesh.resolvers import Resolver
 
 from rlacd.errors import EmptyMeshError, MeshDataError, MeshFileError
+from rlacd.read_file import LARGEST, read_file
 from rlacd.solid.frame import FloatArray
+from rlacd.solid.load_gltf import check_gltf
+from rlacd.solid.load_limits import MOST_TRIANGLES
+from rlacd.solid.load_text import check_off, check_text, plain_obj, plain_ply, plain_stl
+from rlacd.solid.load_xml import check_3mf, collada_of
 from rlacd.solid.topology import BoolArray, IntArray
 
 Source: TypeAlias = str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]
 
+FORMATS = ("obj", "stl", "ply", "off", "glb", "gltf", "dae", "zae", "3mf", "xyz")
+"""What is read. trimesh has parsers of more formats, but what they do with a hostile file nobody has looked at."""
+
 # Triangles are all we need of a file: no colours, and no images, whose decoders are the riskier part of any loader.
-_DATA_FILES = {".bin", ".gltf", ".glb", ".xml", ".model"}
+_DATA_FILES = {".bin"}
 
 
 @dataclass(frozen=True)
@@ -58,9 +66,9 @@ def load_mesh(source: Source) -> InputMesh:
     Parameters
     ----------
     source
-        A path (obj, stl, ply, off, glb, gltf, dae, 3mf and whatever else trimesh reads), a mesh or scene of trimesh, or
-        vertices ``[V, 3]`` with faces ``[F, 3]`` (or quads ``[F, 4]``). Scenes are baked: every instance of a geometry
-        is placed by its transform. Paths and curves are ignored; point clouds give vertices without faces.
+        A path (obj, stl, ply, off, glb, gltf, dae, zae, 3mf, xyz), a mesh or scene of trimesh, or vertices ``[V, 3]``
+        with faces ``[F, 3]`` (or quads ``[F, 4]``). Scenes are baked: every instance of a geometry is placed by its
+        transform. Paths and curves are ignored; point clouds give vertices without faces.
 
     Returns
     -------
@@ -69,7 +77,8 @@ def load_mesh(source: Source) -> InputMesh:
     Raises
     ------
     MeshFileError
-        The file is missing, empty, cut off, or not what its name says.
+        The file is missing, empty, cut off, or not what its name says; or it is made to take more memory or time
+        than a mesh is worth.
     MeshDataError
         The arrays have the wrong shape, indices are out of range, or no face is finite.
     EmptyMeshError
@@ -77,9 +86,10 @@ def load_mesh(source: Source) -> InputMesh:
     """
     if isinstance(source, str | os.PathLike):
         path = Path(source)
-        return _clean(*_bake(_read(path)), path.name)
+        return _clean(*_bake(_read(path), path.name), path.name)
     if isinstance(source, trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud):
-        return _clean(*_bake(source), type(source).__name__)
+        kind = type(source).__name__
+        return _clean(*_bake(source, kind), kind)
     if isinstance(source, tuple) and len(source) == 2:
         return _clean(*_arrays(*source), "arrays")
     raise MeshDataError(
@@ -91,29 +101,28 @@ def _read(path: Path) -> trimesh.Scene:
     """Parse a file; raises MeshFileError with the likeliest reason."""
     # The content is opened here and not by name: a name that looks like an address must never be fetched.
     try:
-        if path.is_dir():
-            raise MeshFileError(f"{path} is a folder: give a mesh file in it")
-        if not path.exists():
-            raise MeshFileError(f"{path} does not exist: check the spelling and the folder")
-        if not path.is_file():
-            raise MeshFileError(f"{path} is not a regular file: save the mesh to a file first")
-        content = path.read_bytes()
-    except OSError as error:
-        raise MeshFileError(f"{path} cannot be opened ({error.strerror}): check its name and permissions") from error
+        content = read_file(path)
+    except FileNotFoundError as error:
+        raise MeshFileError(f"{path} does not exist: check the spelling and the folder") from error
+    except IsADirectoryError as error:
+        raise MeshFileError(f"{path} is a folder: give a mesh file in it") from error
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise MeshFileError(f"{path} cannot be opened ({reason}): check its name and permissions") from error
     if not content.strip(b"\0 \t\r\n"):
         raise MeshFileError(f"{path} is empty: export the mesh again")
     extension = path.suffix.lower().lstrip(".")
     holds = _format_of(content)
-    if extension not in mesh_formats():
+    if extension not in FORMATS:
         hint = f"rename it to .{holds}, which it seems to hold" if holds else "convert it to glb, obj, stl or ply"
-        raise MeshFileError(f"{path} has no mesh format's extension: {hint}")
-    if extension == "stl" and holds in (None, "stl"):
-        _check_stl_is_whole(path, content)
+        raise MeshFileError(f"{path} is in no format that is read here: {hint}")
+    beside = _FolderResolver(path.parent)
     try:
+        content, extension = _checked(path, content, extension, beside)
         scene = trimesh.load_scene(
             io.BytesIO(content),
             file_type=extension,
-            resolver=_FolderResolver(path.parent),
+            resolver=beside,
             allow_remote=False,
             process=False,
             skip_materials=True,
@@ -121,6 +130,10 @@ def _read(path: Path) -> trimesh.Scene:
     except Exception as error:  # parsers of damaged files raise anything
         if holds and holds != extension:
             raise MeshFileError(f"{path} is not {extension} but {holds}: rename it to .{holds}") from error
+        if isinstance(error, MeshFileError):
+            raise
+        if isinstance(error, MemoryError):
+            raise MeshFileError(f"{path} takes more memory than there is: simplify the mesh first") from error
         # A parser that misses a module was trying an encoding no mesh has: that says nothing about the file.
         reason = (
             "" if isinstance(error, ImportError) else f" ({str(error).splitlines()[0][:200]})" if str(error) else ""
@@ -128,31 +141,31 @@ def _read(path: Path) -> trimesh.Scene:
         raise MeshFileError(
             f"{path} cannot be read as {extension}: it is damaged or cut off{reason}; export it again"
         ) from error
-    if extension == "off":
-        _check_off_is_whole(path, content)
     if holds and holds != extension and not scene.geometry:
         raise MeshFileError(f"{path} is not {extension} but {holds}: rename it to .{holds}")
     return scene
 
 
-def _check_stl_is_whole(path: Path, content: bytes) -> None:
-    """Compare the length of a binary STL file with the count in its header; a short one would be read as text."""
-    if b"\0" not in content[:512]:
-        return
-    count = int.from_bytes(content[80:84], "little")
-    if len(content) < 84 + 50 * count:
-        raise MeshFileError(f"{path} is cut off: its header promises {count} triangles; export it again")
-
-
-def _check_off_is_whole(path: Path, content: bytes) -> None:
-    """Compare the lines of an OFF file with the counts in its header, which the parser takes on trust."""
-    lines = [line for line in (raw.split(b"#")[0].strip() for raw in content.splitlines()) if line]
-    words = b" ".join(lines[:2]).replace(b"COFF", b" ").replace(b"OFF", b" ").split()
-    body = len(lines) - (1 if len(lines[0].split()) > 2 else 2)
-    counts = [int(word) for word in words[:2] if word.isdigit()]
-    if len(counts) == 2 and body < sum(counts):
-        promised = f"{counts[0]} vertices and {counts[1]} faces"
-        raise MeshFileError(f"{path} is cut off: its header promises {promised}; export it again")
+def _checked(path: Path, content: bytes, extension: str, beside: _FolderResolver) -> tuple[bytes, str]:
+    """Get what a parser is given, once nothing in the file makes it run wild; raises MeshFileError."""
+    match extension:
+        case "gltf" | "glb":
+            check_gltf(path, content, beside.get)
+        case "3mf":
+            check_3mf(path, content)
+        case "dae" | "zae":
+            return collada_of(path, content, extension), "dae"
+        case "stl":
+            return plain_stl(path, content), extension
+        case "ply":
+            return plain_ply(path, content), extension
+        case "obj":
+            return plain_obj(path, content), extension
+        case "off":
+            check_off(path, content)
+        case _:
+            check_text(path, content)
+    return content, extension
 
 
 def _format_of(content: bytes) -> str | None:
@@ -163,7 +176,7 @@ def _format_of(content: bytes) -> str | None:
     if head.startswith(b"ply\n") or head.startswith(b"ply\r"):
         return "ply"
     if head.startswith(b"PK\x03\x04"):
-        return "3mf"
+        return "zae" if b".dae" in content else "3mf"
     if head.startswith((b"OFF", b"COFF")):
         return "off"
     if head.startswith(b"<") and b"COLLADA" in head:
@@ -192,13 +205,27 @@ class _FolderResolver(Resolver):  # type: ignore[misc]
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder.resolve()
+        self._read: dict[Path, bytes] = {}
 
     def get(self, name: str) -> bytes:
-        """Return the content of a file in the folder."""
-        path = (self._folder / str(name).strip()).resolve()
-        if path.suffix.lower() not in _DATA_FILES or not path.is_relative_to(self._folder) or not path.is_file():
-            raise FileNotFoundError(f"{name!r} is not a data file beside the mesh")
-        return path.read_bytes()
+        """Return the content of a file in the folder; once read it is kept, as a file may be named any number of times.
+
+        Raises
+        ------
+        FileNotFoundError
+            There is no such file, or it may not be read.
+        """
+        for spelled in dict.fromkeys((name, unquote(name))):
+            try:
+                path = (self._folder / spelled.strip()).resolve()
+                if path.suffix.lower() not in _DATA_FILES or not path.is_relative_to(self._folder):
+                    continue
+                if path not in self._read:
+                    self._read[path] = read_file(path, LARGEST - sum(map(len, self._read.values())))
+            except (OSError, ValueError, RuntimeError):  # a name with a NUL, links in a circle
+                continue
+            return self._read[path]
+        raise FileNotFoundError(f"{name!r:.200} is not a data file beside the mesh")
 
     def write(self, name: str, data: Any) -> None:
         """Refuse: loading writes nothing."""
@@ -213,13 +240,13 @@ class _FolderResolver(Resolver):  # type: ignore[misc]
         return iter(())
 
 
-def _bake(source: trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud) -> tuple[FloatArray, IntArray]:
+def _bake(source: trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud, name: str) -> tuple[FloatArray, IntArray]:
     """Concatenate all triangles of a scene, every instance in its place; points are kept if there are no triangles."""
     vertices: list[FloatArray] = []
     faces: list[IntArray] = []
     points: list[FloatArray] = []
     count = 0
-    for geometry, transform in _instances(source):
+    for geometry, transform in _instances(source, name):
         if isinstance(geometry, trimesh.Trimesh):
             v, f = _arrays(geometry.vertices, geometry.faces)
             if transform is not None:
@@ -242,14 +269,38 @@ def _bake(source: trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud) -> tuple
     return (np.concatenate(points) if points else np.empty((0, 3))), np.empty((0, 3), dtype=np.int64)
 
 
-def _instances(source: Any) -> Iterator[tuple[Any, FloatArray | None]]:
+def _instances(source: Any, name: str) -> Iterator[tuple[Any, FloatArray | None]]:
+    """Give each geometry of a scene with its transform, None for the identity, as often as it is placed."""
     if not isinstance(source, trimesh.Scene):
         yield source, None
         return
-    for node in source.graph.nodes_geometry:
-        transform, name = source.graph[node]
-        transform = np.asarray(transform, dtype=np.float64)
-        yield source.geometry[name], None if np.array_equal(transform, np.eye(4)) else transform
+    data = source.graph.transforms.node_data
+    instances = [(node, source.geometry[data[node]["geometry"]]) for node in source.graph.nodes_geometry]
+    count = sum(len(getattr(geometry, "faces", ())) for _, geometry in instances)
+    if count > MOST_TRIANGLES:
+        raise MeshDataError(f"{name} places {count} triangles, more than {MOST_TRIANGLES}: simplify it first")
+    placed = {source.graph.base_frame: np.eye(4)}
+    for node, geometry in instances:
+        transform = _placed(source.graph, node, placed, name)
+        yield geometry, None if np.array_equal(transform, np.eye(4)) else transform
+
+
+def _placed(graph: Any, node: Any, placed: dict[Any, FloatArray], name: str) -> FloatArray:
+    """Find a node's transform [4, 4] from those of its ancestors, each of which is multiplied only once."""
+    chain: list[tuple[Any, Any]] = []
+    at = node
+    while at not in placed:
+        parent = graph.transforms.parents.get(at)
+        if parent is None:
+            return np.asarray(graph[node][0], dtype=np.float64)  # the base is not its ancestor
+        chain.append((parent, at))
+        if len(chain) > len(graph.transforms.parents):
+            raise MeshDataError(f"the node {node!r:.80} of {name} is placed in itself: export the scene again")
+        at = parent
+    for parent, child in reversed(chain):
+        edge = graph.transforms.edge_data[parent, child]
+        placed[child] = placed[parent] @ np.asarray(edge.get("matrix", np.eye(4)), dtype=np.float64)
+    return placed[node]
 
 
 def _arrays(vertices: Any, faces: Any) -> tuple[FloatArray, IntArray]:

@@ -1,0 +1,47 @@
+"""Reading files that others made: ordinary ones only, and none that would not fit into memory."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+
+LARGEST = 2**30
+"""Bytes of the largest file that is read. A binary STL of this length has 21 million triangles."""
+
+
+def read_file(path: str | os.PathLike[str], most: int = LARGEST) -> bytes:
+    """Read all that a file holds at the moment it is opened, even if it grows meanwhile.
+
+    Parameters
+    ----------
+    path : path-like
+        Links are followed.
+    most : int
+        Bytes of the largest file that is read.
+
+    Raises
+    ------
+    OSError
+        The file cannot be opened, is no regular one (pipes and devices may never end), or is too large; ``strerror``
+        says which.
+    """
+    _check(os.stat(path), path, most)  # opening a device may set it going
+    handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)  # opening a pipe would wait for a writer
+    try:
+        opened = os.fstat(handle)  # the name may mean another file by now
+        _check(opened, path, most)
+    except OSError:
+        os.close(handle)
+        raise
+    with os.fdopen(handle, "rb") as file:
+        return file.read(opened.st_size)
+
+
+def _check(status: os.stat_result, path: str | os.PathLike[str], most: int) -> None:
+    if stat.S_ISDIR(status.st_mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), os.fspath(path))
+    if not stat.S_ISREG(status.st_mode):
+        raise OSError(errno.EINVAL, "it is a pipe or a device, not a regular file", os.fspath(path))
+    if status.st_size > most:
+        raise OSError(errno.EFBIG, f"it is larger than {most / 2**20:g} MB", os.fspath(path))

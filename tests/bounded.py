@@ -1,0 +1,58 @@
+"""Running a function in a process of its own that may take only so much memory and time."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import re
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+resource = pytest.importorskip("resource")
+
+PRELOADED = ["tests.bounded", "rlacd.solid.load", "rlacd.robots", "rlacd.policies.learned", "trimesh.exchange.load"]
+
+_server = multiprocessing.get_context("forkserver")
+
+
+class Died(AssertionError):
+    """The process crashed, or was ended because it took too long."""
+
+
+def bounded(function: Callable[..., Any], *args: Any, memory: int = 2**30, seconds: float = 60.0) -> Any:
+    """What `function` returns or raises, called in a process that may take `memory` more bytes of address space."""
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # each of its threads reserves memory of its own
+    _server.set_forkserver_preload(PRELOADED)
+    here, there = _server.Pipe(duplex=False)
+    process = _server.Process(target=_answer, args=(there, memory, function, args))
+    process.start()
+    there.close()
+    try:
+        if not here.poll(seconds):
+            raise Died(f"no answer within {seconds:g} s")
+        kind, value = here.recv()
+    except EOFError:
+        process.join()
+        raise Died(f"ended with code {process.exitcode}") from None
+    finally:
+        process.kill()
+        process.join()
+    if kind == "raised":
+        raise value
+    return value
+
+
+def _answer(pipe: Connection, memory: int, function: Callable[..., Any], args: tuple[Any, ...]) -> None:
+    held = int(re.search(r"VmSize:\s+(\d+)", Path("/proc/self/status").read_text())[1]) * 1024  # type: ignore[index]
+    resource.setrlimit(resource.RLIMIT_AS, (held + memory, held + memory))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    try:
+        answer: tuple[str, Any] = ("returned", function(*args))
+    except BaseException as error:  # which one it is, is what is tested
+        error.__cause__ = error.__context__ = None
+        answer = ("raised", error)
+    pipe.send(answer)
