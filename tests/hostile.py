@@ -6,6 +6,7 @@ import base64
 import bz2
 import io
 import json
+import os
 import struct
 import zipfile
 from collections.abc import Callable
@@ -396,8 +397,6 @@ for style, uri in {
 
     def _build(folder: Path, uri: str = uri) -> Path:
         """A folder with all kinds of traps; the secret would do as the box's buffer."""
-        import os
-
         inside = folder / "inside"
         inside.mkdir()
         positions, indices = BOX.vertices.astype("<f4").tobytes(), BOX.faces.astype("<u4").tobytes()
@@ -414,16 +413,12 @@ for style, uri in {
     REFUSED[f"a buffer {style}.gltf"] = (_build, "beside the mesh")
 
 
-def _repeated(folder: Path) -> Path:
-    """One file of a megabyte, named a hundred thousand times over."""
-    (folder / "much.bin").write_bytes(b"\0" * 10**6)
+def named_often(folder: Path) -> Path:
+    """A box whose buffer, a megabyte of zeros, is named nine thousand times over."""
+    (folder / "much.bin").write_bytes(bytes(10**6))
     path = folder / "mesh.gltf"
     path.write_bytes(gltf(buffers=many(9_000, {"byteLength": 10**6, "uri": "much.bin"})))
     return path
-
-
-HARMLESS_BUT_FLAT = _repeated
-"""Its box has all corners at zero."""
 
 
 def _shadow(folder: Path) -> Path:

@@ -13,6 +13,7 @@ from pathlib import Path, PurePosixPath
 from urllib.parse import unquote
 
 from rlacd.errors import MeshFileError
+from rlacd.read_file import LARGEST, read_file
 
 ENDINGS = (".obj", ".stl", ".ply", ".off", ".glb", ".gltf", ".dae", ".3mf")
 """Of the files that count as meshes, whatever their case."""
@@ -47,7 +48,7 @@ class Asset:
             The mesh file cannot be opened.
         """
         try:
-            content = self.path.read_bytes()
+            content = read_file(self.path)
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
             raise MeshFileError(f"{self.name} cannot be opened ({reason}): check its name and permissions") from error
@@ -141,8 +142,8 @@ def _buffers(path: Path, content: bytes) -> dict[str, bytes]:
     for name in sorted({spelled for uri in uris if not uri.startswith("data:") for spelled in (uri, unquote(uri))}):
         try:
             buffer = (path.parent / name).resolve()
-            if buffer.is_relative_to(path.parent.resolve()) and buffer.is_file():
-                found[name] = buffer.read_bytes()
-        except (OSError, ValueError):
+            if buffer.is_relative_to(path.parent.resolve()):
+                found[name] = read_file(buffer, LARGEST - sum(map(len, found.values())))
+        except (OSError, ValueError, RuntimeError):
             continue
     return found

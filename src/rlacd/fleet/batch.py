@@ -220,11 +220,12 @@ class Batch:
         return task, self.redo != "all" and self._is_finished(task, manifest.get(asset.name), store)
 
     def _is_finished(self, task: Task, row: Row | None, store: Store) -> bool:
-        if row is None or row["key"] != task.key or row["place"] != task.asset.place:
+        if row is None or row.get("key") != task.key or row.get("place") != task.asset.place:
             return False  # where a result is put depends on the meshes beside it
-        if row["status"] != "done" and (self.redo == "failed" or row["limits"] != self._refusal()):
+        status = row.get("status")
+        if status != "done" and (self.redo == "failed" or row.get("limits") != self._refusal()):
             return False
-        return all(store.size(name) == size for name, size in row["outputs"].items())
+        return status is not None and all(store.size(name) == size for name, size in row.get("outputs", {}).items())
 
     def _row(self, task: Task, outcome: Outcome) -> Row:
         """All that does not differ from run to run."""

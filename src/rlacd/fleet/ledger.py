@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from pathlib import PurePosixPath
 from typing import Any, TypeAlias
 
 from rlacd.errors import OutputError
@@ -92,6 +93,14 @@ def _read(where: str, lines: Iterable[bytes]) -> Iterable[Row]:
             row: Row = json.loads(line)
             if not isinstance(row["mesh"], str):
                 raise TypeError("no name")
-        except (ValueError, KeyError, TypeError) as error:
+            if not all(_is_inside(output) for output, _ in row.get("outputs", {}).items()):
+                raise ValueError("an output outside of the results")
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
             raise OutputError(f"line {number} of {where} is damaged ({error}); delete the line.") from error
         yield row
+
+
+def _is_inside(output: str) -> bool:
+    """Tell whether a name leads to a file of the results: outputs of meshes that are done again are removed."""
+    parts = PurePosixPath(output).parts
+    return bool(parts) and "\0" not in output and parts[0] != "/" and ".." not in parts

@@ -17,6 +17,7 @@ from rlacd.formats import DENSITY, FORMATS, MODELS, check_model_options, hull_ta
 from rlacd.options import Options
 from rlacd.policies import make_policy
 from rlacd.presets import find_preset
+from rlacd.read_file import read_file
 
 WEIGHTS_ENDING = ".onnx"
 DEFAULT_FORMAT = "glb"
@@ -171,7 +172,7 @@ def _weights(policy: str) -> str:
     digest = hashlib.sha256(files("rlacd.weights").joinpath("guide.onnx").read_bytes())
     if policy.endswith(WEIGHTS_ENDING):
         try:
-            digest.update(Path(policy).read_bytes())
+            digest.update(read_file(policy))
         except OSError as error:
             raise WeightsError(f"The policy {policy} cannot be read ({error}); give another path.") from error
     return digest.hexdigest()

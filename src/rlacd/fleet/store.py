@@ -6,6 +6,7 @@ import contextlib
 import fcntl
 import io
 import os
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any, Protocol
 
 from rlacd.errors import MissingExtraError, OptionError, OutputError
 from rlacd.formats.atomic import output_errors, write_file
+from rlacd.read_file import read_file
 
 PRIVATE = ".rlacd"
 """Folder in the results for what only the next run needs."""
@@ -105,10 +107,13 @@ class FolderStore:
 
     def read(self, name: str) -> bytes | None:
         """See `Store`."""
+        path = self.folder / name
         try:
-            return (self.folder / name).read_bytes()
+            return read_file(path, sys.maxsize)
         except FileNotFoundError:
             return None
+        except OSError as error:
+            raise OutputError(f"cannot read {path} ({error.strerror}); move it away.") from error
 
     def size(self, name: str) -> int | None:
         """See `Store`."""
@@ -169,7 +174,8 @@ class _FileJournal:
         self._file: io.BufferedWriter | None = None
 
     def lines(self) -> Iterator[bytes]:
-        content = self._path.read_bytes() if self._path.exists() else b""
+        with output_errors(self._path):
+            content = read_file(self._path, sys.maxsize) if self._path.exists() else b""
         whole = content.rfind(b"\n") + 1
         if whole < len(content):
             os.truncate(self._path, whole)  # what a kill left of its last line

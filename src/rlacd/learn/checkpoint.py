@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,8 +22,12 @@ from safetensors.torch import load_file, save_file
 from torch import Tensor
 
 from rlacd.errors import OutputError, TrainingError
+from rlacd.read_file import read_file
 
 FORMAT = 1
+
+DAMAGE = (OSError, ValueError, KeyError, TypeError, RecursionError, MemoryError)
+"""What reading a damaged file may raise, beside the exceptions of its format."""
 
 
 @dataclass(frozen=True)
@@ -87,17 +92,23 @@ def load_checkpoint(folder: Path) -> Checkpoint | None:
     if not folder.exists():
         return None
     try:
-        state = json.loads((folder / "state.json").read_text())
+        state = json.loads(read_file(folder / "state.json"))
         weights = load_file(folder / "weights.safetensors")
-        with np.load(folder / "replay.npz", allow_pickle=False) as arrays:
-            replay = {name: arrays[name] for name in arrays.files}
+        replay = _arrays(folder / "replay.npz")
         if state["format"] != FORMAT:
             raise TrainingError(f"{folder} has format {state['format']}, not {FORMAT}; train again from the beginning.")
-    except (OSError, ValueError, KeyError, SafetensorError) as error:
-        if isinstance(error, TrainingError):
-            raise
+    except (*DAMAGE, SafetensorError, zipfile.BadZipFile) as error:
         raise TrainingError(f"the checkpoint {folder} is damaged ({error}); remove it to train again.") from error
     return Checkpoint(weights, replay, state)
+
+
+def _arrays(path: Path) -> dict[str, NDArray[Any]]:
+    """Read arrays; they were written without compression, so that no file grows when it is read."""
+    with zipfile.ZipFile(path) as archive:
+        if any(member.compress_type != zipfile.ZIP_STORED for member in archive.infolist()):
+            raise ValueError(f"{path.name} is compressed")
+    with np.load(path, allow_pickle=False) as arrays:
+        return {name: arrays[name] for name in arrays.files}
 
 
 def adam_state(optimizer: torch.optim.Adam) -> dict[str, Tensor]:

@@ -11,17 +11,17 @@ import os
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import onnxruntime
 
 from rlacd.errors import WeightsError
 from rlacd.planes.sweep import Sweep
 from rlacd.planes.views import Views
 from rlacd.policies.features import CONCAVE_EDGES, DIRECTIONS, VERSION, features, measures, planes_per_axis, tables
 from rlacd.policies.greedy import cheapest, excess_norm
+from rlacd.policies.network_file import open_network
+from rlacd.read_file import read_file
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
 
@@ -36,6 +36,9 @@ DECIMALS = 4
 
 NOTHING = 1e-9
 """Least greedy score, relative to the hull."""
+
+MOST_PLANES = 1000
+"""Along a direction that a network may ask for; the shipped one asks for 25."""
 
 USUAL_SCALE = 0.05
 """Scale for criteria that have none: the usual concavity threshold."""
@@ -80,11 +83,8 @@ class Guide:
 
     def __init__(self, weights: str | os.PathLike[str] | None = None) -> None:
         name, content = _read(weights)
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = options.inter_op_num_threads = 1
-        options.log_severity_level = 4
         try:
-            self._session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+            self._session = open_network(content)
         except Exception as error:  # onnxruntime's own exceptions have no public base
             raise WeightsError(f"{name} is damaged or no ONNX file; export the policy again.") from error
         self.about = _about(name, self._session.get_modelmeta().custom_metadata_map.get("rlacd"))
@@ -181,7 +181,7 @@ def _read(weights: str | os.PathLike[str] | None) -> tuple[str, bytes]:
     try:
         if weights is None:
             return f"The shipped policy {SHIPPED}", files("rlacd.weights").joinpath(SHIPPED).read_bytes()
-        return str(weights), Path(weights).read_bytes()
+        return str(weights), read_file(weights)
     except (OSError, ModuleNotFoundError) as error:
         name = SHIPPED if weights is None else weights
         raise WeightsError(
@@ -199,8 +199,11 @@ def _about(name: str, metadata: str | None) -> About:
                 f"{name} was made for version {about['features']} of the features, not for {VERSION}; train it again."
             )
         least, greatest = (float(s) for s in about["scales"])
-        return About(int(about["per_axis"]), (least, greatest), float(about["blend"]), float(about["edge_bonus"]))
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        per_axis, blend, bonus = int(about["per_axis"]), float(about["blend"]), float(about["edge_bonus"])
+        if not 1 <= per_axis <= MOST_PLANES or not np.isfinite([least, greatest, blend, bonus]).all():
+            raise ValueError("out of range")
+        return About(per_axis, (least, greatest), blend, bonus)
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
         if isinstance(error, WeightsError):
             raise
         raise WeightsError(f"The metadata of {name} are damaged; export the policy again.") from error

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import onnxruntime
 
 from rlacd.errors import WeightsError
+from rlacd.policies.network_file import open_network
 from rlacd.policies.observe import Float32Array, Observation
+from rlacd.read_file import read_file
 
 KIND = "q"
 """What the metadata of such a file say that it is."""
@@ -19,6 +21,9 @@ KIND = "q"
 INPUTS = ("points", "directions", "scale")
 
 OUTPUTS = ("values",)
+
+MOST_POINTS = 2**17
+"""That a network may ask for on a surface; the paper's asks for 2,048."""
 
 METADATA = "rlacd"
 """Key of the metadata under which our own JSON stands."""
@@ -49,7 +54,7 @@ class OnnxQ:
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         try:
-            self._session = _opened(path)
+            self._session = open_network(read_file(path))
         except OSError as error:
             raise WeightsError(f"The policy {path} cannot be read ({error}); give another path.") from error
         except Exception as error:  # onnxruntime's own exceptions have no public base
@@ -62,9 +67,9 @@ class OnnxQ:
             raise WeightsError(f"{path} is no Q network of rlacd; export the policy again.")
         try:
             self.points, self.threshold = int(about["points"]), float(about["threshold"])
-            if self.points < 1 or not self.threshold > 0:
+            if not 1 <= self.points <= MOST_POINTS or not 0 < self.threshold < math.inf:
                 raise ValueError
-        except (KeyError, TypeError, ValueError) as error:
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise WeightsError(f"The metadata of {path} are damaged; export the policy again.") from error
 
     def run(self, points: Float32Array, directions: Float32Array, scale: Float32Array) -> Float32Array:
@@ -89,24 +94,15 @@ def load_q_network(path: str) -> OnnxQ | None:
         It is a Q network, but not of this version.
     """
     try:
-        kind = _about(_opened(path, optimized=False)).get("kind")
+        kind = _about(open_network(read_file(path), optimized=False)).get("kind")
     except Exception:  # whoever else reads policies says what is wrong with the file
         return None
     return OnnxQ(path) if kind == KIND else None
 
 
-def _opened(path: str | os.PathLike[str], optimized: bool = True) -> onnxruntime.InferenceSession:
-    settings = onnxruntime.SessionOptions()
-    settings.intra_op_num_threads = settings.inter_op_num_threads = 1
-    settings.log_severity_level = 4
-    if not optimized:
-        settings.graph_optimization_level = onnxruntime.GraphOptimizationLevel.ORT_DISABLE_ALL
-    return onnxruntime.InferenceSession(Path(path).read_bytes(), settings, providers=["CPUExecutionProvider"])
-
-
 def _about(session: onnxruntime.InferenceSession) -> dict[str, Any]:
     try:
         about = json.loads(session.get_modelmeta().custom_metadata_map.get(METADATA, "{}"))
-    except ValueError:
+    except (ValueError, RecursionError):
         return {}
     return about if isinstance(about, dict) else {}

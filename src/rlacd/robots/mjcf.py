@@ -90,13 +90,14 @@ def plan_mjcf(document: Document, references: References, named: Callable[[str, 
         for name in dict.fromkeys(geom.mesh for geom in geoms)
     }
     warnings += _caveats(root, geoms)
+    rewritten = {assets[name] for name in uses}
     relative = [
         str(full["file"])
         for element in root.walk()
         if element.tag in ("mesh", "texture", "hfield", "skin", "include", "model")
         and (full := defaults.full(element)).get("file")
         and not Path(full["file"]).is_absolute()
-        and element not in [assets[name] for name in uses]
+        and element not in rewritten
     ]
 
     def edit(hulls: HullFiles) -> Edits:

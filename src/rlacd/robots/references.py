@@ -13,7 +13,8 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from rlacd.errors import MeshFileError, OptionError
-from rlacd.robots.spans import parse
+from rlacd.read_file import read_file
+from rlacd.robots.spans import LARGEST_DESCRIPTION, parse
 
 PACKAGE_SCHEMES = ("package", "model")
 
@@ -121,7 +122,7 @@ def _package_name(folder: Path) -> str | None:
     if not place.is_file():
         return None
     try:
-        document = parse(place, place.read_bytes())
+        document = parse(place, read_file(place, LARGEST_DESCRIPTION))
     except (MeshFileError, OSError):
         return None
     found = next(document.root.named("name"), None)

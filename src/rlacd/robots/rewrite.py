@@ -17,11 +17,12 @@ from rlacd.errors import MeshError, MeshFileError, OptionError, OutputError
 from rlacd.formats import check_file, check_name, file_stem, write_file
 from rlacd.formats.encode import encode_plain_obj
 from rlacd.formats.folder import check_names, write_folder
+from rlacd.read_file import read_file
 from rlacd.robots.collada import collada_unit
 from rlacd.robots.mjcf import mesh_folder, plan_mjcf
 from rlacd.robots.plan import HullFile, MeshUse, Plan
 from rlacd.robots.references import References
-from rlacd.robots.spans import Document, parse, replaced
+from rlacd.robots.spans import LARGEST_DESCRIPTION, Document, parse, replaced
 from rlacd.robots.urdf import plan_urdf
 from rlacd.solid.hull import Hull
 from rlacd.solid.load import load_mesh
@@ -220,6 +221,6 @@ def _stems(paths: Sequence[Path]) -> list[str]:
 
 def _read(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return read_file(path, LARGEST_DESCRIPTION)
     except OSError as error:
         raise MeshFileError(f"{path} cannot be opened ({error.strerror}): check its name and permissions.") from error

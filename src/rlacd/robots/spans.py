@@ -19,6 +19,12 @@ from rlacd.errors import MeshFileError
 DEEPEST = 500
 """Elements inside elements; robots have some fifty."""
 
+MOST_ELEMENTS = 500_000
+"""Of a file. An element takes about a kilobyte."""
+
+LARGEST_DESCRIPTION = 2**26
+"""Bytes of the largest file that is read."""
+
 _ATTRIBUTE = re.compile(rb"""(\s+)([^\s=/>"']+)(\s*=\s*)("[^"]*"|'[^']*')""")
 
 
@@ -63,10 +69,12 @@ class Document:
 
     def indent(self, element: Element) -> bytes:
         """Get the white space before the element, back to the line's end; nothing if something else is there."""
-        before = self.data[: element.start]
-        line = before[len(before.rstrip(b" \t\r\n")) :]
-        at = line.rfind(b"\n")
-        return line[at - (line[at - 1 : at] == b"\r") :] if at >= 0 else b""
+        start = element.start
+        while start and self.data[start - 1] in b" \t\r\n":
+            start -= 1
+        space = self.data[start : element.start]
+        at = space.rfind(b"\n")
+        return space[at - (space[at - 1 : at] == b"\r") :] if at >= 0 else b""
 
     def with_attributes(self, element: Element, values: Mapping[str, str]) -> bytes:
         """Get the element's bytes with attributes set in its start tag, and all else as it is."""
@@ -88,12 +96,13 @@ def parse(path: Path, data: bytes) -> Document:
     Raises
     ------
     MeshFileError
-        It is not well-formed, has a document type, nests too deep, or is not in an encoding that holds ASCII as it is.
+        It is not well-formed, has a document type, nests too deep or is too long, or is not in an encoding that holds
+        ASCII as it is.
     """
     parser = expat.ParserCreate()
     top: list[Element] = []
     open_elements: list[Element] = []
-    said = ["utf-8"]
+    said, count = ["utf-8"], [0]
 
     def refuse(*_: object) -> None:
         raise MeshFileError(f"{path} has a document type (<!DOCTYPE>), which may hide anything: remove it.")
@@ -105,6 +114,9 @@ def parse(path: Path, data: bytes) -> Document:
         at = parser.CurrentByteIndex
         if len(open_elements) >= DEEPEST:
             raise MeshFileError(f"{path} nests elements more than {DEEPEST} deep: that is no robot.")
+        count[0] += 1
+        if count[0] > MOST_ELEMENTS:
+            raise MeshFileError(f"{path} has more than {MOST_ELEMENTS} elements: that is no robot.")
         element = Element(tag, attributes, open_elements[-1] if open_elements else None, at, _tag_end(data, at))
         (open_elements[-1].children if open_elements else top).append(element)
         open_elements.append(element)

@@ -292,7 +292,7 @@ def _placed(graph: Any, node: Any, placed: dict[Any, FloatArray], name: str) -> 
     while at not in placed:
         parent = graph.transforms.parents.get(at)
         if parent is None:
-            return np.asarray(graph[node][0], dtype=np.float64)  # the base is not its ancestor
+            return _placed_otherwise(graph, node, name)
         chain.append((parent, at))
         if len(chain) > len(graph.transforms.parents):
             raise MeshDataError(f"the node {node!r:.80} of {name} is placed in itself: export the scene again")
@@ -301,6 +301,14 @@ def _placed(graph: Any, node: Any, placed: dict[Any, FloatArray], name: str) -> 
         edge = graph.transforms.edge_data[parent, child]
         placed[child] = placed[parent] @ np.asarray(edge.get("matrix", np.eye(4)), dtype=np.float64)
     return placed[node]
+
+
+def _placed_otherwise(graph: Any, node: Any, name: str) -> FloatArray:
+    """Find the transform of a node that is not below the base: a scene in memory may have turned its edges round."""
+    try:
+        return np.asarray(graph[node][0], dtype=np.float64)
+    except ValueError as error:
+        raise MeshDataError(f"the node {node!r:.80} of {name} is placed nowhere: export the scene again") from error
 
 
 def _arrays(vertices: Any, faces: Any) -> tuple[FloatArray, IntArray]:

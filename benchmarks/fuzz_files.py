@@ -1,0 +1,232 @@
+r"""Damage real files of every format and see that each gives hulls or one typed error: no crash, no hang, no flood.
+
+    python benchmarks/fuzz_files.py MESHES --minutes 10 --out files.jsonl [--seed 0] [--formats obj,glb]
+    python benchmarks/fuzz_files.py --table files.jsonl
+    python benchmarks/fuzz_files.py MESHES --seed 0 --only 1234 --keep folder     # one input again, its file kept
+    python benchmarks/fuzz_files.py --minimise finding.obj                        # cut what it does not need
+
+MESHES is the folder of real meshes: what lies in its ``raw/`` and small meshes of its index, written in every format,
+are the seeds. Every input is made from the seed and its own number alone, and decomposed within a small budget by the
+watched processes of a batch (`rlacd.fleet`). What happened to those that did not end well is written to the output.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import count
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import trimesh
+from fuzz_mutations import Seed, mutated
+
+from rlacd.fleet import Limits, Order
+from rlacd.fleet.worker import Worker, WorkerDiedError
+from rlacd.weights import __name__ as weights_package
+
+SECONDS, MEMORY = 120.0, 2 * 2**30
+"""What an input may take; a decomposition is told to stop after a second."""
+
+BUDGET = {"threshold": 0.2, "max_hulls": 3, "quality": "fast", "timeout": 1.0, "threads": 1, "resolution": 30}
+
+LARGEST_SEED = 60_000
+
+SMALL_MESHES = 12
+
+BOX = trimesh.creation.box()
+
+WELL = ("loaded", "refused")
+"""How an input may end."""
+
+
+def seeds_of(meshes: Path) -> dict[str, list[Seed]]:
+    """Real files and small real meshes in every format, by format."""
+    found: dict[str, list[Seed]] = {}
+    for path in sorted((meshes / "raw").iterdir()):
+        if path.stat().st_size < LARGEST_SEED:
+            found.setdefault(path.suffix[1:], []).append(Seed(path.read_bytes()))
+    with open(meshes / "index.csv", newline="") as listing:
+        small = [row["file"] for row in csv.DictReader(listing) if 8 < int(row["faces"]) < 150]
+    for name in small[:: max(1, len(small) // SMALL_MESHES)][:SMALL_MESHES]:
+        for kind, seed in written(trimesh.load_mesh(meshes / name, process=False)):
+            found.setdefault(kind, []).append(seed)
+    weights = Path(sys.modules[weights_package].__file__ or "").with_name("guide.onnx")
+    found["onnx"] = [Seed(weights.read_bytes())]
+    return found
+
+
+def written(mesh: trimesh.Trimesh) -> Iterator[tuple[str, Seed]]:
+    """A mesh in every format."""
+    mesh = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    scene = trimesh.Scene()
+    scene.add_geometry(mesh, node_name="first", geom_name="mesh")
+    scene.graph.update("second", "first", matrix=trimesh.transformations.translation_matrix([3, 0, 0]), geometry="mesh")
+    yield "obj", Seed(mesh.export(file_type="obj").encode())
+    yield "off", Seed(mesh.export(file_type="off").encode())
+    yield "stl", Seed(mesh.export(file_type="stl"))
+    yield "stl", Seed(mesh.export(file_type="stl_ascii").encode())
+    yield "ply", Seed(mesh.export(file_type="ply"))
+    yield "ply", Seed(mesh.export(file_type="ply", encoding="ascii"))
+    yield "dae", Seed(mesh.export(file_type="dae"))
+    yield "3mf", Seed(scene.export(file_type="3mf"))
+    yield "glb", Seed(scene.export(file_type="glb"))
+    yield "xyz", Seed("\n".join(" ".join(map(str, row)) for row in mesh.vertices.tolist()).encode())
+    files = scene.export(file_type="gltf")
+    yield "gltf", Seed(files.pop("model.gltf"), files)
+
+
+@dataclass
+class Fuzzer:
+    """Makes inputs and has them decomposed."""
+
+    seeds: dict[str, list[Seed]]
+    seed: int
+    folder: Path
+    worker: Worker = field(default_factory=lambda: Worker(Limits(SECONDS, MEMORY)))
+
+    def input(self, number: int) -> tuple[str, Path]:
+        """Write the input of a number; its format, and its file."""
+        rng = np.random.default_rng([self.seed, number])
+        kind = list(self.seeds)[number % len(self.seeds)]
+        seeds = self.seeds[kind]
+        seed = seeds[rng.integers(len(seeds))]
+        path = self.folder / f"{number}.{kind}"
+        path.write_bytes(mutated(kind, seed, seeds, rng))
+        for name, content in seed.beside.items():
+            (self.folder / name).write_bytes(content)
+        return kind, path
+
+    def result(self, path: Path) -> tuple[str, str]:
+        """How it ended (see `WELL`), and what was said."""
+        mesh, options = path, dict(BUDGET)
+        if path.suffix == ".onnx":
+            mesh = path.with_suffix(".stl")
+            BOX.export(mesh)
+            options["policy"] = str(path)
+        try:
+            said, _ = self.worker.run(Order(options), mesh, "mesh", "mesh")
+        except WorkerDiedError as error:
+            self.worker.close()
+            kinds = {"it took": "hang", "it needed": "memory"}
+            end = next((kind for words, kind in kinds.items() if error.reason.startswith(words)), "crash")
+            return end, f"{error.reason} {error.last_words[-300:]}"
+        finally:
+            if mesh != path:
+                mesh.unlink()
+        if "error" not in said:
+            return "loaded", ""
+        if said["error"].startswith(("a bug in rlacd", "there is not enough memory")):
+            return "untyped", said["error"]
+        return "refused", said["error"]
+
+    def close(self) -> None:
+        self.worker.close()
+
+
+def run(args: argparse.Namespace) -> int:
+    chosen = seeds_of(args.meshes)
+    if args.formats:
+        chosen = {kind: chosen[kind] for kind in args.formats.split(",")}
+    tally: dict[str, Counter[str]] = {kind: Counter() for kind in chosen}
+    numbers = [args.only] if args.only is not None else count(args.start)
+    end = time.monotonic() + 60 * args.minutes
+    keep = Path(args.keep) if args.keep else None
+    with TemporaryDirectory(prefix="rlacd-fuzz-") as scratch, open(args.out or "/dev/null", "a") as out:
+        fuzzer = Fuzzer(chosen, args.seed, Path(scratch))
+        try:
+            for number in numbers:
+                if time.monotonic() > end:
+                    break
+                kind, path = fuzzer.input(number)
+                begun = time.monotonic()
+                ended, said = fuzzer.result(path)
+                tally[kind][ended] += 1
+                row = {"seed": args.seed, "number": number, "format": kind, "end": ended, "said": said}
+                if ended not in WELL or args.only is not None:
+                    print(json.dumps(row), flush=True)
+                    if keep is not None:
+                        keep.mkdir(parents=True, exist_ok=True)
+                        (keep / f"{args.seed}-{path.name}").write_bytes(path.read_bytes())
+                out.write(json.dumps({**row, "seconds": round(time.monotonic() - begun, 3)}) + "\n")
+                out.flush()
+                path.unlink()
+        finally:
+            fuzzer.close()
+    print(table(tally))
+    return sum(counter[end] for counter in tally.values() for end in counter if end not in WELL)
+
+
+def minimise(path: Path) -> None:
+    """Cut out whatever a finding ends alike without, in ever smaller pieces; written beside it as ``small-…``."""
+    content = path.read_bytes()
+    with TemporaryDirectory(prefix="rlacd-fuzz-") as scratch:
+        fuzzer = Fuzzer({}, 0, Path(scratch))
+
+        def ends(data: bytes) -> str:
+            place = Path(scratch) / f"mesh{path.suffix}"
+            place.write_bytes(data)
+            ended, said = fuzzer.result(place)
+            return ended if ended != "untyped" else said.split("(")[1].split(":")[0]
+
+        wanted = ends(content)
+        step = len(content) // 2
+        while step:
+            at = 0
+            while at < len(content):
+                shorter = content[:at] + content[at + step :]
+                if shorter and ends(shorter) == wanted:
+                    content = shorter
+                else:
+                    at += step
+            step //= 2
+        fuzzer.close()
+    path.with_name(f"small-{path.name}").write_bytes(content)
+    print(f"{wanted}: {len(content)} bytes\n{content[:2000]!r}")
+
+
+def table(tally: dict[str, Counter[str]]) -> str:
+    """Totals as Markdown."""
+    ends = ("loaded", "refused", "crash", "hang", "memory", "untyped")
+    lines = ["| format | tried | " + " | ".join(ends) + " |", "|---|--:|" + "--:|" * len(ends)]
+    total: Counter[str] = sum(tally.values(), Counter())
+    for kind, counter in [*sorted(tally.items()), ("all", total)]:
+        lines.append(f"| {kind} | {counter.total()} | " + " | ".join(str(counter[end]) for end in ends) + " |")
+    return "\n".join(lines)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("meshes", nargs="?", type=Path)
+    parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--start", type=int, default=0, help="number of the first input")
+    parser.add_argument("--only", type=int, help="number of the only input")
+    parser.add_argument("--formats", help="comma-separated; all by default")
+    parser.add_argument("--out", type=Path, help="a line of JSON per input is appended to it")
+    parser.add_argument("--keep", help="folder for the files that did not end well")
+    parser.add_argument("--minimise", type=Path, help="a finding to make small")
+    parser.add_argument("--table", type=Path, help="an output to count")
+    args = parser.parse_args()
+    if args.minimise:
+        minimise(args.minimise)
+        return 0
+    if args.table:
+        tally: dict[str, Counter[str]] = {}
+        for line in args.table.read_text().splitlines():
+            row = json.loads(line)
+            tally.setdefault(row["format"], Counter())[row["end"]] += 1
+        print(table(tally))
+        return 0
+    return min(run(args), 1)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,241 @@
+"""Ways to damage a file: some know nothing of it, some know numbers, lines, tags, JSON, chunks or archives."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import struct
+import zipfile
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+Rng = np.random.Generator
+
+TEXT = {"obj", "off", "xyz", "dae", "gltf"}
+
+NUMBER = re.compile(rb"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
+
+WORDS = [
+    *b"0 -1 1 2 3 255 65536 2147483647 -2147483648 4294967295 4294967296 99999999999999999999".split(),
+    *b"1e308 -1e308 1e-320 1e999 1e9 nan inf -inf 0x10 1/2 - 3.5 true [] {}".split(),
+    *(b"", b" ", b"\n", b"\0", b"\xff", b'""', b"9" * 400, b"1" * 50 + b".0"),
+]
+
+BITS = [0, 1, 0x7F, 0x80, 0xFF, 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, 0x7F800000, 0x7FC00000, 0xFF7FFFFF]
+"""As 32 bits: small and large whole numbers, infinity, NaN and the largest float."""
+
+VALUES: list[Any] = [
+    0,
+    -1,
+    1,
+    2**31,
+    2**63,
+    1e300,
+    -1e-300,
+    None,
+    True,
+    "",
+    "x",
+    [],
+    {},
+    [0],
+    "../mesh.bin",
+    5120,
+    5126,
+]
+"""For JSON."""
+
+
+@dataclass(frozen=True)
+class Seed:
+    """A sound file, and the files that lie beside it."""
+
+    content: bytes
+    beside: dict[str, bytes] = field(default_factory=dict)
+
+
+def mutated(kind: str, seed: Seed, others: list[Seed], rng: Rng) -> bytes:
+    """One mutation, or up to four in a row."""
+    data = seed.content
+    for _ in range(rng.choice([1, 2, 3, 4], p=[0.6, 0.2, 0.1, 0.1])):
+        ways = _ways(kind, data)
+        data = ways[rng.integers(len(ways))](data, others[rng.integers(len(others))].content, rng)
+    return data
+
+
+def _ways(kind: str, data: bytes) -> list[Callable[[bytes, bytes, Rng], bytes]]:
+    rough = [flip, cut_off, delete, splice]
+    if kind in ("3mf", "zae"):
+        return [*rough, overwrite, double, *[in_member] * 14]
+    if kind == "glb":
+        return [*rough, overwrite, double, *[in_chunk] * 14]
+    if kind == "gltf":
+        return [*rough, number, *[in_json] * 10]
+    if kind in TEXT or b"\0" not in data[:200]:
+        return [*rough, *[number] * 8, head, head, *[lines] * 4, tags, tags]
+    return [*rough, double, head, *[overwrite] * 10]
+
+
+def _span(data: bytes, rng: Rng) -> tuple[int, int]:
+    """A piece of a file, short ones as likely as long ones."""
+    if not data:
+        return 0, 0
+    length = int(np.exp(rng.uniform(0, np.log(len(data) + 1))))
+    start = int(rng.integers(len(data)))
+    return start, min(len(data), start + length)
+
+
+def flip(data: bytes, _: bytes, rng: Rng) -> bytes:
+    changed = bytearray(data)
+    for at in rng.integers(max(1, len(data)), size=rng.integers(1, 9)) if data else []:
+        changed[at] ^= 1 << int(rng.integers(8))
+    return bytes(changed)
+
+
+def overwrite(data: bytes, _: bytes, rng: Rng) -> bytes:
+    """Put a nasty number somewhere, more often near the start and where a number may begin."""
+    if len(data) < 8:
+        return data
+    end = min(len(data), 200) if rng.random() < 0.5 else len(data)
+    at = int(rng.integers(end - 4)) // 4 * 4 + int(rng.integers(4)) * int(rng.random() < 0.3)
+    packed = struct.pack("<I", int(rng.choice(BITS)))
+    return data[:at] + packed[: 4 if rng.random() < 0.7 else 2] + data[at + (4 if len(packed) == 4 else 2) :]
+
+
+def cut_off(data: bytes, _: bytes, rng: Rng) -> bytes:
+    return data[: int(rng.integers(len(data) + 1))]
+
+
+def delete(data: bytes, _: bytes, rng: Rng) -> bytes:
+    start, end = _span(data, rng)
+    return data[:start] + data[end:]
+
+
+def double(data: bytes, _: bytes, rng: Rng) -> bytes:
+    start, end = _span(data, rng)
+    return data[:end] + data[start:end] * int(rng.integers(1, 4)) + data[end:]
+
+
+def splice(data: bytes, other: bytes, rng: Rng) -> bytes:
+    """Put a piece of another file in the place of one."""
+    start, end = _span(data, rng)
+    begin, stop = _span(other, rng)
+    return data[:start] + other[begin:stop] + data[end:]
+
+
+def number(data: bytes, _: bytes, rng: Rng) -> bytes:
+    """Replace some numbers, by nasty ones or others of the same file."""
+    found = [match.span() for match in NUMBER.finditer(data)]
+    for at in sorted({int(rng.integers(len(found))) for _ in range(rng.integers(1, 4))} if found else [], reverse=True):
+        start, end = found[at]
+        other = found[rng.integers(at + 1)]  # before it, where nothing has moved yet
+        word = WORDS[rng.integers(len(WORDS))] if rng.random() < 0.5 else data[slice(*other)]
+        data = data[:start] + word + data[end:]
+    return data
+
+
+def head(data: bytes, other: bytes, rng: Rng) -> bytes:
+    """Do something to the first lines only."""
+    at = min(len(data), 300)
+    way = (number, lines, flip)[rng.integers(3)]
+    return way(data[:at], other[:300], rng) + data[at:]
+
+
+def lines(data: bytes, _: bytes, rng: Rng) -> bytes:
+    return _pieces(data, b"\n", rng)
+
+
+def tags(data: bytes, _: bytes, rng: Rng) -> bytes:
+    return _pieces(data, b"<" if data.lstrip().startswith(b"<") else b" ", rng)
+
+
+def _pieces(data: bytes, between: bytes, rng: Rng) -> bytes:
+    """Double, delete, swap or move pieces."""
+    pieces = data.split(between)
+    for _ in range(rng.integers(1, 4)):
+        i, j = sorted(rng.integers(len(pieces), size=2).tolist())
+        what = rng.integers(4)
+        if what == 0:
+            pieces[i:i] = pieces[i : i + 1 + int(rng.integers(20))]
+        elif what == 1 and len(pieces) > 1:
+            del pieces[i : i + 1 + int(rng.integers(3))]
+        elif what == 2:
+            pieces[i], pieces[j] = pieces[j], pieces[i]
+        else:
+            pieces.insert(j, pieces[i])
+        pieces = pieces or [b""]
+    return between.join(pieces)
+
+
+def in_json(data: bytes, other: bytes, rng: Rng) -> bytes:
+    """Replace, delete or double a value of the tree."""
+    try:
+        tree = json.loads(data)
+    except ValueError:
+        return number(data, other, rng)
+    for _ in range(rng.integers(1, 3)):
+        places = list(_places(tree))
+        if not places:
+            break
+        holder, key = places[rng.integers(len(places))]
+        what = rng.integers(5)
+        if what == 0:
+            del holder[key]
+        elif what == 1 and isinstance(holder, list):
+            holder[key:key] = [holder[key]] * int(rng.choice([1, 2, 100]))
+        elif what == 2:  # another value of the same tree
+            there, which = places[rng.integers(len(places))]
+            holder[key] = json.loads(json.dumps(there[which]))
+        else:
+            value = VALUES[rng.integers(len(VALUES))]
+            if isinstance(holder[key], int) and rng.random() < 0.5:
+                value = holder[key] + int(rng.integers(-3, 4))
+            holder[key] = json.loads(json.dumps(value))
+    return json.dumps(tree).encode()
+
+
+def _places(tree: Any) -> Any:
+    items = enumerate(tree) if isinstance(tree, list) else tree.items() if isinstance(tree, dict) else ()
+    for key, value in list(items):
+        yield tree, key
+        yield from _places(value)
+
+
+def in_chunk(data: bytes, other: bytes, rng: Rng) -> bytes:
+    """Change a GLB's JSON or its binary chunk, and mend the lengths."""
+    if len(data) < 28 or struct.unpack_from("<I", data, 12)[0] > len(data) - 20:
+        return flip(data, other, rng)
+    end = 20 + struct.unpack_from("<I", data, 12)[0]
+    text, binary = data[20:end], data[end + 8 :]
+    if rng.random() < 0.8:
+        text = in_json(text, b"", rng)
+        text += b" " * (-len(text) % 4)
+    else:
+        binary = overwrite(binary, b"", rng)
+    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(binary), 0x004E4942) + binary
+    return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
+
+
+def in_member(data: bytes, _: bytes, rng: Rng) -> bytes:
+    """Change a member of an archive, and pack it again."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            members = {name: archive.read(name) for name in archive.namelist()}
+    except (zipfile.BadZipFile, zlib.error, OSError, RuntimeError, NotImplementedError, ValueError, EOFError):
+        return data
+    if not members:
+        return data
+    names = list(members)
+    name = max(names, key=lambda n: len(members[n])) if rng.random() < 0.8 else names[rng.integers(len(names))]
+    way = (number, number, tags, tags, lines, flip, delete)[rng.integers(7)]
+    members[name] = way(members[name], b"", rng)
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        for key, content in members.items():
+            archive.writestr(key, content)
+    return file.getvalue()
