@@ -6,7 +6,7 @@ RLACD_INSTALL := $(BIN)/pip install --quiet --constraint constraints-dev.txt --n
                  --config-settings=cmake.define.RLACD_WERROR=ON
 NATIVE_SOURCES := $(wildcard native/*.cpp native/*.hpp) CMakeLists.txt pyproject.toml constraints-dev.txt
 
-.PHONY: install demo test test-fast lint format clean
+.PHONY: install demo test test-fast lint fuzz-files format clean
 
 install: $(VENV)/installed
 
@@ -38,6 +38,13 @@ test: lint
 
 test-fast: $(VENV)/test-extras
 	$(BIN)/pytest -m 'not slow'
+
+# MINUTES of damaged files of every format, made from the real meshes in MESHES; SEED for other ones.
+MINUTES ?= 10
+SEED    ?= 0
+MESHES  ?= ../shared/meshes
+fuzz-files: $(VENV)/test-extras
+	$(BIN)/python benchmarks/fuzz_files.py $(MESHES) --minutes $(MINUTES) --seed $(SEED)
 
 format: $(VENV)/test-extras
 	$(BIN)/ruff check --fix .

@@ -15,25 +15,34 @@ from __future__ import annotations
 import argparse
 import csv
 import json
+import re
+import shutil
 import sys
+import threading
 import time
+import uuid
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
+from unittest import mock
 
 import numpy as np
+import psutil
 import trimesh
-from fuzz_mutations import Seed, mutated
+from fuzz_mutations import Seed, mutated, repacked
 
 from rlacd.fleet import Limits, Order
 from rlacd.fleet.worker import Worker, WorkerDiedError
 from rlacd.weights import __name__ as weights_package
 
-SECONDS, MEMORY = 120.0, 2 * 2**30
-"""What an input may take; a decomposition is told to stop after a second."""
+CPU_SECONDS, SECONDS, MEMORY = 60.0, 1800.0, 2 * 2**30
+"""What an input may take: time of a processor, time by the clock, bytes. A decomposition is to stop after a second."""
+
+Row = dict[str, Any]
 
 BUDGET = {"threshold": 0.2, "max_hulls": 3, "quality": "fast", "timeout": 1.0, "threads": 1, "resolution": 30}
 
@@ -75,12 +84,44 @@ def written(mesh: trimesh.Trimesh) -> Iterator[tuple[str, Seed]]:
     yield "stl", Seed(mesh.export(file_type="stl_ascii").encode())
     yield "ply", Seed(mesh.export(file_type="ply"))
     yield "ply", Seed(mesh.export(file_type="ply", encoding="ascii"))
-    yield "dae", Seed(mesh.export(file_type="dae"))
-    yield "3mf", Seed(scene.export(file_type="3mf"))
+    with mock.patch("uuid.uuid4", side_effect=(uuid.UUID(int=i) for i in count())):  # the same names every time
+        yield "dae", Seed(re.sub(rb"\d{4}-\d\d-\d\dT[^<]*", b"2000-01-01T00:00:00", mesh.export(file_type="dae")))
+        yield "3mf", Seed(repacked({}, scene.export(file_type="3mf")))
     yield "glb", Seed(scene.export(file_type="glb"))
     yield "xyz", Seed("\n".join(" ".join(map(str, row)) for row in mesh.vertices.tolist()).encode())
     files = scene.export(file_type="gltf")
     yield "gltf", Seed(files.pop("model.gltf"), files)
+
+
+class Watch:
+    """Ends a process that has kept a processor busy for too long, however many others there are."""
+
+    def __init__(self, worker: Worker) -> None:
+        self.too_long = False
+        self._worker = worker
+        self._stopped = threading.Event()
+        self._begun = self._spent()
+        threading.Thread(target=self._look, daemon=True).start()
+
+    def stop(self) -> None:
+        self._stopped.set()
+
+    def _look(self) -> None:
+        while not self._stopped.wait(0.5):
+            if self._spent() - self._begun > CPU_SECONDS:
+                self.too_long = True
+                psutil.Process(self._pid()).kill()
+                return
+
+    def _pid(self) -> int:
+        return int(self._worker.name.partition("@")[0].replace("-", "0"))
+
+    def _spent(self) -> float:
+        try:
+            times = psutil.Process(self._pid()).cpu_times()
+        except psutil.Error:
+            return 0.0
+        return float(times.user + times.system) if self._pid() else 0.0
 
 
 @dataclass
@@ -104,28 +145,28 @@ class Fuzzer:
             (self.folder / name).write_bytes(content)
         return kind, path
 
-    def result(self, path: Path) -> tuple[str, str]:
-        """How it ended (see `WELL`), and what was said."""
+    def result(self, path: Path) -> Row:
+        """How it ended (see `WELL`), what was said, and how many seconds of a processor it took."""
         mesh, options = path, dict(BUDGET)
         if path.suffix == ".onnx":
             mesh = path.with_suffix(".stl")
             BOX.export(mesh)
             options["policy"] = str(path)
+        watch = Watch(self.worker)
         try:
             said, _ = self.worker.run(Order(options), mesh, "mesh", "mesh")
         except WorkerDiedError as error:
             self.worker.close()
-            kinds = {"it took": "hang", "it needed": "memory"}
-            end = next((kind for words, kind in kinds.items() if error.reason.startswith(words)), "crash")
-            return end, f"{error.reason} {error.last_words[-300:]}"
+            flood = error.reason.startswith("it needed")
+            end = "hang" if watch.too_long or error.reason.startswith("it took") else "memory" if flood else "crash"
+            return {"end": end, "said": f"{error.reason} {error.last_words[-300:]}", "cpu": CPU_SECONDS}
         finally:
+            watch.stop()
             if mesh != path:
                 mesh.unlink()
-        if "error" not in said:
-            return "loaded", ""
-        if said["error"].startswith(("a bug in rlacd", "there is not enough memory")):
-            return "untyped", said["error"]
-        return "refused", said["error"]
+        told = str(said.get("error", ""))
+        untyped = told.startswith(("a bug in rlacd", "there is not enough memory"))
+        return {"end": "untyped" if untyped else "refused" if told else "loaded", "said": told, "cpu": said["cpu"]}
 
     def close(self) -> None:
         self.worker.close()
@@ -146,16 +187,13 @@ def run(args: argparse.Namespace) -> int:
                 if time.monotonic() > end:
                     break
                 kind, path = fuzzer.input(number)
-                begun = time.monotonic()
-                ended, said = fuzzer.result(path)
-                tally[kind][ended] += 1
-                row = {"seed": args.seed, "number": number, "format": kind, "end": ended, "said": said}
-                if ended not in WELL or args.only is not None:
+                row = {"seed": args.seed, "number": number, "format": kind, **fuzzer.result(path)}
+                tally[kind][row["end"]] += 1
+                if row["end"] not in WELL or args.only is not None:
                     print(json.dumps(row), flush=True)
                     if keep is not None:
-                        keep.mkdir(parents=True, exist_ok=True)
-                        (keep / f"{args.seed}-{path.name}").write_bytes(path.read_bytes())
-                out.write(json.dumps({**row, "seconds": round(time.monotonic() - begun, 3)}) + "\n")
+                        shutil.copytree(fuzzer.folder, keep / f"{args.seed}-{number}", dirs_exist_ok=True)
+                out.write(json.dumps(row) + "\n")
                 out.flush()
                 path.unlink()
         finally:
@@ -173,8 +211,8 @@ def minimise(path: Path) -> None:
         def ends(data: bytes) -> str:
             place = Path(scratch) / f"mesh{path.suffix}"
             place.write_bytes(data)
-            ended, said = fuzzer.result(place)
-            return ended if ended != "untyped" else said.split("(")[1].split(":")[0]
+            row = fuzzer.result(place)
+            return row["end"] if row["end"] != "untyped" else row["said"].split("(")[1].split(":")[0]
 
         wanted = ends(content)
         step = len(content) // 2

@@ -234,8 +234,15 @@ def in_member(data: bytes, _: bytes, rng: Rng) -> bytes:
     name = max(names, key=lambda n: len(members[n])) if rng.random() < 0.8 else names[rng.integers(len(names))]
     way = (number, number, tags, tags, lines, flip, delete)[rng.integers(7)]
     members[name] = way(members[name], b"", rng)
+    return repacked(members, data)
+
+
+def repacked(changed: dict[str, bytes], data: bytes) -> bytes:
+    """An archive with some members changed, and no dates: the same bytes every time."""
     file = io.BytesIO()
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-        for key, content in members.items():
-            archive.writestr(key, content)
+    with zipfile.ZipFile(io.BytesIO(data)) as old, zipfile.ZipFile(file, "w") as new:
+        for name in old.namelist():
+            member = zipfile.ZipInfo(name)
+            member.compress_type = zipfile.ZIP_DEFLATED
+            new.writestr(member, changed[name] if name in changed else old.read(name))
     return file.getvalue()

@@ -1,6 +1,9 @@
 // Python bindings of the convex hull and of mesh volume and area.
 #include <nanobind/stl/vector.h>
 
+#include <cmath>
+#include <stdexcept>
+
 #include "arrays.hpp"
 #include "hull.hpp"
 #include "parallel.hpp"
@@ -18,6 +21,9 @@ void bind_hull(nb::module_& m) {
       "convex_hull",
       [](const PointsIn& array) {
         const std::vector<Vec3> points = to_points(array);
+        for (const Vec3& p : points)  // no predicate decides about infinity
+          if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
+            throw std::invalid_argument("points must be finite");
         Hull hull;
         {
           nb::gil_scoped_release release;

@@ -700,3 +700,16 @@ def _() -> bytes:
 
 for ending in ("xaml", "3dxml", "step", "stp", "xdmf", "h5", "vtk", "msh", "binvox", "zip", "dxf"):
     refused(f"another format.{ending}", "convert it")(lambda: b"anything")
+
+
+# --- found by benchmarks/fuzz_files.py --------------------------------------------------------------------------------
+
+
+@refused("a node below one whose mesh there is not.gltf", "placed nowhere")
+def _() -> bytes:
+    return gltf(nodes=[{"mesh": -3, "children": [1]}, {"mesh": 0}])
+
+
+@refused("a node that is the parent of the scene.gltf", "itself")
+def _() -> bytes:
+    return gltf(nodes=[{"name": "world", "children": [1]}, {"mesh": 0, "children": [0]}])

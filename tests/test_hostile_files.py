@@ -171,6 +171,19 @@ def test_a_hostile_robot_is_refused_with_its_reason(text: str, says: str, tmp_pa
     assert not (tmp_path / "out.urdf").exists()
 
 
+@pytest.mark.parametrize(("scale", "says"), [("1e-320 1 1", "divided out"), ("1e999 1 1", "scale"), ("nan", "scale")])
+def test_a_scale_that_no_number_can_hold_is_refused(scale: str, says: str, tmp_path: Path) -> None:
+    """What is divided by the least number there is, is infinite."""
+    text = COLLISION.format(f'box.stl" scale="{scale}')
+    check_refused(MeshFileError, says, rewrite_robot, robot(tmp_path, f"<robot>{text}</robot>"), tmp_path / "out.urdf")
+
+
+def test_a_mass_that_is_no_number_is_refused(tmp_path: Path) -> None:
+    text = '<mujoco><asset><mesh name="b" file="box.stl"/></asset><worldbody><body>{}</body></worldbody></mujoco>'
+    path = robot(tmp_path, text.format('<geom type="mesh" mesh="b" mass="true"/>'), ".xml")
+    check_refused(MeshFileError, "mass", rewrite_robot, path, tmp_path / "out.xml")
+
+
 def test_a_robot_with_ten_thousand_parts_in_one_line_is_rewritten(tmp_path: Path) -> None:
     """What each costs must not grow with the length of the file before it."""
     path = robot(tmp_path, "<robot>" + COLLISION.format("box.stl") * 10_000 + "<!--" + " " * 10**7 + "--></robot>")

@@ -143,3 +143,11 @@ def test_hull_of_real_meshes(corpus) -> None:
         hull = Hull.of(points)
         assert hull is not None
         assert hull.volume == pytest.approx(ConvexHull(points).volume, rel=1e-9)
+
+
+@pytest.mark.parametrize("bad", [np.inf, -np.inf, np.nan])
+def test_points_that_are_not_finite_are_refused(bad: float) -> None:
+    """Predicates that decide about infinity once led the kernel astray, out of its own memory."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, bad]], dtype=float)
+    with pytest.raises(ValueError, match="finite"):
+        Hull.of(points)

@@ -85,6 +85,8 @@ def plan_mjcf(document: Document, references: References, named: Callable[[str, 
     geoms = []
     for body in (element for element in root.walk() if element.tag in BODIES):
         geoms += [geom for geom in _colliding(body, defaults) if _is_file(assets, geom, defaults, warnings)]
+    for geom in geoms:
+        _mass(geom.attributes)  # before any work
     uses = {
         name: _use(assets[name], defaults, references, folder, document)
         for name in dict.fromkeys(geom.mesh for geom in geoms)
@@ -154,9 +156,17 @@ def _geom_edit(document: Document, geom: _Geom, names: list[str], hulls: list[Hu
         if geom.stays:
             values["group"] = HIDDEN_GROUP
         if "mass" in geom.attributes:
-            values["mass"] = repr(float(geom.attributes["mass"]) * hull.share)
+            values["mass"] = repr(_mass(geom.attributes) * hull.share)
         pieces.append(document.with_attributes(element, values))
     return element.start, element.end, document.indent(element).join(pieces)
+
+
+def _mass(attributes: Mapping[str, str]) -> float:
+    try:
+        return float(attributes.get("mass", "0"))
+    except ValueError as error:
+        name, mass = attributes.get("name", "without a name"), attributes["mass"]
+        raise MeshFileError(f"the geom {name} has {mass!r} as its mass, which is no number: mend it.") from error
 
 
 def _colliding(body: Element, defaults: Defaults) -> Iterator[_Geom]:

@@ -198,7 +198,10 @@ def _decomposed(use: MeshUse, unit: float, options: Mapping[str, Any]) -> Decomp
 
 def _unscaled(hull: trimesh.Trimesh, use: MeshUse) -> trimesh.Trimesh:
     """Take the description's scale out of a hull: it will be applied again when that is read."""
-    points = np.ascontiguousarray(hull.vertices / use.scale)
+    with np.errstate(over="ignore"):
+        points = np.ascontiguousarray(hull.vertices / use.scale)
+    if not np.isfinite(points).all():
+        raise MeshFileError(f"{use.path} has the scale {use.scale}, which cannot be divided out again: mend the scale.")
     exact = Hull.of(points)
     if exact is not None:
         return trimesh.Trimesh(exact.vertices, exact.faces, process=False)
