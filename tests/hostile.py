@@ -97,6 +97,11 @@ def _() -> bytes:
     return ply(f"element vertex 3\n{XYZ}element nothing {10**9}\n", b"\0" * 36)
 
 
+@refused("ten million empty lines of FORMAT  ASCII.ply", "lines")
+def _() -> bytes:
+    return ply(f"element vertex {10**7}\n{XYZ}", b"\n" * 10**7, " ASCII")
+
+
 @refused("ten million empty lines.ply", "lines")
 def _() -> bytes:
     return ply(f"element vertex {10**7}\n{XYZ}", b"\n" * 10**7, "ascii")
@@ -153,6 +158,14 @@ def _() -> bytes:
         for triangle in BOX.triangles
     )
     return b"solid a\n" + b"endsolid a\nsolid a\n" * 100_000 + corners.encode() + b"endsolid a\n"
+
+
+@harmless("ten thousand bodies that end and begin in one line.stl")
+def _() -> bytes:
+    corners = "".join(
+        "".join(f"vertex {x} {y} {z}\n" for x, y, z in triangle) + "endsolid solid a\n" for triangle in BOX.triangles
+    )
+    return ("solid a\n" + corners * 1000 + "endsolid\n").encode()
 
 
 @harmless("a hundred thousand materials.obj")
@@ -350,6 +363,11 @@ def _() -> bytes:
 @refused("a chunk of four billion bytes.glb", "cut off|again")
 def _() -> bytes:
     return struct.pack("<IIIII", 0x46546C67, 2, 0xFFFFFFFF, 0xFFFFFFF0, 0x4E4F534A) + b'{"asset":{}}'
+
+
+@refused("each of a thousand nodes below each.gltf", "references")
+def _() -> bytes:
+    return gltf(nodes=[{"children": list(range(1000))}] * 999 + [{"mesh": 0}])
 
 
 @refused("a million buffers.glb", "buffers")

@@ -91,9 +91,10 @@ def _check(path: Path, header: Json, given: int) -> None:
         raise MeshFileError(f"{path} hides its triangles by {hidden[0]}: export it again without compression")
     primitives = [primitive for mesh in header.get("meshes", []) for primitive in mesh["primitives"]]
     nodes = header.get("nodes", [])
-    places = len(nodes) + sum(len(node.get("children", [])) for node in nodes)
-    places += sum(len(scene.get("nodes", [])) for scene in header.get("scenes", []))
-    for count, what in ((places, "nodes and references to them"), (len(primitives), "primitives")):
+    edges = sum(len(node.get("children", [])) for node in nodes)
+    edges += sum(len(scene.get("nodes", [])) for scene in header.get("scenes", []))
+    counts = {"nodes": len(nodes), "references to nodes": edges, "primitives": len(primitives)}
+    for what, count in counts.items():
         if count > MOST_PLACES:
             raise MeshFileError(f"{path} has {count} {what}, more than {MOST_PLACES}: join its meshes first")
     views = header.get("bufferViews", [])

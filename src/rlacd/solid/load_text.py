@@ -15,7 +15,7 @@ from rlacd.solid.load_limits import MOST_TRIANGLES
 PLY_ELEMENT = re.compile(rb"^element\s+(\S+)\s+(\S+)", re.MULTILINE)
 PLY_END = re.compile(rb"^end_header[ \t]*\r?\n", re.MULTILINE)
 EMPTY_LINES = re.compile(rb"[ \t]*[\r\n]\s*")
-NEXT_BODY = re.compile(rb"endsolid[^\n]*\n\s*solid[^\n]*\n", re.IGNORECASE)
+BODY_END = re.compile(rb"endsolid", re.IGNORECASE)
 
 
 def check_text(path: Path, content: bytes) -> None:
@@ -43,7 +43,8 @@ def plain_stl(path: Path, content: bytes) -> bytes:
     if len(content) == 84 + 50 * int.from_bytes(content[80:84], "little"):
         return content
     check_text(path, content)
-    return NEXT_BODY.sub(b"", content)
+    last = content.lower().rfind(b"endsolid")
+    return BODY_END.sub(b"", content[:last]) + content[last:] if last >= 0 else content
 
 
 def plain_ply(path: Path, content: bytes) -> bytes:
@@ -56,7 +57,7 @@ def plain_ply(path: Path, content: bytes) -> bytes:
         raise MeshFileError(f"{path} cannot be read as ply: its header has no end; export it again")
     header = content[: end.end()]
     counts = [_count(path, word) for _, word in PLY_ELEMENT.findall(header)]
-    if b"format ascii" not in header:
+    if b"ascii" not in header.lower().split(b"\n", 2)[1]:
         return content
     check_text(path, content)
     body = EMPTY_LINES.sub(b"\n", content[end.end() :].strip())
