@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import importlib
+import math
 import multiprocessing
 import os
 import re
+import time
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -20,26 +22,31 @@ PRELOADED = ["tests.bounded", "rlacd.solid.load", "rlacd.robots", "rlacd.policie
 _server = multiprocessing.get_context("forkserver")
 
 
+PATIENCE = 900.0
+"""Seconds by the clock after which a process is taken to be stuck."""
+
+
 class Died(AssertionError):
     """The process crashed, or was ended because it took too long."""
 
 
 def bounded(
-    function: Callable[..., Any], *args: Any, memory: int = 2**30, seconds: float = 120.0, needs: str | None = None
+    function: Callable[..., Any], *args: Any, memory: int = 2**30, seconds: int = 60, needs: str | None = None
 ) -> Any:
     """What `function` returns or raises, called in a process that may take `memory` more bytes of address space.
 
+    It may keep a processor busy for so many `seconds`; waiting for one is not counted, nor waiting in vain for long.
     A module that it `needs` is imported before that is counted.
     """
     os.environ["OPENBLAS_NUM_THREADS"] = "1"  # each of its threads reserves memory of its own
     _server.set_forkserver_preload(PRELOADED)
     here, there = _server.Pipe(duplex=False)
-    process = _server.Process(target=_answer, args=(there, memory, needs, function, args))
+    process = _server.Process(target=_answer, args=(there, memory, seconds, needs, function, args))
     process.start()
     there.close()
     try:
-        if not here.poll(seconds):
-            raise Died(f"no answer within {seconds:g} s")
+        if not here.poll(PATIENCE):
+            raise Died(f"no answer within {PATIENCE:g} s")
         kind, value = here.recv()
     except EOFError:
         process.join()
@@ -53,12 +60,14 @@ def bounded(
 
 
 def _answer(
-    pipe: Connection, memory: int, needs: str | None, function: Callable[..., Any], args: tuple[Any, ...]
+    pipe: Connection, memory: int, seconds: int, needs: str | None, function: Callable[..., Any], args: tuple[Any, ...]
 ) -> None:
     if needs is not None:
         importlib.import_module(needs)
     held = int(re.search(r"VmSize:\s+(\d+)", Path("/proc/self/status").read_text())[1]) * 1024  # type: ignore[index]
     resource.setrlimit(resource.RLIMIT_AS, (held + memory, held + memory))
+    spent = math.ceil(time.process_time())
+    resource.setrlimit(resource.RLIMIT_CPU, (spent + seconds, spent + seconds))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     try:
         answer: tuple[str, Any] = ("returned", function(*args))

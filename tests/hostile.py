@@ -70,6 +70,12 @@ def _() -> bytes:
     return ply(f"element vertex {10**12}\n{XYZ}element face 1\n{LIST.format(count='uchar')}")
 
 
+@refused("thirty thousand lists.ply", "header")
+def _() -> bytes:
+    lists = "".join(f"property list uchar int a{i}\n" for i in range(30_000))
+    return ply(f"element vertex 3\n{XYZ}element face 1\n{lists}", bytes(40_000))
+
+
 @refused("a trillion vertices in text.ply", "promises")
 def _() -> bytes:
     return ply(f"element vertex {10**12}\n{XYZ}", b"0 0 0\n1 0 0\n0 1 0\n", "ascii")
@@ -385,6 +391,14 @@ def _() -> bytes:
     return gltf(extensionsRequired=["EXT_meshopt_compression"])
 
 
+@harmless("a name of a megabyte and ten thousand primitives.gltf")
+def _() -> bytes:
+    primitives = many(10_000, {"attributes": {"POSITION": 0}, "indices": 1, "mode": 0})
+    primitives[-1] = {**primitives[-1], "mode": 4}
+    named = {"name": "a" * 10**6, "extras": {str(i): i for i in range(100_000)}, "primitives": primitives}
+    return gltf(meshes=[named], nodes=[{"mesh": 0, "name": "b" * 10**6}])
+
+
 @refused("numbers where lists belong.gltf", "damaged")
 def _() -> bytes:
     return gltf(accessors=7, meshes={"a": 3})
@@ -562,9 +576,15 @@ def _() -> bytes:
     return threemf(model(items='<item objectid="1"/>' * 1_000_000))
 
 
-@refused("a hundred thousand items.3mf", "places")
+@refused("fifty thousand items.3mf", "places")
 def _() -> bytes:
-    return threemf(model(items='<item objectid="1"/>' * 110_000))
+    return threemf(model(items='<item objectid="1"/>' * 50_000))
+
+
+@refused("a name of a megabyte.3mf", "name of 1000000")
+def _() -> bytes:
+    named = f'<object id="1" name="{"a" * 10**6}">{MESH}</object>'
+    return threemf(model(named, '<item objectid="1"/>' * 5000))
 
 
 @refused("a member that is read ten thousand times.3mf", "places|amounts to|triangles")
@@ -676,6 +696,13 @@ def _() -> bytes:
 def _() -> bytes:
     nodes = '<node id="a"><instance_node url="#b"/></node><node id="b"><instance_node url="#a"/></node>'
     return collada(nodes=nodes, scene='<node id="n"><instance_node url="#a"/></node>')
+
+
+@refused("a name of a megabyte.dae", "name of 1000000")
+def _() -> bytes:
+    return collada(scene='<node id="n">' + '<instance_geometry url="#g"/>' * 5000 + "</node>").replace(
+        b'<geometry id="g">', b'<geometry id="' + b"g" * 10**6 + b'">'
+    )
 
 
 @refused("a million placed boxes.dae", "places")

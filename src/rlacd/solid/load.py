@@ -23,7 +23,7 @@ from trimesh.resolvers import Resolver
 from rlacd.errors import EmptyMeshError, MeshDataError, MeshFileError
 from rlacd.read_file import LARGEST, read_file
 from rlacd.solid.frame import FloatArray
-from rlacd.solid.load_gltf import check_gltf
+from rlacd.solid.load_gltf import plain_gltf
 from rlacd.solid.load_limits import MOST_TRIANGLES
 from rlacd.solid.load_text import check_off, check_text, plain_obj, plain_ply, plain_stl
 from rlacd.solid.load_xml import check_3mf, collada_of
@@ -150,7 +150,7 @@ def _checked(path: Path, content: bytes, extension: str, beside: _FolderResolver
     """Get what a parser is given, once nothing in the file makes it run wild; raises MeshFileError."""
     match extension:
         case "gltf" | "glb":
-            check_gltf(path, content, beside.get)
+            return plain_gltf(path, content, beside.get), extension
         case "3mf":
             check_3mf(path, content)
         case "dae" | "zae":

@@ -1,7 +1,8 @@
 """What a glTF file promises, weighed against what it holds.
 
 Its JSON may use one array for any number of meshes, take any part of a buffer any number of times, and promise arrays
-that no bytes stand for. A parser makes room for all of it, one after another.
+that no bytes stand for. A parser makes room for all of it, one after another; and it copies names and whatever else
+hangs on a mesh for each of its primitives. So it is given the triangles and their places, and nothing else.
 """
 
 from __future__ import annotations
@@ -27,11 +28,20 @@ ITEMS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MA
 UNREAD = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
 """Extensions that hide the triangles: without what decodes them, files hold zeros in their place."""
 
+KEPT = {
+    "buffers": ("byteLength", "uri"),
+    "bufferViews": ("buffer", "byteOffset", "byteLength", "byteStride"),
+    "accessors": ("bufferView", "byteOffset", "componentType", "count", "type"),
+    "nodes": ("children", "mesh", "matrix", "translation", "rotation", "scale"),
+    "scenes": ("nodes",),
+}
+"""What the triangles and their places follow from, beside the meshes."""
+
 UNREADABLE = "cannot be read as glTF: it is damaged or cut off"
 
 
-def check_gltf(path: Path, content: bytes, beside: Callable[[str], bytes]) -> None:
-    """Refuse a glTF file that promises what it does not hold, or more than anybody could use.
+def plain_gltf(path: Path, content: bytes, beside: Callable[[str], bytes]) -> bytes:
+    """Make a glTF file with the same triangles and nothing else, unless it promises what it does not hold.
 
     Parameters
     ----------
@@ -45,26 +55,37 @@ def check_gltf(path: Path, content: bytes, beside: Callable[[str], bytes]) -> No
     Raises
     ------
     MeshFileError
-        It does.
+        It does, or asks for more than anybody could use.
     FileNotFoundError
         Raised by `beside`.
     """
-    header = _header(path, content)
+    header, rest = _header(path, content)
     try:
-        _check(path, header, _bytes_given(path, header, len(content), beside))
+        plain = _plain(path, header)
+        _check(path, plain, _bytes_given(path, plain, len(content), beside))
     except (TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:
-        raise MeshFileError(f"{path} {UNREADABLE} ({type(error).__name__}: {error}); export it again") from error
+        reason = f"{type(error).__name__}: {error!s:.100}"
+        raise MeshFileError(f"{path} {UNREADABLE} ({reason}); export it again") from error
+    text = json.dumps(plain).encode()
+    if rest is None:
+        return text
+    text += b" " * (-len(text) % 4)
+    head = struct.pack("<4sIII4s", MAGIC, 2, 20 + len(text) + len(rest), len(text), JSON_CHUNK)
+    return b"".join((head, text, rest))
 
 
-def _header(path: Path, content: bytes) -> Json:
-    text = content
+def _header(path: Path, content: bytes) -> tuple[Json, bytes | None]:
+    """Take a file apart into its JSON and, if it is binary, what follows that."""
+    text, rest = content, None
     if content.startswith(MAGIC):
         if len(content) < 20 or content[16:20] != JSON_CHUNK:
             raise MeshFileError(f"{path} {UNREADABLE}; export it again")
         length, chunk = struct.unpack_from("<II", content, 8)
         if max(length, 20 + chunk) > len(content):
             raise MeshFileError(f"{path} is cut off: its header promises {length} bytes; export it again")
-        text = content[20 : 20 + chunk]
+        if content[4:8] != b"\2\0\0\0":
+            raise MeshFileError(f"{path} is of another version than glTF 2: convert it to glb, obj, stl or ply")
+        text, rest = content[20 : 20 + chunk], content[20 + chunk :]
     try:
         header = json.loads(text.decode())
     except RecursionError as error:
@@ -73,7 +94,31 @@ def _header(path: Path, content: bytes) -> Json:
         raise MeshFileError(f"{path} {UNREADABLE} ({error}); export it again") from error
     if not isinstance(header, dict):
         raise MeshFileError(f"{path} {UNREADABLE}; export it again")
-    return header
+    return header, rest
+
+
+def _plain(path: Path, header: Json) -> Json:
+    hidden = [name for name in UNREAD if name in header.get("extensionsRequired", [])]
+    if hidden:
+        raise MeshFileError(f"{path} hides its triangles by {hidden[0]}: export it again without compression")
+    plain: Json = {key: header[key] for key in ("scene",) if key in header}
+    plain["asset"] = {"version": header.get("asset", {}).get("version", "2.0")}
+    for key, fields in KEPT.items():
+        if key in header:
+            plain[key] = [_only(item, fields) for item in header[key]]
+    plain["meshes"] = [
+        {"primitives": [_plain_primitive(primitive) for primitive in mesh["primitives"]]}
+        for mesh in header.get("meshes", [])
+    ]
+    return plain
+
+
+def _plain_primitive(primitive: Json) -> Json:
+    return {**_only(primitive, ("indices", "mode")), "attributes": _only(primitive["attributes"], ("POSITION",))}
+
+
+def _only(item: Json, fields: tuple[str, ...]) -> Json:
+    return {field: item[field] for field in fields if field in item}
 
 
 def _bytes_given(path: Path, header: Json, own: int, beside: Callable[[str], bytes]) -> int:
@@ -86,10 +131,7 @@ def _bytes_given(path: Path, header: Json, own: int, beside: Callable[[str], byt
 
 
 def _check(path: Path, header: Json, given: int) -> None:
-    hidden = [name for name in UNREAD if name in header.get("extensionsRequired", [])]
-    if hidden:
-        raise MeshFileError(f"{path} hides its triangles by {hidden[0]}: export it again without compression")
-    primitives = [primitive for mesh in header.get("meshes", []) for primitive in mesh["primitives"]]
+    primitives = [primitive for mesh in header["meshes"] for primitive in mesh["primitives"]]
     nodes = header.get("nodes", [])
     edges = sum(len(node.get("children", [])) for node in nodes)
     edges += sum(len(scene.get("nodes", [])) for scene in header.get("scenes", []))

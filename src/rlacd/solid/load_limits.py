@@ -8,6 +8,12 @@ MOST_TRIANGLES = 20_000_000
 MOST_PLACES = 100_000
 """Nodes of a scene, and instances of its geometries; parsers take about a kilobyte for each."""
 
+MOST_ITEMS = 10_000
+"""Places in a 3MF file, whose parser numbers them by trying all numbers."""
+
+LONGEST_NAME = 1000
+"""Of a part. Each place of a part gets a name of its own, with a number behind that."""
+
 DEEPEST = 20
 """Instances inside instances: the cost of a place grows with the third power of its depth."""
 

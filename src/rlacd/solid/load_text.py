@@ -12,6 +12,9 @@ from pathlib import Path
 from rlacd.errors import MeshFileError
 from rlacd.solid.load_limits import MOST_TRIANGLES
 
+MOST_FIELDS = 2000
+"""Lines of a PLY file's header: for each list among its properties, all before it are looked at again."""
+
 PLY_ELEMENT = re.compile(rb"^element\s+(\S+)\s+(\S+)", re.MULTILINE)
 PLY_END = re.compile(rb"^end_header[ \t]*\r?\n", re.MULTILINE)
 EMPTY_LINES = re.compile(rb"[ \t]*[\r\n]\s*")
@@ -56,6 +59,9 @@ def plain_ply(path: Path, content: bytes) -> bytes:
     if end is None:
         raise MeshFileError(f"{path} cannot be read as ply: its header has no end; export it again")
     header = content[: end.end()]
+    fields = header.count(b"\n")
+    if fields > MOST_FIELDS:
+        raise MeshFileError(f"{path} has a header of {fields} lines, more than {MOST_FIELDS}: export it again")
     counts = [_count(path, word) for _, word in PLY_ELEMENT.findall(header)]
     if b"ascii" not in header.lower().split(b"\n", 2)[1]:
         return content

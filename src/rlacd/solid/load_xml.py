@@ -21,7 +21,7 @@ from lxml import etree
 
 from rlacd.errors import MeshFileError
 from rlacd.solid.load_archive import open_archive, unpack
-from rlacd.solid.load_limits import DEEPEST, MOST_PLACES, MOST_TRIANGLES, most_in_memory
+from rlacd.solid.load_limits import DEEPEST, LONGEST_NAME, MOST_ITEMS, MOST_PLACES, MOST_TRIANGLES, most_in_memory
 
 WORLD = ""
 """The part that everything else is placed in; no identifier is empty."""
@@ -92,6 +92,8 @@ def check_3mf(path: Path, content: bytes) -> None:
     reads = _Reads(path, archive)
     for element in reads.elements(models[0]):
         part = parts.setdefault(element.get("id", "?") if _is(element, "object") else WORLD, Part())
+        for named in (element, *element.iter("{*}item")):
+            _check_names(path, named, ("id", "name", "partnumber"))
         part.triangles += sum(1 for _ in element.iter("{*}triangle"))
         part.parts += [item.get("objectid", "?") for item in element.iter("{*}item", "{*}component")]
         for component in element.iter("{*}component"):
@@ -99,7 +101,7 @@ def check_3mf(path: Path, content: bytes) -> None:
             if other is not None and other in archive.namelist():
                 parts.setdefault(component.get("objectid", "?"), Part()).triangles += reads.triangles_of(other)
         element.clear()
-    check_instances(path, parts)
+    check_instances(path, parts, MOST_ITEMS)
 
 
 class _Reads:
@@ -171,6 +173,7 @@ def check_collada(path: Path, data: bytes) -> None:
         raise MeshFileError(f"{path} holds XML that is damaged or cut off ({error}); export it again") from error
     parts = {WORLD: Part()}
     for geometry in root.iter("{*}geometry"):
+        _check_names(path, geometry, ("id",))
         parts[f"geometry {geometry.get('id')}"] = Part(sum(_corners(path, p) for p in geometry.iter(*PRIMITIVES)) // 3)
     for scene in root.iter("{*}visual_scene"):
         parts[WORLD].parts += _placed(scene)
@@ -208,11 +211,17 @@ def _placed(element: Any) -> list[str]:
     return [f"{kinds[etree.QName(one).localname]} {one.get('url', '')[1:]}" for one in found]
 
 
+def _check_names(path: Path, element: Any, attributes: tuple[str, ...]) -> None:
+    longest = max(len(element.get(attribute, "")) for attribute in attributes)
+    if longest > LONGEST_NAME:
+        raise MeshFileError(f"{path} has a name of {longest} letters, more than {LONGEST_NAME}: export it again")
+
+
 def _is(element: Any, name: str) -> bool:
     return bool(etree.QName(element).localname == name)
 
 
-def check_instances(path: Path, parts: dict[str, Part]) -> None:
+def check_instances(path: Path, parts: dict[str, Part], most_places: int = MOST_PLACES) -> None:
     """Refuse parts that hold themselves, nest too deep, or make too many instances or triangles of themselves.
 
     Raises
@@ -237,7 +246,7 @@ def check_instances(path: Path, parts: dict[str, Part]) -> None:
         open_parts.discard(name)
         places = 1 + sum(places for places, _ in inner)
         triangles = part.triangles + sum(triangles for _, triangles in inner)
-        for number, most, what in ((triangles, MOST_TRIANGLES, "triangles"), (places, MOST_PLACES, "places")):
+        for number, most, what in ((triangles, MOST_TRIANGLES, "triangles"), (places, most_places, "places")):
             if number > most:
                 raise MeshFileError(f"{path} has {number} {what} for its parts, more than {most}: simplify it first")
         done[name] = places, triangles
