@@ -27,6 +27,8 @@ ROUNDING = 1e-5
 
 SAMPLES = 400
 
+THIN = 1e-3
+
 MANY_FACES = 20_000
 """Unions with more faces are not judged by trying all of them."""
 
@@ -142,9 +144,10 @@ def overhang(case: Case, where: Floats, faces: Ints, hulls: list[Polytope], rand
 def filled_solid(where: Floats, faces: Ints) -> manifold3d.Manifold | None:
     """The closed input as a solid without cavities; None where manifold3d does not take it for one."""
     solid = manifold3d.Manifold(manifold3d.Mesh64(np.ascontiguousarray(where), faces.astype(np.uint64)))
-    if solid.is_empty() or solid.volume() <= 1e-4:
-        return None
-    outer = [piece for piece in solid.decompose() if piece.volume() > 0]
+    pieces = solid.decompose()
+    if any(abs(piece.volume()) < THIN * piece.surface_area() for piece in pieces):
+        return None  # repair makes slabs of sheets
+    outer = [piece for piece in pieces if piece.volume() > 0]
     return manifold3d.Manifold.batch_boolean(outer, manifold3d.OpType.Add) if outer else None
 
 

@@ -142,7 +142,7 @@ def triangles(random: Random) -> Shape:
     """Triangles at random, often among few points, so that they share corners, cross and are doubled."""
     points = int(random.choice([3, 4, 6, 12, 60]))
     vertices = random.choice([random.normal(size=(points, 3)), random.integers(0, 3, (points, 3)).astype(float)])
-    faces = random.integers(0, points, (int(random.choice([1, 2, 4, 20, 100])), 3))
+    faces = random.integers(0, points, (int(random.choice([1, 2, 4, 12, 30])), 3))
     return Shape(vertices, faces, (f"{len(faces)} triangles among {points} points",))
 
 
