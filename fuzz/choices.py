@@ -47,7 +47,8 @@ def draw_options(seed: int) -> dict[str, Any]:
 
 def _space(random: np.random.Generator, chance: Any) -> NavigableSpace:
     radius, tolerance = float(random.choice([0.02, 0.05, 0.1, 0.4, 1.5])), float(random.choice([0.005, 0.02, 0.1]))
-    planes = ()
+    planes: tuple[tuple[tuple[float, float, float], float], ...] = ()
     if chance(0.2):
-        planes = ((tuple(random.normal(size=3).tolist()), float(random.normal())),)
+        x, y, z, offset = random.normal(size=4).tolist()
+        planes = (((x, y, z), offset),)
     return NavigableSpace(radius, tolerance, reachable_only=not chance(0.3), closed_planes=planes)

@@ -13,6 +13,7 @@ from typing import Any
 
 import manifold3d
 import numpy as np
+import numpy.typing as npt
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
@@ -59,7 +60,8 @@ class Case:
 
 def finite_faces(shape: Shape) -> Ints:
     """The faces all of whose corners are finite."""
-    return shape.faces[np.isfinite(shape.vertices).all(axis=1)[shape.faces].all(axis=1)]
+    finite: npt.NDArray[np.bool_] = np.asarray(np.isfinite(shape.vertices).all(axis=1))
+    return shape.faces[finite[shape.faces].all(axis=1)]
 
 
 def judge(case: Case) -> list[str]:
@@ -208,7 +210,7 @@ def free_space(case: Case, solid: manifold3d.Manifold, hulls: list[Polytope], ra
     lower, upper = vertices.min(axis=0) - 2 * radius - pitch, vertices.max(axis=0) + 2 * radius + pitch
     axes = [np.arange(a, b + pitch, pitch) for a, b in zip(lower, upper, strict=True)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    clearance = tree.query(grid.reshape(-1, 3))[0].reshape(grid.shape[:3]) - spacing
+    clearance = np.asarray(tree.query(grid.reshape(-1, 3))[0]).reshape(grid.shape[:3]) - spacing
     labels, _ = ndimage.label(clearance >= radius + tolerance + pitch)
     outside = labels == labels[0, 0, 0]
     if labels[0, 0, 0] == 0:

@@ -30,6 +30,7 @@ from fuzz.files import read_hulls, write_mesh
 from fuzz.judges import Case, finite_faces, judge
 from fuzz.recipes import Shape, make_shape
 from rlacd.fleet import Order
+from rlacd.fleet.child import answer
 from rlacd.fleet.worker import Limits, Worker, WorkerDiedError
 
 AGAIN = 4
@@ -68,7 +69,19 @@ class Row:
     twice: bool = False
 
 
-def run_seed(seed: int, worker: Worker, folder: Path) -> Row:
+class Here:
+    """Does what a worker does in this process, so that a sanitizer's words can be read; a crash ends everything."""
+
+    def run(self, order: Order, mesh: Path, name: str, stem: str) -> tuple[dict[str, Any], dict[str, bytes]]:
+        print(f"seed {mesh.stem}", file=sys.stderr, flush=True)
+        request = {"order": order.as_plain(), "mesh": str(mesh), "name": name, "stem": stem, "hull_only": False}
+        return answer({**request, "staging": str(mesh.parent)})
+
+    def close(self) -> None:
+        pass
+
+
+def run_seed(seed: int, worker: Worker | Here, folder: Path) -> Row:
     """Decompose and judge."""
     shape, options = make_shape(seed), draw_options(seed)
     random = np.random.default_rng([seed, 3])
@@ -159,6 +172,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=600.0, help="stop after so many")
     parser.add_argument("--limit", type=float, default=180.0, help="seconds a shape may take")
     parser.add_argument("--memory", type=float, default=3.0, help="gigabytes it may take; 0 for no limit")
+    parser.add_argument("--here", action="store_true", help="in this process, without limits")
     parser.add_argument("--log", type=Path, default=Path("fuzz.jsonl"), help="added to")
     parser.add_argument("--again", type=int, help="repeat one seed in this process")
     parser.add_argument("--totals", type=Path, help="sums over a log")
@@ -170,7 +184,7 @@ def main() -> None:
         print(totals([json.loads(line) for line in args.totals.read_text().splitlines()]))
         return
     rows: list[dict[str, Any]] = []
-    worker = Worker(Limits(seconds=args.limit, memory=int(args.memory * 2**30)))
+    worker = Here() if args.here else Worker(Limits(seconds=args.limit, memory=int(args.memory * 2**30)))
     until = time.monotonic() + args.seconds
     with tempfile.TemporaryDirectory() as folder, args.log.open("a") as log:
         for seed in range(args.first, args.first + args.count):

@@ -35,7 +35,7 @@ WAYS: dict[str, dict[str, Any]] = {
     "not merged": {"merge": False},
     "navigable": {"criterion": SPACE(0.05, 0.02), "quality": "fast"},
     "navigable, sealed rooms": {"criterion": SPACE(0.04, 0.02, reachable_only=False)},
-    "navigable, ground": {"criterion": SPACE(0.1, 0.05, closed_planes=[((0, 0, 1), 0)]), "quality": "fast"},
+    "navigable, ground": {"criterion": SPACE(0.1, 0.05, closed_planes=(((0, 0, 1), 0),)), "quality": "fast"},
 }
 
 

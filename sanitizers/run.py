@@ -15,6 +15,7 @@ import ctypes
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -27,6 +28,8 @@ NATIVE_TESTS = (
 """Files of tests/ that reach the kernels."""
 
 RUNTIMES = {"address": ("libasan.so", "libubsan.so"), "thread": ("libtsan.so",)}
+
+CONTROL = {"address": ("read_after_the_end", "-fsanitize=address"), "thread": ("race", "-fsanitize=thread")}
 
 OPTIONS = {
     # Python frees little at its end, which is no leak of ours; numpy asks for more memory than there is and copes.
@@ -45,11 +48,13 @@ def environment(kind: str, reports: Path) -> dict[str, str]:
         subprocess.run(["gcc", f"-print-file-name={name}"], check=True, capture_output=True, text=True).stdout.strip()
         for name in libraries
     ]
-    options = {name: f"{words}:log_path={reports / 'report'}" for name, words in OPTIONS.items()}
+    options = {
+        name: f"{words}:log_path={reports / 'report'}:{os.environ.get(name, '')}" for name, words in OPTIONS.items()
+    }
     suppressions = HERE / f"{kind}.supp"
     if suppressions.exists():
         options[f"{kind[0].upper()}SAN_OPTIONS"] += f":suppressions={suppressions}"
-    return {**os.environ, **options, "LD_PRELOAD": " ".join(found), "PYTHONMALLOC": "malloc", "OMP_NUM_THREADS": "1"}
+    return {**os.environ, **options, "LD_PRELOAD": " ".join(found), "PYTHONUNBUFFERED": "1", "OMP_NUM_THREADS": "1"}
 
 
 def command(build: Path, words: list[str]) -> list[str]:
@@ -67,21 +72,50 @@ def without_random_addresses() -> None:
     ctypes.CDLL(None).personality(ADDR_NO_RANDOMIZE)
 
 
+def run(kind: str, build: Path, words: list[str], quiet: bool = False) -> tuple[int, list[str]]:
+    """The exit status, and the reports of all processes that were started."""
+    with tempfile.TemporaryDirectory(dir=build) as folder:
+        done = subprocess.run(
+            words,
+            cwd=HERE.parent,
+            env=environment(kind, Path(folder)),
+            preexec_fn=without_random_addresses,
+            stderr=subprocess.DEVNULL if quiet else None,
+        )
+        return done.returncode, [path.read_text(errors="replace") for path in sorted(Path(folder).glob("report*"))]
+
+
+def check_that_it_watches(kind: str, build: Path) -> None:
+    """Make a mistake on purpose, in the same surroundings: it has to be seen."""
+    library, mistake, flags = build / "control.so", *CONTROL[kind]
+    compiler = [
+        "g++",
+        "-O1",
+        "-g",
+        "-fPIC",
+        "-shared",
+        "-pthread",
+        flags,
+        str(HERE / "control.cpp"),
+        "-o",
+        str(library),
+    ]
+    subprocess.run(compiler, check=True)
+    code = f"import ctypes; ctypes.CDLL({str(library)!r}).{mistake}()"
+    status, reports = run(kind, build, [str(build / "bin" / "python"), "-c", code], quiet=True)
+    if status == 0 and not reports:
+        sys.exit(f"the {kind} sanitizer does not see a mistake made on purpose ({mistake} in sanitizers/control.cpp)")
+
+
 def main() -> None:
     kind, *words = sys.argv[1:]
     build = HERE.parent / "build" / f"sanitize-{kind}"
-    reports = build / "reports"
-    reports.mkdir(parents=True, exist_ok=True)
-    for old in reports.glob("report*"):
-        old.unlink()
-    done = subprocess.run(
-        command(build, words), cwd=HERE.parent, env=environment(kind, reports), preexec_fn=without_random_addresses
-    )
-    found = sorted(reports.glob("report*"))
-    for report in found:
-        print(f"--- {report.name}\n{report.read_text(errors='replace')[:4000]}")
-    print(f"{kind} sanitizer: {len(found)} processes with reports, exit status {done.returncode}")
-    sys.exit(1 if found else done.returncode)
+    check_that_it_watches(kind, build)
+    status, reports = run(kind, build, command(build, words))
+    for report in reports:
+        print(f"---\n{report[:4000]}")
+    print(f"{kind} sanitizer: {len(reports)} processes with reports, exit status {status}")
+    sys.exit(1 if reports else status)
 
 
 if __name__ == "__main__":
