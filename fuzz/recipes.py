@@ -87,7 +87,10 @@ def heap(random: Random) -> Shape:
 
 def carved(random: Random) -> Shape:
     """Primitives united with and taken from each other: one closed surface."""
-    solid = as_manifold(piece(random, 1))
+    first = piece(random, 1)
+    solid = as_manifold(first)
+    if solid.is_empty():
+        return replace(first, is_closed=False)
     steps = []
     for _ in range(random.integers(1, 7)):
         other = piece(random, 3)
