@@ -15,8 +15,9 @@ from fuzz.choices import draw_options
 from fuzz.files import read_hulls, write_mesh
 from fuzz.geometry import Polytope, distance_to_triangles, distance_to_union, why_not_convex
 from fuzz.judges import Case, judge
+from fuzz.kernels import try_seed
 from fuzz.recipes import Shape, make_shape
-from fuzz.shapes import run_seed
+from fuzz.shapes import Here, run_seed
 from rlacd.fleet.worker import Limits, Worker
 from rlacd.options import Options
 from tests.shapes import Closed, box, from_manifold, point_to_triangles
@@ -129,6 +130,18 @@ def test_a_seed_is_the_same_shape_and_options_every_time() -> None:
         assert one.faces.tobytes() == two.faces.tobytes()
         assert draw_options(seed) == draw_options(seed)
         Options(**draw_options(seed))
+
+
+@pytest.mark.parametrize("seed", [*range(8), 1047])
+def test_kernels_agree_with_brute_force_on_any_soup(seed: int) -> None:
+    try_seed(seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3, 10))
+def test_whole_decompositions_pass_the_judges(seed: int, tmp_path: Path) -> None:
+    row = run_seed(seed, Here(), tmp_path)
+    assert row.status in ("done", "refused"), row.said
 
 
 @pytest.mark.slow
