@@ -6,7 +6,17 @@ RLACD_INSTALL := $(BIN)/pip install --quiet --constraint constraints-dev.txt --n
                  --config-settings=cmake.define.RLACD_WERROR=ON
 NATIVE_SOURCES := $(wildcard native/*.cpp native/*.hpp) CMakeLists.txt pyproject.toml constraints-dev.txt
 
-.PHONY: install demo test test-fast lint fuzz-files format clean
+# The sanitized builds live in environments of their own.
+SANITIZE_address := address,undefined,float-divide-by-zero,float-cast-overflow
+SANITIZE_thread  := thread
+
+# What the fuzzers are given: minutes, a seed for other inputs, and the real meshes whose files are damaged.
+MINUTES ?= 10
+SEED    ?= 0
+MESHES  ?= ../shared/meshes
+SECONDS_TO_FUZZ = $(shell expr 60 \* $(MINUTES))
+
+.PHONY: install demo test test-fast lint fuzz-files fuzz-shapes sanitize sanitize-address sanitize-thread format clean
 
 install: $(VENV)/installed
 
@@ -39,10 +49,27 @@ test: lint
 test-fast: $(VENV)/test-extras
 	$(BIN)/pytest -m 'not slow'
 
-# MINUTES of damaged files of every format, made from the real meshes in MESHES; SEED for other ones.
-MINUTES ?= 10
-SEED    ?= 0
-MESHES  ?= ../shared/meshes
+# Nightly: the native tests and a cross-section of $$RLACD_MESHES, decomposed in every way, watched by sanitizers.
+sanitize: sanitize-address sanitize-thread
+
+sanitize-address sanitize-thread: sanitize-%: build/sanitize-%/installed
+	$(PYTHON) sanitizers/run.py $* tests
+	$(PYTHON) sanitizers/run.py $* meshes
+
+build/sanitize-%/installed: $(NATIVE_SOURCES)
+	test -x build/sanitize-$*/bin/python || $(PYTHON) -m venv build/sanitize-$*
+	build/sanitize-$*/bin/pip install --quiet --constraint constraints-dev.txt \
+	  scikit-build-core nanobind cmake ninja pytest hypothesis point-cloud-utils
+	build/sanitize-$*/bin/pip install --quiet --constraint constraints-dev.txt --no-build-isolation --editable . \
+	  --config-settings=build-dir=build/sanitize-$*/native --config-settings=cmake.build-type=RelWithDebInfo \
+	  --config-settings=cmake.define.RLACD_SANITIZE=$(SANITIZE_$*)
+	touch $@
+
+# Random shapes under random options.
+fuzz-shapes: $(VENV)/installed
+	$(BIN)/python -m fuzz.shapes --seconds $(SECONDS_TO_FUZZ)
+
+# Damaged files of every format.
 fuzz-files: $(VENV)/test-extras
 	$(BIN)/python benchmarks/fuzz_files.py $(MESHES) --minutes $(MINUTES) --seed $(SEED)
 

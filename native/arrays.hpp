@@ -42,10 +42,16 @@ inline Mesh to_mesh(const PointsIn& vertices, const FacesIn& faces) {
   return mesh;
 }
 
+// Beyond this, squares of distances overflow: no triangle would be the nearest.
+constexpr double kFarthest = 1e150;
+
 inline void require_finite(const std::vector<Vec3>& points) {
   for (const Vec3 p : points)
-    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
-      throw std::invalid_argument("a point is not finite");
+    for (const double x : {p.x, p.y, p.z}) {
+      if (!std::isfinite(x)) throw std::invalid_argument("a point is not finite");
+      if (std::fabs(x) > kFarthest)
+        throw std::invalid_argument("a point lies beyond 1e150, where distances have no value");
+    }
 }
 
 // As to_mesh, for kernels that compare distances: a NaN would compare false with everything and go unnoticed.

@@ -62,8 +62,9 @@ inline double best_mixture(const std::array<double, 3>& a, const std::array<doub
   for (int j = 0; j < 3; ++j) {
     const int k = j == 2 ? 0 : j + 1;
     const double slope = (a[j] - b[j]) - (a[k] - b[k]);
+    if (slope == 0) continue;  // the lines are parallel
     const double l = (b[k] - b[j]) / slope;
-    if (!(l > 0 && l < 1)) continue;  // also when the lines are parallel
+    if (!(l > 0 && l < 1)) continue;
     double worst = 0;
     for (int i = 0; i < 3; ++i) worst = std::max(worst, l * a[i] + (1 - l) * b[i]);
     best = std::min(best, worst);

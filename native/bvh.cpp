@@ -45,7 +45,9 @@ Items split(Items first, Items last, int depth) {
   for (Items item = first; item != last; ++item) centres.extend(item->centre);
   const Vec3 extent = centres.upper - centres.lower;
   const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
-  if (depth >= kDeepestHeuristicSplit || !(extent[axis] > 0)) return halve(first, last, axis);
+  // Beside numbers smaller than these or beyond the largest, the scale would overflow or vanish.
+  const bool is_told_apart = extent[axis] > 0x1p-1000 && extent[axis] <= std::numeric_limits<double>::max();
+  if (depth >= kDeepestHeuristicSplit || !is_told_apart) return halve(first, last, axis);
 
   const double scale = kBins / extent[axis], origin = centres.lower[axis];
   const auto bin_of = [=](const Item& item) {

@@ -1,0 +1,236 @@
+"""What has to hold of hulls, judged without the kernels that made them.
+
+Distances are sampled from below or taken over all triangles, hulls are checked in rational arithmetic or by Qhull,
+solids are manifold3d's. Lengths are in the frame where the longest side is 2. Each judge returns sentences, none when
+all is well.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import manifold3d
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage
+from scipy.spatial import cKDTree
+
+from fuzz.geometry import Floats, Ints, Polytope, distance_to_triangles, distance_to_union, sampled, why_not_convex
+from fuzz.recipes import Shape
+from rlacd import PRESETS, NavigableSpace
+
+HONEST_WITHIN = 5e-3
+"""What hulls may miss of the input, or reach beyond the threshold, without a word in the report."""
+
+ROUNDING = 1e-5
+
+SAMPLES = 400
+
+THIN = 1e-3
+
+MANY_FACES = 20_000
+"""Unions with more faces are not judged by trying all of them."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """An input, what was asked of it, and what came out.
+
+    Attributes
+    ----------
+    shape : Shape
+    options : dict
+    hulls : list of (vertices [V, 3], faces [F, 3])
+        In the input's unit, as they were read from the file.
+    report : dict
+        Parts, hausdorff, warnings, complete, and what the criterion says.
+    """
+
+    shape: Shape
+    options: dict[str, Any]
+    hulls: list[tuple[Floats, Ints]]
+    report: dict[str, Any]
+
+    @property
+    def warned(self) -> str:
+        return " ".join(self.report["warnings"])
+
+
+def finite_faces(shape: Shape) -> Ints:
+    """The faces all of whose corners are finite."""
+    finite: npt.NDArray[np.bool_] = np.asarray(np.isfinite(shape.vertices).all(axis=1))
+    return shape.faces[finite[shape.faces].all(axis=1)]
+
+
+def judge(case: Case) -> list[str]:
+    """Ask all judges."""
+    found = [f"hull {i}: {why}" for i, hull in enumerate(case.hulls) if (why := why_not_convex(*hull))]
+    found += limits(case)
+    faces = finite_faces(case.shape)
+    used = case.shape.vertices[np.unique(faces)]
+    lower, upper = used.min(axis=0), used.max(axis=0)
+    size = float((upper - lower).max()) / 2
+    if size == 0 or found:
+        return found
+    center = lower / 2 + upper / 2
+    where = np.zeros_like(case.shape.vertices)
+    where[np.unique(faces)] = (used - center) / size
+    corners = where[faces]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    faces = faces[area > 0]
+    hulls = [Polytope((vertices - center) / size, hull_faces) for vertices, hull_faces in case.hulls]
+    random = np.random.default_rng(0)
+    if len(faces):
+        found += coverage(case, where, faces, hulls, random)
+        found += overhang(case, where, faces, hulls, random)
+    if case.shape.is_closed:
+        solid = filled_solid(where, faces)
+        if solid is not None:
+            found += concavity(case, solid, hulls, random)
+            found += free_space(case, solid, hulls, random)
+    return found
+
+
+def limits(case: Case) -> list[str]:
+    found = []
+    preset = PRESETS.get(case.options.get("preset", ""))
+    for index, (name, what) in enumerate((("max_vertices", "vertices"), ("max_faces", "faces"))):
+        limit = case.options.get(name, getattr(preset, name, None))
+        most = max(len(hull[index]) for hull in case.hulls)
+        if limit is not None and most > limit:
+            found.append(f"a hull has {most} {what}, not {limit}")
+    most_hulls = case.options.get("max_hulls")
+    if most_hulls is not None and len(case.hulls) > most_hulls and case.report["complete"]:
+        found.append(f"{len(case.hulls)} hulls, not {most_hulls}; said: {case.warned!r}")
+    if len(case.hulls) != case.report["parts"] or not case.hulls:
+        found.append(f"{len(case.hulls)} hulls in the file, {case.report['parts']} in the report")
+    return found
+
+
+def coverage(case: Case, where: Floats, faces: Ints, hulls: list[Polytope], random: np.random.Generator) -> list[str]:
+    """Every point of the input lies in a hull, or as near as the report says, and says in words if that is far."""
+    missed = float(distance_to_union(sampled(where, faces, SAMPLES, random), hulls).max())
+    said = case.report["hausdorff"]["under"]
+    found = []
+    if said is not None and missed > said + ROUNDING:
+        found.append(f"the input leads {missed:.6g} out of the hulls, the report says {said:.6g}")
+    if missed > HONEST_WITHIN + ROUNDING and "from the hulls" not in case.warned:
+        found.append(f"the input leads {missed:.6g} out of the hulls, and no word of it")
+    return found
+
+
+def overhang(case: Case, where: Floats, faces: Ints, hulls: list[Polytope], random: np.random.Generator) -> list[str]:
+    """No point of the hulls' outside is farther from the input than the report says, or than the threshold says."""
+    if len(faces) > MANY_FACES:
+        return []
+    reached = 0.0
+    for hull in hulls:
+        points = sampled(hull.vertices, hull.faces, 60, random)
+        for other in hulls:
+            if other is not hull and len(points):
+                points = points[other.height(points) > 1e-5]
+        if len(points):
+            reached = max(reached, float(distance_to_triangles(points, where[faces]).max()))
+    said = case.report["hausdorff"]["over"]
+    found = []
+    if said is not None and reached > said + 2 * ROUNDING:
+        found.append(f"the hulls reach {reached:.6g} beyond the input, the report says {said:.6g}")
+    allowed = case.options.get("threshold", math.inf) + HONEST_WITHIN + ROUNDING
+    if reached > allowed and not any(word in case.warned for word in ("exceed", "beyond the input", "Incomplete")):
+        found.append(f"the hulls reach {reached:.6g} beyond the input, and no word of it")
+    return found
+
+
+def filled_solid(where: Floats, faces: Ints) -> manifold3d.Manifold | None:
+    """The closed input as a solid without cavities; None where manifold3d does not take it for one."""
+    solid = manifold3d.Manifold(manifold3d.Mesh64(np.ascontiguousarray(where), faces.astype(np.uint64)))
+    pieces = solid.decompose()
+    if any(abs(piece.volume()) < THIN * piece.surface_area() for piece in pieces):
+        return None  # repair makes slabs of sheets
+    outer = [piece for piece in pieces if piece.volume() > 0]
+    return manifold3d.Manifold.batch_boolean(outer, manifold3d.OpType.Add) if outer else None
+
+
+def triangles_of(solid: manifold3d.Manifold) -> tuple[Floats, Ints]:
+    mesh = solid.to_mesh64()
+    return np.array(mesh.vert_properties[:, :3], dtype=np.float64), np.array(mesh.tri_verts, dtype=np.int64)
+
+
+def concavity(case: Case, solid: manifold3d.Manifold, hulls: list[Polytope], random: np.random.Generator) -> list[str]:
+    """What the solid fills of each hull shows how concave its part is at least.
+
+    The part lies in the hull's share of the solid, so the share leaves no more of the hull empty than the part does,
+    and no point of the hull's surface is farther from it.
+    """
+    told = case.report.get("concavity")
+    if told is None:
+        return []
+    found = []
+    threshold = case.options["threshold"]
+    if told > threshold * (1 + 1e-9) and "exceed" not in case.warned:
+        found.append(f"the concavity is {told:.6g}, more than {threshold:g}, and no word of it")
+    if "finite" in " ".join(case.shape.steps):
+        return found
+    for i, hull in enumerate(hulls):
+        body = manifold3d.Manifold(manifold3d.Mesh64(hull.vertices, hull.faces.astype(np.uint64)))
+        share = solid ^ body
+        if body.is_empty() or share.is_empty():
+            continue  # thinner than booleans can tell
+        radius = math.pow(max(0.0, 3 * (body.volume() - share.volume()) / (4 * math.pi)), 1 / 3)
+        vertices, faces = triangles_of(share)
+        depth = float(distance_to_triangles(sampled(hull.vertices, hull.faces, 60, random), vertices[faces]).max())
+        least = max(0.3 * radius, depth)
+        if least > told + 1e-3:
+            found.append(f"hull {i} is {least:.6g} concave, the report says {told:.6g} at most")
+    return found
+
+
+def free_space(case: Case, solid: manifold3d.Manifold, hulls: list[Polytope], random: np.random.Generator) -> list[str]:
+    """No hull leads far into a place that a ball can certainly get to.
+
+    Certain are the cells of a grid so far from the surface that the ball, with the tolerance around it, fits everywhere
+    in them and on the straight way to their neighbours, and that are joined to the outside by such cells.
+    """
+    space = case.options.get("criterion")
+    if not isinstance(space, NavigableSpace) or space.closed_planes or not case.report["complete"]:
+        return []
+    if any(word in case.warned for word in ("gave way", "reach into", "is small", "asked for", "larger than")):
+        return []
+    assert space.radius is not None
+    assert space.tolerance is not None
+    radius, tolerance = 2 * space.radius, 2 * space.tolerance
+    if radius >= 2 or "max_hulls" in case.options:
+        return []
+    vertices, faces = triangles_of(solid)
+    pitch = max(radius / 3, (2 + 4 * radius) / 48)
+    spacing = pitch / 3
+    tree = cKDTree(_dense(vertices, faces, spacing))
+    lower, upper = vertices.min(axis=0) - 2 * radius - pitch, vertices.max(axis=0) + 2 * radius + pitch
+    axes = [np.arange(a, b + pitch, pitch) for a, b in zip(lower, upper, strict=True)]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    clearance = np.asarray(tree.query(grid.reshape(-1, 3))[0]).reshape(grid.shape[:3]) - spacing
+    labels, _ = ndimage.label(clearance >= radius + tolerance + pitch)
+    outside = labels == labels[0, 0, 0]
+    if labels[0, 0, 0] == 0:
+        return []
+    reached = grid[outside]
+    reached = reached[random.permutation(len(reached))[:2000]]
+    depth = radius - distance_to_union(reached, hulls)
+    worst = float(depth.max())
+    # Between the balls a hull can reach a third of their radius unseen.
+    return [f"a hull reaches {worst:.6g} into a ball of {radius:g}"] if worst > 0.4 * radius + pitch else []
+
+
+def _dense(vertices: Floats, faces: Ints, spacing: float) -> Floats:
+    """Points such that none of the triangles is farther than `spacing` from one of them."""
+    points = [vertices]
+    for a, b, c in vertices[faces]:
+        longest = max(np.linalg.norm(b - a), np.linalg.norm(c - b), np.linalg.norm(a - c))
+        steps = max(1, int(np.ceil(longest / spacing)))
+        i, j = np.meshgrid(np.arange(steps + 1), np.arange(steps + 1), indexing="ij")
+        kept = i + j <= steps
+        s, t = i[kept] / steps, j[kept] / steps
+        points.append(a + s[:, None] * (b - a) + t[:, None] * (c - a))
+    return np.concatenate(points)

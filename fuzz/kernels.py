@@ -1,0 +1,210 @@
+"""Hand random shapes straight to the kernels, compare with brute force, and with themselves on other threads.
+
+    python -m fuzz.kernels --seconds 600
+    python -m fuzz.kernels --again 4711
+
+No repair stands between the shapes and the kernels: flat, doubled, crossing, needles and all. A decomposition takes
+seconds, this milliseconds, so it is what a sanitized build has most time for.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from fuzz.geometry import Floats, Polytope, distance_to_triangles, distance_to_union, sampled, why_not_convex
+from fuzz.judges import finite_faces
+from fuzz.recipes import make_shape
+from rlacd import _native
+from rlacd.solid.frame import Frame
+from rlacd.solid.hull import Hull
+
+Soup = tuple[Floats, Any]
+
+ROUNDING = 1e-7
+"""What a kernel may be off beside coordinates up to 1: its comments promise 1e-8."""
+
+TOLERANCE = 2e-3
+
+
+def soup(seed: int) -> Soup:
+    """The faces of a seed's shape in the frame, int32."""
+    shape = make_shape(seed)
+    faces = finite_faces(shape)
+    used, corner = np.unique(faces, return_inverse=True)
+    vertices = Frame.of(shape.vertices[used]).to_frame(shape.vertices[used])
+    return vertices, np.ascontiguousarray(corner.reshape(-1, 3), dtype=np.int32)
+
+
+def same(call: Callable[[int], Any]) -> Any:
+    """What a call gives on one thread; it has to give the same bits on four."""
+    one, four = call(1), call(4)
+    for a, b in zip(*((x if isinstance(x, tuple) else (x,)) for x in (one, four)), strict=True):
+        assert np.asarray(a).tobytes() == np.asarray(b).tobytes(), "other bits on other threads"
+    return one
+
+
+def hull_of(mesh: Soup, random: np.random.Generator) -> Hull | None:
+    """The convex hull, which nothing may stick out of, and its simplification, which holds it."""
+    points = mesh[0]
+    indices, faces, rank = _native.convex_hull(points)
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False) if len(points) > 1 else np.zeros(3)
+    assert rank == 3 or len(spread) < 3 or spread[rank] < 1e-6 * spread[0] + 1e-300, f"rank {rank}, spread {spread}"
+    if rank < 3:
+        return None
+    vertices = points[indices]
+    assert not (why := why_not_convex(vertices, faces)), why
+    outer = Polytope(vertices, faces.astype(np.int64))
+    assert outer.height(points).max() <= ROUNDING, "a point is not in the hull"
+    hull = Hull(vertices, faces, _native.mesh_volume(vertices, faces))
+    limit = int(random.integers(4, 40))
+    try:
+        fewer, few_faces = _native.simplify_hull(vertices, faces, limit, 2**31 - 1)
+    except ValueError as error:
+        if "flat" not in str(error):
+            raise
+        return hull
+    assert len(fewer) <= max(4, limit), f"{len(fewer)} corners, not {limit}"
+    assert not (why := why_not_convex(fewer, few_faces)), f"simplified: {why}"
+    assert Polytope(fewer, few_faces.astype(np.int64)).height(vertices).max() <= ROUNDING, "the limited hull is smaller"
+    return hull
+
+
+def surface_queries(mesh: Soup, other: Soup, random: np.random.Generator) -> _native.Surface:
+    """Closest points, winding numbers and the one-sided Hausdorff distance."""
+    surface = _native.Surface(*mesh)
+    corners = mesh[0][mesh[1]]
+    points = np.concatenate([random.uniform(-2, 2, (20, 3)), sampled(*mesh, 10, random)])
+    distance = same(lambda threads: surface.distance(points, threads))
+    expected = distance_to_triangles(points, corners)
+    assert np.abs(distance - expected).max() <= ROUNDING, f"distances are off by {np.abs(distance - expected).max()}"
+    closest, on = same(lambda threads: surface.closest(points, threads))
+    assert np.abs(np.linalg.norm(points - closest, axis=1) - expected).max() <= ROUNDING, "a closest point is not"
+    each = [distance_to_triangles(p[None], corners[[f]])[0] for p, f in zip(closest, on, strict=True)]
+    assert max(each) <= ROUNDING, "a closest point is not on its face"
+    assert np.isfinite(same(lambda threads: surface.winding(points, 2.0, threads))).all()
+    lower, upper = same(lambda threads: _native.directed_hausdorff(*other, surface, TOLERANCE, threads))
+    reached = float(distance_to_triangles(sampled(*other, 40, random), corners).max())
+    assert reached <= upper + ROUNDING, f"Hausdorff: {reached} > {upper}"
+    assert lower <= upper <= lower + TOLERANCE * 1.001, f"Hausdorff: {lower}, {upper}"
+    return surface
+
+
+def union_queries(hulls: list[Hull], mesh: Soup, surface: _native.Surface, random: np.random.Generator) -> None:
+    """Hulls as one solid, against a surface."""
+    union = _native.HullUnion([hull.vertices for hull in hulls], [hull.faces for hull in hulls], 1)
+    solids = [Polytope(hull.vertices, hull.faces.astype(np.int64)) for hull in hulls]
+    points = np.concatenate([random.uniform(-2, 2, (20, 3)), sampled(*mesh, 20, random)])
+    expected = distance_to_union(points, solids)
+    distance = same(lambda threads: union.distance(points, threads))
+    assert np.abs(distance - expected).max() <= ROUNDING, f"the union is off by {np.abs(distance - expected).max()}"
+    lower, upper = same(lambda threads: union.under(*mesh, TOLERANCE, threads))
+    assert expected[20:].max() <= upper + ROUNDING, f"under: {expected[20:].max()} > {upper}"
+    assert lower <= upper, f"under: {lower}, {upper}"
+    lower, upper = same(lambda threads: union.over(surface, TOLERANCE, 1e-6, threads))
+    for own in solids:
+        on = sampled(own.vertices, own.faces, 20, random)
+        for others in solids:
+            if others is not own and len(on):
+                on = on[others.height(on) > 1e-5]
+        if len(on):
+            reached = float(distance_to_triangles(on, mesh[0][mesh[1]]).max())
+            assert reached <= upper + 2e-5, f"over: {reached} > {upper}"
+    pairs = np.array([[i, j] for i in range(len(hulls)) for j in range(i)], dtype=np.int32).reshape(-1, 2)
+    same(lambda threads: _native.joint_hull_volumes([hull.vertices for hull in hulls], pairs, threads))
+
+
+def part_queries(mesh: Soup, other: Soup, hull: Hull, random: np.random.Generator) -> None:
+    """What a component is asked: planes, sweeps, concavity, gluing. Most soups are no solids; no kernel may mind."""
+    directions = random.normal(size=(6, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    directions[:3] = np.eye(3)
+    offsets = np.ascontiguousarray(np.sort(random.choice([-0.5, 0.0, 0.25, 1.0], (6, 4))))
+    same(lambda threads: _native.sweep(*mesh, np.ascontiguousarray(directions), offsets, threads))
+    same(lambda threads: _native.concave_edges(*mesh, hull.vertices, hull.faces, 4))
+    _native.concave_edge_planes(*mesh, hull.vertices, hull.faces, 4)
+    volume = _native.mesh_volume(*mesh)
+    threshold = float(random.choice([0.01, 0.05, 0.3]))
+    met = _native.meets_concavity(*mesh, hull.vertices, hull.faces, volume, hull.volume, threshold)
+    (lower, upper), *_ = _native.concavity(*mesh, hull.vertices, hull.faces, volume, hull.volume, TOLERANCE)
+    assert lower <= upper, f"concavity: {lower}, {upper}"
+    assert not (met and lower > threshold * (1 + 1e-9)), f"concavity {lower} said to be within {threshold}"
+    reached = distance_to_triangles(sampled(hull.vertices, hull.faces.astype(np.int64), 30, random), mesh[0][mesh[1]])
+    assert reached.max() <= upper + ROUNDING, f"concavity: {reached.max()} > {upper}"
+    _native.glue(*mesh, *other)
+    _native.outward_where_touching(*mesh, *other)
+
+
+def ball_queries(hull: Hull, surface: _native.Surface, random: np.random.Generator) -> None:
+    """Balls around the shape, none of which comes nearer to it than the tolerance."""
+    radius, tolerance = float(random.choice([0.2, 0.5, 1.0])), float(random.choice([0.02, 0.1]))
+    reachable, ground = bool(random.random() < 0.5), np.array([[0, 0, 1, -0.5]])[: int(random.integers(2))]
+    centres, radii = same(
+        lambda threads: _native.navigable_balls(
+            surface, hull.vertices, hull.faces, radius, tolerance, reachable, None, ground, radius / 2, threads
+        )
+    )
+    if len(centres) == 0:
+        return
+    assert (surface.distance(centres) >= radii + 0.9 * tolerance).all(), "a ball is too near"
+    balls = _native.BallSet(centres, radii)
+    touched, depth = balls.intrusions(hull.vertices, hull.faces, None, 1e-9)
+    solid = Polytope(hull.vertices, hull.faces.astype(np.int64))
+    clear = solid.height(centres) > 0
+    expected = radii - np.where(clear, solid.distance(centres), 0)
+    sure = np.flatnonzero(expected > 1e-6)
+    assert np.isin(sure, touched).all(), "an intrusion was missed"
+    own = clear[touched]
+    assert np.abs(depth[own] - expected[touched][own]).max(initial=0) <= ROUNDING, "the depth of an intrusion is off"
+
+
+def try_seed(seed: int) -> None:
+    """Ask everything about one seed's shape; raises AssertionError."""
+    random = np.random.default_rng([seed, 4])
+    mesh, other = soup(seed), soup(seed + 10**6)
+    if len(mesh[1]) == 0 or len(other[1]) == 0:
+        return
+    hulls = [hull for hull in (hull_of(part, random) for part in (mesh, other)) if hull is not None]
+    surface = surface_queries(mesh, other, random)
+    if not hulls:
+        return
+    union_queries(hulls, mesh, surface, random)
+    if len(hulls) == 2:  # the first is the mesh's own
+        part_queries(mesh, other, hulls[0], random)
+        ball_queries(hulls[0], surface, random)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--first", type=int, default=0, help="the first seed")
+    parser.add_argument("--count", type=int, default=10**9, help="how many")
+    parser.add_argument("--seconds", type=float, default=600.0, help="stop after so many")
+    parser.add_argument("--again", type=int, help="repeat one seed, with the place that fails")
+    args = parser.parse_args()
+    if args.again is not None:
+        try_seed(args.again)
+        return
+    until = time.monotonic() + args.seconds
+    tried, wrong = 0, []
+    for seed in range(args.first, args.first + args.count):
+        if time.monotonic() > until:
+            break
+        if seed % 50 == 0:
+            print(f"seed {seed}", flush=True)
+        try:
+            try_seed(seed)
+        except Exception as error:
+            wrong.append(seed)
+            print(f"wrong {seed}: {type(error).__name__}: {error}"[:300], flush=True)
+        tried += 1
+    print(f"{tried} shapes, {len(wrong)} wrong: {wrong}")
+    sys.exit(bool(wrong))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,155 @@
+"""The judges of the geometric fuzzer see what is wrong, and nothing where all is well."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from trimesh import creation
+
+import rlacd
+from fuzz.choices import draw_options
+from fuzz.files import read_hulls, write_mesh
+from fuzz.geometry import Polytope, distance_to_triangles, distance_to_union, why_not_convex
+from fuzz.judges import Case, judge
+from fuzz.kernels import try_seed
+from fuzz.recipes import Shape, make_shape
+from fuzz.shapes import Here, run_seed
+from rlacd.fleet.worker import Limits, Worker
+from rlacd.options import Options
+from tests.shapes import Closed, box, from_manifold, point_to_triangles
+
+ELL = from_manifold(box((0, 0, 0), (4, 1, 1)) + box((0, 0, 0), (1, 1, 4)))
+
+
+def case(solid: Closed = ELL, **options: Any) -> Case:
+    options = {"quality": "fast", **({} if "criterion" in options else {"threshold": 0.05}), **options}
+    result = rlacd.decompose((solid.vertices, solid.faces), **options)
+    report = dict(result.report)
+    report["concavity"] = report["concavity"]["max"] if "concavity" in report else None
+    hulls = [(np.array(hull.vertices), np.array(hull.faces)) for hull in result]
+    return Case(Shape(solid.vertices, solid.faces, (), True), options, hulls, report)
+
+
+def test_good_hulls_pass() -> None:
+    assert judge(case()) == []
+    assert judge(case(criterion=rlacd.NavigableSpace(0.05, 0.02))) == []
+
+
+def test_a_missing_hull_is_seen() -> None:
+    good = case()
+    assert len(good.hulls) == 2
+    less = replace(good, hulls=good.hulls[:1], report={**good.report, "parts": 1})
+    assert any("out of the hulls" in word for word in judge(less))
+
+
+def test_hulls_larger_than_promised_are_seen() -> None:
+    good = case()
+    whole = case(threshold=1.5)
+    assert len(whole.hulls) == 1
+    assert judge(whole) == []
+    found = judge(replace(whole, options=good.options, report={**good.report, "parts": 1}))
+    assert any("beyond the input" in word for word in found)
+    assert any("concave" in word for word in found)
+
+
+def test_a_concavity_above_the_threshold_has_to_be_said() -> None:
+    whole = case(threshold=1.5)
+    found = judge(replace(whole, options={"threshold": 0.05}))
+    assert any("more than 0.05, and no word of it" in word for word in found)
+
+
+def test_a_hull_in_the_way_of_a_ball_is_seen() -> None:
+    space = rlacd.NavigableSpace(0.05, 0.02)
+    whole = case(threshold=1.5)
+    found = judge(replace(whole, options={"criterion": space}, report={**whole.report, "concavity": None}))
+    assert any("into a ball" in word for word in found)
+
+
+@pytest.mark.parametrize("limit", [{"max_vertices": 7}, {"max_faces": 11}, {"max_hulls": 1}])
+def test_a_broken_limit_is_seen(limit: dict[str, int]) -> None:
+    good = case()
+    assert judge(replace(good, options={**good.options, **limit}))
+
+
+def test_what_is_wrong_with_a_hull_is_told() -> None:
+    cube = creation.box()
+    vertices, faces = np.array(cube.vertices), np.array(cube.faces)
+    assert why_not_convex(vertices, faces) is None
+    assert why_not_convex(vertices, faces[:, ::-1]) == "a vertex lies above a face"
+    assert why_not_convex(vertices, faces[1:]) == "an edge has no twin"
+    assert why_not_convex(vertices * [1, 1, 0], faces) is not None
+    dented = vertices.copy()
+    dented[0] *= 1 - 1e-15
+    assert why_not_convex(dented, faces) is not None
+    ball = creation.icosphere(3)
+    assert why_not_convex(np.array(ball.vertices), np.array(ball.faces)) is None
+    pushed = np.array(ball.vertices)
+    pushed[0] *= 0.9
+    assert why_not_convex(pushed, np.array(ball.faces)) is not None
+
+
+def test_distances_are_those_of_the_brute_force_reference() -> None:
+    random = np.random.default_rng(3)
+    points = 2 * random.normal(size=(200, 3))
+    expected = point_to_triangles(points, ELL.vertices, ELL.faces)
+    np.testing.assert_allclose(distance_to_triangles(points, ELL.vertices[ELL.faces]), expected, atol=1e-12)
+    hulls = [Polytope(part.vertices, part.faces.astype(np.int64)) for part in (Closed(*cube) for cube in _cubes())]
+    inside = (hulls[0].height(points) <= 0) | (hulls[1].height(points) <= 0)
+    union = np.minimum(*(point_to_triangles(points, hull.vertices, hull.faces) for hull in hulls))
+    np.testing.assert_allclose(distance_to_union(points, hulls), np.where(inside, 0, union), atol=1e-12)
+
+
+def _cubes() -> list[tuple[Any, Any]]:
+    return [
+        (solid.vertices, solid.faces)
+        for solid in map(from_manifold, (box((0, 0, 0), (1, 1, 1)), box((1, 0, 0), (3, 1, 1))))
+    ]
+
+
+@pytest.mark.parametrize("ending", ["obj", "ply"])
+def test_files_keep_every_bit(ending: str, tmp_path: Path) -> None:
+    shape = make_shape(12)
+    mesh = write_mesh(tmp_path / "in.ply", shape.vertices, shape.faces)
+    result = rlacd.decompose(mesh, threshold=0.5, quality="fast")
+    hulls = read_hulls(result.save(tmp_path / f"out.{ending}").read_bytes(), ending)
+    for (vertices, faces), hull in zip(hulls, result, strict=True):
+        np.testing.assert_array_equal(vertices, hull.vertices)
+        np.testing.assert_array_equal(faces, hull.faces)
+    np.testing.assert_array_equal(result.source.vertices, shape.vertices)
+
+
+def test_a_seed_is_the_same_shape_and_options_every_time() -> None:
+    for seed in range(40):
+        one, two = make_shape(seed), make_shape(seed)
+        assert one.steps == two.steps
+        assert one.vertices.tobytes() == two.vertices.tobytes()
+        assert one.faces.tobytes() == two.faces.tobytes()
+        assert draw_options(seed) == draw_options(seed)
+        Options(**draw_options(seed))
+
+
+@pytest.mark.parametrize("seed", [*range(8), 1047])
+def test_kernels_agree_with_brute_force_on_any_soup(seed: int) -> None:
+    try_seed(seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3, 10))
+def test_whole_decompositions_pass_the_judges(seed: int, tmp_path: Path) -> None:
+    row = run_seed(seed, Here(), tmp_path)
+    assert row.status in ("done", "refused"), row.said
+
+
+@pytest.mark.slow
+def test_a_worker_that_hangs_is_a_hang(tmp_path: Path) -> None:
+    worker = Worker(Limits(seconds=600))
+    try:
+        assert run_seed(5, worker, tmp_path).status == "done"
+        worker.limits = Limits(seconds=1e-3)
+        assert run_seed(5, worker, tmp_path).status == "hang"
+    finally:
+        worker.close()
