@@ -21,6 +21,7 @@ from typer.testing import CliRunner
 from rlacd.cli import app
 from rlacd.errors import MissingExtraError, OptionError, TrainingError
 from rlacd.learn.options import PRESETS, TrainOptions
+from rlacd.pool import LocalPool, Pool
 from tests.learning import write_meshes
 
 TINY: dict[str, Any] = {
@@ -45,7 +46,9 @@ def meshes(tmp_path: Path) -> Path:
     return write_meshes(tmp_path / "meshes")
 
 
-def run(meshes: Path, folder: Path, resume: bool = False, export: bool = False, **changes: Any) -> Path:
+def run(
+    meshes: Path, folder: Path, resume: bool = False, export: bool = False, pool: Pool | None = None, **changes: Any
+) -> Path:
     """Train; exporting takes longer than all the rest and has tests of its own."""
     pytest.importorskip("torch", reason="needs the extra train")
     from rlacd.learn import train as module
@@ -54,7 +57,7 @@ def run(meshes: Path, folder: Path, resume: bool = False, export: bool = False, 
     with contextlib.ExitStack() as stack:
         if not export:
             stack.enter_context(mock.patch.object(module, "export_policy"))
-        return module.train(meshes, folder, options, resume=resume, say=lambda line: None)
+        return module.train(meshes, folder, options, resume=resume, say=lambda line: None, pool=pool)
 
 
 def weights(folder: Path) -> bytes:
@@ -96,7 +99,6 @@ def test_presets_are_valid_and_the_papers_is_the_papers() -> None:
         ("discount", "both"),
         ("rotate", 1),
         ("seed", -1),
-        ("workers", 5),
     ],
 )
 def test_options_out_of_range_are_said(name: str, value: Any) -> None:
@@ -156,7 +158,7 @@ def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, tmp_path:
 def test_a_killed_run_resumes_exactly(meshes: Path, tmp_path: Path) -> None:
     whole, killed = tmp_path / "whole", tmp_path / "killed"
     run(meshes, whole, iterations=400)
-    given = [f"--{k.replace('_', '-')}={v}" for k, v in {**TINY, "iterations": 400, "workers": 2}.items()]
+    given = [f"--{k.replace('_', '-')}={v}" for k, v in {**TINY, "iterations": 400, "jobs": 2}.items()]
     command = [sys.executable, "-c", "from rlacd.cli import main; main()", "train", str(meshes), "--run", str(killed)]
     command += ["--preset", "paper", "--encoder", "profile"]  # the defaults of TrainOptions
     process = subprocess.Popen([*command, *given], stdout=subprocess.DEVNULL)
@@ -171,27 +173,13 @@ def test_a_killed_run_resumes_exactly(meshes: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_worker_processes_change_nothing(meshes: Path, tmp_path: Path) -> None:
-    run(meshes, tmp_path / "alone")
-    run(meshes, tmp_path / "spread", workers=2)
+@pytest.mark.parametrize("jobs", [1, 3])
+def test_where_episodes_are_played_changes_nothing(meshes: Path, tmp_path: Path, jobs: int) -> None:
+    changes = {"environments": 4}
+    run(meshes, tmp_path / "alone", **changes)
+    with LocalPool(jobs) as pool:
+        run(meshes, tmp_path / "spread", pool=pool, **changes)
     assert_same_run(tmp_path / "alone", tmp_path / "spread")
-
-
-@pytest.mark.slow
-def test_a_worker_that_dies_is_one_clear_error(meshes: Path, tmp_path: Path) -> None:
-    pytest.importorskip("torch", reason="needs the extra train")
-    from rlacd.learn.actors import ActorSetting, ProcessActors
-
-    options = TrainOptions(**{**TINY, "workers": 2})
-    actors = ProcessActors(ActorSetting(meshes, tmp_path / "cache", ("angle.ply", "cross.ply"), options))
-    try:
-        actors.start()
-        actors._processes[1].kill()
-        actors._processes[1].join()
-        with pytest.raises(TrainingError, match=r"a worker process died.*--resume"):
-            actors.step([(0, 12), (0, 12)])
-    finally:
-        actors.close()
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from rlacd.fleet.course import Course, Outcome, Task, course
 from rlacd.fleet.work import Work
@@ -51,7 +51,8 @@ class Engine:
                 self._begin(tasks)
                 if not (self._asked or self._writing or self._begin_last()):
                     return
-                wait({*self._asked, *self._writing}, LOOK, FIRST_COMPLETED)
+                going_on: list[Future[Any]] = [*self._asked, *self._writing]
+                wait(going_on, LOOK, FIRST_COMPLETED)
                 for written in [future for future in self._writing if future.done()]:
                     yield self._writing.pop(written), written.result()
                 for asked in [future for future in self._asked if future.done()]:

@@ -1,6 +1,7 @@
 """Checkpoints: a folder that holds all of a run's state, replaced as a whole, read without pickle.
 
-``weights.safetensors`` holds the networks and Adam's moments, ``replay.npz`` the buffer, ``state.json`` the rest.
+``weights.safetensors`` holds the networks and Adam's moments, ``replay.npz`` the buffer, ``rollouts.npz`` the episodes
+that are not learned from yet, ``state.json`` the rest.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ import json
 import os
 import shutil
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from torch import Tensor
 
 from rlacd.errors import OutputError, TrainingError
 
-FORMAT = 1
+FORMAT = 2
 
 
 @dataclass(frozen=True)
@@ -35,11 +36,13 @@ class Checkpoint:
     replay : dict of ndarray
     state : dict
         Plain JSON values.
+    rollouts : dict of ndarray
     """
 
     weights: Mapping[str, Tensor]
     replay: Mapping[str, NDArray[Any]]
     state: Mapping[str, Any]
+    rollouts: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
 
 def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
@@ -59,6 +62,7 @@ def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
             fresh / "weights.safetensors",
         )
         np.savez(fresh / "replay.npz", allow_pickle=False, **checkpoint.replay)
+        np.savez(fresh / "rollouts.npz", allow_pickle=False, **checkpoint.rollouts)
         (fresh / "state.json").write_text(json.dumps({"format": FORMAT, **checkpoint.state}))
         for path in fresh.iterdir():
             with open(path, "rb") as file:
@@ -89,15 +93,19 @@ def load_checkpoint(folder: Path) -> Checkpoint | None:
     try:
         state = json.loads((folder / "state.json").read_text())
         weights = load_file(folder / "weights.safetensors")
-        with np.load(folder / "replay.npz", allow_pickle=False) as arrays:
-            replay = {name: arrays[name] for name in arrays.files}
         if state["format"] != FORMAT:
             raise TrainingError(f"{folder} has format {state['format']}, not {FORMAT}; train again from the beginning.")
+        replay, rollouts = (_arrays(folder / name) for name in ("replay.npz", "rollouts.npz"))
     except (OSError, ValueError, KeyError, SafetensorError) as error:
         if isinstance(error, TrainingError):
             raise
         raise TrainingError(f"the checkpoint {folder} is damaged ({error}); remove it to train again.") from error
-    return Checkpoint(weights, replay, state)
+    return Checkpoint(weights, replay, state, rollouts)
+
+
+def _arrays(path: Path) -> dict[str, NDArray[Any]]:
+    with np.load(path, allow_pickle=False) as arrays:
+        return dict(arrays)
 
 
 def adam_state(optimizer: torch.optim.Adam) -> dict[str, Tensor]:
