@@ -12,7 +12,7 @@ import numpy as np
 from manifold3d import Manifold, Mesh64
 from numpy.typing import NDArray
 
-from rlacd.errors import RlacdError, TrainingError
+from rlacd.errors import MeshFileError, RlacdError, TrainingError
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component
 from rlacd.solid.files import mesh_files
@@ -72,6 +72,9 @@ def list_meshes(folder: Path, max_faces: int, validation: int, seed: int) -> Mes
     return MeshList(tuple(sorted(shuffled[validation:])), tuple(sorted(shuffled[:validation])), unreadable, too_large)
 
 
+NOTHING = np.empty((0, 3)), np.empty((0, 3), dtype=np.uint64)
+"""Vertices and faces of what could not be repaired."""
+
 SOLID = "solid.npz"
 """Name of a repaired solid among the files of a request and of its answer."""
 
@@ -82,7 +85,7 @@ def repaired(path: Path) -> bytes:
         solid = repair(load_mesh(path), threads=1).manifold
         Component(solid)
     except (RlacdError, ValueError):  # flat or empty: nothing to cut
-        return _packed(np.empty((0, 3)), np.empty((0, 3), dtype=np.uint64))
+        return _packed(*NOTHING)
     mesh = solid.to_mesh64()
     return _packed(np.asarray(mesh.vert_properties[:, :3]), np.asarray(mesh.tri_verts, dtype=np.uint64))
 
@@ -119,19 +122,26 @@ class Solids:
 
     def get(self, name: str, axis: int = 0, degrees: float = 0.0) -> Component | None:
         """Get a solid turned about a coordinate axis, in its frame; None when it cannot be repaired."""
+        solid = self.manifold(name)
+        return None if solid is None else turned(solid, axis, degrees)
+
+    def manifold(self, name: str) -> Manifold | None:
+        """Get a solid as it is in its file; None when it cannot be repaired."""
         if name not in self._held:
             kept = self._kept(name)
             if kept is None:
                 kept = repaired(self._folder / name)
                 self.keep(name, kept)
             self._held[name] = unpack_solid(kept)
-        solid = self._held[name]
-        return None if solid is None else turned(solid, axis, degrees)
+        return self._held[name]
 
     def files(self, name: str) -> dict[str, bytes]:
         """Get what another machine makes the solid of: the solid itself (`SOLID`), or the files of the mesh."""
         kept = self._kept(name)
-        return mesh_files(self._folder / name) if kept is None else {SOLID: kept}
+        try:
+            return mesh_files(self._folder / name) if kept is None else {SOLID: kept}
+        except MeshFileError:
+            return {SOLID: _packed(*NOTHING)}
 
     def keep(self, name: str, packed: bytes) -> None:
         """Put what `repaired` gave into the cache."""

@@ -19,13 +19,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rlacd.errors import MeshFileError, TrainingError
+from rlacd.errors import TrainingError
 from rlacd.learn.episodes import TRIES, Start, draw_start, nothing_to_cut
 from rlacd.learn.meshes import SOLID, Solids
 from rlacd.learn.options import TrainOptions
 from rlacd.learn.record import Record
 from rlacd.learn.rollout_server import SERVER
-from rlacd.pool import Answer, Limits, Pool, Request, Shared, WorkerDiedError
+from rlacd.pool import Answer, Limits, Pool, Request, Shared, WorkerDiedError, submit_twice
 
 LOST = 10
 """So many episodes in a row that no process could play, and it is not the meshes' fault."""
@@ -103,9 +103,6 @@ class Rollouts:
         RlacdError
             What went wrong with all of them: no GPU where one is asked for, ...
         """
-        for episode in self._ahead:
-            if isinstance(episode, _Episode):
-                episode.play_again_if_lost()
         record = self._record(self._ahead.popleft())
         self._in_vain = 0 if record.cuts else self._in_vain + 1
         self._lost = self._lost + 1 if record.how == "lost" else 0
@@ -133,7 +130,7 @@ class Rollouts:
         fields = [field.name for field in dataclasses.fields(Record)]
         self._ahead = deque(Record.of({name: arrays[f"{i}.{name}"] for name in fields}) for i in range(ahead))
 
-    def _episode(self, number: int, acting: Acting) -> _Episode | Record:
+    def _episode(self, number: int, acting: Acting) -> _Episode:
         options = self._options
         start = draw_start(self._names, options.rotate, np.random.default_rng([options.seed, MESH, number]))
         values = {
@@ -143,17 +140,14 @@ class Rollouts:
             "seed": [options.seed, ACT, number],
         }
         shared = {"setting": self._setting} | ({} if acting.network is None else {"network": acting.network})
-        try:
-            files = self._solids.files(start.name)
-        except MeshFileError:
-            return Record.empty("nothing")
-        return _Episode(number, start, Request(SERVER, values, files, shared, self._limits), self._pool)
+        request = Request(SERVER, values, self._solids.files(start.name), shared, self._limits)
+        return _Episode(number, start, submit_twice(self._pool, request))
 
     def _record(self, episode: _Episode | Record) -> Record:
         if isinstance(episode, Record):
             return episode
         try:
-            answer = episode.answer()
+            answer = episode.future.result()
         except WorkerDiedError as died:
             words = (died.last_words.splitlines() or [""])[-1]
             self._say(f"episode {episode.number}, {episode.start.name}, is left out: {died} {words}".rstrip())
@@ -163,23 +157,10 @@ class Rollouts:
         return Record.from_bytes(answer.blobs["record"])
 
 
+@dataclass(frozen=True)
 class _Episode:
-    """An episode that is being played; if its process dies, once more in a new one."""
+    """An episode that is being played."""
 
-    def __init__(self, number: int, start: Start, request: Request, pool: Pool) -> None:
-        self.number, self.start = number, start
-        self._request, self._pool = request, pool
-        self._future: Future[Answer] = pool.submit(request)
-
-    def play_again_if_lost(self) -> None:
-        lost = self._future.done() and isinstance(self._future.exception(), WorkerDiedError)
-        if lost and not self._request.fresh:
-            self._request = dataclasses.replace(self._request, fresh=True)
-            self._future = self._pool.submit(self._request)
-
-    def answer(self) -> Answer:
-        try:
-            return self._future.result()
-        except WorkerDiedError:
-            self.play_again_if_lost()
-            return self._future.result()
+    number: int
+    start: Start
+    future: Future[Answer]

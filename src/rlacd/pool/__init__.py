@@ -1,5 +1,6 @@
 """Watched processes that do one request after another: here, on this machine, or on the machines of a Ray cluster."""
 
+from rlacd.pool.again import answers, submit_twice
 from rlacd.pool.here import HerePool
 from rlacd.pool.local import LocalPool
 from rlacd.pool.open import open_pool
@@ -16,5 +17,7 @@ __all__ = [
     "Request",
     "Shared",
     "WorkerDiedError",
+    "answers",
     "open_pool",
+    "submit_twice",
 ]

@@ -11,7 +11,7 @@ import socket
 import time
 import weakref
 from collections.abc import Mapping
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
 from typing import Any
 
@@ -82,6 +82,7 @@ class RayPool:
                 ) from error
         self._remote = ray.remote(max_retries=LOST, retry_exceptions=False)(_do)
         self._running: set[Any] = set()
+        self._finishing = ThreadPoolExecutor(1)  # what Ray calls back must not call Ray, and a callback of ours may
         self._stored: weakref.WeakKeyDictionary[Shared, Any] = weakref.WeakKeyDictionary()
         self._processors, self._counted = 0.0, -RECOUNT
 
@@ -109,7 +110,7 @@ class RayPool:
         self._running.add(task)
         future: Future[Answer] = Future()
         future.set_running_or_notify_cancel()
-        task.future().add_done_callback(lambda done: self._finish(task, done, future))
+        task.future().add_done_callback(lambda done: self._finishing.submit(self._finish, task, done, future))
         return future
 
     def close(self) -> None:
@@ -117,6 +118,7 @@ class RayPool:
         for task in list(self._running):
             self._ray.cancel(task, force=True)
         self._running.clear()
+        self._finishing.shutdown()
         if self._ours:
             self._ray.shutdown()
 
