@@ -85,9 +85,16 @@ def repaired(path: Path) -> bytes:
         solid = repair(load_mesh(path), threads=1).manifold
         Component(solid)
     except (RlacdError, ValueError):  # flat or empty: nothing to cut
-        return _packed(*NOTHING)
+        return pack_solid(*NOTHING)
     mesh = solid.to_mesh64()
-    return _packed(np.asarray(mesh.vert_properties[:, :3]), np.asarray(mesh.tri_verts, dtype=np.uint64))
+    return pack_solid(np.asarray(mesh.vert_properties[:, :3]), np.asarray(mesh.tri_verts, dtype=np.uint64))
+
+
+def pack_solid(vertices: FloatArray, faces: NDArray[np.uint64]) -> bytes:
+    """Pack a solid for `unpack_solid`."""
+    file = io.BytesIO()
+    np.savez(file, vertices=vertices, faces=faces)
+    return file.getvalue()
 
 
 def unpack_solid(packed: bytes) -> Manifold | None:
@@ -141,7 +148,7 @@ class Solids:
         try:
             return mesh_files(self._folder / name) if kept is None else {SOLID: kept}
         except MeshFileError:
-            return {SOLID: _packed(*NOTHING)}
+            return {SOLID: pack_solid(*NOTHING)}
 
     def keep(self, name: str, packed: bytes) -> None:
         """Put what `repaired` gave into the cache."""
@@ -157,12 +164,6 @@ class Solids:
     def _place(self, name: str) -> Path | None:
         digest = hashlib.sha256(name.encode()).hexdigest()[:24]
         return None if self._cache is None else self._cache / f"{digest}.npz"
-
-
-def _packed(vertices: FloatArray, faces: NDArray[np.uint64]) -> bytes:
-    file = io.BytesIO()
-    np.savez(file, vertices=vertices, faces=faces)
-    return file.getvalue()
 
 
 def _framed(solid: Manifold) -> Manifold:

@@ -6,6 +6,7 @@ requests share lies in the object store once; a machine fetches it for the first
 
 from __future__ import annotations
 
+import contextlib
 import os
 import socket
 import time
@@ -110,7 +111,7 @@ class RayPool:
         self._running.add(task)
         future: Future[Answer] = Future()
         future.set_running_or_notify_cancel()
-        task.future().add_done_callback(lambda done: self._finishing.submit(self._finish, task, done, future))
+        task.future().add_done_callback(lambda done: self._hand_over(task, done, future))
         return future
 
     def close(self) -> None:
@@ -118,7 +119,6 @@ class RayPool:
         for task in list(self._running):
             self._ray.cancel(task, force=True)
         self._running.clear()
-        self._finishing.shutdown()
         if self._ours:
             self._ray.shutdown()
 
@@ -127,6 +127,10 @@ class RayPool:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self.close()
+
+    def _hand_over(self, task: Any, done: Future[Any], future: Future[Answer]) -> None:
+        with contextlib.suppress(RuntimeError):  # the interpreter ends, and nobody waits
+            self._finishing.submit(self._finish, task, done, future)
 
     def _finish(self, task: Any, done: Future[Any], future: Future[Answer]) -> None:
         self._running.discard(task)
