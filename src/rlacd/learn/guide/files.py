@@ -26,7 +26,12 @@ def save_bytes(path: Path, content: bytes) -> None:
     os.replace(part, path)
 
 
+def save_arrays(path: Path, arrays: Mapping[str, NDArray[np.generic]]) -> None:
+    """Write arrays to an .npz file under its final name only when it is complete."""
+    save_bytes(path, packed(arrays))
+
+
 def load_arrays(path: Path) -> dict[str, NDArray[np.generic]]:
-    """Read what `packed` has made."""
+    """Read what `save_arrays` wrote."""
     with np.load(path, allow_pickle=False) as arrays:
         return dict(arrays)

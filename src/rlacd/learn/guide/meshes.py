@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 from manifold3d import Manifold
 
+from rlacd.learn.meshes import Solids
+
 ENDINGS = frozenset({".ply", ".obj", ".stl", ".off", ".glb", ".gltf"})
 
 HELD_OUT = 24
@@ -36,6 +38,11 @@ def shuffled(names: Sequence[str], seed: int) -> list[str]:
     """Put names in an order that depends on the seed only."""
     order = np.random.default_rng(seed).permutation(len(names))
     return [names[i] for i in order]
+
+
+def load_solid(folder: Path, name: str, cache: Path) -> Manifold | None:
+    """Load and repair a mesh, or take it from the cache; None where it cannot be used (that is cached too)."""
+    return small(Solids(folder, cache).manifold(name))
 
 
 def small(solid: Manifold | None) -> Manifold | None:

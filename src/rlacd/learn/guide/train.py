@@ -24,7 +24,7 @@ from rlacd.learn.guide.export import export
 from rlacd.learn.guide.files import save_bytes
 from rlacd.learn.guide.fit import fit, load_labels
 from rlacd.learn.guide.label_server import SERVER
-from rlacd.learn.guide.meshes import is_held_out, mesh_names, shuffled, small
+from rlacd.learn.guide.meshes import is_held_out, load_solid, mesh_names, shuffled
 from rlacd.learn.guide.network import Ensemble
 from rlacd.learn.meshes import SOLID, Solids
 from rlacd.policies import Greedy
@@ -178,8 +178,7 @@ def _deploy_round(
     folder = options.work / f"round{number}"
     if not names or (folder / "deployed.json").exists():
         return
-    known = Solids(options.meshes, options.work / "solids")
-    solids = [s for n in names if (s := small(known.manifold(n))) is not None]
+    solids = [s for n in names if (s := load_solid(options.meshes, n, options.work / "solids")) is not None]
     counts = deploy(Learned(network, options.threshold), solids, options.threshold)
     row: dict[str, Any] = {"raw": sum(c.raw for c in counts), "merged": sum(c.merged for c in counts)}
     for score in ("hull-sum", "excess-norm"):
