@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from rlacd.errors import OptionError
-from rlacd.fleet import Asset, Batch, Limits, LocalEngine, Order
+from rlacd.fleet import Asset, Batch, Order
+from rlacd.pool import Limits, LocalPool
 from tests.test_batch import TIMES, rows
 from tests.trouble import make_trouble, tree, write_ell
 
@@ -18,7 +19,7 @@ ray = pytest.importorskip("ray", reason="the extra fleet is not installed")
 
 from ray.cluster_utils import Cluster  # noqa: E402
 
-from rlacd.fleet.on_ray import RayEngine  # noqa: E402
+from rlacd.pool.on_ray import RayPool  # noqa: E402
 
 pytestmark = pytest.mark.slow
 
@@ -43,9 +44,9 @@ class Counter:
 def test_a_cluster_that_is_not_there_is_told() -> None:
     assert not ray.is_initialized(), "comes before the cluster of the other tests"
     with pytest.raises(OptionError, match="jobs belongs"):
-        RayEngine("auto", 2)
+        RayPool("auto", 2)
     with pytest.raises(OptionError, match=r"no Ray cluster at 127\.0\.0\.1:1"):
-        RayEngine("127.0.0.1:1")
+        RayPool("127.0.0.1:1")
 
 
 @pytest.fixture(scope="module")
@@ -74,18 +75,18 @@ def test_a_node_dies_half_way_and_the_results_are_those_of_one_machine(cluster: 
 
     killing = threading.Thread(target=lambda: cluster.remove_node(doomed, allow_graceful=False))
     counter = Counter(at=3, then=killing.start)
-    over_ray = Batch(assets, str(tmp_path / "ray"), order, limits).run(RayEngine("auto"), counter)
+    over_ray = Batch(assets, str(tmp_path / "ray"), order, limits).run(RayPool("auto"), counter)
     killing.join()
     assert over_ray.status == {"done": 8, "fallback": 1, "failed": 1}
     assert sorted(node["Alive"] for node in ray.nodes()) == [False, True]
 
-    here = Batch(assets, str(tmp_path / "here"), order, limits).run(LocalEngine(1), Counter())
+    here = Batch(assets, str(tmp_path / "here"), order, limits).run(LocalPool(1), Counter())
     assert here.status == over_ray.status
     assert tree(tmp_path / "ray", TIMES) == tree(tmp_path / "here", TIMES)
     assert rows(tmp_path / "ray", TIMES)["deep/dies.obj"]["attempts"] == 2
 
     again = Counter()
-    assert Batch(assets, str(tmp_path / "ray"), order, limits).run(RayEngine("auto"), again).passed_over == 10
+    assert Batch(assets, str(tmp_path / "ray"), order, limits).run(RayPool("auto"), again).passed_over == 10
     assert again.rows == []
 
 
@@ -98,8 +99,8 @@ def test_a_network_of_ones_own_and_a_shared_address_reach_the_nodes(cluster: Clu
     order = Order.of({"policy": str(policy), "threshold": 0.1})
     # "local:" is fsspec's own word for files; unlike a plain folder it is taken for an address that all nodes reach.
     out = f"local://{tmp_path}/shared"
-    summary = Batch(tmp_path / "assets", out, order).run(RayEngine("auto"), Counter())
+    summary = Batch(tmp_path / "assets", out, order).run(RayPool("auto"), Counter())
     assert summary.status == {"done": 1}
     here = Batch(tmp_path / "assets", str(tmp_path / "here"), Order.of({"policy": "learned", "threshold": 0.1}))
-    assert here.run(LocalEngine(1), Counter()).status == {"done": 1}
+    assert here.run(LocalPool(1), Counter()).status == {"done": 1}
     assert (tmp_path / "shared" / "a.glb").read_bytes() == (tmp_path / "here" / "a.glb").read_bytes()

@@ -1,13 +1,21 @@
-"""Same input, options and seed: the same bytes, in every process and on any number of threads."""
+"""Same input, options and seed: the same bytes, in every process, on any number of threads, alone or in a batch."""
 
 from __future__ import annotations
 
-import hashlib
+import os
+import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+
+from rlacd import decompose
+from rlacd.fleet import Batch, Order
+from rlacd.pool import HerePool
+from tests.test_batch import TIMES
+from tests.trouble import tree
 
 MESHES = [
     "test/vhacd/lamp.ply",
@@ -17,29 +25,113 @@ MESHES = [
     "test/ikea_assembled/chair_ivar_0668.ply",
     "test/aws_small_house/Trash_01__aws_Trash_01_visual.ply",
 ]
+SMALL = ["test/vhacd/ob_chair_gothic.ply", "test/gazebo_models/door_handle__handle.ply", MESHES[-1]]
+FORMATS = [("glb", "glb"), ("mjcf", "xml"), ("usd", "usd")]
+"""As a batch is told, and the ending of the file."""
+
+RUN = """
+import sys
+from rlacd.cli import main
+for words in " ".join(sys.argv[1:]).split(" ; "):
+    sys.argv = ["rlacd", *words.split(" ")]
+    try:
+        main()
+    except SystemExit as end:
+        if end.code:
+            raise
+"""
 
 
-def written(mesh: Path, output: Path, *words: str) -> str:
-    """Decompose in a process of its own; the digest of the file, which holds every digit of every hull."""
-    command = [sys.executable, "-c", "from rlacd.cli import main; main()", "decompose", str(mesh), "-o", str(output)]
-    done = subprocess.run([*command, "-q", *words], capture_output=True, text=True, timeout=300)
+def rlacd(*commands: Sequence[object], hash_seed: int) -> None:
+    """Run commands one after another in a new process, in which sets and dicts have an order of their own."""
+    words = " ; ".join(" ".join(str(word) for word in command) for command in commands)
+    environment = {**os.environ, "PYTHONHASHSEED": str(hash_seed)}
+    command = [sys.executable, "-c", RUN, *words.split(" ")]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=1800)
     assert done.returncode == 0, done.stderr
-    return hashlib.sha256(output.read_bytes()).hexdigest()
+
+
+def copied(corpus: Path, names: Sequence[str], folder: Path) -> Path:
+    """Put meshes side by side."""
+    folder.mkdir()
+    for name in names:
+        shutil.copy(corpus / name, folder)
+    return folder
+
+
+def watch_nothing() -> object:
+    class Nothing:
+        def begin(self, *_: object) -> None: ...
+
+        passed_over = finished = begin
+
+    return Nothing()
+
+
+@pytest.mark.parametrize(("file_format", "ending"), FORMATS)
+def test_a_batch_of_real_meshes_writes_what_decompose_writes(
+    file_format: str, ending: str, corpus: Path, tmp_path: Path
+) -> None:
+    if file_format == "usd":
+        pytest.importorskip("pxr", reason="the extra usd is not installed")
+    assets, alone = copied(corpus, SMALL, tmp_path / "assets"), tmp_path / "alone"
+    order = Order.of({"quality": "fast", "threads": 1}, file_format=file_format)
+    with HerePool() as pool:
+        Batch(assets, str(tmp_path / "out"), order).run(pool, watch_nothing())  # type: ignore[arg-type]
+    alone.mkdir()
+    for mesh in assets.iterdir():
+        decompose(mesh, quality="fast", threads=3).save(alone / f"{mesh.stem}.{ending}", up="z")
+    assert tree(alone) == tree(tmp_path / "out", TIMES, "manifest.jsonl", ".rlacd/lock")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MESHES)
 def test_the_same_bytes_in_every_process_and_for_any_number_of_threads(name: str, corpus: Path, tmp_path: Path) -> None:
-    mesh = corpus / name
-    once = written(mesh, tmp_path / "a.ply", "--threads", "1")
-    assert written(mesh, tmp_path / "b.ply", "--threads", "1") == once
-    assert written(mesh, tmp_path / "c.ply", "--threads", "2") == once
-    assert written(mesh, tmp_path / "d.ply", "--threads", "5") == once
+    digits = set()
+    for seed, threads in enumerate((1, 1, 2, 5)):
+        out = tmp_path / f"{seed}.ply"
+        rlacd(["decompose", corpus / name, "-o", out, "-q", "--threads", threads], hash_seed=seed)
+        digits.add(out.read_bytes())
+    assert len(digits) == 1
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MESHES[2:4])
 def test_limits_do_not_change_that(name: str, corpus: Path, tmp_path: Path) -> None:
-    words = ("--max-hulls", "6", "--max-vertices", "24", "--threshold", "0.1")
-    once = written(corpus / name, tmp_path / "a.ply", "--threads", "1", *words)
-    assert written(corpus / name, tmp_path / "b.ply", "--threads", "3", *words) == once
+    words = ("--max-hulls", 6, "--max-vertices", 24, "--threshold", 0.1)
+    for threads in (1, 3):
+        out = tmp_path / f"{threads}.ply"
+        rlacd(["decompose", corpus / name, "-o", out, "-q", "--threads", threads, *words], hash_seed=threads)
+    assert (tmp_path / "1.ply").read_bytes() == (tmp_path / "3.ply").read_bytes()
+
+
+def compare(meshes: Path, tmp_path: Path, file_format: str, ending: str, *words: str) -> None:
+    """Two batches and two times every mesh by itself, each in new processes and on another number of threads."""
+    batches, alone = (tmp_path / "b1", tmp_path / "b2"), (tmp_path / "a1", tmp_path / "a2")
+    for number, (out, jobs, threads) in enumerate(zip(batches, (2, 1), (1, 3), strict=True)):
+        how = ["--format", file_format, "--jobs", jobs, "--threads", threads, "-q"]
+        rlacd(["batch", meshes, "-o", out, *how, *words], hash_seed=10 + number)
+    for number, (out, threads) in enumerate(zip(alone, (1, 2), strict=True)):
+        out.mkdir()
+        each = [["decompose", mesh, "-o", out / f"{mesh.stem}.{ending}"] for mesh in sorted(meshes.iterdir())]
+        rlacd(*([*one, "--threads", threads, "-q", *words] for one in each), hash_seed=20 + number)
+    expected = tree(alone[0])
+    assert len(expected) >= len(list(meshes.iterdir()))
+    assert tree(alone[1]) == expected
+    assert tree(batches[0], TIMES) == tree(batches[1], TIMES), "the manifest, too"
+    assert tree(batches[0], TIMES, "manifest.jsonl", ".rlacd/lock") == expected
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("file_format", "ending"), FORMATS)
+def test_the_same_files_one_by_one_and_in_a_batch(file_format: str, ending: str, corpus: Path, tmp_path: Path) -> None:
+    if file_format == "usd":
+        pytest.importorskip("pxr", reason="the extra usd is not installed")
+    compare(copied(corpus, SMALL, tmp_path / "assets"), tmp_path, file_format, ending)
+
+
+@pytest.mark.slow
+def test_the_same_files_for_a_cross_section_of_real_meshes(corpus: Path, tmp_path: Path) -> None:
+    names = (corpus / "quick.txt").read_text().split()
+    assert len(names) == 25
+    compare(copied(corpus, names, tmp_path / "assets"), tmp_path, "glb", "glb", "--quality", "fast")

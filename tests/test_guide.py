@@ -29,6 +29,7 @@ from rlacd.planes.sweep import Sweep, sweep  # noqa: E402
 from rlacd.policies.features import MIRRORED, candidates_of  # noqa: E402
 from rlacd.policies.greedy import excess_norm  # noqa: E402
 from rlacd.policies.learned import Guide  # noqa: E402
+from rlacd.pool import LocalPool  # noqa: E402
 from rlacd.solid.component import Component  # noqa: E402
 from rlacd.workers import Workers  # noqa: E402
 from tests.test_learned import chair, seen  # noqa: E402
@@ -222,7 +223,8 @@ def test_training_goes_on_where_it_stopped_and_ends_with_the_same_weights(meshes
     for gone in (stopped / "round1").iterdir():  # as if stopped in the middle of the second round's labels
         gone.unlink() if gone.is_file() else None
     sorted((stopped / "round1" / "labels").glob("*.npz"))[0].unlink()
-    resumed = train(options(meshes, stopped), say=lambda _: None)
+    with LocalPool(2) as pool:  # where meshes are labelled decides nothing
+        resumed = train(options(meshes, stopped), say=lambda _: None, pool=pool)
     for ending in (".safetensors", ".onnx"):
         assert resumed.with_suffix(ending).read_bytes() == whole.with_suffix(ending).read_bytes()
     mesh = chair().to_mesh64()

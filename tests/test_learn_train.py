@@ -10,17 +10,21 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Container
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 from unittest import mock
 
 import numpy as np
+import psutil
 import pytest
 from typer.testing import CliRunner
 
 from rlacd.cli import app
 from rlacd.errors import MissingExtraError, OptionError, TrainingError
 from rlacd.learn.options import PRESETS, TrainOptions
+from rlacd.pool import Answer, HerePool, LocalPool, Pool, Request, WorkerDiedError
 from tests.learning import write_meshes
 
 TINY: dict[str, Any] = {
@@ -45,7 +49,15 @@ def meshes(tmp_path: Path) -> Path:
     return write_meshes(tmp_path / "meshes")
 
 
-def run(meshes: Path, folder: Path, resume: bool = False, export: bool = False, **changes: Any) -> Path:
+def run(
+    meshes: Path,
+    folder: Path,
+    resume: bool = False,
+    export: bool = False,
+    pool: Pool | None = None,
+    say: Callable[[str], None] = lambda line: None,
+    **changes: Any,
+) -> Path:
     """Train; exporting takes longer than all the rest and has tests of its own."""
     pytest.importorskip("torch", reason="needs the extra train")
     from rlacd.learn import train as module
@@ -54,7 +66,7 @@ def run(meshes: Path, folder: Path, resume: bool = False, export: bool = False, 
     with contextlib.ExitStack() as stack:
         if not export:
             stack.enter_context(mock.patch.object(module, "export_policy"))
-        return module.train(meshes, folder, options, resume=resume, say=lambda line: None)
+        return module.train(meshes, folder, options, resume=resume, say=say, pool=pool)
 
 
 def weights(folder: Path) -> bytes:
@@ -96,7 +108,6 @@ def test_presets_are_valid_and_the_papers_is_the_papers() -> None:
         ("discount", "both"),
         ("rotate", 1),
         ("seed", -1),
-        ("workers", 5),
     ],
 )
 def test_options_out_of_range_are_said(name: str, value: Any) -> None:
@@ -156,7 +167,7 @@ def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, tmp_path:
 def test_a_killed_run_resumes_exactly(meshes: Path, tmp_path: Path) -> None:
     whole, killed = tmp_path / "whole", tmp_path / "killed"
     run(meshes, whole, iterations=400)
-    given = [f"--{k.replace('_', '-')}={v}" for k, v in {**TINY, "iterations": 400, "workers": 2}.items()]
+    given = [f"--{k.replace('_', '-')}={v}" for k, v in {**TINY, "iterations": 400, "jobs": 2}.items()]
     command = [sys.executable, "-c", "from rlacd.cli import main; main()", "train", str(meshes), "--run", str(killed)]
     command += ["--preset", "paper", "--encoder", "profile"]  # the defaults of TrainOptions
     process = subprocess.Popen([*command, *given], stdout=subprocess.DEVNULL)
@@ -171,27 +182,66 @@ def test_a_killed_run_resumes_exactly(meshes: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_worker_processes_change_nothing(meshes: Path, tmp_path: Path) -> None:
-    run(meshes, tmp_path / "alone")
-    run(meshes, tmp_path / "spread", workers=2)
+@pytest.mark.parametrize("jobs", [1, 3])
+def test_where_episodes_are_played_changes_nothing(meshes: Path, tmp_path: Path, jobs: int) -> None:
+    changes = {"environments": 4}
+    run(meshes, tmp_path / "alone", **changes)
+    with LocalPool(jobs) as pool:
+        run(meshes, tmp_path / "spread", pool=pool, **changes)
     assert_same_run(tmp_path / "alone", tmp_path / "spread")
 
 
 @pytest.mark.slow
-def test_a_worker_that_dies_is_one_clear_error(meshes: Path, tmp_path: Path) -> None:
-    pytest.importorskip("torch", reason="needs the extra train")
-    from rlacd.learn.actors import ActorSetting, ProcessActors
+def test_a_worker_that_is_killed_changes_nothing(meshes: Path, tmp_path: Path) -> None:
+    run(meshes, tmp_path / "alone")
+    killed: list[psutil.Process] = []
 
-    options = TrainOptions(**{**TINY, "workers": 2})
-    actors = ProcessActors(ActorSetting(meshes, tmp_path / "cache", ("angle.ply", "cross.ply"), options))
-    try:
-        actors.start()
-        actors._processes[1].kill()
-        actors._processes[1].join()
-        with pytest.raises(TrainingError, match=r"a worker process died.*--resume"):
-            actors.step([(0, 12), (0, 12)])
-    finally:
-        actors.close()
+    def kill_one(line: str) -> None:
+        if line.startswith("cut") and len(killed) < 2:
+            killed.append(psutil.Process().children()[-1])
+            killed[-1].kill()
+
+    with LocalPool(2) as pool:
+        run(meshes, tmp_path / "disturbed", pool=pool, say=kill_one)
+    assert len({process.pid for process in killed}) == 2
+    assert_same_run(tmp_path / "alone", tmp_path / "disturbed")
+
+
+class Doomed(HerePool):
+    """Of some episodes the process dies every time."""
+
+    def __init__(self, episodes: Container[int]) -> None:
+        super().__init__()
+        self._episodes = episodes
+
+    def submit(self, request: Request) -> Future[Answer]:
+        if request.values["seed"][-1] not in self._episodes:
+            return super().submit(request)
+        died: Future[Answer] = Future()
+        died.set_exception(WorkerDiedError("it took more than 600 s"))
+        return died
+
+
+def test_an_episode_nobody_can_play_is_said_and_left_out(meshes: Path, tmp_path: Path) -> None:
+    said: list[str] = []
+    for name in ("a", "b"):
+        run(meshes, tmp_path / name, pool=Doomed({1, 4}), say=said.append, validation=0)
+    assert sum("episode 1, " in line and "left out: it took more than 600 s" in line for line in said) == 2
+    assert sum(point.get("ended_lost", 0) for point in curves(tmp_path / "a")) == 2
+    assert weights(tmp_path / "a") == weights(tmp_path / "b")
+
+
+def test_when_no_process_can_play_that_is_one_clear_error(meshes: Path, tmp_path: Path) -> None:
+    with pytest.raises(TrainingError, match=r"10 episodes in a row were lost.*--memory"):
+        run(meshes, tmp_path / "run", pool=Doomed(range(5, 10**6)), validation=0)
+
+
+def test_solids_without_anything_to_cut_are_one_clear_error(meshes: Path, tmp_path: Path) -> None:
+    for path in meshes.rglob("*.ply"):
+        if path.stem not in ("box", "broken"):
+            path.unlink()
+    with pytest.raises(TrainingError, match="none of 1000 solids drawn from 1 meshes needs a cut"):
+        run(meshes, tmp_path / "run", validation=0)
 
 
 @pytest.mark.slow

@@ -19,7 +19,7 @@ from rlacd.errors import OptionError
 
 if TYPE_CHECKING:
     from rlacd.fleet import Batch
-    from rlacd.fleet.batch import Engine
+    from rlacd.pool import Pool
 
 STOPPED_EARLY, SOME_FAILED = 4, 5
 
@@ -121,7 +121,7 @@ def batch_command(
             if own["dry_run"]:
                 _tell_plan(work)
             else:
-                _run(work, _engine(own), quiet=quiet)
+                _run(work, own, quiet=quiet)
 
     hints = get_type_hints(decompose, include_extras=True)
     lent = {
@@ -137,7 +137,8 @@ def batch_command(
 
 
 def _batch(own: dict[str, Any], given: dict[str, Any]) -> Batch:
-    from rlacd.fleet import REDO, Batch, Limits, Order
+    from rlacd.fleet import REDO, Batch, Order
+    from rlacd.pool import Limits
 
     if own["redo"] not in REDO:
         raise OptionError(f"--redo is {own['redo']!r}; it has to be one of {', '.join(REDO)}.")
@@ -150,14 +151,10 @@ def _batch(own: dict[str, Any], given: dict[str, Any]) -> Batch:
     return Batch(own["assets"], own["out"], order, limits, own["fallback"], own["glob"], own["redo"])
 
 
-def _engine(own: dict[str, Any]) -> Engine:
-    from rlacd.fleet import LocalEngine
+def _pool(own: dict[str, Any]) -> Pool:
+    from rlacd.pool import open_pool
 
-    if own["ray"] is None:
-        return LocalEngine(own["jobs"] or os.cpu_count() or 1)
-    from rlacd.fleet.on_ray import RayEngine
-
-    return RayEngine(own["ray"], own["jobs"])
+    return open_pool(own["jobs"] or (None if own["ray"] else os.cpu_count()), own["ray"])
 
 
 def _tell_plan(batch: Batch) -> None:
@@ -172,7 +169,7 @@ def _tell_plan(batch: Batch) -> None:
     say(f"{len(plan)} meshes: {done} done, {len(plan) - done} to do; nothing was written")
 
 
-def _run(batch: Batch, engine: Engine, *, quiet: bool) -> None:
+def _run(batch: Batch, own: dict[str, Any], *, quiet: bool) -> None:
     from rlacd.batch_screen import Screen, summary_lines
     from rlacd.terminal import say
 
@@ -187,8 +184,8 @@ def _run(batch: Batch, engine: Engine, *, quiet: bool) -> None:
     with suppress(ValueError):  # not in the main thread: then nobody presses Ctrl-C
         previous = signal.signal(signal.SIGINT, on_interrupt)
     try:
-        with Screen(quiet=quiet) as screen:
-            summary = batch.run(engine, screen, stop)
+        with _pool(own) as pool, Screen(quiet=quiet) as screen:
+            summary = batch.run(pool, screen, stop)
     finally:
         if previous is not None:
             signal.signal(signal.SIGINT, previous)

@@ -30,7 +30,8 @@ TRAIN_HELP = """Train a policy that chooses cuts, by the paper's reinforcement l
 [bold]Examples[/bold]
   rlacd train meshes/ --run run/ --preset quick
   rlacd train meshes/ --run run/ --seed 1
-  rlacd train meshes/ --run run/ --seed 1 --resume
+  rlacd train meshes/ --run run/ --seed 1 --resume --jobs 8
+  rlacd train meshes/ --run run/ --environments 256 --ray auto
   rlacd train meshes/ --run run/ --preset paper --encoder-weights i2p_mae.pth
   tensorboard --logdir run/tensorboard
 
@@ -53,6 +54,33 @@ Beside the weights a folder, weights.run, gets the curves and a checkpoint to --
 """
 
 MESHES = (inspect.Parameter.empty, Annotated[Path, typer.Argument(help="A folder of meshes, of any depth.")])
+WHERE: Parameters = {
+    "jobs": (
+        None,
+        Annotated[
+            int | None,
+            typer.Option(
+                min=0, help="Processes that cut; 0: the one that learns. [dim]\\[default: 1][/dim]", show_default=False
+            ),
+        ],
+    ),
+    "ray": (
+        None,
+        Annotated[
+            str | None, typer.Option(metavar="ADDRESS", help="Cut on a Ray cluster: its address, auto, or local.")
+        ],
+    ),
+    "limit": (
+        600.0,
+        Annotated[float, typer.Option(metavar="SECONDS", min=0.1, help="What one episode may take.")],
+    ),
+    "memory": (
+        4.0,
+        Annotated[float, typer.Option(metavar="GB", min=0.0, help="What a process that cuts may hold; 0: no limit.")],
+    ),
+}
+"""Where episodes are played, which decides nothing but how long that takes."""
+
 RESUME = (False, Annotated[bool, typer.Option("--resume", help="Go on from the run's last checkpoint.")])
 
 
@@ -62,16 +90,22 @@ def train_command(exit_codes: ExitCodes) -> Callable[..., None]:
     def train(**given: Any) -> None:
         with exit_codes():
             meshes, run, preset, resume = (given.pop(name) for name in ("meshes", "run", "preset", "resume"))
+            from rlacd.pool import Limits, open_pool
+
+            jobs, ray, limit, memory = (given.pop(name) for name in WHERE)
             options = TrainOptions.preset(preset, **_chosen(given))
             if run.exists() and not run.is_dir():
                 raise OptionError(f"--run {run} is a file; give a folder.")
-            _learn("rlacd.learn.train", "train")(meshes, run, options, resume=resume, say=typer.echo)
+            learn, limits = _learn("rlacd.learn.train", "train"), Limits(limit, int(memory * 2**30))
+            with open_pool(jobs, ray) as pool:
+                learn(meshes, run, options, resume=resume, say=typer.echo, pool=pool, limits=limits)
 
     own: Parameters = {
         "meshes": MESHES,
         "run": (inspect.Parameter.empty, Annotated[Path, typer.Option("--run", "-o", help="A folder for this run.")]),
         "preset": (DEFAULT_PRESET, Annotated[str, typer.Option(help=f"One of {', '.join(PRESETS)}.")]),
         "resume": RESUME,
+        **WHERE,
     }
     return _command(train, TRAIN_HELP, own | _parameters(TrainOptions, "without a preset: "))
 

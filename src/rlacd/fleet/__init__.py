@@ -1,9 +1,7 @@
-"""Many meshes: processes on one machine, Ray on many; limits, cache, resume."""
+"""Many meshes: limits, cache, resume; on any pool of processes."""
 
 from rlacd.fleet.assets import ENDINGS, Asset, find_assets
 from rlacd.fleet.batch import REDO, Batch, Summary, Watcher
-from rlacd.fleet.local import LocalEngine
 from rlacd.fleet.order import Order
-from rlacd.fleet.worker import Limits
 
-__all__ = ["ENDINGS", "REDO", "Asset", "Batch", "Limits", "LocalEngine", "Order", "Summary", "Watcher", "find_assets"]
+__all__ = ["ENDINGS", "REDO", "Asset", "Batch", "Order", "Summary", "Watcher", "find_assets"]

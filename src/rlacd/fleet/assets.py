@@ -10,10 +10,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
-from urllib.parse import unquote
 
 from rlacd.errors import MeshFileError
-from rlacd.read_file import LARGEST, read_file
+from rlacd.solid.files import mesh_files
 
 ENDINGS = (".obj", ".stl", ".ply", ".off", ".glb", ".gltf", ".dae", ".3mf")
 """Of the files that count as meshes, whatever their case."""
@@ -47,12 +46,7 @@ class Asset:
         MeshFileError
             The mesh file cannot be opened.
         """
-        try:
-            content = read_file(self.path)
-        except OSError as error:
-            reason = (error.strerror or str(error)).lower()
-            raise MeshFileError(f"{self.name} cannot be opened ({reason}): check its name and permissions") from error
-        return {self.path.name: content, **_buffers(self.path, content)}
+        return mesh_files(self.path, self.name)
 
 
 def content_hash(files: dict[str, bytes]) -> str:
@@ -128,22 +122,3 @@ def _places(names: Sequence[str]) -> dict[str, str]:
 
 def _digest(name: str) -> str:
     return hashlib.sha256(os.fsencode(name)).hexdigest()[:8]
-
-
-def _buffers(path: Path, content: bytes) -> dict[str, bytes]:
-    """Files beside a glTF file that its buffers name; what is missing or leads out of the folder is for the loader."""
-    if path.suffix.lower() != ".gltf":
-        return {}
-    try:
-        uris = [str(buffer["uri"]) for buffer in json.loads(content)["buffers"] if "uri" in buffer]
-    except (ValueError, KeyError, TypeError, RecursionError):
-        return {}
-    found: dict[str, bytes] = {}
-    for name in sorted({spelled for uri in uris if not uri.startswith("data:") for spelled in (uri, unquote(uri))}):
-        try:
-            buffer = (path.parent / name).resolve()
-            if buffer.is_relative_to(path.parent.resolve()):
-                found[name] = read_file(buffer, LARGEST - sum(map(len, found.values())))
-        except (OSError, ValueError, RuntimeError):
-            continue
-    return found

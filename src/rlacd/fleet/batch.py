@@ -1,4 +1,4 @@
-"""Many meshes: what is finished is passed over, the rest is handed to an engine, and every outcome becomes a row."""
+"""Many meshes: what is finished is passed over, the rest goes through a pool, and every outcome becomes a row."""
 
 from __future__ import annotations
 
@@ -12,30 +12,18 @@ from typing import Literal, Protocol
 
 from rlacd.errors import MeshFileError, OptionError
 from rlacd.fleet.assets import EVERYTHING, Asset, content_hash, find_assets
-from rlacd.fleet.attempt import Outcome, Task
+from rlacd.fleet.course import Outcome, Task
+from rlacd.fleet.engine import Engine
 from rlacd.fleet.ledger import Ledger, Row
 from rlacd.fleet.order import Order
 from rlacd.fleet.store import FolderStore, Store, open_store
 from rlacd.fleet.work import Work
-from rlacd.fleet.worker import Limits
+from rlacd.pool import Limits, Pool
 
 MANIFEST, TIMINGS = "manifest.jsonl", "timings.jsonl"
 
 Redo = Literal["none", "failed", "all"]
 REDO: tuple[Redo, ...] = ("none", "failed", "all")
-
-
-class Engine(Protocol):
-    """Where the work is done."""
-
-    def run(self, tasks: Iterator[Task], work: Work) -> Iterator[tuple[Task, Outcome]]:
-        """Do tasks in any order; what an outcome's ``files`` name is in the store by then.
-
-        No more tasks are taken from the iterator than can be worked on soon.
-        """
-
-    def close(self) -> None:
-        """End all work at once."""
 
 
 class Watcher(Protocol):
@@ -124,12 +112,13 @@ class Batch:
         manifest = Ledger(store, MANIFEST)
         return [(asset, self._task(asset, manifest, store)[1]) for asset in assets]
 
-    def run(self, engine: Engine, watcher: Watcher, stop: threading.Event | None = None) -> Summary:
+    def run(self, pool: Pool, watcher: Watcher, stop: threading.Event | None = None) -> Summary:
         """Do all meshes that are not done.
 
         Parameters
         ----------
-        engine : Engine
+        pool : Pool
+            Where meshes are done.
         watcher : Watcher
         stop : threading.Event, optional
             Once it is set no further mesh is begun.
@@ -150,13 +139,13 @@ class Batch:
         assets, store = self._find(), open_store(self.out)
         store.open()
         try:
-            work = Work(self.order, self.limits, self.fallback, self.out, store, stop or threading.Event())
-            return self._run(assets, work, engine, watcher)
+            shared = self.order.shared()
+            work = Work(self.order, self.limits, self.fallback, self.out, store, stop or threading.Event(), shared)
+            return self._run(assets, work, pool, watcher)
         finally:
-            engine.close()
             store.close()
 
-    def _run(self, assets: list[Asset], work: Work, engine: Engine, watcher: Watcher) -> Summary:
+    def _run(self, assets: list[Asset], work: Work, pool: Pool, watcher: Watcher) -> Summary:
         summary, start = Summary(len(assets)), time.monotonic()
         manifest, timings = Ledger(work.store, MANIFEST), Ledger(work.store, TIMINGS)
         seen: list[str] = []
@@ -175,7 +164,7 @@ class Batch:
 
         watcher.begin(len(assets))
         try:
-            for task, outcome in engine.run(waiting(), work):
+            for task, outcome in Engine(pool, work).run(waiting()):
                 row = self._row(task, outcome)
                 timing = {"mesh": task.asset.name, **outcome.timing}
                 timings.add(timing)

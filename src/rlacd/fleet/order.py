@@ -16,12 +16,16 @@ from rlacd.errors import OptionError, WeightsError
 from rlacd.formats import DENSITY, FORMATS, MODELS, check_model_options, hull_target
 from rlacd.options import Options
 from rlacd.policies import make_policy
+from rlacd.pool import Shared
 from rlacd.presets import find_preset
 from rlacd.read_file import read_file
 
 WEIGHTS_ENDING = ".onnx"
 DEFAULT_FORMAT = "glb"
 FOLDER_FORMAT = "obj"
+
+POLICY = "policy"
+"""Name of the network that requests share, if the policy is a file."""
 
 
 @dataclass(frozen=True)
@@ -140,10 +144,12 @@ class Order:
         """Get the same order with the network in another place."""
         return replace(self, options={**self.options, "policy": str(path)})
 
-    def policy_file(self) -> Path | None:
-        """Get the network of a policy that is a file."""
+    def shared(self) -> dict[str, Shared]:
+        """Get what all processes need that make these decompositions: the network of a policy that is a file."""
         policy = str(self.options.get("policy", ""))
-        return Path(policy) if policy.endswith(WEIGHTS_ENDING) else None
+        if not policy.endswith(WEIGHTS_ENDING):
+            return {}
+        return {POLICY: Shared({"onnx": Path(policy).read_bytes()}, key=self.weights)}
 
     def as_plain(self) -> dict[str, Any]:
         """Everything as plain values; ``Order(**plain)`` makes the order of them again."""

@@ -8,8 +8,8 @@ import io
 import os
 import sys
 import time
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Iterator, Mapping
+from pathlib import Path, PurePosixPath
 from typing import Any, Protocol
 
 from rlacd.errors import MissingExtraError, OptionError, OutputError
@@ -87,6 +87,18 @@ def open_store(place: str) -> Store:
     if place.startswith("file://"):
         return FolderStore(Path(place.removeprefix("file://")))
     return AddressStore(place)
+
+
+def under(parent: str, files: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Name files as a store does, by the folder they go to."""
+    return {str(PurePosixPath(parent) / name): data for name, data in files.items()}
+
+
+def put_files(store: Store, files: Mapping[str, bytes]) -> dict[str, int]:
+    """Write files, the one that names others last; returns their lengths."""
+    for name, data in files.items():
+        store.write(name, data)
+    return {name: len(data) for name, data in files.items()}
 
 
 class FolderStore:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from rlacd.fleet.order import Order
 from rlacd.fleet.store import Store
-from rlacd.fleet.worker import Limits
+from rlacd.pool import Limits, Shared
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,8 @@ class Work:
         The same, open.
     stop
         Once it is set no further mesh is begun.
+    shared
+        What all processes need: the network of a policy that is a file.
     """
 
     order: Order
@@ -36,3 +38,4 @@ class Work:
     out: str
     store: Store
     stop: threading.Event = field(default_factory=threading.Event)
+    shared: dict[str, Shared] = field(default_factory=dict)

@@ -1,6 +1,7 @@
 """Checkpoints: a folder that holds all of a run's state, replaced as a whole, read without pickle.
 
-``weights.safetensors`` holds the networks and Adam's moments, ``replay.npz`` the buffer, ``state.json`` the rest.
+``weights.safetensors`` holds the networks and Adam's moments, ``replay.npz`` the buffer, ``rollouts.npz`` the episodes
+that are not learned from yet, ``state.json`` the rest.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import os
 import shutil
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from torch import Tensor
 from rlacd.errors import OutputError, TrainingError
 from rlacd.read_file import read_file
 
-FORMAT = 1
+FORMAT = 2
 
 DAMAGE = (OSError, ValueError, KeyError, TypeError, RecursionError, MemoryError)
 """What reading a damaged file may raise, beside the exceptions of its format."""
@@ -40,11 +41,13 @@ class Checkpoint:
     replay : dict of ndarray
     state : dict
         Plain JSON values.
+    rollouts : dict of ndarray
     """
 
     weights: Mapping[str, Tensor]
     replay: Mapping[str, NDArray[Any]]
     state: Mapping[str, Any]
+    rollouts: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
 
 def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
@@ -64,6 +67,7 @@ def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
             fresh / "weights.safetensors",
         )
         np.savez(fresh / "replay.npz", allow_pickle=False, **checkpoint.replay)
+        np.savez(fresh / "rollouts.npz", allow_pickle=False, **checkpoint.rollouts)
         (fresh / "state.json").write_text(json.dumps({"format": FORMAT, **checkpoint.state}))
         for path in fresh.iterdir():
             with open(path, "rb") as file:
@@ -94,12 +98,12 @@ def load_checkpoint(folder: Path) -> Checkpoint | None:
     try:
         state = json.loads(read_file(folder / "state.json"))
         weights = load_file(folder / "weights.safetensors")
-        replay = _arrays(folder / "replay.npz")
         if state["format"] != FORMAT:
             raise TrainingError(f"{folder} has format {state['format']}, not {FORMAT}; train again from the beginning.")
+        replay, rollouts = (_arrays(folder / name) for name in ("replay.npz", "rollouts.npz"))
     except (*DAMAGE, SafetensorError, zipfile.BadZipFile) as error:
         raise TrainingError(f"the checkpoint {folder} is damaged ({error}); remove it to train again.") from error
-    return Checkpoint(weights, replay, state)
+    return Checkpoint(weights, replay, state, rollouts)
 
 
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from rlacd.criteria import Criterion
 from rlacd.errors import TrainingError
 from rlacd.learn.mdp import Cutting
 from rlacd.learn.meshes import TURNS, Solids
+from rlacd.solid.component import Component
 
 TRIES = 1000
 """So many solids in a row without anything to cut, and there is nothing to learn on."""
@@ -22,6 +24,26 @@ class Start:
     name: str
     axis: int
     degrees: float
+
+
+def draw_start(names: Sequence[str], rotate: bool, rng: np.random.Generator) -> Start:
+    """Draw a mesh, and if wanted a turn as the paper's (`TURNS`)."""
+    name = names[int(rng.integers(len(names)))]
+    axis = int(rng.integers(3))
+    return Start(name, axis, TURNS[int(rng.integers(len(TURNS)))] if rotate else 0.0)
+
+
+def begin(solid: Component, criterion: Criterion, max_parts: int) -> Cutting | None:
+    """Begin an episode; None when there is nothing to cut, or too much."""
+    cutting = Cutting(solid, criterion)
+    return None if cutting.over or cutting.count > max_parts else cutting
+
+
+def nothing_to_cut(tries: int, meshes: int) -> TrainingError:
+    """Say that so many solids in a row were drawn in vain."""
+    return TrainingError(
+        f"none of {tries} solids drawn from {meshes} meshes needs a cut; give other meshes, or a smaller threshold."
+    )
 
 
 @dataclass(frozen=True)
@@ -56,22 +78,15 @@ class Episodes:
             There seems to be none.
         """
         for _ in range(TRIES):
-            name = self.names[int(rng.integers(len(self.names)))]
-            axis = int(rng.integers(3))
-            degrees = TURNS[int(rng.integers(len(TURNS)))] if self.rotate else 0.0
-            start = Start(name, axis, degrees)
+            start = draw_start(self.names, self.rotate, rng)
             if (cutting := self.begin(start)) is not None:
                 return start, cutting
-        raise TrainingError(
-            f"none of {TRIES} solids drawn from {len(self.names)} meshes needs a cut; give other meshes, or a smaller "
-            "threshold."
-        )
+        raise nothing_to_cut(TRIES, len(self.names))
 
     def begin(self, start: Start) -> Cutting | None:
         """Begin an episode; None when the solid cannot be had, or there is nothing to cut or too much."""
         solid = self.solids.get(start.name, start.axis, start.degrees)
-        cutting = None if solid is None else Cutting(solid, self.criterion)
-        return None if cutting is None or cutting.over or cutting.count > self.max_parts else cutting
+        return None if solid is None else begin(solid, self.criterion, self.max_parts)
 
     def is_capped(self, cutting: Cutting, cuts: int) -> bool:
         """Tell whether an episode has to be broken off after so many cuts."""

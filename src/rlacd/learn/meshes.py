@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,9 +12,10 @@ import numpy as np
 from manifold3d import Manifold, Mesh64
 from numpy.typing import NDArray
 
-from rlacd.errors import RlacdError, TrainingError
+from rlacd.errors import MeshFileError, RlacdError, TrainingError
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component
+from rlacd.solid.files import mesh_files
 from rlacd.solid.frame import Frame
 from rlacd.solid.load import load_mesh
 from rlacd.solid.repair import repair
@@ -70,6 +72,43 @@ def list_meshes(folder: Path, max_faces: int, validation: int, seed: int) -> Mes
     return MeshList(tuple(sorted(shuffled[validation:])), tuple(sorted(shuffled[:validation])), unreadable, too_large)
 
 
+NOTHING = np.empty((0, 3)), np.empty((0, 3), dtype=np.uint64)
+"""Vertices and faces of what could not be repaired."""
+
+SOLID = "solid.npz"
+"""Name of a repaired solid among the files of a request and of its answer."""
+
+
+def repaired(path: Path) -> bytes:
+    """Repair a mesh and pack it for `unpack_solid`."""
+    try:
+        solid = repair(load_mesh(path), threads=1).manifold
+        Component(solid)
+    except (RlacdError, ValueError):  # flat or empty: nothing to cut
+        return pack_solid(*NOTHING)
+    mesh = solid.to_mesh64()
+    return pack_solid(np.asarray(mesh.vert_properties[:, :3]), np.asarray(mesh.tri_verts, dtype=np.uint64))
+
+
+def pack_solid(vertices: FloatArray, faces: NDArray[np.uint64]) -> bytes:
+    """Pack a solid for `unpack_solid`."""
+    file = io.BytesIO()
+    np.savez(file, vertices=vertices, faces=faces)
+    return file.getvalue()
+
+
+def unpack_solid(packed: bytes) -> Manifold | None:
+    """Get a solid back; None when it could not be repaired."""
+    with np.load(io.BytesIO(packed), allow_pickle=False) as arrays:
+        vertices, faces = arrays["vertices"], arrays["faces"]
+    return Manifold(Mesh64(vertices, faces)) if len(faces) else None
+
+
+def turned(solid: Manifold, axis: int, degrees: float) -> Component:
+    """Turn a solid about a coordinate axis, and carry it to its frame."""
+    return Component(_framed(solid.rotate([degrees if i == axis else 0.0 for i in range(3)])) if degrees else solid)
+
+
 class Solids:
     """Repaired solids by name, taken from the cache folder, or repaired and put there.
 
@@ -90,34 +129,41 @@ class Solids:
 
     def get(self, name: str, axis: int = 0, degrees: float = 0.0) -> Component | None:
         """Get a solid turned about a coordinate axis, in its frame; None when it cannot be repaired."""
+        solid = self.manifold(name)
+        return None if solid is None else turned(solid, axis, degrees)
+
+    def manifold(self, name: str) -> Manifold | None:
+        """Get a solid as it is in its file; None when it cannot be repaired."""
         if name not in self._held:
-            self._held[name] = self._load(name)
-        solid = self._held[name]
-        if solid is None:
-            return None
-        return Component(_framed(solid.rotate([degrees if i == axis else 0.0 for i in range(3)])) if degrees else solid)
+            kept = self._kept(name)
+            if kept is None:
+                kept = repaired(self._folder / name)
+                self.keep(name, kept)
+            self._held[name] = unpack_solid(kept)
+        return self._held[name]
 
-    def _load(self, name: str) -> Manifold | None:
-        kept = None if self._cache is None else self._cache / f"{hashlib.sha256(name.encode()).hexdigest()[:24]}.npz"
-        if kept is not None and kept.exists():
-            with np.load(kept, allow_pickle=False) as arrays:
-                vertices, faces = arrays["vertices"], arrays["faces"]
-        else:
-            vertices, faces = self._repaired(name)
-        if kept is not None and not kept.exists():
-            partial = kept.with_suffix(f".{os.getpid()}.npz")
-            np.savez(partial, vertices=vertices, faces=faces)
-            os.replace(partial, kept)
-        return Manifold(Mesh64(vertices, faces)) if len(faces) else None
-
-    def _repaired(self, name: str) -> tuple[FloatArray, NDArray[np.uint64]]:
+    def files(self, name: str) -> dict[str, bytes]:
+        """Get what another machine makes the solid of: the solid itself (`SOLID`), or the files of the mesh."""
+        kept = self._kept(name)
         try:
-            solid = repair(load_mesh(self._folder / name), threads=1).manifold
-            Component(solid)
-        except (RlacdError, ValueError):  # flat or empty: nothing to cut
-            return np.empty((0, 3)), np.empty((0, 3), dtype=np.uint64)
-        mesh = solid.to_mesh64()
-        return np.array(mesh.vert_properties[:, :3], order="C"), np.array(mesh.tri_verts, dtype=np.uint64, order="C")
+            return mesh_files(self._folder / name) if kept is None else {SOLID: kept}
+        except MeshFileError:
+            return {SOLID: pack_solid(*NOTHING)}
+
+    def keep(self, name: str, packed: bytes) -> None:
+        """Put what `repaired` gave into the cache."""
+        if (place := self._place(name)) is not None:
+            partial = place.with_suffix(f".{os.getpid()}.npz")
+            partial.write_bytes(packed)
+            os.replace(partial, place)
+
+    def _kept(self, name: str) -> bytes | None:
+        place = self._place(name)
+        return place.read_bytes() if place is not None and place.exists() else None
+
+    def _place(self, name: str) -> Path | None:
+        digest = hashlib.sha256(name.encode()).hexdigest()[:24]
+        return None if self._cache is None else self._cache / f"{digest}.npz"
 
 
 def _framed(solid: Manifold) -> Manifold:

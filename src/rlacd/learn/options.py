@@ -81,8 +81,12 @@ class TrainOptions:
 
     # The run
     seed: int = option(0, "The same seed, meshes and options give the same weights on CPU.", least=0, most=2**63 - 1)
-    environments: int = option(4, "Solids cut side by side.", least=1, most=4096)
-    workers: int = option(0, "Processes they are spread over; 0 cuts in the training process.", least=0, most=1024)
+    environments: int = option(
+        4,
+        "Episodes side by side; each begins when the one so many before it has been learned from.",
+        least=1,
+        most=4096,
+    )
     threads: int = option(1, "Threads of the training process.", least=1, most=1024)
     device: str = option("auto", "cpu, cuda, or auto: a GPU when there is one.", one_of=("auto", "cpu", "cuda"))
     log_every: int = option(500, "Cuts between points of the curves.", least=1)
@@ -92,10 +96,13 @@ class TrainOptions:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        if self.workers > self.environments:
-            raise OptionError(f"workers is {self.workers}; it has to be at most environments, {self.environments}.")
         if self.discount == "hull" and not math.isfinite(self.volume_reward + self.finish_reward):
             raise OptionError("volume_reward and finish_reward have to be finite.")
+
+    @property
+    def unit(self) -> float:
+        """What values are measured in, so that a network's outputs are of the order of 1."""
+        return max(self.volume_reward, self.finish_reward, 10 * self.cut_cost, 1e-9)
 
     @classmethod
     def preset(cls, name: str, **changes: Any) -> TrainOptions:

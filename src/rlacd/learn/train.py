@@ -1,8 +1,9 @@
 """RL-ACD's training, from top to bottom as the paper tells it: cut, remember, learn from what a cut left behind.
 
 Deep soft Q-learning on the dual-state Bellman equation (`rlacd.learn.loss`), with components as states
-(`rlacd.learn.mdp`). On CPU the same meshes, options and seed give the same weights bit for bit, whether the run was
-interrupted or not: a checkpoint holds everything that decides what comes next.
+(`rlacd.learn.mdp`). A pool of processes plays episodes (`rlacd.learn.rollouts`), and they are learned from here. On CPU
+the same meshes, options and seed give the same weights bit for bit, wherever episodes are played and whether the run
+was interrupted or not: a checkpoint holds everything that decides what comes next.
 """
 
 from __future__ import annotations
@@ -11,35 +12,48 @@ import dataclasses
 import json
 import time
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
+from safetensors.torch import save as save_tensors
 
 from rlacd.criteria import Concavity
 from rlacd.errors import OptionError, TrainingError
-from rlacd.learn.actor import Described, Step
-from rlacd.learn.actors import ActorSetting, make_actors
 from rlacd.learn.checkpoint import Checkpoint, adam_state, load_checkpoint, restore_adam, save_checkpoint
 from rlacd.learn.curves import Curves
 from rlacd.learn.device import pick_device
 from rlacd.learn.encoders import AnyEncoder, I2PMAEEncoder, make_encoder
 from rlacd.learn.export import export_policy
-from rlacd.learn.loss import bellman_loss, boltzmann, dual_state_target, soft_value
+from rlacd.learn.loss import bellman_loss, dual_state_target, soft_value
 from rlacd.learn.mdp import Reward
 from rlacd.learn.meshes import MeshList, Solids, list_meshes
 from rlacd.learn.options import TrainOptions
 from rlacd.learn.qnetwork import PLANES, QNetwork
+from rlacd.learn.record import Record
 from rlacd.learn.replay import Replay
+from rlacd.learn.rollouts import Acting, Rollouts
 from rlacd.learn.validate import Score, count_parts, torch_policy
 from rlacd.policies import Greedy
 from rlacd.policies.observe import SCALE_INPUTS
+from rlacd.pool import HerePool, Limits, Pool, Shared
 
 Say = Callable[[str], None]
 
 
-def train(meshes: Path, run: Path, options: TrainOptions, *, resume: bool = False, say: Say = print) -> Path:
+def train(
+    meshes: Path,
+    run: Path,
+    options: TrainOptions,
+    *,
+    resume: bool = False,
+    say: Say = print,
+    pool: Pool | None = None,
+    limits: Limits | None = None,
+) -> Path:
     """Train a Q network on a folder of meshes.
 
     Parameters
@@ -53,6 +67,10 @@ def train(meshes: Path, run: Path, options: TrainOptions, *, resume: bool = Fals
         Go on from the checkpoint in `run`, exactly; without one, start.
     say : callable
         Takes a line of progress.
+    pool : Pool, optional
+        Where episodes are played; in this process by default. It decides nothing but how long that takes.
+    limits : Limits, optional
+        Of one episode.
 
     Returns
     -------
@@ -64,7 +82,7 @@ def train(meshes: Path, run: Path, options: TrainOptions, *, resume: bool = Fals
     OptionError
         `run` holds another run, or the options do not fit the one to be resumed.
     TrainingError
-        There are no usable meshes, the checkpoint is damaged, or a worker died.
+        There are no usable meshes, the checkpoint is damaged, or no process can play.
     """
     torch.set_num_threads(options.threads)
     checkpoint = load_checkpoint(run / "checkpoint")
@@ -76,8 +94,11 @@ def train(meshes: Path, run: Path, options: TrainOptions, *, resume: bool = Fals
         f"{len(listed.training)} meshes to learn on, {len(listed.validation)} to validate with; "
         f"{listed.unreadable} cannot be read, {listed.too_large} are too large"
     )
-    training = Training(meshes, run, options, listed, encoder, say)
-    try:
+    with ExitStack() as stack:
+        where, solids = pool or stack.enter_context(HerePool()), Solids(meshes, run / "solids")
+        rollouts = Rollouts(where, solids, listed.training, options, limits or Limits(), say)
+        training = Training(run, options, listed, encoder, solids, rollouts, say)
+        stack.callback(training.close)
         if checkpoint is None:
             training.begin()
         else:
@@ -85,15 +106,20 @@ def train(meshes: Path, run: Path, options: TrainOptions, *, resume: bool = Fals
             say(f"resuming at cut {training.cuts}")
         training.run()
         return training.export()
-    finally:
-        training.close()
 
 
 class Training:
     """The state of a run, and the loop."""
 
     def __init__(
-        self, meshes: Path, run: Path, options: TrainOptions, listed: MeshList, encoder: AnyEncoder, say: Say
+        self,
+        run: Path,
+        options: TrainOptions,
+        listed: MeshList,
+        encoder: AnyEncoder,
+        solids: Solids,
+        rollouts: Rollouts,
+        say: Say,
     ) -> None:
         self.options = options
         self.folder = run
@@ -101,7 +127,7 @@ class Training:
         self.device = pick_device(options.device)
         self.encoder = encoder
         self.inputs = self.encoder.dim + (SCALE_INPUTS if options.scale_input else 0)
-        self.unit = max(options.volume_reward, options.finish_reward, 10 * options.cut_cost, 1e-9)
+        self.unit = options.unit
         torch.manual_seed(options.seed)
         self.network = QNetwork(self.inputs, self.unit).to(self.device)
         self.target = QNetwork(self.inputs, self.unit).to(self.device)
@@ -109,33 +135,27 @@ class Training:
         self.optimizer = torch.optim.Adam(self.network.parameters(), lr=options.learning_rate, fused=True)
         self.replay = Replay(options.replay, self.inputs, PLANES, options.priority, options.priority_correction)
         self.rng = np.random.default_rng([options.seed, 0])
-        self.solids = Solids(meshes, run / "solids")
+        self.solids = solids
+        self.rollouts = rollouts
         self.listed = listed
-        self.actors = make_actors(ActorSetting(meshes, run / "solids", listed.training, options))
-        self.frontiers: list[list[int]] = []  # rows in the replay buffer of each actor's unfinished components
-        self.largest: list[int] = []
         self.cuts = 0
         self.learned = 0
         self.seconds = 0.0
         self.sums: dict[str, float] = {}
         self.best = np.inf
         self.baseline: Score | None = None
+        self.shown: tuple[int, Shared] | None = None  # the network that was shared last, after so many steps
         self.curves = Curves(run)
 
     # The algorithm
 
     def run(self) -> None:
-        """Cut and learn until the last iteration."""
+        """Have episodes played and learn from them until the last iteration."""
         options, started, saved, before = self.options, time.perf_counter(), time.perf_counter(), self.seconds
         while self.cuts < options.iterations:
+            self.rollouts.begin(self.acting())
             cuts_before = self.cuts
-            actions = self.act()
-            for k, step in enumerate(self.actors.step(actions)):
-                self.remember(k, actions[k], step)
-            self.cuts += len(actions)
-            for _ in range(self.cuts // options.learn_every - cuts_before // options.learn_every):
-                if self.cuts > options.warmup:
-                    self.learn()
+            self.learn_from(self.rollouts.take())
             self.seconds = before + time.perf_counter() - started
             if self._passed(cuts_before, options.log_every):
                 self.log()
@@ -146,43 +166,42 @@ class Training:
                 saved = time.perf_counter()
         self.save()
 
-    def act(self) -> list[tuple[int, int]]:
-        """Choose for each actor its largest component, and a plane: at random, or by the Boltzmann policy."""
+    def acting(self) -> Acting:
+        """Say how episodes that begin now are played: at random at first, then by the network as it is."""
         options = self.options
-        rows = [frontier[i] for frontier, i in zip(self.frontiers, self.largest, strict=True)]
-        masks = self.replay.masks(rows)
         if self.cuts < options.warmup:
-            chances = masks / masks.sum(axis=1, keepdims=True)
-        else:
-            epsilon = options.epsilon * options.epsilon_decay ** ((self.cuts - options.warmup) // 1000)
-            with torch.inference_mode():
-                q = self.network(self._tensor(self.replay.features(rows)))
-                policy = boltzmann(q, self._tensor(masks), options.temperature).double().cpu().numpy()
-            chances = epsilon * masks / masks.sum(axis=1, keepdims=True) + (1 - epsilon) * policy
-            self._add("value", float(q.masked_fill(~self._tensor(masks), -torch.inf).amax(dim=1).mean()))
-        return [(i, _draw(p, self.rng)) for i, p in zip(self.largest, chances, strict=True)]
+            return Acting(None, 1.0)
+        if self.shown is None or self.shown[0] != self.learned:
+            weights = {name: tensor.detach().cpu().contiguous() for name, tensor in self.network.state_dict().items()}
+            self.shown = (self.learned, Shared({"weights": save_tensors(weights)}))
+        epsilon = options.epsilon * options.epsilon_decay ** ((self.cuts - options.warmup) // 1000)
+        return Acting(self.shown[1], epsilon)
 
-    def remember(self, k: int, action: tuple[int, int], step: Step) -> None:
-        """Put what actor `k` did into the replay buffer."""
-        index, plane = action
-        state = self.frontiers[k].pop(index)
-        children = self._keep(step.children)
-        discounts = step.discounts
-        if self.options.discount == "static":
-            discounts = [self.options.static_discount] * len(children)
-        reward = self.reward(step.reward)
-        self.replay.add(state, plane, reward, children, discounts)
-        self.replay.release(state)
-        self.frontiers[k] += children
-        self._add("reward", reward)
-        if step.ended:
-            for row in self.frontiers[k]:
-                self.replay.release(row)
-            assert step.fresh is not None
-            self.frontiers[k] = self._keep(step.fresh)
-            self._add("episode_parts", step.parts)
-            self._add(f"ended_{step.ended}", 1.0)
-        self.largest[k] = step.largest
+    def learn_from(self, record: Record) -> None:
+        """Put an episode into the replay buffer cut by cut, and learn after each."""
+        rows = iter(self._keep(record))
+        frontier = list(islice(rows, int(record.joined[0])))
+        discounts = iter(record.discounts[int(record.joined[0]) :].tolist())
+        for k, count in enumerate(record.joined[1:].tolist()):
+            state, children = frontier.pop(int(record.index[k])), list(islice(rows, count))
+            weights = list(islice(discounts, count))
+            if self.options.discount == "static":
+                weights = [self.options.static_discount] * count
+            reward = self.reward(record.reward(k))
+            self.replay.add(state, int(record.planes[k]), reward, children, weights)
+            self.replay.release(state)
+            frontier += children
+            self._add("reward", reward)
+            if np.isfinite(record.values[k]):
+                self._add("value", float(record.values[k]))
+            self.cuts += 1
+            if self.cuts > self.options.warmup and self.cuts % self.options.learn_every == 0:
+                self.learn()
+        for row in frontier:
+            self.replay.release(row)
+        if record.cuts:
+            self._add("episode_parts", float(record.parts))
+        self._add(f"ended_{record.how}", 1.0)
 
     def reward(self, terms: Reward) -> float:
         """r = lambda_1 r_1 + lambda_2 r_2, as the component's own decision process sees it."""
@@ -248,10 +267,7 @@ class Training:
     # Beginning, ending, going on
 
     def begin(self) -> None:
-        """Begin the first episodes."""
-        started = self.actors.start()
-        self.frontiers = [self._keep(described) for described, _ in started]
-        self.largest = [largest for _, largest in started]
+        """Begin with nothing."""
         self.curves.restart(0)
 
     def save(self) -> None:
@@ -269,10 +285,9 @@ class Training:
             "best": self.best,
             "baseline": None if self.baseline is None else dataclasses.asdict(self.baseline),
             "generator": self.rng.bit_generator.state,
-            "frontiers": self.frontiers,
-            "actors": self.actors.recipes(),
         }
-        save_checkpoint(self.folder / "checkpoint", Checkpoint(weights, self.replay.state(), state))
+        checkpoint = Checkpoint(weights, self.replay.state(), state, self.rollouts.state())
+        save_checkpoint(self.folder / "checkpoint", checkpoint)
 
     def restore(self, checkpoint: Checkpoint) -> None:
         """Go back to where a checkpoint was written."""
@@ -291,8 +306,7 @@ class Training:
         self.sums, self.best = dict(state["sums"]), state["best"]
         self.baseline = None if state["baseline"] is None else Score(**state["baseline"])
         self.rng.bit_generator.state = state["generator"]
-        self.frontiers = [list(rows) for rows in state["frontiers"]]
-        self.largest = self.actors.restore(state["actors"])
+        self.rollouts.restore(checkpoint.rollouts)
         self.curves.restart(self.cuts)
 
     def export(self) -> Path:
@@ -307,15 +321,15 @@ class Training:
         return export_policy(self.folder / "policy.onnx", self.encoder, network, self.options)
 
     def close(self) -> None:
-        """End the actors and the curves."""
-        self.actors.close()
+        """End the curves."""
         self.curves.close()
 
-    def _keep(self, described: Described) -> list[int]:
-        bounds = self.options.volume_reward * (1 - described.fill) + self.options.finish_reward - self.options.cut_cost
+    def _keep(self, record: Record) -> list[int]:
+        """Rows in the replay buffer of all components of an episode; each is released when it is cut, or at the end."""
+        bounds = self.options.volume_reward * (1 - record.fill) + self.options.finish_reward - self.options.cut_cost
         return [
             self.replay.add_component(features, mask, bound)
-            for features, mask, bound in zip(described.features, described.masks, bounds, strict=True)
+            for features, mask, bound in zip(record.features, record.masks, bounds, strict=True)
         ]
 
     def _tensor(self, array: np.ndarray) -> torch.Tensor:
@@ -343,7 +357,6 @@ MAY_CHANGE = frozenset(
         "log_every",
         "validate_every",
         "device",
-        "workers",
         "threads",
         "encoder_weights",
     }
@@ -386,11 +399,6 @@ def _mesh_list(meshes: Path, run: Path, options: TrainOptions) -> MeshList:
     kept.write_text(json.dumps(dataclasses.asdict(listed), indent=1))
     (run / "options.json").write_text(json.dumps(dataclasses.asdict(options), indent=1))
     return listed
-
-
-def _draw(chances: np.ndarray, rng: np.random.Generator) -> int:
-    accumulated = np.cumsum(chances)
-    return int(np.searchsorted(accumulated, rng.random() * accumulated[-1], side="right"))
 
 
 __all__: Sequence[str] = ("Training", "train")

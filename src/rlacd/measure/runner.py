@@ -12,8 +12,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from rlacd.fleet.process import kill_group, why_it_ended
 from rlacd.measure.store import Row, Store, Task
+from rlacd.pool.process import kill_group, why_it_ended
 
 Say = Callable[[str], None]
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from rlacd.errors import RlacdError
 from rlacd.learn.guide.train import TrainOptions, train
+from rlacd.pool import open_pool
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -23,9 +24,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         else:
             flag = "--" + option.name.replace("_", "-")
             parser.add_argument(flag, type=type(option.default), default=option.default, help=f"{text} (%(default)s)")
+    parser.add_argument("--jobs", type=int, help="processes that label; 0: this one (1)")
+    parser.add_argument("--ray", metavar="ADDRESS", help="label on a Ray cluster: its address, auto, or local")
     given = vars(parser.parse_args(arguments))
     try:
-        print(train(TrainOptions(**given), say=lambda line: print(line, flush=True)))
+        with open_pool(given.pop("jobs"), given.pop("ray")) as pool:
+            print(train(TrainOptions(**given), say=lambda line: print(line, flush=True), pool=pool))
     except RlacdError as error:
         print(f"Error: {error}", file=sys.stderr)
         return 1

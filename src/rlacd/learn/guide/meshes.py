@@ -1,4 +1,4 @@
-"""The meshes to learn from: repaired once, kept as arrays, and split into those to learn from and those to judge by."""
+"""The meshes to learn from: those that are small enough, split into those to learn from and those to judge by."""
 
 from __future__ import annotations
 
@@ -7,12 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from manifold3d import Manifold, Mesh64
+from manifold3d import Manifold
 
-from rlacd.errors import MeshError
-from rlacd.learn.guide.files import load_arrays, save_arrays
-from rlacd.solid.load import load_mesh
-from rlacd.solid.repair import repair
+from rlacd.learn.meshes import Solids
 
 ENDINGS = frozenset({".ply", ".obj", ".stl", ".off", ".glb", ".gltf"})
 
@@ -45,15 +42,9 @@ def shuffled(names: Sequence[str], seed: int) -> list[str]:
 
 def load_solid(folder: Path, name: str, cache: Path) -> Manifold | None:
     """Load and repair a mesh, or take it from the cache; None where it cannot be used (that is cached too)."""
-    kept = cache / f"{name}.npz"
-    if not kept.exists():
-        try:
-            mesh = repair(load_mesh(folder / name), threads=1).manifold.to_mesh64()
-            vertices, faces = mesh.vert_properties[:, :3], mesh.tri_verts
-        except MeshError:
-            vertices, faces = np.empty((0, 3)), np.empty((0, 3), np.uint64)
-        save_arrays(kept, {"vertices": np.asarray(vertices), "faces": np.asarray(faces)})
-    arrays = load_arrays(kept)
-    if not 0 < len(arrays["faces"]) <= TOO_MANY_FACES:
-        return None
-    return Manifold(Mesh64(arrays["vertices"], arrays["faces"]))
+    return small(Solids(folder, cache).manifold(name))
+
+
+def small(solid: Manifold | None) -> Manifold | None:
+    """Leave out what cannot be used, or has too many faces."""
+    return None if solid is None or solid.num_tri() > TOO_MANY_FACES else solid

@@ -10,26 +10,26 @@ import json
 import os
 import time
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
 
 from rlacd.errors import OptionError
 from rlacd.learn.guide.deploy import deploy, ratio
 from rlacd.learn.guide.export import export
-from rlacd.learn.guide.files import save_arrays
+from rlacd.learn.guide.files import save_bytes
 from rlacd.learn.guide.fit import fit, load_labels
-from rlacd.learn.guide.label import label
+from rlacd.learn.guide.label_server import SERVER
 from rlacd.learn.guide.meshes import is_held_out, load_solid, mesh_names, shuffled
 from rlacd.learn.guide.network import Ensemble
-from rlacd.learn.guide.rollout import Cost
+from rlacd.learn.meshes import SOLID, Solids
 from rlacd.policies import Greedy
-from rlacd.policies.greedy import excess_norm
-from rlacd.policies.learned import Guide, Learned, guided_cost
+from rlacd.policies.learned import Learned
+from rlacd.pool import HerePool, Pool, Request, Shared, WorkerDiedError, answers
 
 SCALES = (0.025, 0.1)
 """Thresholds labelled: half and twice the usual one."""
@@ -56,8 +56,16 @@ class TrainOptions:
     threshold: float = field(default=0.05, metadata={"help": "concavity that networks are deployed at"})
 
 
-def train(options: TrainOptions, say: Callable[[str], None] = print) -> Path:
+def train(options: TrainOptions, say: Callable[[str], None] = print, pool: Pool | None = None) -> Path:
     """Train a guide.
+
+    Parameters
+    ----------
+    options : TrainOptions
+    say : callable
+        Takes a line of progress.
+    pool : Pool, optional
+        Where meshes are labelled; in this process by default. It decides nothing but how long that takes.
 
     Returns
     -------
@@ -77,43 +85,52 @@ def train(options: TrainOptions, say: Callable[[str], None] = print) -> Path:
     if not learning:
         raise OptionError(f"There are no meshes of at most {options.max_bytes} bytes in {options.meshes}.")
     network: Path | None = None
-    for number in range(options.rounds):
-        first = number * options.meshes_per_round
-        turn = [learning[i % len(learning)] for i in range(first, first + min(options.meshes_per_round, len(learning)))]
-        _label_round(options, number, turn, network, say)
-        network = _fit_round(options, number, say)
-        _deploy_round(options, number, network, judging, say)
+    a_round = min(options.meshes_per_round, len(learning))
+    with ExitStack() as stack:
+        where = pool or stack.enter_context(HerePool())
+        for number in range(options.rounds):
+            first = number * options.meshes_per_round
+            turn = [learning[i % len(learning)] for i in range(first, first + a_round)]
+            _label_round(options, number, turn, network, where, say)
+            network = _fit_round(options, number, say)
+            _deploy_round(options, number, network, judging, say)
     assert network is not None
     return network
 
 
 def _label_round(
-    options: TrainOptions, number: int, names: Sequence[str], network: Path | None, say: Callable[[str], None]
+    options: TrainOptions,
+    number: int,
+    names: Sequence[str],
+    network: Path | None,
+    pool: Pool,
+    say: Callable[[str], None],
 ) -> None:
     folder = options.work / f"round{number}" / "labels"
     waiting = [name for name in names if not (folder / f"{name}.npz").exists()]
-    guide = None if network is None else Guide(network)
+    solids = Solids(options.meshes, options.work / "solids")
+    shared = {} if network is None else {"network": Shared({"onnx": network.read_bytes()})}
+
+    def requests() -> Iterator[tuple[str, Request]]:
+        for name in waiting:
+            values = {
+                "threshold": options.threshold,
+                "budget": options.sweeps_per_mesh,
+                "seed": [options.seed, number, zlib.crc32(name.encode())],
+            }
+            yield name, Request(SERVER, values, solids.files(name), shared)
+
     labels, start = 0, time.monotonic()
-    for i, name in enumerate(waiting):
-        rng = np.random.default_rng([options.seed, number, zlib.crc32(name.encode())])
-        threshold = options.threshold * float(2 ** rng.uniform(-1, 1) if rng.random() < 0.4 else 1)
-        solid = load_solid(options.meshes, name, options.work / "solids")
-        found = (
-            {}
-            if solid is None
-            else label(solid, threshold, _cost(guide, threshold), options.sweeps_per_mesh, rng).arrays()
-        )
-        save_arrays(folder / f"{name}.npz", found)
-        labels += len(found.get("parts", ()))
+    for i, (name, answer) in enumerate(answers(pool, requests())):
+        if isinstance(answer, WorkerDiedError):
+            say(f"{name} is left out: {answer}")
+            continue
+        if SOLID in answer.blobs:
+            solids.keep(name, answer.blobs[SOLID])
+        save_bytes(folder / f"{name}.npz", answer.blobs["labels"])
+        labels += answer.values["labels"]
         if i % 50 == 49 or i + 1 == len(waiting):
             say(f"round {number}: {i + 1}/{len(waiting)} meshes, {labels} labels, {time.monotonic() - start:.0f} s")
-
-
-def _cost(guide: Guide | None, threshold: float) -> Cost:
-    """The policy whose choices are labelled: greedy at first, then the last network's."""
-    if guide is None:
-        return lambda component, swept: excess_norm(swept)
-    return lambda component, swept: guided_cost(guide, component, swept, threshold)
 
 
 def _fit_round(options: TrainOptions, number: int, say: Callable[[str], None]) -> Path:

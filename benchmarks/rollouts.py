@@ -1,0 +1,177 @@
+"""What training's episodes cost, where they are played, and what a request costs a pool beside what it asks for.
+
+    python benchmarks/rollouts.py train MESHES --count 150 --jobs 0 --jobs 1 --jobs 2
+    python benchmarks/rollouts.py overhead --jobs 2
+    python benchmarks/rollouts.py overhead --ray local --jobs 2
+    python benchmarks/rollouts.py boxes --jobs 2
+    python benchmarks/rollouts.py boxes --ray local --jobs 2
+
+Processor seconds of this process and of all that it started, which are nearly the same on a busy machine; wall times
+are only worth something on one that does nothing else. Over Ray, what Ray's own servers take is told apart.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import resource
+import tempfile
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import psutil
+import trimesh
+import typer
+
+from rlacd.fleet import Batch, Order, find_assets
+from rlacd.pool import Pool, Request, Shared, answers, open_pool
+
+app = typer.Typer(add_completion=False)
+
+SERVERS = ("raylet", "gcs_server", "dashboard", "log_monitor", "monitor.py", "runtime_env")
+
+Ray = Annotated[str | None, typer.Option(help="A cluster: local, auto, or its address.")]
+
+
+class Used:
+    """Wall and processor seconds since the beginning."""
+
+    def __init__(self) -> None:
+        self._start, self._own, self._others = time.perf_counter(), self._seconds(), self._family()
+
+    def told(self) -> dict[str, float]:
+        """Seconds: ``wall``; ``own``, of this process; ``workers``, and ``servers``, Ray's."""
+        now = self._family()
+        spent = {kind: now[kind] - self._others[kind] for kind in now}
+        return {"wall": time.perf_counter() - self._start, "own": self._seconds() - self._own, **spent}
+
+    def _seconds(self) -> float:
+        usage = resource.getrusage(resource.RUSAGE_SELF)
+        return usage.ru_utime + usage.ru_stime
+
+    def _family(self) -> dict[str, float]:
+        """Processes that have ended are counted by whoever waited for them, and so by their parents."""
+        spent = {"workers": 0.0, "servers": 0.0}
+        usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+        spent["workers"] += usage.ru_utime + usage.ru_stime
+        for process in psutil.Process().children(recursive=True):
+            try:
+                times, words = process.cpu_times(), " ".join(process.cmdline())
+            except psutil.Error:
+                continue
+            kind = "servers" if any(name in words for name in SERVERS) else "workers"
+            spent[kind] += times.user + times.system + times.children_user + times.children_system
+        return spent
+
+
+@app.command()
+def train(
+    meshes: Path,
+    count: int = 150,
+    jobs: Annotated[list[int] | None, typer.Option()] = None,
+    ray: Ray = None,
+    cuts: int = 3000,
+    warmup: int = 1000,
+    environments: int = 4,
+) -> None:
+    """Train a little and tell cuts a second and processor seconds, of the learner and of those who play."""
+    import rlacd.learn.train as module
+    from rlacd.learn.options import TrainOptions
+
+    module.export_policy = lambda path, *_: path  # type: ignore[assignment]  # not what is measured
+    changes = {"iterations": cuts, "warmup": warmup, "validation": 0, "environments": environments}
+    options = TrainOptions.preset("two-cores", **changes)
+    assets = find_assets(meshes)
+    print("| jobs | cuts | wall s | learner CPU s | players CPU s | cuts/s if nobody else computes |")
+    print("|---|---|---|---|---|---|")
+    for number in jobs or [0, 1, 2]:
+        with tempfile.TemporaryDirectory() as folder:
+            links = Path(folder, "meshes")
+            for asset in assets[:: max(1, len(assets) // count)][:count]:
+                link = links / asset.name
+                link.parent.mkdir(parents=True, exist_ok=True)
+                link.symlink_to(asset.path.resolve())
+            with open_pool(number if ray is None else None, ray) as pool:
+                used = Used()
+                module.train(links, Path(folder, "run"), options, say=lambda _: None, pool=pool)
+                told = used.told()
+            made = json.loads(Path(folder, "run", "checkpoint", "state.json").read_text())["cuts"]
+        slowest = told["own"] if number == 0 else max(told["own"], told["workers"] / number)
+        print(
+            f"| {number} | {made} | {told['wall']:.0f} | {told['own']:.1f} | {told['workers']:.1f} "
+            f"| {made / slowest:.0f} |"
+        )
+
+
+@app.command()
+def overhead(count: int = 300, jobs: int = 2, ray: Ray = None) -> None:
+    """Ask for episodes of a solid that is none: the way there and back, without and with a new network each time."""
+    import torch
+    from safetensors.torch import save
+
+    from rlacd.learn.encoders import make_encoder
+    from rlacd.learn.meshes import NOTHING, SOLID, pack_solid
+    from rlacd.learn.options import TrainOptions
+    from rlacd.learn.qnetwork import QNetwork
+    from rlacd.learn.rollout_server import SERVER
+
+    torch.set_num_threads(1)
+    options = TrainOptions.preset("two-cores")
+    setting = Shared({"options": json.dumps(dataclasses.asdict(options)).encode()})
+    weights = save(QNetwork(make_encoder(options.encoder).dim).state_dict())
+    files, values = {SOLID: pack_solid(*NOTHING)}, {"axis": 0, "degrees": 0.0, "epsilon": 1.0, "seed": [0]}
+
+    def requests(networks: bool) -> Any:
+        for number in range(count):
+            shared = {"setting": setting, **({"network": Shared({"weights": weights})} if networks else {})}
+            yield number, Request(SERVER, values, files, shared)
+
+    print(f"a network is {len(weights) / 1e6:.1f} MB")
+    with open_pool(jobs, ray) as pool:
+        _ask(pool, requests(False), 0)  # processes start
+        for networks in (False, True):
+            _ask(pool, requests(networks), count, "with a new network" if networks else "with nothing")
+
+
+def _ask(pool: Pool, requests: Any, count: int, what: str = "") -> None:
+    used = Used()
+    for _, answer in answers(pool, requests):
+        if isinstance(answer, Exception):
+            raise answer
+    if count:
+        told = {name: f"{1000 * seconds / count:.2f}" for name, seconds in used.told().items()}
+        print(f"{what}: " + ", ".join(f"{name} {value} ms" for name, value in told.items()) + " a request")
+
+
+class _Nothing:
+    def begin(self, meshes: int) -> None: ...
+
+    def passed_over(self, asset: Any) -> None: ...
+
+    def finished(self, row: Any, timing: Any) -> None: ...
+
+
+@app.command()
+def boxes(count: int = 300, jobs: int = 2, ray: Ray = None) -> None:
+    """Do a batch of boxes, which need no cut, and tell what each costs beside its decomposition."""
+    with tempfile.TemporaryDirectory() as folder, open_pool(jobs, ray) as pool:
+        for part in ("warm", "boxes"):
+            for number in range(count if part == "boxes" else 2 * jobs):
+                path = Path(folder, part, f"{number:04d}.stl")
+                path.parent.mkdir(exist_ok=True)
+                trimesh.creation.box((1, 2, 3 + number / count)).export(path)
+        for part in ("warm", "boxes"):
+            used, out = Used(), Path(folder, f"out-{part}")
+            Batch(Path(folder, part), str(out), Order.of({"quality": "fast"})).run(pool, _Nothing())
+            told = used.told()
+        rows = [json.loads(line) for line in (out / "timings.jsonl").read_text().splitlines()]
+        mesh = sum(row["cpu"] for row in rows)
+    told["workers"] -= mesh
+    each = {name: f"{1000 * seconds / count:.2f} ms" for name, seconds in told.items()}
+    beside = ", ".join(f"{name} {spent}" for name, spent in each.items())
+    print(f"{count} boxes, {1000 * mesh / count:.2f} ms each; beside it: {beside}")
+
+
+if __name__ == "__main__":
+    app()

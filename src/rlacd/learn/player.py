@@ -1,0 +1,139 @@
+"""Playing an episode: cutting a solid until nothing is left to cut, by the network as it is, and telling all of it."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from rlacd.learn.encoders import Encoder, describe
+from rlacd.learn.loss import boltzmann
+from rlacd.learn.mdp import Cutting, Reward
+from rlacd.learn.options import TrainOptions
+from rlacd.learn.qnetwork import QNetwork
+from rlacd.learn.record import ENDED, Record
+from rlacd.policies.observe import Float32Array, observe
+from rlacd.solid.arrays import BoolArray, FloatArray
+from rlacd.solid.component import Component
+
+
+@dataclass
+class _Seen:
+    """A component of the frontier."""
+
+    features: Float32Array
+    mask: BoolArray
+    fill: float
+
+
+@dataclass(frozen=True)
+class Player:
+    """Plays one episode.
+
+    Attributes
+    ----------
+    cutting : Cutting
+        The solid, uncut, with something to cut.
+    options : TrainOptions
+    encoder : Encoder
+    network : QNetwork or None
+        None: every valid plane is as good as any other.
+    epsilon : float
+        Share of cuts for which that holds in any case.
+    rng : Generator
+        Of this episode alone.
+    """
+
+    cutting: Cutting
+    options: TrainOptions
+    encoder: Encoder
+    network: QNetwork | None
+    epsilon: float
+    rng: np.random.Generator
+
+    def play(self) -> Record:
+        """Cut the largest component again and again; a pure function of the attributes, on one thread of torch."""
+        cutting, frontier = self.cutting, self._see(self.cutting.frontier)
+        everything, joined, discounts = list(frontier), [len(frontier)], [1.0] * len(frontier)
+        index: list[int] = []
+        planes: list[int] = []
+        values: list[float] = []
+        rewards: list[Reward] = []
+        while not (ended := self._ended(len(planes))):
+            largest = cutting.largest()
+            seen = frontier.pop(largest)
+            plane, value = self._choose(seen)
+            component = cutting.frontier[largest]
+            cut = cutting.cut(largest, cutting.candidates(component).plane(plane))
+            children = self._see(cut.unfinished)
+            frontier += children
+            everything += children
+            joined.append(len(children))
+            discounts += cut.discounts
+            index.append(largest)
+            planes.append(plane)
+            values.append(value)
+            rewards.append(cut.reward)
+        return Record(
+            features=np.stack([seen.features for seen in everything]).astype(np.float16),
+            masks=np.stack([seen.mask for seen in everything]),
+            fill=np.array([seen.fill for seen in everything]),
+            discounts=np.array(discounts),
+            joined=np.array(joined, np.int64),
+            index=np.array(index, np.int64),
+            planes=np.array(planes, np.int64),
+            rewards=np.array([dataclasses.astuple(reward) for reward in rewards]),
+            values=np.array(values),
+            parts=cutting.count,
+            ended=ENDED.index(ended),
+        )
+
+    def _ended(self, cuts: int) -> str:
+        if self.cutting.over:
+            return "terminal" if self.cutting.terminal else "stuck"
+        capped = cuts >= self.options.max_cuts or self.cutting.count >= self.options.max_parts
+        return "cap" if capped and cuts else ""
+
+    def _see(self, components: list[Component]) -> list[_Seen]:
+        """Describe components for the learner."""
+        if not components:
+            return []
+        options = self.options
+        seen = [observe(c, self.cutting.candidates(c), options.threshold, options.points) for c in components]
+        features = describe(self.encoder, seen, options.scale_input)
+        return [
+            _Seen(row, o.mask, c.volume / c.hull.volume) for row, o, c in zip(features, seen, components, strict=True)
+        ]
+
+    def _choose(self, seen: _Seen) -> tuple[int, float]:
+        """Choose a plane, at random or by the Boltzmann policy; also the greatest Q, nan where nobody looked."""
+        chances, value = seen.mask / seen.mask.sum(), np.nan
+        if self.network is not None:
+            mask = torch.from_numpy(seen.mask)[None]
+            with torch.inference_mode():
+                q = self.network(torch.from_numpy(seen.features)[None])
+                policy = boltzmann(q, mask, self.options.temperature)[0].double().numpy()
+            chances = self.epsilon * chances + (1 - self.epsilon) * policy
+            value = float(q.masked_fill(~mask, -torch.inf).amax())
+        return _draw(chances, self.rng), value
+
+
+@contextlib.contextmanager
+def one_thread() -> Iterator[None]:
+    """Have torch compute on one thread: sums of several have bits of their own."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
+
+
+def _draw(chances: FloatArray, rng: np.random.Generator) -> int:
+    accumulated: NDArray[np.float64] = np.cumsum(chances)
+    return int(np.searchsorted(accumulated, rng.random() * accumulated[-1], side="right"))

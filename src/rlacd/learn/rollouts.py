@@ -1,0 +1,166 @@
+"""Episodes played by a pool, some ahead of the learner, and taken over in the order of their numbers.
+
+Episode n is drawn from the seed and n alone, and is played by the network as it is when episode n - E has been taken
+over, E being how many are side by side. So what is learned does not depend on how many processes play, where they are,
+how fast, or whether one of them dies: its episode is played again.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rlacd.errors import TrainingError
+from rlacd.learn.episodes import TRIES, Start, draw_start, nothing_to_cut
+from rlacd.learn.meshes import SOLID, Solids
+from rlacd.learn.options import TrainOptions
+from rlacd.learn.record import Record
+from rlacd.learn.rollout_server import SERVER
+from rlacd.pool import Answer, Limits, Pool, Request, Shared, WorkerDiedError, submit_twice
+
+LOST = 10
+"""So many episodes in a row that no process could play, and it is not the meshes' fault."""
+
+MESH, ACT = 1, 2
+"""Streams of an episode's random numbers."""
+
+
+@dataclass(frozen=True)
+class Acting:
+    """How cuts are chosen.
+
+    Attributes
+    ----------
+    network : Shared or None
+        Weights of the Q network; None for cuts at random.
+    epsilon : float
+        Share of cuts at random in any case.
+    """
+
+    network: Shared | None
+    epsilon: float
+
+
+class Rollouts:
+    """Plays episodes without end.
+
+    Parameters
+    ----------
+    pool : Pool
+        Closed by whoever made it.
+    solids : Solids
+    names : sequence of str
+        The meshes to draw from.
+    options : TrainOptions
+    limits : Limits
+        Of one episode.
+    say : callable
+        Is told of episodes that nobody could play.
+    """
+
+    def __init__(
+        self,
+        pool: Pool,
+        solids: Solids,
+        names: Sequence[str],
+        options: TrainOptions,
+        limits: Limits,
+        say: Callable[[str], None],
+    ) -> None:
+        self._pool, self._solids, self._names, self._options = pool, solids, names, options
+        self._limits, self._say = limits, say
+        setting = {"options": json.dumps(dataclasses.asdict(options)).encode()}
+        if options.encoder_weights:
+            setting["encoder"] = Path(options.encoder_weights).read_bytes()
+        self._setting = Shared(setting)
+        self._ahead: deque[_Episode | Record] = deque()
+        self._begun = 0
+        self._in_vain = 0
+        self._lost = 0
+
+    def begin(self, acting: Acting) -> None:
+        """Begin episodes until there are as many ahead as there should be."""
+        while len(self._ahead) < self._options.environments:
+            self._ahead.append(self._episode(self._begun, acting))
+            self._begun += 1
+
+    def take(self) -> Record:
+        """Wait for the next episode, by number, and take it over; one without a cut has nothing to teach.
+
+        Raises
+        ------
+        TrainingError
+            Many in a row had nothing to teach, or none of them could be played.
+        RlacdError
+            What went wrong with all of them: no GPU where one is asked for, ...
+        """
+        record = self._record(self._ahead.popleft())
+        self._in_vain = 0 if record.cuts else self._in_vain + 1
+        self._lost = self._lost + 1 if record.how == "lost" else 0
+        if self._lost == LOST:
+            raise TrainingError(
+                f"{LOST} episodes in a row were lost with their processes; give more --memory or a longer --limit, or "
+                "fewer --jobs, and use --resume."
+            )
+        if self._in_vain == TRIES:
+            raise nothing_to_cut(TRIES, len(self._names))
+        return record
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Wait for all that is ahead; returns everything as arrays."""
+        self._ahead = deque(self._record(episode) for episode in self._ahead)
+        arrays: dict[str, NDArray[Any]] = {"counts": np.array([self._begun, len(self._ahead), self._in_vain])}
+        for i, record in enumerate(self._ahead):
+            assert isinstance(record, Record)
+            arrays |= {f"{i}.{name}": array for name, array in record.arrays().items()}
+        return arrays
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go back to where `state` was told."""
+        self._begun, ahead, self._in_vain = (int(count) for count in arrays["counts"])
+        fields = [field.name for field in dataclasses.fields(Record)]
+        self._ahead = deque(Record.of({name: arrays[f"{i}.{name}"] for name in fields}) for i in range(ahead))
+
+    def _episode(self, number: int, acting: Acting) -> _Episode:
+        options = self._options
+        start = draw_start(self._names, options.rotate, np.random.default_rng([options.seed, MESH, number]))
+        values = {
+            "axis": start.axis,
+            "degrees": start.degrees,
+            "epsilon": acting.epsilon,
+            "seed": [options.seed, ACT, number],
+        }
+        shared = {"setting": self._setting} | ({} if acting.network is None else {"network": acting.network})
+        request = Request(SERVER, values, self._solids.files(start.name), shared, self._limits)
+        return _Episode(number, start, submit_twice(self._pool, request))
+
+    def _record(self, episode: _Episode | Record) -> Record:
+        if isinstance(episode, Record):
+            return episode
+        try:
+            answer = episode.future.result()
+        except WorkerDiedError as died:
+            words = (died.last_words.splitlines() or [""])[-1]
+            self._say(f"episode {episode.number}, {episode.start.name}, is left out: {died} {words}".rstrip())
+            return Record.empty("lost")
+        if SOLID in answer.blobs:
+            self._solids.keep(episode.start.name, answer.blobs[SOLID])
+        return Record.from_bytes(answer.blobs["record"])
+
+
+@dataclass(frozen=True)
+class _Episode:
+    """An episode that is being played."""
+
+    number: int
+    start: Start
+    future: Future[Answer]

@@ -1,0 +1,32 @@
+"""The pool that a command's ``--jobs`` and ``--ray`` ask for."""
+
+from __future__ import annotations
+
+from rlacd.pool.here import HerePool
+from rlacd.pool.local import LocalPool
+from rlacd.pool.request import Pool
+
+
+def open_pool(jobs: int | None, ray: str | None = None) -> Pool:
+    """Open a pool.
+
+    Parameters
+    ----------
+    jobs : int, optional
+        Processes on this machine; 0 for this very process. On a cluster that is started here, its processors, all by
+        default.
+    ray : str, optional
+        Address of a cluster.
+
+    Raises
+    ------
+    MissingExtraError
+        Ray is not installed.
+    OptionError
+        There is no cluster at the address, or the number of processes is negative.
+    """
+    if ray is not None:
+        from rlacd.pool.on_ray import RayPool
+
+        return RayPool(ray, jobs)
+    return HerePool() if jobs == 0 else LocalPool(1 if jobs is None else jobs)

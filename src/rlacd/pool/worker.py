@@ -1,0 +1,160 @@
+"""A process for requests, watched from outside: it is ended when it takes too long or too much memory.
+
+Pools of the standard library and of other packages share a pipe or a lock between their processes; one that is killed
+while it holds it stops the whole pool. Here every process has a pipe of its own, and so its death is nobody else's.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+
+import psutil
+
+from rlacd import errors
+from rlacd.pool.child import READY
+from rlacd.pool.message import receive, send
+from rlacd.pool.process import end, kill_group, why_it_ended
+from rlacd.pool.request import Answer, Request, WorkerDiedError
+
+LOOK = 0.05
+"""Seconds between two looks at a process that is busy."""
+
+START = 300.0
+"""Seconds that a process may take to start."""
+
+
+class Worker:
+    """One process; it starts with its first request, and again after it was ended."""
+
+    def __init__(self) -> None:
+        self._server = ""
+        self._process: subprocess.Popen[bytes] | None = None
+        self._given: dict[str, str] = {}
+        self._killed = False
+        self._starting = threading.Lock()
+
+    @property
+    def name(self) -> str:
+        """Process and machine."""
+        return f"{self._process.pid if self._process else '-'}@{socket.gethostname()}"
+
+    def ask(self, request: Request) -> Answer:
+        """Have a request done.
+
+        Raises
+        ------
+        WorkerDiedError
+            The process died or was ended; the next request gets a new one.
+        RlacdError
+            Whatever the server has raised.
+        """
+        if request.fresh or request.server != self._server:
+            self.close()
+        if self._process is None:
+            self._start(request.server)
+        limits = request.limits
+        self._said.seek(0)
+        self._said.truncate()
+        try:
+            self._send(request)
+            self._await(time.monotonic() + limits.seconds, f"it took more than {limits.seconds:g} s", limits.memory)
+            header, blobs = receive(self._pipe)
+        except (EOFError, OSError) as error:
+            raise self._death() from error
+        except BaseException:
+            self.close()
+            raise
+        name = self.name
+        if limits.memory and self._memory() > limits.memory // 2:
+            self.close()  # what earlier requests have left behind is not to be held against the next
+        if "error" in header:
+            kind, said = header["error"]
+            raise getattr(errors, kind, errors.RlacdError)(said)
+        return Answer(header["values"], blobs, name)
+
+    def close(self) -> None:
+        """End the process; only for whoever asks it."""
+        if self._process is None:
+            return
+        process, self._process = self._process, None
+        end(process)
+        self._given = {}
+        self._pipe.close()
+        self._said.close()
+        self._folder.cleanup()
+
+    def kill(self) -> None:
+        """End the process for good, whoever is waiting for it; that one is told, and closes."""
+        with self._starting:
+            self._killed = True
+            if (process := self._process) is not None:
+                kill_group(process)
+
+    def _start(self, server: str) -> None:
+        self._server = server
+        self._pipe, there = multiprocessing.Pipe()
+        self._folder = tempfile.TemporaryDirectory(prefix="rlacd-")
+        self._said = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process
+        with self._starting:
+            if self._killed:
+                raise WorkerDiedError("its pool was closed")
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "rlacd.pool.child", str(there.fileno()), server, self._folder.name],
+                pass_fds=[there.fileno()],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=self._said,
+                env={**os.environ, "OMP_NUM_THREADS": "1"},
+                start_new_session=True,
+            )
+        there.close()
+        try:
+            self._await(time.monotonic() + START, f"its process did not start within {START:g} s", 0)
+            if self._pipe.recv_bytes() != READY:
+                raise EOFError
+        except (EOFError, OSError) as error:
+            raise self._death() from error
+        except BaseException:
+            self.close()
+            raise
+
+    def _send(self, request: Request) -> None:
+        for name, shared in request.shared.items():
+            if self._given.get(name) != shared.key:
+                send(self._pipe, {"shares": name, "key": shared.key}, shared.blobs)
+        self._given = {name: shared.key for name, shared in request.shared.items()}
+        send(self._pipe, {"shares": "", "values": request.values, "shared": list(request.shared)}, request.blobs)
+
+    def _await(self, until: float, too_late: str, memory: int) -> None:
+        """Wait for something to read, or for the end of the process."""
+        while not self._pipe.poll(LOOK):
+            if time.monotonic() > until:
+                raise WorkerDiedError(too_late)
+            if memory and self._memory() > memory:
+                raise WorkerDiedError(f"it needed more than {memory / 2**30:g} GB of memory")
+
+    def _memory(self) -> int:
+        if self._process is None:
+            return 0
+        try:
+            return int(psutil.Process(self._process.pid).memory_info().rss)
+        except psutil.Error:
+            return 0  # it has just ended, which the pipe tells
+
+    def _death(self) -> WorkerDiedError:
+        assert self._process is not None
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(timeout=10)  # the pipe closes a moment before the process is gone
+        code = self._process.poll()
+        self._said.seek(0)
+        last_words = self._said.read().decode(errors="replace")[-500:].strip()
+        self.close()
+        return WorkerDiedError(f"its process {why_it_ended(code)}", last_words)

@@ -1,0 +1,175 @@
+"""The pool: what is asked is answered, and a process that dies, hangs or is killed is nobody else's trouble."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import psutil
+import pytest
+
+from rlacd.errors import OptionError
+from rlacd.pool import (
+    HerePool,
+    Limits,
+    LocalPool,
+    Pool,
+    Request,
+    Shared,
+    WorkerDiedError,
+    answers,
+    open_pool,
+    submit_twice,
+    worker,
+)
+from tests.pool_server import SERVER
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(autouse=True)
+def server_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).resolve().parents[1]))
+
+
+@pytest.fixture(params=["here", "local"])
+def pool(request: pytest.FixtureRequest) -> Iterator[Pool]:
+    with HerePool() if request.param == "here" else LocalPool(2) as pool:
+        yield pool
+
+
+@pytest.fixture
+def one() -> Iterator[LocalPool]:
+    with LocalPool(1) as pool:
+        yield pool
+
+
+def ask(what: str = "echo", **more: Any) -> Request:
+    seconds = more.pop("seconds", 600)
+    kept = {name: more.pop(name) for name in ("blobs", "shared", "fresh") if name in more}
+    return Request(SERVER, {"what": what, **more}, **kept, limits=Limits(seconds=seconds))
+
+
+def pid(pool: Pool, request: Request | None = None) -> int:
+    return int(pool.submit(request or ask()).result().values["pid"])
+
+
+def test_what_is_asked_is_answered_with_all_that_came_with_it(pool: Pool) -> None:
+    blobs = {"nothing": b"", "a": os.urandom(3_000_000), "椅子": b"x"}
+    shared = {"network": Shared({"weights": b"1234"})}
+    futures = [pool.submit(ask(number=n, blobs=blobs, shared=shared)) for n in range(5)]
+    for number, future in enumerate(futures):
+        answer = future.result()
+        assert answer.values["echo"]["number"] == number
+        assert answer.values["shared"] == {"network": {"weights": 4}}
+        assert answer.blobs == blobs
+
+
+def test_refusals_are_raised_as_what_they_are(pool: Pool) -> None:
+    with pytest.raises(OptionError, match="that is too much; ask for less"):
+        pool.submit(ask("refuse")).result()
+    assert pid(pool)
+
+
+def test_what_is_shared_reaches_a_process_once_and_again_when_it_changes(one: LocalPool) -> None:
+    first, second = Shared({"weights": b"1"}), Shared({"weights": b"22"})
+    with mock.patch.object(worker, "send", wraps=worker.send) as send:
+        seen = [
+            one.submit(ask(shared={"network": shared})).result().values["shared"]["network"]["weights"]
+            for shared in (first, first, second, second, first)
+        ]
+        given = [call.args[1]["shares"] for call in send.call_args_list]
+    assert seen == [1, 1, 2, 2, 1]
+    assert given.count("network") == 3
+    one.submit(ask("die")).exception()
+    assert one.submit(ask(shared={"network": first})).result().values["shared"] == {"network": {"weights": 1}}
+
+
+def test_a_death_is_told_and_is_nobody_elses(pool: Pool) -> None:
+    if isinstance(pool, HerePool):
+        pytest.skip("nobody watches this process")
+    well = [pool.submit(ask(number=n)) for n in range(3)]
+    died = pool.submit(ask("die"))
+    more = [pool.submit(ask(number=n)) for n in range(3)]
+    with pytest.raises(WorkerDiedError, match="its process died of SIGKILL") as told:
+        died.result()
+    assert told.value.last_words == "last words"
+    assert [future.result().values["echo"]["number"] for future in [*well, *more]] == [0, 1, 2] * 2
+    with pytest.raises(WorkerDiedError, match="ended with code 1") as bug:
+        pool.submit(ask("bug")).result()
+    assert "a surprise" in bug.value.last_words
+
+
+def test_a_process_that_hangs_is_ended(one: LocalPool) -> None:
+    before = pid(one)
+    with pytest.raises(WorkerDiedError, match=r"it took more than 0\.5 s"):
+        one.submit(ask("hang", seconds=0.5)).result()
+    assert not psutil.pid_exists(before)
+    assert pid(one) != before
+
+
+def test_a_process_stays_unless_a_new_one_is_wanted(one: LocalPool) -> None:
+    before = pid(one)
+    assert pid(one) == before
+    assert pid(one, ask(fresh=True)) != before
+
+
+def test_a_second_chance_is_one(one: LocalPool, tmp_path: Path) -> None:
+    before = pid(one)
+    assert submit_twice(one, ask("die once", mark=str(tmp_path / "mark"))).result().values["pid"] != before
+    with pytest.raises(WorkerDiedError, match="SIGKILL"):
+        submit_twice(one, ask("die")).result()
+    with pytest.raises(OptionError, match="too much"):
+        submit_twice(one, ask("refuse")).result()
+
+
+def test_a_process_that_is_killed_from_outside_costs_nothing_but_time(one: LocalPool) -> None:
+    os.kill(pid(one), signal.SIGKILL)
+    assert submit_twice(one, ask(number=7)).result().values["echo"]["number"] == 7
+
+
+def test_many_requests_are_taken_as_there_is_room(pool: Pool) -> None:
+    taken = []
+
+    def requests() -> Iterator[tuple[int, Request]]:
+        for number in range(20):
+            taken.append(number)
+            yield number, ask(number=number)
+
+    stream = answers(pool, requests())
+    first, _ = next(stream)
+    assert len(taken) < 10
+    assert sorted([first, *(key for key, _ in stream)]) == list(range(20))
+    if isinstance(pool, LocalPool):
+        lost = dict(answers(pool, [("a", ask("die")), ("b", ask())]))
+        assert isinstance(lost["a"], WorkerDiedError)
+        assert not isinstance(lost["b"], WorkerDiedError)
+
+
+def test_closing_ends_what_is_running_at_once() -> None:
+    with LocalPool(2) as pool:
+        hanging = [pool.submit(ask("hang")) for _ in range(4)]
+        while len(own := psutil.Process().children()) < 2:
+            time.sleep(0.05)
+    assert all(future.done() for future in hanging)
+    assert not any(child.is_running() for child in own)
+
+
+def test_a_server_that_is_not_there_is_told(one: LocalPool) -> None:
+    with pytest.raises(WorkerDiedError, match="ended with code 1") as told:
+        one.submit(Request("nowhere.at.all:Server", {})).result()
+    assert "nowhere" in told.value.last_words
+    assert pid(one)
+
+
+def test_pools_by_what_a_command_is_given() -> None:
+    with open_pool(None) as one, open_pool(0) as here, open_pool(3) as three:
+        assert (one.room, three.room) == (1, 3)
+        assert isinstance(here, HerePool)
+    with pytest.raises(OptionError, match="jobs is -1"):
+        open_pool(-1)
