@@ -65,7 +65,7 @@ def compare_page(bench: Bench, title: str, entries: Sequence[Entry], pictures: i
     page.add(comparison(groups), details(groups))
     shared = common_meshes(rows for _, rows in groups)
     if shared:
-        page.add(*trade_off(entries, shared), Heading("Mesh by mesh"), mesh_by_mesh(entries))
+        page.add(trade_off(entries, shared), Heading("Mesh by mesh"), mesh_by_mesh(entries))
     page.add(Heading("Failures"), Text(failures(row for entry in entries for row in entry.rows)))
     if pictures:
         page.add(Heading("Pictures"), *sheets(bench, entries, bench.names[:pictures], up))
@@ -98,15 +98,11 @@ def machine() -> str:
     return platform.processor() or platform.machine()
 
 
-def trade_off(entries: Sequence[Entry], shared: set[str]) -> list[Figure]:
+def trade_off(entries: Sequence[Entry], shared: set[str]) -> Figure:
     """Plot mean parts against mean CPU seconds."""
-    points = [
-        (entry.label, _mean(entry.rows, shared, "cpu"), _mean(entry.rows, shared, "parts"))
-        for entry in entries
-        if shared
-    ]
+    points = [(entry.label, _mean(entry.rows, shared, "cpu"), _mean(entry.rows, shared, "parts")) for entry in entries]
     drawn = pareto_chart(points, "mean CPU seconds", "mean parts")
-    return [Figure("pareto.svg", drawn, "Fewer parts and less time are better; the line joins what nothing beats.")]
+    return Figure("pareto.svg", drawn, "Fewer parts and less time are better; the line joins what nothing beats.")
 
 
 def mesh_by_mesh(entries: Sequence[Entry]) -> Table:

@@ -187,7 +187,7 @@ def ratio_of_parts(rows: Sequence[Row], reference: Sequence[Row]) -> str:
         return "–"
     mean = math.exp(statistics.fmean(logs))
     error = mean * statistics.stdev(logs) / math.sqrt(len(logs)) if len(logs) > 1 else 0.0
-    return f"{mean:.3f} ± {error:.3f}"
+    return f"{mean:.2f} ± {error:.2f}"
 
 
 def failures(rows: Iterable[Row]) -> str:
