@@ -4,16 +4,20 @@
     python benchmarks/results.py RUN docs/results.md
 
 The document says where each table comes from: the lines between ``<!-- PAGE.md, table N -->`` and ``<!-- end -->`` are
-replaced by the N-th table of RUN/PAGE.md.
+replaced by the N-th table of RUN/PAGE.md. The chart it shows is put beside it.
 """
 
 from __future__ import annotations
 
 import argparse
 import re
+import shutil
 from pathlib import Path
 
 PLACE = re.compile(r"(<!-- (?P<page>\S+\.md), table (?P<number>\d+) -->\n).*?(<!-- end -->)", re.DOTALL)
+CHARTS = {"quick/curves.svg": "parts_against_error.svg"}
+"""From a run's folder to the document's."""
+
 TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
 
 
@@ -38,6 +42,8 @@ def main() -> None:
     parser.add_argument("document", type=Path)
     given = parser.parse_args()
     given.document.write_text(fill(given.document.read_text(), given.run))
+    for source, name in CHARTS.items():
+        shutil.copyfile(given.run / source, given.document.parent / name)
 
 
 if __name__ == "__main__":
