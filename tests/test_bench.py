@@ -20,7 +20,17 @@ from rlacd.errors import MissingExtraError, OptionError, OutputError
 from rlacd.measure import Bench, Limits, Store, Task, find_meshes, make_method, tables, tuning
 from rlacd.measure.deployed import Deployment, decompose_as_deployed
 from rlacd.measure.store import load_hulls, save_hulls
-from rlacd.measure.tables import Spread, Table, as_csv, common_meshes, comparison, failures, ratio_of_parts
+from rlacd.measure.tables import (
+    Spread,
+    Table,
+    as_csv,
+    common_meshes,
+    comparison,
+    details,
+    failures,
+    ratio_of_parts,
+    short_names,
+)
 from rlacd.measure.tuning import CLOSE, next_setting, tune
 from tests.shapes import box, from_manifold
 
@@ -272,6 +282,65 @@ class TestRunner:
         assert find_meshes(meshes, tmp_path / "list.txt") == ["box.ply"]
 
 
+def test_what_another_version_made_is_made_again(meshes: Path, tmp_path: Path) -> None:
+    bench = bench_of(meshes, tmp_path / "run")
+    (first, _) = rows = bench.run("greedy", 0.05)
+    bench.store.add({**first, "version": "0.0.0", "parts": 99})
+    assert tuning.known_curve(bench, "greedy") == []
+    written = bench.store.hulls_of(Task(first["mesh"], "greedy", 0.05)).stat().st_mtime_ns
+    again = bench.run("greedy", 0.05)
+    assert [row["parts"] for row in again] == [row["parts"] for row in rows]
+    assert again[1] == rows[1], "only that one"
+    assert bench.store.hulls_of(Task(first["mesh"], "greedy", 0.05)).stat().st_mtime_ns > written
+
+
+class TestLayouts:
+    """Data sets that people have are read as they are distributed; the files here are made up."""
+
+    LAYOUTS: ClassVar = {
+        "ShapeNetCore v1": {
+            "02691156/10155655850468db78d106ce0a280f87/model.obj": True,
+            "02691156/10155655850468db78d106ce0a280f87/model.mtl": False,
+            "02691156/10155655850468db78d106ce0a280f87/images/texture0.jpg": False,
+            "03001627/1006be65e7bc937e9141f9b58470d646/model.obj": True,
+        },
+        "ShapeNetCore v2": {
+            "02691156/10155655850468db78d106ce0a280f87/models/model_normalized.obj": True,
+            "02691156/10155655850468db78d106ce0a280f87/models/model_normalized.mtl": False,
+            "02691156/10155655850468db78d106ce0a280f87/models/model_normalized.json": False,
+            "02691156/10155655850468db78d106ce0a280f87/models/model_normalized.solid.binvox": False,
+            "02691156/10155655850468db78d106ce0a280f87/models/model_normalized.surface.binvox": False,
+            "02691156/10155655850468db78d106ce0a280f87/screenshots/10155655850468db78d106ce0a280f87-0.png": False,
+            "03001627/1006be65e7bc937e9141f9b58470d646/models/model_normalized.obj": True,
+            "taxonomy.json": False,
+        },
+        "COSEG": {
+            "chairs/shapes/1.off": True,
+            "chairs/gt/1.seg": False,
+            "vases/shapes/1.off": True,
+        },
+        "HumanBody": {
+            "meshes/train/adobe/alien.off": True,
+            "meshes/train/faust/tr_reg_000.ply": True,
+            "meshes/train/MIT_animation/meshes_bouncing/mesh_0000.obj": True,
+            "meshes/test/shrec/1.off": True,
+            "segs/test/shrec/shrec_1_full.txt": False,
+        },
+    }
+
+    @pytest.mark.parametrize("layout", LAYOUTS)
+    def test_every_mesh_is_found_and_has_a_name_of_its_own(self, layout: str, tmp_path: Path) -> None:
+        files = self.LAYOUTS[layout]
+        for name in files:
+            (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / name).touch()
+        found = find_meshes(tmp_path)
+        assert found == sorted(name for name, wanted in files.items() if wanted)
+        names = set(short_names(found).values())
+        assert len(names) == len(found)
+        assert not any("model" in name for name in names), "files that are all called alike say nothing"
+
+
 class TestTuning:
     """On made-up methods, whose D_h is a known function of their number."""
 
@@ -343,17 +412,26 @@ class TestTables:
         a, b = self.rows(2, 4, 100), self.rows(3, 5, failed="m2")
         assert common_meshes([a, b]) == {"m0", "m1"}
         text = comparison([("a", a), ("b", b)]).markdown()
-        assert "| a | 3.0 (4.0, ± 1.4) |" in text
-        assert "| 1 of 3 |" in text
-        assert "2 meshes that every method managed" in text
+        assert "| 2 meshes | #P |" in text
+        assert "| a | 3.0 (4.0, ± 1.4) | 1 |" in text
+        assert "| b | 4.0 (5.0, ± 1.4) | 1.37 ± 0.12 |" in text
+        assert [line[-1] for line in details([("a", a), ("b", b)]).lines] == ["0 of 3", "1 of 3"]
 
     def test_a_method_that_always_fails(self) -> None:
-        text = comparison([("a", self.rows(2)), ("b", self.rows(failed="m0"))]).markdown()
-        assert "| b | – |" in text
+        groups = [("a", self.rows(2)), ("b", self.rows(failed="m0"))]
+        assert "| b | – | – |" in comparison(groups).markdown()
+        assert [line[-1] for line in details(groups).lines] == ["0 of 1", "1 of 1"]
 
     def test_ratio(self) -> None:
-        assert ratio_of_parts(self.rows(2, 8), self.rows(4, 4)) == "1.000 ± 0.693"
+        assert ratio_of_parts(self.rows(2, 8), self.rows(4, 4)) == "1.00 ± 0.69"
         assert ratio_of_parts(self.rows(failed="m0"), self.rows(4)) == "–"
+
+    def test_names_tell_meshes_apart(self) -> None:
+        named = short_names(["a/chair.obj", "b/chair.obj", "b/lamp.obj"])
+        assert list(named.values()) == ["a/chair", "b/chair", "lamp"]
+        assert short_names(["x/one.obj"]) == {"x/one.obj": "one"}
+        same = short_names(["one.obj", "one.stl", "a/one.obj"])
+        assert len(set(same.values())) == 3
 
     def test_csv_keeps_errors_with_commas(self) -> None:
         import csv

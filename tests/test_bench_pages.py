@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import csv
 import json
+import re
+import subprocess
+import sys
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -195,6 +198,35 @@ class TestCommands:
     def test_a_listed_mesh_that_is_missing(self, meshes: Path, tmp_path: Path) -> None:
         (tmp_path / "list.txt").write_text("cross.stl\nno.stl\n")
         assert "no.stl" in bench("compare", meshes, "-o", tmp_path / "run", "--list", tmp_path / "list.txt", code=2)
+
+
+class TestResultsInTheDocs:
+    """docs/results.md shows tables that commands printed, and no others."""
+
+    ROOT = Path(__file__).resolve().parents[1]
+
+    def test_every_table_says_where_it_comes_from(self) -> None:
+        document = (self.ROOT / "docs" / "results.md").read_text()
+        places = re.compile(r"<!-- \S+\.md, table \d+ -->\n.*?<!-- end -->", re.DOTALL)
+        assert len(places.findall(document)) > 5
+        assert "|---" not in places.sub("", document)
+
+    def test_tables_are_put_in_their_place(self, tmp_path: Path) -> None:
+        (tmp_path / "run" / "quick").mkdir(parents=True)
+        pages = {"compare.md": "# A\n\n| a |\n|---|\n| 1 |\n\ntext\n\n| b |\n|---|\n| 2 |\n", "curves.svg": "<svg/>"}
+        for name, text in pages.items():
+            (tmp_path / "run" / "quick" / name).write_text(text)
+        document = tmp_path / "results.md"
+        document.write_text("before\n<!-- quick/compare.md, table 2 -->\nold\n<!-- end -->\nafter\n")
+        command = [sys.executable, self.ROOT / "benchmarks" / "results.py", tmp_path / "run", document]
+        for _ in range(2):  # the second time nothing changes
+            subprocess.run(command, check=True)
+            expected = "before\n<!-- quick/compare.md, table 2 -->\n\n| b |\n|---|\n| 2 |\n\n<!-- end -->\nafter\n"
+            assert document.read_text() == expected
+        document.write_text("<!-- quick/compare.md, table 3 -->\n<!-- end -->\n")
+        told = subprocess.run(command, capture_output=True, text=True)
+        assert told.returncode == 1
+        assert "has 2 tables, not 3" in told.stderr
 
 
 class TestArms:

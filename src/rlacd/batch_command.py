@@ -7,7 +7,7 @@ import os
 import signal
 import threading
 from collections.abc import Callable
-from contextlib import AbstractContextManager, suppress
+from contextlib import suppress
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
@@ -16,12 +16,11 @@ import typer
 
 from rlacd.command_options import HOW, decompose_options
 from rlacd.errors import OptionError
+from rlacd.exit_codes import ExitCode, exit_codes
 
 if TYPE_CHECKING:
     from rlacd.fleet import Batch
     from rlacd.pool import Pool
-
-STOPPED_EARLY, SOME_FAILED = 4, 5
 
 HELP = """Decompose all meshes of a folder; what is done already is passed over.
 
@@ -108,10 +107,8 @@ _OWN: Parameters = {
 }
 
 
-def batch_command(
-    exit_codes: Callable[[], AbstractContextManager[None]], decompose: Callable[..., None]
-) -> Callable[..., None]:
-    """Build the command; `exit_codes` turns errors into a sentence and an exit code, `decompose` lends its options."""
+def batch_command(decompose: Callable[..., None]) -> Callable[..., None]:
+    """Build the command; `decompose` lends its options."""
 
     def batch(**given: Any) -> None:
         with exit_codes():
@@ -192,6 +189,6 @@ def _run(batch: Batch, own: dict[str, Any], *, quiet: bool) -> None:
     if not quiet:
         say("\n".join(summary_lines(summary, batch.out)))
     if summary.stopped:
-        raise typer.Exit(STOPPED_EARLY)
+        raise typer.Exit(ExitCode.STOPPED_EARLY)
     if summary.failures:
-        raise typer.Exit(SOME_FAILED)
+        raise typer.Exit(ExitCode.SOME_FAILED)

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
 from rlacd.errors import MeshFileError, OptionError, OutputError
+from rlacd.exit_codes import exit_codes
 
 if TYPE_CHECKING:
     from rlacd.measure import Bench
     from rlacd.measure.page import Page
-
-ExitCodes = Callable[[], AbstractContextManager[None]]
 
 HELP = """Compare decompositions by other tools and by rlacd: fewer, tighter hulls, and how long they take.
 
@@ -32,186 +33,188 @@ so a run can be stopped and started again. Pages are written as Markdown and HTM
                                  the paper's deployment, its kinds and numbers of planes left free
 """
 
+app = typer.Typer(help=HELP, no_args_is_help=True, rich_markup_mode="rich")
+
 Meshes = Annotated[Path, typer.Argument(help="A folder of meshes, of any depth.", show_default=False)]
 Out = Annotated[Path, typer.Option("--out", "-o", help="A folder for results, pages and pictures.")]
-Listed = Annotated[
-    Path | None, typer.Option("--list", help="A file with one mesh a line, relative to the folder; default: all.")
-]
-Most = Annotated[int | None, typer.Option("--first", min=1, help="Only so many of the meshes.", show_default=False)]
 Methods = Annotated[str | None, typer.Option(help="Separated by commas.", show_default=False)]
-Seconds = Annotated[float, typer.Option("--limit", min=0.1, help="Seconds a method may take for one mesh.")]
-Memory = Annotated[float, typer.Option(min=0.0, help="GB a process may use (Linux); 0: no limit.")]
-Threads = Annotated[int, typer.Option(min=1, help="Threads of each process.")]
-Jobs = Annotated[int, typer.Option(min=1, help="Processes at a time.")]
 Threshold = Annotated[float, typer.Option("--threshold", "-t", help="Concavity threshold.")]
 Ranking = Annotated[str, typer.Option(help="What ranks the planes along the axes: learned or excess.")]
+MeanError = Annotated[list[float] | None, typer.Option(help="Mean D_h to tune to; may be repeated.")]
+
+Runs: dict[str, tuple[Any, Any]] = {
+    "listed": (
+        None,
+        Annotated[
+            Path | None,
+            typer.Option("--list", help="A file with one mesh a line, relative to the folder; default: all."),
+        ],
+    ),
+    "first": (
+        None,
+        Annotated[int | None, typer.Option(min=1, help="Only so many of the meshes.", show_default=False)],
+    ),
+    "limit": (
+        600.0,
+        Annotated[float, typer.Option("--limit", min=0.1, help="Seconds a method may take for one mesh.")],
+    ),
+    "memory": (12.0, Annotated[float, typer.Option(min=0.0, help="GB a process may use (Linux); 0: no limit.")]),
+    "threads": (1, Annotated[int, typer.Option(min=1, help="Threads of each process.")]),
+    "jobs": (1, Annotated[int, typer.Option(min=1, help="Processes at a time.")]),
+}
+"""Options of every command that runs methods on meshes: name to default and annotation."""
 
 
-def bench_app(exit_codes: ExitCodes) -> typer.Typer:
-    """Build the commands; `exit_codes` turns errors into a sentence and an exit code."""
-    app = typer.Typer(help=HELP, no_args_is_help=True, rich_markup_mode="rich")
+def experiment(name: str) -> Callable[[Callable[..., Page]], Callable[..., Page]]:
+    """Make a command of a function that takes a `Bench`, and options of its own, and returns a page."""
 
-    @app.command()
-    def compare(
+    def register(make_page: Callable[..., Page]) -> Callable[..., Page]:
+        hints = get_type_hints(make_page, {**globals(), "Bench": Any, "Page": Any}, include_extras=True)
+        own = {key: (p.default, hints[key]) for key, p in list(inspect.signature(make_page).parameters.items())[1:]}
+        required = inspect.Parameter.empty
+        parameters = {"meshes": (required, Meshes), "out": (required, Out), **own, **Runs}
+
+        @functools.wraps(make_page)
+        def command(**given: Any) -> None:
+            chosen = {key: given.pop(key) for key in own}
+            with exit_codes(), _open(**given) as opened:
+                _save(opened, make_page(opened, **chosen), name)
+
+        command.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+            [
+                inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+                for key, (default, annotation) in parameters.items()
+            ]
+        )
+        command.__annotations__ = {key: annotation for key, (_, annotation) in parameters.items()}
+        app.command(name)(command)
+        return make_page
+
+    return register
+
+
+@experiment("compare")
+def compare(
+    bench: Bench,
+    methods: Methods = None,
+    threshold: Threshold = 0.05,
+    pictures: Annotated[int, typer.Option(min=0, help="Draw so many meshes by every method.")] = 8,
+    up: Annotated[str, typer.Option(help="The axis that points up in the pictures: x, y or z.")] = "z",
+) -> Page:
+    """Compare methods at their own numbers; those with a concavity threshold all at the same.
+
+    \b
+    [bold]Example[/bold]
+      rlacd bench compare meshes/ --out run/ --jobs 2
+    """
+    from rlacd.measure.compare import DEFAULT_METHODS, at_settings, compare_page
+
+    if up not in ("x", "y", "z"):
+        raise OptionError(f"--up is {up!r}; it has to be x, y or z.")
+    entries = at_settings(bench, _names(methods, DEFAULT_METHODS), threshold)
+    return compare_page(bench, "Side by side", entries, pictures, up)
+
+
+@experiment("paper-table-1")
+def table_1(bench: Bench, methods: Methods = None, at: MeanError = None) -> Page:
+    """Tune every method to the same mean D_h, then compare (4.4.1)."""
+    return _equal_accuracy(bench, "Equal accuracy (Table 1)", methods, at)
+
+
+@experiment("paper-greedy")
+def greedy(bench: Bench, methods: Methods = "greedy-hull-sum,greedy,learned", at: MeanError = None) -> Page:
+    """The same for one step ahead (greedy-hull-sum, greedy) against the learned ranking (4.4.3)."""
+    return _equal_accuracy(bench, "Greedy against the policy (4.4.3)", methods, at)
+
+
+@experiment("paper-table-4")
+def table_4(bench: Bench, methods: Methods = None, at: MeanError = None) -> Page:
+    """Table 1 on a folder of meshes the policy has seen nothing like: ShapeNetCore, HumanBody, COSEG, or any other."""
+    return _equal_accuracy(bench, "Other meshes (Table 4)", methods, at)
+
+
+def _equal_accuracy(bench: Bench, title: str, methods: str | None, at: list[float] | None) -> Page:
+    from rlacd.measure.experiments import TABLE_1_METHODS, TARGETS, equal_accuracy
+
+    return equal_accuracy(bench, _names(methods, TABLE_1_METHODS), at or TARGETS, title)
+
+
+@experiment("paper-vhacd")
+def vhacd(
+    bench: Bench,
+    reference: Annotated[str, typer.Option(help="The method whose number of hulls V-HACD is given.")] = "greedy",
+    threshold: Threshold = 0.05,
+) -> Page:
+    """Give V-HACD as many hulls as rlacd made of each mesh, and compare how tight they are (4.4.2)."""
+    from rlacd.measure.experiments import vhacd_at_equal_parts
+
+    return vhacd_at_equal_parts(bench, reference, threshold)
+
+
+@experiment("paper-table-2")
+def table_2(bench: Bench, ranking: Ranking = "learned", threshold: Threshold = 0.05) -> Page:
+    """Leave out spatial planes, PCA planes, planes of concave edges (Table 2)."""
+    from rlacd.measure.experiments import kinds_of_planes
+
+    return kinds_of_planes(bench, ranking, threshold)
+
+
+@experiment("paper-table-3")
+def table_3(
+    bench: Bench,
+    planes: Annotated[str, typer.Option(help="#AP: ranked planes that go on.")] = "1,5,10,20,50,150",
+    edges: Annotated[str, typer.Option(help="#CE: concave edges asked.")] = "0,4,16,64",
+    ranking: Ranking = "learned",
+    threshold: Threshold = 0.05,
+) -> Page:
+    """Vary the numbers of planes and of concave edges (Table 3)."""
+    from rlacd.measure.experiments import numbers_of_planes
+
+    return numbers_of_planes(bench, ranking, threshold, _counts(planes), _counts(edges))
+
+
+def _trained(name: str, about: str) -> None:
+    @app.command(name, help=about)
+    def run(
         meshes: Meshes,
         out: Out,
-        listed: Listed = None,
-        first: Most = None,
-        methods: Methods = None,
-        threshold: Threshold = 0.05,
-        pictures: Annotated[int, typer.Option(min=0, help="Draw so many meshes by every method.")] = 8,
-        up: Annotated[str, typer.Option(help="The axis that points up in the pictures: x, y or z.")] = "z",
-        limit: Seconds = 600.0,
-        memory: Memory = 12.0,
-        threads: Threads = 1,
-        jobs: Jobs = 1,
+        preset: Annotated[str, typer.Option(help="Of `rlacd train`.")] = "quick",
+        iterations: Annotated[int | None, typer.Option(help="Cuts an arm.", show_default=False)] = None,
+        seed: Annotated[int, typer.Option(min=0)] = 0,
     ) -> None:
-        """Compare methods at their own numbers; those with a concavity threshold all at the same.
-
-        \b
-        [bold]Example[/bold]
-          rlacd bench compare meshes/ --out run/ --jobs 2
-        """
-        with exit_codes(), _bench(meshes, out, listed, first, limit, memory, threads, jobs) as bench:
-            from rlacd.measure.compare import DEFAULT_METHODS, at_settings, compare_page
-
-            if up not in ("x", "y", "z"):
-                raise OptionError(f"--up is {up!r}; it has to be x, y or z.")
-            entries = at_settings(bench, _names(methods, DEFAULT_METHODS), threshold)
-            _save(bench, compare_page(bench, "Side by side", entries, pictures, up), "compare")
-
-    def equal(name: str, title: str, about: str, usual: tuple[str, ...] | None = None) -> None:
-        @app.command(name, help=about)
-        def run(
-            meshes: Meshes,
-            out: Out,
-            listed: Listed = None,
-            first: Most = None,
-            methods: Methods = None,
-            at: Annotated[list[float] | None, typer.Option(help="Mean D_h to tune to; may be repeated.")] = None,
-            limit: Seconds = 600.0,
-            memory: Memory = 12.0,
-            threads: Threads = 1,
-            jobs: Jobs = 1,
-        ) -> None:
-            with exit_codes(), _bench(meshes, out, listed, first, limit, memory, threads, jobs) as bench:
-                from rlacd.measure.experiments import TABLE_1_METHODS, TARGETS, equal_accuracy
-
-                page = equal_accuracy(bench, _names(methods, usual or TABLE_1_METHODS), at or TARGETS, title)
-                _save(bench, page, name)
-
-    equal("paper-table-1", "Equal accuracy (Table 1)", "Tune every method to the same mean D_h, then compare (4.4.1).")
-    equal(
-        "paper-greedy",
-        "Greedy against the policy (4.4.3)",
-        "The same for one step ahead (greedy-hull-sum, greedy) against the learned ranking (4.4.3).",
-        ("greedy-hull-sum", "greedy", "learned"),
-    )
-    equal("paper-table-4", "Other meshes (Table 4)", "Table 1 on a folder of meshes the policy has seen nothing like.")
-
-    @app.command("paper-vhacd")
-    def vhacd(
-        meshes: Meshes,
-        out: Out,
-        listed: Listed = None,
-        first: Most = None,
-        reference: Annotated[str, typer.Option(help="The method whose number of hulls V-HACD is given.")] = "greedy",
-        threshold: Threshold = 0.05,
-        limit: Seconds = 600.0,
-        memory: Memory = 12.0,
-        threads: Threads = 1,
-        jobs: Jobs = 1,
-    ) -> None:
-        """Give V-HACD as many hulls as rlacd made of each mesh, and compare how tight they are (4.4.2)."""
-        with exit_codes(), _bench(meshes, out, listed, first, limit, memory, threads, jobs) as bench:
-            from rlacd.measure.experiments import vhacd_at_equal_parts
-
-            _save(bench, vhacd_at_equal_parts(bench, reference, threshold), "paper-vhacd")
-
-    @app.command("paper-table-2")
-    def table_2(
-        meshes: Meshes,
-        out: Out,
-        listed: Listed = None,
-        first: Most = None,
-        ranking: Ranking = "learned",
-        threshold: Threshold = 0.05,
-        limit: Seconds = 600.0,
-        memory: Memory = 12.0,
-        threads: Threads = 1,
-        jobs: Jobs = 1,
-    ) -> None:
-        """Leave out spatial planes, PCA planes, planes of concave edges (Table 2)."""
-        with exit_codes(), _bench(meshes, out, listed, first, limit, memory, threads, jobs) as bench:
-            from rlacd.measure.experiments import kinds_of_planes
-
-            _save(bench, kinds_of_planes(bench, ranking, threshold), "paper-table-2")
-
-    @app.command("paper-table-3")
-    def table_3(
-        meshes: Meshes,
-        out: Out,
-        listed: Listed = None,
-        first: Most = None,
-        planes: Annotated[str, typer.Option(help="#AP: ranked planes that go on.")] = "1,5,10,25,50,150",
-        edges: Annotated[str, typer.Option(help="#CE: concave edges asked.")] = "0,1,4,16,64",
-        ranking: Ranking = "learned",
-        threshold: Threshold = 0.05,
-        limit: Seconds = 600.0,
-        memory: Memory = 12.0,
-        threads: Threads = 1,
-        jobs: Jobs = 1,
-    ) -> None:
-        """Vary the numbers of planes and of concave edges (Table 3)."""
-        with exit_codes(), _bench(meshes, out, listed, first, limit, memory, threads, jobs) as bench:
-            from rlacd.measure.experiments import numbers_of_planes
-
-            page = numbers_of_planes(bench, ranking, threshold, _counts(planes), _counts(edges))
-            _save(bench, page, "paper-table-3")
-
-    def trained(name: str, about: str) -> None:
-        @app.command(name, help=about)
-        def run(
-            meshes: Meshes,
-            out: Out,
-            preset: Annotated[str, typer.Option(help="Of `rlacd train`.")] = "quick",
-            iterations: Annotated[int | None, typer.Option(help="Cuts an arm.", show_default=False)] = None,
-            seed: Annotated[int, typer.Option(min=0)] = 0,
-        ) -> None:
-            with exit_codes():
-                from rlacd.measure.arms import train_arms
-
-                _need_folder(meshes)
-                _make_folder(out)
-                page = train_arms(name, meshes, out, preset, iterations, seed, typer.echo)
-                _write(page, out, name)
-
-    trained("paper-rewards", "Train with other weights of the two rewards, and without each (4.5.3).")
-    trained("paper-encoding", "Train with a network that does not see the hull (4.5.2).")
-    trained("paper-curves", "Train with other discounts, and draw the curves (Fig. 7).")
-
-    @app.command("paper-discounts")
-    def discounts(
-        meshes: Meshes,
-        out: Out,
-        count: Annotated[int, typer.Option(min=1, help="Small meshes whose cut trees are grown.")] = 12,
-        depth: Annotated[int, typer.Option(min=1, help="Cuts deep.")] = 4,
-        steps: Annotated[int, typer.Option(min=1, help="Steps of Q-learning.")] = 300_000,
-    ) -> None:
-        """Find by tabular Q-learning on real cut trees which discounts converge (appendix A)."""
         with exit_codes():
-            from rlacd.measure import find_meshes
-            from rlacd.measure.discounts import discounts_page
+            from rlacd.measure.arms import train_arms
 
             _need_folder(meshes)
             _make_folder(out)
-            _write(discounts_page(meshes, find_meshes(meshes), count, depth, steps), out, "paper-discounts")
+            _write(train_arms(name, meshes, out, preset, iterations, seed, typer.echo), out, name)
 
-    return app
+
+_trained("paper-rewards", "Train with other weights of the two rewards, and without each (4.5.3).")
+_trained("paper-encoding", "Train with a network that does not see the hull (4.5.2).")
+_trained("paper-curves", "Train with other discounts, and draw the curves (Fig. 7).")
+
+
+@app.command("paper-discounts")
+def discounts(
+    meshes: Meshes,
+    out: Out,
+    count: Annotated[int, typer.Option(min=1, help="Small meshes whose cut trees are grown.")] = 12,
+    depth: Annotated[int, typer.Option(min=1, help="Cuts deep.")] = 4,
+    steps: Annotated[int, typer.Option(min=1, help="Steps of Q-learning.")] = 300_000,
+) -> None:
+    """Find by tabular Q-learning on real cut trees which discounts converge (appendix A)."""
+    with exit_codes():
+        from rlacd.measure import find_meshes
+        from rlacd.measure.discounts import discounts_page
+
+        _need_folder(meshes)
+        _make_folder(out)
+        _write(discounts_page(meshes, find_meshes(meshes), count, depth, steps), out, "paper-discounts")
 
 
 @contextmanager
-def _bench(
+def _open(
     meshes: Path,
     out: Path,
     listed: Path | None,

@@ -9,11 +9,11 @@ import typer
 
 from rlacd import __version__
 from rlacd.batch_command import BATCH_EPILOG, batch_command
-from rlacd.bench_command import bench_app
+from rlacd.bench_command import app as bench
 from rlacd.decompose_command import decompose
 from rlacd.exit_codes import EPILOG, exit_codes
 from rlacd.train_command import pretrain_command, train_command
-from rlacd.view_command import view_command
+from rlacd.view_command import view
 
 app = typer.Typer(
     name="rlacd",
@@ -69,8 +69,8 @@ def info(
         typer.echo(to_json(facts) if as_json else printable(describe_text(facts)), nl=False)
 
 
-app.command("view", epilog=EPILOG)(view_command(exit_codes))
-app.command("batch", epilog=BATCH_EPILOG)(batch_command(exit_codes, decompose))
-app.add_typer(bench_app(exit_codes), name="bench")
-app.command("train", epilog=EPILOG)(train_command(exit_codes))
-app.command("pretrain", epilog=EPILOG)(pretrain_command(exit_codes))
+app.command("view", epilog=EPILOG)(view)
+app.command("batch", epilog=BATCH_EPILOG)(batch_command(decompose))
+app.add_typer(bench, name="bench")
+app.command("train", epilog=EPILOG)(train_command())
+app.command("pretrain", epilog=EPILOG)(pretrain_command())

@@ -6,19 +6,18 @@ import dataclasses
 import importlib
 import inspect
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from rlacd.errors import MissingExtraError, OptionError
+from rlacd.exit_codes import exit_codes
 from rlacd.learn.options import PRESETS, TrainOptions
 from rlacd.learn.pretrain.options import PretrainOptions
 
 EXTRA = ("torch", "gymnasium", "tensorboard", "safetensors", "onnx", "onnxscript", "onnxruntime")
 
-ExitCodes = Callable[[], AbstractContextManager[None]]
 Parameters = dict[str, tuple[Any, Any]]
 """Of a command: name to default and annotation."""
 
@@ -84,8 +83,8 @@ WHERE: Parameters = {
 RESUME = (False, Annotated[bool, typer.Option("--resume", help="Go on from the run's last checkpoint.")])
 
 
-def train_command(exit_codes: ExitCodes) -> Callable[..., None]:
-    """Build `rlacd train`; `exit_codes` turns errors into a sentence and an exit code."""
+def train_command() -> Callable[..., None]:
+    """Build `rlacd train`."""
 
     def train(**given: Any) -> None:
         with exit_codes():
@@ -110,8 +109,8 @@ def train_command(exit_codes: ExitCodes) -> Callable[..., None]:
     return _command(train, TRAIN_HELP, own | _parameters(TrainOptions, "without a preset: "))
 
 
-def pretrain_command(exit_codes: ExitCodes) -> Callable[..., None]:
-    """Build `rlacd pretrain`; `exit_codes` turns errors into a sentence and an exit code."""
+def pretrain_command() -> Callable[..., None]:
+    """Build `rlacd pretrain`."""
 
     def pretrain(**given: Any) -> None:
         with exit_codes():

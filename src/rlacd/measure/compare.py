@@ -17,7 +17,7 @@ from rlacd.measure.page import Figure, Heading, Page, Text
 from rlacd.measure.runner import Bench
 from rlacd.measure.sheets import draw_sheet
 from rlacd.measure.store import Row, Task, load_hulls
-from rlacd.measure.tables import Table, as_csv, common_meshes, comparison, failures, ratio_of_parts
+from rlacd.measure.tables import Table, as_csv, common_meshes, comparison, details, failures, short_names
 from rlacd.measure.tuning import Point, known_curve
 
 DEFAULT_METHODS = (
@@ -62,14 +62,10 @@ def compare_page(bench: Bench, title: str, entries: Sequence[Entry], pictures: i
     """Put what the entries have in common into a page: table, trade-off, mesh by mesh, failures, pictures."""
     page = Page(title, [about(bench)])
     groups = [(entry.label, entry.rows) for entry in entries]
-    page.add(comparison(groups))
+    page.add(comparison(groups), details(groups))
     shared = common_meshes(rows for _, rows in groups)
     if shared:
-        reference = entries[0]
-        ratios = [[e.label, ratio_of_parts(e.rows, reference.rows)] for e in entries[1:]]
-        if ratios:
-            page.add(Table(["method", f"parts / {reference.label}"], ratios, "Geometric mean a mesh ± standard error."))
-        page.add(*trade_off(entries, shared), Heading("Mesh by mesh"), mesh_by_mesh(entries))
+        page.add(trade_off(entries, shared), Heading("Mesh by mesh"), mesh_by_mesh(entries))
     page.add(Heading("Failures"), Text(failures(row for entry in entries for row in entry.rows)))
     if pictures:
         page.add(Heading("Pictures"), *sheets(bench, entries, bench.names[:pictures], up))
@@ -102,24 +98,20 @@ def machine() -> str:
     return platform.processor() or platform.machine()
 
 
-def trade_off(entries: Sequence[Entry], shared: set[str]) -> list[Figure]:
+def trade_off(entries: Sequence[Entry], shared: set[str]) -> Figure:
     """Plot mean parts against mean CPU seconds."""
-    points = [
-        (entry.label, _mean(entry.rows, shared, "cpu"), _mean(entry.rows, shared, "parts"))
-        for entry in entries
-        if shared
-    ]
+    points = [(entry.label, _mean(entry.rows, shared, "cpu"), _mean(entry.rows, shared, "parts")) for entry in entries]
     drawn = pareto_chart(points, "mean CPU seconds", "mean parts")
-    return [Figure("pareto.svg", drawn, "Fewer parts and less time are better; the line joins what nothing beats.")]
+    return Figure("pareto.svg", drawn, "Fewer parts and less time are better; the line joins what nothing beats.")
 
 
 def mesh_by_mesh(entries: Sequence[Entry]) -> Table:
     """Parts and D_h of each method on each mesh."""
     by_mesh = {entry.label: {row["mesh"]: row for row in entry.rows} for entry in entries}
-    lines = []
-    for mesh in [row["mesh"] for row in entries[0].rows]:
-        cells = [f"{_cell(by_mesh[entry.label].get(mesh))}" for entry in entries]
-        lines.append([Path(mesh).stem, *cells])
+    lines = [
+        [name, *(_cell(by_mesh[entry.label].get(mesh)) for entry in entries)]
+        for mesh, name in short_names([row["mesh"] for row in entries[0].rows]).items()
+    ]
     return Table(["mesh", *(entry.label for entry in entries)], lines, "#P / D_h / CPU seconds.")
 
 
@@ -164,6 +156,7 @@ def _means(point: Point, shared: set[str]) -> tuple[float, float, float]:
 def sheets(bench: Bench, entries: Sequence[Entry], meshes: Sequence[str], up: str = "z") -> list[Figure | Text]:
     """Draw each mesh by every method that managed it."""
     drawn: list[Figure | Text] = []
+    names = short_names(bench.names)
     for mesh in meshes:
         managed = []
         for entry in entries:
@@ -176,7 +169,7 @@ def sheets(bench: Bench, entries: Sequence[Entry], meshes: Sequence[str], up: st
             content = draw_sheet(bench.meshes / mesh, managed, axis)
         except MissingExtraError as error:
             return [Text(f"No pictures: {error}")]
-        drawn.append(Figure(f"{Path(mesh).stem}.png", content, mesh))
+        drawn.append(Figure(f"{names[mesh].replace('/', '-')}.png", content, mesh))
     return drawn
 
 

@@ -62,7 +62,7 @@ def discounts_page(meshes: Path, names: list[str], count: int = 12, depth: int =
         size = np.array([np.abs(q).max() for q in history])
         shown = (size > 0) & (size < ENDLESS)
         sizes.append(Curve(name, at[shown].tolist(), size[shown].tolist()))
-        cells = ["did not converge", f"|Q| {size[-1]:.3g}"]
+        cells = ["does not exist", f"|Q| {size[-1]:.3g}"]
         if exact is not None:
             away = np.array([np.abs(q - exact)[process.possible].max() for q in history])
             errors.append(Curve(name, at[away > 0].tolist(), away[away > 0].tolist()))
@@ -73,9 +73,9 @@ def discounts_page(meshes: Path, names: list[str], count: int = 12, depth: int =
         Text(
             f"All that three planes can make of {count} real solids in {depth} cuts, concavity {THRESHOLD:g}. "
             "Components that look alike (share of the hull filled and proportions, in thirds) are one state. Tabular "
-            f"Q-learning of {steps} steps against exact dynamic programming."
+            f"Q-learning of {steps:,} steps against exact dynamic programming."
         ),
-        Table(["discounts", "states", "greatest |Q*|", "in the end"], lines),
+        Table(["discounts", "states", "greatest |Q*|", f"after {steps:,} steps"], lines),
         _figure("discounts-size.svg", sizes, "greatest |Q|"),
         _figure("discounts-error.svg", errors, "greatest |Q − Q*|, where Q* exists"),
     )

@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+from rlacd.measure.methods import make_method
 from rlacd.measure.store import Row, Store, Task
 from rlacd.pool.process import kill_group, why_it_ended
 
@@ -73,7 +74,7 @@ class Bench:
     def run_tasks(self, tasks: Iterable[Task]) -> list[Row]:
         """Do what is not done yet, and return the rows of all tasks in their order."""
         tasks = list(tasks)
-        waiting = [task for task in dict.fromkeys(tasks) if self.store.get(task) is None]
+        waiting = [task for task in dict.fromkeys(tasks) if self.known(task) is None]
         self._stopping = False
         pool = ThreadPoolExecutor(self.limits.jobs)
         try:
@@ -89,9 +90,16 @@ class Bench:
             pool.shutdown(cancel_futures=True)
         return [found for task in tasks if (found := self.store.get(task)) is not None]
 
+    def known(self, task: Task) -> Row | None:
+        """The row of a task that is finished, unless another version of its tool made it."""
+        row = self.store.get(task)
+        return None if row is None or is_outdated(row) else row
+
     def _finish(self, task: Task) -> Row:
         row: Row = {"mesh": task.mesh, "method": task.method, "setting": task.setting}
         hulls = self.store.hulls_of(task)
+        if self.store.get(task) is not None:
+            hulls.unlink(missing_ok=True)  # another version's
         with tempfile.TemporaryDirectory() as folder:
             answer = Path(folder) / "answer.json"
             failure = self._child(task, hulls, answer)
@@ -145,11 +153,16 @@ class Bench:
         return (last or why_it_ended(process.returncode)) if process.returncode else None
 
 
+def is_outdated(row: Row) -> bool:
+    """Tell whether a row was made by another version of its tool than the one that is installed."""
+    return "version" in row and row["version"] != make_method(row["method"]).version
+
+
 def find_meshes(folder: Path, listed: Path | None = None) -> list[str]:
     """Names of the meshes in a folder of any depth, or those of a list, one a line.
 
-    ShapeNetCore, HumanBody and COSEG are read as they are distributed: a folder of folders. Of ShapeNetCore v2, which
-    keeps a ``models/model_normalized.obj`` in each, voxels and screenshots are passed over.
+    ShapeNetCore (v1 and v2), HumanBody and COSEG are read as they are distributed, folders of folders, in which voxels,
+    pictures and labels lie between the meshes.
     """
     if listed is not None:
         return [line for line in listed.read_text().splitlines() if line.strip() and not line.startswith("#")]

@@ -6,10 +6,13 @@ import csv
 import io
 import math
 import statistics
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeAlias
 
 from rlacd.measure.store import Row
 
@@ -92,44 +95,87 @@ class Table:
 
 
 def comparison(groups: Sequence[tuple[str, Sequence[Row]]]) -> Table:
-    """Compare methods on the meshes that all of them managed: a line each, as in the paper's Table 1, and failures.
+    """Compare methods on the meshes that all of them managed: a line each, as in the paper's Table 1.
 
     Parameters
     ----------
     groups : sequence of (label, rows)
+        The first is what the parts of the others are divided by.
     """
-    shared = common_meshes(rows for _, rows in groups)
+    good = _managed(groups)
+    first = next(iter(good.values()), [])
     lines = []
-    for label, rows in groups:
-        good = [row for row in rows if row["mesh"] in shared]
-        failed = sum("error" in row for row in rows)
-        cells = [show(good) if good else "–" for show in _SHOWN.values()]
-        lines.append([label, *cells, f"{failed} of {len(rows)}"])
-    note = f"{len(shared)} meshes that every method managed; mean (max, ± standard deviation)."
-    return Table(["method", *_SHOWN, "failed"], lines, note)
+    for label, rows in good.items():
+        cells = [show(rows) if rows else "–" for show in _COMPARED.values()]
+        ratio = "1" if rows is first and rows else ratio_of_parts(rows, first)
+        lines.append([label, cells[0], ratio, *cells[1:]])
+    parts, *others = _COMPARED
+    note = (
+        "The meshes that every method managed; mean (max, ± standard deviation); the ratio is a geometric mean over "
+        "them, ± its standard error."
+    )
+    return Table([f"{len(first)} meshes", parts, f"{parts} / first line's", *others], lines, note)
 
 
-def _spread(key: str, digits: int) -> Callable[[Sequence[Row]], str]:
+def details(groups: Sequence[tuple[str, Sequence[Row]]]) -> Table:
+    """Show what else was measured of the meshes that all methods managed, and how many each of them failed on."""
+    failed = {label: f"{sum('error' in row for row in rows)} of {len(rows)}" for label, rows in groups}
+    lines = [
+        [label, *(show(rows) if rows else "–" for show in _DETAILS.values()), failed[label]]
+        for label, rows in _managed(groups).items()
+    ]
+    return Table(["the same meshes", *_DETAILS, "failed"], lines)
+
+
+def _managed(groups: Sequence[tuple[str, Sequence[Row]]]) -> dict[str, list[Row]]:
+    shared = common_meshes(rows for _, rows in groups)
+    return {label: [row for row in rows if row["mesh"] in shared] for label, rows in groups}
+
+
+Show: TypeAlias = Callable[[Sequence[Row]], object]
+"""What a column says of the rows of one method."""
+
+
+def _spread(key: str, digits: int) -> Show:
     return lambda rows: Spread.of([row[key] for row in rows]).text(digits)
 
 
-_SHOWN: Mapping[str, Callable[[Sequence[Row]], object]] = MappingProxyType(
+def _mean_and_worst(key: str, digits: int) -> Show:
+    def show(rows: Sequence[Row]) -> str:
+        spread = Spread.of([row[key] for row in rows])
+        return f"{spread.mean:.{digits}f}, {spread.most:.{digits}f}"
+
+    return show
+
+
+def _share(key: str) -> Show:
+    return lambda rows: f"{100 * statistics.fmean(row[key] for row in rows):.1f} %"
+
+
+_COMPARED: Mapping[str, Show] = MappingProxyType(
     {
         "#P": _spread("parts", 1),
         "#F": _spread("faces", 0),
         "D_h": _spread("hausdorff", 3),
+        "concavity: mean, worst": _mean_and_worst("concavity", 3),
+        "CPU s": _spread("cpu", 2),
+    }
+)
+
+_DETAILS: Mapping[str, Show] = MappingProxyType(
+    {
         "over": _spread("over", 3),
         "under": _spread("under", 3),
-        "concavity": _spread("concavity", 3),
-        "Σ hull / solid": _spread("volume", 2),
-        "uncovered": lambda rows: f"{100 * statistics.fmean(row['uncovered'] for row in rows):.1f} %",
+        "uncovered": _share("uncovered"),
+        "Σ hull / solid, median": lambda rows: f"{statistics.median(row['volume'] for row in rows):.2f}",
         "invalid hulls": lambda rows: sum(row["invalid"] for row in rows),
-        "CPU s": _spread("cpu", 2),
-        "wall s": _spread("wall", 2),
+        "wall s: mean, worst": _mean_and_worst("wall", 2),
+        "CPU s: median, sum": lambda rows: (
+            f"{statistics.median(row['cpu'] for row in rows):.2f}, {sum(row['cpu'] for row in rows):.0f}"
+        ),
         "peak MB": lambda rows: f"{max(row['peak_mb'] for row in rows):.0f}",
     }
 )
-"""Columns of a comparison: what each says of the rows of one method."""
 
 
 def ratio_of_parts(rows: Sequence[Row], reference: Sequence[Row]) -> str:
@@ -141,13 +187,36 @@ def ratio_of_parts(rows: Sequence[Row], reference: Sequence[Row]) -> str:
         return "–"
     mean = math.exp(statistics.fmean(logs))
     error = mean * statistics.stdev(logs) / math.sqrt(len(logs)) if len(logs) > 1 else 0.0
-    return f"{mean:.3f} ± {error:.3f}"
+    return f"{mean:.2f} ± {error:.2f}"
 
 
 def failures(rows: Iterable[Row]) -> str:
     """One line for everything that went wrong; "none" otherwise."""
     found = [f"- {r['mesh']}, {r['method']} {r['setting']:g}: {r['error']}" for r in rows if "error" in r]
     return "\n".join(found) or "none"
+
+
+def short_names(meshes: Sequence[str]) -> dict[str, str]:
+    """Call each mesh by the least of its path that tells it from the others.
+
+    Where all files are called alike, as ShapeNetCore's ``models/model_normalized.obj``, their folders are named.
+    """
+    paths = {mesh: Path(mesh).with_suffix("").parts for mesh in meshes}
+    while len(paths) > 1 and len({path[-1] for path in paths.values()}) == 1 and min(map(len, paths.values())) > 1:
+        paths = {mesh: path[:-1] for mesh, path in paths.items()}
+
+    def tail(mesh: str, length: int) -> str:
+        return "/".join(paths[mesh][-length:])
+
+    @cache
+    def met(length: int) -> Counter[str]:
+        return Counter(tail(mesh, length) for mesh in paths)
+
+    def shortest(mesh: str) -> str:
+        lengths = range(1, len(paths[mesh]) + 1)
+        return next((tail(mesh, n) for n in lengths if met(n)[tail(mesh, n)] == 1), mesh)
+
+    return {mesh: shortest(mesh) for mesh in meshes}
 
 
 def as_csv(rows: Iterable[Row]) -> str:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from rlacd.errors import OptionError
 from rlacd.measure.methods import Method, make_method
-from rlacd.measure.runner import Bench
+from rlacd.measure.runner import Bench, is_outdated
 from rlacd.measure.store import Row
 
 CLOSE = 0.02
@@ -63,7 +63,7 @@ def known_curve(bench: Bench, method: str) -> list[Point]:
     """The numbers at which the store holds every mesh of the set, in ascending order."""
     by_setting: dict[float, dict[str, Row]] = {}
     for row in bench.store.rows():
-        if row["method"] == method:
+        if row["method"] == method and not is_outdated(row):
             by_setting.setdefault(row["setting"], {})[row["mesh"]] = row
     whole = [s for s, rows in by_setting.items() if all(name in rows for name in bench.names)]
     return [Point(s, [by_setting[s][name] for name in bench.names]) for s in sorted(whole)]
