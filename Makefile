@@ -71,7 +71,7 @@ fuzz-shapes: $(VENV)/installed
 
 # Damaged files of every format.
 fuzz-files: $(VENV)/test-extras
-	$(BIN)/python benchmarks/fuzz_files.py $(MESHES) --minutes $(MINUTES) --seed $(SEED)
+	$(BIN)/python -m fuzz.damaged $(MESHES) --minutes $(MINUTES) --seed $(SEED)
 
 format: $(VENV)/test-extras
 	$(BIN)/ruff check --fix .

@@ -29,9 +29,9 @@ from fuzz.choices import draw_options
 from fuzz.files import read_hulls, write_mesh
 from fuzz.judges import Case, finite_faces, judge
 from fuzz.recipes import Shape, make_shape
+from fuzz.worker import Here, Watched
 from rlacd.fleet import Order
-from rlacd.fleet.child import answer
-from rlacd.fleet.worker import Limits, Worker, WorkerDiedError
+from rlacd.pool import Limits, WorkerDiedError
 
 AGAIN = 4
 """One of so many seeds is decomposed twice."""
@@ -69,19 +69,7 @@ class Row:
     twice: bool = False
 
 
-class Here:
-    """Does what a worker does in this process, so that a sanitizer's words can be read; a crash ends everything."""
-
-    def run(self, order: Order, mesh: Path, name: str, stem: str) -> tuple[dict[str, Any], dict[str, bytes]]:
-        print(f"seed {mesh.stem}", file=sys.stderr, flush=True)
-        request = {"order": order.as_plain(), "mesh": str(mesh), "name": name, "stem": stem, "hull_only": False}
-        return answer({**request, "staging": str(mesh.parent)})
-
-    def close(self) -> None:
-        pass
-
-
-def run_seed(seed: int, worker: Worker | Here, folder: Path) -> Row:
+def run_seed(seed: int, worker: Watched | Here, folder: Path) -> Row:
     """Decompose and judge."""
     shape, options = make_shape(seed), draw_options(seed)
     random = np.random.default_rng([seed, 3])
@@ -184,7 +172,7 @@ def main() -> None:
         print(totals([json.loads(line) for line in args.totals.read_text().splitlines()]))
         return
     rows: list[dict[str, Any]] = []
-    worker = Here() if args.here else Worker(Limits(seconds=args.limit, memory=int(args.memory * 2**30)))
+    worker = Here() if args.here else Watched(Limits(seconds=args.limit, memory=int(args.memory * 2**30)))
     until = time.monotonic() + args.seconds
     with tempfile.TemporaryDirectory() as folder, args.log.open("a") as log:
         for seed in range(args.first, args.first + args.count):

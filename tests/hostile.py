@@ -747,7 +747,7 @@ for ending in ("xaml", "3dxml", "step", "stp", "xdmf", "h5", "vtk", "msh", "binv
     refused(f"another format.{ending}", "convert it")(lambda: b"anything")
 
 
-# --- found by benchmarks/fuzz_files.py --------------------------------------------------------------------------------
+# --- found by fuzz/damaged.py --------------------------------------------------------------------------------
 
 
 @refused("a node below one whose mesh there is not.gltf", "placed nowhere")

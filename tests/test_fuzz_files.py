@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +10,11 @@ import pytest
 import trimesh
 from trimesh import creation
 
+from fuzz import damaged, mutations
 from rlacd.errors import RlacdError
 from rlacd.robots import rewrite_robot
 from rlacd.solid.load import load_mesh
 from tests.bounded import bounded
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
-fuzz = pytest.importorskip("fuzz_files")
-mutations = pytest.importorskip("fuzz_mutations")
 
 INPUTS = 60
 
@@ -41,7 +37,7 @@ def shape() -> trimesh.Trimesh:
 
 def damaged(kind: str, number: int, folder: Path) -> Path:
     """The file of a number."""
-    seeds: list[Any] = [seed for of, seed in fuzz.written(shape()) if of == kind]
+    seeds: list[Any] = [seed for of, seed in damaged.written(shape()) if of == kind]
     seeds += [mutations.Seed({"urdf": URDF, "xml": MJCF}[kind].encode())] if kind in ("urdf", "xml") else []
     rng = np.random.default_rng([7, number])
     seed = seeds[rng.integers(len(seeds))]

@@ -17,9 +17,10 @@ from fuzz.geometry import Polytope, distance_to_triangles, distance_to_union, wh
 from fuzz.judges import Case, judge
 from fuzz.kernels import try_seed
 from fuzz.recipes import Shape, make_shape
-from fuzz.shapes import Here, run_seed
-from rlacd.fleet.worker import Limits, Worker
+from fuzz.shapes import run_seed
+from fuzz.worker import Here, Watched
 from rlacd.options import Options
+from rlacd.pool import Limits
 from tests.shapes import Closed, box, from_manifold, point_to_triangles
 
 ELL = from_manifold(box((0, 0, 0), (4, 1, 1)) + box((0, 0, 0), (1, 1, 4)))
@@ -146,7 +147,7 @@ def test_whole_decompositions_pass_the_judges(seed: int, tmp_path: Path) -> None
 
 @pytest.mark.slow
 def test_a_worker_that_hangs_is_a_hang(tmp_path: Path) -> None:
-    worker = Worker(Limits(seconds=600))
+    worker = Watched(Limits(seconds=600))
     try:
         assert run_seed(5, worker, tmp_path).status == "done"
         worker.limits = Limits(seconds=1e-3)

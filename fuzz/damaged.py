@@ -1,9 +1,9 @@
 r"""Damage real files of every format and see that each gives hulls or one typed error: no crash, no hang, no flood.
 
-    python benchmarks/fuzz_files.py MESHES --minutes 10 --out files.jsonl [--seed 0] [--formats obj,glb]
-    python benchmarks/fuzz_files.py --table files.jsonl
-    python benchmarks/fuzz_files.py MESHES --seed 0 --only 1234 --keep folder     # one input again, its file kept
-    python benchmarks/fuzz_files.py --minimise finding.obj                        # cut what it does not need
+    python -m fuzz.damaged MESHES --minutes 10 --out files.jsonl [--seed 0] [--formats obj,glb]
+    python -m fuzz.damaged --table files.jsonl
+    python -m fuzz.damaged MESHES --seed 0 --only 1234 --keep folder     # one input again, its file kept
+    python -m fuzz.damaged --minimise finding.obj                        # cut what it does not need
 
 MESHES is the folder of real meshes: what lies in its ``raw/`` and small meshes of its index, written in every format,
 are the seeds. Every input is made from the seed and its own number alone, and decomposed within a small budget by the
@@ -33,10 +33,11 @@ from unittest import mock
 import numpy as np
 import psutil
 import trimesh
-from fuzz_mutations import Seed, mutated, repacked
 
-from rlacd.fleet import Limits, Order
-from rlacd.fleet.worker import Worker, WorkerDiedError
+from fuzz.mutations import Seed, mutated, repacked
+from fuzz.worker import Watched
+from rlacd.fleet import Order
+from rlacd.pool import Limits, WorkerDiedError
 from rlacd.weights import __name__ as weights_package
 
 CPU_SECONDS, SECONDS, MEMORY = 60.0, 1800.0, 2 * 2**30
@@ -96,7 +97,7 @@ def written(mesh: trimesh.Trimesh) -> Iterator[tuple[str, Seed]]:
 class Watch:
     """Ends a process that has kept a processor busy for too long, however many others there are."""
 
-    def __init__(self, worker: Worker) -> None:
+    def __init__(self, worker: Watched) -> None:
         self.too_long = False
         self._worker = worker
         self._stopped = threading.Event()
@@ -110,18 +111,15 @@ class Watch:
         while not self._stopped.wait(0.5):
             if self._spent() - self._begun > CPU_SECONDS:
                 self.too_long = True
-                psutil.Process(self._pid()).kill()
+                psutil.Process(self._worker.pid).kill()
                 return
-
-    def _pid(self) -> int:
-        return int(self._worker.name.partition("@")[0].replace("-", "0"))
 
     def _spent(self) -> float:
         try:
-            times = psutil.Process(self._pid()).cpu_times()
+            times = psutil.Process(self._worker.pid).cpu_times()
         except psutil.Error:
             return 0.0
-        return float(times.user + times.system) if self._pid() else 0.0
+        return float(times.user + times.system) if self._worker.pid else 0.0
 
 
 @dataclass
@@ -131,7 +129,7 @@ class Fuzzer:
     seeds: dict[str, list[Seed]]
     seed: int
     folder: Path
-    worker: Worker = field(default_factory=lambda: Worker(Limits(SECONDS, MEMORY)))
+    worker: Watched = field(default_factory=lambda: Watched(Limits(SECONDS, MEMORY)))
 
     def input(self, number: int) -> tuple[str, Path]:
         """Write the input of a number; its format, and its file."""
