@@ -102,10 +102,11 @@ def train_arms(
     first = next(iter(arms.values()))
     page.add(
         Text(
-            f"Every arm: preset {preset}, {first.iterations:,} cuts (the paper: 1,000,000), seed {seed}, meshes of up to "
-            f"{first.max_faces} triangles, concavity {first.threshold:g}, {first.validation} meshes held out. Ratios "
-            "are geometric means over those, to greedy over 150 planes by the least sum of hull volumes; deployed: the "
-            "least sum among the network's ten best planes. One seed: differences of a few percent say nothing."
+            f"Every arm: preset {preset}, {first.iterations:,} cuts (the paper: 1,000,000), seed {seed}, meshes of up "
+            f"to {first.max_faces} triangles, concavity {first.threshold:g}, {first.validation} meshes held out. "
+            "Ratios are geometric means over those, to greedy over 150 planes by the least sum of hull volumes; "
+            "deployed: the least sum among the network's ten best planes. One seed: differences of a few percent say "
+            "nothing."
         ),
         _last_validations(curves),
         Heading("Curves"),

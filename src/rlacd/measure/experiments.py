@@ -11,7 +11,7 @@ from rlacd.measure.page import Heading, Page, Text
 from rlacd.measure.runner import Bench
 from rlacd.measure.store import Row, Task
 from rlacd.measure.tables import Table, common_meshes, comparison, details, failures
-from rlacd.measure.tuning import Point, tune
+from rlacd.measure.tuning import CLOSE, Point, tune
 
 TARGETS = (0.15, 0.10)
 """The paper's two accuracies."""
@@ -56,12 +56,14 @@ def paper_table_1() -> Table:
 PAPER_COLUMNS = ("#P", "#P / CoACD's", "s")
 
 
-def equal_accuracy(bench: Bench, methods: Sequence[str], targets: Sequence[float], title: str) -> Page:
+def equal_accuracy(
+    bench: Bench, methods: Sequence[str], targets: Sequence[float], title: str, close: float = CLOSE
+) -> Page:
     """Tune each method to the same mean D_h and compare (4.4, Tables 1 and 4)."""
     page = Page(title, [about(bench)])
     everything: list[Row] = []
     for target in targets:
-        tuned = [(method, tune(bench, method, target)) for method in methods]
+        tuned = [(method, tune(bench, method, target, close)) for method in methods]
         entries = [Entry(method, point.setting, point.rows) for method, point in tuned]
         everything += [row for entry in entries for row in entry.rows]
         groups = [(_label(method, point, target), point.rows) for method, point in tuned]

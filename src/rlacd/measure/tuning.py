@@ -16,7 +16,7 @@ from rlacd.measure.runner import Bench, is_outdated
 from rlacd.measure.store import Row
 
 CLOSE = 0.02
-"""The mean D_h may be this share of the target away from it."""
+"""The mean D_h may be this share of the target away from it, unless told otherwise."""
 
 TRIES = 8
 """Numbers tried at most, beyond those already known."""
@@ -69,8 +69,8 @@ def known_curve(bench: Bench, method: str) -> list[Point]:
     return [Point(s, [by_setting[s][name] for name in bench.names]) for s in sorted(whole)]
 
 
-def tune(bench: Bench, method: str, target: float) -> Point:
-    """Find the number at which a method's mean D_h is the target, to within `CLOSE`.
+def tune(bench: Bench, method: str, target: float, close: float = CLOSE) -> Point:
+    """Find the number at which a method's mean D_h is the target, to within the share `close` of it.
 
     What the store knows is where the search begins: between two numbers whose means lie on both sides, the next one is
     interpolated; regula falsi, with bisection where that is slow.
@@ -91,7 +91,7 @@ def tune(bench: Bench, method: str, target: float) -> Point:
     points = known_curve(bench, method)
     for attempt in range(TRIES):
         usable = [p for p in points if not math.isnan(p.hausdorff)]
-        if any(abs(p.hausdorff - target) <= CLOSE * target for p in usable) or (points and not usable):
+        if any(abs(p.hausdorff - target) <= close * target for p in usable) or (points and not usable):
             break
         setting = next_setting(tool, [(p.setting, p.hausdorff) for p in usable], target, attempt)
         if setting is None or any(p.setting == setting for p in points):
