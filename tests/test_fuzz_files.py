@@ -10,7 +10,8 @@ import pytest
 import trimesh
 from trimesh import creation
 
-from fuzz import damaged, mutations
+from fuzz import mutations
+from fuzz.damaged import written
 from rlacd.errors import RlacdError
 from rlacd.robots import rewrite_robot
 from rlacd.solid.load import load_mesh
@@ -37,7 +38,7 @@ def shape() -> trimesh.Trimesh:
 
 def damaged(kind: str, number: int, folder: Path) -> Path:
     """The file of a number."""
-    seeds: list[Any] = [seed for of, seed in damaged.written(shape()) if of == kind]
+    seeds: list[Any] = [seed for of, seed in written(shape()) if of == kind]
     seeds += [mutations.Seed({"urdf": URDF, "xml": MJCF}[kind].encode())] if kind in ("urdf", "xml") else []
     rng = np.random.default_rng([7, number])
     seed = seeds[rng.integers(len(seeds))]
