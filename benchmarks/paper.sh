@@ -5,8 +5,10 @@
 set -eu
 meshes=$1 list=$2 training=$3 run=$4
 
-for page in compare paper-table-1 paper-greedy paper-vhacd; do
-    rlacd bench "$page" "$meshes" --list "$list" --out "$run/quick" --jobs 2 --limit 3600
+rlacd bench compare "$meshes" --list "$list" --out "$run/quick" --jobs 2 --limit 3600
+rlacd bench paper-table-1 "$meshes" --list "$list" --out "$run/quick" --jobs 2 --limit 3600 --close 0.04
+for page in paper-greedy paper-vhacd; do
+    rlacd bench "$page" "$meshes" --list "$list" --out "$run/quick" --jobs 2
 done
 for page in paper-table-2 paper-table-3; do
     rlacd bench "$page" "$meshes" --list "$list" --out "$run/quick" --jobs 2 --threshold 0.1
