@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from rlacd import _native
+from rlacd.solid.load import load_mesh
+from rlacd.solid.repair import repair
 
 
 def triangles(unit: float) -> tuple[np.ndarray, np.ndarray]:
@@ -37,3 +39,14 @@ def test_a_point_that_is_no_number_is_refused() -> None:
     vertices[3, 1] = np.nan
     with pytest.raises(ValueError, match="not finite"):
         _native.Surface(vertices, faces)
+
+
+@pytest.mark.parametrize(("count", "step"), [(12, "slab"), (60, "wrapped")])
+def test_sheets_that_all_cross_are_wrapped_when_they_are_many(count: int, step: str) -> None:
+    """Uniting some hundred of them one by one took a quarter of an hour."""
+    random = np.random.default_rng(0)
+    corners = random.normal(size=(count, 2, 3))
+    vertices = np.concatenate([corners, -corners.sum(axis=1, keepdims=True)], axis=1).reshape(-1, 3)  # around 0
+    solid = repair(load_mesh((vertices, np.arange(3 * count).reshape(-1, 3))), threads=1)
+    assert {body.step for body in solid.bodies} == {step}
+    assert solid.manifold.volume() > 0
