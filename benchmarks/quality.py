@@ -21,8 +21,8 @@ import numpy as np
 import rlacd
 
 METHODS: dict[str, dict[str, Any]] = {
-    "fast, greedy-hull-sum": {"policy": "greedy-hull-sum"},
-    "fast": {},
+    "fast, greedy-hull-sum": {"quality": "fast", "policy": "greedy-hull-sum"},
+    "fast": {"quality": "fast"},
     "balanced": {"quality": "balanced"},
     "best, 5 s": {"quality": "best", "budget": 5.0},
     "best, 10 s": {"quality": "best", "budget": 10.0},
