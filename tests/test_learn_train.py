@@ -26,6 +26,7 @@ from rlacd.errors import MissingExtraError, OptionError, TrainingError
 from rlacd.learn.options import PRESETS, TrainOptions
 from rlacd.pool import Answer, HerePool, LocalPool, Pool, Request, WorkerDiedError
 from tests.learning import write_meshes
+from tests.pools import pool_processes
 
 TINY: dict[str, Any] = {
     "iterations": 120,
@@ -198,7 +199,7 @@ def test_a_worker_that_is_killed_changes_nothing(meshes: Path, tmp_path: Path) -
 
     def kill_one(line: str) -> None:
         if line.startswith("cut") and len(killed) < 2:
-            killed.append(psutil.Process().children()[-1])
+            killed.append(pool_processes()[-1])
             killed[-1].kill()
 
     with LocalPool(2) as pool:
