@@ -31,10 +31,6 @@ ROUNDING = 1e-7
 
 TOLERANCE = 2e-3
 
-THINNEST = 1e-9
-"""Share of its length below which a hull is not simplified here: parts are never that thin, and the limited hull of a
-needle 1e-12 thick was seen to miss up to 2e-4 of its length."""
-
 
 def soup(seed: int) -> Soup:
     """The faces of a seed's shape in the frame, int32."""
@@ -66,8 +62,6 @@ def hull_of(mesh: Soup, random: np.random.Generator) -> Hull | None:
     outer = Polytope(vertices, faces.astype(np.int64))
     assert outer.height(points).max() <= ROUNDING, "a point is not in the hull"
     hull = Hull(vertices, faces, _native.mesh_volume(vertices, faces))
-    if spread[2] < THINNEST * spread[0]:
-        return hull
     limit = int(random.integers(4, 40))
     try:
         fewer, few_faces = _native.simplify_hull(vertices, faces, limit, 2**31 - 1)

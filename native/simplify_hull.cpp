@@ -19,6 +19,10 @@ constexpr std::size_t kFewCorners = 10;
 constexpr double kLastStretch = 1.5, kStep = 1.1;
 constexpr int kSweepsOnTheWay = 3, kSweepsAtTheEnd = 30;
 
+// Hulls thinner than this share of their length are given that thickness first: rounding is 1e-4 of a thickness of
+// 1e-12, and where two facets meet at the tip of a needle that much of its length would be left outside.
+constexpr double kThinnest = 1e-9;
+
 // The affine map to a frame where the hull is about 2 wide in three perpendicular directions and around the origin. The
 // directions come from extreme points (the longest line, the point farthest from it), not from second moments, whose
 // cancellation would lose a plate's thickness below 1e-8 of its width.
@@ -48,6 +52,21 @@ class Whitening {
   }
   Vec3 from(Vec3 p) const {
     return centre_ + scale_[0] * p.x * axes_[0] + scale_[1] * p.y * axes_[1] + scale_[2] * p.z * axes_[2];
+  }
+  // The points, moved to both sides along every axis in which they are not `share` as thick as they are long, so that
+  // they are; none if there is no such axis.
+  std::vector<Vec3> thickened(const std::vector<Vec3>& points, double share) const {
+    const double enough = share * std::max({scale_[0], scale_[1], scale_[2]}), by = 2 * enough;
+    std::vector<Vec3> moved = points;
+    bool thin = false;
+    for (int i = 0; i < 3; ++i) {
+      if (scale_[i] >= enough) continue;
+      thin = true;
+      std::vector<Vec3> both;
+      for (const Vec3 p : moved) both.push_back(p - by * axes_[i]), both.push_back(p + by * axes_[i]);
+      moved = std::move(both);
+    }
+    return thin ? moved : std::vector<Vec3>();
   }
 
  private:
@@ -171,6 +190,8 @@ Mesh simplify_hull(const Mesh& hull, std::size_t max_vertices, std::size_t max_f
   // A triangulated convex polytope has twice as many triangles as corners, less four.
   const std::size_t most = std::min(max_vertices, (max_faces + 4) / 2);
   const Whitening whitening(hull.vertices);
+  if (const std::vector<Vec3> thick = whitening.thickened(hull.vertices, kThinnest); !thick.empty())
+    return hull.vertices.size() <= most ? hull : simplify_hull(hull_mesh(thick), max_vertices, max_faces, tolerance);
   std::vector<Vec3> whitened;
   for (const Vec3 p : hull.vertices) whitened.push_back(whitening.to(p));
   const Mesh inner = hull_mesh(whitened);

@@ -80,7 +80,8 @@ def test_a_node_dies_half_way_and_the_results_are_those_of_one_machine(cluster: 
     assert over_ray.status == {"done": 8, "fallback": 1, "failed": 1}
     assert sorted(node["Alive"] for node in ray.nodes()) == [False, True]
 
-    here = Batch(assets, str(tmp_path / "here"), order, limits).run(LocalPool(1), Counter())
+    with LocalPool(1) as pool:
+        here = Batch(assets, str(tmp_path / "here"), order, limits).run(pool, Counter())
     assert here.status == over_ray.status
     assert tree(tmp_path / "ray", TIMES) == tree(tmp_path / "here", TIMES)
     assert rows(tmp_path / "ray", TIMES)["deep/dies.obj"]["attempts"] == 2
@@ -102,5 +103,6 @@ def test_a_network_of_ones_own_and_a_shared_address_reach_the_nodes(cluster: Clu
     summary = Batch(tmp_path / "assets", out, order).run(RayPool("auto"), Counter())
     assert summary.status == {"done": 1}
     here = Batch(tmp_path / "assets", str(tmp_path / "here"), Order.of({"policy": "learned", "threshold": 0.1}))
-    assert here.run(LocalPool(1), Counter()).status == {"done": 1}
+    with LocalPool(1) as pool:
+        assert here.run(pool, Counter()).status == {"done": 1}
     assert (tmp_path / "shared" / "a.glb").read_bytes() == (tmp_path / "here" / "a.glb").read_bytes()

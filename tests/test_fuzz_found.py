@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import rlacd
+from fuzz.recipes import make_shape
 from rlacd import _native
+from rlacd.solid.hull import Hull
 from rlacd.solid.load import load_mesh
 from rlacd.solid.repair import repair
 
@@ -50,3 +53,26 @@ def test_sheets_that_all_cross_are_wrapped_when_they_are_many(count: int, step: 
     solid = repair(load_mesh((vertices, np.arange(3 * count).reshape(-1, 3))), threads=1)
     assert {body.step for body in solid.bodies} == {step}
     assert solid.manifold.volume() > 0
+
+
+def test_sheets_narrower_than_they_become_thick_are_not_built_inside_out() -> None:
+    """Rods a millionth as thick as long, half of them flipped: their slabs had negative volume, and so no mass."""
+    shape = make_shape(30363)
+    solid = repair(load_mesh((shape.vertices, shape.faces)), threads=1)
+    assert min(piece.volume() for piece in solid.manifold.decompose()) > 0
+    extent = np.ptp(np.reshape(solid.manifold.bounding_box(), (2, 3)), axis=0)
+    assert extent.max() == pytest.approx(2, abs=0.01)
+
+
+@pytest.mark.parametrize("where", [[-3.9e35, 6.2e35, -2.3e35], [0, 0, 0], [1e300, -1e308, 1e308], [0, 1e-310, 5]])
+@pytest.mark.parametrize(("limit", "most"), [({"max_vertices": 4}, 4), ({"max_faces": 11}, 7), ({}, 8)])
+def test_limits_hold_where_coordinates_cannot_tell_corners_apart(
+    where: list[float], limit: dict[str, int], most: int
+) -> None:
+    """A box stood in for such a hull, whatever the limit."""
+    (hull,) = rlacd.decompose((np.array([where] * 3), np.array([[0, 1, 2]])), **limit)
+    assert len(hull.vertices) <= most
+    assert hull.is_watertight
+    assert (hull.bounds[0] <= where).all()
+    assert (hull.bounds[1] >= where).all()
+    assert (Hull.of(np.vstack([hull.vertices, where])).vertices == hull.vertices).all()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import os
 from pathlib import Path
@@ -17,17 +16,14 @@ from rlacd.criteria import Concavity, Criterion, NavigableSpace
 from rlacd.cut import CutTree
 from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError
-from rlacd.finish import drop_slivers, limit_part, merge_parts, merge_to_count, with_limits
+from rlacd.finish import drop_slivers, in_input, limit_part, merge_parts, merge_to_count, with_limits
 from rlacd.options import CONCAVITY, DEFAULT_RESOLUTION, DEFAULT_THRESHOLD, Options
 from rlacd.planes.views import Views
 from rlacd.policies import make_policy
 from rlacd.progress import ProgressCallback
 from rlacd.report import make_report
 from rlacd.search import level, search
-from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part
-from rlacd.solid.frame import Frame
-from rlacd.solid.hull import Hull
 from rlacd.solid.load import load_mesh
 from rlacd.solid.repair import repair
 from rlacd.solid.solid import Solid
@@ -185,7 +181,9 @@ def decompose(
         with clock.stage("finish"):
             parts = drop_slivers(parts, workers)
             parts = workers.map(lambda part: limit_part(part, options.max_vertices, options.max_faces), parts)
-            hulls = workers.map(lambda part: _in_input(part.hull, solid.frame), parts)
+            hulls = workers.map(
+                lambda part: in_input(part.hull, solid.frame, options.max_vertices, options.max_faces), parts
+            )
         with clock.stage("measure"):
             report = make_report(solid, parts, hulls, options, goal, workers, clock)
     report = {
@@ -249,25 +247,3 @@ def _cut_and_merge(
         return parts, criterion
     with clock.stage("merge"):
         return merge_parts(parts, criterion, workers, clock), criterion
-
-
-def _in_input(hull: Hull, frame: Frame) -> trimesh.Trimesh:
-    """Carry a hull from the frame to the input's unit: rounded there first, so that it is exactly convex there."""
-    points = frame.to_input(hull.vertices)
-    there = Hull.of(points)
-    if there is None:  # thinner than the input's coordinates can tell apart
-        there = Hull.of(_box_around(points))
-        assert there is not None
-    return trimesh.Trimesh(there.vertices, there.faces, process=False)
-
-
-def _box_around(points: FloatArray) -> FloatArray:
-    """Corners [8, 3] of a box around the points, just as thick everywhere as their largest coordinate can resolve.
-
-    One step of floating point along an axis may be nothing beside a large coordinate on another.
-    """
-    limits = np.finfo(np.float64)
-    step = np.abs(points).max() * limits.eps + limits.smallest_subnormal
-    lower = np.maximum(points.min(axis=0), step - limits.max) - step
-    upper = np.minimum(points.max(axis=0), limits.max - step) + step
-    return np.array(list(itertools.product(*zip(lower, upper, strict=True))))

@@ -31,6 +31,7 @@ from rlacd.solid.repair_skin import skin
 from rlacd.solid.repair_soup import NO_AREA, Soup, hidden_faces, on_repeated_edge
 from rlacd.solid.repair_union import (
     hull_of_points,
+    slab_of_faces,
     split_labels,
     to_arrays,
     to_manifold,
@@ -332,8 +333,14 @@ class _Repair:
             faces[rooms[label]] = faces[rooms[label]][:, ::-1]
         built, count = np.unique(label, return_counts=True)
         body = soup.body_of_side()[built]
-        np.add.at(self.faces_out, body, count)
         solids = [to_manifold(v, f) for v, f in split_labels(vertices, faces, label)]
+        # Sheets narrower than they shall be thick can cross themselves, and come out inside out.
+        for i in np.flatnonzero(has_sheet[built] | flat[built]):
+            if solids[i].volume() <= 0:
+                some = (sides.label.reshape(-1, 2) == built[i]).any(axis=1)
+                solids[i] = slab_of_faces(soup.vertices, soup.faces[some], HALF_THICKNESS)
+                count[i] = solids[i].num_tri()
+        np.add.at(self.faces_out, body, count)
         return list(zip(solids, body.tolist(), strict=True))
 
     @staticmethod

@@ -107,3 +107,8 @@ def hull_of_points(points: FloatArray, half_thickness: float) -> Manifold:
     for axis in axes[extent < half_thickness]:
         points = np.concatenate([points - half_thickness * axis, points + half_thickness * axis])
     return manifold3d.Manifold.hull_points(points)
+
+
+def slab_of_faces(vertices: FloatArray, faces: IntArray, half_thickness: float) -> Manifold:
+    """Return the union of triangles that each are given thickness."""
+    return unite([hull_of_points(vertices[face], half_thickness) for face in faces])
