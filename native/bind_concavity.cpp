@@ -1,6 +1,7 @@
 // Python bindings of the concavity of a part.
 #include "arrays.hpp"
 #include "concavity.hpp"
+#include "filling.hpp"
 
 namespace rlacd {
 
@@ -38,6 +39,26 @@ void bind_concavity(nb::module_& m) {
       "one-sided distance may be wider below the value, where the others decide it. Values up to `floor` need not be "
       "told\n"
       "apart: the interval may then be as wide as (0, floor), which is much faster for nearly convex parts.");
+  nb::class_<Filling>(m, "Filling", "A closed solid that hulls of its parts are held against.")
+      .def(
+          "__init__",
+          [](Filling* self, const PointsIn& vertices, const FacesIn& faces) {
+            const Mesh solid = to_finite_mesh(vertices, faces);
+            if (solid.faces.empty()) throw std::invalid_argument("the solid has no faces");
+            nb::gil_scoped_release release;
+            new (self) Filling(solid);
+          },
+          nb::arg("vertices"), nb::arg("faces"))
+      .def(
+          "chance",
+          [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces, double threshold) {
+            const Mesh hull = to_finite_mesh(hull_vertices, hull_faces);
+            nb::gil_scoped_release release;
+            return static_cast<int>(self.chance(hull, threshold));
+          },
+          nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("threshold"),
+          "Whether the surfaces of a hull and of the solid's share of it may be as near as the threshold.\n\n"
+          "0: they may; 1: they are not; 2: nor are those of any hull that holds this one.");
 }
 
 }  // namespace rlacd

@@ -53,6 +53,9 @@ struct Box {
     extend(other.lower);
     extend(other.upper);
   }
+  bool holds(Vec3 p) const {
+    return lower.x <= p.x && p.x <= upper.x && lower.y <= p.y && p.y <= upper.y && lower.z <= p.z && p.z <= upper.z;
+  }
 };
 
 }  // namespace rlacd

@@ -38,6 +38,11 @@ def sample_surface(vertices: FloatArray, faces: IntArray, count: int, seed: int)
 def directed_hausdorff(
     vertices: FloatArray, faces: IntArray, surface: Surface, tolerance: float, threads: int = 0
 ) -> Interval: ...
+
+class Filling:
+    def __init__(self, vertices: FloatArray, faces: IntArray) -> None: ...
+    def chance(self, hull_vertices: FloatArray, hull_faces: IntArray, threshold: float) -> int: ...  # 0, 1 or 2
+
 def meets_concavity(
     part_vertices: FloatArray,
     part_faces: IntArray,

@@ -72,7 +72,7 @@ class CutTree:
     """
 
     def __init__(self, root: Component, policy: Policy, workers: Workers, divisions: Divisions | None = None) -> None:
-        self._root = root
+        self.root = root
         self._policy = policy
         self._workers = workers
         self._divisions = divisions or Divisions()
@@ -97,7 +97,7 @@ class CutTree:
         """
         done: list[Component] = []
         left: list[Component] = []
-        frontier = [self._root]
+        frontier = [self.root]
         while frontier:
             verdicts = self._workers.map(criterion.is_met, frontier)
             done += [c for c, met in zip(frontier, verdicts, strict=True) if met]

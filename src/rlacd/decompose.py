@@ -246,4 +246,4 @@ def _cut_and_merge(
     if not options.merge:
         return parts, criterion
     with clock.stage("merge"):
-        return merge_parts(parts, criterion, workers, clock), criterion
+        return merge_parts(parts, criterion, workers, clock, solid=tree.root), criterion

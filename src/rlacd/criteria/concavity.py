@@ -13,8 +13,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rlacd import _native
-from rlacd.criteria.criterion import Account, Part
+from rlacd.criteria.criterion import Account, Chance, Part
 from rlacd.errors import OptionError
+from rlacd.solid.hull import Hull
 
 VOLUME_WEIGHT = 0.3
 """The weight of ``R_v``, as in the original definition."""
@@ -97,6 +98,10 @@ class Concavity:
     def least_error(self, volume: float, hull_volume: float) -> float:
         """``0.3 R_v``, which the concavity is never less than."""
         return VOLUME_WEIGHT * volume_radius(volume, hull_volume)
+
+    def chance(self, filling: _native.Filling, hull: Hull) -> Chance:
+        """Look at the solid's corners and at points of the hull."""
+        return Chance(filling.chance(hull.vertices, hull.faces, self.threshold))
 
     def filled(self, part: Part) -> float:
         """The solid's volume: what is left is what ``R_v`` is made of."""

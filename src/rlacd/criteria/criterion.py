@@ -4,11 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Any, Protocol
 
+from rlacd import _native
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.balls import Balls
 from rlacd.solid.hull import Hull
+
+
+class Chance(IntEnum):
+    """Whether what a solid fills of a hull may meet a criterion (see native/filling.hpp)."""
+
+    SOME = 0
+    NONE = 1
+    NEVER = 2
+    """Nor does what it fills of any hull that holds this one."""
 
 
 class Part(Protocol):
@@ -71,6 +82,9 @@ class Criterion(Protocol):
 
     def excludes(self, volume: float, hull_volume: float) -> bool:
         """Tell from the volumes alone that a part cannot meet the criterion (cheap, necessary)."""
+
+    def chance(self, filling: _native.Filling, hull: Hull) -> Chance:
+        """Tell cheaply whether what a solid fills of a hull may meet the criterion."""
 
     def is_met(self, part: Part) -> bool:
         """Decide strictly whether the part meets the criterion."""

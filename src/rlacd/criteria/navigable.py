@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rlacd import _native
-from rlacd.criteria.criterion import Account, Part
+from rlacd.criteria.criterion import Account, Chance, Part
 from rlacd.errors import OptionError
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.balls import Balls
@@ -243,6 +243,10 @@ class Navigable:
     def excludes(self, volume: float, hull_volume: float) -> bool:
         """Nothing: volumes say nothing about balls."""
         return False
+
+    def chance(self, filling: _native.Filling, hull: Hull) -> Chance:
+        """None: what is inside a hull does not count, and hulls of pairs have been tried."""
+        return Chance.NEVER
 
     def least_error(self, volume: float, hull_volume: float) -> float:
         """0: volumes say nothing about balls."""

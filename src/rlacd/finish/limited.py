@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from rlacd import _native
 from rlacd.criteria import Criterion
-from rlacd.criteria.criterion import Account
+from rlacd.criteria.criterion import Account, Chance
 from rlacd.criteria.criterion import Part as PartLike
 from rlacd.finish.limits import limit_hull
 from rlacd.solid.balls import Balls
 from rlacd.solid.component import Part
+from rlacd.solid.hull import Hull
 
 FEWEST_VERTICES, FEWEST_FACES = 24, 44
 """Lower limits are applied at the end only, with a warning where a hull then exceeds the threshold: round parts would
@@ -45,6 +47,10 @@ class Limited:
     def excludes(self, volume: float, hull_volume: float) -> bool:
         """Limiting a hull only adds volume, so the underlying bound holds."""
         return self.criterion.excludes(volume, hull_volume)
+
+    def chance(self, filling: _native.Filling, hull: Hull) -> Chance:
+        """The underlying criterion's: limited hulls are larger."""
+        return self.criterion.chance(filling, hull)
 
     def least_error(self, volume: float, hull_volume: float) -> float:
         """Limiting a hull only adds volume, so the underlying bound holds."""

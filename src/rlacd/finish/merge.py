@@ -5,14 +5,17 @@ from __future__ import annotations
 import heapq
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from rlacd import _native
 from rlacd.clock import Clock
-from rlacd.criteria.criterion import Criterion
-from rlacd.solid.component import Part
+from rlacd.criteria.criterion import Chance, Criterion
+from rlacd.solid.arrays import BoolArray, FloatArray
+from rlacd.solid.component import Component, Part, Share
+from rlacd.solid.hull import Hull
+from rlacd.solid.reunite import TOUCHING
 from rlacd.workers import Workers
 
 
@@ -23,12 +26,19 @@ class _Pair(NamedTuple):
 
 
 def merge_parts(
-    parts: Sequence[Part], criterion: Criterion, workers: Workers, clock: Clock, beside: Sequence[Part] = ()
+    parts: Sequence[Part],
+    criterion: Criterion,
+    workers: Workers,
+    clock: Clock,
+    beside: Sequence[Part] = (),
+    solid: Component | None = None,
 ) -> list[Part]:
     """Unite pairs of parts, the cheapest first, as long as the union meets the criterion.
 
-    The test looks at the glued union: its own surface against its own hull, both ways. Pairs are tested a batch at a
-    time on all workers, and taken in the order of their cost whatever the number of workers.
+    The test looks at the glued union: its own surface against its own hull, both ways. When no pair is left that meets
+    it so, parts are united across what lies between them, where the solid is given: there the test looks at all that
+    the solid fills of the joint hull (`Share`). Pairs are tested a batch at a time on all workers, and taken in the
+    order of their cost whatever the number of workers.
 
     Parameters
     ----------
@@ -36,39 +46,64 @@ def merge_parts(
         Solids with disjoint interiors.
     beside : sequence of Part
         More of them, of which no two are to be united with each other: that has been tried before.
+    solid : Component, optional
+        What all of them are parts of.
 
     Returns
     -------
     list of Part
         Parts that could not be united further, in the order of their first piece, those beside last.
     """
-    alive: dict[int, Part] = dict(enumerate([*parts, *beside]))
+    pairs = _Adjoining(criterion, workers)
+    alive = _unite_pairs([*parts, *beside], len(parts), pairs, workers, clock)
+    if solid is None:
+        return alive
+    waiting = {id(part) for part in beside}
+    new = [part for part in alive if id(part) not in waiting]
+    old = [part for part in alive if id(part) in waiting]
+    return _unite_pairs([*new, *old], len(new), _Bridged(criterion, workers, solid), workers, clock)
+
+
+class _Pairing(Protocol):
+    """Which pairs of parts may become one, and how that is found out."""
+
+    def pairs(self, alive: Mapping[int, Part], new: Sequence[int]) -> list[_Pair]:
+        """Pairs of a new part with any other that may be united, and their costs."""
+
+    def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
+        """Their union if it meets the criterion; otherwise None, and whether no larger union will either."""
+
+
+def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, workers: Workers, clock: Clock) -> list[Part]:
+    """Unite pairs, of which one at least is among the first `new` parts or made of them."""
+    alive: dict[int, Part] = dict(enumerate(parts))
     origin = {i: i for i in alive}
-    queue = _pairs(alive, range(len(parts)), criterion, workers)
+    queue = pairing.pairs(alive, range(new))
     heapq.heapify(queue)
-    refused: dict[int, set[int]] = {i: set() for i in alive}  # whom a part, or a piece of it, was not united with
-    unions: dict[_Pair, Part | None] = {}  # verdicts on pairs that are back in the queue
+    refused: dict[int, set[int]] = {i: set() for i in alive}  # whom a part, or a piece of it, can never be united with
+    verdicts: dict[_Pair, tuple[Part | None, bool]] = {}  # on pairs that are back in the queue
     count = newest = len(alive)
     while queue and clock.step(count - len(alive), None, len(alive)):
         batch = _cheapest(queue, alive, 2 * workers.threads)
-        new = [pair for pair in batch if pair not in unions]
-        unions.update(
-            zip(new, workers.map(lambda p: _unite(alive[p.first], alive[p.second], criterion), new), strict=True)
+        fresh = [pair for pair in batch if pair not in verdicts]
+        verdicts.update(
+            zip(fresh, workers.map(lambda p: pairing.unite(alive[p.first], alive[p.second]), fresh), strict=True)
         )
         for taken, pair in enumerate(batch, start=1):
-            union = unions.pop(pair)
+            union, for_good = verdicts.pop(pair)
             if union is None:
-                refused[pair.first].add(pair.second)
-                refused[pair.second].add(pair.first)
+                if for_good:
+                    refused[pair.first].add(pair.second)
+                    refused[pair.second].add(pair.first)
                 continue
             origin[newest] = min(origin[pair.first], origin[pair.second])
             del alive[pair.first], alive[pair.second]
             alive[newest] = union
-            refused[newest] = refused.pop(pair.first) | refused.pop(pair.second) if criterion.is_hereditary else set()
+            refused[newest] = refused.pop(pair.first) | refused.pop(pair.second)
             for i in refused[newest] & alive.keys():
                 refused[i].add(newest)
             asked = {i: part for i, part in alive.items() if i not in refused[newest]}
-            for other in [*batch[taken:], *_pairs(asked, [newest], criterion, workers)]:
+            for other in [*batch[taken:], *pairing.pairs(asked, [newest])]:
                 heapq.heappush(queue, other)
             newest += 1
             break
@@ -85,30 +120,71 @@ def _cheapest(queue: list[_Pair], alive: dict[int, Part], most: int) -> list[_Pa
     return batch
 
 
-def _unite(first: Part, second: Part, criterion: Criterion) -> Part | None:
-    union = Part.glued(first, second)
-    return union if criterion.is_met(union) else None
+@dataclass(frozen=True)
+class _Adjoining:
+    """Pairs within the criterion's reach, judged by themselves."""
+
+    criterion: Criterion
+    workers: Workers
+
+    def pairs(self, alive: Mapping[int, Part], new: Sequence[int]) -> list[_Pair]:
+        """Those that the volume bound allows."""
+        filled = self.criterion.filled
+        return [
+            _Pair(hull_volume - (filled(alive[first]) + filled(alive[second])), first, second)
+            for first, second, volume, hull_volume in neighbours(alive, new, self.criterion.reach, self.workers)
+            if not self.criterion.excludes(volume, hull_volume)
+        ]
+
+    def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
+        """Glue them."""
+        union = Part.glued(first, second)
+        return (union, False) if self.criterion.is_met(union) else (None, self.criterion.is_hereditary)
 
 
-def _pairs(alive: Mapping[int, Part], new: Sequence[int], criterion: Criterion, workers: Workers) -> list[_Pair]:
-    """Pairs of a new part with any other that the criterion's reach and volume bound allow, and their costs."""
-    return [
-        _Pair(hull_volume - (criterion.filled(alive[first]) + criterion.filled(alive[second])), first, second)
-        for first, second, volume, hull_volume in neighbours(alive, new, criterion.reach, workers)
-        if not criterion.excludes(volume, hull_volume)
-    ]
+@dataclass(frozen=True)
+class _Bridged:
+    """Pairs that touch, or both touch a third, judged by what the solid fills of their joint hull."""
+
+    criterion: Criterion
+    workers: Workers
+    solid: Component
+
+    def pairs(self, alive: Mapping[int, Part], new: Sequence[int]) -> list[_Pair]:
+        """All of them: how much the solid fills is not known yet."""
+        filled = self.criterion.filled
+        return [
+            _Pair(hull_volume - (filled(alive[first]) + filled(alive[second])), first, second)
+            for first, second, _, hull_volume in neighbours(alive, new, TOUCHING, self.workers, across=True)
+        ]
+
+    def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
+        """Take the solid's share of the joint hull."""
+        hull = Hull.around(first.hull, second.hull)
+        chance = self.criterion.chance(self.solid.filling, hull)
+        if chance is not Chance.SOME:
+            return None, chance is Chance.NEVER
+        share = Share(self.solid, first, second, hull)
+        fits = share.is_whole and not self.criterion.excludes(share.volume, hull.volume)
+        return (share if fits and self.criterion.is_met(share) else None), False
 
 
 def neighbours(
-    alive: Mapping[int, Part], new: Sequence[int], reach: float, workers: Workers
+    alive: Mapping[int, Part], new: Sequence[int], reach: float, workers: Workers, across: bool = False
 ) -> list[tuple[int, int, float, float]]:
-    """Pairs of a new part with any other whose boxes lie within reach: (first, second, volume, joint hull's volume)."""
+    """Pairs of a new part with any other whose boxes lie within reach: (first, second, volume, joint hull's volume).
+
+    With `across`, also pairs both of which are within reach of a third.
+    """
     ids, parts, among = list(alive), list(alive.values()), set(new)
     is_new = np.array([i in among for i in ids])
     rows = np.flatnonzero(is_new)
     boxes = np.array([part.box for part in parts])
-    gap = np.maximum(boxes[rows, None, 0] - boxes[:, 1], boxes[:, 0] - boxes[rows, None, 1])
-    k, other = np.nonzero(np.sqrt(np.square(np.maximum(gap, 0.0)).sum(axis=2)) <= reach)
+    near = _near(boxes[rows], boxes, reach)
+    if across:
+        between = near.any(axis=0)
+        near |= near[:, between].astype(np.float32) @ _near(boxes[between], boxes, reach).astype(np.float32) > 0
+    k, other = np.nonzero(near)
     once = (rows[k] < other) | ~is_new[other]  # two new parts find each other twice
     pairs = np.sort(np.stack([rows[k], other], axis=1)[once], axis=1)
     pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
@@ -118,6 +194,13 @@ def neighbours(
         (ids[i], ids[j], parts[i].volume + parts[j].volume, hull)
         for (i, j), hull in zip(pairs.tolist(), hulls.tolist(), strict=True)
     ]
+
+
+def _near(some: FloatArray, boxes: FloatArray, reach: float) -> BoolArray:
+    """Which boxes [N, 2, 3] lie within reach of which others [S, 2, 3]: [S, N]."""
+    gap = np.maximum(some[:, None, 0] - boxes[:, 1], boxes[:, 0] - some[:, None, 1])
+    near: BoolArray = np.sqrt(np.square(np.maximum(gap, 0.0)).sum(axis=2)) <= reach
+    return near
 
 
 def merge_to_count(

@@ -260,5 +260,5 @@ def _whole(tree: CutTree, criterion: Criterion, workers: Workers, pace: Pace, mo
     parts = drop_slivers([*done, *left], workers, suspects=left)
     if not all(workers.map(criterion.is_met, [part for part in left if part in parts])):
         return None
-    merged = merge_parts(parts, criterion, workers, pace)
+    merged = merge_parts(parts, criterion, workers, pace, solid=tree.root)
     return None if pace.is_over else drop_slivers(merged, workers)

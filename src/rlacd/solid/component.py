@@ -19,6 +19,9 @@ from rlacd.solid.hull import Hull
 NEGLIGIBLE_VOLUME = 1e-12
 """Solids below this volume (the frame's box has 8) are rounding left over by a cut."""
 
+LOST = 1e-6
+"""Share of a solid's volume that a boolean may lose."""
+
 
 @dataclass(frozen=True)
 class Plane:
@@ -96,7 +99,13 @@ class Part:
 
     @staticmethod
     def glued(first: Part, second: Part) -> Part:
-        """Unite two parts with disjoint interiors; the regions where they touch are no surface of the union."""
+        """Unite two parts with disjoint interiors; the regions where they touch are no surface of the union.
+
+        Where one of them is a `Share`, which has what others have too, so is the union.
+        """
+        for part in (first, second):
+            if isinstance(part, Share):
+                return Share(part.solid, first, second)
         return _Union(first, second)
 
     def _resolved(self) -> tuple[FloatArray, IntArray]:
@@ -144,6 +153,40 @@ class _Union(Part):
         return found
 
 
+class Share(Part):
+    """What a solid fills of the joint hull of two of its parts, whomever it belongs to.
+
+    Parts on both sides of a third are one this way, as a beam that crosses another is: hulls may overlap, and what
+    lies in one of them is where it should be. The members stay disjoint, so that parts can be reunited and cut anew.
+
+    Parameters
+    ----------
+    solid : Component
+        All of it.
+    first, second : Part
+        Made of its components.
+    """
+
+    def __init__(self, solid: Component, first: Part, second: Part, hull: Hull | None = None) -> None:
+        hull = hull or Hull.around(first.hull, second.hull)
+        body = Manifold(Mesh64(hull.vertices, hull.faces.astype(np.uint64)))
+        vertices, faces = _surface_of(solid.manifold ^ body)
+        volume = _native.mesh_volume(vertices, faces) if len(faces) else 0.0
+        super().__init__(vertices, faces, volume, hull, first.piece_hulls + second.piece_hulls)
+        self.solid = solid
+        self._members = (*first.members, *second.members)
+
+    @property
+    def members(self) -> tuple[Component, ...]:
+        """Those of both parts."""
+        return self._members
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all of the members is there: what touches the hull from inside is hard on booleans."""
+        return self.volume >= (1 - LOST) * sum(member.volume for member in self.members)
+
+
 class Component(Part):
     """A closed solid, not necessarily connected, that can be cut.
 
@@ -154,9 +197,7 @@ class Component(Part):
     """
 
     def __init__(self, manifold: Manifold) -> None:
-        mesh = manifold.to_mesh64()
-        vertices = np.ascontiguousarray(mesh.vert_properties[:, :3], dtype=np.float64)
-        faces = np.ascontiguousarray(mesh.tri_verts, dtype=np.int32)
+        vertices, faces = _surface_of(manifold)
         hull = Hull.of(vertices)
         if hull is None:
             raise ValueError("a component has to have a volume")
@@ -167,6 +208,11 @@ class Component(Part):
     def members(self) -> tuple[Component, ...]:
         """Itself."""
         return (self,)
+
+    @cached_property
+    def filling(self) -> _native.Filling:
+        """What hulls of its parts are held against."""
+        return _native.Filling(self.vertices, self.faces)
 
     @cached_property
     def principal_axes(self) -> FloatArray:
@@ -211,6 +257,12 @@ class Component(Part):
         if cavities:
             shells = _enclose(shells, cavities)
         return [piece for m in shells if (piece := _component(m, self)) is not None]
+
+
+def _surface_of(manifold: Manifold) -> tuple[FloatArray, IntArray]:
+    mesh = manifold.to_mesh64()
+    vertices = np.ascontiguousarray(mesh.vert_properties[:, :3], dtype=np.float64)
+    return vertices, np.ascontiguousarray(mesh.tri_verts, dtype=np.int32)
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -262,10 +314,7 @@ def _enclose(shells: list[Manifold], cavities: list[Manifold]) -> list[Manifold]
     for cavity in cavities:
         point = np.asarray(cavity.to_mesh64().vert_properties[:1, :3], dtype=np.float64)
         for i in by_volume:
-            mesh = shells[i].to_mesh64()
-            vertices = np.ascontiguousarray(mesh.vert_properties[:, :3], dtype=np.float64)
-            faces = np.ascontiguousarray(mesh.tri_verts, dtype=np.int32)
-            if _native.Surface(vertices, faces).winding(point)[0] > 0.5:
+            if _native.Surface(*_surface_of(shells[i])).winding(point)[0] > 0.5:
                 by_shell[i].append(cavity)
                 break
     return [group[0] if len(group) == 1 else _concatenate(group) for group in by_shell.values()]

@@ -13,7 +13,7 @@ from manifold3d import Manifold, Mesh64, OpType
 
 from rlacd import _native
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.component import Component, Part
+from rlacd.solid.component import Component, Part, Share
 
 TOUCHING = 1e-8
 """Distance at which faces count as touching (see native/glue.hpp)."""
@@ -53,8 +53,16 @@ def reunite(components: Sequence[Component]) -> Component | None:
 
 
 def touch(first: Part, second: Part) -> bool:
-    """Tell whether two parts touch face to face."""
-    return _boxes_meet(first, second) and bool(_outward(first, second).any())
+    """Tell whether two parts, or members of them, touch face to face."""
+    return _boxes_meet(first, second) and any(
+        _boxes_meet(a, b) and bool(_outward(a, b).any())
+        for a in _disjoint_pieces(first)
+        for b in _disjoint_pieces(second)
+    )
+
+
+def _disjoint_pieces(part: Part) -> Sequence[Part]:
+    return part.members if isinstance(part, Share) else (part,)
 
 
 def _overlapping(which: int, components: Sequence[Component]) -> Manifold:
