@@ -15,8 +15,10 @@ from rlacd.criteria.criterion import Chance, Criterion
 from rlacd.solid.arrays import BoolArray, FloatArray
 from rlacd.solid.component import Component, Part, Share
 from rlacd.solid.hull import Hull
-from rlacd.solid.reunite import TOUCHING
 from rlacd.workers import Workers
+
+FEW = 100
+"""Among so many parts every pair may be united across what lies between; among more, those that a third is near to."""
 
 
 class _Pair(NamedTuple):
@@ -144,7 +146,7 @@ class _Adjoining:
 
 @dataclass(frozen=True)
 class _Bridged:
-    """Pairs that touch, or both touch a third, judged by what the solid fills of their joint hull."""
+    """All pairs (of many parts, those near each other or a third), judged by the solid's share of the joint hull."""
 
     criterion: Criterion
     workers: Workers
@@ -153,9 +155,10 @@ class _Bridged:
     def pairs(self, alive: Mapping[int, Part], new: Sequence[int]) -> list[_Pair]:
         """All of them: how much the solid fills is not known yet."""
         filled = self.criterion.filled
+        reach = np.inf if len(alive) <= FEW else self.criterion.reach
         return [
             _Pair(hull_volume - (filled(alive[first]) + filled(alive[second])), first, second)
-            for first, second, _, hull_volume in neighbours(alive, new, TOUCHING, self.workers, across=True)
+            for first, second, _, hull_volume in neighbours(alive, new, reach, self.workers, across=True)
         ]
 
     def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:

@@ -180,7 +180,7 @@ def search(
             others = rankings[1:] if first == "greedy" else rankings  # the first score is that policy's own
             starts = _portfolio(root, best, criterion, others, views, workers, pace)
         from_portfolio = len(starts[0])
-        outcome = _from_all(starts, criterion, rankings, near_views, workers, pace, steps, seed)
+        outcome = _from_all(root, starts, criterion, rankings, near_views, workers, pace, steps, seed)
     account = Account(
         level=name,
         seconds=time.perf_counter() - start,
@@ -222,6 +222,7 @@ def _portfolio(
 
 
 def _from_all(
+    root: Component,
     starts: Sequence[list[Part]],
     criterion: Criterion,
     rankings: Sequence[Ranking],
@@ -236,7 +237,7 @@ def _from_all(
     total = accepted = 0
     exhausted = False
     for number in range(ROUNDS * len(starts)):
-        state = Neighbourhood(starts[number % len(starts)], criterion, rankings, views, workers, seed + number)
+        state = Neighbourhood(root, starts[number % len(starts)], criterion, rankings, views, workers, seed + number)
         outcome = state.run(pace, steps - total)
         total += outcome.steps
         accepted += outcome.accepted

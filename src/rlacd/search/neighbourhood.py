@@ -24,7 +24,7 @@ from rlacd.search.neighbours import Cluster, Neighbours
 from rlacd.search.pace import Pace
 from rlacd.search.rankings import Ranked, Ranking
 from rlacd.search.recut import Exchange, recut
-from rlacd.solid.component import Part
+from rlacd.solid.component import Component, Part
 from rlacd.workers import Workers
 
 SIZES = (3, 4, 5, 6, 8)
@@ -66,6 +66,8 @@ class Neighbourhood:
 
     Parameters
     ----------
+    root : Component
+        The solid.
     parts : sequence of Part
         Made of components with disjoint interiors; all that meet the criterion stay so.
     criterion : Criterion
@@ -79,6 +81,7 @@ class Neighbourhood:
 
     def __init__(
         self,
+        root: Component,
         parts: Sequence[Part],
         criterion: Criterion,
         rankings: Sequence[Ranking],
@@ -86,6 +89,7 @@ class Neighbourhood:
         workers: Workers,
         seed: int,
     ) -> None:
+        self._root = root
         self._criterion = criterion
         self._policies = [Ranked(ranking, views) for ranking in rankings]
         self._workers = workers
@@ -119,7 +123,7 @@ class Neighbourhood:
     def _try(self, cluster: Cluster, policy: int, pace: Pace) -> Exchange | None:
         parts = [self._here.parts[i] for i in cluster]
         around = [self._here.parts[i] for i in self._here.around(cluster)]
-        return recut(parts, around, self._policies[policy], self._criterion, pace.left)
+        return recut(parts, around, self._policies[policy], self._criterion, pace.left, self._root)
 
 
 @dataclass

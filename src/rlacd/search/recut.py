@@ -11,7 +11,7 @@ from rlacd.criteria.criterion import Criterion
 from rlacd.cut import CutTree
 from rlacd.finish.merge import merge_parts
 from rlacd.policies import Policy
-from rlacd.solid.component import Part
+from rlacd.solid.component import Component, Part
 from rlacd.solid.reunite import reunite
 from rlacd.workers import Workers
 
@@ -32,6 +32,15 @@ class Exchange:
     out: tuple[Part, ...]
     into: tuple[Part, ...]
 
+    @classmethod
+    def between(cls, before: Sequence[Part], after: Sequence[Part]) -> Exchange:
+        """What turns some parts into others; those that are among both stay."""
+        known, kept = {id(part) for part in before}, {id(part) for part in after}
+        return cls(
+            tuple(part for part in before if id(part) not in kept),
+            tuple(part for part in after if id(part) not in known),
+        )
+
     @property
     def gain(self) -> int:
         """How many parts fewer there are."""
@@ -44,6 +53,7 @@ def recut(
     policy: Policy,
     criterion: Criterion,
     seconds: float,
+    whole: Component | None = None,
 ) -> Exchange | None:
     """Cut some parts anew, and merge the pieces with each other and with the parts around.
 
@@ -59,6 +69,8 @@ def recut(
         Every new part meets it.
     seconds : float
         Give up after this time; infinite to be independent of it.
+    whole : Component, optional
+        What all are parts of: pieces may then be merged across what lies between them.
 
     Returns
     -------
@@ -74,14 +86,10 @@ def recut(
         return None
     if _volumes(pieces) == _volumes(parts):  # cut as before: what could be merged with these was merged
         return None
-    merged = merge_parts(pieces, criterion, alone, clock, beside=around)
+    merged = merge_parts(pieces, criterion, alone, clock, beside=around, solid=whole)
     if clock.stopped_by is not None:
         return None
-    untouched = {id(part) for part in around} & {id(part) for part in merged}
-    exchange = Exchange(
-        (*parts, *(part for part in around if id(part) not in untouched)),
-        tuple(part for part in merged if id(part) not in untouched),
-    )
+    exchange = Exchange.between([*parts, *around], merged)
     tighter = hull_volume(exchange.into) < (1 - TIGHTER) * hull_volume(exchange.out)
     return exchange if exchange.gain > 0 or (exchange.gain == 0 and tighter) else None
 

@@ -67,11 +67,11 @@ def tighten(
         finer = criterion.scaled(factor)
         with pace.share(left):
             done, unmet = tree.cut_until(finer, pace)
-            fine = merge_parts(done, finer, workers, pace)
+            fine = merge_parts(done, finer, workers, pace, solid=root)
             if unmet or pace.is_over:
                 least = factor
                 continue
-            found = Neighbourhood(fine, finer, rankings, near_views, workers, seed).run(
+            found = Neighbourhood(root, fine, finer, rankings, near_views, workers, seed).run(
                 pace, math.floor((steps - total) / left) if math.isfinite(steps) else steps, most_parts
             )
         total += found.steps
