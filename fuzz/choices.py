@@ -39,7 +39,9 @@ def draw_options(seed: int) -> dict[str, Any]:
         if chance(0.15):
             options[name] = int(random.choice([4, 5, 8, 24, 44, 64]))
     if chance(0.2):
-        options["resolution"] = int(random.choice([1, 20, 60]))
+        options["resolution"] = int(random.choice([20, 60]))
+    if "criterion" in options and options["criterion"].radius < 0.05:
+        options["timeout"] = 30.0  # loose sheets and small balls may make tens of thousands of parts
     if chance(0.05):
         options["timeout"] = float(random.choice([1e-6, 0.05, 0.5]))
     return options

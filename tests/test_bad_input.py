@@ -197,7 +197,7 @@ WRONG_OPTIONS = {
     "max_faces": [3, 0, 12.0, "x"],
     "merge": [None, "no", 0, 2],
     "policy": ["", None, 3, "GREEDY", "greedy-", ["greedy"]],
-    "resolution": [0, -1, 2.5, "3", None, 10**6],
+    "resolution": [0, -1, 19, 401, 2.5, "3", None, 10**6],
     "seed": [-1, 1.5, "a", None, 2**70],
     "threads": [0, -1, 1.5, "2", True, 10**6],
     "timeout": [0, -1, NAN, INFINITE, "3"],
@@ -240,7 +240,8 @@ def test_hulls_and_corners_can_be_limited_below_what_fits(max_hulls: int, max_ve
     result = check((ELL, FACES), max_hulls=max_hulls, max_vertices=max_vertices)
     assert len(result) <= max_hulls
     assert all(len(hull.vertices) <= (max_vertices or np.inf) for hull in result)
-    assert any("exceed the concavity" in sentence for sentence in result.report["warnings"])
+    too_coarse = max_hulls == 1 or max_vertices == 4  # two boxes that cross are what it is
+    assert any("exceed the concavity" in sentence for sentence in result.report["warnings"]) == too_coarse
     assert result.report["hausdorff"]["under"] < 2e-3
 
 
@@ -283,7 +284,7 @@ def test_an_exception_of_the_callback_is_the_callers_own() -> None:
 
     with pytest.raises(MyError):
         rlacd.decompose((ELL, FACES), progress=fail, threads=2)
-    assert len(rlacd.decompose((ELL, FACES), threads=2)) == 4, "the next run is not disturbed"
+    assert len(rlacd.decompose((ELL, FACES), threads=2)) == 2, "the next run is not disturbed"
 
 
 # --- files, through the command line ----------------------------------------------------------------------------------

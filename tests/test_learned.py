@@ -171,6 +171,8 @@ def bad_weights(tmp_path: Path, kind: str) -> Path:
         onnx_file(path, rlacd="[1, 2]")
     elif kind == "metadata that are no JSON":
         onnx_file(path, rlacd="{")
+    elif kind == "metadata that are no text":
+        path.write_bytes(onnx_file(path, rlacd="placeholder").read_bytes().replace(b"placeholder", b"\xff" * 11))
     return path
 
 
@@ -186,6 +188,7 @@ BAD = [
     "no version",
     "metadata of another kind",
     "metadata that are no JSON",
+    "metadata that are no text",
 ]
 
 

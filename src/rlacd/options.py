@@ -29,8 +29,9 @@ MIN_THRESHOLD = 0.001
 """Least concavity that can be asked for; the longest side of the input is 2."""
 
 
-MAX_RESOLUTION = 400
-"""The grid that repair looks for rooms on has this number cubed of cells; more would take over 4 GB."""
+RESOLUTIONS = (20, 400)
+"""The grid that repair looks for rooms on has this number cubed of cells: with fewer than 20 along a side, a wrap drawn
+onto the surface folds over itself; more than 400 would take over 4 GB."""
 
 QUALITIES = ("fast", "balanced", "best")
 """Levels of search; see `rlacd.search`."""
@@ -89,7 +90,7 @@ class Options:
         _require(isinstance(self.merge, (bool, np.bool_)), "merge", self.merge, "True or False")
         object.__setattr__(self, "merge", bool(self.merge))
         _require(is_policy(self.policy), "policy", self.policy, f"one of {', '.join(POLICIES)}, or an .onnx file")
-        self._as_integer("resolution", 1, MAX_RESOLUTION, f"between 1 and {MAX_RESOLUTION}")
+        self._as_integer("resolution", *RESOLUTIONS, "between {} and {}".format(*RESOLUTIONS))
         self._as_integer("seed", 0, MAX_SEED, "between 0 and 2**63 - 1")
         self._as_integer("threads", 1, MAX_THREADS, f"between 1 and {MAX_THREADS}", None)
         self._as_number("timeout", lambda x: 0 < x < math.inf, "a positive number of seconds", None)

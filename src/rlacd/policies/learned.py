@@ -85,10 +85,11 @@ class Guide:
         name, content = _read(weights)
         try:
             self._session = open_network(content)
+            about = self._session.get_modelmeta().custom_metadata_map.get("rlacd")
+            signature = [[v.name for v in self._session.get_inputs()], [v.name for v in self._session.get_outputs()]]
         except Exception as error:  # onnxruntime's own exceptions have no public base
             raise WeightsError(f"{name} is damaged or no ONNX file; export the policy again.") from error
-        self.about = _about(name, self._session.get_modelmeta().custom_metadata_map.get("rlacd"))
-        signature = [[v.name for v in self._session.get_inputs()], [v.name for v in self._session.get_outputs()]]
+        self.about = _about(name, about)
         if signature != [INPUTS, OUTPUTS]:
             raise WeightsError(f"{name} is no guide network; export the policy again.")
 

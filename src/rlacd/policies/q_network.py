@@ -55,13 +55,13 @@ class OnnxQ:
     def __init__(self, path: str | os.PathLike[str]) -> None:
         try:
             self._session = open_network(read_file(path))
+            signature = [
+                tuple(v.name for v in given) for given in (self._session.get_inputs(), self._session.get_outputs())
+            ]
         except OSError as error:
             raise WeightsError(f"The policy {path} cannot be read ({error}); give another path.") from error
         except Exception as error:  # onnxruntime's own exceptions have no public base
             raise WeightsError(f"{path} is damaged or no ONNX file; export the policy again.") from error
-        signature = [
-            tuple(v.name for v in given) for given in (self._session.get_inputs(), self._session.get_outputs())
-        ]
         about = _about(self._session)
         if about.get("kind") != KIND or signature != [INPUTS, OUTPUTS]:
             raise WeightsError(f"{path} is no Q network of rlacd; export the policy again.")

@@ -15,7 +15,7 @@ from rlacd.solid.component import Component, Part
 from rlacd.solid.reunite import reunite
 from rlacd.workers import Workers
 
-SLACK = 1
+SLACK = 5
 """Merging may make up for so many pieces more than the parts there were; it seldom does for more."""
 
 TIGHTER = 1e-4

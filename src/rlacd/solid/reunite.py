@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from manifold3d import Manifold, Mesh64, OpType
+from manifold3d import Manifold, OpType
 
 from rlacd import _native
 from rlacd.solid.arrays import FloatArray
@@ -27,6 +27,10 @@ CRUMBS = 5 * OVERLAP
 LOST = 4 * OVERLAP
 """The reunited solid's volume differs from that of its components by no more than a film of this thickness on them."""
 
+FOLDED, OFF = 1e-3, 1e-6
+"""Or by this share of it, where the components overlap themselves or each other, as those of a solid with folds do; no
+corner of them is farther outside than this."""
+
 
 def reunite(components: Sequence[Component]) -> Component | None:
     """Unite components with disjoint interiors into one; None when no clean solid comes of it.
@@ -41,15 +45,17 @@ def reunite(components: Sequence[Component]) -> Component | None:
     united = Manifold.batch_boolean([_overlapping(i, components) for i in range(len(components))], OpType.Add)
     volume = sum(component.volume for component in components)
     area = sum(_native.mesh_area(component.vertices, component.faces) for component in components)
-    if united.is_empty() or abs(united.volume() - volume) > LOST * area:
+    if united.is_empty() or abs(united.volume() - volume) > FOLDED * volume:
         return None
-    clean = united.simplify(CRUMBS)
-    if abs(clean.volume() - volume) <= LOST * area:
+    clean = united.as_original().simplify(CRUMBS)
+    if abs(clean.volume() - united.volume()) <= LOST * area:
         united = clean
     try:
-        return Component(united)
+        whole = Component(united)
     except ValueError:
         return None
+    # Less volume may be a fold less, or a piece that a boolean has lost.
+    return whole if abs(whole.volume - volume) <= LOST * area or _holds(whole, components) else None
 
 
 def touch(first: Part, second: Part) -> bool:
@@ -65,6 +71,14 @@ def _disjoint_pieces(part: Part) -> Sequence[Part]:
     return part.members if isinstance(part, Share) else (part,)
 
 
+def _holds(whole: Component, components: Sequence[Component]) -> bool:
+    """Tell whether every corner of the components lies in the whole, or on it."""
+    surface = _native.Surface(whole.vertices, whole.faces)
+    corners = np.concatenate([component.vertices for component in components])
+    off = corners[surface.distance(corners, 1) > OFF]
+    return bool((surface.winding(off, 2.0, 1) > 0.5).all()) if len(off) else True
+
+
 def _overlapping(which: int, components: Sequence[Component]) -> Manifold:
     """Move one component's faces out by `OVERLAP` where they touch any other's."""
     component = components[which]
@@ -74,7 +88,9 @@ def _overlapping(which: int, components: Sequence[Component]) -> Manifold:
             outward += _outward(component, other)
     if not outward.any():
         return component.manifold
-    return Manifold(Mesh64(component.vertices + OVERLAP * outward, component.faces.astype(np.uint64)))
+    # Moved where they are: a mesh that is read anew loses folds that are hardly there, and what they enclose.
+    moved = component.vertices + OVERLAP * outward
+    return component.manifold.warp_batch(lambda points: moved if np.array_equal(points, component.vertices) else points)
 
 
 def _outward(part: Part, other: Part) -> FloatArray:

@@ -1,0 +1,156 @@
+"""Parts are united across what lies between them, where what the solid fills of their joint hull is tight."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from manifold3d import Manifold, Mesh64, OpType
+
+import rlacd
+from rlacd import _native
+from rlacd.clock import Clock
+from rlacd.criteria import Concavity
+from rlacd.criteria.criterion import Chance
+from rlacd.criteria.navigable import Navigable, NavigableSpace
+from rlacd.finish import merge_parts, merge_to_count
+from rlacd.solid.balls import Balls
+from rlacd.solid.component import Component, Part, Plane, Share
+from rlacd.solid.hull import Hull
+from rlacd.solid.reunite import reunite
+from rlacd.workers import Workers
+
+TIGHT = Concavity(0.02)
+
+
+def block(x: float, y: float, z: float, at: tuple[float, float, float] = (0, 0, 0)) -> Manifold:
+    return Manifold.cube((x, y, z), True).translate(at)
+
+
+CROSS = block(2, 0.3, 0.3) + block(0.3, 2, 0.3)
+
+
+def arms_and_beam(solid: Manifold) -> tuple[Component, list[Part]]:
+    """The solid, and what lies left of x = -0.15, right of x = 0.15 and between."""
+    root = Component(solid)
+    left, rest = root.cut(Plane((1.0, 0.0, 0.0), -0.15))
+    assert left is not None
+    assert rest is not None
+    middle, right = rest.cut(Plane((1.0, 0.0, 0.0), 0.15))
+    assert middle is not None
+    assert right is not None
+    return root, [left, middle, right]
+
+
+@pytest.fixture
+def workers() -> Iterator[Workers]:
+    with Workers(2) as pool:
+        yield pool
+
+
+def test_a_beam_is_one_part_although_another_crosses_it(workers: Workers) -> None:
+    root, parts = arms_and_beam(CROSS)
+    assert len(merge_parts(parts, TIGHT, workers, Clock())) == 3
+    merged = merge_parts(parts, TIGHT, workers, Clock(), solid=root)
+    assert sorted(part.hull.volume for part in merged) == pytest.approx([2 * 0.09, 2 * 0.09])
+    assert all(part.volume == pytest.approx(2 * 0.09) for part in merged)  # the crossing belongs to both
+    (beam,) = (part for part in merged if isinstance(part, Share))
+    assert set(beam.members) == {parts[0], parts[2]}
+    assert TIGHT.error(beam) < 1e-3
+
+
+@pytest.mark.parametrize(
+    "solid",
+    [
+        block(2, 0.3, 0.3) - block(0.3, 0.3, 0.2) + block(0.3, 2, 0.1, (0, 0, -0.1)),  # air between
+        CROSS - block(0.2, 0.2, 2),  # a bore through the crossing
+        CROSS - block(0.2, 0.2, 0.2),  # a bubble inside it
+        block(0.85, 0.3, 0.3, (-0.575, 0, 0)) + block(0.85, 0.3, 0.3, (0.575, 0, 0.25)) + block(0.3, 2, 1),  # beside
+    ],
+)
+def test_arms_stay_apart_where_something_is_missing_between(workers: Workers, solid: Manifold) -> None:
+    root, parts = arms_and_beam(solid)
+    merged = merge_parts(parts, TIGHT, workers, Clock(), solid=root)
+    assert not any({parts[0], parts[2]} <= set(part.members) for part in merged)
+
+
+def test_hulls_of_crossing_beams_cover_them_and_no_more() -> None:
+    bars = [block(2, 0.2, 0.2, (0, y, 0)) for y in (-0.5, 0.5)] + [block(0.2, 2, 0.2, (x, 0, 0)) for x in (-0.5, 0.5)]
+    window = Manifold.batch_boolean(bars, OpType.Add)
+    mesh = window.to_mesh64()
+    found = rlacd.decompose((mesh.vert_properties[:, :3], mesh.tri_verts), threshold=0.02, quality="fast", threads=1)
+    assert len(found) == 4
+    hulls = [Manifold(Mesh64(np.array(h.vertices), np.array(h.faces, dtype=np.uint64))) for h in found]
+    assert (window - Manifold.batch_boolean(hulls, OpType.Add)).volume() == pytest.approx(0, abs=1e-9)
+    assert all((hull - window).volume() == pytest.approx(0, abs=1e-9) for hull in hulls)
+    assert found.report["concavity"]["max"] < 1e-3
+
+
+def test_the_number_of_threads_does_not_matter() -> None:
+    root, parts = arms_and_beam(CROSS + block(0.3, 0.3, 2))
+    found = []
+    for threads in (1, 4):
+        with Workers(threads) as pool:
+            found.append(merge_parts(parts, TIGHT, pool, Clock(), solid=root))
+    for one, four in zip(*found, strict=True):
+        assert one.vertices.tobytes() == four.vertices.tobytes()
+        assert one.hull.vertices.tobytes() == four.hull.vertices.tobytes()
+
+
+def test_what_is_united_with_a_share_is_a_share(workers: Workers) -> None:
+    """Gluing would count what two of them have in common twice."""
+    root, parts = arms_and_beam(CROSS)
+    merged = merge_parts(parts, TIGHT, workers, Clock(), solid=root)
+    (whole,) = merge_to_count(merged, 1, TIGHT, workers, Clock()) or []
+    assert isinstance(whole, Share)
+    assert whole.volume == pytest.approx(CROSS.volume())
+    united = reunite(whole.members)
+    assert united is not None
+    assert united.volume == pytest.approx(CROSS.volume())
+
+
+def test_balls_do_not_ask_what_is_inside_a_hull() -> None:
+    component = Component(CROSS)
+    space = Navigable(NavigableSpace(0.1, 0.05), 0.1, 0.05, Balls(np.zeros((0, 3)), np.zeros(0)))
+    assert space.chance(component.filling, component.hull) is Chance.NEVER
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.integers(0, 10**6), st.floats(0.01, 0.5))
+def test_a_quick_no_is_never_wrong(seed: int, threshold: float) -> None:
+    """Held against the strict test of the share itself, for hulls of corners of random heaps of blocks."""
+    random = np.random.default_rng(seed)
+    sizes, places = random.uniform(0.1, 1, (4, 3)), random.uniform(-0.4, 0.4, (4, 3))
+    solid = Component(
+        Manifold.batch_boolean([block(*s, tuple(p)) for s, p in zip(sizes, places, strict=True)], OpType.Add)
+    )
+    hull = Hull.of(random.permutation(solid.vertices)[: int(random.integers(4, 12))])
+    if hull is None or hull.volume < 1e-4:
+        return
+    body = Manifold(Mesh64(hull.vertices + 0, hull.faces.astype(np.uint64)))
+    share = solid.manifold ^ body
+    mesh = share.to_mesh64()
+    vertices = np.ascontiguousarray(mesh.vert_properties[:, :3])
+    chance = Concavity(threshold).chance(solid.filling, hull)
+    if len(vertices) == 0:
+        return
+    fits = _native.meets_concavity(
+        vertices, mesh.tri_verts.astype(np.int32), hull.vertices, hull.faces, share.volume(), hull.volume, threshold
+    )
+    assert not (fits and chance is not Chance.SOME)
+    larger = Hull.of(np.concatenate([hull.vertices, random.uniform(-1, 1, (3, 3))]))
+    assert larger is not None
+    if chance is Chance.NEVER:
+        assert Concavity(threshold * (1 - 1e-9)).chance(solid.filling, larger) is Chance.NEVER
+
+
+def test_a_solid_that_overlaps_itself_can_be_reunited() -> None:
+    """Volumes of its pieces count twice what overlaps; that is no loss."""
+    folded = Manifold.compose([block(2, 0.5, 0.5), block(0.5, 2, 0.02, (0.3, 0, 0))])
+    pieces = [Component(piece) for piece in folded.split_by_plane((1, 0.2, 0.1), 0.1)]
+    united = reunite(pieces)
+    assert united is not None
+    assert united.volume == pytest.approx((block(2, 0.5, 0.5) + block(0.5, 2, 0.02, (0.3, 0, 0))).volume(), rel=1e-6)
