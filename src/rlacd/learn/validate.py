@@ -51,7 +51,7 @@ def count_parts(policy: Policy, solids: Sequence[Component], criterion: Concavit
             done, left = CutTree(solid, policy, workers).cut_until(criterion, Clock(), most=MOST_PARTS)
             parts = drop_slivers([*done, *left], workers, suspects=left)
             raw.append(len(parts))
-            merged.append(len(merge_parts(parts, criterion, workers, Clock())))
+            merged.append(len(merge_parts(parts, criterion, workers, Clock(), solid=solid)))
     return Score(raw, merged)
 
 

@@ -141,6 +141,6 @@ def decompose_as_deployed(
         tree = CutTree(Component(solid.manifold), Deployed(deployment, threshold), workers)
         done, left = tree.cut_until(criterion, clock)
         parts = drop_slivers([*done, *left], workers, suspects=left)
-        parts = drop_slivers(merge_parts(parts, criterion, workers, clock), workers)
+        parts = drop_slivers(merge_parts(parts, criterion, workers, clock, solid=tree.root), workers)
     there = [Hull.of(solid.frame.to_input(limit_part(part, None, None).hull.vertices)) for part in parts]
     return [(hull.vertices, hull.faces) for hull in there if hull is not None]

@@ -31,9 +31,11 @@ def deploy(policy: Policy, solids: Sequence[Manifold], threshold: float) -> list
     with Workers(1) as workers:
         for solid in solids:
             clock = Clock()
-            done, left = CutTree(Component(solid), policy, workers).cut_until(Concavity(threshold), clock)
+            root = Component(solid)
+            done, left = CutTree(root, policy, workers).cut_until(Concavity(threshold), clock)
             parts = [*done, *left]
-            counts.append(Count(len(parts), len(merge_parts(parts, Concavity(threshold), workers, clock))))
+            merged = merge_parts(parts, Concavity(threshold), workers, clock, solid=root)
+            counts.append(Count(len(parts), len(merged)))
     return counts
 
 
