@@ -1,0 +1,257 @@
+// Parallel planes through a mesh: see sections.hpp for input, output and algorithm.
+#include "sections.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "hull.hpp"
+
+namespace rlacd {
+
+namespace {
+
+constexpr double kFilm = 1e-13;  // relative to the mesh
+
+int axis_of(Vec3 n) {
+  for (int axis = 0; axis < 3; ++axis)
+    if (std::fabs(n[axis]) == 1) return axis;
+  return -1;
+}
+
+// Corners of the convex hull of points on a plane, by Andrew's monotone chain in the coordinates other than `drop`.
+// Rounding may drop a corner that stands out by some 1e-16, which no volume notices.
+template <int drop>
+void reduce_to_planar_hull(std::vector<Vec3>& points) {
+  if (points.size() < 4) return;
+  constexpr int u = (drop + 1) % 3, v = (drop + 2) % 3;
+  std::sort(points.begin(), points.end(), [](Vec3 a, Vec3 b) {
+    return a[u] != b[u] ? a[u] < b[u] : a[v] != b[v] ? a[v] < b[v] : a[drop] < b[drop];
+  });
+  std::vector<Vec3> chain;
+  chain.reserve(points.size() + 1);
+  const auto extend = [&chain](Vec3 p, std::size_t base) {
+    while (chain.size() >= base + 2) {
+      const Vec3 a = chain[chain.size() - 2], b = chain.back();
+      if ((b[u] - a[u]) * (p[v] - a[v]) - (b[v] - a[v]) * (p[u] - a[u]) > 0) break;
+      chain.pop_back();
+    }
+    chain.push_back(p);
+  };
+  for (const Vec3 p : points) extend(p, 0);
+  const std::size_t lower = chain.size() - 1;
+  for (std::size_t i = points.size() - 1; i-- > 0;) extend(points[i], lower);
+  chain.pop_back();
+  points = std::move(chain);
+}
+
+// The same without the coordinate that the plane's normal determines best.
+void reduce_to_planar_hull(std::vector<Vec3>& points, Vec3 n) {
+  if (std::fabs(n.x) >= std::fabs(n.y) && std::fabs(n.x) >= std::fabs(n.z))
+    reduce_to_planar_hull<0>(points);
+  else if (std::fabs(n.y) >= std::fabs(n.z))
+    reduce_to_planar_hull<1>(points);
+  else
+    reduce_to_planar_hull<2>(points);
+}
+
+// Integral of min(s - d, 0) over a triangle with corner values s0 <= s1 <= s2, divided by its area.
+double mean_below(double s0, double s1, double s2, double d) {
+  if (d <= s0) return 0;
+  if (d >= s2) return (s0 + s1 + s2) / 3 - d;
+  if (d <= s1) {
+    const double t = (d - s0) * (d - s0) / ((s1 - s0) * (s2 - s0));
+    return t * (s0 - d) / 3;
+  }
+  const double t = (s2 - d) * (s2 - d) / ((s2 - s0) * (s2 - s1));
+  return (s0 + s1 + s2) / 3 - d - t * (s2 - d) / 3;
+}
+
+}  // namespace
+
+Sections::Sections(const Mesh& mesh, Vec3 normal, std::vector<double> offsets)
+    : mesh_(mesh), normal_(normal), axis_(axis_of(normal)), offsets_(std::move(offsets)) {
+  project();
+  fill_slabs();
+  cut_edges();
+  measure_solid();
+}
+
+void Sections::project() {
+  heights_.reserve(mesh_.vertices.size());
+  above_.reserve(mesh_.vertices.size());
+  for (const Vec3 p : mesh_.vertices) {
+    const double s = dot(normal_, p);
+    heights_.push_back(s);
+    above_.push_back(
+        static_cast<std::int32_t>(std::upper_bound(offsets_.begin(), offsets_.end(), s) - offsets_.begin()));
+  }
+  for (const Triangle& f : mesh_.faces)
+    for (const std::int32_t c : f) {
+      lowest_ = std::min(lowest_, heights_[c]);
+      highest_ = std::max(highest_, heights_[c]);
+    }
+  film_ = kFilm * (highest_ - lowest_);
+}
+
+std::size_t Sections::first_from(std::int32_t vertex) const {
+  const auto j = static_cast<std::size_t>(above_[vertex]);
+  return j > 0 && offsets_[j - 1] == heights_[vertex] ? j - 1 : j;
+}
+
+std::int32_t Sections::lowest_corner(const Triangle& f) const {
+  const std::int32_t lower = heights_[f[1]] < heights_[f[0]] ? f[1] : f[0];
+  return heights_[f[2]] < heights_[lower] ? f[2] : lower;
+}
+
+void Sections::fill_slabs() {
+  // On which sides of a vertex its faces go on: 1 below, 2 above, 4 anywhere.
+  std::vector<char> sides(mesh_.vertices.size(), 0);
+  for (const Triangle& f : mesh_.faces) {
+    const auto [low, high] = std::minmax({heights_[f[0]], heights_[f[1]], heights_[f[2]]});
+    for (const std::int32_t c : f)
+      sides[c] = static_cast<char>(sides[c] | (low < heights_[c] ? 1 : 0) | (high > heights_[c] ? 2 : 0) | 4);
+  }
+  struct Entry {
+    std::size_t slab;
+    std::int32_t vertex;
+  };
+  std::vector<Entry> entries;
+  entries.reserve(sides.size());
+  for (std::int32_t i = 0; i < static_cast<std::int32_t>(sides.size()); ++i) {
+    if (sides[i] == 0) continue;
+    const auto j = static_cast<std::size_t>(above_[i]);
+    const bool on_plane = j > 0 && offsets_[j - 1] == heights_[i];
+    if (!on_plane || (sides[i] & 2) != 0) entries.push_back({j, i});
+    if (on_plane && (sides[i] & 1) != 0) entries.push_back({j - 1, i});
+  }
+  first_.assign(offsets_.size() + 2, 0);
+  for (const Entry& e : entries) ++first_[e.slab + 1];
+  for (std::size_t j = 1; j < first_.size(); ++j) first_[j] += first_[j - 1];
+  order_.resize(entries.size());
+  std::vector<std::size_t> next(first_.begin(), first_.end() - 1);
+  for (const Entry& e : entries) order_[next[e.slab]++] = e.vertex;
+}
+
+// The point where an edge meets a plane; on the plane to the last bit when n is a coordinate axis.
+Vec3 Sections::crossing(std::int32_t low, std::int32_t high, double offset) const {
+  const Vec3 a = mesh_.vertices[low], b = mesh_.vertices[high];
+  const double t = (offset - heights_[low]) / (heights_[high] - heights_[low]);
+  Vec3 p = a + t * (b - a);
+  if (axis_ >= 0) p[axis_] = offset * normal_[axis_];
+  return p;
+}
+
+void Sections::cut_edges() {
+  outlines_.resize(offsets_.size());
+  for (const Triangle& f : mesh_.faces)
+    for (int e = 0; e < 3; ++e) {
+      // In a closed oriented mesh every edge is run through once in each direction: take the ascending one.
+      const std::int32_t a = f[e], b = f[(e + 1) % 3];
+      if (heights_[a] >= heights_[b]) continue;
+      for (auto j = static_cast<std::size_t>(above_[a]); j < offsets_.size() && offsets_[j] < heights_[b]; ++j)
+        outlines_[j].push_back(crossing(a, b, offsets_[j]));
+    }
+  for (std::vector<Vec3>& points : outlines_) reduce_to_planar_hull(points, normal_);
+}
+
+double Sections::end_area(bool lowest) const {
+  std::vector<Vec3> end;
+  const std::size_t slab = lowest ? 0 : planes();
+  for_each_inside(slab, slab + 1, [&](Vec3 p) {
+    if (const double s = dot(normal_, p); lowest ? s <= lowest_ + film_ : s >= highest_ - film_) end.push_back(p);
+  });
+  reduce_to_planar_hull(end, normal_);
+  return outline_area(end, normal_);
+}
+
+void Sections::measure_solid() {
+  std::vector<double> slope(offsets_.size() + 1, 0), constant(offsets_.size() + 1, 0);
+  solid_below_.assign(offsets_.size(), 0);
+  for (const Triangle& f : mesh_.faces) {
+    const Vec3 a = mesh_.vertices[f[0]], b = mesh_.vertices[f[1]], c = mesh_.vertices[f[2]];
+    const double flux = dot(normal_, cross(b - a, c - a)) / 2;
+    const std::int32_t lowest = lowest_corner(f);
+    double s[3] = {heights_[f[0]], heights_[f[1]], heights_[f[2]]};
+    if (s[0] > s[1]) std::swap(s[0], s[1]);
+    if (s[1] > s[2]) std::swap(s[1], s[2]);
+    if (s[0] > s[1]) std::swap(s[0], s[1]);
+    std::size_t j = first_from(lowest);
+    for (; j < offsets_.size() && offsets_[j] < s[2]; ++j)
+      solid_below_[j] += flux * mean_below(s[0], s[1], s[2], offsets_[j]);
+    // From here on the whole triangle lies below: flux * (mean - d), summed up as a line in d.
+    slope[j] += flux;
+    constant[j] += flux * ((s[0] + s[1] + s[2]) / 3);
+  }
+  solid_ = mesh_volume(mesh_.vertices, mesh_.faces);
+  double flux = 0, moment = 0;
+  for (std::size_t j = 0; j < offsets_.size(); ++j) {
+    flux += slope[j];
+    moment += constant[j];
+    solid_below_[j] = solid_below_[j] + moment - flux * offsets_[j];
+  }
+}
+
+// Every triangle that a plane cuts adds a segment to the section's perimeter and (as a directed edge) its area.
+std::vector<Sections::Measures> Sections::measure_sections() const {
+  std::vector<Measures> measures(offsets_.size());
+  std::vector<Vec3> area(offsets_.size());
+  for (const Triangle& f : mesh_.faces) {
+    // A section is taken just above its plane, so a corner on the plane counts as below.
+    const double high = std::max({heights_[f[0]], heights_[f[1]], heights_[f[2]]});
+    for (std::size_t j = first_from(lowest_corner(f)); j < offsets_.size() && offsets_[j] < high; ++j) {
+      Vec3 up, down;  // where the boundary of the triangle crosses the plane upwards and downwards
+      bool has_up = false, has_down = false;
+      for (int e = 0; e < 3; ++e) {
+        const std::int32_t a = f[e], b = f[(e + 1) % 3];
+        const bool below_a = heights_[a] <= offsets_[j], below_b = heights_[b] <= offsets_[j];
+        if (below_a && !below_b) up = crossing(a, b, offsets_[j]), has_up = true;
+        if (!below_a && below_b) down = crossing(b, a, offsets_[j]), has_down = true;
+      }
+      if (!has_up || !has_down) continue;
+      const Vec3 origin = offsets_[j] * normal_;
+      measures[j].perimeter += norm(down - up);
+      area[j] = area[j] + cross(up - origin, down - origin);
+    }
+  }
+  for (std::size_t j = 0; j < measures.size(); ++j) measures[j].area = std::fabs(dot(normal_, area[j])) / 2;
+  return measures;
+}
+
+double outline_area(const std::vector<Vec3>& outline, Vec3 n) {
+  Vec3 doubled;
+  for (std::size_t i = 2; i < outline.size(); ++i)
+    doubled = doubled + cross(outline[i - 1] - outline[0], outline[i] - outline[0]);
+  return std::fabs(dot(n, doubled)) / 2;
+}
+
+Bundles bundle_planes(const std::vector<Vec3>& directions, const std::vector<double>& offsets) {
+  Bundles bundles;
+  if (directions.empty()) return bundles;
+  if (offsets.size() % directions.size() != 0) throw std::invalid_argument("every direction needs as many offsets");
+  const std::size_t planes = offsets.size() / directions.size();
+  bundles.place.resize(offsets.size());
+  for (std::size_t k = 0; k < directions.size(); ++k) {
+    const auto row = offsets.begin() + static_cast<std::ptrdiff_t>(k * planes);
+    const auto row_end = row + static_cast<std::ptrdiff_t>(planes);
+    if (!std::is_sorted(row, row_end) || !std::all_of(row, row_end, [](double d) { return std::isfinite(d); }))
+      throw std::invalid_argument("offsets must be finite and ascend");
+    const auto known = std::find_if(bundles.all.begin(), bundles.all.end(),
+                                    [&](const Bundle& bundle) { return bundle.normal == directions[k]; });
+    const auto b = static_cast<std::size_t>(known - bundles.all.begin());
+    if (b == bundles.all.size()) bundles.all.push_back({directions[k], {}});
+    std::vector<double>& d = bundles.all[b].offsets;
+    d.insert(d.end(), row, row_end);
+    for (std::size_t j = 0; j < planes; ++j) bundles.place[k * planes + j].bundle = b;
+  }
+  for (Bundle& bundle : bundles.all) {
+    std::sort(bundle.offsets.begin(), bundle.offsets.end());
+    bundle.offsets.erase(std::unique(bundle.offsets.begin(), bundle.offsets.end()), bundle.offsets.end());
+  }
+  for (std::size_t i = 0; i < offsets.size(); ++i) {
+    const std::vector<double>& d = bundles.all[bundles.place[i].bundle].offsets;
+    bundles.place[i].plane = static_cast<std::size_t>(std::lower_bound(d.begin(), d.end(), offsets[i]) - d.begin());
+  }
+  return bundles;
+}
+
+}  // namespace rlacd
