@@ -1,5 +1,8 @@
 // Python bindings of the plane sweep.
+#include <nanobind/stl/vector.h>
+
 #include "arrays.hpp"
+#include "least_excess.hpp"
 #include "sweep.hpp"
 
 namespace rlacd {
@@ -25,6 +28,26 @@ void bind_sweep(nb::module_& m) {
       "10].\n\n"
       "Columns: hull volume below, above; solid volume below, above; section area, perimeter; thickness below, above;\n"
       "largest extent below, above. The mesh must be closed and outward oriented.");
+  m.def(
+      "find_least_excess",
+      [](const PointsIn& vertices, const FacesIn& faces, const PointsIn& directions,
+         const nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>& offsets, double exponent,
+         double tie, double least_solid, const std::vector<double>& slivers, int threads) {
+        if (offsets.shape(0) != directions.shape(0)) throw std::invalid_argument("one row of offsets a direction");
+        const Mesh mesh = to_finite_mesh(vertices, faces);
+        const std::vector<Vec3> normals = to_points(directions);
+        const std::vector<double> d(offsets.data(), offsets.data() + offsets.size());
+        nb::gil_scoped_release release;
+        return static_cast<std::int64_t>(
+            find_least_excess(mesh, normals, d, {exponent, tie, least_solid, slivers}, threads));
+      },
+      nb::arg("vertices"), nb::arg("faces"), nb::arg("directions"), nb::arg("offsets"), nb::arg("exponent"),
+      nb::arg("tie"), nb::arg("least_solid"), nb::arg("slivers"), nb::arg("threads") = 0,
+      "The first of the planes n.x = d, for unit directions n [K, 3] and ascending offsets d [K, M], whose sides'\n"
+      "excesses (volume of the hull less that of the solid) have the least norm; -1 where no plane is valid.\n\n"
+      "A plane is valid where both sides hold more than `least_solid` and are thicker than a share of their largest\n"
+      "extent: the first of `slivers` by which there are valid planes. Costs, the norm's power `exponent` where that\n"
+      "is finite, that differ by no more than `tie` are equal. The mesh must be closed and outward oriented.");
 }
 
 }  // namespace rlacd

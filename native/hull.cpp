@@ -32,6 +32,22 @@ void HullBuilder::clear() {
   insertion_ = 0;
 }
 
+void HullBuilder::drop_inner_points() {
+  if (rank_ < 3) return;
+  std::vector<std::int32_t> number(points_.size(), -1);
+  std::vector<Vec3> corners;
+  for (Facet& f : facets_) {
+    if (!f.alive) continue;
+    for (std::int32_t& corner : f.corner) {
+      std::int32_t& known = number[corner];
+      if (known < 0) known = static_cast<std::int32_t>(corners.size()), corners.push_back(points_[corner]);
+      corner = known;
+    }
+  }
+  points_ = std::move(corners);
+  next_outside_.assign(points_.size(), -1);
+}
+
 inline bool HullBuilder::sees(const Facet& f, Vec3 p) const {
   const Vec3 offset = p - f.origin;
   const double h = dot(f.normal, offset);

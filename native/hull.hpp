@@ -28,6 +28,9 @@ class HullBuilder {
   // Extends the hull by a batch of points. Points seen so far keep their numbers, in the order they were added.
   void add(const std::vector<Vec3>& points);
 
+  // Forgets the points that are no corners, as far as there are facets; the others get new numbers.
+  void drop_inner_points();
+
   // Dimension of the points' affine hull: -1 (none), 0 (one point), 1 (a line), 2 (a plane), 3. Facets exist for 3.
   int rank() const { return rank_; }
   double volume() const;

@@ -1,5 +1,7 @@
 """C++ kernels of rlacd: points are float64 [N, 3], faces int32 [F, 3]; the GIL is released inside."""
 
+from collections.abc import Sequence
+
 from rlacd.solid.arrays import FloatArray, IntArray
 
 Interval = tuple[float, float]
@@ -12,6 +14,17 @@ def mesh_area(vertices: FloatArray, faces: IntArray) -> float: ...
 def sweep(
     vertices: FloatArray, faces: IntArray, directions: FloatArray, offsets: FloatArray, threads: int = 0
 ) -> FloatArray: ...
+def find_least_excess(
+    vertices: FloatArray,
+    faces: IntArray,
+    directions: FloatArray,
+    offsets: FloatArray,
+    exponent: float,
+    tie: float,
+    least_solid: float,
+    slivers: Sequence[float],
+    threads: int = 0,
+) -> int: ...
 def reflex_edges(
     vertices: FloatArray, faces: IntArray
 ) -> tuple[IntArray, IntArray, FloatArray, FloatArray]: ...  # [E, 2], [E, 2], [E, 6], [E]
