@@ -30,7 +30,7 @@ from rlacd.search.levels import LEVELS, Level, cost, level, search
 from rlacd.search.neighbourhood import Neighbourhood
 from rlacd.search.neighbours import Neighbours
 from rlacd.search.pace import Pace
-from rlacd.search.rankings import Ranked, by_score
+from rlacd.search.rankings import by_score
 from rlacd.search.recut import Exchange, recut
 from rlacd.solid.component import Component, Part, Plane
 from rlacd.solid.load import load_mesh
@@ -193,12 +193,12 @@ def test_a_cluster_that_was_cut_badly_becomes_fewer_parts() -> None:
     pieces: list[Component] = [bar]
     for offset in (-1.0, 0.2, 1.1):
         pieces = [side for piece in pieces for side in piece.cut(Plane((1, 0, 0), offset)) if side is not None]
-    exchange = recut(pieces, [], Ranked(by_score("hull-sum"), Views(12, 0)), CRITERION, math.inf)
+    exchange = recut(pieces, [], by_score("hull-sum")(Views(12, 0)), CRITERION, math.inf)
     assert exchange is not None
     assert exchange.gain == 3
     assert exchange.into[0].volume == pytest.approx(3)
     # With no time left, nothing is found.
-    assert recut(pieces, [], Ranked(by_score("hull-sum"), Views(12, 0)), CRITERION, -1.0) is None
+    assert recut(pieces, [], by_score("hull-sum")(Views(12, 0)), CRITERION, -1.0) is None
 
 
 @pytest.mark.slow

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Mapping
 from types import MappingProxyType
 
 import numpy as np
 
-from rlacd.planes.sweep import SLIVER, Sweep
+from rlacd.planes.least_excess import SLIVERS, TIE, least_excess
+from rlacd.planes.sweep import Sweep
 from rlacd.planes.views import Views
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
+
+EXPONENT = 1.3
+"""Of the norm that gives the fewest parts (docs/benchmarks.md)."""
 
 
 def hull_sum(s: Sweep) -> FloatArray:
@@ -24,19 +29,14 @@ def max_excess(s: Sweep) -> FloatArray:
 
 
 def excess_norm(s: Sweep) -> FloatArray:
-    """p-norm of the two sides' |CH(m_i)| - |m_i| with p = 1.3: between the sum (p = 1) and the maximum."""
+    """p-norm of the two sides' |CH(m_i)| - |m_i| with p = `EXPONENT`: between the sum (p = 1) and the maximum."""
     below, above = np.maximum(s.hull_below - s.solid_below, 0), np.maximum(s.hull_above - s.solid_above, 0)
-    norm: FloatArray = below**1.3 + above**1.3
+    norm: FloatArray = below**EXPONENT + above**EXPONENT
     return norm
 
 
-SCORES: Mapping[str, Callable[[Sweep], FloatArray]] = MappingProxyType(
-    {"hull-sum": hull_sum, "max-excess": max_excess, "excess-norm": excess_norm}
-)
-
-
-TIE = 1e-9
-"""Costs that differ by less than this share of the largest are equal."""
+SCORES: Mapping[str, float] = MappingProxyType({"hull-sum": 1.0, "max-excess": math.inf, "excess-norm": EXPONENT})
+"""Exponents of the norms that order planes as these functions of a sweep do."""
 
 
 def cheapest(scored: Sweep, cost: FloatArray) -> Plane | None:
@@ -45,7 +45,7 @@ def cheapest(scored: Sweep, cost: FloatArray) -> Plane | None:
     Planes that leave slivers are taken only where no other is left. Of planes that cost the same but for rounding, as
     they do in symmetric shapes, the first is taken, so that the cuts do not depend on the input's unit and place.
     """
-    for sliver in (SLIVER, SLIVER / 100):
+    for sliver in SLIVERS:
         valid = scored.valid(sliver)
         if valid.any():
             equal = cost[valid].min() + TIE * cost[valid].max()
@@ -63,14 +63,13 @@ class Greedy:
     concave_edges : int
         How many concave edges add their planes; with 0, the paper's baseline.
     views : Views, optional
-        Where the sweeps come from, to share them with others; decides about the planes then.
+        Where the planes come from; decides about them then.
     """
 
     def __init__(self, score: str = "excess-norm", concave_edges: int = 4, views: Views | None = None) -> None:
-        self.score = SCORES[score]
-        self.views = views or Views(concave_edges=concave_edges)
+        self._exponent = SCORES[score]
+        self._views = views or Views(concave_edges=concave_edges)
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None when every candidate misses it or shaves off a film."""
-        scored = self.views.of(component, threads)
-        return cheapest(scored, self.score(scored))
+        return least_excess(component, self._views.candidates(component), self._exponent, threads)

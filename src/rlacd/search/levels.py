@@ -16,7 +16,7 @@ from rlacd.planes.views import Views
 from rlacd.policies.greedy import SCORES
 from rlacd.search.neighbourhood import Neighbourhood, Outcome
 from rlacd.search.pace import Pace
-from rlacd.search.rankings import Ranked, Ranking, by_score
+from rlacd.search.rankings import Ranking, by_score
 from rlacd.search.tighten import tighten
 from rlacd.solid.component import Component, Part
 from rlacd.workers import Workers
@@ -213,7 +213,7 @@ def _portfolio(
     for ranking in rankings:
         if pace.is_over or len(parts) == 1:
             break
-        tree = CutTree(root, Ranked(ranking, views), workers, divisions)
+        tree = CutTree(root, ranking(views), workers, divisions)
         other = _whole(tree, criterion, workers, pace, most=HOPELESS * len(parts))
         if other is not None and all(cost(other) != cost(known) for known in found):
             found.append(other)

@@ -22,7 +22,7 @@ from rlacd.criteria.criterion import Criterion
 from rlacd.planes.views import Views
 from rlacd.search.neighbours import Cluster, Neighbours
 from rlacd.search.pace import Pace
-from rlacd.search.rankings import Ranked, Ranking
+from rlacd.search.rankings import Ranking
 from rlacd.search.recut import Exchange, recut
 from rlacd.solid.component import Component, Part
 from rlacd.workers import Workers
@@ -91,7 +91,7 @@ class Neighbourhood:
     ) -> None:
         self._root = root
         self._criterion = criterion
-        self._policies = [Ranked(ranking, views) for ranking in rankings]
+        self._policies = [ranking(views) for ranking in rankings]
         self._workers = workers
         self._random = np.random.default_rng(seed)
         self._here = Neighbours(parts, criterion, workers)

@@ -11,7 +11,7 @@ from rlacd.finish import merge_parts
 from rlacd.planes.views import Views
 from rlacd.search.neighbourhood import Neighbourhood, Outcome
 from rlacd.search.pace import Pace
-from rlacd.search.rankings import Ranked, Ranking
+from rlacd.search.rankings import Ranking
 from rlacd.solid.component import Component, Part
 from rlacd.workers import Workers
 
@@ -56,7 +56,7 @@ def tighten(
     Outcome
         Its parts exceed the threshold by no larger factor than those given.
     """
-    tree = CutTree(root, Ranked(rankings[0], views), workers)
+    tree = CutTree(root, rankings[0](views), workers)
     best = list(parts)
     total = accepted = 0
     least, reached = 1.0, _factor(best, criterion, workers)

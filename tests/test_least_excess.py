@@ -1,0 +1,173 @@
+"""The plane of least excess against a sweep of all planes."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from manifold3d import Manifold
+
+from rlacd import _native
+from rlacd.planes.candidates import Candidates, axis_and_principal
+from rlacd.planes.least_excess import least_excess
+from rlacd.planes.sweep import SLIVER, Sweep, sweep
+from rlacd.planes.views import Views
+from rlacd.policies import SCORES, Greedy
+from rlacd.policies.greedy import cheapest, excess_norm, hull_sum, max_excess
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.component import Component, Plane
+from rlacd.solid.load import load_mesh
+from rlacd.solid.repair import repair
+from tests.test_sweep import SOLIDS, gear
+
+EXPONENTS = {"hull_sum": 1.0, "max_excess": math.inf, "excess_norm": SCORES["excess-norm"]}
+COSTS = {"hull_sum": hull_sum, "max_excess": max_excess, "excess_norm": excess_norm}
+
+
+def excess_cost(swept: Sweep, exponent: float) -> FloatArray:
+    below = np.maximum(swept.hull_below - swept.solid_below, 0)
+    above = np.maximum(swept.hull_above - swept.solid_above, 0)
+    return np.maximum(below, above) if math.isinf(exponent) else below**exponent + above**exponent
+
+
+@pytest.mark.parametrize("score", EXPONENTS)
+@pytest.mark.parametrize("name", SOLIDS)
+def test_it_is_the_plane_that_a_sweep_of_all_finds(name: str, score: str) -> None:
+    component = Component(SOLIDS[name]())
+    views = Views()
+    swept = views.of(component)
+    found = least_excess(component, views.candidates(component), EXPONENTS[score])
+    assert found is not None
+    assert found == cheapest(swept, COSTS[score](swept))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("score", EXPONENTS)
+def test_it_is_so_all_the_way_down_real_meshes(corpus: Path, score: str) -> None:
+    names = ("kenney_cc0", "quaternius_cc0", "kaykit_cc0")
+    files = [sorted((corpus / "train" / name).glob("*.*"))[7] for name in names]
+    greedy = Greedy(score.replace("_", "-"))
+    cuts = 0
+    for file in files:
+        frontier = [Component(repair(load_mesh(file)).manifold)]
+        for _ in range(3):
+            sides: list[Component] = []
+            for component in frontier:
+                swept = Views().of(component)
+                plane = greedy.choose(component)
+                assert plane == cheapest(swept, COSTS[score](swept))
+                if plane is not None and component.hull.volume > 1.01 * component.volume:
+                    sides += [side for side in component.cut(plane) if side is not None]
+                    cuts += 1
+            frontier = sides
+    assert cuts > 10
+
+
+@st.composite
+def blocks_and_planes(draw: st.DrawFn) -> tuple[Component, Candidates]:
+    """A few blocks with corners on a coarse grid, and planes on it and off it: many meet faces, some miss the solid."""
+    grid = st.integers(0, 6)
+    solid = Manifold()
+    for _ in range(draw(st.integers(1, 4))):
+        corner = [draw(grid) / 4 for _ in range(3)]
+        solid += Manifold.cube([draw(st.integers(1, 4)) / 4 for _ in range(3)]).translate(corner)
+    if draw(st.booleans()):
+        solid = solid.rotate((0, 0, 45)) + Manifold.sphere(draw(st.integers(1, 3)) / 4, 12)
+    directions, offsets = [], []
+    for _ in range(draw(st.integers(1, 8))):
+        normal = np.array([draw(st.integers(-2, 2)) for _ in range(3)], dtype=np.float64)
+        if not normal.any():
+            normal[2] = 1
+        directions.append(normal / np.linalg.norm(normal))
+        offsets.append(sorted(draw(st.lists(st.integers(-4, 12).map(lambda i: i / 4), min_size=5, max_size=5))))
+    return Component(solid), Candidates(np.array(directions) + 0.0, np.array(offsets))
+
+
+@settings(max_examples=150, deadline=None)
+@given(blocks_and_planes(), st.sampled_from([1.0, 1.3, 2.0, math.inf]))
+def test_no_valid_plane_costs_less(case: tuple[Component, Candidates], exponent: float) -> None:
+    component, candidates = case
+    swept = sweep(component, candidates)
+    valid = next((v for s in (SLIVER, SLIVER / 100) if (v := swept.valid(s)).any()), None)
+    found = least_excess(component, candidates, exponent)
+    if valid is None:
+        assert found is None
+        return
+    assert found is not None
+    cost = excess_cost(swept, exponent)
+    chosen = next(i for i in np.flatnonzero(valid) if candidates.plane(int(i)) == found)
+    # Excesses are differences of volumes: those of nearly convex solids are nothing but rounding.
+    rounding = 1e-12 * component.hull.volume
+    rounding = rounding if math.isinf(exponent) else exponent * component.hull.volume ** (exponent - 1) * rounding
+    most = component.hull.volume - (0 if exponent == 1 else component.volume)
+    tie = 1e-9 * max(most, 0.0) ** (1 if math.isinf(exponent) else exponent)
+    assert cost[chosen] <= cost[valid].min() + tie + rounding
+
+
+def test_the_first_of_equal_planes_is_taken() -> None:
+    solid = Component(gear() + gear().translate((4, 0, 0)).mirror((1, 0, 0)).translate((4, 0, 0)))
+    waist = 0.5 * (solid.box[0, 0] + solid.box[1, 0])
+    for shift in (0.3, -0.3):  # the solid is symmetric about its waist
+        candidates = Candidates(np.eye(3)[[0, 0]], np.array([[waist + shift], [waist - shift]]))
+        assert least_excess(solid, candidates, 1.3) == Plane((1.0, 0.0, 0.0), waist + shift)
+
+
+def test_slivers_are_left_only_where_every_plane_leaves_one() -> None:
+    notched = Component(Manifold.cube((4, 4, 1)) - Manifold.cube((1, 1, 0.02)))
+    shaving, middle = Candidates(np.eye(3)[2:], np.array([[0.02]])), Candidates(np.eye(3)[2:], np.array([[0.02, 0.5]]))
+    plane = least_excess(notched, shaving, 1.0)
+    assert plane is not None
+    assert plane.offset == 0.02, "nothing else is left"
+    plane = least_excess(notched, middle, 1.0)
+    assert plane is not None
+    assert plane.offset == 0.5, "the notch is not worth a film"
+    assert least_excess(notched, Candidates(np.eye(3)[2:], np.array([[-1.0, 0.0, 1.0, 7.0]])), 1.0) is None
+
+
+def test_no_planes_no_choice() -> None:
+    assert least_excess(Component(gear()), Candidates(np.zeros((0, 3)), np.zeros((0, 1))), 1.0) is None
+
+
+def test_the_same_plane_for_any_number_of_threads() -> None:
+    component = Component(gear().rotate((3, 5, 7)))
+    candidates = Views().candidates(component)
+    planes = {least_excess(component, candidates, 1.3, threads) for threads in (1, 2, 5, 16)}
+    assert len(planes) == 1
+
+
+def ask(vertices: FloatArray, offsets: list[float], exponent: float = 1.3, tie: float = 0.0) -> int:
+    faces = Component(gear()).faces
+    return _native.find_least_excess(
+        vertices, faces, np.eye(3)[:1], np.array([offsets]), exponent, tie, 1e-11, [SLIVER], 1
+    )
+
+
+def test_what_makes_no_sense_is_refused() -> None:
+    vertices = Component(gear()).vertices
+    assert ask(vertices, [0.1, 0.2]) in (0, 1)
+    with pytest.raises(ValueError, match="finite and ascend"):
+        ask(vertices, [0.5, 0.2])
+    with pytest.raises(ValueError, match="finite and ascend"):
+        ask(vertices, [0.2, math.nan])
+    with pytest.raises(ValueError, match="exponent"):
+        ask(vertices, [0.2], exponent=0.9)
+    with pytest.raises(ValueError, match="exponent"):
+        ask(vertices, [0.2], exponent=math.nan)
+    with pytest.raises(ValueError, match="tie"):
+        ask(vertices, [0.2], tie=-1.0)
+    with pytest.raises(ValueError, match="not finite"):
+        ask(np.where(vertices == vertices.max(), np.nan, vertices), [0.2])
+
+
+def test_a_solid_cut_through_a_convex_part_is_no_better_than_its_waist() -> None:
+    balls = Manifold.sphere(0.5, 32).translate((-1, 0, 0)) + Manifold.sphere(0.5, 32).translate((1, 0, 0))
+    dumbbell = Component(balls + Manifold.cylinder(2, 0.1, 0.1, 16, True).rotate((0, 90, 0)))
+    for exponent in (1.0, 1.3, math.inf):
+        plane = least_excess(dumbbell, axis_and_principal(dumbbell), exponent)
+        assert plane is not None
+        assert plane.normal == (1.0, 0.0, 0.0)
+        assert abs(plane.offset) < 0.7
