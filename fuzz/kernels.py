@@ -126,6 +126,12 @@ def part_queries(mesh: Soup, other: Soup, hull: Hull, random: np.random.Generato
     directions[:3] = np.eye(3)
     offsets = np.ascontiguousarray(np.sort(random.choice([-0.5, 0.0, 0.25, 1.0], (6, 4))))
     same(lambda threads: _native.sweep(*mesh, np.ascontiguousarray(directions), offsets, threads))
+    exponent = float(random.choice([1.0, 1.3, np.inf]))
+    same(
+        lambda threads: _native.find_least_excess(
+            *mesh, np.ascontiguousarray(directions), offsets, exponent, 1e-9, 1e-11, (0.02, 2e-4), threads
+        )
+    )
     same(lambda threads: _native.concave_edges(*mesh, hull.vertices, hull.faces, 4))
     _native.concave_edge_planes(*mesh, hull.vertices, hull.faces, 4)
     volume = _native.mesh_volume(*mesh)
