@@ -194,14 +194,13 @@ def _least_area(points: FloatArray) -> IntArray:
     cost = np.zeros((n, n))
     choice = np.zeros((n, n), dtype=np.int64)
     for span in range(2, n):
-        for i in range(n - span):
-            k = i + span
-            middle = np.arange(i + 1, k)
-            areas = np.linalg.norm(np.cross(points[middle] - points[i], points[k] - points[i]), axis=1)
-            total = cost[i, middle] + cost[middle, k] + areas
-            best = int(total.argmin())
-            cost[i, k] = total[best]
-            choice[i, k] = middle[best]
+        first = np.arange(n - span)[:, None]
+        middle, last = first + np.arange(1, span), first + span
+        areas = np.linalg.norm(np.cross(points[middle] - points[first], points[last] - points[first]), axis=2)
+        total = cost[first, middle] + cost[middle, last] + areas
+        best = total.argmin(axis=1)[:, None]
+        cost[first, last] = np.take_along_axis(total, best, axis=1)
+        choice[first, last] = np.take_along_axis(middle, best, axis=1)
     triangles, open_spans = [], [(0, n - 1)]
     while open_spans:
         i, k = open_spans.pop()
