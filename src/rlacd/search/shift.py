@@ -7,11 +7,13 @@ of less even sizes are progress too: in the end the small ones vanish, as bins d
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import reduce
 
 import numpy as np
 
+from rlacd.clock import Clock
 from rlacd.criteria.criterion import Criterion
 from rlacd.finish.merge import unite
 from rlacd.search.recut import Exchange
@@ -43,7 +45,12 @@ PATCHES = 4
 
 
 def shift(
-    part: Part, around: Sequence[Part], criterion: Criterion, random: np.random.Generator, solid: Component
+    part: Part,
+    around: Sequence[Part],
+    criterion: Criterion,
+    random: np.random.Generator,
+    solid: Component,
+    seconds: float = math.inf,
 ) -> Exchange | None:
     """Let a part give pieces of itself to the parts around.
 
@@ -58,16 +65,21 @@ def shift(
         Draws takers and directions.
     solid : Component
         What all are parts of.
+    seconds : float
+        Be content with what is given after this time; infinite to be independent of it.
 
     Returns
     -------
     Exchange or None
         With as many parts, of less even sizes, or one less; None where nobody takes anything.
     """
+    clock = Clock(seconds if math.isfinite(seconds) else None)
     now = list(around)
     takers = [i for i, other in enumerate(around) if other.hull.volume > SMALLER * part.hull.volume]
     rest = part
-    for _ in range(TRIES if takers else 0):
+    for tried in range(TRIES if takers else 0):
+        if not clock.step(tried, TRIES, len(now) + 1):
+            break
         i = takers[random.integers(len(takers))]
         bite = _largest_bite(rest, now[i], _direction(rest, now[i], random), criterion, solid)
         if bite is None:
