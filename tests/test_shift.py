@@ -149,3 +149,16 @@ def test_small_parts_are_drawn_more_often_and_only_those_near_take() -> None:
     drawn = np.bincount([here.draw_small(random) for _ in range(2000)], minlength=4)
     assert drawn[1] > drawn[2] > drawn[0]
     assert drawn.min() > 0
+
+
+def test_a_search_in_vain_ends() -> None:
+    """A cube and a ball on it: pieces can be given away for ever, and two parts are the least there can be."""
+    cube, ball = Component(box((-1, -1, -1), (1, 1, 0))), Component(Manifold.sphere(0.7, 24).translate((0, 0, 0.7)))
+    solid = Component(cube.manifold + ball.manifold)
+    parts: list[Part] = [cube, Component(solid.manifold - cube.manifold)]
+    with Workers(1) as workers:
+        state = Neighbourhood(solid, parts, CRITERION, [by_score("hull-sum")], Views(12, 0), workers, 0)
+        outcome = state.run(Pace(Clock(), None, 2), 1000)
+    assert outcome.exhausted
+    assert outcome.steps < 1000
+    assert len(outcome.parts) == 2

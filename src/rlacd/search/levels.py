@@ -95,7 +95,7 @@ class Account:
     accepted : int
         Trials that were taken over.
     exhausted : bool
-        There was nothing left to try.
+        There was nothing left to try, or it had been in vain for long.
     """
 
     level: str

@@ -33,6 +33,9 @@ from rlacd.workers import Workers
 DRY = 4
 """The search ends when so many batches in a row found nothing new to try."""
 
+PATIENCE = 16
+"""It ends, too, after so many trials a part that saved none: giving pieces away finds something new to try for ever."""
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -46,7 +49,7 @@ class Outcome:
     accepted : int
         Trials that were taken over.
     exhausted : bool
-        There was nothing left to try.
+        There was nothing left to try, or it had been in vain for long.
     """
 
     parts: list[Part]
@@ -99,10 +102,11 @@ class Neighbourhood:
         return list(self._here.parts.values())
 
     def run(self, pace: Pace, most: float = math.inf, enough: int = 1) -> Outcome:
-        """Try until nothing is left to try, the clock says no, `most` trials are made or `enough` parts are left."""
-        steps = accepted = dry = 0
+        """Try until there is no hope left, the clock says no, `most` trials are made or `enough` parts are left."""
+        steps = accepted = dry = vain = 0
         here = self._here
-        while pace.step(steps, None, len(here.parts)) and steps < most and len(here.parts) > enough and dry < DRY:
+        exhausted = len(here.parts) == 1
+        while pace.step(steps, None, len(here.parts)) and steps < most and len(here.parts) > enough and not exhausted:
             batch = list(self._ways.draw(here, self._random, self._near))
             dry = 0 if batch else dry + 1
             batch = batch[: int(min(BATCH, most - steps))]  # drawn in full, so that more steps begin with the same
@@ -112,10 +116,12 @@ class Neighbourhood:
                 self._ways.count(trial, exchange.gain if exchange is not None and taken else 0)
                 steps += 1
                 accepted += taken
+                vain = 0 if exchange is not None and taken and exchange.gain > 0 else vain + 1
                 self._best = min(self._best, self.parts, key=cost)
             pace.steps += len(batch)
             pace.parts = min(pace.parts, len(here.parts))
-        return Outcome(self._best, steps, accepted, dry == DRY or len(here.parts) == 1)
+            exhausted = dry == DRY or vain >= PATIENCE * len(here.parts) or len(here.parts) == 1
+        return Outcome(self._best, steps, accepted, exhausted)
 
     def _try(self, trial: Trial, pace: Pace) -> Exchange | None:
         parts = self._here.parts
