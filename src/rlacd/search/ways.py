@@ -18,9 +18,6 @@ BATCH = 8
 AS_LONG_AS = 3
 """A part that gives pieces away takes about as long as a cluster of so many that is cut anew."""
 
-AFTER = 24
-"""So many clusters are cut anew before anybody gives pieces away: at first there is more to gain by cutting."""
-
 REPEATS = 4
 """So often a part may try to give pieces to the same others, each time drawing anew to whom and in which direction."""
 
@@ -92,8 +89,6 @@ class Ways:
     def _worth(self, size: int, policy: int | None) -> float:
         """Parts gained by the time it takes, which is about in proportion to the size of a cluster."""
         rate = self._sizes[size].rate
-        if policy is None and sum(tally.tried for tally in self._policies) < AFTER:
-            return 0.0
         if policy is None:
             return len(self._policies) * rate / AS_LONG_AS
         return rate * self._policies[policy].rate / self._usual / size
