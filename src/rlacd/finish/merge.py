@@ -13,7 +13,7 @@ from rlacd import _native
 from rlacd.clock import Clock
 from rlacd.criteria.criterion import Chance, Criterion
 from rlacd.solid.arrays import BoolArray, FloatArray
-from rlacd.solid.component import Component, Part, Share
+from rlacd.solid.component import LOST, Component, Part, Share
 from rlacd.solid.hull import Hull
 from rlacd.workers import Workers
 
@@ -167,9 +167,30 @@ class _Bridged:
         chance = self.criterion.chance(self.solid.filling, hull)
         if chance is not Chance.SOME:
             return None, chance is Chance.NEVER
-        share = Share(self.solid, first, second, hull)
-        fits = share.is_whole and not self.criterion.excludes(share.volume, hull.volume)
-        return (share if fits and self.criterion.is_met(share) else None), False
+        return _share(first, second, hull, self.criterion, self.solid), False
+
+
+def unite(first: Part, second: Part, criterion: Criterion, solid: Component) -> Part | None:
+    """Unite two parts of a solid, as they are or across what lies between them; None where neither is allowed."""
+    union = Part.glued(first, second)
+    chance = criterion.chance(solid.filling, union.hull)
+    if chance is Chance.NONE:
+        return None
+    are_apart = is_alone(first) and is_alone(second)  # otherwise they may overlap each other
+    if are_apart and not criterion.excludes(union.volume, union.hull.volume) and criterion.is_met(union):
+        return union
+    return _share(first, second, union.hull, criterion, solid) if chance is Chance.SOME else None
+
+
+def is_alone(part: Part) -> bool:
+    """Tell whether a part is made of its members only, and of nothing that other parts have too."""
+    return part.volume <= (1 + LOST) * sum(member.volume for member in part.members)
+
+
+def _share(first: Part, second: Part, hull: Hull, criterion: Criterion, solid: Component) -> Share | None:
+    share = Share(solid, first, second, hull)
+    fits = share.is_whole and not criterion.excludes(share.volume, hull.volume)
+    return share if fits and criterion.is_met(share) else None
 
 
 def neighbours(

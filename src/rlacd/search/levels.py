@@ -14,7 +14,7 @@ from rlacd.cut import CutTree, Divisions
 from rlacd.finish import drop_slivers, merge_parts
 from rlacd.planes.views import Views
 from rlacd.policies.greedy import SCORES
-from rlacd.search.neighbourhood import Neighbourhood, Outcome
+from rlacd.search.neighbourhood import Neighbourhood, Outcome, cost
 from rlacd.search.pace import Pace
 from rlacd.search.rankings import Ranking, by_score
 from rlacd.search.tighten import tighten
@@ -95,7 +95,7 @@ class Account:
     accepted : int
         Trials that were taken over.
     exhausted : bool
-        There was nothing left to try.
+        There was nothing left to try, or it had been in vain for long.
     """
 
     level: str
@@ -246,11 +246,6 @@ def _from_all(
         if not exhausted:
             break
     return Outcome(best, total, accepted, exhausted)
-
-
-def cost(parts: Sequence[Part]) -> tuple[int, float]:
-    """How many parts there are, and the volume of their hulls: the less, the better they fit."""
-    return len(parts), sum(part.hull.volume for part in parts)
 
 
 def _whole(tree: CutTree, criterion: Criterion, workers: Workers, pace: Pace, most: int) -> list[Part] | None:

@@ -3,7 +3,8 @@
 A state is the parts so far, all of them meeting the criterion. A trial takes a cluster of neighbours, two of which have
 a joint hull that fits almost, reunites what they are made of into one solid, cuts that anew, and merges the pieces with
 each other and with the parts around. It is accepted when fewer parts are left, or as many with less volume in their
-hulls. Small clusters are quick to try, large ones can be cut in quite another way; which of them, and which ranking of
+hulls. Or a part gives pieces of itself to those around, which is taken over even if no part is saved yet. Small
+clusters are quick to try, large ones can be cut in quite another way; which of them, or giving, and which ranking of
 planes, is worth its time depends on the shape, so that is learned on the way. (P. Shaw, "Using Constraint Programming
 and Local Search Methods to Solve Vehicle Routing Problems", CP 1998, and S. Ropke and D. Pisinger, "An Adaptive Large
 Neighborhood Search Heuristic for the Pickup and Delivery Problem with Time Windows", 2006, are where the ideas come
@@ -13,31 +14,27 @@ from.)
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from rlacd.criteria.criterion import Criterion
 from rlacd.planes.views import Views
-from rlacd.search.neighbours import Cluster, Neighbours
+from rlacd.search.neighbours import Neighbours
 from rlacd.search.pace import Pace
 from rlacd.search.rankings import Ranking
 from rlacd.search.recut import Exchange, recut
+from rlacd.search.shift import shift
+from rlacd.search.ways import BATCH, Trial, Ways
 from rlacd.solid.component import Component, Part
 from rlacd.workers import Workers
 
-SIZES = (3, 4, 5, 6, 8)
-"""So many parts are cut anew together: two seldom become one, and more take too long."""
-
-BATCH = 8
-"""Trials made of one state at a time; the same whatever the number of threads, so that the result is too."""
-
-DRAWS = 10
-"""A way of trying is left for this batch when so many draws in a row gave nothing new."""
-
 DRY = 4
 """The search ends when so many batches in a row found nothing new to try."""
+
+PATIENCE = 16
+"""It ends, too, after so many trials a part that saved none: giving pieces away finds something new to try for ever."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +49,7 @@ class Outcome:
     accepted : int
         Trials that were taken over.
     exhausted : bool
-        There was nothing left to try.
+        There was nothing left to try, or it had been in vain for long.
     """
 
     parts: list[Part]
@@ -95,7 +92,9 @@ class Neighbourhood:
         self._workers = workers
         self._random = np.random.default_rng(seed)
         self._here = Neighbours(parts, criterion, workers)
-        self._ways = _Ways(len(rankings))
+        self._ways = Ways(len(rankings))
+        self._best = list(parts)
+        self._near = min(criterion.reach, 2 * criterion.overhang)
 
     @property
     def parts(self) -> list[Part]:
@@ -103,70 +102,37 @@ class Neighbourhood:
         return list(self._here.parts.values())
 
     def run(self, pace: Pace, most: float = math.inf, enough: int = 1) -> Outcome:
-        """Try until nothing is left to try, the clock says no, `most` trials are made or `enough` parts are left."""
-        steps = accepted = dry = 0
+        """Try until there is no hope left, the clock says no, `most` trials are made or `enough` parts are left."""
+        steps = accepted = dry = vain = 0
         here = self._here
-        while pace.step(steps, None, len(here.parts)) and steps < most and len(here.parts) > enough and dry < DRY:
-            batch = list(self._ways.draw(here, self._random))
+        exhausted = len(here.parts) == 1
+        while pace.step(steps, None, len(here.parts)) and steps < most and len(here.parts) > enough and not exhausted:
+            batch = list(self._ways.draw(here, self._random, self._near))
             dry = 0 if batch else dry + 1
             batch = batch[: int(min(BATCH, most - steps))]  # drawn in full, so that more steps begin with the same
-            found = self._workers.map(lambda trial: self._try(*trial, pace), batch)
-            for (cluster, policy), exchange in zip(batch, found, strict=True):
+            found = self._workers.map(lambda trial: self._try(trial, pace), batch)
+            for trial, exchange in zip(batch, found, strict=True):
                 taken = exchange is not None and here.apply(exchange)
-                self._ways.count(cluster, policy, exchange.gain if exchange is not None and taken else 0)
+                self._ways.count(trial, exchange.gain if exchange is not None and taken else 0)
                 steps += 1
                 accepted += taken
+                vain = 0 if exchange is not None and taken and exchange.gain > 0 else vain + 1
+                self._best = min(self._best, self.parts, key=cost)
             pace.steps += len(batch)
             pace.parts = min(pace.parts, len(here.parts))
-        return Outcome(self.parts, steps, accepted, dry == DRY or len(here.parts) == 1)
+            exhausted = dry == DRY or vain >= PATIENCE * len(here.parts) or len(here.parts) == 1
+        return Outcome(self._best, steps, accepted, exhausted)
 
-    def _try(self, cluster: Cluster, policy: int, pace: Pace) -> Exchange | None:
-        parts = [self._here.parts[i] for i in cluster]
-        around = [self._here.parts[i] for i in self._here.around(cluster)]
-        return recut(parts, around, self._policies[policy], self._criterion, pace.left, self._root)
-
-
-@dataclass
-class _Tally:
-    """How often something was tried, and how many parts that gained."""
-
-    tried: int = 0
-    gained: int = 0
-
-    @property
-    def rate(self) -> float:
-        """Parts gained a try, from a hopeful start."""
-        return (self.gained + 1) / (self.tried + 10)
+    def _try(self, trial: Trial, pace: Pace) -> Exchange | None:
+        parts = self._here.parts
+        cluster = [parts[i] for i in trial.cluster]
+        if trial.policy is None:
+            around = [parts[i] for i in trial.around]
+            return shift(cluster[0], around, self._criterion, np.random.default_rng(trial.seed), self._root, pace.left)
+        around = [parts[i] for i in self._here.around(trial.cluster)]
+        return recut(cluster, around, self._policies[trial.policy], self._criterion, pace.left, self._root)
 
 
-class _Ways:
-    """Ways of trying: so many parts at once, cut by this policy. Those that turned out well are taken more often."""
-
-    def __init__(self, policies: int) -> None:
-        self._ways = [(size, policy) for size in SIZES for policy in range(policies)]
-        self._sizes = {size: _Tally() for size in SIZES}
-        self._policies = [_Tally() for _ in range(policies)]
-        self._seen: list[set[Cluster]] = [set() for _ in range(policies)]
-
-    def draw(self, here: Neighbours, random: np.random.Generator) -> Iterator[tuple[Cluster, int]]:
-        """Draw up to `BATCH` disjoint clusters, each with a policy that it was not cut by before."""
-        # A try takes time about in proportion to its size.
-        worth = np.array([self._sizes[s].rate * self._policies[p].rate / s for s, p in self._ways])
-        taken: set[int] = set()
-        for way in random.choice(len(self._ways), BATCH, p=worth / worth.sum()):
-            size, policy = self._ways[way]
-            for _ in range(DRAWS):
-                cluster = here.draw(size, random)
-                if cluster is None:
-                    break
-                if cluster not in self._seen[policy] and taken.isdisjoint(cluster):
-                    self._seen[policy].add(cluster)
-                    taken.update(cluster)
-                    yield cluster, policy
-                    break
-
-    def count(self, cluster: Cluster, policy: int, gain: int) -> None:
-        """Remember what a try gave."""
-        for tally in (self._sizes[len(cluster)], self._policies[policy]):
-            tally.tried += 1
-            tally.gained += gain
+def cost(parts: Sequence[Part]) -> tuple[int, float]:
+    """How many parts there are, and the volume of their hulls: the less, the better they fit."""
+    return len(parts), sum(part.hull.volume for part in parts)

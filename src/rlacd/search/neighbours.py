@@ -75,6 +75,22 @@ class Neighbours:
         """Get the parts that touch the cluster's, in ascending order."""
         return tuple(sorted({j for i in cluster for j in self._gaps[i]} - set(cluster)))
 
+    def near(self, which: int, reach: float) -> Cluster:
+        """Get the parts whose boxes lie within reach of a part's along every axis, in ascending order."""
+        ids = [i for i in self.parts if i != which]
+        if not ids:
+            return ()
+        boxes = np.array([self.parts[i].box for i in ids])
+        box = self.parts[which].box
+        gaps = np.maximum(box[0] - boxes[:, 1], boxes[:, 0] - box[1]).max(axis=1)
+        return tuple(i for i, gap in zip(ids, gaps.tolist(), strict=True) if gap <= reach)
+
+    def draw_small(self, random: np.random.Generator) -> int:
+        """Draw a part, those with small hulls more often: the chances fall with the rank, as 1/2, 1/3, 1/4, ..."""
+        by_size = sorted(self.parts, key=lambda i: (self.parts[i].hull.volume, i))
+        chances = 1 / np.arange(2, len(by_size) + 2)
+        return by_size[int(random.choice(len(by_size), p=chances / chances.sum()))]
+
     def draw(self, size: int, random: np.random.Generator) -> Cluster | None:
         """Draw a cluster of parts that hang together: a pair with a small gap, and what lies close to it.
 
