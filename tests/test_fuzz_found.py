@@ -8,9 +8,11 @@ import pytest
 import rlacd
 from fuzz.recipes import make_shape
 from rlacd import _native
+from rlacd.solid.component import Component, Plane
 from rlacd.solid.hull import Hull
 from rlacd.solid.load import load_mesh
 from rlacd.solid.repair import repair
+from rlacd.solid.reunite import reunite
 
 
 def triangles(unit: float) -> tuple[np.ndarray, np.ndarray]:
@@ -76,3 +78,21 @@ def test_limits_hold_where_coordinates_cannot_tell_corners_apart(
     assert (hull.bounds[0] <= where).all()
     assert (hull.bounds[1] >= where).all()
     assert (Hull.of(np.vstack([hull.vertices, where])).vertices == hull.vertices).all()
+
+
+def test_reuniting_layers_that_nearly_touch_piles_up_no_faces() -> None:
+    """A search around two skins 1e-6 apart went from 1,070 triangles a part to 29,000, and from 0.1 to 55 s a trial."""
+    shape = make_shape(50089)
+    solid = Component(repair(load_mesh((shape.vertices, shape.faces)), threads=1).manifold)
+    random = np.random.default_rng(0)
+    parts = [solid]
+    for _ in range(12):
+        x, y, z = random.normal(size=3)
+        length = float(np.linalg.norm([x, y, z]))
+        plane = Plane((float(x / length), float(y / length), float(z / length)), 0.1 * float(random.normal()))
+        cut = [side for part in parts for side in part.cut(plane) if side is not None]
+        whole = reunite(cut)
+        parts = [whole] if whole is not None else cut[:3]
+        if whole is not None:
+            assert len(whole.faces) <= 1.3 * sum(len(side.faces) for side in cut)
+    assert sum(len(part.faces) for part in parts) < 3 * len(solid.faces)
