@@ -1,7 +1,7 @@
 r"""What searching brings: hulls of every quality level, against one pass, and the CPU seconds of one core they take.
 
     python benchmarks/quality.py MESHES --list MESHES/quick.txt --out quality.jsonl
-    python benchmarks/quality.py --table quality.jsonl
+    python benchmarks/quality.py --table quality.jsonl [--baseline earlier.jsonl]
 
 Runs with one thread, pinned to one core where the system can. All seconds, the search's own budget included, are CPU
 seconds, so that a busy machine does not matter. Finished runs are not computed again.
@@ -39,9 +39,10 @@ def measure(path: Path, options: dict[str, Any]) -> dict[str, Any]:
     return {"parts": len(result), "cpu": cpu, "search": report["search"], "error": error["max"]}
 
 
-def table(rows: list[dict[str, Any]]) -> str:
+def table(rows: list[dict[str, Any]], baseline: list[dict[str, Any]]) -> str:
     """Means over the meshes of the ratio of hulls, with their standard errors; only meshes all methods were run on."""
     runs = {(row["mesh"], row["method"]): row for row in rows}
+    compared = {(row["mesh"], row["method"]): row["parts"] for row in baseline}
     methods = [m for m in METHODS if any(row["method"] == m for row in rows)]
     meshes = [mesh for mesh in dict.fromkeys(row["mesh"] for row in rows) if all((mesh, m) in runs for m in methods)]
     lines = [
@@ -51,8 +52,8 @@ def table(rows: list[dict[str, Any]]) -> str:
     for method in methods:
         some = [runs[mesh, method] for mesh in meshes]
         cells = [method, str(sum(run["parts"] for run in some))]
-        for baseline in BASELINES:
-            ratios = np.array([run["parts"] / runs[run["mesh"], baseline]["parts"] for run in some])
+        for name in BASELINES:
+            ratios = np.array([run["parts"] / compared[run["mesh"], name] for run in some])
             cells.append(f"{ratios.mean():.3f} ± {ratios.std(ddof=1) / np.sqrt(len(ratios)):.3f}")
         seconds = [run["cpu"] for run in some]
         cells += [f"{np.mean(seconds):.2f}, {np.median(seconds):.2f}", f"{max(run['error'] for run in some):.4f}"]
@@ -68,9 +69,14 @@ def main() -> None:
     parser.add_argument("--thresholds", type=Path, help="JSON object of thresholds by mesh; 0.05 by default")
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS))
     parser.add_argument("--table", type=Path, help="print the table of such a file")
+    parser.add_argument("--baseline", type=Path, help="with hulls of the same methods, run at an earlier commit")
     args = parser.parse_args()
     if args.table is not None:
-        print(table([json.loads(line) for line in args.table.read_text().splitlines()]))
+        rows, baseline = (
+            [json.loads(line) for line in path.read_text().splitlines()]
+            for path in (args.table, args.baseline or args.table)
+        )
+        print(table(rows, baseline))
         return
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
