@@ -27,8 +27,8 @@ CRUMBS = 5 * OVERLAP
 LOST = 4 * OVERLAP
 """The reunited solid's volume differs from that of its components by no more than a film of this thickness on them."""
 
-GROWN = 1.3
-"""More faces than this multiple of the components' are crumbs that were not found: they would pile up."""
+GROWN, SOME = 1.3, 100
+"""More faces than this multiple of the components', and some more, are crumbs that were not found: they would pile up."""
 
 FOLDED, OFF = 1e-3, 1e-6
 """Or by this share of it, where the components overlap themselves or each other, as those of a solid with folds do; no
@@ -57,7 +57,7 @@ def reunite(components: Sequence[Component]) -> Component | None:
         whole = Component(united)
     except ValueError:
         return None
-    if len(whole.faces) > GROWN * sum(len(component.faces) for component in components):
+    if len(whole.faces) > GROWN * sum(len(component.faces) for component in components) + SOME:
         return None
     # Less volume may be a fold less, or a piece that a boolean has lost.
     return whole if abs(whole.volume - volume) <= LOST * area or _holds(whole, components) else None
