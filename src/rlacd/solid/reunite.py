@@ -28,7 +28,7 @@ LOST = 4 * OVERLAP
 """The reunited solid's volume differs from that of its components by no more than a film of this thickness on them."""
 
 GROWN, SOME = 1.3, 100
-"""More faces than this multiple of the components', and some more, are crumbs that were not found: they would pile up."""
+"""More faces than this multiple of the components', and some, are crumbs that were not found: they would pile up."""
 
 FOLDED, OFF = 1e-3, 1e-6
 """Or by this share of it, where the components overlap themselves or each other, as those of a solid with folds do; no
