@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from scipy.optimize import linprog
 
 import rlacd
 from rlacd.errors import OptionError
@@ -49,20 +50,18 @@ def test_real_objects_are_what_a_gpu_takes(corpus: Path) -> None:
 
 
 def thinner_than_a_hundredth(hull: trimesh.Trimesh) -> bool:
-    """By bisection on the radius: does a ball of 1/100 of the extent fit between the shifted faces?"""
-    from scipy.spatial import HalfspaceIntersection, QhullError
-
-    normals = hull.face_normals
-    offsets = np.einsum("ij,ij->i", normals, hull.triangles[:, 0])
-    shrunk = np.column_stack([normals, -(offsets - 0.01 * hull.extents.max())])
-    try:
-        HalfspaceIntersection(shrunk, hull.center_mass)
-    except QhullError:  # the centre is no witness: ask a linear program for one
-        from scipy.optimize import linprog
-
-        found = linprog(np.zeros(3), A_ub=normals, b_ub=-shrunk[:, 3], bounds=[(None, None)] * 3)
-        return not found.success
-    return False
+    """Whether the largest ball between the planes of its faces has a radius below 1/100 of its extent."""
+    corners = np.array(hull.vertices)[np.array(hull.faces)]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1)
+    some = lengths > 1e-9 * lengths.max()  # a needle's normal may be anything; its neighbours have its edges
+    normals = normals[some] / lengths[some, None]
+    offsets = (np.array(hull.vertices) @ normals.T).max(axis=0)
+    ball = linprog(
+        [0, 0, 0, -1], A_ub=np.column_stack([normals, np.ones(len(normals))]), b_ub=offsets, bounds=[(None, None)] * 4
+    )
+    assert ball.status == 0, ball.message
+    return bool(ball.x[3] < 0.01 * np.ptp(hull.vertices, axis=0).max())
 
 
 def test_options_given_go_before_the_preset() -> None:
