@@ -11,7 +11,7 @@ from rlacd.criteria.criterion import Criterion
 from rlacd.cut import CutTree
 from rlacd.finish.merge import merge_parts
 from rlacd.policies import Policy
-from rlacd.solid.component import Component, Part
+from rlacd.solid.component import LOST, Component, Part
 from rlacd.solid.reunite import reunite
 from rlacd.workers import Workers
 
@@ -20,9 +20,6 @@ SLACK = 5
 
 TIGHTER = 1e-4
 """As many parts are better only if their hulls are smaller by this share; otherwise the search would tread water."""
-
-LOST = 1e-6
-"""No more than this share of the solid may be lost (see the shavings of `rlacd.cut`)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ NEGLIGIBLE_VOLUME = 1e-12
 """Solids below this volume (the frame's box has 8) are rounding left over by a cut."""
 
 LOST = 1e-6
-"""Share of a solid's volume that a boolean may lose."""
+"""Share of a solid's volume that may be lost by a boolean, or as shavings (see `rlacd.cut`)."""
 
 
 @dataclass(frozen=True)
@@ -165,6 +165,12 @@ class Share(Part):
         All of it.
     first, second : Part
         Made of its components.
+    hull : Hull, optional
+        Their joint hull, where it is known already.
+
+    Attributes
+    ----------
+    solid : Component
     """
 
     def __init__(self, solid: Component, first: Part, second: Part, hull: Hull | None = None) -> None:
