@@ -94,7 +94,9 @@ def _overlapping(which: int, components: Sequence[Component]) -> Manifold:
     if not outward.any():
         return component.manifold
     # Moved where they are: a mesh that is read anew loses folds that are hardly there, and what they enclose.
-    moved = component.vertices + OVERLAP * outward
+    # Not out of the box around all: parts that are reunited again and again would creep out of the input.
+    boxes = np.array([other.box for other in components])
+    moved = np.clip(component.vertices + OVERLAP * outward, boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0))
     return component.manifold.warp_batch(lambda points: moved if np.array_equal(points, component.vertices) else points)
 
 
