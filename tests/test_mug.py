@@ -36,7 +36,7 @@ def test_the_mug_hangs_by_its_handle_and_its_one_hull_falls(tmp_path: Path, exam
     hulls, one = example.main(tmp_path, threads=1)
     assert hulls.held
     assert hulls.height > 0.2
-    assert hulls.speed < 0.1
+    assert hulls.speed**2 / (2 * 9.81) < 0.01, "it may swing for minutes, but not so high that it gets off the peg"
     assert not one.held
     assert one.height < 0.06
 
