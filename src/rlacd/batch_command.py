@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import os
 import signal
 import threading
 from collections.abc import Callable
@@ -17,6 +16,7 @@ import typer
 from rlacd.command_options import HOW, decompose_options
 from rlacd.errors import OptionError
 from rlacd.exit_codes import ExitCode, exit_codes
+from rlacd.workers import available_cpus
 
 if TYPE_CHECKING:
     from rlacd.fleet import Batch
@@ -151,7 +151,7 @@ def _batch(own: dict[str, Any], given: dict[str, Any]) -> Batch:
 def _pool(own: dict[str, Any]) -> Pool:
     from rlacd.pool import open_pool
 
-    return open_pool(own["jobs"] or (None if own["ray"] else os.cpu_count()), own["ray"])
+    return open_pool(own["jobs"] or (None if own["ray"] else available_cpus()), own["ray"])
 
 
 def _tell_plan(batch: Batch) -> None:

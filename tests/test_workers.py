@@ -1,0 +1,50 @@
+"""How many threads run: as many as were asked for, whoever starts them."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from rlacd.workers import Workers, available_cpus
+
+ON_LINUX = sys.platform.startswith("linux")
+
+COUNT_THREADS = """
+import os, sys
+import trimesh
+import rlacd
+before = len(os.listdir("/proc/self/task"))
+body = trimesh.creation.torus(1.0, 0.4, major_sections=160, minor_sections=80)
+result = rlacd.decompose(body, quality="fast", threshold=0.3, threads=int(sys.argv[1]))
+print(len(os.listdir("/proc/self/task")) - before, len(os.sched_getaffinity(0)))
+"""
+
+
+def threads_started(threads: int) -> tuple[int, int]:
+    """Count the threads that a process has more of after a decomposition, and the processors it may use then."""
+    run = [sys.executable, "-c", COUNT_THREADS, str(threads)]
+    started, allowed = subprocess.run(run, capture_output=True, text=True, check=True).stdout.split()
+    return int(started), int(allowed)
+
+
+@pytest.mark.skipif(not ON_LINUX or available_cpus() < 2, reason="needs Linux and two processors")
+def test_one_thread_is_one_thread_for_booleans_too() -> None:
+    """manifold3d has a pool of its own as soon as a surface has ten thousand triangles."""
+    assert threads_started(1) == (0, available_cpus())
+
+
+@pytest.mark.skipif(not ON_LINUX, reason="processors are given to processes on Linux")
+def test_as_many_workers_as_the_process_may_use() -> None:
+    assert available_cpus() == len(os.sched_getaffinity(0))
+    with Workers() as workers:
+        assert workers.threads == available_cpus()
+
+
+def test_results_come_in_the_order_of_the_items() -> None:
+    with Workers(3) as workers:
+        assert workers.map(lambda x: x * x, range(100)) == [x * x for x in range(100)]
+        assert workers.share(2) == 1
+        assert workers.share(1) == 3
