@@ -172,14 +172,15 @@ class _Bridged:
 
 def unite(first: Part, second: Part, criterion: Criterion, solid: Component) -> Part | None:
     """Unite two parts of a solid, as they are or across what lies between them; None where neither is allowed."""
-    union = Part.glued(first, second)
-    chance = criterion.chance(solid.filling, union.hull)
+    hull = Hull.around(first.hull, second.hull)
+    chance = criterion.chance(solid.filling, hull)
     if chance is Chance.NONE:
         return None
-    are_apart = is_alone(first) and is_alone(second)  # otherwise they may overlap each other
-    if are_apart and not criterion.excludes(union.volume, union.hull.volume) and criterion.is_met(union):
-        return union
-    return _share(first, second, union.hull, criterion, solid) if chance is Chance.SOME else None
+    if is_alone(first) and is_alone(second):  # otherwise they may overlap each other
+        union = Part.glued(first, second)
+        if not criterion.excludes(union.volume, hull.volume) and criterion.is_met(union):
+            return union
+    return _share(first, second, hull, criterion, solid) if chance is Chance.SOME else None
 
 
 def is_alone(part: Part) -> bool:

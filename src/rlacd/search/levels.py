@@ -14,7 +14,7 @@ from rlacd.cut import CutTree, Divisions
 from rlacd.finish import drop_slivers, merge_parts
 from rlacd.planes.views import Views
 from rlacd.policies.greedy import SCORES
-from rlacd.search.neighbourhood import Neighbourhood, Outcome, cost
+from rlacd.search.neighbourhood import OPENING, Neighbourhood, Outcome, cost
 from rlacd.search.pace import Pace
 from rlacd.search.rankings import Ranking, by_score
 from rlacd.search.tighten import tighten
@@ -49,24 +49,22 @@ class Level:
     Attributes
     ----------
     steps : int or None
-        Trials of the neighbourhood search at most.
+        Steps of the neighbourhood search at most.
     seconds : float or None
         Wall time of the search at most.
-    least_steps : int
-        So much is searched even if the seconds do not suffice for it.
+    whole_opening : bool
+        What the search begins with is done in full, even if the seconds do not suffice for it.
     """
 
     steps: int | None
     seconds: float | None
-    least_steps: int = 0
+    whole_opening: bool = False
 
-
-BALANCED_STEPS = 24
 
 LEVELS = {
     "fast": Level(0, None),
-    "balanced": Level(BALANCED_STEPS, None),
-    "best": Level(None, 5.0, least_steps=BALANCED_STEPS),
+    "balanced": Level(OPENING, None),
+    "best": Level(None, 5.0, whole_opening=True),
 }
 """What the levels mean when neither steps nor seconds are given. Each goes through the states of the one before it, so
 that it is never worse."""
@@ -165,7 +163,7 @@ def search(
     # What the finish would drop must not count, or a level could end with more hulls than the one below it.
     best = parts = drop_slivers(parts, workers)
     at_a_limit = most_parts is not None and not all(workers.map(criterion.is_met, best))
-    pace = Pace(clock, bounds.seconds, len(parts), 0 if at_a_limit else bounds.least_steps)
+    pace = Pace(clock, bounds.seconds, len(parts), bounds.whole_opening and not at_a_limit)
     if most_parts is not None and at_a_limit:
         if len(best) <= most_parts:
             outcome = tighten(

@@ -3,12 +3,12 @@
 A state is the parts so far, all of them meeting the criterion. A trial takes a cluster of neighbours, two of which have
 a joint hull that fits almost, reunites what they are made of into one solid, cuts that anew, and merges the pieces with
 each other and with the parts around. It is accepted when fewer parts are left, or as many with less volume in their
-hulls. Or a part gives pieces of itself to those around, which is taken over even if no part is saved yet. Small
-clusters are quick to try, large ones can be cut in quite another way; which of them, or giving, and which ranking of
-planes, is worth its time depends on the shape, so that is learned on the way. (P. Shaw, "Using Constraint Programming
-and Local Search Methods to Solve Vehicle Routing Problems", CP 1998, and S. Ropke and D. Pisinger, "An Adaptive Large
-Neighborhood Search Heuristic for the Pickup and Delivery Problem with Time Windows", 2006, are where the ideas come
-from.)
+hulls. Or a part gives pieces of itself to those around, which is taken over even if no part is saved yet, or it is
+divided among them altogether. Small clusters are quick to try, large ones can be cut in quite another way; which of
+them, or giving, and which ranking of planes, is worth its time depends on the shape, so that is learned on the way.
+(P. Shaw, "Using Constraint Programming and Local Search Methods to Solve Vehicle Routing Problems", CP 1998, and S.
+Ropke and D. Pisinger, "An Adaptive Large Neighborhood Search Heuristic for the Pickup and Delivery Problem with Time
+Windows", 2006, are where the ideas come from.)
 """
 
 from __future__ import annotations
@@ -21,19 +21,32 @@ import numpy as np
 
 from rlacd.criteria.criterion import Criterion
 from rlacd.planes.views import Views
+from rlacd.search.dissolve import dissolve
 from rlacd.search.neighbours import Neighbours
 from rlacd.search.pace import Pace
 from rlacd.search.rankings import Ranking
 from rlacd.search.recut import Exchange, recut
 from rlacd.search.shift import shift
-from rlacd.search.ways import BATCH, Trial, Ways
+from rlacd.search.ways import BATCH, Move, Trial, Ways, giving_away
 from rlacd.solid.component import Component, Part
 from rlacd.workers import Workers
 
 DRY = 4
 """The search ends when so many batches in a row found nothing new to try."""
 
-PATIENCE = 16
+OPENING = 16
+"""So many steps are made before parts are tried to be done without: what is cut anew later undoes some of that."""
+
+OPENING_SHARE = 4
+"""They take no more than this fraction of the time: a quarter."""
+
+ROUNDS = 2
+"""So often each part is tried to be done without at first, each time by other cuts."""
+
+STEPS_PER_PART = 2
+"""After so many steps a part each of them is tried again."""
+
+PATIENCE = 24
 """It ends, too, after so many trials a part that saved none: giving pieces away finds something new to try for ever."""
 
 
@@ -94,6 +107,7 @@ class Neighbourhood:
         self._here = Neighbours(parts, criterion, workers)
         self._ways = Ways(len(rankings))
         self._best = list(parts)
+        self._steps = self._accepted = self._dry = self._vain = 0
         self._near = min(criterion.reach, 2 * criterion.overhang)
 
     @property
@@ -102,35 +116,66 @@ class Neighbourhood:
         return list(self._here.parts.values())
 
     def run(self, pace: Pace, most: float = math.inf, enough: int = 1) -> Outcome:
-        """Try until there is no hope left, the clock says no, `most` trials are made or `enough` parts are left."""
-        steps = accepted = dry = vain = 0
+        """Search until there is no hope left, the clock says no, `most` steps are made or `enough` parts are left.
+
+        An opening comes first: a few steps, then every part is tried to be done without. Such rounds are no steps.
+        """
+        if most > 0:
+            with pace.share(OPENING_SHARE):
+                self._walk(pace, min(most, OPENING), enough)
+            for _ in range(ROUNDS):
+                self._dissolve_all(pace, enough)
+        pace.hurry()
+        exhausted = len(self._here.parts) == 1
+        while not exhausted and self._steps < most and len(self._here.parts) > enough and not pace.is_over:
+            exhausted = self._walk(pace, min(most, self._steps + STEPS_PER_PART * len(self._here.parts)), enough)
+            self._dissolve_all(pace, enough)
+        return Outcome(self._best, self._steps, self._accepted, exhausted)
+
+    def _walk(self, pace: Pace, most: float, enough: int) -> bool:
+        """Try at random until `most` steps are made in all; whether there is no hope left."""
         here = self._here
-        exhausted = len(here.parts) == 1
-        while pace.step(steps, None, len(here.parts)) and steps < most and len(here.parts) > enough and not exhausted:
+        while self._dry < DRY and self._vain < PATIENCE * len(here.parts) and len(here.parts) > 1:
+            if not pace.step(self._steps, None, len(here.parts)) or self._steps >= most or len(here.parts) <= enough:
+                return False
             batch = list(self._ways.draw(here, self._random, self._near))
-            dry = 0 if batch else dry + 1
-            batch = batch[: int(min(BATCH, most - steps))]  # drawn in full, so that more steps begin with the same
-            found = self._workers.map(lambda trial: self._try(trial, pace), batch)
-            for trial, exchange in zip(batch, found, strict=True):
-                taken = exchange is not None and here.apply(exchange)
-                self._ways.count(trial, exchange.gain if exchange is not None and taken else 0)
-                steps += 1
-                accepted += taken
-                vain = 0 if exchange is not None and taken and exchange.gain > 0 else vain + 1
-                self._best = min(self._best, self.parts, key=cost)
+            self._dry = 0 if batch else self._dry + 1
+            batch = batch[: int(min(BATCH, most - self._steps))]  # drawn in full: more steps begin with the same
+            self._make(batch, pace)
+            self._steps += len(batch)
             pace.steps += len(batch)
-            pace.parts = min(pace.parts, len(here.parts))
-            exhausted = dry == DRY or vain >= PATIENCE * len(here.parts) or len(here.parts) == 1
-        return Outcome(self._best, steps, accepted, exhausted)
+        return True
+
+    def _dissolve_all(self, pace: Pace, enough: int) -> None:
+        """Try to do without each part, the smallest first."""
+        here = self._here
+        waiting = sorted(here.parts, key=lambda i: (here.parts[i].hull.volume, i))
+        while waiting and len(here.parts) > enough and pace.step(self._steps, None, len(here.parts)):
+            batch, waiting = waiting[:BATCH], waiting[BATCH:]
+            trials = [giving_away(Move.DISSOLVE, here, i, self._random, self._near) for i in batch if i in here.parts]
+            self._make([trial for trial in trials if self._ways.is_new(trial)], pace)
+
+    def _make(self, trials: Sequence[Trial], pace: Pace) -> None:
+        """Make trials side by side, and take over what is better."""
+        found = self._workers.map(lambda trial: self._try(trial, pace), trials)
+        for trial, exchange in zip(trials, found, strict=True):
+            taken = exchange is not None and self._here.apply(exchange)
+            gain = exchange.gain if exchange is not None and taken else 0
+            self._ways.count(trial, gain)
+            self._accepted += taken
+            self._vain = 0 if gain > 0 else self._vain + 1
+            self._best = min(self._best, self.parts, key=cost)
+        pace.parts = min(pace.parts, len(self._here.parts))
 
     def _try(self, trial: Trial, pace: Pace) -> Exchange | None:
         parts = self._here.parts
         cluster = [parts[i] for i in trial.cluster]
-        if trial.policy is None:
-            around = [parts[i] for i in trial.around]
-            return shift(cluster[0], around, self._criterion, np.random.default_rng(trial.seed), self._root, pace.left)
-        around = [parts[i] for i in self._here.around(trial.cluster)]
-        return recut(cluster, around, self._policies[trial.policy], self._criterion, pace.left, self._root)
+        if trial.policy is not None:
+            around = [parts[i] for i in self._here.around(trial.cluster)]
+            return recut(cluster, around, self._policies[trial.policy], self._criterion, pace.left, self._root)
+        give = dissolve if trial.move is Move.DISSOLVE else shift
+        around = [parts[i] for i in trial.around]
+        return give(cluster[0], around, self._criterion, np.random.default_rng(trial.seed), self._root, pace.left)
 
 
 def cost(parts: Sequence[Part]) -> tuple[int, float]:

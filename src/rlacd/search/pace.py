@@ -21,17 +21,17 @@ class Pace(Clock):
         Wall time that is left.
     parts : int
         Told to the other clock as the number of parts so far.
-    least_steps : int
-        Steps that may be made whatever time they take.
+    patient : bool
+        Time does not matter until `hurry` is called.
     """
 
-    def __init__(self, clock: Clock, seconds: float | None, parts: int, least_steps: int = 0) -> None:
+    def __init__(self, clock: Clock, seconds: float | None, parts: int, patient: bool = False) -> None:
         super().__init__()
         self._outer = clock
         self._end = math.inf if seconds is None else time.perf_counter() + seconds
         self.parts = parts
         self.steps = 0
-        self._least_steps = least_steps
+        self._patient = patient
 
     @property
     def is_over(self) -> bool:
@@ -41,7 +41,11 @@ class Pace(Clock):
     @property
     def left(self) -> float:
         """Seconds left on this clock; infinite where it never runs out."""
-        return math.inf if self.steps < self._least_steps else self._end - time.perf_counter()
+        return math.inf if self._patient else self._end - time.perf_counter()
+
+    def hurry(self) -> None:
+        """Let time matter from now on."""
+        self._patient = False
 
     def step(self, done: int, total: int | None, parts: int) -> bool:
         """Report to the other clock; True when the work may go on."""

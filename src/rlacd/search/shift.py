@@ -93,7 +93,7 @@ def shift(
 
 def _exchange(part: Part, around: Sequence[Part], after: Sequence[Part], criterion: Criterion) -> Exchange:
     known = {id(other) for other in around}
-    return Exchange.between([part, *around], [p if id(p) in known else _mended(p, criterion) for p in after])
+    return Exchange.between([part, *around], [p if id(p) in known else mended(p, criterion) for p in after])
 
 
 def _direction(part: Part, taker: Part, random: np.random.Generator) -> FloatArray:
@@ -173,8 +173,8 @@ def _glued(pieces: Sequence[Part]) -> Part:
     return reduce(Part.glued, pieces)
 
 
-def _mended(part: Part, criterion: Criterion) -> Part:
-    """The part as one component if it is made of many."""
+def mended(part: Part, criterion: Criterion) -> Part:
+    """Get the part as one component if it is made of many and that meets the criterion."""
     if len(part.members) <= PATCHES:
         return part
     whole = reunite(part.members)

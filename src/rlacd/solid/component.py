@@ -84,17 +84,16 @@ class Part:
         """Triangles of the surface [F, 3]."""
         return self._resolved()[1]
 
-    @cached_property
+    @property
     def box(self) -> FloatArray:
         """Lower and upper corner of the bounding box [2, 3]."""
-        return np.array([self.hull.vertices.min(axis=0), self.hull.vertices.max(axis=0)])
+        return self.hull.box
 
     def with_hull(self, hull: Hull) -> Part:
         """Get the same solid with another hull around it."""
         other = copy.copy(self)
         other.hull = hull
         other.within = None  # the other hull may be larger
-        other.__dict__.pop("box", None)
         return other
 
     @staticmethod

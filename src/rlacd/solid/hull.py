@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -26,6 +27,11 @@ class Hull:
     vertices: FloatArray
     faces: IntArray
     volume: float
+
+    @cached_property
+    def box(self) -> FloatArray:
+        """Lower and upper corner of the bounding box [2, 3]."""
+        return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
     @classmethod
     def of(cls, points: FloatArray) -> Hull | None:
