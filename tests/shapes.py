@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import manifold3d
 import numpy as np
 import numpy.typing as npt
+from manifold3d import CrossSection, Manifold, Mesh64
 
 from rlacd import _native
+from rlacd.solid.component import Component, Part
+from rlacd.solid.reunite import reunite
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
@@ -39,12 +43,12 @@ def from_manifold(solid: Any) -> Closed:
 
 
 def to_manifold(vertices: Floats, faces: Ints) -> Any:
-    return manifold3d.Manifold(manifold3d.Mesh64(vertices.astype(np.float64), faces.astype(np.uint64)))
+    return Manifold(Mesh64(vertices.astype(np.float64), faces.astype(np.uint64)))
 
 
 def box(lower: tuple[float, float, float], upper: tuple[float, float, float]) -> Any:
     size = tuple(b - a for a, b in zip(lower, upper, strict=True))
-    return manifold3d.Manifold.cube(size).translate(lower)
+    return Manifold.cube(size).translate(lower)
 
 
 def refined(solid: Any, levels: int) -> Any:
@@ -81,3 +85,22 @@ def depth_in(hull: Closed, points: Floats) -> Floats:
 def dense(mesh: Closed, count: int = 20_000) -> Floats:
     points, _ = _native.sample_surface(mesh.vertices, mesh.faces, count, 7)
     return np.vstack([points, mesh.vertices[np.unique(mesh.faces)]])
+
+
+def arc(start: float, end: float) -> Component:
+    """A stretch (in degrees) of a bent bar of square section: radius 1, thickness 0.1."""
+    steps = np.radians(np.linspace(start, end, 1 + round(end - start)))
+    rim = [(math.cos(a), math.sin(a)) for a in steps]
+    outline = [*rim, *((0.9 * x, 0.9 * y) for x, y in reversed(rim))]
+    return Component(Manifold.extrude(CrossSection([outline]), 0.1))
+
+
+def bent_bar() -> list[Component]:
+    """Stretches of 26, 16 and 26 degrees; 36 degrees is as much as one hull may span."""
+    return [arc(0, 26), arc(26, 42), arc(42, 68)]
+
+
+def together(parts: Sequence[Part]) -> Component:
+    solid = reunite([member for part in parts for member in part.members])
+    assert solid is not None
+    return solid

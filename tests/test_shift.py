@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from manifold3d import CrossSection, Manifold
+from manifold3d import Manifold
 
 from rlacd.clock import Clock
 from rlacd.criteria import Concavity
@@ -21,30 +20,10 @@ from rlacd.search.pace import Pace
 from rlacd.search.rankings import by_score
 from rlacd.search.shift import shift
 from rlacd.solid.component import Component, Part
-from rlacd.solid.reunite import reunite
 from rlacd.workers import Workers
-from tests.shapes import box
+from tests.shapes import bent_bar, box, together
 
 CRITERION = Concavity(0.05)
-
-
-def arc(start: float, end: float) -> Component:
-    """A stretch (in degrees) of a bent bar of square section: radius 1, thickness 0.1."""
-    steps = np.radians(np.linspace(start, end, 1 + round(end - start)))
-    rim = [(math.cos(a), math.sin(a)) for a in steps]
-    outline = [*rim, *((0.9 * x, 0.9 * y) for x, y in reversed(rim))]
-    return Component(Manifold.extrude(CrossSection([outline]), 0.1))
-
-
-def bent_bar() -> list[Component]:
-    """Stretches of 26, 16 and 26 degrees; 36 degrees is as much as one hull may span."""
-    return [arc(0, 26), arc(26, 42), arc(42, 68)]
-
-
-def together(parts: Sequence[Part]) -> Component:
-    solid = reunite([member for part in parts for member in part.members])
-    assert solid is not None
-    return solid
 
 
 def own_volume(parts: Sequence[Part]) -> float:
