@@ -2,10 +2,14 @@
 //
 // In:  a closed solid, convex hulls of parts of it, a distance t.
 // Out: a verdict on the Hausdorff distance between the surfaces of a hull and of the solid's share of it. It is larger
-//      than t where a corner of the solid lies deeper than t inside the hull, as it then does in every larger hull; and
+//      than t where the solid's surface comes deeper than t inside the hull, as it then does in every larger hull; and
 //      where a point of the hull's surface lies outside the solid and farther than t from it.
+// How: faces of the solid are clipped to the points deeper than t. Facets of the hull are looked at in a few points,
+//      then divided, the largest cells first, until each is decided by the distance at its middle and its radius, is
+//      small, or there were enough.
 #pragma once
 
+#include "convex_planes.hpp"
 #include "surface.hpp"
 
 namespace rlacd {
@@ -18,12 +22,15 @@ enum class Chance : std::int32_t {
 
 class Filling {
  public:
-  explicit Filling(const Mesh& solid) : corners_(solid.vertices), surface_(solid) {}
+  explicit Filling(const Mesh& solid) : solid_(solid), surface_(solid) {}
 
   Chance chance(const Mesh& hull, double threshold) const;
 
  private:
-  std::vector<Vec3> corners_;
+  bool comes_deeper(const ConvexPlanes& planes, const Box& inner, double threshold) const;
+  bool is_missed(const Mesh& hull, double threshold) const;
+
+  Mesh solid_;
   Surface surface_;
 };
 

@@ -26,8 +26,8 @@ PORTFOLIO = ("excess-norm", "hull-sum", "max-excess")
 
 assert set(PORTFOLIO) <= set(SCORES)
 
-SHARE = 1 / 8
-"""Cutting the whole solid anew may take about this share of the seconds; the neighbourhoods make more of them."""
+SHARE = 2 / 5
+"""The whole solid is cut anew while that takes no more than this share of the seconds that are left."""
 
 HOPELESS = 5
 """A pass that makes so many times more pieces than there are parts will not have fewer of them after merging."""
@@ -173,10 +173,8 @@ def search(
             outcome = Outcome(best, 0, 0, True)
         from_portfolio = len(parts)
     else:
-        starts = [best]
-        if _seconds_of_a_pass(clock) <= SHARE * pace.left:
-            others = rankings[1:] if first == "greedy" else rankings  # the first score is that policy's own
-            starts = _portfolio(root, best, criterion, others, views, workers, pace)
+        others = rankings[1:] if first == "greedy" else rankings  # the first score is that policy's own
+        starts = _portfolio(root, best, criterion, others, views, workers, pace, _seconds_of_a_pass(clock))
         from_portfolio = len(starts[0])
         outcome = _from_all(root, starts, criterion, rankings, near_views, workers, pace, steps, seed)
     account = Account(
@@ -204,12 +202,13 @@ def _portfolio(
     views: Views,
     workers: Workers,
     pace: Pace,
+    seconds: float,
 ) -> list[list[Part]]:
-    """The given parts, and those of the whole solid cut by other rankings; the best first."""
+    """The given parts, made in so many seconds, and those of the whole solid cut by other rankings; the best first."""
     divisions = Divisions()
     found = [parts]
     for ranking in rankings:
-        if pace.is_over or len(parts) == 1:
+        if pace.is_over or len(parts) == 1 or seconds > SHARE * pace.left:
             break
         tree = CutTree(root, ranking(views), workers, divisions)
         other = _whole(tree, criterion, workers, pace, most=HOPELESS * len(parts))
