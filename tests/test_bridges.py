@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from manifold3d import Manifold, Mesh64, OpType
+from manifold3d import CrossSection, Manifold, Mesh64, OpType
 
 import rlacd
 from rlacd import _native
@@ -145,6 +145,24 @@ def test_a_quick_no_is_never_wrong(seed: int, threshold: float) -> None:
     assert larger is not None
     if chance is Chance.NEVER:
         assert Concavity(threshold * (1 - 1e-9)).chance(solid.filling, larger) is Chance.NEVER
+
+
+def test_a_face_deep_in_a_hull_is_seen_without_its_corners() -> None:
+    """A groove from end to end: its corners lie on the hull, its bottom deep inside; the hull is nowhere far away."""
+    ends = [(-0.04, 0.0), (0.04, 0.0), (0.0, -0.3)]
+    groove = Manifold.extrude(CrossSection([[ends[0], ends[2], ends[1]]]), 1).translate((0, 0, -0.5))
+    solid = Component(block(1, 1, 1, (0, -0.5, 0)) - groove)
+    assert solid.volume == pytest.approx(1 - 0.5 * 0.08 * 0.3)
+    for threshold in (0.05, 0.1, 0.29):
+        assert Concavity(threshold).chance(solid.filling, solid.hull) is Chance.NEVER
+    assert Concavity(0.31).chance(solid.filling, solid.hull) is Chance.SOME
+
+
+def test_a_window_in_a_wall_is_seen_between_the_points_first_looked_at() -> None:
+    wall = block(4, 4, 0.3) - block(0.3, 0.3, 1, (0.83, -1.41, 0))
+    solid = Component(wall)
+    assert Concavity(0.1).chance(solid.filling, solid.hull) is not Chance.SOME
+    assert Concavity(0.2).chance(solid.filling, solid.hull) is Chance.SOME
 
 
 def test_a_solid_that_overlaps_itself_can_be_reunited() -> None:

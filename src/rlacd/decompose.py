@@ -98,7 +98,7 @@ def decompose(
         Seconds the search may take instead, whatever is found until then; what that is depends on the machine. ``best``
         has 5, and more where ``balanced`` takes longer.
     search_steps : int, optional
-        Steps the search may take instead (about 10 to 20 a second on one core); 24 with ``balanced``. The result
+        Steps the search may take instead (about 10 to 20 a second on one core); 16 with ``balanced``. The result
         depends on nothing else.
     preset : str, optional
         The engine the hulls are for: ``mujoco``, ``physx``, ``physx-gpu``, ``unity``, ``unreal``, ``newton`` or

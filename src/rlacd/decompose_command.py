@@ -322,7 +322,7 @@ def decompose(
         typer.Option(
             rich_help_panel=METHOD,
             help="How many steps the search may take; unlike --budget, this gives the same bytes on every machine. "
-            "[dim]\\[default: 24 with --quality balanced][/dim]",
+            "[dim]\\[default: 16 with --quality balanced][/dim]",
             show_default=False,
         ),
     ] = None,
