@@ -81,7 +81,9 @@ def dissolve(
 
 
 def _may_be_taken(part: Part, around: Sequence[Part], criterion: Criterion, solid: Component) -> bool:
-    """Whether each of the part's outermost corners alone could belong to one of the others."""
+    """Whether each of the part's outermost corners alone could belong to one of the others: a quick no."""
+    if criterion.is_hereditary:  # then every union that is tried is as quick a no
+        return True
     corners = part.hull.vertices
     directions = np.concatenate([np.eye(3), -np.eye(3)])
     outermost = sorted(set(np.argmax(corners @ directions.T, axis=0).tolist()))
