@@ -137,7 +137,9 @@ class Concavity:
     def error(self, part: Part) -> float:
         """Upper end of the measured concavity; no more than the threshold where the part certainly meets it."""
         measured = self.measure(part, tolerance=self.threshold / 50).value[1]
-        return min(measured, self.threshold) if measured <= 1.02 * self.threshold and self.is_met(part) else measured
+        if not self.threshold < measured <= 1.02 * self.threshold:
+            return measured
+        return self.threshold if self.is_met(part) else self.measure(part, tolerance=self.threshold / 5000).value[1]
 
     def is_met(self, part: Part) -> bool:
         """Whether the part's concavity is certainly at most the threshold.
