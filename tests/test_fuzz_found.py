@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
 
 import rlacd
 from fuzz.recipes import make_shape
@@ -96,3 +97,11 @@ def test_reuniting_layers_that_nearly_touch_piles_up_no_faces() -> None:
         if whole is not None:
             assert len(whole.faces) <= 1.3 * sum(len(side.faces) for side in cut) + 100
     assert sum(len(part.faces) for part in parts) < 3 * len(solid.faces)
+
+
+@pytest.mark.parametrize(("faces", "said"), [(5, True), (12, False)])
+def test_a_hull_of_few_faces_that_leaves_the_room_for_balls_is_told_of(faces: int, said: bool) -> None:
+    """A tetrahedron around a cube reaches twice its length out of it; where it goes, no balls had been placed."""
+    cube = trimesh.creation.box((1, 1, 1))
+    result = rlacd.decompose(cube, criterion=rlacd.NavigableSpace(0.4, 0.005), max_faces=faces, quality="fast")
+    assert any("bounding box" in warning for warning in result.report["warnings"]) is said

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
 import trimesh
 
 from rlacd._version import __version__
@@ -67,8 +68,21 @@ def make_report(
                 options,
                 criterion.overhang if not account.warnings else math.inf,
             ),
+            *(_out_of_the_box([part.hull for part in parts], solid) if criterion.obstacles is not None else []),
         ],
     }
+
+
+def _out_of_the_box(hulls: Sequence[Hull], solid: Solid) -> list[str]:
+    """Where balls decide, limits that no tight hull can keep to must not go unsaid: there are no balls so far out."""
+    lower, upper = np.array(solid.manifold.bounding_box()).reshape(2, 3)
+    beyond = max(float(max((lower - hull.box[0]).max(), (hull.box[1] - upper).max())) for hull in hulls)
+    if beyond <= HONEST_WITHIN:
+        return []
+    return [
+        f"The hulls reach up to {beyond:.4g} out of the solid's bounding box, where a ball may go: the limits on "
+        "corners or faces that were asked for leave no better ones."
+    ]
 
 
 def _early_end(clock: Clock) -> list[str]:
