@@ -59,6 +59,7 @@ def make_report(
         "repair": [asdict(body) for body in solid.bodies],
         "warnings": [
             *solid.warnings,
+            *_coarse(solid),
             *_early_end(clock),
             *account.warnings,
             *_shortcomings(
@@ -71,6 +72,15 @@ def make_report(
             *(_out_of_the_box([part.hull for part in parts], solid) if criterion.obstacles is not None else []),
         ],
     }
+
+
+def _coarse(solid: Solid) -> list[str]:
+    if solid.frame.resolution <= HONEST_WITHIN / 2:
+        return []
+    return [
+        f"So far from the origin coordinates tell nothing apart that is closer than {solid.frame.resolution:.2g} (the "
+        "longest side is 2), and hulls thinner than that are made thicker: move the mesh to the origin."
+    ]
 
 
 def _out_of_the_box(hulls: Sequence[Hull], solid: Solid) -> list[str]:

@@ -43,6 +43,11 @@ class Frame:
         half = float((upper / 2 - lower / 2).max())
         return cls(center, 1.0 / max(half, SMALLEST) if half > 0 else 1.0)
 
+    @property
+    def resolution(self) -> float:
+        """Distance of neighbouring coordinates of the input, in the frame; large where the input lies far from 0."""
+        return float(np.spacing(np.abs(self.center).max() + 1.0 / self.scale)) * self.scale
+
     def to_frame(self, points: ArrayLike) -> FloatArray:
         """Map points ``[N, 3]`` from the input's unit into the frame."""
         there = np.ascontiguousarray((np.asarray(points, dtype=np.float64) - self.center) * self.scale)
