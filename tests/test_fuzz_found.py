@@ -130,3 +130,10 @@ def test_the_mass_of_a_thin_plate_far_out_is_positive() -> None:
     mass = mass_of_triangles(plate.triangles, Frame(np.zeros(3), 1.0))
     assert mass.volume_m == pytest.approx(1e-22, rel=1e-2)
     assert mass.centre_m == pytest.approx(np.array([0.3, 0.9, -0.7]), abs=1e-9)
+
+
+def test_a_needle_of_inverted_shells_has_a_mass() -> None:
+    """With its cavities kept, because balls go there, most of it was inside out: a solid of negative volume."""
+    shape = make_shape(500635)
+    for keep in (True, False):
+        assert repair(load_mesh((shape.vertices, shape.faces)), keep_cavities=keep).manifold.volume() > 0

@@ -46,7 +46,8 @@ def unite(solids: list[Manifold], *, keep_cavities: bool = False) -> Manifold:
     if len(solids) > MOST_UNITED:
         return Manifold.compose(solids)
     united = solids[0] if len(solids) == 1 else Manifold.batch_boolean(solids, OpType.Add)
-    return united if keep_cavities else _without_cavities(united)
+    # More cavities than solid are none: shells that came out inside out.
+    return united if keep_cavities and united.volume() > 0 else _without_cavities(united)
 
 
 def unite_around_cavities(solids: list[Manifold], inward: list[bool]) -> Manifold:
