@@ -46,7 +46,7 @@ class Frame:
     @property
     def resolution(self) -> float:
         """Distance of neighbouring coordinates of the input, in the frame; large where the input lies far from 0."""
-        return float(np.spacing(np.abs(self.center).max() + 1.0 / self.scale)) * self.scale
+        return float(np.finfo(np.float64).eps) * (float(np.abs(self.center).max()) * float(self.scale) + 1.0)
 
     def to_frame(self, points: ArrayLike) -> FloatArray:
         """Map points ``[N, 3]`` from the input's unit into the frame."""
