@@ -104,3 +104,8 @@ def together(parts: Sequence[Part]) -> Component:
     solid = reunite([member for part in parts for member in part.members])
     assert solid is not None
     return solid
+
+
+def own_volume(parts: Sequence[Part]) -> float:
+    """Without what a part has in common with others."""
+    return sum(member.volume for part in parts for member in part.members)

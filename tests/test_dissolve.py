@@ -24,13 +24,9 @@ from rlacd.solid.component import Component, Part
 from rlacd.solid.load import load_mesh
 from rlacd.solid.repair import repair
 from rlacd.workers import Workers
-from tests.shapes import bent_bar, box, together
+from tests.shapes import bent_bar, box, own_volume, together
 
 CRITERION = Concavity(0.05)
-
-
-def own_volume(parts: Sequence[Part]) -> float:
-    return sum(member.volume for part in parts for member in part.members)
 
 
 def depth_outside(points: np.ndarray, parts: Sequence[Part]) -> float:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -21,14 +19,9 @@ from rlacd.search.rankings import by_score
 from rlacd.search.shift import shift
 from rlacd.solid.component import Component, Part
 from rlacd.workers import Workers
-from tests.shapes import bent_bar, box, together
+from tests.shapes import bent_bar, box, own_volume, together
 
 CRITERION = Concavity(0.05)
-
-
-def own_volume(parts: Sequence[Part]) -> float:
-    """Without what a part has in common with others."""
-    return sum(member.volume for part in parts for member in part.members)
 
 
 def test_what_nobody_can_take_whole_is_divided() -> None:

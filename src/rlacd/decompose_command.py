@@ -321,7 +321,7 @@ def decompose(
         int | None,
         typer.Option(
             rich_help_panel=METHOD,
-            help="How many steps the search may take; unlike --budget, this gives the same bytes on every machine. "
+            help="How many steps the search may take; unlike --budget, this gives the same bytes however busy it is. "
             "[dim]\\[default: 16 with --quality balanced][/dim]",
             show_default=False,
         ),

@@ -48,7 +48,7 @@ def available_cpus() -> int:
 
 @cache
 def _start_booleans(threads: int) -> None:
-    """Let manifold3d have no more threads of its own than we may use: idle ones spin, for a fifth of the CPU time.
+    """Let manifold3d have no more threads of its own than we may use: idle ones spin, for a seventh of the CPU time.
 
     It counts the processors of the process when it is first used, and never again: only the first call matters, and
     only where a process can be given fewer of them.

@@ -15,7 +15,7 @@ from rlacd.clock import Clock
 from rlacd.criteria.criterion import Chance, Criterion
 from rlacd.finish.merge import unite
 from rlacd.search.recut import Exchange
-from rlacd.search.shift import mended
+from rlacd.search.shift import exchange_of
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part, Plane
 from rlacd.solid.hull import Hull
@@ -76,8 +76,7 @@ def dissolve(
 
     if not all(take(member, HALVINGS) for member in sorted(part.members, key=lambda member: -member.volume)):
         return None
-    known = {id(other) for other in around}
-    return Exchange.between([part, *around], [p if id(p) in known else mended(p, criterion) for p in now])
+    return exchange_of(part, around, now, criterion)
 
 
 def _may_be_taken(part: Part, around: Sequence[Part], criterion: Criterion, solid: Component) -> bool:

@@ -86,14 +86,15 @@ def shift(
             continue
         now[i], left = bite
         if left is None or _take_whole(left, now, criterion, solid):
-            return _exchange(part, around, now, criterion)
+            return exchange_of(part, around, now, criterion)
         rest = left
-    return None if rest is part else _exchange(part, around, [*now, rest], criterion)
+    return None if rest is part else exchange_of(part, around, [*now, rest], criterion)
 
 
-def _exchange(part: Part, around: Sequence[Part], after: Sequence[Part], criterion: Criterion) -> Exchange:
+def exchange_of(part: Part, around: Sequence[Part], after: Sequence[Part], criterion: Criterion) -> Exchange:
+    """What turns a part and those around into what they are after giving; parts of many patches are mended."""
     known = {id(other) for other in around}
-    return Exchange.between([part, *around], [p if id(p) in known else mended(p, criterion) for p in after])
+    return Exchange.between([part, *around], [p if id(p) in known else _mended(p, criterion) for p in after])
 
 
 def _direction(part: Part, taker: Part, random: np.random.Generator) -> FloatArray:
@@ -173,7 +174,7 @@ def _glued(pieces: Sequence[Part]) -> Part:
     return reduce(Part.glued, pieces)
 
 
-def mended(part: Part, criterion: Criterion) -> Part:
+def _mended(part: Part, criterion: Criterion) -> Part:
     """Get the part as one component if it is made of many and that meets the criterion."""
     if len(part.members) <= PATCHES:
         return part
