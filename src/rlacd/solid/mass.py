@@ -46,13 +46,12 @@ def mass_of(solid: Solid) -> Mass:
 
 def mass_of_triangles(triangles: FloatArray, frame: Frame) -> Mass:
     """Integrate over closed, outward triangles ``[F, 3, 3]`` in the frame."""
-    origin = triangles.reshape(-1, 3).mean(axis=0)  # close by: a thin solid far away would be lost to cancellation
-    found = mass_properties(triangles - origin)
+    found = mass_properties(triangles)
     with np.errstate(over="ignore", under="ignore"):  # at the ends of float64, volumes have none
         unit = np.minimum(np.float64(1.0) / frame.scale, _GREATEST)
         return Mass(
             float(_times(found["volume"], unit, 3)),
-            frame.to_input(found["center_mass"][None] + origin)[0],
+            frame.to_input(found["center_mass"][None])[0],
             _times(found["inertia"], unit, 5),
         )
 
