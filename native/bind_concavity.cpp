@@ -58,7 +58,16 @@ void bind_concavity(nb::module_& m) {
           },
           nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("threshold"),
           "Whether the surfaces of a hull and of the solid's share of it may be as near as the threshold.\n\n"
-          "0: they may; 1: they are not; 2: nor are those of any hull that holds this one.");
+          "0: they may; 1: they are not; 2: nor are those of any hull that holds this one.")
+      .def(
+          "comes_deeper",
+          [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces, double threshold) {
+            const Mesh hull = to_finite_mesh(hull_vertices, hull_faces);
+            nb::gil_scoped_release release;
+            return self.comes_deeper(hull, threshold);
+          },
+          nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("threshold"),
+          "Whether the solid's surface comes deeper than the threshold inside a hull: `chance` is 2.");
 }
 
 }  // namespace rlacd

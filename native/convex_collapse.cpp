@@ -17,7 +17,7 @@ constexpr double kReach = 50;
 
 }  // namespace
 
-ConvexCollapse::ConvexCollapse(const Mesh& hull)
+ConvexCollapse::ConvexCollapse(const Mesh& hull, const std::function<bool(std::int32_t, std::int32_t)>& may_collapse)
     : points_(hull.vertices),
       facet_of_(hull.vertices.size(), -1),
       version_(hull.vertices.size(), 0),
@@ -31,7 +31,8 @@ ConvexCollapse::ConvexCollapse(const Mesh& hull)
     for (int i = 0; i < 3; ++i) facet.neighbour[i] = sides.at({facet.corner[(i + 1) % 3], facet.corner[i]});
   for (const std::int32_t f : facet_of_) alive_ += f >= 0;
   for (const auto& side : sides)
-    if (side.first.first < side.first.second) schedule(side.first.first, side.first.second);
+    if (side.first.first < side.first.second && may_collapse(side.first.first, side.first.second))
+      schedule(side.first.first, side.first.second);
 }
 
 std::vector<Vec3> ConvexCollapse::corners() const {

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -17,7 +18,10 @@ namespace rlacd {
 
 class ConvexCollapse {
  public:
-  explicit ConvexCollapse(const Mesh& hull);
+  // Edges of the hull that need not be tried can be left out: may_collapse(from, to).
+  explicit ConvexCollapse(
+      const Mesh& hull, const std::function<bool(std::int32_t, std::int32_t)>& may_collapse =
+                            [](std::int32_t, std::int32_t) { return true; });
 
   // Collapses edges while there are more than `most` corners, and further while the new corner is acceptable. False
   // when no edge can be collapsed any more although there are too many corners.

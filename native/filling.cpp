@@ -68,16 +68,16 @@ struct Cell {
 }  // namespace
 
 Chance Filling::chance(const Mesh& hull, double threshold) const {
+  if (comes_deeper(hull, threshold)) return Chance::kNever;
+  return is_missed(hull, threshold) ? Chance::kNone : Chance::kSome;
+}
+
+bool Filling::comes_deeper(const Mesh& hull, double threshold) const {
   const ConvexPlanes planes(hull);
   Box inner;
   for (const Vec3 p : hull.vertices) inner.extend(p);
   inner.lower = inner.lower + Vec3{threshold, threshold, threshold};
   inner.upper = inner.upper - Vec3{threshold, threshold, threshold};
-  if (comes_deeper(planes, inner, threshold)) return Chance::kNever;
-  return is_missed(hull, threshold) ? Chance::kNone : Chance::kSome;
-}
-
-bool Filling::comes_deeper(const ConvexPlanes& planes, const Box& inner, double threshold) const {
   for (const Vec3 p : solid_.vertices)
     if (inner.holds(p) && planes.nearest(p).depth > threshold) return true;
   const std::vector<Bvh::Node>& nodes = surface_.bvh().nodes();

@@ -25,9 +25,10 @@ class Filling {
   explicit Filling(const Mesh& solid) : solid_(solid), surface_(solid) {}
 
   Chance chance(const Mesh& hull, double threshold) const;
+  // Whether it is kNever: much sooner known than which of the others it is.
+  bool comes_deeper(const Mesh& hull, double threshold) const;
 
  private:
-  bool comes_deeper(const ConvexPlanes& planes, const Box& inner, double threshold) const;
   bool is_missed(const Mesh& hull, double threshold) const;
 
   Mesh solid_;

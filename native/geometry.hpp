@@ -49,7 +49,8 @@ struct Box {
     lower = {std::min(lower.x, p.x), std::min(lower.y, p.y), std::min(lower.z, p.z)};
     upper = {std::max(upper.x, p.x), std::max(upper.y, p.y), std::max(upper.z, p.z)};
   }
-  void extend(const Box& other) {
+  bool is_empty() const { return !(lower.x <= upper.x); }
+  void extend(const Box& other) {  // not empty
     extend(other.lower);
     extend(other.upper);
   }

@@ -284,6 +284,34 @@ std::vector<Triangle> HullBuilder::triangles() const {
   return result;
 }
 
+// A corner is extreme when at least three of the edges around it are creases (their two facets not exactly coplanar):
+// none or two creases mean that it lies inside a facet or an edge of the polytope.
+std::vector<std::int32_t> HullBuilder::extreme_corners() const {
+  std::vector<std::int32_t> creases(points_.size(), 0);
+  for (std::size_t id = 0; id < facets_.size(); ++id) {
+    const Facet& f = facets_[id];
+    if (!f.alive) continue;
+    for (int e = 0; e < 3; ++e) {
+      if (f.neighbour[e] < static_cast<std::int32_t>(id)) continue;  // every edge once
+      const std::int32_t a = f.corner[e], b = f.corner[(e + 1) % 3];
+      const Triangle& across = facets_[f.neighbour[e]].corner;
+      const std::int32_t opposite = across[0] != a && across[0] != b   ? across[0]
+                                    : across[1] != a && across[1] != b ? across[1]
+                                                                       : across[2];
+      const Vec3 offset = points_[opposite] - f.origin;
+      if (dot(f.normal, offset) < -f.error * max_abs(offset) ||
+          orient3d_exact(points_[f.corner[0]], points_[f.corner[1]], points_[f.corner[2]], points_[opposite]) != 0) {
+        ++creases[a];
+        ++creases[b];
+      }
+    }
+  }
+  std::vector<std::int32_t> extreme;
+  for (std::size_t i = 0; i < creases.size(); ++i)
+    if (creases[i] >= 3) extreme.push_back(static_cast<std::int32_t>(i));
+  return extreme;
+}
+
 std::vector<std::int32_t> HullBuilder::corners() const {
   std::vector<bool> used(points_.size(), rank_ < 3);
   for (const Facet& f : facets_)
@@ -296,39 +324,6 @@ std::vector<std::int32_t> HullBuilder::corners() const {
 }
 
 namespace {
-
-// A corner is extreme when at least three of the edges around it are creases (their two facets not exactly coplanar):
-// none or two creases mean that it lies inside a facet or an edge of the polytope.
-std::vector<std::int32_t> extreme_points(const std::vector<Vec3>& points, const std::vector<Triangle>& faces) {
-  struct Side {
-    std::int32_t low, high, face, opposite;
-  };
-  std::vector<Side> sides;
-  sides.reserve(3 * faces.size());
-  for (std::size_t f = 0; f < faces.size(); ++f)
-    for (int e = 0; e < 3; ++e) {
-      const std::int32_t a = faces[f][e], b = faces[f][(e + 1) % 3];
-      sides.push_back({std::min(a, b), std::max(a, b), static_cast<std::int32_t>(f), faces[f][(e + 2) % 3]});
-    }
-  std::sort(sides.begin(), sides.end(), [](const Side& s, const Side& t) {
-    return s.low != t.low ? s.low < t.low : s.high != t.high ? s.high < t.high : s.face < t.face;
-  });
-  std::vector<std::int32_t> creases(points.size(), 0);
-  for (std::size_t i = 0; i + 1 < sides.size(); i += 2) {
-    const Triangle& f = faces[sides[i].face];
-    const Vec3 a = points[f[0]], ab = points[f[1]] - a, ac = points[f[2]] - a, d = points[sides[i + 1].opposite] - a;
-    const double bound = 40 * kRoundoff * max_abs(ab) * max_abs(ac) * max_abs(d);
-    if (dot(cross(ab, ac), d) < -bound ||
-        orient3d_exact(a, points[f[1]], points[f[2]], points[sides[i + 1].opposite]) != 0) {
-      ++creases[sides[i].low];
-      ++creases[sides[i].high];
-    }
-  }
-  std::vector<std::int32_t> extreme;
-  for (std::size_t i = 0; i < points.size(); ++i)
-    if (creases[i] >= 3) extreme.push_back(static_cast<std::int32_t>(i));
-  return extreme;
-}
 
 // The exponent of the power of two that brings the points into the range where the predicates are exact; 0 inside it.
 int exponent_out_of_range(const std::vector<Vec3>& points) {
@@ -356,13 +351,8 @@ Hull convex_hull(const std::vector<Vec3>& points) {
   if (hull.rank < 3) return hull;
 
   hull.faces = builder.triangles();
-  hull.indices = extreme_points(points, hull.faces);
-  std::vector<bool> corner(points.size(), false);
-  std::size_t corners = 0;
-  for (const Triangle& face : hull.faces)
-    for (const std::int32_t c : face) corners += !corner[c], corner[c] = true;
-  std::vector<std::int32_t> rank_of(points.size(), -1);
-  if (corners > hull.indices.size()) {
+  hull.indices = builder.extreme_corners();
+  if (hull.faces.size() > 2 * hull.indices.size() - 4) {  // a corner inside a facet or an edge of the polytope
     std::vector<Vec3> extreme;
     for (const std::int32_t i : hull.indices) extreme.push_back(points[i]);
     builder.clear();
@@ -370,6 +360,7 @@ Hull convex_hull(const std::vector<Vec3>& points) {
     hull.faces = builder.triangles();
     return hull;
   }
+  std::vector<std::int32_t> rank_of(points.size(), -1);
   for (std::size_t i = 0; i < hull.indices.size(); ++i) rank_of[hull.indices[i]] = static_cast<std::int32_t>(i);
   for (Triangle& face : hull.faces)
     for (std::int32_t& c : face) c = rank_of[c];

@@ -39,6 +39,7 @@ class HullBuilder {
   const Box& extent() const { return extent_; }  // of all points
   std::vector<Triangle> triangles() const;
   std::vector<std::int32_t> corners() const;  // ascending: points that are corners of facets (rank 3), or all points
+  std::vector<std::int32_t> extreme_corners() const;  // those that are inside no facet or edge of the polytope (rank 3)
 
  private:
   struct Facet {

@@ -32,15 +32,15 @@ double box_volume(const Mesh& mesh) {
 }
 
 // The planes of a bundle, and others where they are few.
-std::vector<double> section_offsets(const Mesh& mesh, const Bundle& bundle) {
+std::vector<double> section_offsets(const SolidMesh& solid, const Bundle& bundle) {
   std::vector<double> offsets = bundle.offsets;
   if (offsets.size() >= kFewPlanes) return offsets;
   double low = kInfinity, high = -kInfinity;
-  for (const Triangle& f : mesh.faces)
-    for (const std::int32_t c : f) {
-      const double s = dot(bundle.normal, mesh.vertices[c]);
-      low = std::min(low, s), high = std::max(high, s);
-    }
+  for (std::size_t i = 0; i < solid.is_corner.size(); ++i) {
+    if (!solid.is_corner[i]) continue;
+    const double s = dot(bundle.normal, solid.mesh.vertices[i]);
+    low = std::min(low, s), high = std::max(high, s);
+  }
   if (!std::isfinite(high - low)) return offsets;
   for (std::size_t i = 1; i <= kFewPlanes; ++i)
     offsets.push_back(low + (high - low) * (static_cast<double>(i) / (kFewPlanes + 1)));
@@ -80,8 +80,8 @@ std::vector<double> least_hull_volumes(const Sections& sections, Side side) {
 class Direction {
  public:
   // Numbers are those of the bundle's planes among all candidates.
-  Direction(const Mesh& mesh, const Bundle& bundle, const std::vector<std::ptrdiff_t>& numbers)
-      : sections_(mesh, bundle.normal, section_offsets(mesh, bundle)), slack_(kRounding * box_volume(mesh)) {
+  Direction(const SolidMesh& solid, const Bundle& bundle, const std::vector<std::ptrdiff_t>& numbers)
+      : sections_(solid, bundle.normal, section_offsets(solid, bundle)), slack_(kRounding * box_volume(solid.mesh)) {
     sections_.drop_heights();
     for (std::size_t j = 0, i = 0; j < planes(); ++j)
       numbers_.push_back(i < numbers.size() && bundle.offsets[i] == sections_.offset(j) ? numbers[i++] : -1);
@@ -89,9 +89,9 @@ class Direction {
       least_[side].assign(planes(), 0);
       hulls_[side].resize(planes());
       const std::vector<double> volumes = least_hull_volumes(sections_, side);
-      for (std::size_t j = 0; j < planes(); ++j) raise(side, j, volumes[j] - solid(side, j) - slack_);
-      measure_extents(side);
+      for (std::size_t j = 0; j < planes(); ++j) raise(side, j, volumes[j] - this->solid(side, j) - slack_);
     }
+    measure_extents();
   }
 
   std::size_t planes() const { return sections_.planes(); }
@@ -146,14 +146,21 @@ class Direction {
     for (; j != end(across(side)) && least_[side][j] < excess; side == kBelow ? ++j : --j) least_[side][j] = excess;
   }
 
-  void measure_extents(Side side) {
-    extent_[side].resize(planes());
-    Box box;
-    for (std::size_t i = 0; i < planes(); ++i) {
-      const std::size_t j = side == kBelow ? i : planes() - 1 - i, slab = side == kBelow ? j : j + 1;
-      sections_.for_each_inside(slab, slab + 1, [&box](Vec3 p) { box.extend(p); });
-      for (const Vec3 p : sections_.outline(j)) box.extend(p);
-      extent_[side][j] = box.lower.x <= box.upper.x ? max_abs(box.upper - box.lower) : 0;
+  void measure_extents() {
+    std::vector<Box> slabs(planes() + 1), sections(planes());
+    for (std::size_t j = 0; j <= planes(); ++j)
+      sections_.for_each_inside(j, j + 1, [&](Vec3 p) { slabs[j].extend(p); });
+    for (std::size_t j = 0; j < planes(); ++j)
+      for (const Vec3 p : sections_.outline(j)) sections[j].extend(p);
+    for (const Side side : {kBelow, kAbove}) {
+      extent_[side].resize(planes());
+      Box box;
+      for (std::size_t i = 0; i < planes(); ++i) {
+        const std::size_t j = side == kBelow ? i : planes() - 1 - i;
+        for (const Box& more : {slabs[side == kBelow ? j : j + 1], sections[j]})
+          if (!more.is_empty()) box.extend(more);
+        extent_[side][j] = box.is_empty() ? 0 : max_abs(box.upper - box.lower);
+      }
     }
   }
 
@@ -169,7 +176,7 @@ class Search {
  public:
   Search(const Mesh& mesh, const std::vector<Vec3>& normals, const std::vector<double>& offsets,
          const LeastExcess& wanted, int threads)
-      : wanted_(wanted) {
+      : wanted_(wanted), solid_(mesh) {
     const Bundles bundles = bundle_planes(normals, offsets);
     std::vector<std::vector<std::ptrdiff_t>> numbers;
     for (const Bundle& bundle : bundles.all) numbers.emplace_back(bundle.offsets.size(), -1);
@@ -177,7 +184,7 @@ class Search {
       numbers[bundles.place[i].bundle][bundles.place[i].plane] = static_cast<std::ptrdiff_t>(i);
     directions_.resize(numbers.size());
     parallel_for(directions_.size(), threads, [&](std::size_t k) {
-      directions_[k] = std::make_unique<Direction>(mesh, bundles.all[k], numbers[k]);
+      directions_[k] = std::make_unique<Direction>(solid_, bundles.all[k], numbers[k]);
     });
   }
 
@@ -263,6 +270,7 @@ class Search {
   }
 
   const LeastExcess wanted_;
+  const SolidMesh solid_;
   std::vector<std::unique_ptr<Direction>> directions_;
   std::priority_queue<Interval> queue_;
   double least_cost_ = kInfinity;

@@ -10,7 +10,9 @@ namespace rlacd {
 
 namespace {
 
-constexpr double kFilm = 1e-13;  // relative to the mesh
+constexpr double kFilm = 1e-13;        // relative to the mesh
+constexpr std::size_t kFew = 20;       // so many points are quickly sorted
+constexpr double kWellInside = 1e-12;  // share of the area of the points' box: far above rounding
 
 int axis_of(Vec3 n) {
   for (int axis = 0; axis < 3; ++axis)
@@ -18,11 +20,35 @@ int axis_of(Vec3 n) {
   return -1;
 }
 
+// Drops most points that lie well inside the octagon of those that are outermost in eight directions: what is left is
+// quickly sorted (Akl and Toussaint, "A Fast Convex Hull Algorithm", 1978).
+template <int drop>
+void drop_inner(std::vector<Vec3>& points) {
+  constexpr int u = (drop + 1) % 3, v = (drop + 2) % 3;
+  constexpr double direction[8][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
+  double most[8];
+  Vec3 outermost[8];
+  std::fill(std::begin(most), std::end(most), -std::numeric_limits<double>::infinity());
+  for (const Vec3 p : points)
+    for (int k = 0; k < 8; ++k)
+      if (const double s = direction[k][0] * p[u] + direction[k][1] * p[v]; s > most[k]) most[k] = s, outermost[k] = p;
+  const double well = kWellInside * (most[0] + most[4]) * (most[2] + most[6]);
+  const auto is_inside = [&](Vec3 p) {
+    for (int k = 0; k < 8; ++k) {
+      const Vec3 a = outermost[k], b = outermost[(k + 1) % 8];
+      if ((b[u] - a[u]) * (p[v] - a[v]) - (b[v] - a[v]) * (p[u] - a[u]) <= well && !(a == b)) return false;
+    }
+    return true;
+  };
+  points.erase(std::remove_if(points.begin(), points.end(), is_inside), points.end());
+}
+
 // Corners of the convex hull of points on a plane, by Andrew's monotone chain in the coordinates other than `drop`.
 // Rounding may drop a corner that stands out by some 1e-16, which no volume notices.
 template <int drop>
 void reduce_to_planar_hull(std::vector<Vec3>& points) {
   if (points.size() < 4) return;
+  if (points.size() > kFew) drop_inner<drop>(points);
   constexpr int u = (drop + 1) % 3, v = (drop + 2) % 3;
   std::sort(points.begin(), points.end(), [](Vec3 a, Vec3 b) {
     return a[u] != b[u] ? a[u] < b[u] : a[v] != b[v] ? a[v] < b[v] : a[drop] < b[drop];
@@ -68,8 +94,18 @@ double mean_below(double s0, double s1, double s2, double d) {
 
 }  // namespace
 
-Sections::Sections(const Mesh& mesh, Vec3 normal, std::vector<double> offsets)
-    : mesh_(mesh), normal_(normal), axis_(axis_of(normal)), offsets_(std::move(offsets)) {
+SolidMesh::SolidMesh(const Mesh& solid) : mesh(solid), is_corner(solid.vertices.size(), 0) {
+  area.reserve(mesh.faces.size());
+  for (const Triangle& f : mesh.faces) {
+    const Vec3 a = mesh.vertices[f[0]], b = mesh.vertices[f[1]], c = mesh.vertices[f[2]];
+    area.push_back(0.5 * cross(b - a, c - a));
+    for (const std::int32_t corner : f) is_corner[corner] = 1;
+  }
+  volume = mesh_volume(mesh.vertices, mesh.faces);
+}
+
+Sections::Sections(const SolidMesh& solid, Vec3 normal, std::vector<double> offsets)
+    : solid_(solid), mesh_(solid.mesh), normal_(normal), axis_(axis_of(normal)), offsets_(std::move(offsets)) {
   project();
   fill_slabs();
   cut_edges();
@@ -77,25 +113,40 @@ Sections::Sections(const Mesh& mesh, Vec3 normal, std::vector<double> offsets)
 }
 
 void Sections::project() {
-  heights_.reserve(mesh_.vertices.size());
-  above_.reserve(mesh_.vertices.size());
-  for (const Vec3 p : mesh_.vertices) {
-    const double s = dot(normal_, p);
-    heights_.push_back(s);
-    above_.push_back(
-        static_cast<std::int32_t>(std::upper_bound(offsets_.begin(), offsets_.end(), s) - offsets_.begin()));
+  const std::size_t count = mesh_.vertices.size();
+  heights_.resize(count);
+  above_.resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double s = dot(normal_, mesh_.vertices[i]);
+    heights_[i] = s;
+    above_[i] = first_above(s);
+    if (!solid_.is_corner[i]) continue;
+    is_on_plane_ = is_on_plane_ || (above_[i] > 0 && offsets_[above_[i] - 1] == s);
+    lowest_ = std::min(lowest_, s);
+    highest_ = std::max(highest_, s);
   }
-  for (const Triangle& f : mesh_.faces)
-    for (const std::int32_t c : f) {
-      lowest_ = std::min(lowest_, heights_[c]);
-      highest_ = std::max(highest_, heights_[c]);
-    }
   film_ = kFilm * (highest_ - lowest_);
+}
+
+// Planes mostly stand at equal distances: the first guess is right then.
+std::int32_t Sections::first_above(double height) const {
+  if (offsets_.empty()) return 0;
+  const auto planes = static_cast<std::int32_t>(offsets_.size());
+  const double share = (height - offsets_.front()) / (offsets_.back() - offsets_.front());
+  auto j = share > 0 ? share < 1 ? static_cast<std::int32_t>(share * (planes - 1)) + 1 : planes : 0;
+  while (j < planes && offsets_[j] <= height) ++j;
+  while (j > 0 && offsets_[j - 1] > height) --j;
+  return j;
 }
 
 std::size_t Sections::first_from(std::int32_t vertex) const {
   const auto j = static_cast<std::size_t>(above_[vertex]);
   return j > 0 && offsets_[j - 1] == heights_[vertex] ? j - 1 : j;
+}
+
+// A corner may be on the lower plane.
+bool Sections::is_between_planes(const Triangle& f) const {
+  return above_[f[0]] == above_[f[1]] && above_[f[1]] == above_[f[2]];
 }
 
 std::int32_t Sections::lowest_corner(const Triangle& f) const {
@@ -104,13 +155,14 @@ std::int32_t Sections::lowest_corner(const Triangle& f) const {
 }
 
 void Sections::fill_slabs() {
-  // On which sides of a vertex its faces go on: 1 below, 2 above, 4 anywhere.
+  // On which sides of a vertex on a plane its faces go on: 1 below, 2 above.
   std::vector<char> sides(mesh_.vertices.size(), 0);
-  for (const Triangle& f : mesh_.faces) {
-    const auto [low, high] = std::minmax({heights_[f[0]], heights_[f[1]], heights_[f[2]]});
-    for (const std::int32_t c : f)
-      sides[c] = static_cast<char>(sides[c] | (low < heights_[c] ? 1 : 0) | (high > heights_[c] ? 2 : 0) | 4);
-  }
+  if (is_on_plane_)
+    for (const Triangle& f : mesh_.faces) {
+      const auto [low, high] = std::minmax({heights_[f[0]], heights_[f[1]], heights_[f[2]]});
+      for (const std::int32_t c : f)
+        sides[c] = static_cast<char>(sides[c] | (low < heights_[c] ? 1 : 0) | (high > heights_[c] ? 2 : 0));
+    }
   struct Entry {
     std::size_t slab;
     std::int32_t vertex;
@@ -118,7 +170,7 @@ void Sections::fill_slabs() {
   std::vector<Entry> entries;
   entries.reserve(sides.size());
   for (std::int32_t i = 0; i < static_cast<std::int32_t>(sides.size()); ++i) {
-    if (sides[i] == 0) continue;
+    if (!solid_.is_corner[i]) continue;
     const auto j = static_cast<std::size_t>(above_[i]);
     const bool on_plane = j > 0 && offsets_[j - 1] == heights_[i];
     if (!on_plane || (sides[i] & 2) != 0) entries.push_back({j, i});
@@ -143,7 +195,8 @@ Vec3 Sections::crossing(std::int32_t low, std::int32_t high, double offset) cons
 
 void Sections::cut_edges() {
   outlines_.resize(offsets_.size());
-  for (const Triangle& f : mesh_.faces)
+  for (const Triangle& f : mesh_.faces) {
+    if (is_between_planes(f)) continue;
     for (int e = 0; e < 3; ++e) {
       // In a closed oriented mesh every edge is run through once in each direction: take the ascending one.
       const std::int32_t a = f[e], b = f[(e + 1) % 3];
@@ -151,6 +204,7 @@ void Sections::cut_edges() {
       for (auto j = static_cast<std::size_t>(above_[a]); j < offsets_.size() && offsets_[j] < heights_[b]; ++j)
         outlines_[j].push_back(crossing(a, b, offsets_[j]));
     }
+  }
   for (std::vector<Vec3>& points : outlines_) reduce_to_planar_hull(points, normal_);
 }
 
@@ -167,22 +221,20 @@ double Sections::end_area(bool lowest) const {
 void Sections::measure_solid() {
   std::vector<double> slope(offsets_.size() + 1, 0), constant(offsets_.size() + 1, 0);
   solid_below_.assign(offsets_.size(), 0);
-  for (const Triangle& f : mesh_.faces) {
-    const Vec3 a = mesh_.vertices[f[0]], b = mesh_.vertices[f[1]], c = mesh_.vertices[f[2]];
-    const double flux = dot(normal_, cross(b - a, c - a)) / 2;
-    const std::int32_t lowest = lowest_corner(f);
+  for (std::size_t i = 0; i < mesh_.faces.size(); ++i) {
+    const Triangle& f = mesh_.faces[i];
+    const double flux = dot(normal_, solid_.area[i]);
     double s[3] = {heights_[f[0]], heights_[f[1]], heights_[f[2]]};
     if (s[0] > s[1]) std::swap(s[0], s[1]);
     if (s[1] > s[2]) std::swap(s[1], s[2]);
     if (s[0] > s[1]) std::swap(s[0], s[1]);
-    std::size_t j = first_from(lowest);
+    std::size_t j = is_between_planes(f) && !is_on_plane_ ? above_[f[0]] : first_from(lowest_corner(f));
     for (; j < offsets_.size() && offsets_[j] < s[2]; ++j)
       solid_below_[j] += flux * mean_below(s[0], s[1], s[2], offsets_[j]);
     // From here on the whole triangle lies below: flux * (mean - d), summed up as a line in d.
     slope[j] += flux;
     constant[j] += flux * ((s[0] + s[1] + s[2]) / 3);
   }
-  solid_ = mesh_volume(mesh_.vertices, mesh_.faces);
   double flux = 0, moment = 0;
   for (std::size_t j = 0; j < offsets_.size(); ++j) {
     flux += slope[j];

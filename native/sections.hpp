@@ -16,10 +16,20 @@
 
 namespace rlacd {
 
+// What sections of a mesh in all directions have in common. Refers to the mesh for as long as it lives.
+struct SolidMesh {
+  explicit SolidMesh(const Mesh& solid);
+
+  const Mesh& mesh;
+  std::vector<Vec3> area;       // of every face, times its normal
+  std::vector<char> is_corner;  // of a face, for every vertex
+  double volume;
+};
+
 class Sections {
  public:
-  // Refers to the mesh for as long as it lives.
-  Sections(const Mesh& mesh, Vec3 normal, std::vector<double> offsets);
+  // Refers to the solid for as long as it lives.
+  Sections(const SolidMesh& solid, Vec3 normal, std::vector<double> offsets);
 
   std::size_t planes() const { return offsets_.size(); }
   Vec3 normal() const { return normal_; }
@@ -42,7 +52,7 @@ class Sections {
   double end_area(bool lowest) const;
 
   double solid_below(std::size_t plane) const { return solid_below_[plane]; }
-  double solid_above(std::size_t plane) const { return solid_ - solid_below_[plane]; }
+  double solid_above(std::size_t plane) const { return solid_.volume - solid_below_[plane]; }
 
   // Area and perimeter of each plane's section of the solid itself.
   struct Measures {
@@ -58,13 +68,16 @@ class Sections {
 
  private:
   void project();
+  std::int32_t first_above(double height) const;
   void fill_slabs();
   void cut_edges();
   void measure_solid();
+  bool is_between_planes(const Triangle& face) const;
   std::int32_t lowest_corner(const Triangle& face) const;
   std::size_t first_from(std::int32_t vertex) const;  // first plane not below it
   Vec3 crossing(std::int32_t low, std::int32_t high, double offset) const;
 
+  const SolidMesh& solid_;
   const Mesh& mesh_;
   const Vec3 normal_;
   const int axis_;  // the coordinate axis that the normal is, or -1
@@ -74,11 +87,11 @@ class Sections {
   double lowest_ = std::numeric_limits<double>::infinity();
   double highest_ = -std::numeric_limits<double>::infinity();
   double film_ = 0;
+  bool is_on_plane_ = false;         // some vertex
   std::vector<std::int32_t> order_;  // vertices slab by slab
   std::vector<std::size_t> first_;   // M + 2 places in it
   std::vector<std::vector<Vec3>> outlines_;
   std::vector<double> solid_below_;
-  double solid_ = 0;
 };
 
 // Area of a convex polygon across n, its corners in order.

@@ -19,8 +19,8 @@ struct Slab {
 
 class DirectionSweep {
  public:
-  DirectionSweep(const Mesh& mesh, Vec3 n, const std::vector<double>& offsets)
-      : sections_(mesh, n, offsets), scores_(offsets.size()) {}
+  DirectionSweep(const SolidMesh& solid, Vec3 n, const std::vector<double>& offsets)
+      : sections_(solid, n, offsets), scores_(offsets.size()) {}
 
   std::vector<PlaneScore> run() {
     build_slabs();
@@ -92,7 +92,7 @@ class DirectionSweep {
 }  // namespace
 
 std::vector<PlaneScore> sweep_direction(const Mesh& mesh, Vec3 direction, const std::vector<double>& offsets) {
-  return DirectionSweep(mesh, direction, offsets).run();
+  return DirectionSweep(SolidMesh(mesh), direction, offsets).run();
 }
 
 std::vector<PlaneScore> sweep(const Mesh& mesh, const std::vector<Vec3>& directions, const std::vector<double>& offsets,
@@ -100,8 +100,10 @@ std::vector<PlaneScore> sweep(const Mesh& mesh, const std::vector<Vec3>& directi
   // Principal axes are often coordinate axes, and faces parallel to them: equal directions share one sweep.
   const Bundles bundles = bundle_planes(directions, offsets);
   std::vector<std::vector<PlaneScore>> swept(bundles.all.size());
-  parallel_for(swept.size(), threads,
-               [&](std::size_t b) { swept[b] = sweep_direction(mesh, bundles.all[b].normal, bundles.all[b].offsets); });
+  const SolidMesh solid(mesh);
+  parallel_for(swept.size(), threads, [&](std::size_t b) {
+    swept[b] = DirectionSweep(solid, bundles.all[b].normal, bundles.all[b].offsets).run();
+  });
   std::vector<PlaneScore> scores;
   scores.reserve(offsets.size());
   for (const Bundles::Place place : bundles.place) scores.push_back(swept[place.bundle][place.plane]);

@@ -158,18 +158,22 @@ Interval HullUnion::under(const Mesh& surface, double tolerance, int threads) co
   const std::size_t count = surface.faces.size();
   parallel_for((count + kChunk - 1) / kChunk, threads, [&](std::size_t chunk) {
     std::vector<std::size_t> near;
+    std::size_t last = members_.size();  // the hull that covered the face before this one
     for (std::size_t f = chunk * kChunk; f < std::min(count, (chunk + 1) * kChunk); ++f) {
       const Corners corner = corners_of(surface, surface.faces[f]);
       const Box box = box_of(corner);
+      const auto is_covered_by = [&](std::size_t m) {
+        return overlap(box, members_[m]->box, kInsideSlack) && std::all_of(corner.begin(), corner.end(), [&](Vec3 p) {
+                 return members_[m]->planes.nearest(p).depth >= -kInsideSlack;
+               });
+      };
+      if (last < members_.size() && is_covered_by(last)) continue;
+      last = 0;
+      while (last < members_.size() && !is_covered_by(last)) ++last;
+      if (last < members_.size()) continue;
       near.clear();
-      bool covered = false;
-      for (std::size_t m = 0; m < members_.size() && !covered; ++m) {
-        if (!overlap(box, members_[m]->box, kInsideSlack)) continue;
-        near.push_back(m);
-        covered = std::all_of(corner.begin(), corner.end(),
-                              [&](Vec3 p) { return members_[m]->planes.nearest(p).depth >= -kInsideSlack; });
-      }
-      if (covered) continue;
+      for (std::size_t m = 0; m < members_.size(); ++m)
+        if (overlap(box, members_[m]->box, kInsideSlack)) near.push_back(m);
       outside[f] = {{corner.begin(), corner.end()}};
       for (const std::size_t m : near) {
         if (outside[f].size() > kMostPieces) break;  // uncut pieces are in no way wrong here, only more work

@@ -100,8 +100,13 @@ def bent_bar() -> list[Component]:
     return [arc(0, 26), arc(26, 42), arc(42, 68)]
 
 
+def strangers(components: Sequence[Component]) -> list[Component]:
+    """The same components, of which nobody knows what they were cut from."""
+    return [Component(component.manifold) for component in components]
+
+
 def together(parts: Sequence[Part]) -> Component:
-    solid = reunite([member for part in parts for member in part.members])
+    solid = reunite(strangers([member for part in parts for member in part.members]))
     assert solid is not None
     return solid
 

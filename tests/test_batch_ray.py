@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -63,6 +64,15 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
         cluster.shutdown()
 
 
+def _dies(node: Any) -> bool:
+    """Whether the cluster gives the node up; it may take several of its health checks to."""
+    for _ in range(240):
+        if not any(row["Alive"] for row in ray.nodes() if row["NodeID"] == node.node_id):
+            return True
+        time.sleep(0.5)
+    return False
+
+
 def test_a_node_dies_half_way_and_the_results_are_those_of_one_machine(cluster: Cluster, tmp_path: Path) -> None:
     assets = tmp_path / "assets"
     for number in range(8):
@@ -78,7 +88,7 @@ def test_a_node_dies_half_way_and_the_results_are_those_of_one_machine(cluster: 
     over_ray = Batch(assets, str(tmp_path / "ray"), order, limits).run(RayPool("auto"), counter)
     killing.join()
     assert over_ray.status == {"done": 8, "fallback": 1, "failed": 1}
-    assert sorted(node["Alive"] for node in ray.nodes()) == [False, True]
+    assert _dies(doomed), "the node outlived the batch"
 
     with LocalPool(1) as pool:
         here = Batch(assets, str(tmp_path / "here"), order, limits).run(pool, Counter())

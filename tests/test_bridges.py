@@ -22,6 +22,7 @@ from rlacd.solid.component import Component, Part, Plane, Share
 from rlacd.solid.hull import Hull
 from rlacd.solid.reunite import reunite
 from rlacd.workers import Workers
+from tests.shapes import strangers
 
 TIGHT = Concavity(0.02)
 
@@ -107,7 +108,7 @@ def test_what_is_united_with_a_share_is_a_share(workers: Workers) -> None:
     (whole,) = merge_to_count(merged, 1, TIGHT, workers, Clock()) or []
     assert isinstance(whole, Share)
     assert whole.volume == pytest.approx(CROSS.volume())
-    united = reunite(whole.members)
+    united = reunite(strangers(whole.members))
     assert united is not None
     assert united.volume == pytest.approx(CROSS.volume())
 
@@ -116,6 +117,7 @@ def test_balls_do_not_ask_what_is_inside_a_hull() -> None:
     component = Component(CROSS)
     space = Navigable(NavigableSpace(0.1, 0.05), 0.1, 0.05, Balls(np.zeros((0, 3)), np.zeros(0)))
     assert space.chance(component.filling, component.hull) is Chance.NEVER
+    assert not space.forbids(component.filling, component.hull)
 
 
 @settings(deadline=None, max_examples=60)
@@ -143,6 +145,7 @@ def test_a_quick_no_is_never_wrong(seed: int, threshold: float) -> None:
     assert not (fits and chance is not Chance.SOME)
     larger = Hull.of(np.concatenate([hull.vertices, random.uniform(-1, 1, (3, 3))]))
     assert larger is not None
+    assert Concavity(threshold).forbids(solid.filling, hull) == (chance is Chance.NEVER)
     if chance is Chance.NEVER:
         assert Concavity(threshold * (1 - 1e-9)).chance(solid.filling, larger) is Chance.NEVER
 

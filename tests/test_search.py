@@ -37,7 +37,7 @@ from rlacd.solid.load import load_mesh
 from rlacd.solid.repair import repair
 from rlacd.solid.reunite import reunite, touch
 from rlacd.workers import Workers
-from tests.shapes import box
+from tests.shapes import box, strangers
 
 SHAPES = ("test/coacd_examples/SnowFlake.ply", "test/vhacd/ob_chess_table.ply", "test/capod/class8__m85.ply")
 CRITERION = Concavity(0.05)
@@ -81,7 +81,8 @@ def test_what_slanted_planes_cut_is_reunited(cuts: list[tuple[tuple[float, float
         x, y, z = (x / length for x in normal)
         plane = Plane((x, y, z), offset)
         pieces = [side for piece in pieces for side in piece.cut(plane) if side is not None]
-    again = reunite(pieces)
+    assert reunite(pieces) is solid
+    again = reunite(strangers(pieces))
     if again is None:  # it may give up; it must not return something else
         return
     assert again.volume == pytest.approx(solid.volume, rel=1e-6)
@@ -98,7 +99,7 @@ def test_most_neighbours_can_be_reunited_without_a_wall_between_them(real: Compo
     tried = failed = 0
     for first, second in itertools.pairwise(parts):
         tried += 1
-        solid = reunite([*first.members, *second.members])
+        solid = reunite(strangers([*first.members, *second.members]))
         if solid is None:
             failed += 1
             continue
@@ -181,11 +182,25 @@ def test_reuniting_again_and_again_leaves_no_crumbs() -> None:
         x, y, z = rng.normal(size=3)
         length = math.hypot(x, y, z)
         sides = again.cut(Plane((x / length, y / length, z / length), 0.1))
-        reunited = reunite([side for side in sides if side is not None])
+        reunited = reunite(strangers([side for side in sides if side is not None]))
         assert reunited is not None
         again = reunited
     assert again.volume == pytest.approx(solid.volume, rel=1e-6)
     assert len(again.faces) < 8 * len(solid.faces)  # 160 times as many without cleaning up
+
+
+def test_what_is_all_there_of_a_component_is_put_together_without_a_boolean() -> None:
+    bar = Component(Manifold.cube((3, 1, 1), True))
+    low, high = (side for side in bar.cut(Plane((1, 0, 0), -0.3)) if side is not None)
+    left, right = (side for side in high.cut(Plane((0, 1, 0), 0.1)) if side is not None)
+    near, far = (side for side in high.cut(Plane((0, 0, 1), 0.2)) if side is not None)
+    assert reunite([right, low, left]) is bar
+    assert reunite([far, near]) is high
+    for some, volume in (([low, left], low.volume + left.volume), ([low, near], low.volume + near.volume)):
+        united = reunite(some)
+        assert united is not None
+        assert united is not bar
+        assert united.volume == pytest.approx(volume, rel=1e-6)
 
 
 def test_a_cluster_that_was_cut_badly_becomes_fewer_parts() -> None:

@@ -55,6 +55,7 @@ def directed_hausdorff(
 class Filling:
     def __init__(self, vertices: FloatArray, faces: IntArray) -> None: ...
     def chance(self, hull_vertices: FloatArray, hull_faces: IntArray, threshold: float) -> int: ...  # 0, 1 or 2
+    def comes_deeper(self, hull_vertices: FloatArray, hull_faces: IntArray, threshold: float) -> bool: ...
 
 def meets_concavity(
     part_vertices: FloatArray,

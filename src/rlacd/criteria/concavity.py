@@ -103,6 +103,10 @@ class Concavity:
         """Look at the solid's corners and at points of the hull."""
         return Chance(filling.chance(hull.vertices, hull.faces, self.threshold))
 
+    def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
+        """Whether the solid's surface comes deeper inside the hull than the threshold."""
+        return filling.comes_deeper(hull.vertices, hull.faces, self.threshold)
+
     def filled(self, part: Part) -> float:
         """The solid's volume: what is left is what ``R_v`` is made of."""
         return part.volume

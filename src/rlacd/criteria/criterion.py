@@ -86,6 +86,12 @@ class Criterion(Protocol):
     def chance(self, filling: _native.Filling, hull: Hull) -> Chance:
         """Tell cheaply whether what a solid fills of a hull may meet the criterion."""
 
+    def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
+        """Whether what a solid fills of a hull, and of any that holds it, does not meet it: cheaper than `chance`.
+
+        It need not be known; False then.
+        """
+
     def is_met(self, part: Part) -> bool:
         """Decide strictly whether the part meets the criterion."""
 

@@ -248,6 +248,10 @@ class Navigable:
         """None: what is inside a hull does not count, and hulls of pairs have been tried."""
         return Chance.NEVER
 
+    def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
+        """Not known: balls are asked of parts, not of hulls."""
+        return False
+
     def least_error(self, volume: float, hull_volume: float) -> float:
         """0: volumes say nothing about balls."""
         return 0.0

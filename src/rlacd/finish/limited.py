@@ -52,6 +52,10 @@ class Limited:
         """The underlying criterion's: limited hulls are larger."""
         return self.criterion.chance(filling, hull)
 
+    def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
+        """The underlying criterion's: limited hulls are larger."""
+        return self.criterion.forbids(filling, hull)
+
     def least_error(self, volume: float, hull_volume: float) -> float:
         """Limiting a hull only adds volume, so the underlying bound holds."""
         return self.criterion.least_error(volume, hull_volume)

@@ -170,14 +170,17 @@ class _Bridged:
         return _share(first, second, hull, self.criterion, self.solid), False
 
 
-def unite(first: Part, second: Part, criterion: Criterion, solid: Component) -> Part | None:
-    """Unite two parts of a solid, as they are or across what lies between them; None where neither is allowed."""
-    hull = Hull.around(first.hull, second.hull)
+def unite(first: Part, second: Part, criterion: Criterion, solid: Component, hull: Hull | None = None) -> Part | None:
+    """Unite two parts of a solid, as they are or across what lies between them; None where neither is allowed.
+
+    Their joint hull may be given where it is known.
+    """
+    hull = hull or Hull.around(first.hull, second.hull)
     chance = criterion.chance(solid.filling, hull)
     if chance is Chance.NONE:
         return None
     if is_alone(first) and is_alone(second):  # otherwise they may overlap each other
-        union = Part.glued(first, second)
+        union = Part.glued(first, second, hull)
         if not criterion.excludes(union.volume, hull.volume) and criterion.is_met(union):
             return union
     return _share(first, second, hull, criterion, solid) if chance is Chance.SOME else None

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rlacd.clock import Clock
-from rlacd.criteria.criterion import Chance, Criterion
+from rlacd.criteria.criterion import Criterion
 from rlacd.finish.merge import unite
 from rlacd.search.recut import Exchange
 from rlacd.search.shift import exchange_of
@@ -64,8 +64,8 @@ def dissolve(
     now = list(around)
 
     def take(piece: Component, halvings: int) -> bool:
-        for i in _by_growth(now, piece, criterion.reach):
-            union = unite(now[i], piece, criterion, solid)
+        for i, hull in _by_growth(now, piece, criterion.reach):
+            union = unite(now[i], piece, criterion, solid, hull)
             if union is not None:
                 now[i] = union
                 return True
@@ -81,14 +81,12 @@ def dissolve(
 
 def _may_be_taken(part: Part, around: Sequence[Part], criterion: Criterion, solid: Component) -> bool:
     """Whether each of the part's outermost corners alone could belong to one of the others: a quick no."""
-    if criterion.is_hereditary:  # then every union that is tried is as quick a no
-        return True
     corners = part.hull.vertices
     directions = np.concatenate([np.eye(3), -np.eye(3)])
     outermost = sorted(set(np.argmax(corners @ directions.T, axis=0).tolist()))
     return all(
         any(
-            criterion.chance(solid.filling, _with_point(around[i].hull, corners[k])) is not Chance.NEVER
+            not criterion.forbids(solid.filling, _with_point(around[i].hull, corners[k]))
             for i in np.argsort([_gap(other.box, corners[k]) for other in around], kind="stable").tolist()
         )
         for k in outermost
@@ -99,11 +97,12 @@ def _with_point(hull: Hull, point: FloatArray) -> Hull:
     return Hull.of(np.vstack([hull.vertices, point])) or hull
 
 
-def _by_growth(parts: Sequence[Part], piece: Part, reach: float) -> list[int]:
-    """The parts within reach whose hulls would grow the least."""
+def _by_growth(parts: Sequence[Part], piece: Part, reach: float) -> list[tuple[int, Hull]]:
+    """The parts within reach whose hulls would grow the least, and those hulls."""
     near = [i for i, part in enumerate(parts) if _gap(part.box, piece.box) <= reach]
-    growth = [Hull.around(parts[i].hull, piece.hull).volume - parts[i].hull.volume for i in near]
-    return [near[k] for k in np.argsort(growth, kind="stable")[:TAKERS]]
+    joint = [Hull.around(parts[i].hull, piece.hull) for i in near]
+    growth = [hull.volume - parts[i].hull.volume for i, hull in zip(near, joint, strict=True)]
+    return [(near[k], joint[k]) for k in np.argsort(growth, kind="stable")[:TAKERS]]
 
 
 def _gap(box: FloatArray, other: FloatArray) -> float:

@@ -111,25 +111,51 @@ def _largest_bite(
     part: Part, taker: Part, direction: FloatArray, criterion: Criterion, solid: Component
 ) -> tuple[Part, Part | None] | None:
     """Cut off as much as the taker can have: the taker with it, and the rest; None where that is hardly anything."""
-    heights = np.concatenate([member.hull.vertices for member in part.members]) @ direction
+    heights = _corners(part) @ direction
     lower, upper = float(heights.min()), float(heights.max())
     offset = lower + FIRST * (upper - lower)
-    best, volume = None, 0.0
+    best = None
     for _ in range(1 + HALVINGS):
-        below, above = _divided(part.members, direction, offset)
-        if below:
-            grown = unite(taker, _glued(below), criterion, solid)
-            left = _whole(above, criterion, solid) if grown is not None and above else None
-            if grown is not None and (left is not None or not above):
-                lower, best, volume = offset, (grown, left), sum(piece.volume for piece in below)
-            elif best is None:
-                return None
-            else:
-                upper = offset
+        bite = _bite(part, taker, direction, offset, criterion, solid)
+        if bite is not None:
+            lower, best = offset, bite
+        elif best is None:
+            return None
         else:
-            lower = offset
+            upper = offset
         offset = (lower + upper) / 2
-    return best if volume > LEAST * sum(member.volume for member in part.members) else None
+    if best is None or best[2] <= LEAST * sum(member.volume for member in part.members):
+        return None
+    return best[:2]
+
+
+def _bite(
+    part: Part, taker: Part, direction: FloatArray, offset: float, criterion: Criterion, solid: Component
+) -> tuple[Part, Part | None, float] | None:
+    """The taker with what lies below a plane, the rest, and the volume given; None where one of them must not be."""
+    if _is_too_much(part, taker, direction, offset, criterion, solid):
+        return None
+    below, above = _divided(part.members, direction, offset)
+    if not below:
+        return taker, part, 0.0
+    grown = unite(taker, _glued(below), criterion, solid)
+    left = _whole(above, criterion, solid) if grown is not None and above else None
+    if grown is None or (above and left is None):
+        return None
+    return grown, left, sum(piece.volume for piece in below)
+
+
+def _is_too_much(
+    part: Part, taker: Part, direction: FloatArray, offset: float, criterion: Criterion, solid: Component
+) -> bool:
+    """Whether the taker cannot even have the part's corners below a plane: that is known without cutting."""
+    corners = _corners(part)
+    hull = Hull.of(np.concatenate([taker.hull.vertices, corners[corners @ direction <= offset]]))
+    return hull is not None and criterion.forbids(solid.filling, hull)
+
+
+def _corners(part: Part) -> FloatArray:
+    return np.concatenate([member.hull.vertices for member in part.members])
 
 
 def _whole(pieces: Sequence[Component], criterion: Criterion, solid: Component) -> Part | None:
@@ -141,9 +167,10 @@ def _whole(pieces: Sequence[Component], criterion: Criterion, solid: Component) 
 
 def _take_whole(rest: Part, takers: list[Part], criterion: Criterion, solid: Component) -> bool:
     """Give all that is left to one of the takers; False where none can have it."""
-    added = [Hull.around(taker.hull, rest.hull).volume - taker.hull.volume for taker in takers]
+    joint = [Hull.around(taker.hull, rest.hull) for taker in takers]
+    added = [hull.volume - taker.hull.volume for hull, taker in zip(joint, takers, strict=True)]
     for i in np.argsort(added, kind="stable")[:WHOLE].tolist():
-        union = unite(takers[i], rest, criterion, solid)
+        union = unite(takers[i], rest, criterion, solid, joint[i])
         if union is not None:
             takers[i] = union
             return True

@@ -97,15 +97,17 @@ class Part:
         return other
 
     @staticmethod
-    def glued(first: Part, second: Part) -> Part:
+    def glued(first: Part, second: Part, hull: Hull | None = None) -> Part:
         """Unite two parts with disjoint interiors; the regions where they touch are no surface of the union.
 
-        Where one of them is a `Share`, which has what others have too, so is the union.
+        Where one of them is a `Share`, which has what others have too, so is the union. Their joint hull may be given
+        where it is known.
         """
+        hull = hull or Hull.around(first.hull, second.hull)
         for part in (first, second):
             if isinstance(part, Share):
-                return Share(part.solid, first, second)
-        return _Union(first, second)
+                return Share(part.solid, first, second, hull)
+        return _Union(first, second, hull)
 
     def _resolved(self) -> tuple[FloatArray, IntArray]:
         assert self._surface is not None
@@ -115,11 +117,11 @@ class Part:
 class _Union(Part):
     """Two parts as one. They are glued when the surface is first asked for: some criteria look at the hull only."""
 
-    def __init__(self, first: Part, second: Part) -> None:
+    def __init__(self, first: Part, second: Part, hull: Hull) -> None:
         self._surface = None
         self._operands: tuple[Part, Part] | None = (first, second)
         self.volume = first.volume + second.volume
-        self.hull = Hull.around(first.hull, second.hull)
+        self.hull = hull
         self.piece_hulls = first.piece_hulls + second.piece_hulls
         self.within = None
         self._members = (*first.members, *second.members)
@@ -164,16 +166,15 @@ class Share(Part):
         All of it.
     first, second : Part
         Made of its components.
-    hull : Hull, optional
-        Their joint hull, where it is known already.
+    hull : Hull
+        Their joint hull.
 
     Attributes
     ----------
     solid : Component
     """
 
-    def __init__(self, solid: Component, first: Part, second: Part, hull: Hull | None = None) -> None:
-        hull = hull or Hull.around(first.hull, second.hull)
+    def __init__(self, solid: Component, first: Part, second: Part, hull: Hull) -> None:
         body = Manifold(Mesh64(hull.vertices, hull.faces.astype(np.uint64)))
         vertices, faces = _surface_of(solid.manifold ^ body)
         volume = _native.mesh_volume(vertices, faces) if len(faces) else 0.0

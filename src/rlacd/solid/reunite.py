@@ -27,6 +27,9 @@ CRUMBS = 5 * OVERLAP
 LOST = 4 * OVERLAP
 """The reunited solid's volume differs from that of its components by no more than a film of this thickness on them."""
 
+SHAVED = 1e-6
+"""Share of a component's volume that may have been dropped as shavings when it was cut."""
+
 GROWN, SOME = 1.3, 100
 """More faces than this multiple of the components', and some, are crumbs that were not found: they would pile up."""
 
@@ -43,6 +46,7 @@ def reunite(components: Sequence[Component]) -> Component | None:
     components : sequence of Component
         Pieces of one solid; those that touch do so face to face.
     """
+    components = _joined_again(components)
     if len(components) == 1:
         return components[0]
     united = Manifold.batch_boolean([_overlapping(i, components) for i in range(len(components))], OpType.Add)
@@ -61,6 +65,24 @@ def reunite(components: Sequence[Component]) -> Component | None:
         return None
     # Less volume may be a fold less, or a piece that a boolean has lost.
     return whole if abs(whole.volume - volume) <= LOST * area or _holds(whole, components) else None
+
+
+def _joined_again(components: Sequence[Component]) -> list[Component]:
+    """Put what was cut from a component in its place, where all of it is there: no boolean is as quick or as clean."""
+    found = list(components)
+    while True:
+        siblings: dict[Component, list[Component]] = {}
+        for component in found:
+            if isinstance(component.within, Component):
+                siblings.setdefault(component.within, []).append(component)
+        whole = [
+            origin
+            for origin, pieces in siblings.items()
+            if sum(piece.volume for piece in pieces) >= (1 - SHAVED) * origin.volume
+        ]
+        if not whole:
+            return found
+        found = [component for component in found if component.within not in whole] + whole
 
 
 def touch(first: Part, second: Part) -> bool:
