@@ -162,6 +162,45 @@ def test_the_same_bytes_for_any_number_of_threads(tmp_path: Path) -> None:
     assert (tmp_path / "1.csv").read_bytes() == (tmp_path / "3.csv").read_bytes()
 
 
+def bumpy_ball() -> trimesh.Trimesh:
+    ball = trimesh.creation.icosphere(3)
+    x, y = ball.vertices[:, :1], ball.vertices[:, 1:2]
+    ball.vertices *= 1 + 0.35 * np.sin(5 * x) * np.cos(4 * y)
+    return ball
+
+
+def test_one_pass_does_without_parts_that_others_can_hold_together() -> None:
+    """A policy that stands for a published method does not: the same cuts, merged, are more hulls."""
+    space, mesh = rlacd.NavigableSpace(0.1, 0.02), bumpy_ball()
+    divided = [rlacd.decompose(mesh, criterion=space, quality="fast", threads=threads) for threads in (1, 3)]
+    merged = rlacd.decompose(mesh, criterion=space, quality="fast", policy="greedy-excess-norm+edges")
+    assert len(divided[0]) < len(merged)
+    assert intrusion(divided[0]) < 1e-6
+    assert divided[0].report["hausdorff"]["under"] < 5e-3
+    for one, other in zip(*divided, strict=True):
+        assert one.vertices.tobytes() == other.vertices.tobytes()
+    assert "search" in divided[0].report["seconds"]
+    assert "search" not in merged.report["seconds"]
+
+
+def test_balanced_is_not_worse_than_one_pass_where_balls_decide() -> None:
+    space = rlacd.NavigableSpace(0.05, 0.01)
+    for mesh in (bumpy_ball(), house(door=0.5)):
+        fast, balanced = (rlacd.decompose(mesh, criterion=space, quality=name) for name in ("fast", "balanced"))
+        assert len(balanced) <= len(fast)
+
+
+def test_time_that_runs_out_while_parts_are_divided_leaves_valid_hulls() -> None:
+    def stop(progress: rlacd.Progress) -> bool:
+        return progress.stage != "search"
+
+    space = rlacd.NavigableSpace(0.1, 0.02)
+    result = rlacd.decompose(bumpy_ball(), criterion=space, quality="fast", progress=stop)
+    assert result.report["stopped_by"] == "cancel"
+    assert any("those found so far are valid" in warning for warning in result.report["warnings"])
+    assert intrusion(result) < 1e-6
+
+
 def run(*words: object) -> Result:
     return CliRunner().invoke(app, [str(word) for word in words])
 

@@ -19,10 +19,10 @@ from rlacd.errors import OptionError
 from rlacd.finish import drop_slivers, in_input, limit_part, merge_parts, merge_to_count, with_limits
 from rlacd.options import CONCAVITY, DEFAULT_RESOLUTION, DEFAULT_THRESHOLD, Options
 from rlacd.planes.views import Views
-from rlacd.policies import make_policy
+from rlacd.policies import AS_PUBLISHED, make_policy
 from rlacd.progress import ProgressCallback
 from rlacd.report import make_report
-from rlacd.search import level, search
+from rlacd.search import do_without, level, search
 from rlacd.solid.component import Component, Part
 from rlacd.solid.load import load_mesh
 from rlacd.solid.repair import repair
@@ -91,9 +91,10 @@ def decompose(
     timeout : float, optional
         Seconds after which the decomposition reached so far is returned.
     quality : str, optional
-        ``fast``: one pass of cuts. ``balanced``, the default where parts are merged: the best of several passes, then
-        a short search for fewer parts. ``best``: the same, and a long one. Each level is never worse than the one
-        before it: fewer hulls, or as many with less volume.
+        ``fast``: one pass of cuts; on navigable space, parts that can be divided among others go then, unless the
+        policy stands for a published method (``navacd``, ``greedy-SCORE``). ``balanced``, the default where parts are
+        merged: the best of several passes, then a short search for fewer parts. ``best``: the same, and a long one.
+        Each level is never worse than the one before it: fewer hulls, or as many with less volume.
     budget : float, optional
         Seconds the search may take instead, whatever is found until then; what that is depends on the machine. ``best``
         has 5, and more where ``balanced`` takes longer.
@@ -159,6 +160,10 @@ def decompose(
         views = Views()
         tree = CutTree(root, make_policy(options.policy, views, _scale(goal)), workers)
         parts, goal = _parts(tree, goal, options, workers, clock)
+        may_be_divided = options.merge and goal.obstacles is not None and options.policy not in AS_PUBLISHED
+        if may_be_divided and clock.stopped_by is None:
+            with clock.stage("search"):
+                parts = do_without(root, parts, goal, workers, clock, options.seed)
         found = None
         assert options.quality is not None
         if options.quality != "fast" and clock.stopped_by is None:

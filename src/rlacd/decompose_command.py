@@ -303,7 +303,7 @@ def decompose(
         Quality | None,
         typer.Option(
             rich_help_panel=METHOD,
-            help="How long to search for fewer hulls: fast not at all, balanced about a second, best until --budget "
+            help="How long to search for fewer hulls: fast hardly, balanced about a second, best until --budget "
             "ends. [dim]\\[default: balanced; fast with --no-merge][/dim]",
             show_default=False,
         ),

@@ -8,13 +8,14 @@ from rlacd.policies.qpolicy import QPolicy
 
 EDGES = "+edges"
 
-POLICIES = (
-    "greedy",
+AS_PUBLISHED = (
     *(f"greedy-{score}" for score in SCORES),
     *(f"greedy-{score}{EDGES}" for score in SCORES),
     "navacd",
-    "learned",
 )
+"""Policies of published methods, for comparison: one pass is cuts and merging, and nothing else."""
+
+POLICIES = ("greedy", *AS_PUBLISHED, "learned")
 """Names that `make_policy` knows."""
 
 WEIGHTS_ENDING = ".onnx"
@@ -71,4 +72,4 @@ def make_policy(name: str, views: Views | None = None, scale: float | None = Non
     raise KeyError(name)
 
 
-__all__ = ["POLICIES", "Greedy", "NavACD", "Policy", "is_policy", "make_policy"]
+__all__ = ["AS_PUBLISHED", "POLICIES", "Greedy", "NavACD", "Policy", "is_policy", "make_policy"]

@@ -190,6 +190,18 @@ def search(
     return outcome.parts, account
 
 
+def do_without(
+    root: Component, parts: Sequence[Part], criterion: Criterion, workers: Workers, clock: Clock, seed: int
+) -> list[Part]:
+    """Try once to do without each part of a solid, by dividing it among those around; the same parts where that fails.
+
+    All the search there is in one pass, and only where it is quick: where hulls are held against balls.
+    """
+    state = Neighbourhood(root, parts, criterion, (), Views(), workers, seed)
+    state.dissolve_all(Pace(clock, None, len(parts)))
+    return state.parts
+
+
 def _seconds_of_a_pass(clock: Clock) -> float:
     return clock.seconds.get("cut", 0.0) + clock.seconds.get("merge", 0.0)
 

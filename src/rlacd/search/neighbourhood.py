@@ -124,12 +124,12 @@ class Neighbourhood:
             with pace.share(OPENING_SHARE):
                 self._walk(pace, min(most, OPENING), enough)
             for _ in range(ROUNDS):
-                self._dissolve_all(pace, enough)
+                self.dissolve_all(pace, enough)
         pace.hurry()
         exhausted = len(self._here.parts) == 1
         while not exhausted and self._steps < most and len(self._here.parts) > enough and not pace.is_over:
             exhausted = self._walk(pace, min(most, self._steps + STEPS_PER_PART * len(self._here.parts)), enough)
-            self._dissolve_all(pace, enough)
+            self.dissolve_all(pace, enough)
         return Outcome(self._best, self._steps, self._accepted, exhausted)
 
     def _walk(self, pace: Pace, most: float, enough: int) -> bool:
@@ -146,8 +146,8 @@ class Neighbourhood:
             pace.steps += len(batch)
         return True
 
-    def _dissolve_all(self, pace: Pace, enough: int) -> None:
-        """Try to do without each part, the smallest first."""
+    def dissolve_all(self, pace: Pace, enough: int = 1) -> None:
+        """Try to do without each part, the smallest first, as long as there are more than `enough`."""
         here = self._here
         waiting = sorted(here.parts, key=lambda i: (here.parts[i].hull.volume, i))
         while waiting and len(here.parts) > enough and pace.step(self._steps, None, len(here.parts)):
