@@ -76,6 +76,8 @@ inline void subtract(std::vector<Polygon>& polygons, const std::vector<HalfSpace
     cut_off.clear();
     rest = polygon;
     for (const HalfSpace& half : convex) {
+      const auto is_inside = [&half](Vec3 p) { return dot(half.normal, p) - half.offset <= kOnPlane; };
+      if (std::all_of(rest.begin(), rest.end(), is_inside)) continue;
       split(rest, half, inside, outside);
       rest.swap(inside);
       if (rest.empty()) break;

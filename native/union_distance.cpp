@@ -1,5 +1,7 @@
 #include "union_distance.hpp"
 
+#include <unordered_map>
+
 #include "clip.hpp"
 #include "surface_field.hpp"
 
@@ -39,11 +41,52 @@ double distance2_to_box(const Box& box, Vec3 p) {
   return sum;
 }
 
-void append(Mesh& mesh, const Polygon& polygon) {
-  const auto first = static_cast<std::int32_t>(mesh.vertices.size());
-  mesh.vertices.insert(mesh.vertices.end(), polygon.begin(), polygon.end());
-  for (std::int32_t i = 2; i < static_cast<std::int32_t>(polygon.size()); ++i)
-    mesh.faces.push_back({first, first + i - 1, first + i});
+// Polygons in one mesh, in which equal corners are one vertex: its distance is asked once.
+class Gathering {
+ public:
+  void add(const Polygon& polygon) {
+    corner_.clear();
+    for (const Vec3 p : polygon) corner_.push_back(number_of(p));
+    for (std::size_t i = 2; i < corner_.size(); ++i) mesh_.faces.push_back({corner_[0], corner_[i - 1], corner_[i]});
+  }
+  Mesh take() { return std::move(mesh_); }
+
+ private:
+  using Key = std::array<double, 3>;
+  struct Hash {
+    std::size_t operator()(const Key& p) const {
+      std::size_t all = 0;
+      for (const double x : p) all = (all ^ std::hash<double>()(x)) * 0x9e3779b97f4a7c15u;
+      return all;
+    }
+  };
+
+  std::int32_t number_of(Vec3 p) {
+    const auto next = static_cast<std::int32_t>(mesh_.vertices.size());
+    const auto [place, is_new] = number_.try_emplace(Key{p.x, p.y, p.z}, next);
+    if (is_new) mesh_.vertices.push_back(p);
+    return place->second;
+  }
+
+  Mesh mesh_;
+  std::unordered_map<Key, std::int32_t, Hash> number_;
+  std::vector<std::int32_t> corner_;
+};
+
+// Whether three ascending lists have a number in common.
+bool have_common(const std::vector<std::int32_t>& a, const std::vector<std::int32_t>& b,
+                 const std::vector<std::int32_t>& c) {
+  return std::any_of(a.begin(), a.end(), [&](std::int32_t i) {
+    return std::binary_search(b.begin(), b.end(), i) && std::binary_search(c.begin(), c.end(), i);
+  });
+}
+
+// Whether a triangle lies farther than `gap` beyond one of the planes.
+bool is_beyond(const ConvexPlanes& planes, const Corners& corner, double gap) {
+  for (std::int32_t i = 0; i < static_cast<std::int32_t>(planes.size()); ++i)
+    if (planes.depth(i, corner[0]) < -gap && planes.depth(i, corner[1]) < -gap && planes.depth(i, corner[2]) < -gap)
+      return true;
+  return false;
 }
 
 }  // namespace
@@ -117,6 +160,7 @@ HullUnion::Exposed HullUnion::exposed(double gap, int threads) const {
       // covered. Where it faces the same way, the hull is shrunk by less than that: of two facets in one plane neither
       // covers the other, and of two hulls on both sides of a plane across this facet one always covers it.
       const ConvexPlanes& planes = members_[m]->planes;
+      if (is_beyond(planes, facet.corner, gap)) continue;
       halves.clear();
       for (std::int32_t i = 0; i < static_cast<std::int32_t>(planes.size()); ++i) {
         const bool same_way = dot(planes.normal(i), normal) >= kSameWay;
@@ -130,10 +174,10 @@ HullUnion::Exposed HullUnion::exposed(double gap, int threads) const {
     }
   });
 
-  Exposed result;
+  Gathering resolved, unresolved;
   for (const Facet& facet : facets)
-    for (const Polygon& piece : facet.pieces) append(facet.resolved ? result.exposed : result.unresolved, piece);
-  return result;
+    for (const Polygon& piece : facet.pieces) (facet.resolved ? resolved : unresolved).add(piece);
+  return {resolved.take(), unresolved.take()};
 }
 
 Interval HullUnion::over(const Bvh& surface, double tolerance, double gap, int threads) const {
@@ -153,39 +197,37 @@ Interval HullUnion::under(const Mesh& surface, double tolerance, int threads) co
     for (std::int32_t i = 0; i < static_cast<std::int32_t>(members_[m]->planes.size()); ++i)
       grown[m].push_back({members_[m]->planes.normal(i), members_[m]->planes.offset(i) + kInsideSlack});
 
-  std::vector<std::vector<Polygon>> outside(surface.faces.size());
   constexpr std::size_t kChunk = 64;
-  const std::size_t count = surface.faces.size();
-  parallel_for((count + kChunk - 1) / kChunk, threads, [&](std::size_t chunk) {
-    std::vector<std::size_t> near;
-    std::size_t last = members_.size();  // the hull that covered the face before this one
-    for (std::size_t f = chunk * kChunk; f < std::min(count, (chunk + 1) * kChunk); ++f) {
-      const Corners corner = corners_of(surface, surface.faces[f]);
-      const Box box = box_of(corner);
-      const auto is_covered_by = [&](std::size_t m) {
-        return overlap(box, members_[m]->box, kInsideSlack) && std::all_of(corner.begin(), corner.end(), [&](Vec3 p) {
-                 return members_[m]->planes.nearest(p).depth >= -kInsideSlack;
-               });
-      };
-      if (last < members_.size() && is_covered_by(last)) continue;
-      last = 0;
-      while (last < members_.size() && !is_covered_by(last)) ++last;
-      if (last < members_.size()) continue;
-      near.clear();
-      for (std::size_t m = 0; m < members_.size(); ++m)
-        if (overlap(box, members_[m]->box, kInsideSlack)) near.push_back(m);
-      outside[f] = {{corner.begin(), corner.end()}};
-      for (const std::size_t m : near) {
-        if (outside[f].size() > kMostPieces) break;  // uncut pieces are in no way wrong here, only more work
-        subtract(outside[f], grown[m]);
-      }
+  const auto for_each = [threads](std::size_t count, const auto& task) {
+    parallel_for((count + kChunk - 1) / kChunk, threads, [&](std::size_t chunk) {
+      for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) task(i);
+    });
+  };
+  std::vector<std::vector<std::int32_t>> holders(surface.vertices.size());  // the hulls that a corner is in
+  for_each(holders.size(), [&](std::size_t v) {
+    const Vec3 p = surface.vertices[v];
+    for (std::size_t m = 0; m < members_.size(); ++m)
+      if (overlap({p, p}, members_[m]->box, kInsideSlack) && members_[m]->planes.nearest(p).depth >= -kInsideSlack)
+        holders[v].push_back(static_cast<std::int32_t>(m));
+  });
+  std::vector<std::vector<Polygon>> outside(surface.faces.size());
+  for_each(outside.size(), [&](std::size_t f) {
+    const auto [a, b, c] = surface.faces[f];
+    if (have_common(holders[a], holders[b], holders[c])) return;
+    const Corners corner = corners_of(surface, surface.faces[f]);
+    const Box box = box_of(corner);
+    outside[f] = {{corner.begin(), corner.end()}};
+    for (std::size_t m = 0; m < members_.size(); ++m) {
+      if (!overlap(box, members_[m]->box, kInsideSlack)) continue;
+      if (outside[f].size() > kMostPieces) break;  // uncut pieces are in no way wrong here, only more work
+      subtract(outside[f], grown[m]);
     }
   });
 
-  Mesh left;
+  Gathering left;
   for (const std::vector<Polygon>& polygons : outside)
-    for (const Polygon& polygon : polygons) append(left, polygon);
-  return maximize_in_waves(HullField(*this), left, tolerance, threads);
+    for (const Polygon& polygon : polygons) left.add(polygon);
+  return maximize_in_waves(HullField(*this), left.take(), tolerance, threads);
 }
 
 }  // namespace rlacd
