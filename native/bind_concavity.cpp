@@ -1,7 +1,11 @@
 // Python bindings of the concavity of a part.
+#include <nanobind/stl/vector.h>
+
 #include "arrays.hpp"
 #include "concavity.hpp"
 #include "filling.hpp"
+#include "hull.hpp"
+#include "parallel.hpp"
 
 namespace rlacd {
 
@@ -59,6 +63,36 @@ void bind_concavity(nb::module_& m) {
           nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("threshold"),
           "Whether the surfaces of a hull and of the solid's share of it may be as near as the threshold.\n\n"
           "0: they may; 1: they are not; 2: nor are those of any hull that holds this one.")
+      .def(
+          "joint_chances",
+          [](const Filling& self, const std::vector<PointsIn>& groups,
+             const nb::ndarray<const std::int32_t, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>& pairs,
+             double threshold, int threads) {
+            std::vector<std::vector<Vec3>> corners;
+            for (const PointsIn& group : groups) corners.push_back(to_points(group));
+            const std::vector<std::int32_t> pair(pairs.data(), pairs.data() + pairs.size());
+            for (const std::int32_t g : pair)
+              if (g < 0 || g >= static_cast<std::int64_t>(groups.size()))
+                throw std::invalid_argument("pair out of range");
+            std::vector<double> volumes(pairs.shape(0));
+            std::vector<std::int32_t> chances(pairs.shape(0));
+            {
+              nb::gil_scoped_release release;
+              parallel_for(volumes.size(), resolve_threads(threads), [&](std::size_t i) {
+                std::vector<Vec3> both = corners[pair[2 * i]];
+                const std::vector<Vec3>& other = corners[pair[2 * i + 1]];
+                both.insert(both.end(), other.begin(), other.end());
+                const Mesh hull = hull_mesh(both);
+                volumes[i] = mesh_volume(hull.vertices, hull.faces);
+                chances[i] = static_cast<std::int32_t>(self.chance(hull, threshold));
+              });
+            }
+            return nb::make_tuple(to_array<double>(std::move(volumes)), to_array<std::int32_t>(std::move(chances)));
+          },
+          nb::arg("groups"), nb::arg("pairs"), nb::arg("threshold"), nb::arg("threads") = 0,
+          "Volumes [P] of the joint hulls of pairs [P, 2] of hulls, given by their corners, a list of arrays [N, 3], "
+          "and\n"
+          "the `chance` [P] of each.")
       .def(
           "comes_deeper",
           [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces, double threshold) {

@@ -367,6 +367,15 @@ Hull convex_hull(const std::vector<Vec3>& points) {
   return hull;
 }
 
+Mesh hull_mesh(const std::vector<Vec3>& points) {
+  const Hull hull = convex_hull(points);
+  Mesh mesh;
+  mesh.vertices.reserve(hull.indices.size());
+  for (const std::int32_t i : hull.indices) mesh.vertices.push_back(points[i]);
+  mesh.faces = hull.faces;
+  return mesh;
+}
+
 double mesh_volume(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
   if (faces.empty()) return 0;
   const Vec3 apex = vertices[faces[0][0]];

@@ -88,6 +88,9 @@ struct Hull {
 // The hull with every corner an extreme point: points inside a facet or an edge are left out.
 Hull convex_hull(const std::vector<Vec3>& points);
 
+// The same as a mesh; empty where the points lie in a plane.
+Mesh hull_mesh(const std::vector<Vec3>& points);
+
 double mesh_volume(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces);
 double mesh_area(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces);
 

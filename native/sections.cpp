@@ -132,7 +132,8 @@ void Sections::project() {
 std::int32_t Sections::first_above(double height) const {
   if (offsets_.empty()) return 0;
   const auto planes = static_cast<std::int32_t>(offsets_.size());
-  const double share = (height - offsets_.front()) / (offsets_.back() - offsets_.front());
+  const double width = offsets_.back() - offsets_.front();
+  const double share = width > 0 ? (height - offsets_.front()) / width : 0;
   auto j = share > 0 ? share < 1 ? static_cast<std::int32_t>(share * (planes - 1)) + 1 : planes : 0;
   while (j < planes && offsets_[j] <= height) ++j;
   while (j > 0 && offsets_[j - 1] > height) --j;

@@ -85,14 +85,6 @@ class Whitening {
 
 double volume_of(const Mesh& mesh) { return mesh_volume(mesh.vertices, mesh.faces); }
 
-Mesh hull_mesh(const std::vector<Vec3>& points) {
-  const Hull hull = convex_hull(points);
-  Mesh mesh;
-  for (const std::int32_t i : hull.indices) mesh.vertices.push_back(points[i]);
-  mesh.faces = hull.faces;
-  return mesh;
-}
-
 // The corners of the intersection of half-spaces n . x <= h that all hold the origin inside: facets of the hull of n /
 // h.
 std::vector<Vec3> corners_of_intersection(const std::vector<Above>& planes) {

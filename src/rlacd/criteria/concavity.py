@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from rlacd import _native
 from rlacd.criteria.criterion import Account, Chance, Part
 from rlacd.errors import OptionError
+from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.hull import Hull
 
 VOLUME_WEIGHT = 0.3
@@ -102,6 +103,12 @@ class Concavity:
     def chance(self, filling: _native.Filling, hull: Hull) -> Chance:
         """Look at the solid's corners and at points of the hull."""
         return Chance(filling.chance(hull.vertices, hull.faces, self.threshold))
+
+    def chances(
+        self, filling: _native.Filling, hulls: Sequence[Hull], pairs: IntArray, threads: int
+    ) -> tuple[FloatArray, IntArray]:
+        """Look at the solid's corners and at points of the joint hulls."""
+        return filling.joint_chances([hull.vertices for hull in hulls], pairs, self.threshold, threads)
 
     def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
         """Whether the solid's surface comes deeper inside the hull than the threshold."""

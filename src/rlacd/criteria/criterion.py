@@ -86,6 +86,11 @@ class Criterion(Protocol):
     def chance(self, filling: _native.Filling, hull: Hull) -> Chance:
         """Tell cheaply whether what a solid fills of a hull may meet the criterion."""
 
+    def chances(
+        self, filling: _native.Filling, hulls: Sequence[Hull], pairs: IntArray, threads: int
+    ) -> tuple[FloatArray, IntArray]:
+        """Volumes [P] of the joint hulls of pairs [P, 2] of hulls, and the `chance` [P] of each."""
+
     def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
         """Whether what a solid fills of a hull, and of any that holds it, does not meet it: cheaper than `chance`.
 

@@ -248,6 +248,12 @@ class Navigable:
         """None: what is inside a hull does not count, and hulls of pairs have been tried."""
         return Chance.NEVER
 
+    def chances(
+        self, filling: _native.Filling, hulls: Sequence[Hull], pairs: IntArray, threads: int
+    ) -> tuple[FloatArray, IntArray]:
+        """None, and no volumes: they are not asked for."""
+        return np.zeros(len(pairs)), np.full(len(pairs), int(Chance.NEVER), dtype=np.int32)
+
     def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
         """Not known: balls are asked of parts, not of hulls."""
         return False

@@ -10,6 +10,7 @@ from rlacd.criteria import Criterion
 from rlacd.criteria.criterion import Account, Chance
 from rlacd.criteria.criterion import Part as PartLike
 from rlacd.finish.limits import limit_hull
+from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.balls import Balls
 from rlacd.solid.component import Part
 from rlacd.solid.hull import Hull
@@ -51,6 +52,12 @@ class Limited:
     def chance(self, filling: _native.Filling, hull: Hull) -> Chance:
         """The underlying criterion's: limited hulls are larger."""
         return self.criterion.chance(filling, hull)
+
+    def chances(
+        self, filling: _native.Filling, hulls: Sequence[Hull], pairs: IntArray, threads: int
+    ) -> tuple[FloatArray, IntArray]:
+        """The underlying criterion's: limited hulls are larger."""
+        return self.criterion.chances(filling, hulls, pairs, threads)
 
     def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
         """The underlying criterion's: limited hulls are larger."""

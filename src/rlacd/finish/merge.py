@@ -12,13 +12,17 @@ import numpy as np
 from rlacd import _native
 from rlacd.clock import Clock
 from rlacd.criteria.criterion import Chance, Criterion
-from rlacd.solid.arrays import BoolArray, FloatArray
+from rlacd.solid.arrays import BoolArray, FloatArray, IntArray
 from rlacd.solid.component import LOST, Component, Part, Share
 from rlacd.solid.hull import Hull
 from rlacd.workers import Workers
 
 FEW = 100
 """Among so many parts every pair may be united across what lies between; among more, those that a third is near to."""
+
+
+AT_ONCE = 512
+"""The clock is asked before so many pairs are held against the solid."""
 
 
 class _Pair(NamedTuple):
@@ -63,14 +67,14 @@ def merge_parts(
     waiting = {id(part) for part in beside}
     new = [part for part in alive if id(part) not in waiting]
     old = [part for part in alive if id(part) in waiting]
-    return _unite_pairs([*new, *old], len(new), _Bridged(criterion, workers, solid), workers, clock)
+    return _unite_pairs([*new, *old], len(new), _Bridged(criterion, workers, clock, solid), workers, clock)
 
 
 class _Pairing(Protocol):
     """Which pairs of parts may become one, and how that is found out."""
 
-    def pairs(self, alive: Mapping[int, Part], new: Sequence[int]) -> list[_Pair]:
-        """Pairs of a new part with any other that may be united, and their costs."""
+    def pairs(self, alive: Mapping[int, Part], new: Sequence[int]) -> tuple[list[_Pair], list[tuple[int, int]]]:
+        """Pairs of a new part with any other that may be united, and their costs; and pairs that can never be."""
 
     def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
         """Their union if it meets the criterion; otherwise None, and whether no larger union will either."""
@@ -80,9 +84,16 @@ def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, workers: Wo
     """Unite pairs, of which one at least is among the first `new` parts or made of them."""
     alive: dict[int, Part] = dict(enumerate(parts))
     origin = {i: i for i in alive}
-    queue = pairing.pairs(alive, range(new))
-    heapq.heapify(queue)
     refused: dict[int, set[int]] = {i: set() for i in alive}  # whom a part, or a piece of it, can never be united with
+
+    def refuse(first: int, second: int) -> None:
+        refused[first].add(second)
+        refused[second].add(first)
+
+    queue, never = pairing.pairs(alive, range(new))
+    heapq.heapify(queue)
+    for first, second in never:
+        refuse(first, second)
     verdicts: dict[_Pair, tuple[Part | None, bool]] = {}  # on pairs that are back in the queue
     count = newest = len(alive)
     while queue and clock.step(count - len(alive), None, len(alive)):
@@ -95,8 +106,7 @@ def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, workers: Wo
             union, for_good = verdicts.pop(pair)
             if union is None:
                 if for_good:
-                    refused[pair.first].add(pair.second)
-                    refused[pair.second].add(pair.first)
+                    refuse(pair.first, pair.second)
                 continue
             origin[newest] = min(origin[pair.first], origin[pair.second])
             del alive[pair.first], alive[pair.second]
@@ -105,7 +115,10 @@ def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, workers: Wo
             for i in refused[newest] & alive.keys():
                 refused[i].add(newest)
             asked = {i: part for i, part in alive.items() if i not in refused[newest]}
-            for other in [*batch[taken:], *pairing.pairs(asked, [newest])]:
+            found, never = pairing.pairs(asked, [newest])
+            for first, second in never:
+                refuse(first, second)
+            for other in [*batch[taken:], *found]:
                 heapq.heappush(queue, other)
             newest += 1
             break
@@ -129,14 +142,15 @@ class _Adjoining:
     criterion: Criterion
     workers: Workers
 
-    def pairs(self, alive: Mapping[int, Part], new: Sequence[int]) -> list[_Pair]:
+    def pairs(self, alive: Mapping[int, Part], new: Sequence[int]) -> tuple[list[_Pair], list[tuple[int, int]]]:
         """Those that the volume bound allows."""
         filled = self.criterion.filled
-        return [
+        found = [
             _Pair(hull_volume - (filled(alive[first]) + filled(alive[second])), first, second)
             for first, second, volume, hull_volume in neighbours(alive, new, self.criterion.reach, self.workers)
             if not self.criterion.excludes(volume, hull_volume)
         ]
+        return found, []
 
     def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
         """Glue them."""
@@ -150,24 +164,32 @@ class _Bridged:
 
     criterion: Criterion
     workers: Workers
+    clock: Clock
     solid: Component
 
-    def pairs(self, alive: Mapping[int, Part], new: Sequence[int]) -> list[_Pair]:
-        """All of them: how much the solid fills is not known yet."""
+    def pairs(self, alive: Mapping[int, Part], new: Sequence[int]) -> tuple[list[_Pair], list[tuple[int, int]]]:
+        """Those with a chance: how much the solid fills is not known yet."""
         filled = self.criterion.filled
         reach = np.inf if len(alive) <= FEW else self.criterion.reach
-        return [
-            _Pair(hull_volume - (filled(alive[first]) + filled(alive[second])), first, second)
-            for first, second, _, hull_volume in neighbours(alive, new, reach, self.workers, across=True)
-        ]
+        ids, pairs = _near_pairs(alive, new, reach, across=True)
+        hulls = [part.hull for part in alive.values()]
+        found: list[_Pair] = []
+        never: list[tuple[int, int]] = []
+        for some in np.split(pairs, range(AT_ONCE, len(pairs), AT_ONCE)):
+            if not self.clock.step(0, None, len(alive)):
+                break
+            volumes, chances = self.criterion.chances(self.solid.filling, hulls, some, self.workers.threads)
+            for (i, j), volume, chance in zip(some.tolist(), volumes.tolist(), chances.tolist(), strict=True):
+                first, second = ids[i], ids[j]
+                if chance == Chance.SOME:
+                    found.append(_Pair(volume - (filled(alive[first]) + filled(alive[second])), first, second))
+                elif chance == Chance.NEVER:
+                    never.append((first, second))
+        return found, never
 
     def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
         """Take the solid's share of the joint hull."""
-        hull = Hull.around(first.hull, second.hull)
-        chance = self.criterion.chance(self.solid.filling, hull)
-        if chance is not Chance.SOME:
-            return None, chance is Chance.NEVER
-        return _share(first, second, hull, self.criterion, self.solid), False
+        return _share(first, second, Hull.around(first.hull, second.hull), self.criterion, self.solid), False
 
 
 def unite(first: Part, second: Part, criterion: Criterion, solid: Component, hull: Hull | None = None) -> Part | None:
@@ -198,9 +220,22 @@ def _share(first: Part, second: Part, hull: Hull, criterion: Criterion, solid: C
 
 
 def neighbours(
-    alive: Mapping[int, Part], new: Sequence[int], reach: float, workers: Workers, across: bool = False
+    alive: Mapping[int, Part], new: Sequence[int], reach: float, workers: Workers
 ) -> list[tuple[int, int, float, float]]:
-    """Pairs of a new part with any other whose boxes lie within reach: (first, second, volume, joint hull's volume).
+    """Pairs of a new part with any other whose boxes lie within reach: (first, second, volume, joint hull's volume)."""
+    ids, pairs = _near_pairs(alive, new, reach)
+    parts = list(alive.values())
+    hulls = _native.joint_hull_volumes([part.hull.vertices for part in parts], pairs, workers.threads)
+    return [
+        (ids[i], ids[j], parts[i].volume + parts[j].volume, hull)
+        for (i, j), hull in zip(pairs.tolist(), hulls.tolist(), strict=True)
+    ]
+
+
+def _near_pairs(
+    alive: Mapping[int, Part], new: Sequence[int], reach: float, across: bool = False
+) -> tuple[list[int], IntArray]:
+    """The ids of all parts, and pairs [P, 2] of places among them: of a new part with any other within reach.
 
     With `across`, also pairs both of which are within reach of a third.
     """
@@ -215,13 +250,7 @@ def neighbours(
     k, other = np.nonzero(near)
     once = (rows[k] < other) | ~is_new[other]  # two new parts find each other twice
     pairs = np.sort(np.stack([rows[k], other], axis=1)[once], axis=1)
-    pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
-    corners = [part.hull.vertices for part in parts]
-    hulls = _native.joint_hull_volumes(corners, pairs.astype(np.int32), workers.threads)
-    return [
-        (ids[i], ids[j], parts[i].volume + parts[j].volume, hull)
-        for (i, j), hull in zip(pairs.tolist(), hulls.tolist(), strict=True)
-    ]
+    return ids, np.ascontiguousarray(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))], dtype=np.int32)
 
 
 def _near(some: FloatArray, boxes: FloatArray, reach: float) -> BoolArray:
