@@ -150,6 +150,31 @@ def test_a_quick_no_is_never_wrong(seed: int, threshold: float) -> None:
         assert Concavity(threshold * (1 - 1e-9)).chance(solid.filling, larger) is Chance.NEVER
 
 
+def test_all_pairs_in_one_go_are_the_pairs_one_by_one(workers: Workers) -> None:
+    root, parts = arms_and_beam(CROSS)
+    hulls = [part.hull for part in parts]
+    pairs = np.array([(i, j) for j in range(len(parts)) for i in range(j)], dtype=np.int32)
+    seen = set()
+    for criterion in (Concavity(0.02), Concavity(0.2), Concavity(0.6)):
+        for threads in (1, 3):
+            volumes, chances = criterion.chances(root.filling, hulls, pairs, threads)
+            for (i, j), volume, chance in zip(pairs, volumes, chances, strict=True):
+                joint = Hull.around(hulls[i], hulls[j])
+                assert volume == joint.volume
+                assert chance == criterion.chance(root.filling, joint)
+                seen.add(int(chance))
+    assert len(seen) > 1
+    with pytest.raises(ValueError, match="out of range"):
+        TIGHT.chances(root.filling, hulls, np.array([(0, len(hulls))], dtype=np.int32), 1)
+
+
+def test_time_may_run_out_before_pairs_are_looked_at(workers: Workers) -> None:
+    root, parts = arms_and_beam(CROSS)
+    late = Clock(timeout=-1.0)
+    assert len(merge_parts(parts, TIGHT, workers, late, solid=root)) == len(parts)
+    assert late.stopped_by == "timeout"
+
+
 def test_a_face_deep_in_a_hull_is_seen_without_its_corners() -> None:
     """A groove from end to end: its corners lie on the hull, its bottom deep inside; the hull is nowhere far away."""
     ends = [(-0.04, 0.0), (0.04, 0.0), (0.0, -0.3)]
