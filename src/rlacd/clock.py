@@ -31,7 +31,8 @@ class Clock:
         self._progress = progress
         self._start = time.perf_counter()
         self._stage = ""
-        self._parts = 0
+        self._done = self._parts = 0
+        self._total: int | None = None
         self._nothing_left_to_stop = False
 
     @contextmanager
@@ -52,7 +53,7 @@ class Clock:
 
     def step(self, done: int, total: int | None, parts: int) -> bool:
         """Report a step of the current stage; True when the work may go on."""
-        self._parts = parts
+        self._done, self._total, self._parts = done, total, parts
         if self.stopped_by is None:
             told_to_stop = (
                 self._progress is not None
@@ -67,6 +68,10 @@ class Clock:
             if self.stopped_by is not None:
                 self.stopped_in = self._stage
         return self.stopped_by is None
+
+    def goes_on(self) -> bool:
+        """Whether the work may go on, between two steps."""
+        return self.step(self._done, self._total, self._parts)
 
     def nothing_left_to_stop(self) -> None:
         """Say that the decomposition is reached: from here on the work is only written up, and cannot be incomplete."""

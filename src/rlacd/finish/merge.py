@@ -176,7 +176,7 @@ class _Bridged:
         found: list[_Pair] = []
         never: list[tuple[int, int]] = []
         for some in np.split(pairs, range(AT_ONCE, len(pairs), AT_ONCE)):
-            if not self.clock.step(0, None, len(alive)):
+            if not self.clock.goes_on():
                 break
             volumes, chances = self.criterion.chances(self.solid.filling, hulls, some, self.workers.threads)
             for (i, j), volume, chance in zip(some.tolist(), volumes.tolist(), chances.tolist(), strict=True):
