@@ -80,8 +80,8 @@ std::vector<double> least_hull_volumes(const Sections& sections, Side side) {
 class Direction {
  public:
   // Numbers are those of the bundle's planes among all candidates.
-  Direction(const SolidMesh& solid, const Bundle& bundle, const std::vector<std::ptrdiff_t>& numbers)
-      : sections_(solid, bundle.normal, section_offsets(solid, bundle)), slack_(kRounding * box_volume(solid.mesh)) {
+  Direction(const SolidMesh& mesh, const Bundle& bundle, const std::vector<std::ptrdiff_t>& numbers)
+      : sections_(mesh, bundle.normal, section_offsets(mesh, bundle)), slack_(kRounding * box_volume(mesh.mesh)) {
     sections_.drop_heights();
     for (std::size_t j = 0, i = 0; j < planes(); ++j)
       numbers_.push_back(i < numbers.size() && bundle.offsets[i] == sections_.offset(j) ? numbers[i++] : -1);
@@ -89,7 +89,7 @@ class Direction {
       least_[side].assign(planes(), 0);
       hulls_[side].resize(planes());
       const std::vector<double> volumes = least_hull_volumes(sections_, side);
-      for (std::size_t j = 0; j < planes(); ++j) raise(side, j, volumes[j] - this->solid(side, j) - slack_);
+      for (std::size_t j = 0; j < planes(); ++j) raise(side, j, volumes[j] - solid(side, j) - slack_);
     }
     measure_extents();
   }

@@ -111,12 +111,15 @@ def _largest_bite(
     part: Part, taker: Part, direction: FloatArray, criterion: Criterion, solid: Component
 ) -> tuple[Part, Part | None] | None:
     """Cut off as much as the taker can have: the taker with it, and the rest; None where that is hardly anything."""
-    heights = _corners(part) @ direction
+    corners = np.concatenate([member.hull.vertices for member in part.members])
+    heights = corners @ direction
     lower, upper = float(heights.min()), float(heights.max())
     offset = lower + FIRST * (upper - lower)
     best = None
     for _ in range(1 + HALVINGS):
-        bite = _bite(part, taker, direction, offset, criterion, solid)
+        bite = None
+        if not _is_too_much(corners[heights <= offset], taker, criterion, solid):
+            bite = _bite(part, taker, direction, offset, criterion, solid)
         if bite is not None:
             lower, best = offset, bite
         elif best is None:
@@ -133,8 +136,6 @@ def _bite(
     part: Part, taker: Part, direction: FloatArray, offset: float, criterion: Criterion, solid: Component
 ) -> tuple[Part, Part | None, float] | None:
     """The taker with what lies below a plane, the rest, and the volume given; None where one of them must not be."""
-    if _is_too_much(part, taker, direction, offset, criterion, solid):
-        return None
     below, above = _divided(part.members, direction, offset)
     if not below:
         return taker, part, 0.0
@@ -145,17 +146,10 @@ def _bite(
     return grown, left, sum(piece.volume for piece in below)
 
 
-def _is_too_much(
-    part: Part, taker: Part, direction: FloatArray, offset: float, criterion: Criterion, solid: Component
-) -> bool:
-    """Whether the taker cannot even have the part's corners below a plane: that is known without cutting."""
-    corners = _corners(part)
-    hull = Hull.of(np.concatenate([taker.hull.vertices, corners[corners @ direction <= offset]]))
+def _is_too_much(corners: FloatArray, taker: Part, criterion: Criterion, solid: Component) -> bool:
+    """Whether the taker cannot even have some corners [N, 3] of what would be cut off: known without cutting."""
+    hull = Hull.of(np.concatenate([taker.hull.vertices, corners]))
     return hull is not None and criterion.forbids(solid.filling, hull)
-
-
-def _corners(part: Part) -> FloatArray:
-    return np.concatenate([member.hull.vertices for member in part.members])
 
 
 def _whole(pieces: Sequence[Component], criterion: Criterion, solid: Component) -> Part | None:

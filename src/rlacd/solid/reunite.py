@@ -13,7 +13,7 @@ from manifold3d import Manifold, OpType
 
 from rlacd import _native
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.component import Component, Part, Share
+from rlacd.solid.component import LOST, Component, Part, Share
 
 TOUCHING = 1e-8
 """Distance at which faces count as touching (see native/glue.hpp)."""
@@ -24,11 +24,8 @@ OVERLAP = 2e-9
 CRUMBS = 5 * OVERLAP
 """Edges shorter than this are what overlapping has left; they go again, so that triangles do not pile up."""
 
-LOST = 4 * OVERLAP
+FILM = 4 * OVERLAP
 """The reunited solid's volume differs from that of its components by no more than a film of this thickness on them."""
-
-SHAVED = 1e-6
-"""Share of a component's volume that may have been dropped as shavings when it was cut."""
 
 GROWN, SOME = 1.3, 100
 """More faces than this multiple of the components', and some, are crumbs that were not found: they would pile up."""
@@ -55,7 +52,7 @@ def reunite(components: Sequence[Component]) -> Component | None:
     if united.is_empty() or abs(united.volume() - volume) > FOLDED * volume:
         return None
     clean = united.as_original().simplify(CRUMBS)
-    if abs(clean.volume() - united.volume()) <= LOST * area:
+    if abs(clean.volume() - united.volume()) <= FILM * area:
         united = clean
     try:
         whole = Component(united)
@@ -64,7 +61,7 @@ def reunite(components: Sequence[Component]) -> Component | None:
     if len(whole.faces) > GROWN * sum(len(component.faces) for component in components) + SOME:
         return None
     # Less volume may be a fold less, or a piece that a boolean has lost.
-    return whole if abs(whole.volume - volume) <= LOST * area or _holds(whole, components) else None
+    return whole if abs(whole.volume - volume) <= FILM * area or _holds(whole, components) else None
 
 
 def _joined_again(components: Sequence[Component]) -> list[Component]:
@@ -78,7 +75,7 @@ def _joined_again(components: Sequence[Component]) -> list[Component]:
         whole = [
             origin
             for origin, pieces in siblings.items()
-            if sum(piece.volume for piece in pieces) >= (1 - SHAVED) * origin.volume
+            if sum(piece.volume for piece in pieces) >= (1 - LOST) * origin.volume
         ]
         if not whole:
             return found
