@@ -4,7 +4,6 @@
 #include "arrays.hpp"
 #include "concavity.hpp"
 #include "filling.hpp"
-#include "hull.hpp"
 #include "parallel.hpp"
 
 namespace rlacd {
@@ -79,12 +78,10 @@ void bind_concavity(nb::module_& m) {
             {
               nb::gil_scoped_release release;
               parallel_for(volumes.size(), resolve_threads(threads), [&](std::size_t i) {
-                std::vector<Vec3> both = corners[pair[2 * i]];
-                const std::vector<Vec3>& other = corners[pair[2 * i + 1]];
-                both.insert(both.end(), other.begin(), other.end());
-                const Mesh hull = hull_mesh(both);
-                volumes[i] = mesh_volume(hull.vertices, hull.faces);
-                chances[i] = static_cast<std::int32_t>(self.chance(hull, threshold));
+                const Filling::Joint joint =
+                    self.joint_chance(corners[pair[2 * i]], corners[pair[2 * i + 1]], threshold);
+                volumes[i] = joint.volume;
+                chances[i] = static_cast<std::int32_t>(joint.chance);
               });
             }
             return nb::make_tuple(to_array<double>(std::move(volumes)), to_array<std::int32_t>(std::move(chances)));
@@ -92,7 +89,7 @@ void bind_concavity(nb::module_& m) {
           nb::arg("groups"), nb::arg("pairs"), nb::arg("threshold"), nb::arg("threads") = 0,
           "Volumes [P] of the joint hulls of pairs [P, 2] of hulls, given by their corners, a list of arrays [N, 3], "
           "and\n"
-          "the `chance` [P] of each.")
+          "the `chance` [P] of each, where the hulls themselves are close enough to their shares of the solid.")
       .def(
           "comes_deeper",
           [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces, double threshold) {

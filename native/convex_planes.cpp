@@ -77,4 +77,16 @@ ConvexPlanes::Nearest ConvexPlanes::nearest(Vec3 p) const {
   return best;
 }
 
+std::int32_t ConvexPlanes::first_within(Vec3 p, double t) const {
+  for (std::size_t start = 0; start < h_.size(); start += kBlock) {
+    bool is_within = false;
+    for (std::size_t i = start; i < start + kBlock; ++i)
+      is_within |= h_[i] - (x_[i] * p.x + y_[i] * p.y + z_[i] * p.z) <= t;
+    if (!is_within) continue;
+    for (std::size_t i = start; i < start + kBlock; ++i)
+      if (h_[i] - (x_[i] * p.x + y_[i] * p.y + z_[i] * p.z) <= t) return static_cast<std::int32_t>(i);
+  }
+  return -1;
+}
+
 }  // namespace rlacd

@@ -32,6 +32,8 @@ class ConvexPlanes {
   };
   // The plane of least depth: for a point inside the hull, the distance to its surface; negative outside.
   Nearest nearest(Vec3 p) const;
+  // A plane that p is no deeper under than t, or -1.
+  std::int32_t first_within(Vec3 p, double t) const;
 
  private:
   std::size_t count_ = 0;  // the arrays are padded to whole blocks with planes infinitely far away

@@ -3,16 +3,14 @@
 #include <algorithm>
 #include <queue>
 
+#include "hull.hpp"
+
 namespace rlacd {
 namespace {
 
-// Points of a facet that are looked at first, barycentric.
-constexpr double kLookAt[7][3] = {
-    {1. / 3, 1. / 3, 1. / 3}, {.5, .5, 0}, {0, .5, .5}, {.5, 0, .5}, {.6, .2, .2}, {.2, .6, .2}, {.2, .2, .6}};
-
 constexpr double kInside = 0.5, kAccuracy = 2;
 
-// Cells are looked at: so many, down to this share of the threshold.
+// Cells are looked at: so many besides the facets, down to this share of the threshold.
 constexpr int kMostCells = 400;
 constexpr double kSmall = 0.2;
 
@@ -21,110 +19,169 @@ bool meet(const Box& a, const Box& b) {
          a.lower.z <= b.upper.z && b.lower.z <= a.upper.z;
 }
 
-// Whether some point of a triangle is deeper than t under all planes.
-bool reaches_deeper(const ConvexPlanes& planes, Vec3 a, Vec3 b, Vec3 c, double t) {
-  constexpr int kMost = 24;  // a plane adds one corner at most, and most planes none
-  Vec3 polygon[kMost] = {a, b, c}, clipped[kMost];
-  int count = 3;
-  for (std::size_t i = 0; i < planes.size(); ++i) {
-    const auto plane = static_cast<std::int32_t>(i);
-    double depth[kMost];
-    bool cuts = false;
-    for (int k = 0; k < count; ++k) {
-      depth[k] = planes.depth(plane, polygon[k]) - t;
-      cuts |= depth[k] <= 0;
-    }
-    if (!cuts) continue;
-    int kept = 0;
-    for (int k = 0; k < count; ++k) {
-      const int next = k + 1 < count ? k + 1 : 0;
-      if (kept + 2 > kMost) return false;  // not known
-      if (depth[k] > 0) clipped[kept++] = polygon[k];
-      if ((depth[k] > 0) != (depth[next] > 0)) {
-        const double share = depth[k] / (depth[k] - depth[next]);
-        clipped[kept++] = polygon[k] + share * (polygon[next] - polygon[k]);
-      }
-    }
-    if (kept == 0) return false;
-    std::copy(clipped, clipped + kept, polygon);
-    count = kept;
+// What lies deeper than t under all planes. Most things do not, and mostly for the same plane as those before them.
+class Depths {
+ public:
+  Depths(const ConvexPlanes& planes, double t) : planes_(planes), t_(t) {}
+
+  bool holds(Vec3 p) {
+    if (planes_.depth(last_, p) <= t_) return false;
+    const std::int32_t plane = planes_.first_within(p, t_);
+    if (plane >= 0) last_ = plane;
+    return plane < 0;
   }
-  Vec3 middle{0, 0, 0};
-  for (int k = 0; k < count; ++k) middle = middle + (1.0 / count) * polygon[k];
-  return planes.nearest(middle).depth > t;
-}
+
+  // Whether it is certain that no point of a box is in there.
+  bool misses(const Box& box) {
+    const Vec3 middle = 0.5 * (box.lower + box.upper), half = 0.5 * (box.upper - box.lower);
+    const auto is_off = [&](std::int32_t plane) {
+      const Vec3 n = planes_.normal(plane);
+      const double reach = std::fabs(n.x) * half.x + std::fabs(n.y) * half.y + std::fabs(n.z) * half.z;
+      return planes_.depth(plane, middle) + reach <= t_;
+    };
+    if (is_off(last_)) return true;
+    const std::int32_t plane = planes_.nearest(middle).plane;
+    if (!is_off(plane)) return false;
+    last_ = plane;
+    return true;
+  }
+
+  // Whether some point of a triangle is.
+  bool meets(Vec3 a, Vec3 b, Vec3 c) {
+    if (std::max({planes_.depth(last_, a), planes_.depth(last_, b), planes_.depth(last_, c)}) <= t_) return false;
+    constexpr int kMost = 24;  // a plane adds one corner at most, and most planes none
+    Vec3 polygon[kMost] = {a, b, c}, clipped[kMost];
+    int count = 3;
+    for (std::size_t i = 0; i < planes_.size(); ++i) {
+      const auto plane = static_cast<std::int32_t>(i);
+      double depth[kMost];
+      bool cuts = false;
+      for (int k = 0; k < count; ++k) {
+        depth[k] = planes_.depth(plane, polygon[k]) - t_;
+        cuts |= depth[k] <= 0;
+      }
+      if (!cuts) continue;
+      int kept = 0;
+      for (int k = 0; k < count; ++k) {
+        const int next = k + 1 < count ? k + 1 : 0;
+        if (kept + 2 > kMost) return false;  // not known
+        if (depth[k] > 0) clipped[kept++] = polygon[k];
+        if ((depth[k] > 0) != (depth[next] > 0)) {
+          const double share = depth[k] / (depth[k] - depth[next]);
+          clipped[kept++] = polygon[k] + share * (polygon[next] - polygon[k]);
+        }
+      }
+      if (kept == 0) {
+        last_ = plane;
+        return false;
+      }
+      std::copy(clipped, clipped + kept, polygon);
+      count = kept;
+    }
+    Vec3 middle{0, 0, 0};
+    for (int k = 0; k < count; ++k) middle = middle + (1.0 / count) * polygon[k];
+    return planes_.nearest(middle).depth > t_;
+  }
+
+ private:
+  const ConvexPlanes& planes_;
+  const double t_;
+  std::int32_t last_ = 0;  // the plane that the last thing is not deep under
+};
 
 struct Cell {
   Vec3 corner[3];
   Vec3 middle;
   double radius;
+  std::int32_t hint;                                      // the slot of a face of the solid that is near
+  double most = std::numeric_limits<double>::infinity();  // how far a point of it outside the solid can be from it
 
-  Cell(Vec3 a, Vec3 b, Vec3 c) : corner{a, b, c}, middle((1.0 / 3) * (a + b + c)) {
+  Cell(Vec3 a, Vec3 b, Vec3 c, std::int32_t near) : corner{a, b, c}, middle((1.0 / 3) * (a + b + c)), hint(near) {
     radius = std::sqrt(std::max({norm2(a - middle), norm2(b - middle), norm2(c - middle)}));
   }
-  bool operator<(const Cell& other) const { return radius < other.radius; }
+  bool operator<(const Cell& other) const { return most < other.most; }
 };
 
 }  // namespace
 
 Chance Filling::chance(const Mesh& hull, double threshold) const {
   if (comes_deeper(hull, threshold)) return Chance::kNever;
-  return is_missed(hull, threshold) ? Chance::kNone : Chance::kSome;
+  return is_missed(hull, hull.faces, threshold) ? Chance::kNone : Chance::kSome;
+}
+
+Filling::Joint Filling::joint_chance(const std::vector<Vec3>& first, const std::vector<Vec3>& second,
+                                     double threshold) const {
+  std::vector<Vec3> both = first;
+  both.insert(both.end(), second.begin(), second.end());
+  const Mesh hull = hull_mesh(both);
+  const double volume = mesh_volume(hull.vertices, hull.faces);
+  if (comes_deeper(hull, threshold)) return {volume, Chance::kNever};
+  std::vector<char> is_new(hull.faces.size(), 1);
+  for (const std::vector<Vec3>* one : {&first, &second}) {
+    std::vector<char> is_known(hull.vertices.size());
+    std::transform(hull.vertices.begin(), hull.vertices.end(), is_known.begin(),
+                   [&](Vec3 p) { return std::find(one->begin(), one->end(), p) != one->end(); });
+    for (std::size_t f = 0; f < hull.faces.size(); ++f) {
+      const auto [a, b, c] = hull.faces[f];
+      if (is_known[a] && is_known[b] && is_known[c]) is_new[f] = 0;
+    }
+  }
+  std::vector<Triangle> facets;
+  for (std::size_t f = 0; f < hull.faces.size(); ++f)
+    if (is_new[f]) facets.push_back(hull.faces[f]);
+  return {volume, is_missed(hull, facets, threshold) ? Chance::kNone : Chance::kSome};
 }
 
 bool Filling::comes_deeper(const Mesh& hull, double threshold) const {
   const ConvexPlanes planes(hull);
+  Depths depths(planes, threshold);
   Box inner;
   for (const Vec3 p : hull.vertices) inner.extend(p);
   inner.lower = inner.lower + Vec3{threshold, threshold, threshold};
   inner.upper = inner.upper - Vec3{threshold, threshold, threshold};
   for (const Vec3 p : solid_.vertices)
-    if (inner.holds(p) && planes.nearest(p).depth > threshold) return true;
+    if (inner.holds(p) && depths.holds(p)) return true;
   const std::vector<Bvh::Node>& nodes = surface_.bvh().nodes();
   std::vector<std::int32_t> open = {0};
   while (!open.empty()) {
     const Bvh::Node& node = nodes[open.back()];
     open.pop_back();
     for (int side = 0; side < 2; ++side) {
-      if (!meet(node.box[side], inner)) continue;
+      if (!meet(node.box[side], inner) || depths.misses(node.box[side])) continue;
       if (node.child[side] >= 0) {
         open.push_back(node.child[side]);
         continue;
       }
       for (std::int32_t i = 0; i < node.leaf_size[side]; ++i) {
         const Triangle& face = solid_.faces[surface_.bvh().face(~node.child[side] + i)];
-        const Vec3 a = solid_.vertices[face[0]], b = solid_.vertices[face[1]], c = solid_.vertices[face[2]];
-        if (reaches_deeper(planes, a, b, c, threshold)) return true;
+        if (depths.meets(solid_.vertices[face[0]], solid_.vertices[face[1]], solid_.vertices[face[2]])) return true;
       }
     }
   }
   return false;
 }
 
-bool Filling::is_missed(const Mesh& hull, double threshold) const {
-  const auto is_outside = [&](Vec3 p) { return surface_.winding().at(p, kAccuracy) < kInside; };
-  std::int32_t hint = -1;
-  for (const Triangle& face : hull.faces) {
-    const Vec3 a = hull.vertices[face[0]], b = hull.vertices[face[1]], c = hull.vertices[face[2]];
-    for (const auto& [u, v, w] : kLookAt) {
-      const Vec3 p = u * a + v * b + w * c;
-      const Bvh::Hit hit = surface_.bvh().closest(p, hint, threshold);
-      hint = hit.slot;
-      if (hit.distance2 > threshold * threshold && is_outside(p)) return true;
-    }
-  }
-  std::priority_queue<Cell> cells;
-  for (const Triangle& face : hull.faces)
-    cells.emplace(hull.vertices[face[0]], hull.vertices[face[1]], hull.vertices[face[2]]);
-  for (int looked = 0; looked < kMostCells && !cells.empty(); ++looked) {
-    const Cell cell = cells.top();
-    cells.pop();
-    if (cell.radius < kSmall * threshold) break;
+bool Filling::is_missed(const Mesh& hull, const std::vector<Triangle>& facets, double threshold) const {
+  std::priority_queue<Cell> open;
+  // Whether the middle of a cell is missed; the cell stays open where another point of it may be.
+  const auto look_at = [&](Cell cell) {
+    if (cell.radius < kSmall * threshold) return false;
     const double enough = std::max(0.0, threshold - cell.radius), within = threshold + cell.radius;
-    const Bvh::Hit hit = surface_.bvh().closest(cell.middle, -1, enough, within);
+    const Bvh::Hit hit = surface_.bvh().closest(cell.middle, cell.hint, enough, within);
     const double distance = std::sqrt(hit.distance2);  // `within` where there is nothing nearer
-    if (distance > threshold && is_outside(cell.middle)) return true;
-    if (distance + cell.radius <= threshold || distance >= within) continue;
+    const bool is_far = distance > threshold;
+    if (is_far && surface_.winding().at(cell.middle, kAccuracy) < kInside) return true;
+    // On the way from a middle inside to a point outside, the surface comes after its distance at the soonest.
+    cell.most = is_far ? cell.radius - distance : cell.radius + distance;
+    cell.hint = hit.slot;
+    if (cell.most > threshold) open.push(cell);
+    return false;
+  };
+  for (const auto& [a, b, c] : facets)
+    if (look_at(Cell(hull.vertices[a], hull.vertices[b], hull.vertices[c], -1))) return true;
+  for (int looked = 0; looked < kMostCells && !open.empty(); looked += 2) {
+    const Cell cell = open.top();
+    open.pop();
     // Across the longest side: the cells stay as round as they are.
     int from = 0;
     for (int k = 1; k < 3; ++k)
@@ -132,8 +189,7 @@ bool Filling::is_missed(const Mesh& hull, double threshold) const {
         from = k;
     const Vec3 p = cell.corner[from], q = cell.corner[(from + 1) % 3], tip = cell.corner[(from + 2) % 3];
     const Vec3 between = 0.5 * (p + q);
-    cells.emplace(p, between, tip);
-    cells.emplace(between, q, tip);
+    if (look_at(Cell(p, between, tip, cell.hint)) || look_at(Cell(between, q, tip, cell.hint))) return true;
   }
   return false;
 }

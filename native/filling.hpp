@@ -4,9 +4,9 @@
 // Out: a verdict on the Hausdorff distance between the surfaces of a hull and of the solid's share of it. It is larger
 //      than t where the solid's surface comes deeper than t inside the hull, as it then does in every larger hull; and
 //      where a point of the hull's surface lies outside the solid and farther than t from it.
-// How: faces of the solid are clipped to the points deeper than t. Facets of the hull are looked at in a few points,
-//      then divided, the largest cells first, until each is decided by the distance at its middle and its radius, is
-//      small, or there were enough.
+// How: faces of the solid are clipped to the points deeper than t. Facets of the hull are divided, those that could be
+//      missed farthest first, until each is decided by the distance at its middle and its radius, is small, or there
+//      were enough.
 #pragma once
 
 #include "convex_planes.hpp"
@@ -25,11 +25,18 @@ class Filling {
   explicit Filling(const Mesh& solid) : solid_(solid), surface_(solid) {}
 
   Chance chance(const Mesh& hull, double threshold) const;
+  // The same for the convex hull of the corners of two hulls that are close enough to their own shares of the solid:
+  // facets that the joint hull has of one of them need not be looked at.
+  struct Joint {
+    double volume;
+    Chance chance;
+  };
+  Joint joint_chance(const std::vector<Vec3>& first, const std::vector<Vec3>& second, double threshold) const;
   // Whether it is kNever: much sooner known than which of the others it is.
   bool comes_deeper(const Mesh& hull, double threshold) const;
 
  private:
-  bool is_missed(const Mesh& hull, double threshold) const;
+  bool is_missed(const Mesh& hull, const std::vector<Triangle>& facets, double threshold) const;
 
   Mesh solid_;
   Surface surface_;

@@ -120,34 +120,60 @@ def test_balls_do_not_ask_what_is_inside_a_hull() -> None:
     assert not space.forbids(component.filling, component.hull)
 
 
+def heap_of_blocks(random: np.random.Generator) -> tuple[Component, list[Manifold]]:
+    """The union of four blocks that may overlap, and the blocks."""
+    sizes, places = random.uniform(0.1, 1, (4, 3)), random.uniform(-0.4, 0.4, (4, 3))
+    blocks = [block(*s, tuple(p)) for s, p in zip(sizes, places, strict=True)]
+    return Component(Manifold.batch_boolean(blocks, OpType.Add)), blocks
+
+
+def share_fits(solid: Component, hull: Hull, threshold: float) -> bool | None:
+    """Whether what the solid fills of a hull meets the strict test; None where it is empty."""
+    share = solid.manifold ^ Manifold(Mesh64(hull.vertices + 0, hull.faces.astype(np.uint64)))
+    mesh = share.to_mesh64()
+    vertices = np.ascontiguousarray(mesh.vert_properties[:, :3])
+    if len(vertices) == 0:
+        return None
+    return _native.meets_concavity(
+        vertices, mesh.tri_verts.astype(np.int32), hull.vertices, hull.faces, share.volume(), hull.volume, threshold
+    )
+
+
 @settings(deadline=None, max_examples=60)
 @given(st.integers(0, 10**6), st.floats(0.01, 0.5))
 def test_a_quick_no_is_never_wrong(seed: int, threshold: float) -> None:
     """Held against the strict test of the share itself, for hulls of corners of random heaps of blocks."""
     random = np.random.default_rng(seed)
-    sizes, places = random.uniform(0.1, 1, (4, 3)), random.uniform(-0.4, 0.4, (4, 3))
-    solid = Component(
-        Manifold.batch_boolean([block(*s, tuple(p)) for s, p in zip(sizes, places, strict=True)], OpType.Add)
-    )
+    solid, _ = heap_of_blocks(random)
     hull = Hull.of(random.permutation(solid.vertices)[: int(random.integers(4, 12))])
     if hull is None or hull.volume < 1e-4:
         return
-    body = Manifold(Mesh64(hull.vertices + 0, hull.faces.astype(np.uint64)))
-    share = solid.manifold ^ body
-    mesh = share.to_mesh64()
-    vertices = np.ascontiguousarray(mesh.vert_properties[:, :3])
+    fits = share_fits(solid, hull, threshold)
     chance = Concavity(threshold).chance(solid.filling, hull)
-    if len(vertices) == 0:
+    if fits is None:
         return
-    fits = _native.meets_concavity(
-        vertices, mesh.tri_verts.astype(np.int32), hull.vertices, hull.faces, share.volume(), hull.volume, threshold
-    )
     assert not (fits and chance is not Chance.SOME)
     larger = Hull.of(np.concatenate([hull.vertices, random.uniform(-1, 1, (3, 3))]))
     assert larger is not None
     assert Concavity(threshold).forbids(solid.filling, hull) == (chance is Chance.NEVER)
     if chance is Chance.NEVER:
         assert Concavity(threshold * (1 - 1e-9)).chance(solid.filling, larger) is Chance.NEVER
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.integers(0, 10**6), st.floats(0.01, 0.5))
+def test_a_quick_no_about_a_pair_is_never_wrong(seed: int, threshold: float) -> None:
+    """Nor does anything get lost by leaving out the facets of the two hulls, here blocks that the solid fills."""
+    solid, blocks = heap_of_blocks(np.random.default_rng(seed))
+    hulls = [hull for b in blocks if (hull := Hull.of(b.to_mesh64().vert_properties[:, :3].astype(float))) is not None]
+    pairs = np.array([(i, j) for j in range(len(hulls)) for i in range(j)], dtype=np.int32)
+    _, chances = Concavity(threshold).chances(solid.filling, hulls, pairs, 1)
+    for (i, j), chance in zip(pairs, chances, strict=True):
+        joint = Hull.around(hulls[i], hulls[j])
+        alone = Concavity(threshold).chance(solid.filling, joint)
+        assert (chance == Chance.NEVER) == (alone is Chance.NEVER)
+        assert not (alone is Chance.NONE and chance == Chance.SOME)
+        assert not (share_fits(solid, joint, threshold) and chance != Chance.SOME)
 
 
 def test_all_pairs_in_one_go_are_the_pairs_one_by_one(workers: Workers) -> None:
