@@ -8,6 +8,7 @@ void bind_distance(nanobind::module_& m);
 void bind_glue(nanobind::module_& m);
 void bind_hull(nanobind::module_& m);
 void bind_navigable(nanobind::module_& m);
+void bind_plane_cut(nanobind::module_& m);
 void bind_simplify(nanobind::module_& m);
 void bind_sweep(nanobind::module_& m);
 void bind_union(nanobind::module_& m);
@@ -22,6 +23,7 @@ NB_MODULE(_native, m) {
   rlacd::bind_glue(m);
   rlacd::bind_hull(m);
   rlacd::bind_navigable(m);
+  rlacd::bind_plane_cut(m);
   rlacd::bind_simplify(m);
   rlacd::bind_sweep(m);
   rlacd::bind_union(m);

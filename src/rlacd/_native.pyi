@@ -40,6 +40,13 @@ def glue(
 def outward_where_touching(
     vertices_a: FloatArray, faces_a: IntArray, vertices_b: FloatArray, faces_b: IntArray
 ) -> FloatArray: ...  # [Va, 3]
+def cut_by_plane(
+    vertices: FloatArray, faces: IntArray, x: float, y: float, z: float, offset: float
+) -> tuple[_OpenSide, _OpenSide]: ...
+def bodies(vertices: FloatArray, faces: IntArray) -> list[tuple[FloatArray, IntArray]]: ...
+
+_OpenSide = tuple[FloatArray, IntArray, list[IntArray], list[FloatArray]]
+"""Vertices [V, 3], faces [F, 3]; rims of the cap as loops of vertices, [R] each, and as points of the plane, [R, 2]."""
 
 class Surface:
     def __init__(self, vertices: FloatArray, faces: IntArray) -> None: ...

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from manifold3d import Manifold, Mesh64
+from manifold3d import Manifold, Mesh64, triangulate
 
 from rlacd import _native
 from rlacd.solid.arrays import FloatArray, IntArray
@@ -198,22 +198,33 @@ class Component(Part):
 
     Parameters
     ----------
-    manifold : manifold3d.Manifold
-        The solid, in the normalised frame; not flat.
+    solid : manifold3d.Manifold or (vertices, faces)
+        The solid, in the normalised frame; not flat. A surface [V, 3], [F, 3] has to be closed and oriented.
+
+    Raises
+    ------
+    ValueError
+        It is flat.
     """
 
-    def __init__(self, manifold: Manifold) -> None:
-        vertices, faces = _surface_of(manifold)
+    def __init__(self, solid: Manifold | tuple[FloatArray, IntArray]) -> None:
+        vertices, faces = solid if isinstance(solid, tuple) else _surface_of(solid)
         hull = Hull.of(vertices)
         if hull is None:
             raise ValueError("a component has to have a volume")
         super().__init__(vertices, faces, _native.mesh_volume(vertices, faces), hull)
-        self.manifold = manifold
+        if isinstance(solid, Manifold):
+            self.manifold = solid
 
     @property
     def members(self) -> tuple[Component, ...]:
         """Itself."""
         return (self,)
+
+    @cached_property
+    def manifold(self) -> Manifold:
+        """The solid for booleans."""
+        return Manifold(Mesh64(self.vertices, self.faces.astype(np.uint64)))
 
     @cached_property
     def filling(self) -> _native.Filling:
@@ -243,26 +254,19 @@ class Component(Part):
 
     def cut(self, plane: Plane) -> tuple[Component | None, Component | None]:
         """Cut by a plane: what lies below and what lies above, None where nothing (of any volume) does."""
-        axis = next((axis for axis in range(3) if plane.normal[axis] == 1), None)
-        if axis is not None and (self.vertices[:, axis] == plane.offset).any():
-            # Faces in the plane belong to one side only. Subtraction takes them away with the other side; splitting
-            # would leave them on both, as a film on one, and a half-space rounds the plane by some 1e-16.
-            below_block, above_block = _blocks_beside(self.box, axis, plane.offset)
-            below, above = self.manifold - above_block, self.manifold - below_block
-        else:
-            above, below = self.manifold.split_by_plane(plane.normal, plane.offset)
-        return _component(below, self), _component(above, self)
+        below, above = _native.cut_by_plane(self.vertices, self.faces, *plane.normal, plane.offset)
+        return _component(_capped(*below), self), _component(_capped(*above), self)
 
     def pieces(self) -> list[Component]:
         """Connected pieces, cavities kept inside the piece that encloses them; ``[self]`` when there is but one."""
-        manifolds = self.manifold.decompose()
-        if len(manifolds) == 1:
+        bodies = _native.bodies(self.vertices, self.faces)
+        if len(bodies) == 1:
             return [self]
-        shells = [m for m in manifolds if m.volume() > 0]
-        cavities = [m for m in manifolds if m.volume() < 0]
-        if cavities:
-            shells = _enclose(shells, cavities)
-        return [piece for m in shells if (piece := _component(m, self)) is not None]
+        volumes = [_native.mesh_volume(*body) for body in bodies]
+        shells = [(volume, body) for volume, body in zip(volumes, bodies, strict=True) if volume > 0]
+        cavities = [body for volume, body in zip(volumes, bodies, strict=True) if volume < 0]
+        surfaces = _enclose(shells, cavities) if cavities else [body for _, body in shells]
+        return [piece for surface in surfaces if (piece := _component(surface, self)) is not None]
 
 
 def _surface_of(manifold: Manifold) -> tuple[FloatArray, IntArray]:
@@ -277,60 +281,43 @@ def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
 
-_BLOCK = np.array(
-    [
-        [(0, 4, 6), (0, 6, 2), (1, 3, 7), (1, 7, 5)],
-        [(0, 1, 5), (0, 5, 4), (2, 6, 7), (2, 7, 3)],
-        [(0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6)],
-    ],
-    dtype=np.uint64,
-).reshape(12, 3)
-"""Triangles of a block whose corner i has the upper coordinates of the axes that are set in the bits of i, x lowest."""
+def _capped(
+    vertices: FloatArray, faces: IntArray, rims: list[IntArray], outlines: list[FloatArray]
+) -> tuple[FloatArray, IntArray]:
+    """Close a side of a cut in the plane."""
+    if not rims:
+        return vertices, faces
+    cap = np.concatenate(rims)[triangulate(outlines)]
+    return vertices, np.ascontiguousarray(np.concatenate([faces, cap]), dtype=np.int32)
 
 
-def _blocks_beside(box: FloatArray, axis: int, offset: float) -> tuple[Manifold, Manifold]:
-    """Build two blocks that hold what of a box [2, 3] lies below and above a plane along an axis, to the last bit."""
-    lower, upper = box[0] - 1, box[1] + 1
-    low, high = min(lower[axis], offset - 1), max(upper[axis], offset + 1)
-    return _block(lower, upper, axis, low, offset), _block(lower, upper, axis, offset, high)
-
-
-def _block(lower: FloatArray, upper: FloatArray, axis: int, low: float, high: float) -> Manifold:
-    corners = np.stack([lower, upper])
-    corners[:, axis] = low, high
-    is_upper = np.arange(8)[:, None] >> np.arange(3) & 1
-    return Manifold(Mesh64(np.take_along_axis(corners, is_upper, axis=0), _BLOCK))
-
-
-def _component(manifold: Manifold, within: Component) -> Component | None:
-    if manifold.is_empty() or manifold.volume() <= NEGLIGIBLE_VOLUME:
+def _component(surface: tuple[FloatArray, IntArray], within: Component) -> Component | None:
+    if not len(surface[1]) or _native.mesh_volume(*surface) <= NEGLIGIBLE_VOLUME:
         return None
     try:
-        component = Component(manifold)
+        component = Component(surface)
     except ValueError:
         return None
     component.within = within
     return component
 
 
-def _enclose(shells: list[Manifold], cavities: list[Manifold]) -> list[Manifold]:
-    """Give every cavity (a shell of negative volume) back to the smallest shell around it."""
-    by_shell: dict[int, list[Manifold]] = {i: [shell] for i, shell in enumerate(shells)}
-    by_volume = sorted(range(len(shells)), key=lambda i: (shells[i].volume(), i))
+def _enclose(
+    shells: list[tuple[float, tuple[FloatArray, IntArray]]], cavities: list[tuple[FloatArray, IntArray]]
+) -> list[tuple[FloatArray, IntArray]]:
+    """Give every cavity (a shell of negative volume) back to the smallest shell, given with its volume, around it."""
+    by_shell = [[surface] for _, surface in shells]
+    by_volume = sorted(range(len(shells)), key=lambda i: (shells[i][0], i))
     for cavity in cavities:
-        point = np.asarray(cavity.to_mesh64().vert_properties[:1, :3], dtype=np.float64)
+        point = cavity[0][:1]
         for i in by_volume:
-            if _native.Surface(*_surface_of(shells[i])).winding(point)[0] > 0.5:
+            if _native.Surface(*shells[i][1]).winding(point)[0] > 0.5:
                 by_shell[i].append(cavity)
                 break
-    return [group[0] if len(group) == 1 else _concatenate(group) for group in by_shell.values()]
+    return [group[0] if len(group) == 1 else _concatenated(group) for group in by_shell]
 
 
-def _concatenate(manifolds: list[Manifold]) -> Manifold:
-    vertices, faces, count = [], [], 0
-    for manifold in manifolds:
-        mesh = manifold.to_mesh64()
-        vertices.append(np.asarray(mesh.vert_properties[:, :3], dtype=np.float64))
-        faces.append(np.asarray(mesh.tri_verts, dtype=np.uint64) + np.uint64(count))
-        count += len(vertices[-1])
-    return Manifold(Mesh64(np.concatenate(vertices), np.concatenate(faces)))
+def _concatenated(surfaces: list[tuple[FloatArray, IntArray]]) -> tuple[FloatArray, IntArray]:
+    firsts = np.cumsum([0, *(len(vertices) for vertices, _ in surfaces[:-1])])
+    faces = [own + first for (_, own), first in zip(surfaces, firsts, strict=True)]
+    return np.concatenate([vertices for vertices, _ in surfaces]), np.concatenate(faces).astype(np.int32)

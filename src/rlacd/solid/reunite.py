@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from manifold3d import Manifold, OpType
+from manifold3d import Manifold, Mesh64, OpType
 
 from rlacd import _native
 from rlacd.solid.arrays import FloatArray
@@ -112,11 +112,10 @@ def _overlapping(which: int, components: Sequence[Component]) -> Manifold:
             outward += _outward(component, other)
     if not outward.any():
         return component.manifold
-    # Moved where they are: a mesh that is read anew loses folds that are hardly there, and what they enclose.
     # Not out of the box around all: parts that are reunited again and again would creep out of the input.
     boxes = np.array([other.box for other in components])
     moved = np.clip(component.vertices + OVERLAP * outward, boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0))
-    return component.manifold.warp_batch(lambda points: moved if np.array_equal(points, component.vertices) else points)
+    return Manifold(Mesh64(moved, component.faces.astype(np.uint64)))
 
 
 def _outward(part: Part, other: Part) -> FloatArray:

@@ -1,0 +1,187 @@
+"""Cutting by a plane: both sides closed, nothing lost, no triangles piling up, whatever touches the plane."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from manifold3d import CrossSection, Manifold, OpType
+
+from rlacd import _native
+from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.component import Component, Plane
+from rlacd.solid.load import load_mesh
+from rlacd.solid.repair import repair
+
+LAST_BITS = 1e-12
+
+
+def block(x: float, y: float, z: float, at: tuple[float, float, float] = (0, 0, 0)) -> Manifold:
+    return Manifold.cube((x, y, z), True).translate(at)
+
+
+def is_closed(faces: IntArray) -> bool:
+    """Whether every edge is run through as often one way as the other."""
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    there, back = edges[np.lexsort(edges.T)], edges[:, ::-1][np.lexsort(edges[:, ::-1].T)]
+    return np.array_equal(there, back)
+
+
+def sides_of(component: Component, plane: Plane) -> tuple[Component | None, Component | None]:
+    """Cut, and hold what comes of it against what any cut has to be."""
+    sides = component.cut(plane)
+    volumes = [0.0 if side is None else side.volume for side in sides]
+    assert sum(volumes) == pytest.approx(component.volume, rel=1e-9, abs=LAST_BITS)
+    for side, sign in zip(sides, (1, -1), strict=True):
+        if side is not None:
+            assert is_closed(side.faces)
+            assert len(np.unique(side.faces)) == len(side.vertices)
+            assert (sign * (side.vertices @ plane.normal - plane.offset)).max() < LAST_BITS
+            assert np.isin(np.arange(len(side.vertices)), side.faces).all()
+    return sides
+
+
+def plane_through(random: np.random.Generator, component: Component) -> Plane:
+    """A plane of the kinds that are cut along: a coordinate axis, through a corner or not; a face; any."""
+    kind, axis = random.integers(4), int(random.integers(3))
+    corner = component.vertices[random.integers(len(component.vertices))]
+    normal = np.eye(3)[axis]
+    if kind == 0:
+        return Plane((*normal.tolist(),), float(random.uniform(*component.box[:, axis])))
+    if kind == 2:
+        a, b, c = component.vertices[component.faces[random.integers(len(component.faces))]]
+        normal, corner = np.cross(b - a, c - a), a
+    elif kind == 3:
+        normal = random.normal(size=3)
+    length = np.linalg.norm(normal)
+    if length < 1e-9:
+        return Plane((0.0, 0.0, 1.0), float(corner[2]))
+    return Plane((*(normal / length).tolist(),), float(normal / length @ corner))
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.integers(0, 10**6))
+def test_both_sides_are_closed_and_nothing_is_lost(seed: int) -> None:
+    """Heaps of blocks, cut again and again, against manifold3d's own cut."""
+    random = np.random.default_rng(seed)
+    blocks = [block(*random.uniform(0.1, 1, 3), tuple(random.uniform(-0.4, 0.4, 3))) for _ in range(5)]
+    pieces = [Component(Manifold.batch_boolean(blocks, OpType.Add))]
+    for _ in range(6):
+        component = pieces.pop(random.integers(len(pieces)))
+        plane = plane_through(random, component)
+        sides = sides_of(component, plane)
+        above, below = component.manifold.split_by_plane(plane.normal, plane.offset)
+        for side, expected in zip(sides, (below, above), strict=True):
+            assert (0.0 if side is None else side.volume) == pytest.approx(expected.volume(), rel=1e-6, abs=1e-9)
+        pieces += [side for side in sides if side is not None]
+
+
+@pytest.mark.parametrize("name", ["vhacd/cow-nonormals", "gazebo_models/mars_rover__rover", "capod/class14__m161"])
+def test_real_solids_are_cut_without_loss(corpus: Path, name: str) -> None:
+    random = np.random.default_rng(5)
+    pieces = [Component(repair(load_mesh(corpus / f"test/{name}.ply"), threads=1).manifold)]
+    for _ in range(30):
+        component = pieces.pop(random.integers(len(pieces)))
+        for side in sides_of(component, plane_through(random, component)):
+            pieces += [] if side is None else [piece for piece in side.pieces() if piece.volume > 1e-6]
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_slices_have_no_more_triangles_than_they_need(turned: bool) -> None:
+    """What the triangles of a flat face have between them goes, on either side."""
+    bar = block(2, 0.3, 0.4)
+    bar = bar.rotate((20, 30, 40)) if turned else bar
+    rest, normal = Component(bar), np.array([1.0, 0, 0])
+    if turned:
+        normal = Component(bar).principal_axes[0]
+    for offset in np.linspace(-0.9, 0.9, 30):
+        slice_, after = sides_of(rest, Plane((*normal.tolist(),), float(offset)))
+        assert slice_ is not None
+        assert after is not None
+        assert len(slice_.faces) == 12
+        rest = after
+    assert len(rest.faces) == 12
+
+
+def test_a_section_may_have_holes_and_islands() -> None:
+    rings = [CrossSection.circle(r, 32) for r in (1.0, 0.8, 0.5, 0.2)]
+    tube = Component(Manifold.extrude((rings[0] - rings[1]) + (rings[2] - rings[3]), 2).translate((0, 0, -1)))
+    below, above = sides_of(tube, Plane((0.0, 0.6, 0.8), 0.1))
+    assert below is not None
+    assert above is not None
+    assert [len(side.pieces()) for side in (below, above)] == [2, 2]
+    area = _native.mesh_area(below.vertices, below.faces) + _native.mesh_area(above.vertices, above.faces)
+    section = (1 - 0.64 + 0.25 - 0.04) * 32 * np.sin(np.pi / 32) * np.cos(np.pi / 32) / 0.8
+    assert area - _native.mesh_area(tube.vertices, tube.faces) == pytest.approx(2 * section)
+
+
+def test_what_touches_the_plane_from_one_side_stays_whole() -> None:
+    """A corner, an edge, a valley and a face: no side gets a film of them."""
+    roof = Manifold.extrude(CrossSection([[(-1, 0), (0, 0.5), (1, 0), (1, 1), (-1, 1)]]), 1)  # a valley at y = 0.5
+    tip = Manifold.hull_points(np.array([(0, 0, 0), (1, 0, 1), (-1, 1, 1), (-1, -1, 1)], dtype=float))
+    for solid, plane in (
+        (Component(roof), Plane((0.0, 1.0, 0.0), 0.0)),
+        (Component(tip), Plane((0.0, 0.0, 1.0), 0.0)),
+        (Component(tip), Plane((0.0, 0.0, 1.0), 1.0)),
+        (Component(block(1, 1, 1)), Plane((1.0, 0.0, 0.0), 0.5)),
+        (Component(block(1, 1, 1)), Plane((np.sqrt(0.5), np.sqrt(0.5), 0.0), np.sqrt(0.5))),
+    ):
+        sides = sides_of(solid, plane)
+        (whole,) = [side for side in sides if side is not None]
+        assert np.array_equal(whole.vertices[whole.faces], solid.vertices[solid.faces])
+    below, above = sides_of(Component(roof), Plane((0.0, 1.0, 0.0), 0.5))  # through the valley
+    assert below is not None
+    assert above is not None
+    assert len(below.pieces()) == 2
+    assert above.volume == pytest.approx(1)
+
+
+def test_sections_may_touch_in_a_point() -> None:
+    """Two blocks that share an edge across the plane: one rim that touches itself, or two."""
+    both = block(1, 1, 1, (0.5, 0.5, 0)) + block(1, 1, 1, (-0.5, -0.5, 0))
+    below, above = sides_of(Component(both), Plane((0.0, 0.0, 1.0), 0.1))
+    assert below is not None
+    assert above is not None
+    assert below.volume == pytest.approx(1.2)
+    assert above.volume == pytest.approx(0.8)
+
+
+def test_an_inner_shell_that_is_cut_becomes_a_dent() -> None:
+    hollow = Component(block(2, 2, 2) - block(1, 1, 1))
+    below, above = sides_of(hollow, Plane((1.0, 0.0, 0.0), 0.0))
+    assert below is not None
+    assert above is not None
+    assert below.volume == above.volume == pytest.approx(3.5)
+    assert below.pieces() == [below]
+    whole, none = sides_of(hollow, Plane((1.0, 0.0, 0.0), 0.75))
+    assert whole is not None
+    assert none is not None
+    assert [piece.volume for piece in whole.pieces()] == pytest.approx([6.0])
+
+
+def bodies(*solids: Manifold) -> list[tuple[FloatArray, IntArray]]:
+    component = Component(Manifold.compose(list(solids)))
+    return _native.bodies(component.vertices, component.faces)
+
+
+def test_bodies_hang_together_by_edges() -> None:
+    apart = bodies(block(1, 1, 1), block(1, 1, 1, (3, 0, 0)), block(0.2, 0.2, 0.2, (6, 0, 0)))
+    assert [len(faces) for _, faces in apart] == [12, 12, 12]
+    assert sorted(round(_native.mesh_volume(*body), 9) for body in apart) == [0.008, 1, 1]
+    vertices = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, 0, 0), (0, -1, 0), (0, 0, -1)], dtype=float)
+    faces = np.array([(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)], dtype=np.int32)
+    mirrored = np.where(faces > 0, faces + 3, 0)[:, [0, 2, 1]].astype(np.int32)
+    touching = _native.bodies(vertices, np.concatenate([faces, mirrored]))  # two tetrahedra that share a corner
+    assert [_native.mesh_volume(*body) for body in touching] == pytest.approx([1 / 6, 1 / 6])
+    assert _native.bodies(vertices, faces[:0]) == []
+
+
+def test_bad_meshes_are_refused() -> None:
+    corner = np.eye(3)
+    with pytest.raises(ValueError, match="out of range"):
+        _native.cut_by_plane(corner, np.array([(0, 1, 3)], dtype=np.int32), 1.0, 0.0, 0.0, 0.5)
+    with pytest.raises(ValueError, match="not finite"):
+        _native.cut_by_plane(corner * np.nan, np.array([(0, 1, 2)], dtype=np.int32), 1.0, 0.0, 0.0, 0.5)
