@@ -10,9 +10,11 @@ namespace rlacd {
 
 namespace {
 
-constexpr double kFilm = 1e-13;        // relative to the mesh
-constexpr std::size_t kFew = 20;       // so many points are quickly sorted
-constexpr double kWellInside = 1e-12;  // share of the area of the points' box: far above rounding
+constexpr double kFilm = 1e-13;         // relative to the mesh
+constexpr std::size_t kManyEdges = 24;  // at one vertex: pairs of them take long
+constexpr double kFlat = 1e-12;         // sine of an angle that is none
+constexpr std::size_t kFew = 20;        // so many points are quickly sorted
+constexpr double kWellInside = 1e-12;   // share of the area of the points' box: far above rounding
 
 int axis_of(Vec3 n) {
   for (int axis = 0; axis < 3; ++axis)
@@ -92,9 +94,51 @@ double mean_below(double s0, double s1, double s2, double d) {
   return (s0 + s1 + s2) / 3 - d - t * (s2 - d) / 3;
 }
 
+// A vertex v that is in the hull of its neighbours has no direction w with w . e < 0 for all edges e from v. Where
+// there are such directions, they are a cone, whose rays are normals of two edges each: the sum of these rays is one of
+// them.
+std::vector<char> stick_out(const Mesh& mesh) {
+  const std::size_t count = mesh.vertices.size();
+  std::vector<std::size_t> first(count + 1, 0);  // each vertex' edges, by where they start
+  for (const Triangle& f : mesh.faces)
+    for (const std::int32_t corner : f) ++first[corner + 1];
+  for (std::size_t v = 0; v < count; ++v) first[v + 1] += first[v];
+  std::vector<Vec3> edges(first.back());
+  std::vector<std::size_t> next(first.begin(), first.end() - 1);
+  for (const Triangle& f : mesh.faces)
+    for (int e = 0; e < 3; ++e) edges[next[f[e]]++] = normalized(mesh.vertices[f[(e + 1) % 3]] - mesh.vertices[f[e]]);
+  std::vector<char> sticks_out(count, 0);
+  for (std::size_t v = 0; v < count; ++v) {
+    const Vec3 *begin = edges.data() + first[v], *end = edges.data() + first[v + 1];
+    const auto all_below = [begin, end](Vec3 w, double height) {
+      return std::all_of(begin, end, [w, height](Vec3 e) { return dot(w, e) <= height; });
+    };
+    Vec3 w;
+    for (const Vec3* e = begin; e != end; ++e) w = w - *e;
+    if (!all_below(w, -kFlat)) {
+      if (static_cast<std::size_t>(end - begin) > kManyEdges) {
+        sticks_out[v] = 1;  // nobody knows
+        continue;
+      }
+      w = {};
+      for (const Vec3* e = begin; e != end; ++e)
+        for (const Vec3* g = begin; g != e; ++g) {
+          const Vec3 ray = cross(*e, *g);
+          if (all_below(ray, kFlat))
+            w = w + ray;
+          else if (all_below(-ray, kFlat))
+            w = w - ray;
+        }
+    }
+    sticks_out[v] = begin != end && all_below(w, -kFlat);
+  }
+  return sticks_out;
+}
+
 }  // namespace
 
-SolidMesh::SolidMesh(const Mesh& solid) : mesh(solid), is_corner(solid.vertices.size(), 0) {
+SolidMesh::SolidMesh(const Mesh& solid)
+    : mesh(solid), is_corner(solid.vertices.size(), 0), sticks_out(stick_out(solid)) {
   area.reserve(mesh.faces.size());
   for (const Triangle& f : mesh.faces) {
     const Vec3 a = mesh.vertices[f[0]], b = mesh.vertices[f[1]], c = mesh.vertices[f[2]];
@@ -174,6 +218,7 @@ void Sections::fill_slabs() {
     if (!solid_.is_corner[i]) continue;
     const auto j = static_cast<std::size_t>(above_[i]);
     const bool on_plane = j > 0 && offsets_[j - 1] == heights_[i];
+    if (!on_plane && !solid_.sticks_out[i]) continue;
     if (!on_plane || (sides[i] & 2) != 0) entries.push_back({j, i});
     if (on_plane && (sides[i] & 1) != 0) entries.push_back({j - 1, i});
   }

@@ -2,7 +2,8 @@
 //
 // Input:  a closed triangle mesh, a unit normal n and M ascending offsets d (planes n.x = d). They divide the mesh into
 //         M + 1 slabs; slab j lies below plane j and above plane j - 1.
-// Output: each slab's vertices, the corners of the convex hull of each plane's section, and the volume of the solid
+// Output: each slab's vertices that its convex hull may need, the corners of the convex hull of each plane's section,
+// and the volume of the solid
 //         below and above each plane.
 // Algorithm: vertices are sorted into slabs, and every edge is cut by the planes between its ends. Volumes come from
 // the
@@ -23,6 +24,9 @@ struct SolidMesh {
   const Mesh& mesh;
   std::vector<Vec3> area;       // of every face, times its normal
   std::vector<char> is_corner;  // of a face, for every vertex
+  // For every vertex, whether it may be a corner of a hull of the solid's share of a half-space that it is inside of:
+  // one in the hull of its neighbours is none.
+  std::vector<char> sticks_out;
   double volume;
 };
 
@@ -40,8 +44,8 @@ class Sections {
   // collinear but for the last bits.
   double film() const { return film_; }
 
-  // Calls task(point) for the vertices of slabs [from, to). A vertex on a plane belongs to a side when the surface goes
-  // on there: a face that lies in the plane bounds the solid on one side of it only.
+  // Calls task(point) for the vertices of slabs [from, to) that stick out. A vertex on a plane belongs to a side when
+  // the surface goes on there: a face that lies in the plane bounds the solid on one side of it only.
   template <class Task>
   void for_each_inside(std::size_t from, std::size_t to, const Task& task) const {
     for (std::size_t i = first_[from]; i < first_[to]; ++i) task(mesh_.vertices[order_[i]]);
