@@ -67,8 +67,8 @@ void bind_concavity(nb::module_& m) {
           [](const Filling& self, const std::vector<PointsIn>& groups,
              const nb::ndarray<const std::int32_t, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>& pairs,
              double threshold, int threads) {
-            std::vector<std::vector<Vec3>> corners;
-            for (const PointsIn& group : groups) corners.push_back(to_points(group));
+            std::vector<HullCorners> corners;
+            for (const PointsIn& group : groups) corners.emplace_back(to_points(group));
             const std::vector<std::int32_t> pair(pairs.data(), pairs.data() + pairs.size());
             for (const std::int32_t g : pair)
               if (g < 0 || g >= static_cast<std::int64_t>(groups.size()))
@@ -89,7 +89,9 @@ void bind_concavity(nb::module_& m) {
           nb::arg("groups"), nb::arg("pairs"), nb::arg("threshold"), nb::arg("threads") = 0,
           "Volumes [P] of the joint hulls of pairs [P, 2] of hulls, given by their corners, a list of arrays [N, 3], "
           "and\n"
-          "the `chance` [P] of each, where the hulls themselves are close enough to their shares of the solid.")
+          "the `chance` [P] of each, where the hulls themselves are close enough to their shares of the solid. There "
+          "is no\n"
+          "volume (0) where the chance is 2.")
       .def(
           "comes_deeper",
           [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces, double threshold) {

@@ -8,6 +8,8 @@
 namespace rlacd {
 namespace {
 
+constexpr std::size_t kSome = 40;  // corners: more than this take longer than to look at some first
+
 constexpr double kInside = 0.5, kAccuracy = 2;
 
 // Cells are looked at: so many besides the facets, down to this share of the threshold.
@@ -89,6 +91,12 @@ class Depths {
   std::int32_t last_ = 0;  // the plane that the last thing is not deep under
 };
 
+Mesh joint_hull(const std::vector<Vec3>& first, const std::vector<Vec3>& second) {
+  std::vector<Vec3> both = first;
+  both.insert(both.end(), second.begin(), second.end());
+  return hull_mesh(both);
+}
+
 struct Cell {
   Vec3 corner[3];
   Vec3 middle;
@@ -106,30 +114,50 @@ struct Cell {
 
 Chance Filling::chance(const Mesh& hull, double threshold) const {
   if (comes_deeper(hull, threshold)) return Chance::kNever;
-  return is_missed(hull, hull.faces, threshold) ? Chance::kNone : Chance::kSome;
+  return is_missed(hull, hull.faces, threshold, kMostCells) ? Chance::kNone : Chance::kSome;
 }
 
-Filling::Joint Filling::joint_chance(const std::vector<Vec3>& first, const std::vector<Vec3>& second,
-                                     double threshold) const {
-  std::vector<Vec3> both = first;
-  both.insert(both.end(), second.begin(), second.end());
-  const Mesh hull = hull_mesh(both);
-  const double volume = mesh_volume(hull.vertices, hull.faces);
-  if (comes_deeper(hull, threshold)) return {volume, Chance::kNever};
+HullCorners::HullCorners(std::vector<Vec3> corners) : all(std::move(corners)) {
+  if (all.size() <= kSome) {
+    some = all;
+    return;
+  }
+  std::vector<std::size_t> chosen;
+  for (int x = -1; x <= 1; ++x)
+    for (int y = -1; y <= 1; ++y)
+      for (int z = -1; z <= 1; ++z) {
+        const Vec3 towards = {static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)};
+        const auto farthest = std::max_element(all.begin(), all.end(),
+                                               [towards](Vec3 p, Vec3 q) { return dot(towards, p) < dot(towards, q); });
+        chosen.push_back(static_cast<std::size_t>(farthest - all.begin()));
+      }
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  for (const std::size_t i : chosen) some.push_back(all[i]);
+}
+
+Filling::Joint Filling::joint_chance(const HullCorners& first, const HullCorners& second, double threshold) const {
+  const bool are_all = first.some.size() == first.all.size() && second.some.size() == second.all.size();
+  Mesh hull = joint_hull(first.some, second.some);
+  if (!hull.faces.empty() && comes_deeper(hull, threshold)) return {0, Chance::kNever};
+  if (!are_all) hull = joint_hull(first.all, second.all);
   std::vector<char> is_new(hull.faces.size(), 1);
-  for (const std::vector<Vec3>* one : {&first, &second}) {
-    std::vector<char> is_known(hull.vertices.size());
-    std::transform(hull.vertices.begin(), hull.vertices.end(), is_known.begin(),
-                   [&](Vec3 p) { return std::find(one->begin(), one->end(), p) != one->end(); });
+  for (const std::vector<Vec3>* own : {&first.all, &second.all}) {
+    std::vector<char> is_own(hull.vertices.size());
+    std::transform(hull.vertices.begin(), hull.vertices.end(), is_own.begin(),
+                   [own](Vec3 p) { return std::find(own->begin(), own->end(), p) != own->end(); });
     for (std::size_t f = 0; f < hull.faces.size(); ++f) {
       const auto [a, b, c] = hull.faces[f];
-      if (is_known[a] && is_known[b] && is_known[c]) is_new[f] = 0;
+      if (is_own[a] && is_own[b] && is_own[c]) is_new[f] = 0;
     }
   }
   std::vector<Triangle> facets;
   for (std::size_t f = 0; f < hull.faces.size(); ++f)
     if (is_new[f]) facets.push_back(hull.faces[f]);
-  return {volume, is_missed(hull, facets, threshold) ? Chance::kNone : Chance::kSome};
+  const double volume = mesh_volume(hull.vertices, hull.faces);
+  if (!are_all && is_missed(hull, facets, threshold, 0)) return {volume, Chance::kNone};
+  if (!are_all && comes_deeper(hull, threshold)) return {volume, Chance::kNever};
+  return {volume, is_missed(hull, facets, threshold, kMostCells) ? Chance::kNone : Chance::kSome};
 }
 
 bool Filling::comes_deeper(const Mesh& hull, double threshold) const {
@@ -161,7 +189,7 @@ bool Filling::comes_deeper(const Mesh& hull, double threshold) const {
   return false;
 }
 
-bool Filling::is_missed(const Mesh& hull, const std::vector<Triangle>& facets, double threshold) const {
+bool Filling::is_missed(const Mesh& hull, const std::vector<Triangle>& facets, double threshold, int most) const {
   std::priority_queue<Cell> open;
   // Whether the middle of a cell is missed; the cell stays open where another point of it may be.
   const auto look_at = [&](Cell cell) {
@@ -179,7 +207,7 @@ bool Filling::is_missed(const Mesh& hull, const std::vector<Triangle>& facets, d
   };
   for (const auto& [a, b, c] : facets)
     if (look_at(Cell(hull.vertices[a], hull.vertices[b], hull.vertices[c], -1))) return true;
-  for (int looked = 0; looked < kMostCells && !open.empty(); looked += 2) {
+  for (int looked = 0; looked < most && !open.empty(); looked += 2) {
     const Cell cell = open.top();
     open.pop();
     // Across the longest side: the cells stay as round as they are.

@@ -171,8 +171,8 @@ def test_a_quick_no_about_a_pair_is_never_wrong(seed: int, threshold: float) -> 
     for (i, j), chance in zip(pairs, chances, strict=True):
         joint = Hull.around(hulls[i], hulls[j])
         alone = Concavity(threshold).chance(solid.filling, joint)
-        assert (chance == Chance.NEVER) == (alone is Chance.NEVER)
-        assert not (alone is Chance.NONE and chance == Chance.SOME)
+        assert (chance == Chance.SOME) <= (alone is Chance.SOME)
+        assert (chance == Chance.NEVER) <= (alone is Chance.NEVER)
         assert not (share_fits(solid, joint, threshold) and chance != Chance.SOME)
 
 
@@ -186,8 +186,8 @@ def test_all_pairs_in_one_go_are_the_pairs_one_by_one(workers: Workers) -> None:
             volumes, chances = criterion.chances(root.filling, hulls, pairs, threads)
             for (i, j), volume, chance in zip(pairs, volumes, chances, strict=True):
                 joint = Hull.around(hulls[i], hulls[j])
-                assert volume == joint.volume
-                assert chance == criterion.chance(root.filling, joint)
+                assert chance == Chance.NEVER or volume == joint.volume
+                assert (chance == Chance.SOME) == (criterion.chance(root.filling, joint) is Chance.SOME)
                 seen.add(int(chance))
     assert len(seen) > 1
     with pytest.raises(ValueError, match="out of range"):
