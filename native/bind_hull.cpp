@@ -68,6 +68,15 @@ void bind_hull(nb::module_& m) {
       },
       nb::arg("vertices"), nb::arg("faces"), "Signed volume of a closed triangle mesh.");
   m.def(
+      "mesh_moments",
+      [](const PointsIn& vertices, const FacesIn& faces) {
+        const Mesh mesh = to_mesh(vertices, faces);
+        const std::array<Vec3, 3> rows = mesh_moments(mesh.vertices, mesh.faces);
+        return to_array<double>(std::vector<Vec3>(rows.begin(), rows.end()));
+      },
+      nb::arg("vertices"), nb::arg("faces"),
+      "Second moments [3, 3] of a surface around its centroid, exact over its triangles but for a positive factor.");
+  m.def(
       "mesh_area",
       [](const PointsIn& v, const FacesIn& f) {
         const Mesh mesh = to_mesh(v, f);

@@ -9,6 +9,7 @@
 // topological disk, the horizon is one simple loop and no new triangle is degenerate.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -93,5 +94,8 @@ Mesh hull_mesh(const std::vector<Vec3>& points);
 
 double mesh_volume(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces);
 double mesh_area(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces);
+
+// Second moments of the surface around its centroid, by rows, but for a positive factor.
+std::array<Vec3, 3> mesh_moments(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces);
 
 }  // namespace rlacd

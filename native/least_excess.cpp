@@ -16,7 +16,7 @@ namespace rlacd {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr std::size_t kFewPlanes = 6;  // a direction with fewer planes has so many more sections, to bound its hulls
+constexpr std::size_t kFewPlanes = 3;  // a direction with fewer planes has so many more sections, to bound its hulls
 constexpr std::size_t kFewTrials = 1 << 17;  // of a point and a corner
 constexpr double kRounding = 1e-12;  // share of a box's volume that the rounding of a hull's volume stays far below
 
