@@ -236,10 +236,11 @@ Mesh simplify_hull(const Mesh& hull, std::size_t max_vertices, std::size_t max_f
     // The new corner of a collapse lies above all facets around both ends of its edge. If it is redundant, it is within
     // the tolerance of a point of the hull that is no deeper than that under them: the ends are near it, and each
     // other.
-    const bool is_whole = inner.vertices.size() == hull.vertices.size();
-    const std::vector<double> reach = is_whole ? reach_of_corners(hull) : std::vector<double>();
+    Mesh corners = inner;
+    for (Vec3& p : corners.vertices) p = whitening.from(p);
+    const std::vector<double> reach = reach_of_corners(corners);
     ConvexCollapse collapse(inner, [&](std::int32_t a, std::int32_t b) {
-      return !is_whole || norm(hull.vertices[b] - hull.vertices[a]) <= kSafely * tolerance * (reach[a] + reach[b]);
+      return norm(corners.vertices[b] - corners.vertices[a]) <= kSafely * tolerance * (reach[a] + reach[b]);
     });
     collapse.reduce(most, redundant);
     const std::vector<Vec3> left = collapse.corners();
