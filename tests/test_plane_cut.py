@@ -162,6 +162,36 @@ def test_an_inner_shell_that_is_cut_becomes_a_dent() -> None:
     assert [piece.volume for piece in whole.pieces()] == pytest.approx([6.0])
 
 
+def farthest_outside(side: Component, surface: _native.Surface) -> float:
+    """How far the middle of a side's face lies outside the solid that was cut."""
+    middles = side.vertices[side.faces].mean(axis=1)
+    return float(surface.distance(middles[surface.winding(middles, np.inf) < 0.5]).max(initial=0))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_caps_stay_inside_solids_that_overlap_themselves(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    blocks = [block(*random.uniform(0.5, 1, 3), tuple(random.uniform(-0.3, 0.3, 3))) for _ in range(3)]
+    component = Component(Manifold.compose([b.rotate(tuple(random.uniform(0, 90, 3))) for b in blocks]))
+    surface = _native.Surface(component.vertices, component.faces)
+    for _ in range(5):
+        for side in component.cut(plane_through(random, component)):
+            if side is not None:
+                assert is_closed(side.faces)
+                assert farthest_outside(side, surface) < 1e-6
+
+
+def test_caps_stay_inside_a_real_solid_that_overlaps_itself_by_a_hair(corpus: Path) -> None:
+    """Triangles between rims that cross would lie 0.18 outside of it."""
+    path = corpus / "test/ikea_assembled/bookcase_besta_0172.ply"
+    component = Component(repair(load_mesh(path), threads=1).manifold)
+    surface = _native.Surface(component.vertices, component.faces)
+    normal = (2.817684072819059e-05, 0.9999853887462145, -0.005405691458879702)
+    for side in component.cut(Plane(normal, -0.34842011983949817)):
+        assert side is not None
+        assert farthest_outside(side, surface) < 1e-4
+
+
 def bodies(*solids: Manifold) -> list[tuple[FloatArray, IntArray]]:
     component = Component(Manifold.compose(list(solids)))
     return _native.bodies(component.vertices, component.faces)

@@ -89,7 +89,7 @@ class Criterion(Protocol):
     def chances(
         self, filling: _native.Filling, hulls: Sequence[Hull], pairs: IntArray, threads: int
     ) -> tuple[FloatArray, IntArray]:
-        """Volumes [P] of the joint hulls of pairs [P, 2] of hulls, but for those that are `NEVER`, and the `chance` [P]."""
+        """Volumes [P] of the joint hulls of pairs [P, 2] of hulls, but for `NEVER`, and the `chance` [P] of each."""
 
     def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
         """Whether what a solid fills of a hull, and of any that holds it, does not meet it: cheaper than `chance`.

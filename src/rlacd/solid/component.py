@@ -23,6 +23,15 @@ LOST = 1e-6
 """Share of a solid's volume that may be lost by a boolean, or as shavings (see `rlacd.cut`)."""
 
 
+FOLDED = 1e-2
+"""Share of a cap's area that may lie upside down: more than that where solids overlap themselves by a hair. Rims cross
+each other then, and triangles between them may lead far out of the solid; a boolean knows better what is inside."""
+
+
+NEGLIGIBLE_FOLD = 1e-9
+"""A smaller share than this is rounding."""
+
+
 @dataclass(frozen=True)
 class Plane:
     """The plane n.x = d, n a unit normal; *below* is n.x < d, *above* n.x > d."""
@@ -247,8 +256,12 @@ class Component(Part):
 
     def cut(self, plane: Plane) -> tuple[Component | None, Component | None]:
         """Cut by a plane: what lies below and what lies above, None where nothing (of any volume) does."""
-        below, above = _native.cut_by_plane(self.vertices, self.faces, *plane.normal, plane.offset)
-        return _component(_capped(*below), self), _component(_capped(*above), self)
+        open_sides = _native.cut_by_plane(self.vertices, self.faces, *plane.normal, plane.offset)
+        (below, below_folded), (above, above_folded) = (_capped(*side) for side in open_sides)
+        if max(below_folded, above_folded) > FOLDED and abs(self.manifold.volume() - self.volume) <= LOST * self.volume:
+            upper, lower = self.manifold.split_by_plane(plane.normal, plane.offset)
+            return _component(lower, self), _component(upper, self)
+        return _component(below, self), _component(above, self)
 
     def pieces(self) -> list[Component]:
         """Connected pieces, cavities kept inside the piece that encloses them; ``[self]`` when there is but one."""
@@ -270,19 +283,49 @@ def _surface_of(manifold: Manifold) -> tuple[FloatArray, IntArray]:
 
 def _capped(
     vertices: FloatArray, faces: IntArray, rims: list[IntArray], outlines: list[FloatArray]
-) -> tuple[FloatArray, IntArray]:
-    """Close a side of a cut in the plane."""
+) -> tuple[tuple[FloatArray, IntArray], float]:
+    """Close a side of a cut in the plane; and the share of the cap that lies upside down."""
     if not rims:
-        return vertices, faces
-    cap = np.concatenate(rims)[triangulate(outlines)]
-    return vertices, np.ascontiguousarray(np.concatenate([faces, cap]), dtype=np.int32)
+        return (vertices, faces), 0.0
+    triangles, folded = _triangulated(outlines)
+    surface = np.concatenate([faces, np.concatenate(rims)[triangles]])
+    return (vertices, np.ascontiguousarray(surface, dtype=np.int32)), folded
 
 
-def _component(surface: tuple[FloatArray, IntArray], within: Component) -> Component | None:
-    if not len(surface[1]) or _native.mesh_volume(*surface) <= NEGLIGIBLE_VOLUME:
+def _triangulated(outlines: list[FloatArray]) -> tuple[IntArray, float]:
+    """Triangles [T, 3] of loops in a plane, [R, 2] each, and the share of their area that lies upside down.
+
+    Where loops cross each other, it depends on chance, and on the way round, how far triangles fold.
+    """
+    points = np.concatenate(outlines)
+    triangles = triangulate(outlines)
+    folded = _share_upside_down(points, triangles)
+    if folded > NEGLIGIBLE_FOLD:
+        mirrored = triangulate([outline[::-1, ::-1] for outline in outlines])
+        ends = np.cumsum([len(outline) for outline in outlines])
+        back = np.concatenate([np.arange(end - 1, end - 1 - len(o), -1) for end, o in zip(ends, outlines, strict=True)])
+        other = back[mirrored][:, ::-1]
+        if (share := _share_upside_down(points, other)) < folded:
+            return other, share
+    return triangles, folded
+
+
+def _share_upside_down(points: FloatArray, triangles: IntArray) -> float:
+    a, b, c = (points[corner] for corner in triangles.T)
+    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    total = np.abs(area).sum()
+    return float(-area[area < 0].sum() / total) if total > 0 else 0.0
+
+
+def _component(solid: Manifold | tuple[FloatArray, IntArray], within: Component) -> Component | None:
+    if isinstance(solid, Manifold):
+        is_empty = solid.is_empty() or solid.volume() <= NEGLIGIBLE_VOLUME
+    else:
+        is_empty = not len(solid[1]) or _native.mesh_volume(*solid) <= NEGLIGIBLE_VOLUME
+    if is_empty:
         return None
     try:
-        component = Component(surface)
+        component = Component(solid)
     except ValueError:
         return None
     component.within = within
