@@ -35,6 +35,7 @@ void drop_inner(std::vector<Vec3>& points) {
     for (int k = 0; k < 8; ++k)
       if (const double s = direction[k][0] * p[u] + direction[k][1] * p[v]; s > most[k]) most[k] = s, outermost[k] = p;
   const double well = kWellInside * (most[0] + most[4]) * (most[2] + most[6]);
+  if (!(well > 0)) return;  // they lie on a line, or in one place: the octagon has no inside
   const auto is_inside = [&](Vec3 p) {
     for (int k = 0; k < 8; ++k) {
       const Vec3 a = outermost[k], b = outermost[(k + 1) % 8];
@@ -96,7 +97,7 @@ double mean_below(double s0, double s1, double s2, double d) {
 
 // A vertex v that is in the hull of its neighbours has no direction w with w . e < 0 for all edges e from v. Where
 // there are such directions, they are a cone, whose rays are normals of two edges each: the sum of these rays is one of
-// them.
+// them. Where all edges lie in a plane, the cone has no rays, but holds the directions away from the two outermost.
 std::vector<char> stick_out(const Mesh& mesh) {
   const std::size_t count = mesh.vertices.size();
   std::vector<std::size_t> first(count + 1, 0);  // each vertex' edges, by where they start
@@ -113,6 +114,10 @@ std::vector<char> stick_out(const Mesh& mesh) {
     const auto all_below = [begin, end](Vec3 w, double height) {
       return std::all_of(begin, end, [w, height](Vec3 e) { return dot(w, e) <= height; });
     };
+    if (std::any_of(begin, end, [](Vec3 e) { return norm2(e) < 0.5; })) {
+      sticks_out[v] = 1;  // it is where a neighbour is, and one of the two may
+      continue;
+    }
     Vec3 w;
     for (const Vec3* e = begin; e != end; ++e) w = w - *e;
     if (!all_below(w, -kFlat)) {
@@ -121,16 +126,25 @@ std::vector<char> stick_out(const Mesh& mesh) {
         continue;
       }
       w = {};
-      for (const Vec3* e = begin; e != end; ++e)
+      for (const Vec3* e = begin; e != end && !sticks_out[v]; ++e)
         for (const Vec3* g = begin; g != e; ++g) {
           const Vec3 ray = cross(*e, *g);
-          if (all_below(ray, kFlat))
+          bool below = true, above = true;  // whether all edges are
+          for (const Vec3* h = begin; h != end && (below || above); ++h) {
+            const double height = dot(ray, *h);
+            below = below && height <= kFlat;
+            above = above && height >= -kFlat;
+          }
+          if (below && above) {
+            sticks_out[v] = all_below(-(*e + *g), -kFlat);
+            if (sticks_out[v]) break;
+          } else if (below)
             w = w + ray;
-          else if (all_below(-ray, kFlat))
+          else if (above)
             w = w - ray;
         }
     }
-    sticks_out[v] = begin != end && all_below(w, -kFlat);
+    if (!sticks_out[v]) sticks_out[v] = begin != end && all_below(w, -kFlat);
   }
   return sticks_out;
 }

@@ -11,6 +11,7 @@ from scipy.spatial import ConvexHull, QhullError
 from rlacd import _native
 from rlacd.planes.candidates import Candidates, axis_and_principal
 from rlacd.planes.sweep import sweep
+from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Plane
 
 
@@ -35,6 +36,13 @@ SOLIDS = {
 }
 
 
+def hull_volume(points: FloatArray) -> float:
+    try:
+        return float(ConvexHull(points).volume)
+    except (QhullError, ValueError):
+        return 0.0
+
+
 @pytest.mark.parametrize("name", SOLIDS)
 def test_sweep_equals_real_cuts(name: str) -> None:
     component = Component(SOLIDS[name]())
@@ -49,13 +57,50 @@ def test_sweep_equals_real_cuts(name: str) -> None:
         ):
             assert solid[index] == pytest.approx(side.volume(), abs=1e-9 * total)
             points = np.asarray(side.to_mesh64().vert_properties[:, :3])
-            try:
-                expected = ConvexHull(points).volume
-            except (QhullError, ValueError):
-                expected = 0.0
-            assert hull[index] == pytest.approx(expected, rel=1e-9, abs=1e-12)
+            assert hull[index] == pytest.approx(hull_volume(points), rel=1e-9, abs=1e-12)
         section = component.manifold.rotate(_upright(plane.normal)).slice(plane.offset)
         assert scored.section_area[index] == pytest.approx(section.area(), abs=1e-6)
+
+
+def crowded_pyramid(apexes: int) -> tuple[FloatArray, IntArray]:
+    """A pyramid over a regular polygon whose apex is as many vertices, joined by edges and triangles of no size."""
+    angle = 2 * np.pi * np.arange(apexes) / apexes
+    base = np.stack([np.cos(angle), np.sin(angle), np.zeros(apexes)], axis=1)
+    vertices = np.concatenate([base, np.tile([0.1, 0.2, 1.0], (apexes, 1))])
+    i, after = np.arange(apexes), np.roll(np.arange(apexes), -1)
+    fan = np.arange(1, apexes - 1)
+    bottom = np.stack([np.zeros_like(fan), fan + 1, fan], axis=1)
+    sides = [np.stack([i, after, i + apexes], axis=1), np.stack([after, after + apexes, i + apexes], axis=1)]
+    return vertices, np.concatenate([bottom, *sides, bottom[:, ::-1] + apexes]).astype(np.int32)
+
+
+def finned_tetrahedron() -> tuple[FloatArray, IntArray]:
+    """A tetrahedron with a fin of no thickness: to its blunt tip, more edges lead from one side than from the other."""
+    p, q, r, s = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.5, 1.0, 0.0), (0.5, 0.5, 1.0)
+    vertices = np.array([p, q, r, s, (0.01, 0.0, 0.0), (0.5, -0.1, -0.1)])
+    p, q, r, s, middle, tip = range(6)
+    tetrahedron = [(p, r, middle), (middle, r, q), (q, s, middle), (middle, s, p), (p, s, r), (s, q, r)]
+    fin = [(p, middle, tip), (middle, q, tip), (middle, p, tip), (q, middle, tip)]
+    return vertices, np.array([*tetrahedron, *fin], dtype=np.int32)
+
+
+@pytest.mark.parametrize("solid", [crowded_pyramid(12), crowded_pyramid(40), finned_tetrahedron()])
+def test_corners_count_where_the_mesh_is_degenerate(solid: tuple[FloatArray, IntArray]) -> None:
+    component = Component(solid)
+    vertices, faces = solid
+    corners = np.unique(np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1), axis=0)
+    scored = sweep(component, axis_and_principal(component))
+    assert component.volume > 0
+    for index in range(len(scored.candidates)):
+        plane = scored.candidates.plane(index)
+        height = vertices @ plane.normal - plane.offset
+        low, high = height[corners[:, 0]], height[corners[:, 1]]
+        cross = low * high < 0
+        share = (low / np.where(cross, low - high, 1))[cross, None]
+        crossing = (1 - share) * vertices[corners[cross, 0]] + share * vertices[corners[cross, 1]]
+        for side, hull in ((height <= 0, scored.hull_below), (height >= 0, scored.hull_above)):
+            expected = hull_volume(np.concatenate([vertices[side], crossing]))
+            assert hull[index] == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
 def _upright(normal: tuple[float, float, float]) -> tuple[float, float, float]:
