@@ -2,14 +2,22 @@
 
 #include <stdexcept>
 
+#include "wide.hpp"
+
 namespace rlacd {
 namespace {
-
-constexpr std::size_t kBlock = 16;
 
 // Normals closer than this are one plane. It is pushed out to touch the hull like every other, so taking it for its
 // twin shifts a depth by no more than this times the hull's diameter, and only upwards.
 constexpr double kSameNormal = 1e-9;
+
+// Pushes planes out until they touch a point.
+RLACD_WIDE void push_out(double* h, const double* x, const double* y, const double* z, std::size_t count, Vec3 p) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const double height = x[i] * p.x + y[i] * p.y + z[i] * p.z;
+    h[i] = h[i] > height ? h[i] : height;
+  }
+}
 
 }  // namespace
 
@@ -51,18 +59,12 @@ ConvexPlanes::ConvexPlanes(const Mesh& hull) {
   std::vector<bool> is_corner(hull.vertices.size(), false);
   for (const Triangle& face : hull.faces)
     for (const std::int32_t corner : face) is_corner[corner] = true;
-  for (std::size_t v = 0; v < hull.vertices.size(); ++v) {
-    if (!is_corner[v]) continue;
-    const Vec3 p = hull.vertices[v];
-    for (std::size_t i = 0; i < padded; ++i) {
-      const double height = x_[i] * p.x + y_[i] * p.y + z_[i] * p.z;
-      h_[i] = h_[i] > height ? h_[i] : height;
-    }
-  }
+  for (std::size_t v = 0; v < hull.vertices.size(); ++v)
+    if (is_corner[v]) push_out(h_.data(), x_.data(), y_.data(), z_.data(), padded, hull.vertices[v]);
   std::fill(h_.begin() + static_cast<std::ptrdiff_t>(count_), h_.end(), std::numeric_limits<double>::infinity());
 }
 
-ConvexPlanes::Nearest ConvexPlanes::nearest(Vec3 p) const {
+RLACD_WIDE ConvexPlanes::Nearest ConvexPlanes::nearest(Vec3 p) const {
   Nearest best;
   double depths[kBlock];
   for (std::size_t start = 0; start < h_.size(); start += kBlock) {
@@ -77,7 +79,7 @@ ConvexPlanes::Nearest ConvexPlanes::nearest(Vec3 p) const {
   return best;
 }
 
-std::int32_t ConvexPlanes::first_within(Vec3 p, double t) const {
+RLACD_WIDE std::int32_t ConvexPlanes::first_within(Vec3 p, double t) const {
   for (std::size_t start = 0; start < h_.size(); start += kBlock) {
     bool is_within = false;
     for (std::size_t i = start; i < start + kBlock; ++i)

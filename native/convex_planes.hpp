@@ -17,11 +17,18 @@ namespace rlacd {
 
 class ConvexPlanes {
  public:
+  // The arrays are padded to whole blocks with planes infinitely far away.
+  static constexpr std::size_t kBlock = 16;
+
   explicit ConvexPlanes(const Mesh& hull);
 
   std::size_t size() const { return count_; }
   Vec3 normal(std::int32_t i) const { return {x_[i], y_[i], z_[i]}; }
   double offset(std::int32_t i) const { return h_[i]; }
+  const double* x() const { return x_.data(); }  // of all normals
+  const double* y() const { return y_.data(); }
+  const double* z() const { return z_.data(); }
+  const std::vector<double>& offsets() const { return h_; }
 
   // Distance from p to plane i, positive inside.
   double depth(std::int32_t i, Vec3 p) const { return h_[i] - (x_[i] * p.x + y_[i] * p.y + z_[i] * p.z); }
@@ -36,7 +43,7 @@ class ConvexPlanes {
   std::int32_t first_within(Vec3 p, double t) const;
 
  private:
-  std::size_t count_ = 0;  // the arrays are padded to whole blocks with planes infinitely far away
+  std::size_t count_ = 0;
   std::vector<double> x_, y_, z_, h_;
 };
 

@@ -30,7 +30,7 @@ inline Vec3 normalized(Vec3 a) {
   const double n = norm(a);
   return n > 0 ? (1 / n) * a : a;
 }
-inline double max_abs(Vec3 a) { return std::max({std::fabs(a.x), std::fabs(a.y), std::fabs(a.z)}); }
+inline double max_abs(Vec3 a) { return std::max(std::max(std::fabs(a.x), std::fabs(a.y)), std::fabs(a.z)); }
 
 using Triangle = std::array<std::int32_t, 3>;  // indices of the corners, counter-clockwise seen from outside
 

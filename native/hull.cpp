@@ -29,6 +29,7 @@ void HullBuilder::clear() {
   free_.clear();
   next_outside_.clear();
   extent_ = Box();
+  reach_ = 0;
   insertion_ = 0;
 }
 
@@ -49,37 +50,42 @@ void HullBuilder::drop_inner_points() {
 }
 
 inline bool HullBuilder::sees(const Facet& f, Vec3 p) const {
-  const Vec3 offset = p - f.origin;
-  const double h = dot(f.normal, offset);
-  const double bound = f.error * max_abs(offset);
+  const double h = dot(f.normal, p) - f.offset;
+  const double bound = f.error * reach_;
   if (h > bound) return true;
   if (h < -bound) return false;
-  return sees_exactly(f, p);
+  return sees_closely(f, p);
 }
 
-bool HullBuilder::sees_exactly(const Facet& f, Vec3 p) const {
+bool HullBuilder::sees_closely(const Facet& f, Vec3 p) const {
+  const double h = height(f, p);
+  const double bound = f.error * max_abs(p - f.origin);
+  if (h > bound) return true;
+  if (h < -bound) return false;
   return orient3d_exact(points_[f.corner[0]], points_[f.corner[1]], points_[f.corner[2]], p) > 0;
 }
 
 std::int32_t HullBuilder::new_facet(std::int32_t a, std::int32_t b, std::int32_t c) {
-  Facet f;
+  std::int32_t slot = static_cast<std::int32_t>(facets_.size());
+  if (free_.empty()) {
+    facets_.emplace_back();
+  } else {
+    slot = free_.back();
+    free_.pop_back();
+  }
+  const Vec3 origin = points_[a], ab = points_[b] - origin, ac = points_[c] - origin;
+  Facet& f = facets_[slot];
   f.corner = {a, b, c};
-  const Vec3 ab = points_[b] - points_[a], ac = points_[c] - points_[a];
   f.normal = cross(ab, ac);
-  f.origin = points_[a];
+  f.origin = origin;
+  f.offset = dot(f.normal, origin);
   // Each component of the cross product is off by less than 6 u |ab||ac| and the dot product adds 3 terms of relative
-  // error 5 u, all in the maximum norm: 40 u |ab||ac||p - a| covers their sum.
+  // error 5 u, all in the maximum norm: 40 u |ab||ac||p - a| covers their sum. Without the difference p - a, its two
+  // dot products are off by 36 u |ab||ac| of the longest |p| each, and the normal counts twice: 40 u |ab||ac| 4 |p|.
   f.error = 40 * kRoundoff * max_abs(ab) * max_abs(ac);
   f.outside = -1;
   f.alive = true;
   f.mark = -1;
-  if (free_.empty()) {
-    facets_.push_back(f);
-    return static_cast<std::int32_t>(facets_.size()) - 1;
-  }
-  const std::int32_t slot = free_.back();
-  free_.pop_back();
-  facets_[slot] = f;
   return slot;
 }
 
@@ -157,6 +163,7 @@ void HullBuilder::add(const std::vector<Vec3>& points) {
   points_.insert(points_.end(), points.begin(), points.end());
   next_outside_.resize(points_.size(), -1);
   for (const Vec3 p : points) extent_.extend(p);
+  reach_ = 4 * std::max(max_abs(extent_.lower), max_abs(extent_.upper));
   if (rank_ < 3) {
     if (!initialise()) return;
     first = 0;

@@ -48,6 +48,7 @@ class HullBuilder {
     std::int32_t neighbour[3];  // across the edge corner[i] -> corner[i + 1]
     Vec3 normal;                // (b - a) x (c - a), not normalised
     Vec3 origin;                // corner a
+    double offset;              // of the plane, normal . a
     double error;               // |computed height - exact height| <= error * max_abs(p - a)
     std::int32_t outside;       // first point of the list that this facet is responsible for, -1 when none
     bool alive;
@@ -56,7 +57,7 @@ class HullBuilder {
 
   double height(const Facet& f, Vec3 p) const { return dot(f.normal, p - f.origin); }
   bool sees(const Facet& f, Vec3 p) const;
-  bool sees_exactly(const Facet& f, Vec3 p) const;
+  bool sees_closely(const Facet& f, Vec3 p) const;
   bool initialise();
   std::int32_t new_facet(std::int32_t a, std::int32_t b, std::int32_t c);
   template <class Sees>
@@ -71,6 +72,7 @@ class HullBuilder {
   std::vector<std::int32_t> free_;
   std::vector<std::int32_t> next_outside_;  // linked lists of outside points, by point
   Box extent_;
+  double reach_ = 0;  // four times the largest coordinate
   std::int32_t insertion_ = 0;
 
   struct HorizonEdge {

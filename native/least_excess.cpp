@@ -49,6 +49,11 @@ std::vector<double> section_offsets(const SolidMesh& solid, const Bundle& bundle
   return offsets;
 }
 
+// Volume between two parallel sections of a convex body that are as large as this, at least (Brunn and Minkowski).
+double frustum(double area, double other, double height) {
+  return height / 3 * (area + std::sqrt(area * other) + other);
+}
+
 // Volumes that the hulls of what lies below (or above) each plane cannot be smaller than: see the algorithm.
 std::vector<double> least_hull_volumes(const Sections& sections, Side side) {
   struct Slice {
@@ -79,12 +84,18 @@ std::vector<double> least_hull_volumes(const Sections& sections, Side side) {
 // The planes of one direction, and what is known of the excesses of their sides.
 class Direction {
  public:
-  // Numbers are those of the bundle's planes among all candidates.
-  Direction(const SolidMesh& mesh, const Bundle& bundle, const std::vector<std::ptrdiff_t>& numbers)
-      : sections_(mesh, bundle.normal, section_offsets(mesh, bundle)), slack_(kRounding * box_volume(mesh.mesh)) {
+  // Numbers are those of the bundle's planes among all candidates. Rounding changes volumes by less than the slack.
+  Direction(const SolidMesh& mesh, const Bundle& bundle, const std::vector<std::ptrdiff_t>& numbers, double slack)
+      : sections_(mesh, bundle.normal, section_offsets(mesh, bundle)), slack_(slack) {
     sections_.drop_heights();
     for (std::size_t j = 0, i = 0; j < planes(); ++j)
       numbers_.push_back(i < numbers.size() && bundle.offsets[i] == sections_.offset(j) ? numbers[i++] : -1);
+    std::vector<double> areas;
+    for (std::size_t j = 0; j < planes(); ++j) areas.push_back(outline_area(sections_.outline(j), sections_.normal()));
+    for (std::size_t j = 1; j < planes(); ++j) {
+      const double slab = frustum(areas[j - 1], areas[j], sections_.offset(j) - sections_.offset(j - 1));
+      between_.push_back(std::max(slab - (solid(kBelow, j) - solid(kBelow, j - 1)) - slack_, 0.0));
+    }
     for (const Side side : {kBelow, kAbove}) {
       least_[side].assign(planes(), 0);
       hulls_[side].resize(planes());
@@ -141,9 +152,16 @@ class Direction {
     return side == kBelow ? sections_.solid_below(j) : sections_.solid_above(j);
   }
 
-  // The excess below a plane bounds those below all higher planes, the one above it those above all lower ones.
+  // The excess below a plane, and what is missing between it and higher ones, bounds the excesses below those; the one
+  // above it those above all lower ones.
   void raise(Side side, std::size_t j, double excess) {
-    for (; j != end(across(side)) && least_[side][j] < excess; side == kBelow ? ++j : --j) least_[side][j] = excess;
+    while (least_[side][j] < excess) {
+      least_[side][j] = excess;
+      const std::size_t slab = side == kBelow ? j : j - 1;
+      if (slab >= between_.size()) return;
+      excess += between_[slab];
+      side == kBelow ? ++j : --j;
+    }
   }
 
   void measure_extents() {
@@ -167,6 +185,7 @@ class Direction {
   Sections sections_;
   const double slack_;
   std::vector<std::ptrdiff_t> numbers_;
+  std::vector<double> between_;  // what hulls have more than the solid between planes j and j + 1, at least
   std::array<std::vector<double>, 2> least_;   // by side and plane: a lower bound of the excess
   std::array<std::vector<double>, 2> extent_;  // the largest extent of the side's box
   std::array<std::vector<std::unique_ptr<HullBuilder>>, 2> hulls_;
@@ -183,8 +202,9 @@ class Search {
     for (std::size_t i = bundles.place.size(); i-- > 0;)  // the first of equal planes counts
       numbers[bundles.place[i].bundle][bundles.place[i].plane] = static_cast<std::ptrdiff_t>(i);
     directions_.resize(numbers.size());
+    const double slack = kRounding * box_volume(mesh);
     parallel_for(directions_.size(), threads, [&](std::size_t k) {
-      directions_[k] = std::make_unique<Direction>(solid_, bundles.all[k], numbers[k]);
+      directions_[k] = std::make_unique<Direction>(solid_, bundles.all[k], numbers[k], slack);
     });
   }
 

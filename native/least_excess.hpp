@@ -5,7 +5,8 @@
 // Output: the first of the valid candidates whose cost is the least, but for ties.
 // Algorithm: branch and bound. As a plane moves up, the excess below it can only grow and the one above it only shrink,
 //         since the hull gains at least the solid that the side gains: a hull that has been measured bounds the costs
-//         of all planes of its direction on one side of it. Before any hull is built, sections bound them: the root of
+//         of all planes of its direction on one side of it, the more so by what the hulls of the solid's own sections
+//         between them have more than the solid. Before any hull is built, sections bound them: the root of
 //         the area of a convex body's section is a concave function of its height (Brunn-Minkowski), and at every
 //         plane it is at least that of the hull of the solid's own section. So the hull's volume is at least the
 //         integral of the square of the least concave function above these roots. Of the neighbouring planes with the

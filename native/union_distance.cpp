@@ -81,12 +81,18 @@ bool have_common(const std::vector<std::int32_t>& a, const std::vector<std::int3
   });
 }
 
-// Whether a triangle lies farther than `gap` beyond one of the planes.
-bool is_beyond(const ConvexPlanes& planes, const Corners& corner, double gap) {
+// Whether a triangle lies farther than `gap` beyond a plane.
+bool is_beyond(const ConvexPlanes& planes, std::int32_t plane, const Corners& corner, double gap) {
+  return planes.depth(plane, corner[0]) < -gap && planes.depth(plane, corner[1]) < -gap &&
+         planes.depth(plane, corner[2]) < -gap;
+}
+
+// A plane that a triangle lies farther than `gap` beyond, or -1. The one given is tried first.
+std::int32_t plane_before(const ConvexPlanes& planes, const Corners& corner, double gap, std::int32_t first) {
+  if (first >= 0 && is_beyond(planes, first, corner, gap)) return first;
   for (std::int32_t i = 0; i < static_cast<std::int32_t>(planes.size()); ++i)
-    if (planes.depth(i, corner[0]) < -gap && planes.depth(i, corner[1]) < -gap && planes.depth(i, corner[2]) < -gap)
-      return true;
-  return false;
+    if (is_beyond(planes, i, corner, gap)) return i;
+  return -1;
 }
 
 }  // namespace
@@ -139,44 +145,48 @@ class HullField {
 
 HullUnion::Exposed HullUnion::exposed(double gap, int threads) const {
   struct Facet {
-    std::size_t member;
-    Corners corner;
     std::vector<Polygon> pieces;
     bool resolved = true;
   };
-  std::vector<Facet> facets;
-  for (std::size_t m = 0; m < members_.size(); ++m)
-    for (const Triangle& face : members_[m]->mesh.faces) facets.push_back({m, corners_of(members_[m]->mesh, face), {}});
-
-  parallel_for(facets.size(), threads, [&](std::size_t f) {
-    Facet& facet = facets[f];
-    const Vec3 normal = normalized(cross(facet.corner[1] - facet.corner[0], facet.corner[2] - facet.corner[0]));
-    const Box box = box_of(facet.corner);
-    facet.pieces = {{facet.corner.begin(), facet.corner.end()}};
-    std::vector<HalfSpace> halves;
-    for (std::size_t m = 0; m < members_.size() && !facet.pieces.empty(); ++m) {
-      if (m == facet.member || !overlap(box, members_[m]->box, gap)) continue;
-      // Where another hull's facet faces the other way (or across), the hull is grown by the gap: a touching facet is
-      // covered. Where it faces the same way, the hull is shrunk by less than that: of two facets in one plane neither
-      // covers the other, and of two hulls on both sides of a plane across this facet one always covers it.
-      const ConvexPlanes& planes = members_[m]->planes;
-      if (is_beyond(planes, facet.corner, gap)) continue;
-      halves.clear();
-      for (std::int32_t i = 0; i < static_cast<std::int32_t>(planes.size()); ++i) {
-        const bool same_way = dot(planes.normal(i), normal) >= kSameWay;
-        halves.push_back({planes.normal(i), planes.offset(i) + (same_way ? -0.25 * gap : gap)});
-      }
-      subtract(facet.pieces, halves);
-      if (facet.pieces.size() > kMostPieces) {
-        facet.resolved = false;
-        break;
+  std::vector<std::vector<Facet>> facets(members_.size());
+  parallel_for(members_.size(), threads, [&](std::size_t own) {
+    const Mesh& mesh = members_[own]->mesh;
+    std::vector<std::int32_t> between(members_.size(), -1);  // the plane that the last facet lay beyond
+    Clipper clipper;
+    for (const Triangle& face : mesh.faces) {
+      const Corners corner = corners_of(mesh, face);
+      const Vec3 normal = normalized(cross(corner[1] - corner[0], corner[2] - corner[0]));
+      const Box box = box_of(corner);
+      Facet& facet = facets[own].emplace_back();
+      facet.pieces = {{corner.begin(), corner.end()}};
+      for (std::size_t m = 0; m < members_.size() && !facet.pieces.empty(); ++m) {
+        if (m == own || !overlap(box, members_[m]->box, gap)) continue;
+        // Where another hull's facet faces the other way (or across), the hull is grown by the gap: a touching facet is
+        // covered. Where it faces the same way, the hull is shrunk by less than that: of two facets in one plane
+        // neither covers the other, and of two hulls on both sides of a plane across this facet one always covers it.
+        const ConvexPlanes& planes = members_[m]->planes;
+        if (const std::int32_t plane = plane_before(planes, corner, gap, between[m]); plane >= 0) {
+          between[m] = plane;
+          continue;
+        }
+        HalfSpaces halves(planes);
+        for (std::size_t i = 0; i < halves.offset.size(); ++i) {
+          const double same_way = planes.x()[i] * normal.x + planes.y()[i] * normal.y + planes.z()[i] * normal.z;
+          halves.offset[i] += same_way >= kSameWay ? -0.25 * gap : gap;
+        }
+        clipper.subtract(facet.pieces, halves);
+        if (facet.pieces.size() > kMostPieces) {
+          facet.resolved = false;
+          break;
+        }
       }
     }
   });
 
   Gathering resolved, unresolved;
-  for (const Facet& facet : facets)
-    for (const Polygon& piece : facet.pieces) (facet.resolved ? resolved : unresolved).add(piece);
+  for (const std::vector<Facet>& own : facets)
+    for (const Facet& facet : own)
+      for (const Polygon& piece : facet.pieces) (facet.resolved ? resolved : unresolved).add(piece);
   return {resolved.take(), unresolved.take()};
 }
 
@@ -192,26 +202,27 @@ Interval HullUnion::over(const Bvh& surface, double tolerance, double gap, int t
 
 Interval HullUnion::under(const Mesh& surface, double tolerance, int threads) const {
   if (members_.empty()) return {kInfinity, kInfinity};
-  std::vector<std::vector<HalfSpace>> grown(members_.size());
-  for (std::size_t m = 0; m < members_.size(); ++m)
-    for (std::int32_t i = 0; i < static_cast<std::int32_t>(members_[m]->planes.size()); ++i)
-      grown[m].push_back({members_[m]->planes.normal(i), members_[m]->planes.offset(i) + kInsideSlack});
+  std::vector<HalfSpaces> grown;
+  for (const auto& member : members_) {
+    for (double& offset : grown.emplace_back(member->planes).offset) offset += kInsideSlack;
+  }
 
   constexpr std::size_t kChunk = 64;
   const auto for_each = [threads](std::size_t count, const auto& task) {
     parallel_for((count + kChunk - 1) / kChunk, threads, [&](std::size_t chunk) {
-      for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) task(i);
+      Clipper clipper;
+      for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) task(i, clipper);
     });
   };
   std::vector<std::vector<std::int32_t>> holders(surface.vertices.size());  // the hulls that a corner is in
-  for_each(holders.size(), [&](std::size_t v) {
+  for_each(holders.size(), [&](std::size_t v, Clipper&) {
     const Vec3 p = surface.vertices[v];
     for (std::size_t m = 0; m < members_.size(); ++m)
       if (overlap({p, p}, members_[m]->box, kInsideSlack) && members_[m]->planes.nearest(p).depth >= -kInsideSlack)
         holders[v].push_back(static_cast<std::int32_t>(m));
   });
   std::vector<std::vector<Polygon>> outside(surface.faces.size());
-  for_each(outside.size(), [&](std::size_t f) {
+  for_each(outside.size(), [&](std::size_t f, Clipper& clipper) {
     const auto [a, b, c] = surface.faces[f];
     if (have_common(holders[a], holders[b], holders[c])) return;
     const Corners corner = corners_of(surface, surface.faces[f]);
@@ -220,7 +231,7 @@ Interval HullUnion::under(const Mesh& surface, double tolerance, int threads) co
     for (std::size_t m = 0; m < members_.size(); ++m) {
       if (!overlap(box, members_[m]->box, kInsideSlack)) continue;
       if (outside[f].size() > kMostPieces) break;  // uncut pieces are in no way wrong here, only more work
-      subtract(outside[f], grown[m]);
+      clipper.subtract(outside[f], grown[m]);
     }
   });
 
