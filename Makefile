@@ -4,6 +4,8 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 RLACD_INSTALL := $(BIN)/pip install --quiet --constraint constraints-dev.txt --no-build-isolation \
                  --config-settings=cmake.define.RLACD_WERROR=ON
+# A file's tests stay in one process, one process a processor.
+PYTEST := $(BIN)/pytest --numprocesses auto --dist loadfile
 NATIVE_SOURCES := $(wildcard native/*.cpp native/*.hpp) CMakeLists.txt pyproject.toml constraints-dev.txt
 
 # The sanitized builds live in environments of their own.
@@ -44,10 +46,10 @@ lint: $(VENV)/test-extras
 	$(BIN)/mypy
 
 test: lint
-	$(BIN)/pytest
+	$(PYTEST)
 
 test-fast: $(VENV)/test-extras
-	$(BIN)/pytest -m 'not slow'
+	$(PYTEST) -m 'not slow'
 
 # Nightly: the native tests and a cross-section of $$RLACD_MESHES, decomposed in every way, watched by sanitizers.
 sanitize: sanitize-address sanitize-thread
