@@ -49,13 +49,14 @@ std::vector<double> section_offsets(const SolidMesh& solid, const Bundle& bundle
   return offsets;
 }
 
-// Volume between two parallel sections of a convex body that are as large as this, at least (Brunn and Minkowski).
-double frustum(double area, double other, double height) {
-  return height / 3 * (area + std::sqrt(area * other) + other);
+// Volume between two parallel sections of a convex body whose areas have these roots, at least (Brunn and Minkowski).
+double frustum(double root, double other, double height) {
+  return height / 3 * (root * root + root * other + other * other);
 }
 
-// Volumes that the hulls of what lies below (or above) each plane cannot be smaller than: see the algorithm.
-std::vector<double> least_hull_volumes(const Sections& sections, Side side) {
+// Volumes that the hulls of what lies below (or above) each plane cannot be smaller than: see the algorithm. The roots
+// are those of the areas of the sections' hulls.
+std::vector<double> least_hull_volumes(const Sections& sections, const std::vector<double>& roots, Side side) {
   struct Slice {
     double depth, root, volume;  // distance from the end; root of the area; volume between the end and here
   };
@@ -66,15 +67,14 @@ std::vector<double> least_hull_volumes(const Sections& sections, Side side) {
   for (std::size_t i = 0; i < planes; ++i) {
     const std::size_t j = side == kBelow ? i : planes - 1 - i;
     if (sections.outline(j).empty()) continue;
-    Slice next{std::fabs(sections.offset(j) - end), std::sqrt(outline_area(sections.outline(j), sections.normal())), 0};
+    Slice next{std::fabs(sections.offset(j) - end), roots[j], 0};
     while (majorant.size() > 1) {
       const Slice &a = majorant[majorant.size() - 2], &b = majorant.back();
       if ((b.root - a.root) * (next.depth - a.depth) > (next.root - a.root) * (b.depth - a.depth)) break;
       majorant.pop_back();
     }
     const Slice& last = majorant.back();
-    next.volume = last.volume + (next.depth - last.depth) / 3 *
-                                    (last.root * last.root + last.root * next.root + next.root * next.root);
+    next.volume = last.volume + frustum(last.root, next.root, next.depth - last.depth);
     least[j] = next.volume;
     majorant.push_back(next);
   }
@@ -90,16 +90,17 @@ class Direction {
     sections_.drop_heights();
     for (std::size_t j = 0, i = 0; j < planes(); ++j)
       numbers_.push_back(i < numbers.size() && bundle.offsets[i] == sections_.offset(j) ? numbers[i++] : -1);
-    std::vector<double> areas;
-    for (std::size_t j = 0; j < planes(); ++j) areas.push_back(outline_area(sections_.outline(j), sections_.normal()));
+    std::vector<double> roots;
+    for (std::size_t j = 0; j < planes(); ++j)
+      roots.push_back(std::sqrt(outline_area(sections_.outline(j), sections_.normal())));
     for (std::size_t j = 1; j < planes(); ++j) {
-      const double slab = frustum(areas[j - 1], areas[j], sections_.offset(j) - sections_.offset(j - 1));
+      const double slab = frustum(roots[j - 1], roots[j], sections_.offset(j) - sections_.offset(j - 1));
       between_.push_back(std::max(slab - (solid(kBelow, j) - solid(kBelow, j - 1)) - slack_, 0.0));
     }
     for (const Side side : {kBelow, kAbove}) {
       least_[side].assign(planes(), 0);
       hulls_[side].resize(planes());
-      const std::vector<double> volumes = least_hull_volumes(sections_, side);
+      const std::vector<double> volumes = least_hull_volumes(sections_, roots, side);
       for (std::size_t j = 0; j < planes(); ++j) raise(side, j, volumes[j] - solid(side, j) - slack_);
     }
     measure_extents();

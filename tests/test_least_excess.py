@@ -18,11 +18,11 @@ from rlacd.planes.sweep import SLIVER, Sweep, sweep
 from rlacd.planes.views import Views
 from rlacd.policies import SCORES, Greedy
 from rlacd.policies.greedy import cheapest, excess_norm, hull_sum, max_excess
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Plane
 from rlacd.solid.load import load_mesh
 from rlacd.solid.repair import repair
-from tests.test_sweep import SOLIDS, gear
+from tests.test_sweep import SOLIDS, crowded_pyramid, finned_tetrahedron, gear
 
 EXPONENTS = {"hull_sum": 1.0, "max_excess": math.inf, "excess_norm": SCORES["excess-norm"]}
 COSTS = {"hull_sum": hull_sum, "max_excess": max_excess, "excess_norm": excess_norm}
@@ -43,6 +43,14 @@ def test_it_is_the_plane_that_a_sweep_of_all_finds(name: str, score: str) -> Non
     found = least_excess(component, views.candidates(component), EXPONENTS[score])
     assert found is not None
     assert found == cheapest(swept, COSTS[score](swept))
+
+
+@pytest.mark.parametrize("solid", [crowded_pyramid(12), crowded_pyramid(40), finned_tetrahedron()])
+def test_it_is_so_where_the_mesh_is_degenerate(solid: tuple[FloatArray, IntArray]) -> None:
+    component = Component(solid)
+    candidates = axis_and_principal(component)
+    swept = sweep(component, candidates)
+    assert least_excess(component, candidates, EXPONENTS["excess_norm"]) == cheapest(swept, excess_norm(swept))
 
 
 @pytest.mark.slow

@@ -63,15 +63,17 @@ def test_sweep_equals_real_cuts(name: str) -> None:
 
 
 def crowded_pyramid(apexes: int) -> tuple[FloatArray, IntArray]:
-    """A pyramid over a regular polygon whose apex is as many vertices, joined by edges and triangles of no size."""
+    """A pyramid over a star whose apex is many vertices, joined by edges and triangles of no size."""
     angle = 2 * np.pi * np.arange(apexes) / apexes
-    base = np.stack([np.cos(angle), np.sin(angle), np.zeros(apexes)], axis=1)
-    vertices = np.concatenate([base, np.tile([0.1, 0.2, 1.0], (apexes, 1))])
+    radius = np.where(np.arange(apexes) % 2 == 0, 1.0, 0.5)
+    base = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(apexes)], axis=1)
+    vertices = np.concatenate([base, np.tile([0.1, 0.2, 1.0], (apexes, 1)), np.zeros((1, 3))])
     i, after = np.arange(apexes), np.roll(np.arange(apexes), -1)
-    fan = np.arange(1, apexes - 1)
-    bottom = np.stack([np.zeros_like(fan), fan + 1, fan], axis=1)
+    bottom = np.stack([after, i, np.full(apexes, 2 * apexes)], axis=1)
     sides = [np.stack([i, after, i + apexes], axis=1), np.stack([after, after + apexes, i + apexes], axis=1)]
-    return vertices, np.concatenate([bottom, *sides, bottom[:, ::-1] + apexes]).astype(np.int32)
+    fan = apexes + np.arange(1, apexes - 1)
+    top = np.stack([np.full_like(fan, apexes), fan, fan + 1], axis=1)
+    return vertices, np.concatenate([bottom, *sides, top]).astype(np.int32)
 
 
 def finned_tetrahedron() -> tuple[FloatArray, IntArray]:
