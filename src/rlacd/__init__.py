@@ -1,22 +1,27 @@
 """Approximate convex decomposition: any mesh in, few tight convex hulls out."""
 
+from importlib import import_module
+from typing import TYPE_CHECKING
+
 from rlacd._version import __version__
-from rlacd.criteria import NavigableSpace
-from rlacd.decompose import decompose
-from rlacd.decomposition import Decomposition
-from rlacd.errors import (
-    EmptyMeshError,
-    MeshDataError,
-    MeshError,
-    MeshFileError,
-    MissingExtraError,
-    OptionError,
-    OutputError,
-    RlacdError,
-)
-from rlacd.presets import PRESETS, Preset
-from rlacd.progress import Progress
-from rlacd.robots import Rewritten, rewrite_robot
+
+if TYPE_CHECKING:
+    from rlacd.criteria import NavigableSpace
+    from rlacd.decompose_mesh import decompose
+    from rlacd.decomposition import Decomposition
+    from rlacd.errors import (
+        EmptyMeshError,
+        MeshDataError,
+        MeshError,
+        MeshFileError,
+        MissingExtraError,
+        OptionError,
+        OutputError,
+        RlacdError,
+    )
+    from rlacd.presets import PRESETS, Preset
+    from rlacd.progress import Progress
+    from rlacd.robots import Rewritten, rewrite_robot
 
 __all__ = [
     "PRESETS",
@@ -37,3 +42,30 @@ __all__ = [
     "decompose",
     "rewrite_robot",
 ]
+
+# Where each public name lives. Its module is imported when the name is first used (PEP 562), so that `rlacd --help`
+# and programs that only might decompose do not wait for trimesh and scipy. No module may be called like a public name:
+# importing it would hide that.
+_HOME = {
+    "NavigableSpace": "criteria",
+    "decompose": "decompose_mesh",
+    "Decomposition": "decomposition",
+    "PRESETS": "presets",
+    "Preset": "presets",
+    "Progress": "progress",
+    "Rewritten": "robots",
+    "rewrite_robot": "robots",
+    **dict.fromkeys((name for name in __all__ if name.endswith("Error")), "errors"),
+}
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -399,7 +399,7 @@ def decompose(
             _rewrite(mesh, place, package_dir or [], report, quiet, options)
             return
 
-        from rlacd.decompose import decompose as run
+        from rlacd.decompose_mesh import decompose as run
         from rlacd.plain_json import to_json
         from rlacd.terminal import Watch, say, summary
 

@@ -18,7 +18,7 @@ import numpy as np
 import trimesh
 
 from rlacd.compat.vhacd import compute_vhacd
-from rlacd.decompose import decompose
+from rlacd.decompose_mesh import decompose
 
 __all__ = ["convex_decomposition"]
 

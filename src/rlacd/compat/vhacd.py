@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rlacd.compat.unused import say_unused
-from rlacd.decompose import decompose
+from rlacd.decompose_mesh import decompose
 from rlacd.errors import MeshDataError
 
 __all__ = ["compute_vhacd"]

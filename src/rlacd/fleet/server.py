@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from rlacd.decompose import decompose
+from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError, RlacdError
 from rlacd.fleet.order import POLICY, Order

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from rlacd.decompose import decompose
+from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError, MeshFileError, OptionError, OutputError
 from rlacd.formats import check_file, check_name, file_stem, write_file

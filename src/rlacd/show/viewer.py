@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rlacd.criteria import NavigableSpace
-from rlacd.decompose import decompose
+from rlacd.decompose_mesh import decompose
 from rlacd.errors import OptionError
 from rlacd.options import CONCAVITY, QUALITIES, Options
 from rlacd.show.picture import check_up

@@ -1,0 +1,67 @@
+"""What `import rlacd` costs and offers: every public name, and no library before it is needed."""
+
+from __future__ import annotations
+
+import json
+import pkgutil
+import subprocess
+import sys
+
+import pytest
+
+import rlacd
+
+HEAVY = {"numpy", "scipy", "trimesh", "manifold3d", "networkx", "onnxruntime", "rich", "torch", "typer"}
+
+
+def modules_after(code: str) -> set[str]:
+    """Names of everything imported by a fresh interpreter that runs `code`."""
+    show = f"import json, sys\n{code}\nprint(json.dumps(sorted(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", show], capture_output=True, text=True, check=True)
+    return set(json.loads(done.stdout.splitlines()[-1]))
+
+
+def test_import_loads_no_library() -> None:
+    loaded = modules_after("import rlacd")
+    assert not loaded & HEAVY
+    assert {name for name in loaded if name.startswith("rlacd")} == {"rlacd", "rlacd._version"}
+
+
+def test_errors_can_be_caught_without_loading_a_library() -> None:
+    assert not modules_after("from rlacd import OptionError, RlacdError") & HEAVY
+
+
+@pytest.mark.parametrize(
+    "arguments", [[], ["--help"], ["decompose", "--help"], ["batch", "--help"], ["bench", "--help"]]
+)
+def test_help_does_not_wait_for_the_geometry(arguments: list[str]) -> None:
+    run = f"from rlacd.cli import app\ntry:\n    app({arguments!r})\nexcept SystemExit:\n    pass"
+    assert not modules_after(run) & {"numpy", "scipy", "trimesh", "onnxruntime", "torch"}
+
+
+def test_a_decomposition_loads_no_network_runtime() -> None:
+    vertices = "[[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]"
+    faces = "[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]"
+    loaded = modules_after(f"import rlacd\nrlacd.decompose(({vertices}, {faces}))")
+    assert not loaded & {"onnxruntime", "torch", "typer", "rich"}
+
+
+def test_every_public_name_is_there_and_listed() -> None:
+    for name in rlacd.__all__:
+        assert getattr(rlacd, name) is not None
+    assert set(rlacd.__all__) <= set(dir(rlacd))
+    everything: dict[str, object] = {}
+    exec("from rlacd import *", everything)
+    assert set(rlacd.__all__) <= set(everything)
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'decompse'"):
+        _ = rlacd.decompse
+    with pytest.raises(ImportError):
+        from rlacd import decompse  # noqa: F401
+
+
+def test_no_module_hides_a_public_name() -> None:
+    modules = {module.name for module in pkgutil.iter_modules(rlacd.__path__)}
+    assert not modules & set(rlacd.__all__)
