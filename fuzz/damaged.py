@@ -53,6 +53,9 @@ SMALL_MESHES = 12
 
 BOX = trimesh.creation.box()
 
+OFF_LETTERS = {"4": " 1", "N": " 0 0 1", "C": " 255 128 0 255", "ST": " 0.5 0.25"}
+"""What a letter before ``OFF`` adds to the line of each vertex, in this order."""
+
 WELL = ("loaded", "refused")
 """How an input may end."""
 
@@ -80,7 +83,7 @@ def written(mesh: trimesh.Trimesh) -> Iterator[tuple[str, Seed]]:
     scene.add_geometry(mesh, node_name="first", geom_name="mesh")
     scene.graph.update("second", "first", matrix=trimesh.transformations.translation_matrix([3, 0, 0]), geometry="mesh")
     yield "obj", Seed(mesh.export(file_type="obj").encode())
-    yield "off", Seed(mesh.export(file_type="off").encode())
+    yield from (("off", Seed(off_variant(mesh, letters))) for letters in ("", "N", "STCN", "4", "n"))
     yield "stl", Seed(mesh.export(file_type="stl"))
     yield "stl", Seed(mesh.export(file_type="stl_ascii").encode())
     yield "ply", Seed(mesh.export(file_type="ply"))
@@ -92,6 +95,15 @@ def written(mesh: trimesh.Trimesh) -> Iterator[tuple[str, Seed]]:
     yield "xyz", Seed("\n".join(" ".join(map(str, row)) for row in mesh.vertices.tolist()).encode())
     files = scene.export(file_type="gltf")
     yield "gltf", Seed(files.pop("model.gltf"), files)
+
+
+def off_variant(mesh: trimesh.Trimesh, letters: str) -> bytes:
+    """A mesh as an OFF file with what these letters before its keyword stand for on each vertex's line."""
+    behind = "".join(text for letter, text in OFF_LETTERS.items() if letter in letters)
+    lines = [f"{letters}OFF{' 3' * ('n' in letters)} # {mesh.extents}", f"{len(mesh.vertices)} {len(mesh.faces)} 0"]
+    lines += [f"{x} {y} {z}{behind}" for x, y, z in mesh.vertices.tolist()]
+    lines += [f"3 {a} {b} {c}{' 255 0 0' * ('C' in letters)}" for a, b, c in mesh.faces.tolist()]
+    return "\n".join(lines).encode()
 
 
 class Watch:

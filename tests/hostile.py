@@ -133,6 +133,26 @@ def _() -> bytes:
     return b"OFF\n" + b"9" * 10**6 + b" 1 0\n0 0 0\n"
 
 
+@refused("a trillion vertices with normals, colours and texture coordinates.off", "promises")
+def _() -> bytes:
+    return f"STCNOFF {10**12} 0 0\n0 0 0 0 0 1 1 1 1 1 0 0\n".encode()
+
+
+@refused("a space of a billion dimensions.off", "dimensions")
+def _() -> bytes:
+    return f"nOFF {10**9}\n1 0 0\n{'0 ' * 1000}\n".encode()
+
+
+@refused("a binary file of four billion vertices.off", "binary")
+def _() -> bytes:
+    return b"OFF BINARY\n" + b"\xff" * 4000
+
+
+@refused("a comment of ten million characters, and nothing else.off", "holds|empty")
+def _() -> bytes:
+    return b"#" * 10**7
+
+
 @refused("a face of vertex 10^12.obj", "vertex|again")
 def _() -> bytes:
     return f"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 {10**12}\n".encode()

@@ -83,6 +83,103 @@ def test_a_wrong_extension_names_the_right_one(box, tmp_path, extension, lie):
         load_mesh(wrong)
 
 
+EXTRAS = {"ST": "0.5 0.25", "C": "255 0 0 255", "N": "0 0 1", "4": "2", "n": ""}
+"""What a letter before OFF puts on the line of each vertex."""
+
+
+def off(mesh, letters="", *, header="{keyword}\n{counts}", comments=False):
+    """A mesh as the OFF file of some letters; homogeneous ones have w = 2."""
+    scale = 2 if "4" in letters else 1
+    order = [letter for letter in ("4", "N", "C", "ST") if letter in letters]
+    lines = [
+        " ".join([*(repr(x * scale) for x in point), *(EXTRAS[letter] for letter in order)])
+        for point in mesh.vertices.tolist()
+    ]
+    lines += [f"3 {a} {b} {c}" + " 0.1 0.2 0.3" * (i % 2) for i, (a, b, c) in enumerate(mesh.faces.tolist())]
+    if comments:
+        lines = [word for line in lines for word in ("# a line\n", f"  {line}\t# {line} 7")]
+    keyword = f"{letters}OFF" + " 3" * ("n" in letters)
+    return header.format(keyword=keyword, counts=f"{len(mesh.vertices)} {len(mesh.faces)} 0") + "\n" + "\n".join(lines)
+
+
+HEADERS = [
+    "{keyword}\n{counts}",
+    "{keyword} {counts}",
+    "# made by hand\n\n{keyword} # a keyword\n\n{counts} # and counts\n",
+    "\ufeff{keyword}\r\n{counts}\r",
+]
+LETTERS = ["", "N", "C", "ST", "4", "n", "CN", "STN", "STC", "STCN", "4N", "C4", "STCN4", "STn"]
+
+
+@pytest.mark.parametrize("header", HEADERS)
+@pytest.mark.parametrize("letters", LETTERS)
+def test_every_variant_of_off_gives_the_same_triangles(box, tmp_path, letters, header):
+    path = tmp_path / "box.off"
+    for comments in (False, True):
+        path.write_text(off(box, letters, header=header, comments=comments), encoding="utf-8", newline="")
+        np.testing.assert_array_equal(triangles(load_mesh(path)), triangles(box))
+
+
+@pytest.mark.parametrize("header", ["OFF{counts}", "{counts}", "off\n{counts}"])
+def test_off_without_its_keyword_or_glued_to_the_counts(box, tmp_path, header):
+    path = tmp_path / "box.off"
+    path.write_text(off(box, header=header))
+    np.testing.assert_array_equal(triangles(load_mesh(path)), triangles(box))
+
+
+@pytest.mark.parametrize("letters", LETTERS)
+def test_counts_of_every_variant_of_off_are_held_against_the_file(box, tmp_path, letters):
+    path = tmp_path / "box.off"
+    whole = off(box, letters).split("\n")
+    for lines in (whole[:-1], whole[:5], [whole[0], "8 1000000000000 0", *whole[2:]]):
+        path.write_text("\n".join(lines))
+        with pytest.raises(MeshFileError, match="cut off: its header promises 8 vertices and 1"):
+            load_mesh(path)
+    for counts in ("8", "-8 12 0", "many few", "9" * 40 + " 1"):
+        path.write_text("\n".join([whole[0], counts, *whole[2:]]))
+        with pytest.raises(MeshFileError, match="export it again"):
+            load_mesh(path)
+
+
+def test_off_that_is_not_read_is_refused_for_what_it_is(box, tmp_path):
+    path = tmp_path / "box.off"
+    for content, says in (
+        (b"OFF BINARY\n" + bytes(200), "binary OFF file"),
+        (b"STCNOFF BINARY\n" + bytes(200), "binary OFF file"),
+        (b"nOFF\n5\n1 0 0\n1 2 3 4 5\n", "5 dimensions"),
+        (b"4nOFF 3\n1 0 0\n1 2 3 4\n", "homogeneous"),
+        (b"4OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "four numbers"),
+        (b"OFF\n", "how much it holds"),
+        (b"NOFF", "how much it holds"),
+        (b"# OFF", "how much it holds"),
+    ):
+        path.write_bytes(content)
+        with pytest.raises(MeshFileError, match=says):
+            load_mesh(path)
+
+
+def test_points_at_infinity_of_a_4off_are_left_out(box, tmp_path):
+    path = tmp_path / "box.off"
+    path.write_text(off(box, "4").replace(" 2\n", " 0\n", 1))
+    loaded = load_mesh(path)
+    assert len(loaded.vertices) == 7
+    assert "NaN or infinite" in loaded.warnings[0]
+
+
+def test_polygons_of_an_off_file(tmp_path):
+    path = tmp_path / "house.off"
+    path.write_text("OFF\n5 3 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n4 0 1 2 3 255 0 0\n3 0 1 4\n5 0 1 2 3 4 0 0 1\n")
+    assert len(load_mesh(path).faces) == 2 + 1 + 3
+
+
+def test_an_off_file_under_another_name_is_told(box, tmp_path):
+    for letters in LETTERS:
+        path = tmp_path / "box.ply"
+        path.write_text(off(box, letters, header=HEADERS[2]))
+        with pytest.raises(MeshFileError, match=r"rename it to \.off"):
+            load_mesh(path)
+
+
 def test_instances_are_placed_and_mirrored_ones_face_outward(box, tmp_path):
     scene = trimesh.Scene()
     scene.add_geometry(box, geom_name="box")

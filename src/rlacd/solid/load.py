@@ -25,7 +25,8 @@ from rlacd.read_file import LARGEST, read_file
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.load_gltf import plain_gltf
 from rlacd.solid.load_limits import MOST_TRIANGLES
-from rlacd.solid.load_text import check_off, check_text, plain_obj, plain_ply, plain_stl
+from rlacd.solid.load_off import is_off, plain_off
+from rlacd.solid.load_text import check_text, plain_obj, plain_ply, plain_stl
 from rlacd.solid.load_xml import check_3mf, collada_of
 from rlacd.solid.topology import BoolArray, IntArray
 
@@ -162,7 +163,7 @@ def _checked(path: Path, content: bytes, extension: str, beside: _FolderResolver
         case "obj":
             return plain_obj(path, content), extension
         case "off":
-            check_off(path, content)
+            return plain_off(path, content), extension
         case _:
             check_text(path, content)
     return content, extension
@@ -177,7 +178,7 @@ def _format_of(content: bytes) -> str | None:
         return "ply"
     if head.startswith(b"PK\x03\x04"):
         return "zae" if b".dae" in content else "3mf"
-    if head.startswith((b"OFF", b"COFF")):
+    if is_off(head):
         return "off"
     if head.startswith(b"<") and b"COLLADA" in head:
         return "dae"

@@ -62,7 +62,7 @@ def plain_ply(path: Path, content: bytes) -> bytes:
     fields = header.count(b"\n")
     if fields > MOST_FIELDS:
         raise MeshFileError(f"{path} has a header of {fields} lines, more than {MOST_FIELDS}: export it again")
-    counts = [_count(path, word) for _, word in PLY_ELEMENT.findall(header)]
+    counts = [count_in(path, word) for _, word in PLY_ELEMENT.findall(header)]
     if b"ascii" not in header.lower().split(b"\n", 2)[1]:
         return content
     check_text(path, content)
@@ -72,21 +72,9 @@ def plain_ply(path: Path, content: bytes) -> bytes:
     return header + body + b"\n"
 
 
-def check_off(path: Path, content: bytes) -> None:
-    """Compare the lines of an OFF file with the counts in its header, which the parser takes on trust."""
-    check_text(path, content)
-    lines = [line for line in (raw.split(b"#")[0].strip() for raw in content.splitlines()) if line]
-    words = b" ".join(lines[:2]).replace(b"COFF", b" ").replace(b"OFF", b" ").split()
-    if len(words) < 2:
-        return
-    counts = [_count(path, word) for word in words[:2]]
-    if len(lines) - (1 if len(lines[0].split()) > 2 else 2) < sum(counts):
-        promised = f"{counts[0]} vertices and {counts[1]} faces"
-        raise MeshFileError(f"{path} is cut off: its header promises {promised}; export it again")
-
-
-def _count(path: Path, word: bytes) -> int:
+def count_in(path: Path, word: bytes) -> int:
+    """Read a count in a header; raises MeshFileError where it is none."""
     if not re.fullmatch(rb"\+?\d{1,18}", word):
         said = word[:20].decode(errors="replace")
-        raise MeshFileError(f"{path} promises {said!r} things, which is negative or no number; export it again")
+        raise MeshFileError(f"{path} has {said!r} in its header where a count belongs: it is damaged; export it again")
     return int(word)
