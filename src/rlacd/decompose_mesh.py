@@ -14,9 +14,10 @@ from numpy.typing import ArrayLike
 from rlacd.clock import Clock
 from rlacd.criteria import Concavity, Criterion, NavigableSpace
 from rlacd.cut import CutTree
+from rlacd.cut_and_merge import cut_and_merge
 from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError
-from rlacd.finish import drop_slivers, in_input, limit_part, merge_parts, merge_to_count, with_limits
+from rlacd.finish import drop_slivers, in_input, limit_part, merge_to_count, with_limits
 from rlacd.options import CONCAVITY, DEFAULT_RESOLUTION, DEFAULT_THRESHOLD, Options
 from rlacd.planes.views import Views
 from rlacd.policies import AS_PUBLISHED, make_policy
@@ -221,7 +222,7 @@ def _parts(
     tree: CutTree, criterion: Criterion, options: Options, workers: Workers, clock: Clock
 ) -> tuple[list[Part], Criterion]:
     """The parts, and the criterion they were settled on."""
-    parts, criterion = _cut_and_merge(tree, criterion, options, workers, clock)
+    parts, criterion = _one_pass(tree, criterion, options, workers, clock)
     if options.max_hulls is None or len(parts) <= options.max_hulls:
         return parts, criterion
     best: list[Part] = []
@@ -236,19 +237,11 @@ def _parts(
         if len(parts) <= options.max_hulls or clock.stopped_by is not None:
             return best, criterion
         coarser = coarser.scaled(COARSER)
-        parts, _ = _cut_and_merge(tree, coarser, options, workers, clock)
+        parts, _ = _one_pass(tree, coarser, options, workers, clock)
 
 
-def _cut_and_merge(
+def _one_pass(
     tree: CutTree, criterion: Criterion, options: Options, workers: Workers, clock: Clock
 ) -> tuple[list[Part], Criterion]:
-    with clock.stage("cut"):
-        done, left = tree.cut_until(criterion, clock)
-        parts: list[Part] = [*done, *left]
-        if clock.stopped_by is None:
-            parts = drop_slivers(parts, workers, suspects=left)
-            criterion = criterion.settled(parts)
-    if not options.merge:
-        return parts, criterion
-    with clock.stage("merge"):
-        return merge_parts(parts, criterion, workers, clock, solid=tree.root), criterion
+    done = cut_and_merge(tree, criterion, workers, clock, merge=options.merge)
+    return done.parts, done.criterion

@@ -11,7 +11,7 @@ import torch
 from rlacd.clock import Clock
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
-from rlacd.finish import drop_slivers, merge_parts
+from rlacd.cut_and_merge import cut_and_merge
 from rlacd.learn.encoders import Encoder, describe
 from rlacd.learn.options import TrainOptions
 from rlacd.learn.qnetwork import QNetwork
@@ -48,10 +48,9 @@ def count_parts(policy: Policy, solids: Sequence[Component], criterion: Concavit
     raw, merged = [], []
     with Workers(1) as workers:
         for solid in solids:
-            done, left = CutTree(solid, policy, workers).cut_until(criterion, Clock(), most=MOST_PARTS)
-            parts = drop_slivers([*done, *left], workers, suspects=left)
-            raw.append(len(parts))
-            merged.append(len(merge_parts(parts, criterion, workers, Clock(), solid=solid)))
+            done = cut_and_merge(CutTree(solid, policy, workers), criterion, workers, Clock(), most=MOST_PARTS)
+            raw.append(len(done.pieces))
+            merged.append(len(done.parts))
     return Score(raw, merged)
 
 

@@ -14,8 +14,9 @@ import numpy as np
 from rlacd.clock import Clock
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
+from rlacd.cut_and_merge import cut_and_merge
 from rlacd.errors import OptionError
-from rlacd.finish import drop_slivers, limit_part, merge_parts
+from rlacd.finish import limit_part
 from rlacd.planes.candidates import OFFSETS_PER_AXIS, Candidates
 from rlacd.planes.concave_edges import concave_edge_planes
 from rlacd.planes.sweep import SLIVER, sweep
@@ -136,11 +137,8 @@ def decompose_as_deployed(
         In the input's frame and unit.
     """
     solid = repair(load_mesh((vertices, faces)), threads=threads)
-    criterion, clock = Concavity(threshold), Clock()
     with Workers(threads) as workers:
         tree = CutTree(Component(solid.manifold), Deployed(deployment, threshold), workers)
-        done, left = tree.cut_until(criterion, clock)
-        parts = drop_slivers([*done, *left], workers, suspects=left)
-        parts = drop_slivers(merge_parts(parts, criterion, workers, clock, solid=tree.root), workers)
+        parts = cut_and_merge(tree, Concavity(threshold), workers, Clock()).parts
     there = [Hull.of(solid.frame.to_input(limit_part(part, None, None).hull.vertices)) for part in parts]
     return [(hull.vertices, hull.faces) for hull in there if hull is not None]

@@ -11,7 +11,8 @@ from typing import Any
 from rlacd.clock import Clock
 from rlacd.criteria.criterion import Criterion
 from rlacd.cut import CutTree, Divisions
-from rlacd.finish import drop_slivers, merge_parts
+from rlacd.cut_and_merge import cut_and_merge
+from rlacd.finish import drop_slivers
 from rlacd.planes.views import Views
 from rlacd.policies.greedy import SCORES
 from rlacd.search.neighbourhood import OPENING, Neighbourhood, Outcome, cost
@@ -223,10 +224,12 @@ def _portfolio(
         if pace.is_over or len(parts) == 1 or seconds > SHARE * pace.left:
             break
         tree = CutTree(root, ranking(views), workers, divisions)
-        other = _whole(tree, criterion, workers, pace, most=HOPELESS * len(parts))
-        if other is not None and all(cost(other) != cost(known) for known in found):
-            found.append(other)
-            pace.parts = min(pace.parts, len(other))
+        other = cut_and_merge(tree, criterion, workers, pace, most=HOPELESS * len(parts), strict=True)
+        if other.unmet or pace.is_over:
+            continue
+        if all(cost(other.parts) != cost(known) for known in found):
+            found.append(other.parts)
+            pace.parts = min(pace.parts, len(other.parts))
     return sorted(found, key=cost)
 
 
@@ -255,15 +258,3 @@ def _from_all(
         if not exhausted:
             break
     return Outcome(best, total, accepted, exhausted)
-
-
-def _whole(tree: CutTree, criterion: Criterion, workers: Workers, pace: Pace, most: int) -> list[Part] | None:
-    """The parts of a tree of cuts, merged; None when the clock or `most` stopped them, or not all are feasible."""
-    done, left = tree.cut_until(criterion, pace, most)
-    if pace.is_over or len(done) + len(left) > most:
-        return None
-    parts = drop_slivers([*done, *left], workers, suspects=left)
-    if not all(workers.map(criterion.is_met, [part for part in left if part in parts])):
-        return None
-    merged = merge_parts(parts, criterion, workers, pace, solid=tree.root)
-    return None if pace.is_over else drop_slivers(merged, workers)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from rlacd.criteria.criterion import Criterion
 from rlacd.cut import CutTree
-from rlacd.finish import merge_parts
+from rlacd.cut_and_merge import cut_and_merge
 from rlacd.planes.views import Views
 from rlacd.search.neighbourhood import Neighbourhood, Outcome
 from rlacd.search.pace import Pace
@@ -66,12 +66,11 @@ def tighten(
         factor = math.sqrt(least * reached)
         finer = criterion.scaled(factor)
         with pace.share(left):
-            done, unmet = tree.cut_until(finer, pace)
-            fine = merge_parts(done, finer, workers, pace, solid=root)
-            if unmet or pace.is_over:
+            fine = cut_and_merge(tree, finer, workers, pace, strict=True)
+            if fine.unmet or pace.is_over:
                 least = factor
                 continue
-            found = Neighbourhood(root, fine, finer, rankings, near_views, workers, seed).run(
+            found = Neighbourhood(root, fine.parts, finer, rankings, near_views, workers, seed).run(
                 pace, math.floor((steps - total) / left) if math.isfinite(steps) else steps, most_parts
             )
         total += found.steps

@@ -11,7 +11,7 @@ from manifold3d import Manifold
 from rlacd.clock import Clock
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
-from rlacd.finish import merge_parts
+from rlacd.cut_and_merge import cut_and_merge
 from rlacd.policies import Policy
 from rlacd.solid.component import Component
 from rlacd.workers import Workers
@@ -30,12 +30,9 @@ def deploy(policy: Policy, solids: Sequence[Manifold], threshold: float) -> list
     counts = []
     with Workers(1) as workers:
         for solid in solids:
-            clock = Clock()
-            root = Component(solid)
-            done, left = CutTree(root, policy, workers).cut_until(Concavity(threshold), clock)
-            parts = [*done, *left]
-            merged = merge_parts(parts, Concavity(threshold), workers, clock, solid=root)
-            counts.append(Count(len(parts), len(merged)))
+            tree = CutTree(Component(solid), policy, workers)
+            done = cut_and_merge(tree, Concavity(threshold), workers, Clock())
+            counts.append(Count(len(done.pieces), len(done.parts)))
     return counts
 
 

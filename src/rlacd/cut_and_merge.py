@@ -1,0 +1,81 @@
+"""One pass: cut until every part meets the criterion, drop slivers, merge, drop slivers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rlacd.clock import Clock
+from rlacd.criteria import Criterion
+from rlacd.cut import CutTree
+from rlacd.finish import drop_slivers, merge_parts
+from rlacd.solid.component import Part
+from rlacd.workers import Workers
+
+
+@dataclass(frozen=True)
+class Pass:
+    """What one pass makes of a solid.
+
+    Attributes
+    ----------
+    pieces : list of Part
+        The parts after cutting, without the slivers among those that exceed the criterion.
+    unmet : list of Part
+        Those of the pieces that exceed the criterion.
+    parts : list of Part
+        The pieces merged, without slivers; the pieces themselves where nothing was merged.
+    criterion : Criterion
+        The criterion the parts were merged by: the one asked for, as settled on the pieces.
+    """
+
+    pieces: list[Part]
+    unmet: list[Part]
+    parts: list[Part]
+    criterion: Criterion
+
+
+def cut_and_merge(
+    tree: CutTree,
+    criterion: Criterion,
+    workers: Workers,
+    clock: Clock,
+    *,
+    merge: bool = True,
+    most: float = math.inf,
+    strict: bool = False,
+) -> Pass:
+    """Cut a solid until every part meets the criterion, drop slivers, merge, and drop slivers again.
+
+    Parameters
+    ----------
+    tree : CutTree
+        The cuts of the solid.
+    criterion : Criterion
+    workers : Workers
+    clock : Clock
+        Times the stages ``cut`` and ``merge``. When it stops, the parts reached so far are returned.
+    merge : bool
+        Whether to merge. Without it no slivers are dropped in the end either.
+    most : float
+        Stop cutting as soon as it is clear that there will be more parts than this.
+    strict : bool
+        Only a pass all of whose pieces meet the criterion is of use: do not merge the others.
+    """
+    with clock.stage("cut"):
+        done, left = tree.cut_until(criterion, clock, most)
+        pieces: list[Part] = [*done, *left]
+        if strict and len(pieces) > most:
+            return Pass(pieces, [*left], pieces, criterion)
+        if clock.stopped_by is None:
+            pieces = drop_slivers(pieces, workers, suspects=left)
+            criterion = criterion.settled(pieces)
+        kept = {id(part) for part in pieces}
+        unmet: list[Part] = [part for part in left if id(part) in kept]
+    if not merge or (strict and unmet):
+        return Pass(pieces, unmet, pieces, criterion)
+    with clock.stage("merge"):
+        parts = merge_parts(pieces, criterion, workers, clock, solid=tree.root)
+        if clock.stopped_by is None:
+            parts = drop_slivers(parts, workers)
+    return Pass(pieces, unmet, parts, criterion)
