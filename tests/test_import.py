@@ -6,6 +6,8 @@ import json
 import pkgutil
 import subprocess
 import sys
+from importlib.resources import files
+from pathlib import Path
 
 import pytest
 
@@ -65,3 +67,30 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
 def test_no_module_hides_a_public_name() -> None:
     modules = {module.name for module in pkgutil.iter_modules(rlacd.__path__)}
     assert not modules & set(rlacd.__all__)
+
+
+WITHOUT_ONNXRUNTIME = "import sys\nsys.modules['onnxruntime'] = None\n"
+
+
+@pytest.mark.parametrize("policy", ["learned", "own.onnx"])
+def test_a_learned_policy_without_its_extra_is_one_sentence_before_any_work(policy: str, tmp_path: Path) -> None:
+    (tmp_path / "own.onnx").write_bytes(files("rlacd.weights").joinpath("guide.onnx").read_bytes())
+    command = ["decompose", "missing.stl", "--policy", policy]
+    done = subprocess.run(
+        [sys.executable, "-c", f"{WITHOUT_ONNXRUNTIME}from rlacd.cli import app\napp({command!r})"],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+    )
+    assert done.returncode == 2
+    assert "pip install 'rlacd[learned]'" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert "missing.stl" not in done.stderr
+
+
+def test_every_other_policy_needs_no_extra() -> None:
+    loaded = modules_after(
+        f"{WITHOUT_ONNXRUNTIME}from rlacd.policies import POLICIES, make_policy\n"
+        "for name in POLICIES:\n    if name != 'learned': make_policy(name)"
+    )
+    assert "rlacd.policies.greedy" in loaded

@@ -120,6 +120,8 @@ def decompose(
         The input cannot be read or holds nothing to decompose.
     OptionError
         An option is out of range.
+    MissingExtraError
+        A learned policy is asked for without the extra ``learned``.
     """
     options = Options(
         criterion=criterion,
@@ -141,6 +143,7 @@ def decompose(
     )
     if progress is not None and not callable(progress):
         raise OptionError(f"progress is {progress!r}; it has to be a function that takes a `rlacd.Progress`.")
+    make_policy(options.policy)  # what is wrong with a network is said before any work is done
     clock = Clock(options.timeout, progress)
     with Workers(options.threads) as workers:
         with clock.stage("load"):

@@ -51,6 +51,8 @@ def make_policy(name: str, views: Views | None = None, scale: float | None = Non
         No policy has this name.
     WeightsError
         The network cannot be loaded.
+    MissingExtraError
+        A learned policy is asked for without the extra ``learned``.
     """
     if name == "greedy":
         return Greedy(views=views)

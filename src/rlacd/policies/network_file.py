@@ -7,7 +7,14 @@ from __future__ import annotations
 
 import os
 
-import onnxruntime
+from rlacd.errors import MissingExtraError
+
+try:
+    import onnxruntime
+except ImportError as error:
+    raise MissingExtraError(
+        "learned policies need an extra: run  pip install 'rlacd[learned]'  and try again."
+    ) from error
 
 
 def open_network(content: bytes, optimized: bool = True) -> onnxruntime.InferenceSession:

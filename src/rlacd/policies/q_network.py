@@ -6,14 +6,15 @@ import json
 import math
 import os
 from functools import lru_cache
-from typing import Any
-
-import onnxruntime
+from typing import TYPE_CHECKING, Any
 
 from rlacd.errors import WeightsError
 from rlacd.policies.network_file import open_network
 from rlacd.policies.observe import Float32Array, Observation
 from rlacd.read_file import read_file
+
+if TYPE_CHECKING:
+    import onnxruntime
 
 KIND = "q"
 """What the metadata of such a file say that it is."""
