@@ -75,9 +75,9 @@ class StandIn:
 
 @pytest.fixture
 def stand_in(monkeypatch: pytest.MonkeyPatch) -> StandIn:
-    module = types.ModuleType("rlacd.decompose")
+    module = types.ModuleType("rlacd.decompose_mesh")
     module.decompose = StandIn()  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "rlacd.decompose", module)
+    monkeypatch.setitem(sys.modules, "rlacd.decompose_mesh", module)
     return module.decompose
 
 

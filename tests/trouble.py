@@ -8,9 +8,9 @@ import trimesh
 
 CODE = """
 import os, signal, sys, time
-import rlacd
+import rlacd.decompose_mesh
 
-module = sys.modules["rlacd.decompose"]
+module = sys.modules["rlacd.decompose_mesh"]
 well = module.decompose
 
 def decompose(mesh, **options):
