@@ -16,11 +16,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from rlacd.errors import MissingExtraError, OptionError, OutputError
-from rlacd.measure import Bench, Limits, Store, Task, find_meshes, make_method, tables, tuning
-from rlacd.measure.deployed import Deployment, decompose_as_deployed
-from rlacd.measure.store import load_hulls, save_hulls
-from rlacd.measure.tables import (
+from rlacd.bench import Bench, Limits, Store, Task, find_meshes, make_method, tables, tuning
+from rlacd.bench.deployed import Deployment, decompose_as_deployed
+from rlacd.bench.store import load_hulls, save_hulls
+from rlacd.bench.tables import (
     Spread,
     Table,
     as_csv,
@@ -31,7 +30,8 @@ from rlacd.measure.tables import (
     ratio_of_parts,
     short_names,
 )
-from rlacd.measure.tuning import CLOSE, next_setting, tune
+from rlacd.bench.tuning import CLOSE, next_setting, tune
+from rlacd.errors import MissingExtraError, OptionError, OutputError
 from tests.shapes import box, from_manifold
 
 CROSS = box((-1, -0.2, -0.2), (1, 0.2, 0.2)) + box((-0.2, -1, -0.2), (0.2, 1, 0.2))
@@ -254,7 +254,7 @@ class TestRunner:
         for name in ("a.ply", "b.ply"):
             trimesh.util.concatenate([sphere, sphere.copy().apply_translation((1.5, 0, 0))]).export(folder / name)
         program = (
-            "import signal, sys; from pathlib import Path; from rlacd.measure import Bench, Store, find_meshes;"
+            "import signal, sys; from pathlib import Path; from rlacd.bench import Bench, Store, find_meshes;"
             "signal.signal(signal.SIGINT, signal.default_int_handler);"  # ignored by what runs in a shell's background
             "m, o = map(Path, sys.argv[1:]);"
             "Bench(m, find_meshes(m), Store(o)).run('greedy', 0.002)"

@@ -15,13 +15,13 @@ import pytest
 import trimesh
 from typer.testing import CliRunner
 
+from rlacd.bench.arms import ARMS, LARGEST_WEIGHT, _options, train_arms
+from rlacd.bench.charts import Curve, curves_chart, pareto_chart, pareto_front
+from rlacd.bench.page import Code, Figure, Heading, Page, Text
+from rlacd.bench.sheets import draw_sheet
+from rlacd.bench.tables import Table
 from rlacd.cli import app
 from rlacd.errors import OptionError
-from rlacd.measure.arms import ARMS, LARGEST_WEIGHT, _options, train_arms
-from rlacd.measure.charts import Curve, curves_chart, pareto_chart, pareto_front
-from rlacd.measure.page import Code, Figure, Heading, Page, Text
-from rlacd.measure.sheets import draw_sheet
-from rlacd.measure.tables import Table
 from tests.shapes import box, from_manifold
 
 CROSS = box((-1, -0.2, -0.2), (1, 0.2, 0.2)) + box((-0.2, -1, -0.2), (0.2, 1, 0.2))

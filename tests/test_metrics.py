@@ -1,4 +1,4 @@
-"""What `rlacd.measure` says of hulls, against shapes with known answers and against an independent reference."""
+"""What `rlacd.bench` says of hulls, against shapes with known answers and against an independent reference."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rlacd
+from rlacd.bench import Metrics, measure
+from rlacd.bench.metrics import COVERED, SAMPLES, TOLERANCE, is_valid
 from rlacd.errors import OptionError
-from rlacd.measure import Metrics, measure
-from rlacd.measure.metrics import COVERED, SAMPLES, TOLERANCE, is_valid
 from rlacd.solid.load import load_mesh
 from rlacd.solid.repair import repair
 from tests.shapes import Closed, box, dense, from_manifold, point_to_triangles, to_manifold

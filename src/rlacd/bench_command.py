@@ -15,8 +15,8 @@ from rlacd.errors import MeshFileError, OptionError, OutputError
 from rlacd.exit_codes import exit_codes
 
 if TYPE_CHECKING:
-    from rlacd.measure import Bench
-    from rlacd.measure.page import Page
+    from rlacd.bench import Bench
+    from rlacd.bench.page import Page
 
 HELP = """Compare decompositions by other tools and by rlacd: fewer, tighter hulls, and how long they take.
 
@@ -108,7 +108,7 @@ def compare(
     [bold]Example[/bold]
       rlacd bench compare meshes/ --out run/ --jobs 2
     """
-    from rlacd.measure.compare import DEFAULT_METHODS, at_settings, compare_page
+    from rlacd.bench.compare import DEFAULT_METHODS, at_settings, compare_page
 
     if up not in ("x", "y", "z"):
         raise OptionError(f"--up is {up!r}; it has to be x, y or z.")
@@ -137,7 +137,7 @@ def table_4(bench: Bench, methods: Methods = None, at: MeanError = None, close: 
 
 
 def _equal_accuracy(bench: Bench, title: str, methods: str | None, at: list[float] | None, close: float) -> Page:
-    from rlacd.measure.experiments import TABLE_1_METHODS, TARGETS, equal_accuracy
+    from rlacd.bench.experiments import TABLE_1_METHODS, TARGETS, equal_accuracy
 
     return equal_accuracy(bench, _names(methods, TABLE_1_METHODS), at or TARGETS, title, close)
 
@@ -149,7 +149,7 @@ def vhacd(
     threshold: Threshold = 0.05,
 ) -> Page:
     """Give V-HACD as many hulls as rlacd made of each mesh, and compare how tight they are (4.4.2)."""
-    from rlacd.measure.experiments import vhacd_at_equal_parts
+    from rlacd.bench.experiments import vhacd_at_equal_parts
 
     return vhacd_at_equal_parts(bench, reference, threshold)
 
@@ -157,7 +157,7 @@ def vhacd(
 @experiment("paper-table-2")
 def table_2(bench: Bench, ranking: Ranking = "learned", threshold: Threshold = 0.05) -> Page:
     """Leave out spatial planes, PCA planes, planes of concave edges (Table 2)."""
-    from rlacd.measure.experiments import kinds_of_planes
+    from rlacd.bench.experiments import kinds_of_planes
 
     return kinds_of_planes(bench, ranking, threshold)
 
@@ -171,7 +171,7 @@ def table_3(
     threshold: Threshold = 0.05,
 ) -> Page:
     """Vary the numbers of planes and of concave edges (Table 3)."""
-    from rlacd.measure.experiments import numbers_of_planes
+    from rlacd.bench.experiments import numbers_of_planes
 
     return numbers_of_planes(bench, ranking, threshold, _counts(planes), _counts(edges))
 
@@ -186,7 +186,7 @@ def _trained(name: str, about: str) -> None:
         seed: Annotated[int, typer.Option(min=0)] = 0,
     ) -> None:
         with exit_codes():
-            from rlacd.measure.arms import train_arms
+            from rlacd.bench.arms import train_arms
 
             _need_folder(meshes)
             _make_folder(out)
@@ -208,8 +208,8 @@ def discounts(
 ) -> None:
     """Find by tabular Q-learning on real cut trees which discounts converge (appendix A)."""
     with exit_codes():
-        from rlacd.measure import find_meshes
-        from rlacd.measure.discounts import discounts_page
+        from rlacd.bench import find_meshes
+        from rlacd.bench.discounts import discounts_page
 
         _need_folder(meshes)
         _make_folder(out)
@@ -227,7 +227,7 @@ def _open(
     threads: int,
     jobs: int,
 ) -> Iterator[Bench]:
-    from rlacd.measure import Bench, Limits, Store, find_meshes
+    from rlacd.bench import Bench, Limits, Store, find_meshes
 
     _need_folder(meshes)
     if listed is not None and not listed.is_file():
@@ -258,7 +258,7 @@ def _make_folder(folder: Path) -> None:
 
 
 def _save(bench: Bench, page: Page, name: str) -> None:
-    from rlacd.measure.compare import save_csv
+    from rlacd.bench.compare import save_csv
 
     _write(page, bench.store.folder, name)
     save_csv(bench, bench.store.folder)
@@ -271,7 +271,7 @@ def _write(page: Page, folder: Path, name: str) -> None:
 
 
 def _names(given: str | None, usual: tuple[str, ...]) -> list[str]:
-    from rlacd.measure import make_method
+    from rlacd.bench import make_method
 
     names = list(usual) if given is None else [word.strip() for word in given.split(",") if word.strip()]
     if not names:

@@ -11,11 +11,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from rlacd.bench.charts import Curve, curves_chart
+from rlacd.bench.page import Figure, Heading, Page, Text
+from rlacd.bench.tables import Table
 from rlacd.errors import MissingExtraError, OptionError
 from rlacd.learn.options import TrainOptions
-from rlacd.measure.charts import Curve, curves_chart
-from rlacd.measure.page import Figure, Heading, Page, Text
-from rlacd.measure.tables import Table
 
 Changes = Mapping[str, Any]
 

@@ -10,10 +10,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from rlacd.bench.methods import Method, make_method
+from rlacd.bench.runner import Bench, is_outdated
+from rlacd.bench.store import Row
 from rlacd.errors import OptionError
-from rlacd.measure.methods import Method, make_method
-from rlacd.measure.runner import Bench, is_outdated
-from rlacd.measure.store import Row
 
 CLOSE = 0.02
 """The mean D_h may be this share of the target away from it, unless told otherwise."""

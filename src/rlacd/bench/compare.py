@@ -9,16 +9,16 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
+from rlacd.bench.charts import Curve, curves_chart, pareto_chart
+from rlacd.bench.methods import make_method
+from rlacd.bench.page import Figure, Heading, Page, Text
+from rlacd.bench.runner import Bench
+from rlacd.bench.sheets import draw_sheet
+from rlacd.bench.store import Row, Task, load_hulls
+from rlacd.bench.tables import Table, as_csv, common_meshes, comparison, details, failures, short_names
+from rlacd.bench.tuning import Point, known_curve
 from rlacd.errors import MissingExtraError
 from rlacd.formats import write_file
-from rlacd.measure.charts import Curve, curves_chart, pareto_chart
-from rlacd.measure.methods import make_method
-from rlacd.measure.page import Figure, Heading, Page, Text
-from rlacd.measure.runner import Bench
-from rlacd.measure.sheets import draw_sheet
-from rlacd.measure.store import Row, Task, load_hulls
-from rlacd.measure.tables import Table, as_csv, common_meshes, comparison, details, failures, short_names
-from rlacd.measure.tuning import Point, known_curve
 
 DEFAULT_METHODS = (
     "coacd",

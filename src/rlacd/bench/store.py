@@ -14,8 +14,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from rlacd.bench.methods import RawHull
 from rlacd.errors import OutputError
-from rlacd.measure.methods import RawHull
 
 Row: TypeAlias = dict[str, Any]
 """A finished task: ``mesh``, ``method``, ``setting``; ``error``, or what was measured."""

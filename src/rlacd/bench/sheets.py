@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from rlacd.bench.methods import RawHull
+from rlacd.bench.store import Row
 from rlacd.formats.palette import hull_colors, linear_from_srgb
-from rlacd.measure.methods import RawHull
-from rlacd.measure.store import Row
 from rlacd.show.picture import FADED, INK, INPUT_COLOR, PAPER, TO_Z_UP
 from rlacd.show.render import Body, render, require_extra
 from rlacd.solid.load import load_mesh

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from rlacd.bench.compare import Entry, about, curve_chart, mesh_by_mesh, trade_off
+from rlacd.bench.page import Heading, Page, Text
+from rlacd.bench.runner import Bench
+from rlacd.bench.store import Row, Task
+from rlacd.bench.tables import Table, common_meshes, comparison, details, failures
+from rlacd.bench.tuning import CLOSE, Point, tune
 from rlacd.errors import OptionError
-from rlacd.measure.compare import Entry, about, curve_chart, mesh_by_mesh, trade_off
-from rlacd.measure.page import Heading, Page, Text
-from rlacd.measure.runner import Bench
-from rlacd.measure.store import Row, Task
-from rlacd.measure.tables import Table, common_meshes, comparison, details, failures
-from rlacd.measure.tuning import CLOSE, Point, tune
 
 TARGETS = (0.15, 0.10)
 """The paper's two accuracies."""

@@ -12,8 +12,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from rlacd.measure.methods import make_method
-from rlacd.measure.store import Row, Store, Task
+from rlacd.bench.methods import make_method
+from rlacd.bench.store import Row, Store, Task
 from rlacd.pool.process import kill_group, why_it_ended
 
 Say = Callable[[str], None]
@@ -123,7 +123,7 @@ class Bench:
             "answer": str(answer),
         }
         environment = {**os.environ, "OMP_NUM_THREADS": str(self.limits.threads)}
-        command = [sys.executable, "-m", "rlacd.measure.child", json.dumps(order)]
+        command = [sys.executable, "-m", "rlacd.bench.child", json.dumps(order)]
         # The child reads a pipe that nothing is written to: when this process dies, the pipe ends, and then the child.
         read_end, write_end = os.pipe()
         try:

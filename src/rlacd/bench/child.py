@@ -1,4 +1,4 @@
-"""The process in which a tool runs and its hulls are measured: ``python -m rlacd.measure.child``, one task each.
+"""The process in which a tool runs and its hulls are measured: ``python -m rlacd.bench.child``, one task each.
 
 Whatever a tool does (crash, hang, eat all memory, print to stdout) happens here; what is to be known is in a file.
 """
@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rlacd.measure.methods import make_method
-from rlacd.measure.metrics import measure
-from rlacd.measure.store import Row, load_hulls, save_hulls
+from rlacd.bench.methods import make_method
+from rlacd.bench.metrics import measure
+from rlacd.bench.store import Row, load_hulls, save_hulls
 from rlacd.solid.load import load_mesh
 from rlacd.solid.repair import repair
 

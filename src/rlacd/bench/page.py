@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
 
+from rlacd.bench.tables import Table
 from rlacd.formats import write_file
-from rlacd.measure.tables import Table
 
 
 @dataclass(frozen=True)

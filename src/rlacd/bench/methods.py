@@ -23,8 +23,8 @@ from typing import TypeAlias
 
 import numpy as np
 
+from rlacd.bench.deployed import Deployment, decompose_as_deployed
 from rlacd.errors import MissingExtraError, OptionError
-from rlacd.measure.deployed import Deployment, decompose_as_deployed
 from rlacd.options import QUALITIES
 from rlacd.policies import is_policy
 from rlacd.solid.arrays import FloatArray, IntArray

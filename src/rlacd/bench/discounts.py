@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from rlacd.bench.charts import Curve, curves_chart
+from rlacd.bench.page import Figure, Page, Text
+from rlacd.bench.tables import Table
 from rlacd.criteria import Concavity
 from rlacd.errors import MeshError, RlacdError
 from rlacd.learn.tabular import Node, grow, middle_planes, process_of, q_learning
-from rlacd.measure.charts import Curve, curves_chart
-from rlacd.measure.page import Figure, Page, Text
-from rlacd.measure.tables import Table
 from rlacd.solid.component import Component
 from rlacd.solid.load import load_mesh
 from rlacd.solid.repair import repair
