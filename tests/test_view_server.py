@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import http.client
 import io
 import json
@@ -97,6 +99,32 @@ def test_the_page_comes_with_its_controls(viewer: Viewer) -> None:
     assert "<title>an elbow &#x27;n ümläut</title>" in page
     assert '"threshold":0.05' in page.replace(" ", "")
     assert "connect-src 'self'" in page
+    for script in re.findall(r"\./page/\w+\.js", page):
+        assert ask(viewer, "GET", script.removeprefix(".")).headers["Content-Type"].startswith("text/javascript")
+
+
+def test_every_answer_is_hardened(viewer: Viewer) -> None:
+    settled(viewer, run=1)
+    for path in ("/", "/page/list.js", "/state", "/scene", "/download?format=glb", "/nothing"):
+        headers = ask(viewer, "GET", path).headers
+        assert headers["X-Content-Type-Options"] == "nosniff"
+        assert headers["X-Frame-Options"] == "DENY"
+        assert headers["Referrer-Policy"] == "no-referrer"
+        assert headers["Cross-Origin-Resource-Policy"] == "same-origin"
+        assert "Python" not in headers["Server"]
+
+
+def test_the_content_policy_names_every_script_by_its_hash(viewer: Viewer) -> None:
+    answer = ask(viewer, "GET", "/")
+    policy, page = answer.headers["Content-Security-Policy"], answer.body.decode()
+    assert "default-src 'none'" in policy
+    assert "frame-ancestors 'none'" in policy
+    assert "unsafe" not in policy
+    assert "data:" not in policy.split("script-src")[1].split(";")[0]
+    inside = re.findall(r'<(script|style)(?: type="(importmap|module)")?>(.*?)</\1>', page, re.DOTALL)
+    assert len(inside) == 4
+    for _, _, text in inside:
+        assert base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() in policy
 
 
 def test_hulls_come_with_progress_and_again_with_other_options(viewer: Viewer) -> None:
@@ -219,8 +247,11 @@ def test_pages_of_other_sites_are_turned_away(viewer: Viewer) -> None:
     assert ask(viewer, "POST", "/decompose", options, Host="evil.example:80").status == 403
     assert ask(viewer, "POST", "/decompose", options, Origin="http://evil.example").status == 403
     assert ask(viewer, "POST", "/decompose", options, Origin="null").status == 403
-    assert ask(viewer, "POST", "/decompose", options, Content_Type="text/plain").status == 403
-    assert ask(viewer, "POST", "/decompose", {"x": "y" * 20_000}).status == 403
+    assert ask(viewer, "POST", "/decompose", options, Content_Type="text/plain").status == 415
+    assert ask(viewer, "GET", "/download?format=glb", Sec_Fetch_Site="cross-site").status == 403
+    assert ask(viewer, "GET", "/scene", Sec_Fetch_Site="same-site").status == 403
+    assert ask(viewer, "GET", "/scene", Origin="http://localhost:1").status == 403
+    assert ask(viewer, "GET", "/", Sec_Fetch_Site="cross-site", Sec_Fetch_Mode="navigate").status == 200
     assert viewer.session.state.run == 1
     assert ask(viewer, "POST", "/decompose", options, Origin=f"http://{own}").status == 202
 

@@ -12,6 +12,7 @@ import os
 import sys
 from collections.abc import Iterator
 from enum import IntEnum
+from typing import NoReturn
 
 import typer
 
@@ -64,6 +65,14 @@ def exit_codes() -> Iterator[None]:
     except Exception as error:
         message = f"a bug in rlacd ({type(error).__name__}: {_first_line(error)}); "
         _fail(message + "run again with RLACD_DEBUG=1 for the traceback, and please report it.", ExitCode.BUG)
+
+
+def leave(code: int) -> NoReturn:
+    """End the process now, whatever its threads are doing; for when nothing is left to write."""
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError, AttributeError):
+            stream.flush()
+    os._exit(code)
 
 
 def _fail(message: object, code: ExitCode) -> None:

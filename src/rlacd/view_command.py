@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from rlacd.exit_codes import exit_codes
+from rlacd.exit_codes import exit_codes, leave
 
 
 def view(
@@ -61,3 +61,5 @@ def view(
             if browser:
                 webbrowser.open(server.address)
             server.wait()
+        if server.at_work:
+            leave(0)  # Python would wait for every thread, and a kernel ends what it has begun

@@ -1,15 +1,18 @@
 """The viewer's server: the page, the decomposition, its progress, and files to download, for this machine only.
 
 ====================================  ===========================================================================
-``GET /``                             the page
+``GET /``, ``GET /page/NAME.js``      the page and its scripts
 ``GET /events``                       the state, with every change (server-sent events)
+``GET /state``                        the state as it is
 ``GET /scene``, ``GET /heat``         what is drawn; see `rlacd.show.scene`
 ``GET /download?format=NAME``         a file
 ``POST /decompose``, ``POST /cancel``  JSON in, JSON out
 ====================================  ===========================================================================
 
 It listens on the loopback address alone. Pages of other sites are kept out: a request must name this server as its
-host, so that no foreign name can be pointed at it, and what changes anything must come from the viewer's own page.
+host, so that no foreign name can be pointed at it, and must not come from a page of another origin. What is held is
+bounded: connections and their time in `rlacd.show.connections`, one decomposition with its scene and heat map, and
+`HEAVY` answers that are worked out at a time.
 """
 
 from __future__ import annotations
@@ -23,16 +26,16 @@ import urllib.parse
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from http import HTTPStatus
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
 from rlacd._version import __version__
 from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError, RlacdError
 from rlacd.plain_json import to_json
+from rlacd.show.connections import ANSWER_SECONDS, FOREVER, FULL, REQUEST_SECONDS, BoundedHandler, BoundedServer
 from rlacd.show.downloads import download, offered
 from rlacd.show.heat import heat_map
-from rlacd.show.page import live_page
+from rlacd.show.page import live_page, module
 from rlacd.show.picture import check_up
 from rlacd.show.scene import heat_scene, scene
 from rlacd.show.session import Session, State
@@ -41,9 +44,21 @@ ADDRESS = "127.0.0.1"
 USUAL_PORT = 8765
 LONGEST_REQUEST = 10_000  # bytes of JSON
 QUICKEST = 0.05  # seconds between two reports of progress
+HEARTBEAT = 3.0  # seconds after which a stream in which nothing happens says so, and finds out whether it is read
+HEAVY = 2  # answers that take memory and time, at once
+
+HARDENING = {
+    "Cache-Control": "no-store",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+"""Headers of every answer."""
 
 
-class ViewServer(ThreadingHTTPServer):
+class ViewServer(BoundedServer):
     """Serves one session.
 
     Parameters
@@ -66,8 +81,6 @@ class ViewServer(ThreadingHTTPServer):
         The port is in use, may not be used, or is none.
     """
 
-    daemon_threads = True
-
     def __init__(
         self,
         session: Session,
@@ -79,9 +92,11 @@ class ViewServer(ThreadingHTTPServer):
         accept: Callable[[dict[str, Any]], dict[str, Any]],
     ) -> None:
         self.session, self.up, self.accept = session, up, accept
-        self._heat_of: tuple[int, bytes] | None = None
-        self._heat_lock = threading.Lock()
-        self.page = live_page(name, {"options": options, "downloads": offered(), "version": __version__}).encode()
+        self.heavy = threading.BoundedSemaphore(HEAVY)
+        self._made: dict[str, tuple[int, bytes]] = {}
+        self._making = threading.Lock()
+        page = live_page(name, {"options": options, "downloads": offered(), "version": __version__})
+        self.page, self.policy = page.text.encode(), f"{page.policy}; frame-ancestors 'none'"
         self._bind(port)
 
     @property
@@ -89,16 +104,21 @@ class ViewServer(ThreadingHTTPServer):
         """Where the page is."""
         return f"http://{ADDRESS}:{self.server_address[1]}/"
 
+    def scene(self, run: int, decomposition: Decomposition) -> bytes:
+        """Give the scene as JSON; worked out once for a decomposition."""
+        return self._once("scene", run, lambda: scene(decomposition, self.up))
+
     def heat(self, run: int, decomposition: Decomposition) -> bytes:
         """Give the error heat map as JSON; worked out once for a decomposition."""
-        with self._heat_lock:
-            if self._heat_of is None or self._heat_of[0] != run:
-                found = heat_scene(heat_map(decomposition))
-                self._heat_of = run, to_json(found, indent=None).encode()
-            return self._heat_of[1]
+        return self._once("heat", run, lambda: heat_scene(heat_map(decomposition)))
 
-    def handle_error(self, request: Any, client_address: Any) -> None:
-        """Say nothing: pages that are closed break their connections."""
+    def _once(self, what: str, run: int, make: Callable[[], dict[str, Any]]) -> bytes:
+        with self._making:
+            made = self._made.get(what)
+            if made is None or made[0] != run:
+                self._made.pop(what, None)
+                made = self._made[what] = run, to_json(make(), indent=None).encode()
+            return made[1]
 
     def _bind(self, port: int | None) -> None:
         try:
@@ -116,85 +136,100 @@ class ViewServer(ThreadingHTTPServer):
                 raise OptionError(f"cannot listen on port {port} ({error.strerror}); choose another.") from error
 
 
-class _Handler(BaseHTTPRequestHandler):
+class _Handler(BoundedHandler):
     server: ViewServer
-    protocol_version = "HTTP/1.1"
-    timeout = 60.0
 
     def do_GET(self) -> None:
         place = urllib.parse.urlsplit(self.path)
         query = urllib.parse.parse_qs(place.query)
         with self._answered():
-            self._check_host()
+            self._check_sender()
             if place.path == "/":
-                self._send(self.server.page, "text/html; charset=utf-8")
+                self._send(self.server.page, "text/html", {"Content-Security-Policy": self.server.policy})
             elif place.path == "/events":
                 self._send_events()
+            elif place.path == "/state":
+                self._send_json(asdict(self.server.session.state))
             elif place.path == "/scene":
-                self._send_json(scene(self._result()[1], self.server.up))
+                with self.server.heavy:
+                    content = self.server.scene(*self._result())
+                self._send(content, "application/json")
             elif place.path == "/heat":
-                self._send(self.server.heat(*self._result()), "application/json")
+                with self.server.heavy:
+                    content = self.server.heat(*self._result())
+                self._send(content, "application/json")
             elif place.path == "/download":
                 self._send_file(query.get("format", [""])[0], query.get("up", [self.server.up])[0])
+            elif (script := module(place.path.removeprefix("/page/").removesuffix(".js"))) is not None:
+                self._send(script.encode(), "text/javascript")
             else:
-                self._send_json({"error": "there is nothing here."}, HTTPStatus.NOT_FOUND)
+                raise _Refused(HTTPStatus.NOT_FOUND, "there is nothing here.")
 
     def do_POST(self) -> None:
         with self._answered():
-            self._check_host()
-            self._check_origin()
+            self._check_sender()
             given = self._body()
             if self.path == "/decompose":
                 self.server.session.decompose(self.server.accept(given))
-                self._send_json({}, HTTPStatus.ACCEPTED)
             elif self.path == "/cancel":
                 self.server.session.stop()
-                self._send_json({}, HTTPStatus.ACCEPTED)
             else:
-                self._send_json({"error": "there is nothing here."}, HTTPStatus.NOT_FOUND)
-
-    def log_message(self, format: str, *args: Any) -> None:
-        pass
+                raise _Refused(HTTPStatus.NOT_FOUND, "there is nothing here.")
+            self._send_json({}, HTTPStatus.ACCEPTED)
 
     @contextlib.contextmanager
     def _answered(self) -> Iterator[None]:
         """Turn errors into answers that the page shows."""
+        self.server.expect(self.connection, FOREVER)
         try:
             yield
         except (TimeoutError, ConnectionError):
             self.close_connection = True
         except _Refused as error:
             self.close_connection = True  # what else was sent is not read
-            self._send_json({"error": str(error)}, HTTPStatus.FORBIDDEN)
+            self._send_json({"error": str(error)}, error.status)
         except RlacdError as error:
             self._send_json({"error": str(error)}, HTTPStatus.BAD_REQUEST)
         except Exception as error:
             said = f"a bug in rlacd ({type(error).__name__}: {error}); please report it."
             self._send_json({"error": said}, HTTPStatus.INTERNAL_SERVER_ERROR)
 
-    def _check_host(self) -> None:
-        host = self.headers.get("Host", "").rsplit(":", 1)[0]
-        if host not in (ADDRESS, "localhost"):
-            raise _Refused(f"this viewer answers to {ADDRESS} and localhost only.")
-
-    def _check_origin(self) -> None:
+    def _check_sender(self) -> None:
+        """Refuse requests for another host, and those of pages of other origins."""
+        hosts = self.headers.get_all("Host") or []
+        if len(hosts) != 1 or urllib.parse.urlsplit(f"//{hosts[0]}").hostname not in (ADDRESS, "localhost"):
+            raise _Refused(HTTPStatus.FORBIDDEN, f"this viewer answers to {ADDRESS} and localhost only.")
         origin = self.headers.get("Origin")
-        if origin is not None and urllib.parse.urlsplit(origin).netloc != self.headers.get("Host"):
-            raise _Refused("this viewer takes orders from its own page only.")
-        if self.headers.get_content_type() != "application/json":  # forms of other sites cannot send this
-            raise _Refused("this viewer takes JSON only.")
+        followed = self.command == "GET" and self.headers.get("Sec-Fetch-Mode") == "navigate"  # a link in another page
+        if (origin is not None and origin != f"http://{hosts[0]}") or (
+            self.headers.get("Sec-Fetch-Site") in ("cross-site", "same-site") and not (followed and self.path == "/")
+        ):
+            raise _Refused(HTTPStatus.FORBIDDEN, "this viewer answers to its own page only.")
 
     def _body(self) -> dict[str, Any]:
-        length = int(self.headers.get("Content-Length") or 0)
-        if length > LONGEST_REQUEST:
-            raise _Refused("this request is too long.")
+        if self.headers.get_content_type() != "application/json":  # forms of other sites cannot send this
+            raise _Refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "this viewer takes JSON only.")
+        content = self._read(LONGEST_REQUEST)
         try:
-            given = json.loads(self.rfile.read(length))
-        except ValueError:
+            given = json.loads(content)
+        except (ValueError, RecursionError):
             given = None
         if not isinstance(given, dict):
             raise OptionError("the request is no JSON object; send {} at least.")
         return given
+
+    def _read(self, longest: int) -> bytes:
+        told = self.headers.get("Content-Length", "0")
+        if "Transfer-Encoding" in self.headers or not (told.isascii() and told.isdigit()):
+            raise _Refused(HTTPStatus.LENGTH_REQUIRED, "the request does not say how long it is (Content-Length).")
+        if len(told) > len(str(longest)) or int(told) > longest:
+            raise _Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"the request is longer than {longest:,} bytes.")
+        self.server.expect(self.connection, REQUEST_SECONDS)
+        content = self.read_body(int(told))
+        self.server.expect(self.connection, FOREVER)
+        if len(content) != int(told):
+            raise ConnectionError("the request ended early")
+        return content
 
     def _result(self) -> tuple[int, Decomposition]:
         result = self.server.session.result
@@ -203,20 +238,22 @@ class _Handler(BaseHTTPRequestHandler):
         return result
 
     def _send_events(self) -> None:
-        self.send_response(HTTPStatus.OK)
-        self.send_header("Content-Type", "text/event-stream")
-        self.send_header("Cache-Control", "no-store")
-        self.send_header("Connection", "close")
-        self.end_headers()
-        self.close_connection = True
-        for state in _calmly(self.server.session.changes()):
-            told = ": still here" if state is None else f"data: {json.dumps(asdict(state))}"
-            self.wfile.write(f"{told}\n\n".encode())
-            self.wfile.flush()
+        if not self.server.streams.acquire(blocking=False):
+            raise _Refused(HTTPStatus.SERVICE_UNAVAILABLE, FULL)
+        try:
+            self.close_connection = True
+            self._send_head(HTTPStatus.OK, "text/event-stream", {"Connection": "close"})
+            for state in _calmly(self.server.session.changes(HEARTBEAT)):
+                told = ": still here" if state is None else f"data: {json.dumps(asdict(state))}"
+                self.wfile.write(f"{told}\n\n".encode())
+                self.wfile.flush()
+        finally:
+            self.server.streams.release()
 
     def _send_file(self, wanted: str, up: str) -> None:
         check_up(up)
-        file = download(self._result()[1], wanted, up=up)
+        with self.server.heavy:
+            file = download(self._result()[1], wanted, up=up)
         plain = file.name.encode("ascii", "replace").decode().replace('"', "_").replace("\\", "_")
         exact = urllib.parse.quote(file.name.encode(errors="replace"))
         named = f"attachment; filename=\"{plain}\"; filename*=UTF-8''{exact}"
@@ -228,19 +265,27 @@ class _Handler(BaseHTTPRequestHandler):
     def _send(
         self, content: bytes, kind: str, headers: dict[str, str] | None = None, status: HTTPStatus = HTTPStatus.OK
     ) -> None:
+        self.server.expect(self.connection, ANSWER_SECONDS)
+        self._send_head(status, kind, {"Content-Length": str(len(content)), **(headers or {})})
+        self.wfile.write(content)
+
+    def _send_head(self, status: HTTPStatus, kind: str, headers: dict[str, str]) -> None:
         self.send_response(status)
-        self.send_header("Content-Type", kind)
-        self.send_header("Content-Length", str(len(content)))
-        self.send_header("Cache-Control", "no-store")
-        self.send_header("X-Content-Type-Options", "nosniff")
-        for name, value in (headers or {}).items():
+        text = kind.startswith("text/")
+        self.send_header("Content-Type", f"{kind}; charset=utf-8" if text and kind != "text/event-stream" else kind)
+        if self.close_connection and "Connection" not in headers:
+            self.send_header("Connection", "close")
+        for name, value in {**HARDENING, **headers}.items():
             self.send_header(name, value)
         self.end_headers()
-        self.wfile.write(content)
 
 
 class _Refused(Exception):
     """A request that is none of ours."""
+
+    def __init__(self, status: HTTPStatus, said: str) -> None:
+        super().__init__(said)
+        self.status = status
 
 
 def _calmly(changes: Iterator[State | None]) -> Iterator[State | None]:

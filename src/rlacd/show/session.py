@@ -6,7 +6,10 @@ keeps it. Everybody else reads the state and waits for it to change.
 
 from __future__ import annotations
 
+import atexit
 import threading
+import time
+import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
@@ -44,6 +47,10 @@ class State:
     error: str | None = None
 
 
+_SESSIONS: weakref.WeakSet[Session] = weakref.WeakSet()
+AT_EXIT = 30.0  # seconds that work may take to end when Python does
+
+
 class Session:
     """Decomposes on a thread of its own.
 
@@ -63,6 +70,7 @@ class Session:
         self._result: Decomposition | None = None
         self._thread = threading.Thread(target=self._work, name="rlacd-view", daemon=True)
         self._thread.start()
+        _SESSIONS.add(self)
 
     def __enter__(self) -> Session:
         return self
@@ -82,6 +90,11 @@ class Session:
         with self._changed:
             return None if self._result is None else (int(self._state.run or 0), self._result)
 
+    @property
+    def ended(self) -> bool:
+        """Whether the session is closed and its work has ended."""
+        return not self._thread.is_alive()
+
     def decompose(self, options: dict[str, Any]) -> None:
         """Decompose with these options next, instead of what is under way."""
         with self._changed:
@@ -93,11 +106,17 @@ class Session:
         with self._changed:
             self._stopped = True
 
-    def close(self) -> None:
-        """End the work, drop it, and let those who wait go."""
+    def close(self, patience: float = 1.0) -> bool:
+        """End the work, drop it, and let those who wait go; tells whether the work has ended in so many seconds.
+
+        Work that has not is told to end; its thread is waited for when Python ends, since nothing may hold objects of
+        C++ libraries then.
+        """
         with self._changed:
-            self._tell(replace(self._state, state="closed"))
-        self._thread.join(timeout=10.0)
+            if self._state.state != "closed":
+                self._tell(replace(self._state, state="closed"))
+        self._thread.join(timeout=patience)
+        return self.ended
 
     def changes(self, patience: float = 15.0) -> Iterator[State | None]:
         """Yield the state now and after every change until the session is closed; None after so many quiet seconds."""
@@ -150,3 +169,14 @@ class Session:
         self._state = state
         self._count += 1
         self._changed.notify_all()
+
+
+@atexit.register
+def _end_all() -> None:
+    """End work that goes on when Python ends: its thread would hold what C++ libraries then report as leaked."""
+    until = time.monotonic() + AT_EXIT
+    sessions = list(_SESSIONS)
+    for session in sessions:
+        session.close(0.0)
+    for session in sessions:
+        session.close(max(0.0, until - time.monotonic()))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import dataclasses
 import functools
 import os
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,10 +19,11 @@ from rlacd.errors import OptionError
 from rlacd.options import CONCAVITY, QUALITIES, Options
 from rlacd.show.picture import check_up
 from rlacd.show.server import ViewServer
-from rlacd.show.session import Session
+from rlacd.show.session import AT_EXIT, Session
 from rlacd.solid.load import load_mesh
 
 NAVIGABLE = "navigable"
+LEAVING = 0.8  # seconds that work under way has to end when the viewer is closed
 _DEFAULTS, _SPACE = Options(), NavigableSpace()
 
 
@@ -102,7 +105,8 @@ def open_viewer(
     first = wishes.options()
     Options(threads=threads)
     name = Path(load_mesh(mesh).name).stem
-    with Session(functools.partial(decompose, mesh, threads=threads)) as session:
+    session = Session(functools.partial(decompose, mesh, threads=threads))
+    try:
         server = ViewServer(
             session,
             name,
@@ -111,16 +115,20 @@ def open_viewer(
             up=axis,
             accept=lambda given: read_wishes(given).options(),
         )
-        thread = threading.Thread(target=server.serve_forever, args=(0.1,), name="rlacd-view-server", daemon=True)
-        thread.start()
-        session.decompose(first)
-        try:
-            yield Viewer(session, server, thread)
-        finally:
-            session.close()  # first, so that pages that follow it are let go
-            server.shutdown()
-            server.server_close()
-            thread.join()
+    except BaseException:
+        session.close()
+        raise
+    thread = threading.Thread(target=server.serve_forever, args=(0.1,), name="rlacd-view-server", daemon=True)
+    thread.start()
+    session.decompose(first)
+    try:
+        yield Viewer(session, server, thread)
+    finally:
+        until = time.monotonic() + LEAVING
+        session.close(0.0)  # first, so that pages that follow it are let go
+        if not server.end(until - time.monotonic()):
+            atexit.register(server.end, AT_EXIT)  # an answer is being worked out
+        session.close(max(0.0, until - time.monotonic()))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -141,6 +149,16 @@ class Viewer:
     def address(self) -> str:
         """Where the page is."""
         return self._server.address
+
+    @property
+    def connections(self) -> int:
+        """How many connections are open."""
+        return self._server.connections
+
+    @property
+    def at_work(self) -> bool:
+        """Whether work goes on, even after the viewer is closed: a kernel ends what it has begun."""
+        return not self.session.ended or self.connections > 0
 
     def wait(self) -> None:
         """Serve until Ctrl-C."""

@@ -1,0 +1,211 @@
+"""Connections of the viewer's server: how many, how long and how large they may be.
+
+Every connection has a thread, so their number is bounded; one more is answered 503 at once, without a thread. Each has
+a deadline for what it waits for: a request that trickles in, a reader that does not read and an idle connection end
+when it has passed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import http.client
+import json
+import math
+import socket
+import threading
+import time
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any, BinaryIO
+
+MOST_CONNECTIONS = 48
+"""Connections at a time; a browser opens up to six."""
+
+MOST_STREAMS = 16
+"""Of them, streams of events: pages that are open."""
+
+LONGEST_HEAD = 16_384
+"""Bytes of a request line and headers."""
+
+REQUEST_SECONDS = 10.0
+"""From the first byte waited for to the last of the headers and body; also how long an idle connection is kept."""
+
+ANSWER_SECONDS = 120.0
+"""To take an answer of any size."""
+
+QUIET_SECONDS = 20.0
+"""For a single send or receive."""
+
+FULL = "too many connections to this viewer are open; close a page and reload this one."
+
+
+class HeadTooLong(http.client.HTTPException):
+    """A request whose line and headers are longer than `LONGEST_HEAD`."""
+
+
+class BoundedServer(ThreadingHTTPServer):
+    """A thread for each connection, no more than `MOST_CONNECTIONS`, each with a deadline."""
+
+    daemon_threads = True
+    request_queue_size = 64
+
+    def __init__(self, address: tuple[str, int], handler: type[BoundedHandler]) -> None:
+        self._deadlines: dict[socket.socket, float] = {}
+        self._changed = threading.Condition()
+        self.streams = threading.BoundedSemaphore(MOST_STREAMS)
+        super().__init__(address, handler)
+
+    @property
+    def connections(self) -> int:
+        """How many connections are open."""
+        with self._changed:
+            return len(self._deadlines)
+
+    def expect(self, connection: socket.socket, seconds: float) -> None:
+        """End a connection unless what it waits for comes in so many seconds; infinity while it waits for us."""
+        with self._changed:
+            if connection in self._deadlines:
+                self._deadlines[connection] = time.monotonic() + seconds
+
+    def end(self, seconds: float) -> bool:
+        """Take no more connections and end those that are open; tells whether all have ended in so many seconds."""
+        self.shutdown()
+        self.server_close()
+        with self._changed:
+            for connection in self._deadlines:
+                _hang_up(connection)
+            return self._changed.wait_for(lambda: not self._deadlines, timeout=max(0.0, seconds))
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Give a connection its thread, or turn it away."""
+        with self._changed:
+            full = len(self._deadlines) >= MOST_CONNECTIONS
+            if not full:
+                self._deadlines[request] = time.monotonic() + REQUEST_SECONDS
+        if full:
+            _turn_away(request)
+            self.shutdown_request(request)
+        else:
+            super().process_request(request, client_address)
+
+    def shutdown_request(self, request: Any) -> None:
+        """Close a connection and forget it."""
+        super().shutdown_request(request)
+        with self._changed:
+            self._deadlines.pop(request, None)
+            self._changed.notify_all()
+
+    def service_actions(self) -> None:
+        """End what has passed its deadline; called several times a second."""
+        now = time.monotonic()
+        with self._changed:
+            for connection, deadline in self._deadlines.items():
+                if deadline < now:
+                    _hang_up(connection)
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say nothing: pages that are closed break their connections."""
+
+
+class BoundedHandler(BaseHTTPRequestHandler):
+    """Reads heads of bounded size in bounded time, and speaks JSON where it refuses."""
+
+    server: BoundedServer
+    protocol_version = "HTTP/1.1"
+    timeout = QUIET_SECONDS
+
+    def setup(self) -> None:
+        """Bound what is read before the first byte."""
+        super().setup()
+        self.rfile: Any = _BoundedReader(self.rfile)
+
+    def handle_one_request(self) -> None:
+        """Give each request its own time and size."""
+        self.rfile.left = LONGEST_HEAD
+        self.server.expect(self.connection, REQUEST_SECONDS)
+        try:
+            super().handle_one_request()
+        except HeadTooLong:  # in the request line: headers that are too long are answered by the base class
+            self.close_connection = True
+            self.command = self.requestline = ""
+            self.request_version = self.protocol_version
+            self.send_error(431)
+        except ConnectionError:
+            self.close_connection = True
+
+    def read_body(self, length: int) -> bytes:
+        """Read the body of a request; may be shorter where the connection ends."""
+        self.rfile.left = length
+        body: bytes = self.rfile.read(length)
+        return body
+
+    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
+        """Refuse what the base class refuses (methods, versions, heads), as JSON and for good."""
+        self.close_connection = True
+        reason = self.responses.get(code, ("refused", ""))[0]
+        with contextlib.suppress(OSError):
+            _send_refusal(self.connection, code, reason, f"{message or reason}.")
+
+    def version_string(self) -> str:
+        """Name the program, not its Python."""
+        return "rlacd"
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Say nothing."""
+
+
+class _BoundedReader:
+    """A connection's bytes, up to `left` of them."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+        self.left = 0
+
+    def readline(self, size: int = -1) -> bytes:
+        most = self.left + 1 if size < 0 else min(size, self.left + 1)
+        line = self._file.readline(most)
+        self.left -= len(line)
+        if self.left < 0:
+            raise HeadTooLong("the request's headers are too long")
+        return line
+
+    def read(self, size: int) -> bytes:
+        content = self._file.read(min(size, self.left))
+        self.left -= len(content)
+        return content
+
+    def flush(self) -> None:
+        self._file.flush()
+
+    def close(self) -> None:
+        self._file.close()
+
+    @property
+    def closed(self) -> bool:
+        return self._file.closed
+
+
+FOREVER = math.inf
+
+
+def _hang_up(connection: socket.socket) -> None:
+    """Let whoever reads from or writes to a connection find its end."""
+    with contextlib.suppress(OSError):
+        connection.shutdown(socket.SHUT_RDWR)
+
+
+def _turn_away(connection: socket.socket) -> None:
+    """Answer 503 without waiting for anything."""
+    connection.setblocking(False)
+    with contextlib.suppress(OSError):
+        connection.recv(LONGEST_HEAD)  # what is left unread when a connection closes can destroy the answer
+    with contextlib.suppress(OSError):
+        _send_refusal(connection, 503, "Service Unavailable", FULL)
+
+
+def _send_refusal(connection: socket.socket, code: int, reason: str, said: str) -> None:
+    body = json.dumps({"error": said}).encode()
+    head = (
+        f"HTTP/1.1 {code} {reason}\r\nContent-Type: application/json\r\nContent-Length: {len(body)}\r\n"
+        "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nRetry-After: 5\r\nConnection: close\r\n\r\n"
+    )
+    connection.sendall(head.encode() + body)

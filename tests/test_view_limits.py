@@ -1,0 +1,219 @@
+"""The viewer's server under load and abuse: bounded threads, memory, sizes and times, and a quick and silent end."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from rlacd.show import connections
+from rlacd.show.connections import LONGEST_HEAD, MOST_CONNECTIONS, MOST_STREAMS
+from rlacd.show.viewer import Viewer, open_viewer
+
+PATIENCE = 60.0
+
+
+@pytest.fixture(scope="module")
+def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("limits") / "box.stl"
+    trimesh.creation.box().export(path)
+    return path
+
+
+@pytest.fixture
+def viewer(mesh: Path) -> Iterator[Viewer]:
+    with open_viewer(mesh, {"quality": "fast"}, port=0) as viewer:
+        yield viewer
+
+
+def port_of(address: str) -> int:
+    return int(address.rsplit(":", 1)[1].strip("/"))
+
+
+@contextmanager
+def connected(viewer: Viewer) -> Iterator[socket.socket]:
+    with socket.create_connection(("127.0.0.1", port_of(viewer.address)), timeout=PATIENCE) as connection:
+        yield connection
+
+
+def status_of(answer: bytes) -> int:
+    found = re.match(rb"HTTP/1\.1 (\d+)", answer)
+    assert found, answer
+    return int(found[1])
+
+
+def all_of(connection: socket.socket) -> bytes:
+    """Everything until the other side ends the connection."""
+    got = b""
+    while more := connection.recv(65_536):
+        got += more
+    return got
+
+
+def head(path: str, *lines: str, method: str = "GET") -> bytes:
+    return "\r\n".join([f"{method} {path} HTTP/1.1", "Host: 127.0.0.1", *lines, "", ""]).encode()
+
+
+def test_sixty_streams_hold_no_more_than_their_threads(viewer: Viewer) -> None:
+    before = threading.active_count()
+    with ExitStack() as stack:
+        streams = [stack.enter_context(connected(viewer)) for _ in range(60)]
+        for stream in streams:
+            stream.sendall(head("/events"))
+        answers = [status_of(stream.recv(100)) for stream in streams]
+        assert answers.count(200) == MOST_STREAMS
+        assert answers.count(503) == 60 - MOST_STREAMS
+        assert threading.active_count() - before <= MOST_CONNECTIONS
+    wait_until(lambda: viewer.connections == 0)
+    with connected(viewer) as again:
+        again.sendall(head("/events"))
+        assert status_of(again.recv(100)) == 200, "streams that have gone make room"
+
+
+def test_connections_beyond_the_limit_are_told_and_make_room_when_they_end(viewer: Viewer) -> None:
+    with ExitStack() as stack:
+        for _ in range(MOST_CONNECTIONS):
+            stack.enter_context(connected(viewer))
+        wait_until(lambda: viewer.connections == MOST_CONNECTIONS)
+        with connected(viewer) as more:
+            more.sendall(head("/"))
+            answer = all_of(more)
+        assert status_of(answer) == 503
+        assert b"close a page" in answer
+    wait_until(lambda: viewer.connections == 0)
+    with connected(viewer) as later:
+        later.sendall(head("/", "Connection: close"))
+        assert status_of(all_of(later)) == 200
+
+
+def wait_until(true: Callable[[], bool]) -> None:
+    until = time.monotonic() + PATIENCE
+    while not true():
+        assert time.monotonic() < until
+        time.sleep(0.02)
+
+
+@pytest.mark.parametrize(
+    "trickle",
+    [b"", b"GET /", head("/")[:-2] + b"X-Slow: 1\r\n", head("/cancel", "Content-Length: 9000", method="POST")],
+    ids=["nothing", "request line", "headers", "body"],
+)
+def test_a_request_that_trickles_in_is_ended(viewer: Viewer, trickle: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connections, "REQUEST_SECONDS", 0.5)
+    monkeypatch.setattr("rlacd.show.server.REQUEST_SECONDS", 0.5)
+    trickle = trickle.replace(b"Content-Length", b"Content-Type: application/json\r\nContent-Length")
+    with connected(viewer) as slow:
+        slow.sendall(trickle)
+        until = time.monotonic() + PATIENCE
+        ended = False
+        while not ended and time.monotonic() < until:
+            try:
+                slow.sendall(b"x")  # never silent for longer than a moment
+                slow.settimeout(0.05)
+                ended = slow.recv(10_000) == b""
+            except TimeoutError:
+                pass
+            except OSError:
+                ended = True
+        assert ended
+    wait_until(lambda: viewer.connections == 0)
+
+
+@pytest.mark.parametrize(
+    ("request_", "status"),
+    [
+        (b"GET /" + b"a" * LONGEST_HEAD + b" HTTP/1.1\r\n\r\n", 431),
+        (head("/", "X-Long: " + "a" * LONGEST_HEAD), 431),
+        (head("/", *[f"X-{i}: {'a' * 1000}" for i in range(20)]), 431),
+        (head("/", *[f"X-{i}: 1" for i in range(200)]), 431),
+        (head("/decompose", "Content-Type: application/json", "Content-Length: 20000", method="POST"), 413),
+        (head("/decompose", "Content-Type: application/json", f"Content-Length: {'9' * 5000}", method="POST"), 413),
+        (head("/decompose", "Content-Type: application/json", "Content-Length: -1", method="POST"), 411),
+        (head("/decompose", "Content-Type: application/json", "Content-Length: many", method="POST"), 411),
+        (head("/decompose", "Content-Type: application/json", "Transfer-Encoding: chunked", method="POST"), 411),
+        (head("/", method="DELETE"), 501),
+        (head("/", "Host: 127.0.0.1"), 403),
+        (b"GET / HTTP/1.1\r\n\r\n", 403),
+        (b"nonsense\r\n\r\n", 400),
+        (b"\x16\x03\x01\x02\x00\x01\x00\r\n\r\n", 400),
+    ],
+    ids=lambda value: str(value) if isinstance(value, int) else repr(value[:24]),
+)
+def test_what_is_too_long_or_no_request_is_refused(viewer: Viewer, request_: bytes, status: int) -> None:
+    with connected(viewer) as connection:
+        connection.sendall(request_)
+        assert status_of(all_of(connection)) == status
+    with connected(viewer) as connection:
+        connection.sendall(head("/state", "Connection: close"))
+        assert status_of(all_of(connection)) == 200, "others are served"
+
+
+@pytest.fixture(scope="module")
+def rough(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A mesh that takes much longer than a second."""
+    ball = trimesh.creation.icosphere(5)
+    ball.vertices *= 1 + 0.2 * np.random.default_rng(0).random((len(ball.vertices), 1))
+    path = tmp_path_factory.mktemp("limits") / "rough.ply"
+    ball.export(path)
+    return path
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for one process")
+@pytest.mark.parametrize("seconds", [0.0, 2.0, 6.0])
+def test_the_command_leaves_at_once_and_in_silence_while_at_work(rough: Path, seconds: float) -> None:
+    command = [sys.executable, "-c", "from rlacd.cli import main; main()", "view", str(rough), "--no-browser"]
+    with subprocess.Popen([*command, "--quality", "best"], stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stderr is not None
+            address = re.search(r"http://\S+", process.stderr.readline())
+            assert address is not None
+            port = port_of(address[0])
+            with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as stream:
+                stream.sendall(head("/events"))
+                assert status_of(stream.recv(100)) == 200
+                time.sleep(seconds)
+                asked = time.monotonic()
+                process.send_signal(signal.SIGINT)
+                assert process.wait(timeout=PATIENCE) == 0
+            assert time.monotonic() - asked < 5.0  # 1 s on an idle machine
+            assert process.stderr.read() == ""
+        finally:
+            process.kill()
+
+
+ENDINGS = {
+    "done": "rlacd.decompose(mesh, quality='fast')",
+    "kept": "import sys; sys.kept = rlacd.decompose(mesh, quality='fast', criterion=rlacd.NavigableSpace())",
+    "raised": "rlacd.decompose(mesh, progress=lambda seen: 1 / 0)",
+    "viewed": "from rlacd.show.viewer import open_viewer\nwith open_viewer(mesh, port=0): pass",
+    "viewed for a while": (
+        "import time\nfrom rlacd.show.viewer import open_viewer\nwith open_viewer(mesh, port=0): time.sleep(2)"
+    ),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_nothing_is_said_of_leaks_when_python_ends(rough: Path, ending: str) -> None:
+    mesh = rough if "view" in ending else rough.with_name("cube.stl")
+    trimesh.creation.box().export(rough.with_name("cube.stl"))
+    program = f"import rlacd\nmesh = {os.fspath(mesh)!r}\n{ENDINGS[ending]}"
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=300, check=False)
+    assert "nanobind" not in run.stderr + run.stdout
+    if ending == "raised":
+        assert "ZeroDivisionError" in run.stderr
+    else:
+        assert (run.returncode, run.stderr) == (0, "")
