@@ -12,13 +12,15 @@ NATIVE_SOURCES := $(wildcard native/*.cpp native/*.hpp) CMakeLists.txt pyproject
 SANITIZE_address := address,undefined,float-divide-by-zero,float-cast-overflow
 SANITIZE_thread  := thread
 
-# What the fuzzers are given: minutes, a seed for other inputs, and the real meshes whose files are damaged.
+# What the fuzzers are given: time, a seed for other inputs, and the real meshes whose files are damaged.
 MINUTES ?= 10
+HOURS   ?= 1
+WORKERS ?= 1
 SEED    ?= 0
 MESHES  ?= ../shared/meshes
 SECONDS_TO_FUZZ = $(shell expr 60 \* $(MINUTES))
 
-.PHONY: install demo test test-fast lint fuzz-files fuzz-shapes sanitize sanitize-address sanitize-thread format clean
+.PHONY: install demo test test-fast lint soak soak-totals fuzz-files fuzz-shapes sanitize sanitize-address sanitize-thread format clean
 
 install: $(VENV)/installed
 
@@ -66,6 +68,13 @@ build/sanitize-%/installed: $(NATIVE_SOURCES)
 	  --config-settings=build-dir=build/sanitize-$*/native --config-settings=cmake.build-type=RelWithDebInfo \
 	  --config-settings=cmake.define.RLACD_SANITIZE=$(SANITIZE_$*)
 	touch $@
+
+# Everything at random, as long as you like: files, shapes, real meshes, faults, options. It goes on where it was.
+soak: $(VENV)/test-extras
+	nice -n 19 $(BIN)/python -m fuzz.soak --hours $(HOURS) --seed $(SEED) --workers $(WORKERS) --meshes $(MESHES)
+
+soak-totals: $(VENV)/test-extras
+	$(BIN)/python -m fuzz.soak --totals
 
 # Random shapes under random options.
 fuzz-shapes: $(VENV)/installed

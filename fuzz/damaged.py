@@ -18,7 +18,6 @@ import json
 import re
 import shutil
 import sys
-import threading
 import time
 import uuid
 from collections import Counter
@@ -31,9 +30,10 @@ from typing import Any
 from unittest import mock
 
 import numpy as np
-import psutil
 import trimesh
 
+from fuzz.files import read_hulls
+from fuzz.geometry import why_not_convex
 from fuzz.mutations import Seed, mutated, repacked
 from fuzz.worker import Watched
 from rlacd.fleet import Order
@@ -58,6 +58,9 @@ OFF_LETTERS = {"4": " 1", "N": " 0 0 1", "C": " 255 128 0 255", "ST": " 0.5 0.25
 
 WELL = ("loaded", "refused")
 """How an input may end."""
+
+ENDS = (*WELL, "crash", "hang", "memory", "untyped", "invalid")
+"""How inputs end: ``untyped`` is an error that is not the tool's own, ``invalid`` a hull that is none."""
 
 
 def seeds_of(meshes: Path) -> dict[str, list[Seed]]:
@@ -106,34 +109,6 @@ def off_variant(mesh: trimesh.Trimesh, letters: str) -> bytes:
     return "\n".join(lines).encode()
 
 
-class Watch:
-    """Ends a process that has kept a processor busy for too long, however many others there are."""
-
-    def __init__(self, worker: Watched) -> None:
-        self.too_long = False
-        self._worker = worker
-        self._stopped = threading.Event()
-        self._begun = self._spent()
-        threading.Thread(target=self._look, daemon=True).start()
-
-    def stop(self) -> None:
-        self._stopped.set()
-
-    def _look(self) -> None:
-        while not self._stopped.wait(0.5):
-            if self._spent() - self._begun > CPU_SECONDS:
-                self.too_long = True
-                psutil.Process(self._worker.pid).kill()
-                return
-
-    def _spent(self) -> float:
-        try:
-            times = psutil.Process(self._worker.pid).cpu_times()
-        except psutil.Error:
-            return 0.0
-        return float(times.user + times.system) if self._worker.pid else 0.0
-
-
 @dataclass
 class Fuzzer:
     """Makes inputs and has them decomposed."""
@@ -141,7 +116,7 @@ class Fuzzer:
     seeds: dict[str, list[Seed]]
     seed: int
     folder: Path
-    worker: Watched = field(default_factory=lambda: Watched(Limits(SECONDS, MEMORY)))
+    worker: Watched = field(default_factory=lambda: Watched(Limits(SECONDS, MEMORY), CPU_SECONDS))
 
     def input(self, number: int) -> tuple[str, Path]:
         """Write the input of a number; its format, and its file."""
@@ -156,27 +131,27 @@ class Fuzzer:
         return kind, path
 
     def result(self, path: Path) -> Row:
-        """How it ended (see `WELL`), what was said, and how many seconds of a processor it took."""
+        """How it ended (see `ENDS`), what was said, and how many seconds of a processor it took."""
         mesh, options = path, dict(BUDGET)
         if path.suffix == ".onnx":
             mesh = path.with_suffix(".stl")
             BOX.export(mesh)
             options["policy"] = str(path)
-        watch = Watch(self.worker)
         try:
-            said, _ = self.worker.run(Order(options), mesh, "mesh", "mesh")
+            said, files = self.worker.run(Order(options, ending=".obj"), mesh, "mesh", "mesh")
         except WorkerDiedError as error:
-            self.worker.close()
-            flood = error.reason.startswith("it needed")
-            end = "hang" if watch.too_long or error.reason.startswith("it took") else "memory" if flood else "crash"
+            end = {"it needed": "memory", "it took m": "hang"}.get(error.reason[:9], "crash")
             return {"end": end, "said": f"{error.reason} {error.last_words[-300:]}", "cpu": CPU_SECONDS}
         finally:
-            watch.stop()
             if mesh != path:
                 mesh.unlink()
         told = str(said.get("error", ""))
+        if not told:
+            hulls = read_hulls(files["mesh.obj"], "obj")
+            wrong = "; ".join(f"hull {i}: {why}" for i, hull in enumerate(hulls) if (why := why_not_convex(*hull)))
+            return {"end": "invalid" if wrong else "loaded", "said": wrong, "cpu": said["cpu"]}
         untyped = told.startswith(("a bug in rlacd", "there is not enough memory"))
-        return {"end": "untyped" if untyped else "refused" if told else "loaded", "said": told, "cpu": said["cpu"]}
+        return {"end": "untyped" if untyped else "refused", "said": told, "cpu": said["cpu"]}
 
     def close(self) -> None:
         self.worker.close()
@@ -242,11 +217,10 @@ def minimise(path: Path) -> None:
 
 def table(tally: dict[str, Counter[str]]) -> str:
     """Totals as Markdown."""
-    ends = ("loaded", "refused", "crash", "hang", "memory", "untyped")
-    lines = ["| format | tried | " + " | ".join(ends) + " |", "|---|--:|" + "--:|" * len(ends)]
+    lines = ["| format | tried | " + " | ".join(ENDS) + " |", "|---|--:|" + "--:|" * len(ENDS)]
     total: Counter[str] = sum(tally.values(), Counter())
     for kind, counter in [*sorted(tally.items()), ("all", total)]:
-        lines.append(f"| {kind} | {counter.total()} | " + " | ".join(str(counter[end]) for end in ends) + " |")
+        lines.append(f"| {kind} | {counter.total()} | " + " | ".join(str(counter[end]) for end in ENDS) + " |")
     return "\n".join(lines)
 
 

@@ -54,6 +54,8 @@ class Row:
     steps, options, faces
         Of the input.
     parts, seconds
+    cpu
+        Seconds of a processor.
     twice
         It was decomposed again, with the same bytes.
     """
@@ -66,28 +68,42 @@ class Row:
     faces: int = 0
     parts: int = 0
     seconds: float = 0.0
+    cpu: float = 0.0
     twice: bool = False
 
 
 def run_seed(seed: int, worker: Watched | Here, folder: Path) -> Row:
-    """Decompose and judge."""
-    shape, options = make_shape(seed), draw_options(seed)
+    """Decompose and judge the shape of a seed."""
     random = np.random.default_rng([seed, 3])
-    ending = str(random.choice(FORMATS))
+    ending, twice = str(random.choice(FORMATS)), bool(random.random() < 1 / AGAIN)
+    return judged(Row(seed, "done"), make_shape(seed), draw_options(seed), ending, twice, worker, folder)
+
+
+def judged(
+    row: Row,
+    shape: Shape,
+    options: dict[str, Any],
+    ending: str,
+    twice: bool,
+    worker: Watched | Here,
+    folder: Path,
+) -> Row:
+    """Decompose a shape, if need be twice, on another number of threads, and fill in its row."""
     order = Order.of(options, file_format=ending)
-    row = Row(seed, "done", steps=list(shape.steps), options=order.as_plain()["options"], faces=len(shape.faces))
-    mesh = write_mesh(folder / f"{seed}.ply", shape.vertices, shape.faces)
+    row = replace(row, steps=list(shape.steps), options=order.as_plain()["options"], faces=len(shape.faces))
+    mesh = write_mesh(folder / f"{row.seed}.ply", shape.vertices, shape.faces)
     start = time.perf_counter()
     try:
         said, files = worker.run(order, mesh, mesh.name, "out")
-        row.seconds = round(time.perf_counter() - start, 3)
+        row.seconds, row.cpu = round(time.perf_counter() - start, 3), said["cpu"]
         if "error" in said:
             row.status, row.said = _refusal(shape, ending, said)
             return row
         row.parts = said["report"]["parts"]
-        if random.random() < 1 / AGAIN and said["report"]["complete"]:
+        if twice and said["report"]["complete"]:
             other = Order.of({**options, "threads": options["threads"] % 3 + 1}, file_format=ending)
             again, same = worker.run(other, mesh, mesh.name, "out")
+            row.cpu += again["cpu"]
             row.twice = files == same
             if not row.twice:
                 return replace(row, status="wrong", said=[f"other bytes on other threads {again.get('error', '')}"])

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import sys
+import threading
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import psutil
+
 from rlacd.fleet import Order
 from rlacd.fleet.server import SERVER, MeshServer
-from rlacd.pool import Limits, Request
+from rlacd.pool import Limits, Request, WorkerDiedError
 from rlacd.pool.worker import Worker
 
 Said = tuple[dict[str, Any], dict[str, bytes]]
@@ -22,10 +26,13 @@ class Watched:
     Parameters
     ----------
     limits : Limits
+    cpu_seconds : float
+        Time of a processor that a mesh may take, however busy the machine is.
     """
 
-    def __init__(self, limits: Limits) -> None:
+    def __init__(self, limits: Limits, cpu_seconds: float = math.inf) -> None:
         self.limits = limits
+        self.cpu_seconds = cpu_seconds
         self._worker = Worker()
 
     @property
@@ -41,12 +48,51 @@ class Watched:
         WorkerDiedError
             The process died or was ended; the next mesh gets a new one.
         """
-        answer = self._worker.ask(Request(SERVER, _values(order, mesh, name, stem), limits=self.limits))
+        watch = _Watch(self)
+        try:
+            answer = self._worker.ask(Request(SERVER, _values(order, mesh, name, stem), limits=self.limits))
+        except WorkerDiedError as error:
+            self._worker.close()
+            if watch.too_long:
+                reason = f"it took more than {self.cpu_seconds:g} s of a processor"
+                raise WorkerDiedError(reason, error.last_words) from None
+            raise
+        finally:
+            watch.stop()
         return answer.values, answer.blobs
 
     def close(self) -> None:
         """End the process."""
         self._worker.close()
+
+
+class _Watch:
+    """Ends the process of a `Watched` that has kept a processor busy for too long."""
+
+    def __init__(self, watched: Watched) -> None:
+        self.too_long = False
+        self._watched = watched
+        self._stopped = threading.Event()
+        self._begun = self._spent()
+        if math.isfinite(watched.cpu_seconds):
+            threading.Thread(target=self._look, daemon=True).start()
+
+    def stop(self) -> None:
+        self._stopped.set()
+
+    def _look(self) -> None:
+        while not self._stopped.wait(0.5):
+            if self._spent() - self._begun > self._watched.cpu_seconds:
+                self.too_long = True
+                psutil.Process(self._watched.pid).kill()
+                return
+
+    def _spent(self) -> float:
+        try:
+            times = psutil.Process(self._watched.pid).cpu_times() if self._watched.pid else None
+        except psutil.Error:
+            return 0.0
+        return float(times.user + times.system) if times else 0.0
 
 
 class Here:

@@ -1,0 +1,108 @@
+"""Failures of a soak as small JSON files, tried again by number, or by the triangles and options that they need."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from fuzz.recipes import Shape
+from fuzz.trials import Laboratory, Trial
+from rlacd import NavigableSpace
+
+Case = dict[str, Any]
+
+SMALL = 60
+"""Triangles that are written into a case; larger ones are made again from their number."""
+
+
+def case_of(trial: Trial, shape: Shape | None = None) -> Case:
+    """Everything that is needed to try it again, and to understand it."""
+    options = {name: _plain(value) for name, value in trial.options.items()}
+    case: Case = {"seed": trial.seed, "number": trial.number, "kind": trial.kind, "end": trial.end, "said": trial.said}
+    case |= {"story": trial.story, "options": options}
+    if shape is not None:
+        case |= {"vertices": shape.vertices.tolist(), "faces": shape.faces.tolist(), "closed": shape.is_closed}
+    return case
+
+
+def inputs(laboratory: Laboratory, case: Case) -> tuple[Shape, dict[str, Any]]:
+    """The shape and options of a case of the kinds ``shape`` and ``mesh``."""
+    if "vertices" in case:
+        vertices, faces = np.array(case["vertices"], float), np.array(case["faces"], np.int64)
+        shape = Shape(vertices, faces, tuple(case["story"]), case["closed"])
+    else:
+        shape, _ = laboratory.shape(case["number"])
+    return shape, {name: _lively(name, value) for name, value in case["options"].items()}
+
+
+def try_case(laboratory: Laboratory, case: Case) -> Trial:
+    """Try a case again."""
+    if case["kind"] not in ("shape", "mesh"):
+        return laboratory.trial(case["number"])
+    return laboratory.retry(Trial(case["seed"], case["number"], case["kind"]), *inputs(laboratory, case))
+
+
+def minimised(laboratory: Laboratory, case: Case, tries: int) -> Case:
+    """Leave out options and triangles without which a case ends alike, in ever smaller pieces."""
+    if case["kind"] not in ("shape", "mesh") or case["end"] == "hang":
+        return case
+    shape, options = inputs(laboratory, case)
+    trial = Trial(case["seed"], case["number"], case["kind"], case["end"], case["said"])
+    smallest, left = case, tries
+
+    def fails(less: Shape, fewer: dict[str, Any]) -> bool:
+        nonlocal smallest, left
+        if left == 0:
+            return False
+        left -= 1
+        now = laboratory.retry(trial, less, fewer)
+        if now.end != trial.end or not _alike(now, trial):
+            return False
+        smallest = case_of(now, less if len(less.faces) <= SMALL else None)
+        return True
+
+    for name in [name for name in options if name != "threads"]:
+        fewer = {other: value for other, value in options.items() if other != name}
+        if ("threshold" in fewer or "criterion" in fewer) and fails(shape, fewer):
+            options = fewer
+    _fewer(shape.faces, lambda faces: fails(_only(shape, faces), options))
+    return smallest
+
+
+def _fewer(faces: np.ndarray, fails: Callable[[np.ndarray], bool]) -> None:
+    """Leave out ever smaller pieces."""
+    step = len(faces) // 2
+    while step:
+        at = 0
+        while at < len(faces):
+            less = np.delete(faces, np.arange(at, min(at + step, len(faces))), axis=0)
+            if len(less) and fails(less):
+                faces = less
+            else:
+                at += step
+        step //= 2
+
+
+def _only(shape: Shape, faces: np.ndarray) -> Shape:
+    used, index = np.unique(faces, return_inverse=True)
+    return Shape(shape.vertices[used], index.reshape(-1, 3), shape.steps, False)
+
+
+def _alike(now: Trial, then: Trial) -> bool:
+    """Whether the complaint is the same but for its numbers."""
+    words = [{word for line in said for word in line.split() if word.isalpha()} for said in (now.said, then.said)]
+    return len(words[0] & words[1]) >= 0.7 * len(words[1])
+
+
+def _plain(value: Any) -> Any:
+    if not isinstance(value, NavigableSpace):
+        return value
+    return {name: given for name, given in asdict(value).items() if given is not None and given != ()}
+
+
+def _lively(name: str, value: Any) -> Any:
+    """An option as `rlacd.decompose` takes it."""
+    return NavigableSpace(**value) if name == "criterion" and isinstance(value, dict) else value

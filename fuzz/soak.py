@@ -1,0 +1,178 @@
+"""Keep trying: damaged files, random shapes, real meshes, faults and options, each judged by others than the kernels.
+
+    python -m fuzz.soak --hours 1                   `make soak HOURS=1`; goes on where it was
+    python -m fuzz.soak --totals                    what all runs have come to
+    python -m fuzz.soak --again soak/0-1234.json    a failure once more
+    python -m fuzz.soak --minimise CASE.json        options and triangles that it needs
+
+A trial is made of the seed and its number alone (`fuzz.trials`). What fails is written as a case, a small JSON file;
+put into ``tests/cases``, it is tried by every test run. Sums go to the ledger, a row for every `CHUNK` numbers.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import threading
+import time
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from fuzz.cases import case_of, minimised, try_case
+from fuzz.trials import WELL, Laboratory, Trial
+from rlacd import __version__
+
+CHUNK = 50
+"""Numbers that make a row of the ledger."""
+
+TRIES = 40
+"""Smaller inputs that are tried for every failure."""
+
+Row = dict[str, Any]
+
+
+class Ledger:
+    """What has been done, a line of JSON for every chunk of numbers.
+
+    Parameters
+    ----------
+    path : Path
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._lock = threading.Lock()
+        lines = path.read_text().splitlines() if path.exists() else []
+        self.rows: list[Row] = [json.loads(line) for line in lines if line.endswith("}")]
+
+    def done(self, seed: int) -> set[int]:
+        """The first numbers of the chunks of a seed that are done."""
+        return {row["first"] for row in self.rows if row["seed"] == seed}
+
+    def add(self, row: Row) -> None:
+        """Append a row."""
+        with self._lock, self._path.open("a") as file:
+            file.write(json.dumps(row) + "\n")
+        self.rows.append(row)
+
+
+def do_chunk(laboratory: Laboratory, first: int, until: float, folder: Path) -> Row | None:
+    """Make the trials of a chunk; None when time runs out before all are made."""
+    ends, counts, cpu = Counter[str](), Counter[str](), 0.0
+    for number in range(first, first + CHUNK):
+        if time.monotonic() > until:
+            return None
+        trial = laboratory.trial(number)
+        ends[f"{trial.kind} {trial.end}"] += 1
+        counts += trial.counts
+        cpu += trial.cpu
+        if not trial.is_well:
+            report(laboratory, trial, folder)
+    return {
+        "seed": laboratory.seed,
+        "first": first,
+        "version": __version__,
+        "cpu": round(cpu, 1),
+        "ends": ends,
+        "counts": counts,
+    }
+
+
+def report(laboratory: Laboratory, trial: Trial, folder: Path) -> None:
+    """Say what has failed, and write it as a case, as small as can be found quickly."""
+    place = folder / f"{trial.seed}-{trial.number}.json"
+    print(f"{trial.kind} {trial.number} {trial.end}: {'; '.join(trial.said)}\n  {place}", flush=True)
+    case = case_of(trial)
+    write_case(place, case)
+    write_case(place, minimised(laboratory, case, TRIES))
+
+
+def write_case(place: Path, case: Row) -> None:
+    place.write_text(json.dumps(case, indent=1) + "\n")
+
+
+def soak(args: argparse.Namespace) -> int:
+    folder: Path = args.folder
+    folder.mkdir(parents=True, exist_ok=True)
+    ledger = Ledger(folder / "ledger.jsonl")
+    before = len(list(folder.glob("*.json")))
+    until = time.monotonic() + 3600 * args.hours
+    done = ledger.done(args.seed)
+    chunks = (first for first in count(0, CHUNK) if first not in done)
+    lock = threading.Lock()
+
+    def work() -> None:
+        laboratory = Laboratory(args.seed, meshes_of(args.meshes))
+        try:
+            while time.monotonic() < until:
+                with lock:
+                    first = next(chunks)
+                row = do_chunk(laboratory, first, until, folder)
+                if row is not None:
+                    ledger.add(row)
+        finally:
+            laboratory.close()
+
+    with ThreadPoolExecutor(args.workers) as threads:
+        for worker in [threads.submit(work) for _ in range(args.workers)]:
+            worker.result()
+    print(totals(ledger.rows))
+    return len(list(folder.glob("*.json"))) - before
+
+
+def meshes_of(folder: Path | None) -> Path | None:
+    """The folder of real meshes, if it is there."""
+    return folder if folder is not None and (folder / "index.csv").is_file() else None
+
+
+def totals(rows: list[Row]) -> str:
+    """Sums over the ledger, as Markdown."""
+    ends, counts = Counter[str](), Counter[str]()
+    for row in rows:
+        ends.update(row["ends"])
+        counts.update(row["counts"])
+    kinds = sorted({end.split()[0] for end in ends})
+    columns = [*WELL, *sorted({end.split()[1] for end in ends} - set(WELL))]
+    lines = ["| trials | all | " + " | ".join(columns) + " |", "|---|--:|" + "--:|" * len(columns)]
+    for kind in kinds:
+        cells = [ends[f"{kind} {end}"] for end in columns]
+        lines.append(f"| {kind} | {sum(cells)} | " + " | ".join(map(str, cells)) + " |")
+    counted = ", ".join(f"{name} {number}" for name, number in counts.most_common())
+    hours = sum(row["cpu"] for row in rows) / 3600
+    return "\n".join([*lines, "", f"{hours:.2f} hours of a processor; {counted}"])
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--hours", type=float, default=1.0)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--workers", type=int, default=1, help="trials at a time")
+    parser.add_argument("--meshes", type=Path, help="folder of real meshes, with its index.csv")
+    parser.add_argument("--folder", type=Path, default=Path("soak"), help="for the ledger and the cases")
+    parser.add_argument("--totals", action="store_true", help="sums over the ledger")
+    parser.add_argument("--again", type=Path, help="a case to try once more")
+    parser.add_argument("--minimise", type=Path, help="a case to make smaller, in place")
+    args = parser.parse_args()
+    if args.totals:
+        print(totals(Ledger(args.folder / "ledger.jsonl").rows))
+        return 0
+    if args.again or args.minimise:
+        case = json.loads((args.again or args.minimise).read_text())
+        laboratory = Laboratory(case["seed"], meshes_of(args.meshes))
+        try:
+            trial = try_case(laboratory, case)
+            print(json.dumps(case_of(trial), indent=1))
+            if args.minimise and not trial.is_well:
+                write_case(args.minimise, minimised(laboratory, case, 50 * TRIES))
+        finally:
+            laboratory.close()
+        return int(not trial.is_well)
+    return min(soak(args), 1)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,289 @@
+"""The trials of a soak: each is made of a seed and its number alone, tries one thing, and says how that ended.
+
+A trial is a damaged file, a random shape, a real mesh, a command under a fault, or a batch under a fault.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from fuzz import faults
+from fuzz.choices import draw_options
+from fuzz.damaged import CPU_SECONDS, MEMORY, SECONDS, Fuzzer, seeds_of, written
+from fuzz.faults import draw_fault
+from fuzz.files import read_hulls, write_mesh
+from fuzz.judges import Case, judge
+from fuzz.mutations import Seed
+from fuzz.recipes import FAULTS, Shape, make_shape, pick, placed
+from fuzz.shapes import FORMATS, Row, judged
+from fuzz.worker import Watched
+from rlacd import NavigableSpace
+from rlacd.fleet import Order
+from rlacd.pool import Limits
+
+KINDS = {"file": 0.86, "shape": 0.115, "mesh": 0.012, "fault": 0.011, "batch": 0.002}
+"""How many of the trials are of each kind."""
+
+WELL = ("done", "loaded", "refused")
+"""How a trial may end."""
+
+LARGEST_MESH = 20_000
+"""Triangles of a real mesh."""
+
+SHAPE_SECONDS = 300.0
+"""Time of a processor that a shape may take."""
+
+LATE = 1.0, 1.1
+"""What a timeout may be exceeded by: seconds, and a factor."""
+
+
+@dataclass
+class Trial:
+    """What was tried and how it ended.
+
+    Attributes
+    ----------
+    seed, number
+        What it is made of.
+    kind
+        See `KINDS`.
+    end
+        See `WELL`; else ``crash``, ``hang``, ``memory``, ``untyped``, ``invalid``, ``bug`` or ``wrong``.
+    said
+        What is wrong.
+    story
+        The input, in words.
+    options
+        Of the decomposition.
+    counts
+        Decompositions, hulls, and what else is counted.
+    cpu
+        Seconds of a processor.
+    """
+
+    seed: int
+    number: int
+    kind: str
+    end: str = "done"
+    said: list[str] = field(default_factory=list)
+    story: list[str] = field(default_factory=list)
+    options: dict[str, Any] = field(default_factory=dict)
+    counts: Counter[str] = field(default_factory=Counter)
+    cpu: float = 0.0
+
+    @property
+    def is_well(self) -> bool:
+        return self.end in WELL
+
+
+class Laboratory:
+    """Makes trials.
+
+    Parameters
+    ----------
+    seed : int
+    meshes : Path, optional
+        The folder of real meshes; without one, files of a few simple shapes are damaged, and there are no real meshes.
+    """
+
+    def __init__(self, seed: int, meshes: Path | None) -> None:
+        self.seed = seed
+        self._scratch = TemporaryDirectory(prefix="rlacd-soak-")
+        self.folder = Path(self._scratch.name)
+        self._meshes = meshes
+        self._small = [] if meshes is None else _small_meshes(meshes)
+        seeds = _simple_seeds() if meshes is None else seeds_of(meshes)
+        self._files = Fuzzer(seeds, seed, self.folder, Watched(Limits(SECONDS, MEMORY), CPU_SECONDS))
+        self._shapes = Watched(Limits(4 * SECONDS, 3 * 2**30), SHAPE_SECONDS)
+
+    def close(self) -> None:
+        """End all processes."""
+        self._files.close()
+        self._shapes.close()
+        self._scratch.cleanup()
+
+    def kind(self, number: int) -> str:
+        """What a number stands for."""
+        kind = str(np.random.default_rng([self.seed, number, 10]).choice(list(KINDS), p=list(KINDS.values())))
+        return "shape" if kind == "mesh" and not self._small else kind
+
+    def trial(self, number: int) -> Trial:
+        """Make a trial and see how it ends."""
+        trial = Trial(self.seed, number, self.kind(number))
+        start = time.thread_time()
+        make: dict[str, Callable[[Trial, np.random.Generator], Trial]] = {
+            "file": self._file,
+            "shape": self._shape,
+            "mesh": self._mesh,
+            "fault": self._fault,
+            "batch": self._batch,
+        }
+        trial = make[trial.kind](trial, np.random.default_rng([self.seed, number, 11]))
+        trial.cpu = round(trial.cpu + time.thread_time() - start, 4)
+        return trial
+
+    def shape(self, number: int) -> tuple[Shape, dict[str, Any]]:
+        """Shape and options of a trial of the kinds ``shape``, ``mesh`` and ``fault``."""
+        if self.kind(number) != "mesh":
+            return make_shape(self._shape_seed(number)), draw_options(self._shape_seed(number))
+        random = np.random.default_rng([self.seed, number, 12])
+        path = self._small[int(random.integers(len(self._small)))]
+        mesh = trimesh.load_mesh(path, process=False)
+        shape = Shape(np.array(mesh.vertices, float), np.array(mesh.faces, np.int64), (path.name,))
+        for _ in range(int(random.choice(3, p=[0.4, 0.4, 0.2]))):
+            shape = pick(random, FAULTS)(shape, random)
+        return placed(shape, random), draw_options(self._shape_seed(number))
+
+    def retry(self, trial: Trial, shape: Shape, options: dict[str, Any]) -> Trial:
+        """Try a shape and options of one's own in the way of a trial."""
+        random = np.random.default_rng([self.seed, trial.number, 11])
+        ending, twice = str(random.choice(FORMATS)), bool(random.random() < 0.25)
+        row = judged(Row(trial.number, "done"), shape, options, ending, twice, self._shapes, self.folder)
+        end = {"hang": "memory"}.get(row.status, row.status) if "memory" in " ".join(row.said) else row.status
+        counts = Counter(decompositions=1 + row.twice, hulls=row.parts, twice=row.twice)
+        return replace(trial, end=end, said=row.said, story=row.steps, options=row.options, counts=counts, cpu=row.cpu)
+
+    def _shape_seed(self, number: int) -> int:
+        return self.seed * 10**9 + number
+
+    def _file(self, trial: Trial, random: np.random.Generator) -> Trial:
+        kind, path = self._files.input(trial.number)
+        row = self._files.result(path)
+        path.unlink()
+        counts = Counter({"files": 1, f"{kind} files": 1, "decompositions": row["end"] in ("loaded", "invalid")})
+        said = [row["said"]] if row["said"] and row["end"] != "refused" else []
+        return replace(trial, end=row["end"], said=said, story=[f"damaged {kind}"], counts=counts, cpu=row["cpu"])
+
+    def _shape(self, trial: Trial, random: np.random.Generator) -> Trial:
+        return self.retry(trial, *self.shape(trial.number))
+
+    _mesh = _shape
+
+    def _fault(self, trial: Trial, random: np.random.Generator) -> Trial:
+        """Decompose undisturbed; by the command under a fault, over an older result; and by the command again."""
+        shape, options = self.shape(trial.number)
+        options.pop("timeout", None)
+        if options.get("preset") == "unreal":
+            del options["preset"]  # its files are of another format
+        ending = str(random.choice([*FORMATS, "mjcf", "folder"]))
+        space = options.get("criterion")
+        if isinstance(space, NavigableSpace) and space.radius is not None and space.radius < 0.05:
+            del options["criterion"]  # tens of thousands of parts
+        order = Order.of(options, file_format=None if ending == "folder" else ending, folders=ending == "folder")
+        trial = replace(trial, story=[*shape.steps, ending], options=options)
+        with TemporaryDirectory(dir=self.folder) as place:
+            mesh = write_mesh(Path(place) / "mesh.ply", shape.vertices, shape.faces)
+            out = Path(place) / "out"
+            out.mkdir()
+            said, whole = self._shapes.run(order, mesh, mesh.name, "out")
+            trial.cpu += said["cpu"]
+            if "error" in said:
+                return replace(trial, end="refused", counts=Counter(faults=1))
+            size = sum(map(len, whole.values()))
+            fault = draw_fault(random, said["cpu"], size)
+            trial = replace(trial, story=[*trial.story, f"{fault.name} {fault.environment or fault.memory or ''}"])
+            main = next((name for name in whole if "/" not in name), "") if ending != "folder" else ""
+            old = {main: b"old"} if main and random.random() < 0.5 else {}
+            for name, content in old.items():
+                (out / name).write_bytes(content)
+            words = ["decompose", str(mesh), "-o", str(out / (main or "out")) + ("" if main else "/"), "--quiet"]
+            words += [*words_for(ending), *faults.words_of(options)]
+            first = faults.command(words, fault)
+            after = faults.tree(out)
+            found = faults.complaints(fault, first)
+            found += faults.left_behind(fault, first.code, main, old, after, whole)
+            if first.code == 4 and main.endswith((".obj", ".ply")):
+                report = {**said["report"], "complete": False, "warnings": ["Incomplete exceed from the hulls"]}
+                hulls = read_hulls(after[main], main[-3:])
+                report |= {"parts": len(hulls), "hausdorff": {"under": None, "over": None}, "concavity": None}
+                found += judge(Case(shape, {**options, "max_hulls": None}, hulls, report))
+            if fault.name == "timeout":
+                found += _lateness(first.cpu, float(fault.words[1]), options["threads"])
+            again = faults.command(words)
+            if again.code != 0 or any(faults.tree(out).get(name) != content for name, content in whole.items()):
+                found.append(f"the command again ends with {again.code} and other files: {again.said[-300:]}")
+        counts = Counter(decompositions=3, faults=1, hulls=said["report"]["parts"])
+        counts[fault.name] += 1
+        return replace(
+            trial, end="wrong" if found else "done", said=found, counts=counts, cpu=trial.cpu + first.cpu + again.cpu
+        )
+
+    def _batch(self, trial: Trial, random: np.random.Generator) -> Trial:
+        """A batch undisturbed; under a fault; and again, after which all files have to be the same."""
+        with TemporaryDirectory(dir=self.folder) as place:
+            assets = Path(place) / "assets"
+            assets.mkdir()
+            meshes = int(random.integers(2, 5))
+            for i in range(meshes):
+                shape = make_shape(self._shape_seed(trial.number) + 10**12 * (i + 1))
+                write_mesh(assets / f"{i}.ply", shape.vertices, shape.faces)
+                trial.story += [*shape.steps, f"{i}.ply"]
+            (assets / "bad.stl").write_text("no mesh")
+            words = ["batch", str(assets), "--quality=fast", "--threshold=0.2", "--jobs=1"]
+            words.append(f"--format={random.choice(['obj', 'glb', 'urdf'])}")
+            calm = faults.command([*words, "-o", f"{place}/calm"])
+            fault = draw_fault(random, calm.cpu / 4, 20_000)
+            while fault.memory or fault.words or fault.name == "clock jumps":  # those are other trials
+                fault = draw_fault(random, calm.cpu / 4, 20_000)
+            trial.story.append(f"{fault.name} {fault.environment}")
+            codes = tuple(5 if code == 0 else code for code in fault.codes)
+            first = faults.command([*words, "-o", f"{place}/out"], replace(fault, codes=codes))
+            found = faults.complaints(replace(fault, codes=codes), first)
+            again = faults.command([*words, "-o", f"{place}/out"])
+            expected, got = (_results(Path(place) / name) for name in ("calm", "out"))
+            if calm.code != 5:
+                found.append(f"undisturbed it ended with {calm.code}: {calm.said[-300:]}")
+            if again.code != calm.code:
+                found.append(f"the second run ended with {again.code}: {again.said[-300:]}")
+            if expected != got:
+                names = sorted(name for name in expected | got if expected.get(name) != got.get(name))
+                found.append(f"the second run ends with other files: {', '.join(names)}")
+        counts = Counter({"batches": 1, f"batch {fault.name}": 1, "decompositions": 3 * meshes})
+        cpu = calm.cpu + first.cpu + again.cpu
+        return replace(trial, end="wrong" if found else "done", said=found, counts=counts, cpu=cpu)
+
+
+def words_for(ending: str) -> list[str]:
+    """What tells the command the format of a folder."""
+    return ["--format", "obj"] if ending == "folder" else []
+
+
+def _results(folder: Path) -> faults.Tree:
+    """The files of a batch that are the same in every run."""
+    return {
+        name: content
+        for name, content in faults.tree(folder).items()
+        if name != "timings.jsonl" and not name.startswith(".rlacd/")
+    }
+
+
+def _lateness(cpu: float, timeout: float, threads: int) -> list[str]:
+    """How late a command came back at least: time by the clock is no less than that of its processors, shared."""
+    late = (cpu - 4 * faults.STARTING) / min(threads, os.cpu_count() or 1) - LATE[1] * timeout
+    return [f"it came {late:.1f} s after its timeout of {timeout:g} s, at least"] if late > LATE[0] else []
+
+
+def _small_meshes(meshes: Path) -> list[Path]:
+    with open(meshes / "index.csv", newline="") as listing:
+        return [meshes / row["file"] for row in csv.DictReader(listing) if 4 <= int(row["faces"]) <= LARGEST_MESH]
+
+
+def _simple_seeds() -> dict[str, list[Seed]]:
+    """Files of simple shapes, by format, where there is no folder of real ones."""
+    bodies = [trimesh.creation.box((2, 0.4, 0.4)), trimesh.creation.cylinder(0.3, 1, sections=5)]
+    found: dict[str, list[Seed]] = {}
+    for mesh in (*bodies, trimesh.util.concatenate(bodies)):
+        for kind, seed in written(mesh):
+            found.setdefault(kind, []).append(seed)
+    return found

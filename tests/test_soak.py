@@ -1,0 +1,179 @@
+"""The soak finds what is broken, makes it small, goes on where it was; and what it has found stays mended."""
+
+from __future__ import annotations
+
+import json
+import signal
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fuzz import soak
+from fuzz.cases import case_of, inputs, minimised, try_case
+from fuzz.faults import Fault, Run, complaints, left_behind
+from fuzz.recipes import Shape
+from fuzz.trials import KINDS, Laboratory, Trial
+
+CASES = sorted((Path(__file__).parent / "cases").glob("*.json"))
+
+
+@pytest.fixture(scope="module")
+def laboratory() -> Any:
+    laboratory = Laboratory(0, None)
+    yield laboratory
+    laboratory.close()
+
+
+def first_of(laboratory: Laboratory, kind: str) -> int:
+    return next(number for number in range(10_000) if laboratory.kind(number) == kind)
+
+
+@pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
+def test_what_was_found_stays_mended(path: Path, laboratory: Laboratory) -> None:
+    case = json.loads(path.read_text())
+    assert case["kind"] in ("shape", "mesh")
+    assert "vertices" in case, "a case to keep holds its triangles: `python -m fuzz.soak --minimise`"
+    trial = try_case(laboratory, case)
+    assert trial.is_well, trial.said
+
+
+def test_shares_of_trials_add_up() -> None:
+    assert sum(KINDS.values()) == pytest.approx(1)
+
+
+@pytest.mark.parametrize("kind", ["file", "shape"])
+def test_a_number_is_always_the_same_trial(kind: str, laboratory: Laboratory) -> None:
+    number = first_of(laboratory, kind)
+    one, two = (laboratory.trial(number) for _ in range(2))
+    assert one.is_well, one.said
+    assert replace(one, cpu=0) == replace(two, cpu=0)
+
+
+@pytest.mark.slow
+def test_a_command_under_a_fault_is_a_trial(laboratory: Laboratory) -> None:
+    trial = laboratory.trial(first_of(laboratory, "fault"))
+    assert trial.is_well, trial.said
+    assert trial.counts["faults"] == 1
+
+
+class Pretended:
+    """In place of a laboratory: whatever has triangle (0, 1, 2) and options `a` and `b` is wrong."""
+
+    def __init__(self) -> None:
+        vertices = np.random.default_rng(0).normal(size=(30, 3))
+        self.whole = Shape(vertices, np.arange(30).reshape(-1, 3), ("ten triangles",))
+        self.sought = vertices[:3]
+
+    def shape(self, number: int) -> tuple[Shape, dict[str, Any]]:
+        return self.whole, {}
+
+    def retry(self, trial: Trial, shape: Shape, options: dict[str, Any]) -> Trial:
+        found = any((shape.vertices[face] == self.sought).all() for face in shape.faces)
+        wrong = found and {"a", "b"} <= set(options)
+        return replace(
+            trial, end="wrong" if wrong else "done", said=["it is wrong by 3"] if wrong else [], options=options
+        )
+
+
+def test_a_case_is_made_small_and_is_tried_as_it_stands() -> None:
+    options = {"threshold": 0.1, "a": 1, "seed": 3, "b": 2, "threads": 1}
+    pretended: Any = Pretended()
+    case = case_of(Trial(0, 7, "shape", "wrong", ["it is wrong by 3"], ["ten triangles"], options))
+    small = minimised(pretended, case, tries=100)
+    assert set(small["options"]) == {"threshold", "a", "b", "threads"}
+    assert small["faces"] == [[0, 1, 2]]
+    again = json.loads(json.dumps(small))
+    shape, _ = inputs(pretended, again)
+    assert (shape.vertices == pretended.sought).all()
+    assert try_case(pretended, again).end == "wrong"
+
+
+def test_every_option_survives_the_way_through_a_case(laboratory: Laboratory) -> None:
+    for number in range(200):
+        shape, options = laboratory.shape(number) if laboratory.kind(number) == "shape" else (None, {})
+        if shape is not None:
+            case = json.loads(json.dumps(case_of(Trial(0, number, "shape", options=options))))
+            assert inputs(laboratory, case)[1] == options
+
+
+def test_a_soak_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+    made: list[int] = []
+
+    class Quick:
+        seed = 0
+
+        def __init__(self, *_: Any) -> None:
+            pass
+
+        def trial(self, number: int) -> Trial:
+            made.append(number)
+            if number == 130:
+                raise KeyboardInterrupt
+            end = "wrong" if number == 7 else "done"
+            return Trial(0, number, "fault", end, ["bad"] if end == "wrong" else [], counts=Counter(files=2), cpu=0.5)
+
+        def close(self) -> None:
+            pass
+
+    monkeypatch.setattr(soak, "Laboratory", Quick)
+    words = ["soak", "--folder", str(tmp_path), "--hours", "1"]
+    monkeypatch.setattr("sys.argv", words)
+    with pytest.raises(KeyboardInterrupt):
+        soak.main()
+    assert made == list(range(131))
+    with pytest.raises(KeyboardInterrupt):
+        soak.main()
+    assert made[131:] == list(range(100, 131)), "the chunk that was not finished is made again"
+    assert json.loads((tmp_path / "0-7.json").read_text())["said"] == ["bad"]
+    monkeypatch.setattr("sys.argv", [*words, "--totals"])
+    assert soak.main() == 0
+    said = capsys.readouterr().out
+    assert "| fault | 100 | 99 | 0 | 0 | 1 |" in said
+    assert "files 200" in said
+
+
+FULL = Fault("full disk", (0, 3))
+KILLED = Fault("killed", (0, -int(signal.SIGKILL)))
+
+
+@pytest.mark.parametrize(
+    ("fault", "run", "says"),
+    [
+        (FULL, Run(3, "rlacd: the disk is full", 0), ""),
+        (FULL, Run(0, "", 0), ""),
+        (KILLED, Run(-9, "", 0), ""),
+        (FULL, Run(1, "rlacd: a bug in rlacd", 0), "it ended with 1"),
+        (FULL, Run(-11, "", 0), "it ended with -11"),
+        (FULL, Run(3, "Traceback (most recent call last):\nOSError", 0), "a traceback"),
+        (FULL, Run(3, "", 0), "did not say why"),
+    ],
+)
+def test_a_wrong_end_is_seen(fault: Fault, run: Run, says: str) -> None:
+    found = complaints(fault, run)
+    assert (says in " ".join(found)) if says else not found
+
+
+OLD, WHOLE = {"out.xml": b"old"}, {"out.xml": b"new", "out/a.obj": b"a"}
+
+
+@pytest.mark.parametrize(
+    ("fault", "code", "after", "says"),
+    [
+        (FULL, 0, WHOLE, ""),
+        (FULL, 3, OLD, ""),
+        (FULL, 3, {"out.xml": b"ne"}, "neither"),
+        (FULL, 3, {}, "lost"),
+        (FULL, 3, {**OLD, "tmp": b""}, "left behind"),
+        (FULL, 3, {"out.xml": b"new"}, "names files that are not there"),
+        (FULL, 0, OLD, "undisturbed"),
+        (KILLED, -9, {**OLD, "tmp": b"", "out/a.obj": b"a"}, ""),
+        (KILLED, -9, {**OLD, "out/a.obj": b""}, "neither"),
+    ],
+)
+def test_half_a_file_is_seen(fault: Fault, code: int, after: dict[str, bytes], says: str) -> None:
+    found = left_behind(fault, code, "out.xml", OLD, after, WHOLE)
+    assert (says in " ".join(found)) if says else not found
