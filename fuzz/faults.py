@@ -31,7 +31,8 @@ PATIENCE = 1800.0
 MAIN = "from rlacd.cli import main; main()"
 
 SMALL = """
-import resource, sys, rlacd.decompose, rlacd.decompose_command, rlacd.formats, rlacd.cli
+import resource, sys, rlacd, rlacd.decompose_command, rlacd.formats, rlacd.cli
+assert rlacd.decompose  # which loads it
 held = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
 limit = held + int(sys.argv.pop(1))
 resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
