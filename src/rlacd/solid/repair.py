@@ -25,8 +25,9 @@ from manifold3d import Manifold
 from rlacd.errors import EmptyMeshError
 from rlacd.solid.frame import FloatArray, Frame
 from rlacd.solid.load import InputMesh
+from rlacd.solid.repair_caps import FLAPS, close_holes
 from rlacd.solid.repair_distance import SurfaceQuery, spread_points
-from rlacd.solid.repair_holes import MOST_FREE_EDGES, cap, close_cracks, free_edges, free_loops
+from rlacd.solid.repair_holes import MOST_FREE_EDGES, close_cracks
 from rlacd.solid.repair_skin import skin
 from rlacd.solid.repair_soup import NO_AREA, Soup, hidden_faces, on_repeated_edge
 from rlacd.solid.repair_union import (
@@ -61,17 +62,11 @@ HALF_THICKNESS = 1e-3
 GAP = 0.03
 """Farthest a cap may lead from the input's surface, and the radius of the ball a gap must stop, in frame units."""
 
-HOLE, HOLE_SHARE = 0.1, 0.02
-"""A body nearly closed, its holes no more than this share of its area, is closed with caps up to this far away: a scan
-with a few holes is meant as a solid, a cup is not. The caps are reported."""
-
 _WELDS = (2e-5, 5e-4)
 _WRAP_ERROR = 4e-3
 # More sheets than this are not united one by one: it would take seconds, and cutting what comes out longer. So it does
 # when fewer of them all cross each other: 40 do so 780 times (a second or two), 80 3,160 times (ten).
 _CROWD, _CROSSINGS = 300, 1000
-# A solid may have a few faces sticking out of it, up to this share of its area.
-_FLAPS = 0.05
 # A closed body with less volume per area is flat: nothing could be cut from it.
 _FLAT = 1e-6
 
@@ -121,11 +116,11 @@ def repair(mesh: InputMesh, *, resolution: int = 100, threads: int | None = None
         return Solid(solid, surface, frame, (body,), tuple(warnings))
 
     query = SurfaceQuery(vertices, faces, threads)
-    work = _Repair(query, resolution, keep_cavities)
+    work = _Repair(query, frame, resolution, keep_cavities)
     doubted = work.doubted()
     if len(doubted):
         # Faces of one body that cross each other can be joined wrongly into a skin: try them as sheets.
-        other = _Repair(query, resolution, keep_cavities, doubted)
+        other = _Repair(query, frame, resolution, keep_cavities, doubted)
         if other.deviation.max() < work.deviation.max():
             work = other
     return Solid(work.solid, surface, frame, work.report(), tuple(warnings + work.warnings))
@@ -138,9 +133,15 @@ class _Repair:
     """
 
     def __init__(
-        self, surface: SurfaceQuery, resolution: int, keep_cavities: bool, as_sheets: IntArray | None = None
+        self,
+        surface: SurfaceQuery,
+        frame: Frame,
+        resolution: int,
+        keep_cavities: bool,
+        as_sheets: IntArray | None = None,
     ) -> None:
         self.input = surface
+        self.frame = frame
         self.resolution = resolution
         self.keep_cavities = keep_cavities
         self.as_sheets = np.empty(0, dtype=np.int64) if as_sheets is None else as_sheets
@@ -226,7 +227,7 @@ class _Repair:
             return soup
         share = soup.sheet_share(self.bodies)
         hidden = np.zeros(len(soup.faces), dtype=bool)
-        for body in np.flatnonzero(crowded & (share > _FLAPS)):
+        for body in np.flatnonzero(crowded & (share > FLAPS)):
             some = np.flatnonzero(soup.body == body)
             hidden[some] = hidden_faces(soup.vertices, soup.faces[some])
         if not hidden.any():
@@ -237,51 +238,25 @@ class _Repair:
 
     def _cap(self, soup: Soup) -> Soup:
         """Cap the bodies all of whose holes can honestly be capped."""
-        edges = free_edges(soup.faces, len(soup.vertices))
-        loops = free_loops(edges) if len(edges) <= MOST_FREE_EDGES else []
-        if not loops:
+        free = int((soup.edges.valence == 1).sum())
+        if free == 0 or free > MOST_FREE_EDGES:
             return soup
-        at_hole = soup.at_valence(soup.edges.valence == 1)
-        body_of_vertex = np.zeros(len(soup.vertices), dtype=np.int64)
-        body_of_vertex[soup.faces[at_hole]] = soup.body[at_hole, None]
-        caps = np.concatenate([loop[cap(soup.vertices[loop])] for loop in loops])
-        owner = np.repeat([body_of_vertex[loop[0]] for loop in loops], [len(loop) - 2 for loop in loops])
-
-        points, on = spread_points(soup.vertices, caps, GAP / 2)
-        distance = self.input.distance(points)
-        far = distance > GAP
-        unreachable = far.copy()
-        if far.any() and not self.keep_cavities:
-            far[far] = self.reach.covers(points[far])
-            unreachable &= ~far
-        cap_area = np.bincount(owner, face_areas(soup.vertices, caps), self.bodies)
-        nearly_closed = cap_area <= HOLE_SHARE * np.bincount(soup.body, soup.area, self.bodies)
-        chosen = np.zeros(self.bodies, dtype=bool)
-        chosen[soup.body[at_hole]] = True
-        chosen[owner[on[far & ~(nearly_closed[owner[on]] & (distance <= HOLE))]]] = False
-
-        def capped() -> Soup:
-            some = chosen[owner]
-            faces, body = np.concatenate([soup.faces, caps[some]]), np.concatenate([soup.body, owner[some]])
-            return Soup(soup.vertices, faces, body).only(first_of_doubled(faces, len(soup.vertices)))
-
-        # A cap is worth having only where it gives the body an inside: a strip whose cap lies on itself stays a sheet.
-        trial = capped()
-        volume = np.bincount(trial.body_of_side(), np.maximum(trial.sides.volume, 0), self.bodies)
-        chosen &= volume > HALF_THICKNESS / 2 * np.bincount(trial.body, trial.area, self.bodies)
-        chosen &= trial.sheet_share(self.bodies) <= _FLAPS
-        if not chosen.any():
+        closed = close_holes(soup, self.bodies, self.input, self._covers, GAP, HALF_THICKNESS / 2)
+        if closed is None:
             return soup
-        self._note(np.flatnonzero(chosen), "capped")
-        self.by_room[owner[on[unreachable]]] = True
-        self.by_room &= chosen
-        wide = far & chosen[owner[on]]
-        if wide.any():
+        self._note(closed.bodies, "capped")
+        self.by_room |= closed.by_room
+        if len(closed.far):
+            place = ", ".join(f"{x:.4g}" for x in self.frame.to_input(closed.where[closed.far.argmax()]))
             self.warnings.append(
-                f"{len(np.unique(owner[on[wide]]))} nearly closed bodies had holes that were closed although the caps "
-                f"lead up to {distance[wide].max():.3f} (longest side = 2) away from the surface"
+                f"Holes were closed although the caps lead up to {closed.far.max():.3f} (longest side = 2) away from "
+                f"the surface: the widest is at ({place})."
             )
-        return capped()
+        return closed.soup
+
+    def _covers(self, points: FloatArray) -> BoolArray:
+        """Whether a ball can come to points; where cavities are kept, whatever leads there is open."""
+        return np.ones(len(points), dtype=bool) if self.keep_cavities else self.reach.covers(points)
 
     def _build(self, soup: Soup) -> list[tuple[Manifold, int]]:
         """Turn every body into closed solids; returns them, and the body each belongs to."""

@@ -13,10 +13,17 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from rlacd.solid.frame import FloatArray
-from rlacd.solid.topology import Edges, IntArray, components, first_of_doubled, nondegenerate
+from rlacd.solid.topology import BoolArray, Edges, IntArray, components, first_of_doubled, nondegenerate
 
-# Minimum-area triangulation looks at every pair of corners; longer loops are cut by ears or spanned from the middle.
+# The best triangulation looks at every three corners; longer loops are cut by ears, or where that fails up to a length.
 _EXACT_LOOP = 60
+LONGEST_EXACT_LOOP = 250
+"""Loops of more edges than this are not triangulated in the best way."""
+
+# What area weighs against bending.
+_AREA = 0.1
+# What an edge that is there already weighs: more than anything else, but it is better than no cap.
+_TAKEN = 1e3
 
 
 # Tracing loops is the one step of a repair that walks edge by edge; a soup with more free edges is no scan with holes.
@@ -123,57 +130,40 @@ def free_edges(faces: IntArray, count: int) -> IntArray:
     return np.stack([faces[face, corner], faces[face, (corner + 1) % 3]], axis=1)
 
 
-def free_loops(edges: IntArray) -> list[IntArray]:
-    """Trace edges ``[B, 2]``, in any direction, into closed loops of distinct vertices.
+def cap(points: FloatArray, beside: FloatArray, taken: BoolArray | None = None) -> IntArray:
+    """Triangulate a closed loop of points; a loop may visit a place twice.
 
-    A walk that meets itself sheds the loop it has closed, so holes that touch in a vertex come out apart. Chains that
-    do not close are left out.
+    Parameters
+    ----------
+    points
+        ``[N, 3]``.
+    beside
+        ``[N, 3]``, the unit normal of the face on the other side of the edge from each point to the next. It runs along
+        that edge in the order of the loop.
+    taken
+        ``[N, N]``, between which points an edge would be one too many, because there is one or because they are one.
+
+    Returns
+    -------
+    IntArray
+        ``[N - 2, 3]`` corners, none of them new, which run against the loop, as the faces beside it would have them.
     """
-    around: dict[int, list[tuple[int, int]]] = {}
-    ends = edges.tolist()
-    for i, (a, b) in enumerate(ends):
-        around.setdefault(a, []).append((i, b))
-        around.setdefault(b, []).append((i, a))
-    taken = [False] * len(ends)
-    loops: list[IntArray] = []
-    for start, (first, _) in enumerate(ends):
-        if taken[start]:
-            continue
-        walk, place = [first], {first: 0}
-        while walk:
-            step = next(((i, b) for i, b in around[walk[-1]] if not taken[i]), None)
-            if step is None:
-                del place[walk.pop()]
-                continue
-            taken[step[0]] = True
-            there = step[1]
-            if there in place:
-                loop = walk[place[there] :]
-                for vertex in loop[1:]:
-                    del place[vertex]
-                del walk[place[there] + 1 :]
-                if len(loop) > 2:
-                    loops.append(np.array(loop, dtype=np.int64))
-            else:
-                place[there] = len(walk)
-                walk.append(there)
-    return loops
-
-
-def cap(points: FloatArray) -> IntArray:
-    """Triangulate a closed loop of points ``[N, 3]``; returns ``[N - 2, 3]`` corners, none of them new."""
     if len(points) <= 3:
-        return np.arange(3, dtype=np.int64)[None]
+        return np.array([[0, 2, 1]])
     if len(points) <= _EXACT_LOOP:
-        return _least_area(points)
+        return _least_bent(points, beside, taken)[:, ::-1]
     middle = points.mean(axis=0)
     _, _, axes = np.linalg.svd(points - middle, full_matrices=False)
     flat = np.ascontiguousarray((points - middle) @ axes[:2].T)
     ears = mapbox_earcut.triangulate_float64(flat, np.array([len(points)], dtype=np.uint32)).reshape(-1, 3)
-    if len(ears) == len(points) - 2:
-        return ears.astype(np.int64)
-    # The loop's shadow crosses itself: no plane is right, so span it in strips between opposite points.
-    return _strips(len(points))
+    if len(ears) != len(points) - 2:  # the loop's shadow crosses itself: no plane is right
+        if len(points) <= LONGEST_EXACT_LOOP:
+            return _least_bent(points, beside, taken)[:, ::-1]
+        return _strips(len(points))[:, ::-1]
+    triangles: IntArray = ears.astype(np.int64)
+    a, b, c = triangles.T
+    along = ((b - a) % len(points) < (c - a) % len(points)).sum() * 2 > len(triangles)
+    return triangles[:, ::-1] if along else triangles
 
 
 def _strips(count: int) -> IntArray:
@@ -188,19 +178,38 @@ def _strips(count: int) -> IntArray:
     return np.array(triangles, dtype=np.int64)
 
 
-def _least_area(points: FloatArray) -> IntArray:
-    """Triangulate a loop with the least total area, by dynamic programming (Barequet & Sharir 1995)."""
+def _least_bent(points: FloatArray, beside: FloatArray, taken: BoolArray | None) -> IntArray:
+    """Triangulate a loop so that it bends least, by dynamic programming.
+
+    What is least is the sum over all edges, those of the loop included, of length times angle between the faces: the
+    total absolute mean curvature, which brings the sharp edges of an object back where a small area would cut them off.
+    The area, a little of it, decides where nothing bends. After Liepa, "Filling holes in meshes" (2003).
+    """
     n = len(points)
-    cost = np.zeros((n, n))
-    choice = np.zeros((n, n), dtype=np.int64)
+    cost, choice = np.zeros((n, n)), np.zeros((n, n), dtype=np.int64)
+    normal = np.zeros((n, n, 3))  # of the triangle behind the chord from i to k
+    ring = np.arange(n)
+    # Triangles here run with the loop, the faces beside it against them.
+    normal[ring[:-1], ring[1:]] = -beside[:-1]
+    span_of = np.linalg.norm(points[:, None] - points, axis=2)
+    per_area = _AREA / max(float(span_of.max()), np.finfo(float).tiny)
     for span in range(2, n):
         first = np.arange(n - span)[:, None]
         middle, last = first + np.arange(1, span), first + span
-        areas = np.linalg.norm(np.cross(points[middle] - points[first], points[last] - points[first]), axis=2)
-        total = cost[first, middle] + cost[middle, last] + areas
+        cross = np.cross(points[middle] - points[first], points[last] - points[first])
+        twice = np.linalg.norm(cross, axis=2)
+        cross /= np.maximum(twice, np.finfo(float).tiny)[..., None]
+        total = cost[first, middle] + cost[middle, last] + per_area * twice
+        total += span_of[first, middle] * _angle(cross, normal[first, middle])
+        total += span_of[middle, last] * _angle(cross, normal[middle, last])
+        if taken is not None and span < n - 1:
+            total += np.where(taken[first, last], _TAKEN, 0.0)
+        if span == n - 1:
+            total += span_of[0, n - 1] * _angle(cross, -beside[n - 1])
         best = total.argmin(axis=1)[:, None]
         cost[first, last] = np.take_along_axis(total, best, axis=1)
         choice[first, last] = np.take_along_axis(middle, best, axis=1)
+        normal[first[:, 0], last[:, 0]] = np.take_along_axis(cross, best[..., None], axis=1)[:, 0]
     triangles, open_spans = [], [(0, n - 1)]
     while open_spans:
         i, k = open_spans.pop()
@@ -210,3 +219,9 @@ def _least_area(points: FloatArray) -> IntArray:
         triangles.append((i, j, k))
         open_spans += [(i, j), (j, k)]
     return np.array(triangles, dtype=np.int64)
+
+
+def _angle(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Angles between unit vectors in radians; a right angle for one that is zero."""
+    result: FloatArray = np.arccos(np.clip(np.einsum("...i,...i->...", a, b), -1, 1))
+    return result

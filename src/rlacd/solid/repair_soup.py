@@ -33,11 +33,15 @@ _BESIDE = 2e-4
 
 @dataclass(frozen=True)
 class Soup:
-    """Faces on their way through the steps; `body` numbers the body of each, from the input to the end."""
+    """Faces on their way through the steps; `body` numbers the body of each, from the input to the end.
+
+    The windings of `trusted` faces have been looked into and put right.
+    """
 
     vertices: FloatArray
     faces: IntArray
     body: IntArray
+    trusted: BoolArray | None = None
 
     @cached_property
     def edges(self) -> Edges:
@@ -47,7 +51,7 @@ class Soup:
     @cached_property
     def sides(self) -> Sides:
         """The components that the sides of the faces form."""
-        return sides_of(self.vertices, self.faces, self.edges)
+        return sides_of(self.vertices, self.faces, self.edges, self.trusted)
 
     @cached_property
     def area(self) -> FloatArray:
@@ -64,9 +68,9 @@ class Soup:
         result[self.sides.label] = np.repeat(self.body, 2)
         return result
 
-    def sheet_share(self, bodies: int) -> FloatArray:
-        """Return ``[bodies]`` the share of the area of each body that has no inside."""
-        sheet = np.bincount(self.body, self.area * self.sides.sheet, bodies)
+    def sheet_share(self, bodies: int, flap: BoolArray | bool = False) -> FloatArray:
+        """Return ``[bodies]`` the share of the area of each body that has no inside and is no flap."""
+        sheet = np.bincount(self.body, self.area * (self.sides.sheet & ~np.asarray(flap)), bodies)
         share: FloatArray = sheet / np.maximum(np.bincount(self.body, self.area, bodies), NO_AREA)
         return share
 
@@ -78,8 +82,8 @@ class Soup:
         """
         halfedge = np.argsort(self.edges.of_halfedge, kind="stable")
         halfedge = halfedge[self.edges.valence[self.edges.of_halfedge[halfedge]] == 2].reshape(-1, 2)
-        across = [_across(self.vertices, self.faces, some) for some in halfedge.T]
-        halfedge = halfedge[np.einsum("ij,ij->i", *across) < _FOLD]
+        away = [across(self.vertices, self.faces, some) for some in halfedge.T]
+        halfedge = halfedge[np.einsum("ij,ij->i", *away) < _FOLD]
         count, patch = components(len(self.faces), halfedge[:, 0] // 3, halfedge[:, 1] // 3)
         # Layers of thousands of faces on each other take minutes to unite: there, thin spots are the lesser evil.
         patches = np.unique(np.stack([self.body, patch], axis=1), axis=0)[:, 0]
@@ -94,10 +98,11 @@ class Soup:
 
     def only(self, keep: BoolArray) -> Soup:
         """The marked faces."""
-        return Soup(self.vertices, self.faces[keep], self.body[keep])
+        trusted = None if self.trusted is None else self.trusted[keep]
+        return Soup(self.vertices, self.faces[keep], self.body[keep], trusted)
 
 
-def _across(vertices: FloatArray, faces: IntArray, halfedges: IntArray) -> FloatArray:
+def across(vertices: FloatArray, faces: IntArray, halfedges: IntArray) -> FloatArray:
     """Return the unit direction ``[N, 3]`` in which each halfedge's face leads away from it."""
     face, corner = halfedges // 3, halfedges % 3
     a, b, c = (vertices[faces[face, (corner + i) % 3]] for i in range(3))

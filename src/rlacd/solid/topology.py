@@ -169,15 +169,22 @@ def _apex(faces: IntArray, halfedges: IntArray) -> IntArray:
     return corners
 
 
-def wedges_of(vertices: FloatArray, faces: IntArray, edges: Edges) -> IntArray:
-    """Return the wedges ``[3F, 2]`` around all edges (see `Sides`)."""
+def wedges_of(vertices: FloatArray, faces: IntArray, edges: Edges, trusted: BoolArray | None = None) -> IntArray:
+    """Return the wedges ``[3F, 2]`` around all edges (see `Sides`).
+
+    Around an edge with ``trusted`` ``[F]`` faces only, they alternate as their windings ask, whatever the angles.
+    """
     angle = np.zeros(3 * len(faces))
     crowded = np.flatnonzero(edges.valence[edges.of_halfedge] > 2)  # the order of one or two faces needs no angle
     if len(crowded):
         ends = edges.vertices[edges.of_halfedge[crowded]]
         angle[crowded] = _angles_around(vertices, faces, ends, crowded)
         order = np.lexsort((angle, edges.of_halfedge))
-        _order_ties(order, angle, edges, (faces < faces[:, _NEXT]).ravel())
+        doubted = np.ones(len(edges.valence), dtype=bool)
+        if trusted is not None:
+            doubted[:] = False
+            doubted[edges.of_halfedge[np.repeat(~trusted, 3)]] = True
+        _order_ties(order, angle, edges, (faces < faces[:, _NEXT]).ravel(), ~doubted)
     else:
         order = np.argsort(edges.of_halfedge, kind="stable")
     start = np.concatenate([[0], np.cumsum(edges.valence)])
@@ -186,11 +193,12 @@ def wedges_of(vertices: FloatArray, faces: IntArray, edges: Edges) -> IntArray:
     return np.stack([order, order[follower]], axis=1)
 
 
-def _order_ties(order: IntArray, angle: FloatArray, edges: Edges, forward: BoolArray) -> None:
+def _order_ties(order: IntArray, angle: FloatArray, edges: Edges, forward: BoolArray, trusted: BoolArray) -> None:
     """Put faces that lie on each other around an edge into the order their windings ask for, in place.
 
     Their angles cannot tell which comes first, and a wrong guess would join the inside with the outside. Where windings
-    are consistent, both sides of a wedge are fronts or both are backs.
+    are consistent, both sides of a wedge are fronts or both are backs. Around ``trusted`` ``[E]`` edges all angles
+    count as equal.
     """
     start = np.concatenate([[0], np.cumsum(edges.valence)])
     sorted_angle = angle[order]
@@ -198,6 +206,7 @@ def _order_ties(order: IntArray, angle: FloatArray, edges: Edges, forward: BoolA
     gap[:-1] = np.diff(sorted_angle)
     gap[start[1:] - 1] = sorted_angle[start[:-1]] + 2 * np.pi - sorted_angle[start[1:] - 1]
     tied = np.zeros(len(edges.valence), dtype=bool)
+    gap[trusted[edges.of_halfedge[order]]] = 0
     tied[edges.of_halfedge[order[gap < _SAME_ANGLE]]] = True
     for edge in np.flatnonzero(tied & (edges.valence > 2)):
         here = slice(start[edge], start[edge + 1])
@@ -243,9 +252,9 @@ def _sums(group: IntArray, values: FloatArray, number: int) -> FloatArray:
     return np.bincount(group, values, number).astype(np.float64)
 
 
-def sides_of(vertices: FloatArray, faces: IntArray, edges: Edges) -> Sides:
-    """Join the sides of all faces across their wedges."""
-    wedges = wedges_of(vertices, faces, edges)
+def sides_of(vertices: FloatArray, faces: IntArray, edges: Edges, trusted: BoolArray | None = None) -> Sides:
+    """Join the sides of all faces across their wedges; see `wedges_of`."""
+    wedges = wedges_of(vertices, faces, edges, trusted)
     first, second = facing_sides(faces, wedges)
     number, label = components(2 * len(faces), first, second)
     tetrahedra = signed_tetrahedra(vertices, faces)
