@@ -82,11 +82,9 @@ def rims_of(soup: Soup) -> Rims:
     tail, head = np.where(swap, head, tail), np.where(swap, tail, head)
     tail_fan, head_fan = np.where(swap, head_fan, tail_fan), np.where(swap, tail_fan, head_fan)
     follower = _followers(soup.vertices, normal_of_vertex, tail, head, tail_fan, head_fan)
-    loops = [
-        loop
-        for loop in _cycles(follower)
-        if len(loop) > 2 and (soup.edges.valence[soup.edges.of_halfedge[rim[loop]]] == 1).any()
-    ]
+    # What hangs between bodies is open where it is free; a hole is free all around, or nearly.
+    free = soup.edges.valence[soup.edges.of_halfedge[rim]] == 1
+    loops = [loop for loop in _cycles(follower) if len(loop) > 2 and 2 * free[loop].sum() > len(loop)]
     normals = weighted / np.maximum(np.linalg.norm(weighted, axis=1, keepdims=True), np.finfo(float).tiny)
     beside = [rim[loop] // 3 for loop in loops]
     return Rims([tail[loop] for loop in loops], beside, normals, inverted, flap)
