@@ -104,7 +104,7 @@ def test_onnxruntime_gives_the_features_of_the_official_code(
 ) -> None:
     import onnxruntime
 
-    from rlacd.learn.export import to_onnx
+    from rlacd.learn.onnx_file import to_onnx
 
     class Features(torch.nn.Module):
         def __init__(self) -> None:
@@ -115,7 +115,7 @@ def test_onnxruntime_gives_the_features_of_the_official_code(
             return self.encoder.features(clouds)
 
     points, expected = features
-    model = to_onnx(Features().eval(), (torch.randn(2, *points.shape[1:]),), ("clouds",), "features")
+    model = to_onnx(Features().eval(), (torch.randn(2, *points.shape[1:]),), ("clouds",), ("features",))
     session = onnxruntime.InferenceSession(model.SerializeToString(), providers=["CPUExecutionProvider"])
     assert np.abs(session.run(None, {"clouds": points.numpy()})[0] - expected).max() < 1e-3
     for i in range(len(points)):

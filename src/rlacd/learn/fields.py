@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from rlacd.errors import OptionError
@@ -37,6 +37,23 @@ def check_fields(options: Any) -> None:
             raise OptionError(f"{field.name} is {given!r}; it has to be between {least} and {most}.")
         if one_of and given not in one_of:
             raise OptionError(f"{field.name} is {given!r}; it has to be one of {', '.join(one_of)}.")
+
+
+def require_same(before: Mapping[str, Any], now: Any, may_change: Collection[str]) -> None:
+    """Refuse options that differ from those a run began with; an option that the run is older than had its default.
+
+    Raises
+    ------
+    OptionError
+        One that may not change does.
+    """
+    for name, value in dataclasses.asdict(now).items():
+        was = before.get(name, getattr(type(now), name))
+        if name not in may_change and was != value:
+            raise OptionError(
+                f"{name} is {value!r}, but was {was!r} when the run began; "
+                "resume with the same options, or begin another run."
+            )
 
 
 def refuse_unknown(known: Any, given: Mapping[str, Any], command: str) -> None:

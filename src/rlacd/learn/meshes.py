@@ -1,26 +1,37 @@
-"""The solids to learn on: a folder of meshes, each repaired once and kept."""
+"""The solids to learn on: a folder of meshes, split into those to learn from and to judge by, each repaired once.
+
+There are two lists. `list_meshes` reads every file, leaves out large ones by their triangles, and draws those held out;
+`small_files` and `is_held_out` decide by length and name alone, and so need not read thousands of files.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
-import io
-import os
+import json
+import zlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from manifold3d import Manifold, Mesh64
 from numpy.typing import NDArray
 
 from rlacd.errors import MeshFileError, RlacdError, TrainingError
+from rlacd.learn.files import packed, save_bytes, unpacked
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component
-from rlacd.solid.files import mesh_files
+from rlacd.solid.files import lay_out, mesh_files
 from rlacd.solid.frame import Frame
 from rlacd.solid.load import load_mesh
 from rlacd.solid.repair import repair
 
 ENDINGS = frozenset({".ply", ".obj", ".stl", ".off", ".glb", ".gltf", ".dae", ".3mf"})
+
+HELD_OUT = 24
+"""One mesh in this many is held out where its name decides."""
 
 TURNS = (0.0, 45.0, 90.0, 180.0)
 """Degrees about one axis: the paper's augmentation."""
@@ -68,8 +79,44 @@ def list_meshes(folder: Path, max_faces: int, validation: int, seed: int) -> Mes
             f"{folder} holds {len(names)} meshes to learn on ({unreadable} cannot be read, {too_large} have more than "
             f"{max_faces} triangles); more than {validation} are needed, since that many are held out for validation."
         )
-    shuffled = [names[i] for i in np.random.default_rng(seed).permutation(len(names))]
-    return MeshList(tuple(sorted(shuffled[validation:])), tuple(sorted(shuffled[:validation])), unreadable, too_large)
+    drawn = shuffled(names, seed)
+    return MeshList(tuple(sorted(drawn[validation:])), tuple(sorted(drawn[:validation])), unreadable, too_large)
+
+
+def list_once(meshes: Path, run: Path, max_faces: int, validation: int, seed: int) -> MeshList:
+    """List the meshes when a run begins; later the list is read from the run, so that new files change nothing.
+
+    Raises
+    ------
+    TrainingError
+        There is no such folder, or nothing in it to learn on.
+    """
+    kept = run / "meshes.json"
+    if kept.exists():
+        listed = json.loads(kept.read_text())
+        return MeshList(tuple(listed.pop("training")), tuple(listed.pop("validation")), **listed)
+    if not meshes.is_dir():
+        raise TrainingError(f"there is no folder {meshes}; give one that holds meshes.")
+    found = list_meshes(meshes, max_faces, validation, seed)
+    run.mkdir(parents=True, exist_ok=True)
+    kept.write_text(json.dumps(dataclasses.asdict(found), indent=1))
+    return found
+
+
+def small_files(folder: Path, max_bytes: int) -> list[str]:
+    """List the meshes below a folder whose files have at most `max_bytes`, sorted."""
+    found = (p for p in folder.rglob("*") if p.suffix.lower() in ENDINGS and p.stat().st_size <= max_bytes)
+    return sorted(p.relative_to(folder).as_posix() for p in found)
+
+
+def is_held_out(name: str) -> bool:
+    """Tell whether a mesh is for judging only; decided by its name alone."""
+    return zlib.crc32(name.encode()) % HELD_OUT == 0
+
+
+def shuffled(names: Sequence[str], seed: int) -> list[str]:
+    """Put names in an order that depends on the seed only."""
+    return [names[i] for i in np.random.default_rng(seed).permutation(len(names))]
 
 
 NOTHING = np.empty((0, 3)), np.empty((0, 3), dtype=np.uint64)
@@ -92,16 +139,30 @@ def repaired(path: Path) -> bytes:
 
 def pack_solid(vertices: FloatArray, faces: NDArray[np.uint64]) -> bytes:
     """Pack a solid for `unpack_solid`."""
-    file = io.BytesIO()
-    np.savez(file, vertices=vertices, faces=faces)
-    return file.getvalue()
+    return packed({"vertices": vertices, "faces": faces})
 
 
-def unpack_solid(packed: bytes) -> Manifold | None:
+def unpack_solid(content: bytes) -> Manifold | None:
     """Get a solid back; None when it could not be repaired."""
-    with np.load(io.BytesIO(packed), allow_pickle=False) as arrays:
-        vertices, faces = arrays["vertices"], arrays["faces"]
-    return Manifold(Mesh64(vertices, faces)) if len(faces) else None
+    arrays = unpacked(content)
+    return Manifold(Mesh64(arrays["vertices"], arrays["faces"])) if len(arrays["faces"]) else None
+
+
+def take_solid(blobs: Mapping[str, bytes], staging: Path) -> tuple[Manifold | None, dict[str, bytes]]:
+    """Get the solid of a request (see `Solids.files`), and what the answer gives back of it: `SOLID` if it is new.
+
+    Parameters
+    ----------
+    blobs : mapping of bytes
+        The repaired solid, or the files of a mesh.
+    staging : Path
+        A folder for what is on its way.
+    """
+    if SOLID in blobs:
+        return unpack_solid(blobs[SOLID]), {}
+    with TemporaryDirectory(dir=staging) as folder:
+        solid = repaired(lay_out(blobs, Path(folder)))
+    return unpack_solid(solid), {SOLID: solid}
 
 
 def turned(solid: Manifold, axis: int, degrees: float) -> Component:
@@ -150,12 +211,10 @@ class Solids:
         except MeshFileError:
             return {SOLID: pack_solid(*NOTHING)}
 
-    def keep(self, name: str, packed: bytes) -> None:
+    def keep(self, name: str, content: bytes) -> None:
         """Put what `repaired` gave into the cache."""
         if (place := self._place(name)) is not None:
-            partial = place.with_suffix(f".{os.getpid()}.npz")
-            partial.write_bytes(packed)
-            os.replace(partial, place)
+            save_bytes(place, content)
 
     def _kept(self, name: str) -> bytes | None:
         place = self._place(name)

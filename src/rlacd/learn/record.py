@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -11,6 +10,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from rlacd.learn.files import packed, unpacked
 from rlacd.learn.mdp import Reward
 from rlacd.solid.arrays import BoolArray, FloatArray
 
@@ -105,12 +105,9 @@ class Record:
 
     def as_bytes(self) -> bytes:
         """Write it, to be read by `from_bytes`."""
-        file = io.BytesIO()
-        np.savez(file, allow_pickle=False, **self.arrays())
-        return file.getvalue()
+        return packed(self.arrays())
 
     @classmethod
     def from_bytes(cls, content: bytes) -> Record:
         """Read what `as_bytes` wrote."""
-        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-            return cls.of(dict(arrays))
+        return cls.of(unpacked(content))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -16,14 +15,13 @@ from rlacd.criteria import Concavity
 from rlacd.learn.device import pick_device
 from rlacd.learn.encoders import AnyEncoder, make_encoder
 from rlacd.learn.episodes import begin
-from rlacd.learn.meshes import SOLID, repaired, turned, unpack_solid
+from rlacd.learn.meshes import take_solid, turned
 from rlacd.learn.options import TrainOptions
 from rlacd.learn.player import Player, one_thread
 from rlacd.learn.qnetwork import QNetwork
 from rlacd.learn.record import Record
 from rlacd.policies.observe import SCALE_INPUTS
 from rlacd.pool import Blobs, Shared
-from rlacd.solid.files import lay_out
 
 SERVER = "rlacd.learn.rollout_server:RolloutServer"
 
@@ -69,10 +67,8 @@ class RolloutServer:
         """
         with one_thread():
             self._take_over(shared)
-            packed = blobs[SOLID] if SOLID in blobs else self._repaired(blobs)
-            solid = unpack_solid(packed)
+            solid, kept = take_solid(blobs, self._staging)
             record = Record.empty("nothing") if solid is None else self._play(solid, values, "network" in shared)
-        kept = {} if SOLID in blobs else {SOLID: packed}
         return {}, {"record": record.as_bytes(), **kept}
 
     def _play(self, solid: Manifold, values: dict[str, Any], by_network: bool) -> Record:
@@ -84,10 +80,6 @@ class RolloutServer:
         network = self._network if by_network else None
         rng = np.random.default_rng(values["seed"])
         return Player(cutting, options, self._encoder, network, values["epsilon"], rng).play()
-
-    def _repaired(self, files: Blobs) -> bytes:
-        with TemporaryDirectory(dir=self._staging) as folder:
-            return repaired(lay_out(files, Path(folder)))
 
     def _take_over(self, shared: Mapping[str, Shared]) -> None:
         """Make of what is shared what has changed since the last time."""

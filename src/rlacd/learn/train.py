@@ -15,7 +15,6 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from itertools import islice
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
@@ -28,20 +27,25 @@ from rlacd.learn.curves import Curves
 from rlacd.learn.device import pick_device
 from rlacd.learn.encoders import AnyEncoder, I2PMAEEncoder, make_encoder
 from rlacd.learn.export import export_policy
+from rlacd.learn.fields import require_same
 from rlacd.learn.loss import bellman_loss, dual_state_target, soft_value
 from rlacd.learn.mdp import Reward
-from rlacd.learn.meshes import MeshList, Solids, list_meshes
+from rlacd.learn.meshes import MeshList, Solids, list_once
 from rlacd.learn.options import TrainOptions
+from rlacd.learn.parts import Score, count_parts
 from rlacd.learn.qnetwork import PLANES, QNetwork
 from rlacd.learn.record import Record
 from rlacd.learn.replay import Replay
 from rlacd.learn.rollouts import Acting, Rollouts
-from rlacd.learn.validate import Score, count_parts, torch_policy
+from rlacd.learn.torch_policy import torch_policy
 from rlacd.policies import Greedy
 from rlacd.policies.observe import SCALE_INPUTS
 from rlacd.pool import HerePool, Limits, Pool, Shared
 
 Say = Callable[[str], None]
+
+MOST_PARTS = 64
+"""A policy that makes more of one solid is stopped there when it is validated: early in training some never end."""
 
 
 def train(
@@ -89,7 +93,9 @@ def train(
     if checkpoint is not None and not resume:
         raise OptionError(f"{run} holds a run already; use --resume to go on with it, or another folder.")
     encoder = _encoder(options)
-    listed = _mesh_list(meshes, run, options)
+    listed = list_once(meshes, run, options.max_faces, options.validation, options.seed)
+    if not (run / "options.json").exists():
+        (run / "options.json").write_text(json.dumps(dataclasses.asdict(options), indent=1))
     say(
         f"{len(listed.training)} meshes to learn on, {len(listed.validation)} to validate with; "
         f"{listed.unreadable} cannot be read, {listed.too_large} are too large"
@@ -253,10 +259,10 @@ class Training:
         if not solids:
             raise TrainingError("none of the meshes held out for validation can be repaired; hold out more.")
         if self.baseline is None:
-            self.baseline = count_parts(Greedy("hull-sum"), solids, criterion)
-        score = count_parts(torch_policy(self.network, self.encoder, self.options), solids, criterion)
+            self.baseline = count_parts(Greedy("hull-sum"), solids, criterion, MOST_PARTS)
+        score = count_parts(torch_policy(self.network, self.encoder, self.options), solids, criterion, MOST_PARTS)
         short = torch_policy(self.network, self.encoder, self.options, shortlist=10)
-        deployed = count_parts(short, solids, criterion).against(self.baseline)
+        deployed = count_parts(short, solids, criterion, MOST_PARTS).against(self.baseline)
         values = score.against(self.baseline) | {f"deployed_{k}": v for k, v in deployed.items()}
         self.curves.add(self.cuts, {f"validation_{k}": v for k, v in values.items()}, self.seconds)
         self.say(f"cut {self.cuts}  validation: " + "  ".join(f"{k} {v:.3f}" for k, v in values.items()))
@@ -292,7 +298,7 @@ class Training:
     def restore(self, checkpoint: Checkpoint) -> None:
         """Go back to where a checkpoint was written."""
         state = checkpoint.state
-        _require_same_options(state["options"], self.options)
+        require_same(state["options"], self.options, MAY_CHANGE)
         if state.get("encoder", "") != _digest(self.encoder):
             raise OptionError(
                 f"{self.options.encoder_weights} holds other weights than the run began with; give the same "
@@ -374,31 +380,6 @@ def _encoder(options: TrainOptions) -> AnyEncoder:
 def _digest(encoder: AnyEncoder) -> str:
     """Identify an encoder's weights; those without a file always have the same."""
     return encoder.digest() if isinstance(encoder, I2PMAEEncoder) else ""
-
-
-def _require_same_options(before: dict[str, Any], now: TrainOptions) -> None:
-    for name, value in dataclasses.asdict(now).items():
-        was = before.get(name, getattr(TrainOptions, name))  # the run may be older than the option
-        if name not in MAY_CHANGE and was != value:
-            raise OptionError(
-                f"{name} is {value!r}, but was {was!r} when the run began; "
-                "resume with the same options, or begin another run."
-            )
-
-
-def _mesh_list(meshes: Path, run: Path, options: TrainOptions) -> MeshList:
-    """List the meshes when a run begins; later it is read again from the run, so that new files change nothing."""
-    kept = run / "meshes.json"
-    if kept.exists():
-        listed = json.loads(kept.read_text())
-        return MeshList(tuple(listed.pop("training")), tuple(listed.pop("validation")), **listed)
-    if not meshes.is_dir():
-        raise TrainingError(f"there is no folder {meshes}; give one that holds meshes.")
-    listed = list_meshes(meshes, options.max_faces, options.validation, options.seed)
-    run.mkdir(parents=True, exist_ok=True)
-    kept.write_text(json.dumps(dataclasses.asdict(listed), indent=1))
-    (run / "options.json").write_text(json.dumps(dataclasses.asdict(options), indent=1))
-    return listed
 
 
 __all__: Sequence[str] = ("Training", "train")

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import json
-import warnings
 from pathlib import Path
 from typing import Any
 
-import onnx
 import torch
 from safetensors.torch import load_file, save_file
 
 from rlacd.learn.guide.network import Ensemble, GuideNetwork
+from rlacd.learn.onnx_file import onnx_bytes, to_onnx
 from rlacd.planes.candidates import OFFSETS_PER_AXIS
 from rlacd.policies.features import COMPONENT_FEATURES, DIRECTIONS, EDGE_PLANES, PLANE_FEATURES, VERSION
+from rlacd.policies.learned import INPUTS, OUTPUTS
 
 
 def export(network: Ensemble, path: Path, about: dict[str, Any]) -> None:
@@ -35,29 +35,8 @@ def export(network: Ensemble, path: Path, about: dict[str, Any]) -> None:
         torch.zeros(2, EDGE_PLANES, PLANE_FEATURES),
         torch.zeros(2, COMPONENT_FEATURES),
     )
-    batch, per_axis = torch.export.Dim("batch", min=1), torch.export.Dim("per_axis", min=2)
-    shapes = {"planes": {0: batch, 3: per_axis}, "edges": {0: batch}, "component": {0: batch}}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        program = torch.onnx.export(
-            network,
-            example,
-            dynamo=True,
-            verbose=False,
-            input_names=["planes", "edges", "component"],
-            output_names=["q", "q_edges", "value"],
-            dynamic_shapes=shapes,
-        )
-    assert program is not None
-    model = program.model_proto
-    for entry in list(model.metadata_props):
-        model.metadata_props.remove(entry)
-    for node in model.graph.node:  # traces of the exporter: source lines of the machine it ran on
-        del node.metadata_props[:]
-        node.doc_string = ""
-    onnx.helper.set_model_props(model, {"rlacd": json.dumps(about, sort_keys=True)})
-    onnx.checker.check_model(model)
-    path.write_bytes(model.SerializeToString(deterministic=True))
+    model = to_onnx(network, example, INPUTS, OUTPUTS, {"planes": {3: "per_axis"}})
+    path.write_bytes(onnx_bytes(model, about))
     weights = path.with_suffix(".safetensors")
     save_file(network.state_dict(), weights, {"rlacd": json.dumps(about, sort_keys=True)})
     weights.chmod(0o644)  # it is written for its owner only

@@ -11,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from rlacd.learn.guide.files import load_arrays
+from rlacd.learn.files import unpacked
 from rlacd.learn.guide.network import GuideNetwork
 from rlacd.policies.features import features
 
@@ -78,7 +78,7 @@ class Dataset:
 
 def load_labels(paths: Sequence[Path]) -> Dataset:
     """Read shards of labels (see `rlacd.learn.guide.label`); those without any are skipped."""
-    shards = [arrays for path in paths if len(arrays := load_arrays(path))]
+    shards = [arrays for path in paths if len(arrays := unpacked(path.read_bytes()))]
     inputs = [
         features(*(np.asarray(shard[k], np.float64) for k in ("grid", "edges", "whole", "scale"))) for shard in shards
     ]

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
-from rlacd.learn.guide.files import packed
+from rlacd.learn.files import packed
 from rlacd.learn.guide.label import label
-from rlacd.learn.guide.meshes import small
 from rlacd.learn.guide.rollout import Cost
-from rlacd.learn.meshes import SOLID, repaired, unpack_solid
+from rlacd.learn.meshes import take_solid
 from rlacd.policies.greedy import excess_norm
 from rlacd.policies.learned import Guide, guided_cost
 from rlacd.pool import Blobs, Shared
-from rlacd.solid.files import lay_out
 
 OTHERS = 0.4
 """Share of the meshes that are labelled at another threshold, from half to twice the usual one."""
+
+TOO_MANY_FACES = 3000
+"""Repaired meshes with more are left out: the same time labels several smaller ones."""
 
 SERVER = "rlacd.learn.guide.label_server:LabelServer"
 
@@ -61,16 +61,13 @@ class LabelServer:
         dict of bytes
             ``labels``, as an .npz file, and `SOLID` if it had to be repaired.
         """
-        with TemporaryDirectory(dir=self._staging) as folder:
-            solid = blobs[SOLID] if SOLID in blobs else repaired(lay_out(blobs, Path(folder)))
-        kept = {} if SOLID in blobs else {SOLID: solid}
-        manifold = small(unpack_solid(solid))
-        if manifold is None:
-            return {"labels": 0}, {"labels": packed({}), **kept}
+        manifold, kept = take_solid(blobs, self._staging)
+        if manifold is None or manifold.num_tri() > TOO_MANY_FACES:
+            return {"labels": 0}, {"labels": packed({}, compressed=True), **kept}
         rng = np.random.default_rng(values["seed"])
         threshold = values["threshold"] * float(2 ** rng.uniform(-1, 1) if rng.random() < OTHERS else 1)
         found = label(manifold, threshold, self._cost(threshold, shared), values["budget"], rng)
-        return {"labels": len(found.parts)}, {"labels": packed(found.arrays()), **kept}
+        return {"labels": len(found.parts)}, {"labels": packed(found.arrays(), compressed=True), **kept}
 
     def _cost(self, threshold: float, shared: Mapping[str, Shared]) -> Cost:
         """The policy whose choices are labelled: greedy at first, then the last network's."""

@@ -7,7 +7,6 @@ ends with the same weights.
 from __future__ import annotations
 
 import json
-import os
 import time
 import zlib
 from collections.abc import Callable, Iterator, Sequence
@@ -18,18 +17,19 @@ from typing import Any
 
 import torch
 
+from rlacd.criteria import Concavity
 from rlacd.errors import OptionError
-from rlacd.learn.guide.deploy import deploy, ratio
+from rlacd.learn.files import save_bytes
 from rlacd.learn.guide.export import export
-from rlacd.learn.guide.files import save_bytes
 from rlacd.learn.guide.fit import fit, load_labels
-from rlacd.learn.guide.label_server import SERVER
-from rlacd.learn.guide.meshes import is_held_out, load_solid, mesh_names, shuffled
+from rlacd.learn.guide.label_server import SERVER, TOO_MANY_FACES
 from rlacd.learn.guide.network import Ensemble
-from rlacd.learn.meshes import SOLID, Solids
+from rlacd.learn.meshes import SOLID, Solids, is_held_out, shuffled, small_files
+from rlacd.learn.parts import count_parts, mean_ratio
 from rlacd.policies import Greedy
 from rlacd.policies.learned import Learned
 from rlacd.pool import HerePool, Pool, Request, Shared, WorkerDiedError, answers
+from rlacd.solid.component import Component
 
 SCALES = (0.025, 0.1)
 """Thresholds labelled: half and twice the usual one."""
@@ -79,7 +79,7 @@ def train(options: TrainOptions, say: Callable[[str], None] = print, pool: Pool 
     """
     torch.set_num_threads(1)
     torch.use_deterministic_algorithms(True)
-    names = mesh_names(options.meshes, options.max_bytes)
+    names = small_files(options.meshes, options.max_bytes)
     learning = shuffled([n for n in names if not is_held_out(n)], options.seed)
     judging = shuffled([n for n in names if is_held_out(n)], options.seed)[: options.held_out]
     if not learning:
@@ -166,8 +166,8 @@ def _fit_round(options: TrainOptions, number: int, say: Callable[[str], None]) -
     }
     part = folder / "part.onnx"
     export(Ensemble(members), part, about)
-    os.replace(part.with_suffix(".safetensors"), path.with_suffix(".safetensors"))
-    os.replace(part, path)
+    part.with_suffix(".safetensors").replace(path.with_suffix(".safetensors"))
+    part.replace(path)
     say(f"round {number}: fitted, {time.monotonic() - start:.0f} s")
     return path
 
@@ -178,18 +178,19 @@ def _deploy_round(
     folder = options.work / f"round{number}"
     if not names or (folder / "deployed.json").exists():
         return
-    solids = [s for n in names if (s := load_solid(options.meshes, n, options.work / "solids")) is not None]
-    counts = deploy(Learned(network, options.threshold), solids, options.threshold)
-    row: dict[str, Any] = {"raw": sum(c.raw for c in counts), "merged": sum(c.merged for c in counts)}
+    cache, criterion = Solids(options.meshes, options.work / "solids"), Concavity(options.threshold)
+    found = [s for n in names if (s := cache.manifold(n)) is not None and s.num_tri() <= TOO_MANY_FACES]
+    solids = [Component(solid) for solid in found]
+    counts = count_parts(Learned(network, options.threshold), solids, criterion)
+    row: dict[str, Any] = {"raw": sum(counts.raw), "merged": sum(counts.merged)}
     for score in ("hull-sum", "excess-norm"):
-        baseline = deploy(Greedy(score, concave_edges=0), solids, options.threshold)
-        both = [min(pair, key=lambda c: c.merged) for pair in zip(counts, baseline, strict=True)]
-        row |= {f"ratio to {score}": ratio(counts, baseline), f"the better of it and {score}": ratio(both, baseline)}
+        baseline = count_parts(Greedy(score, concave_edges=0), solids, criterion)
+        cut = [(ours, theirs) for ours, theirs in zip(counts.merged, baseline.merged, strict=True) if theirs > 1]
+        row[f"ratio to {score}"] = mean_ratio([ours for ours, _ in cut], [theirs for _, theirs in cut])
+        row[f"the better of it and {score}"] = mean_ratio([min(pair) for pair in cut], [theirs for _, theirs in cut])
     say(f"round {number}: deployed {row}")
     _write(folder / "deployed.json", [row])
 
 
 def _write(path: Path, rows: Sequence[dict[str, Any]]) -> None:
-    part = path.with_name(path.name + ".part")
-    part.write_text("".join(json.dumps(row) + "\n" for row in rows))
-    os.replace(part, path)
+    save_bytes(path, "".join(json.dumps(row) + "\n" for row in rows).encode())

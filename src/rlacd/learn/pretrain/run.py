@@ -7,12 +7,10 @@ never stopped, and on CPU the same seed gives the same weights.
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
@@ -24,7 +22,8 @@ from rlacd.learn.curves import Curves
 from rlacd.learn.device import pick_device
 from rlacd.learn.encoders.i2p_mae import SIZES
 from rlacd.learn.encoders.weights_file import save_weights
-from rlacd.learn.meshes import MeshList, list_meshes
+from rlacd.learn.fields import require_same
+from rlacd.learn.meshes import MeshList, list_once
 from rlacd.learn.pretrain.clouds import Clouds, augmented, epoch_rows
 from rlacd.learn.pretrain.masked import MaskedAutoencoder
 from rlacd.learn.pretrain.options import PretrainOptions
@@ -76,7 +75,7 @@ def pretrain(meshes: Path, out: Path, options: PretrainOptions, *, resume: bool 
     checkpoint = load_checkpoint(folder / "checkpoint")
     if checkpoint is not None and not resume:
         raise OptionError(f"{folder} holds a run already; use --resume to go on with it, or another --out.")
-    listed = _mesh_list(meshes, folder, options)
+    listed = list_once(meshes, folder, options.max_faces, options.validation, options.seed)
     run = Pretraining(meshes, folder, options, listed, say)
     try:
         if checkpoint is None:
@@ -183,12 +182,7 @@ class Pretraining:
     def restore(self, checkpoint: Checkpoint) -> None:
         """Go back to where a checkpoint was written."""
         state = checkpoint.state
-        for name, value in dataclasses.asdict(self.options).items():
-            if name not in MAY_CHANGE and state["options"].get(name) != value:
-                raise OptionError(
-                    f"{name} is {value!r}, but was {state['options'].get(name)!r} when the run began; resume with the "
-                    "same options, or begin another run."
-                )
+        require_same(state["options"], self.options, MAY_CHANGE)
         self.model.load_state_dict({k[6:]: v for k, v in checkpoint.weights.items() if k.startswith("model.")})
         restore_adam(self.optimizer, checkpoint.weights)
         self.step, self.seconds, self.losses = state["step"], state["seconds"], list(state["losses"])
@@ -208,20 +202,6 @@ def learning_rate(options: PretrainOptions, step: int) -> float:
     if step < rise:
         return options.learning_rate * (step + 1) / (rise + 1)
     return options.learning_rate * (1 + math.cos(math.pi * (step - rise) / (options.steps - rise))) / 2
-
-
-def _mesh_list(meshes: Path, folder: Path, options: PretrainOptions) -> MeshList:
-    """List the meshes when a run begins; later the list is read again, so that new files change nothing."""
-    kept = folder / "meshes.json"
-    if kept.exists():
-        listed: dict[str, Any] = json.loads(kept.read_text())
-        return MeshList(tuple(listed.pop("training")), tuple(listed.pop("validation")), **listed)
-    if not meshes.is_dir():
-        raise TrainingError(f"there is no folder {meshes}; give one that holds meshes.")
-    found = list_meshes(meshes, options.max_faces, options.validation, options.seed)
-    folder.mkdir(parents=True, exist_ok=True)
-    kept.write_text(json.dumps(dataclasses.asdict(found), indent=1))
-    return found
 
 
 __all__ = ["Pretraining", "learning_rate", "pretrain"]

@@ -1,0 +1,36 @@
+"""Arrays as bytes, read without pickle, and files that are written whole or not at all."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def packed(arrays: Mapping[str, NDArray[Any]], *, compressed: bool = False) -> bytes:
+    """Get arrays as the content of an .npz file."""
+    file = io.BytesIO()
+    if compressed:
+        np.savez_compressed(file, allow_pickle=False, **arrays)
+    else:
+        np.savez(file, allow_pickle=False, **arrays)
+    return file.getvalue()
+
+
+def unpacked(content: bytes) -> dict[str, NDArray[Any]]:
+    """Get the arrays of an .npz file's content back."""
+    with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+        return dict(arrays)
+
+
+def save_bytes(path: Path, content: bytes) -> None:
+    """Write a file under its final name only when it is complete; processes may write the same one."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f"{path.name}.{os.getpid()}.part")
+    partial.write_bytes(content)
+    os.replace(partial, path)

@@ -1,0 +1,87 @@
+"""Networks of torch as ONNX files."""
+
+from __future__ import annotations
+
+import json
+import logging
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import onnx
+import torch
+from torch import Tensor, nn
+
+from rlacd.learn import onnx_operators
+from rlacd.learn.encoders import point_groups  # noqa: F401  # registers the operator that is translated
+from rlacd.policies.q_network import METADATA
+
+OPSET = 18
+
+
+def to_onnx(
+    module: nn.Module,
+    example: tuple[Tensor, ...],
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    sizes: Mapping[str, Mapping[int, str]] | None = None,
+) -> onnx.ModelProto:
+    """Translate a module of tensors [B, ...] to tensors [B, ...], for any B; nothing of this machine goes along.
+
+    Parameters
+    ----------
+    module : torch.nn.Module
+    example : tuple of Tensor
+        Inputs of the shapes to come, but for B, which should be 2 here.
+    inputs, outputs : sequence of str
+        Names in the graph.
+    sizes : mapping, optional
+        By input, other sizes that are left open: the name of each by its axis.
+    """
+    names = ("batch", *dict.fromkeys(name for axes in (sizes or {}).values() for name in axes.values()))
+    dims = {name: torch.export.Dim(name, min=1 if name == "batch" else 2) for name in names}
+    shapes = [{0: "batch", **(sizes or {}).get(name, {})} for name in inputs]
+    for logger in ("torch.onnx", "onnxscript"):
+        logging.getLogger(logger).setLevel(logging.ERROR)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the exporter's own deprecations
+        program = torch.onnx.export(
+            module,
+            example,
+            dynamo=True,
+            verbose=False,
+            input_names=list(inputs),
+            output_names=list(outputs),
+            dynamic_shapes=tuple({axis: dims[name] for axis, name in axes.items()} for axes in shapes),
+            opset_version=OPSET,
+            custom_translation_table={torch.ops.rlacd.farthest_points.default: onnx_operators.farthest_points},
+        )
+    assert program is not None
+    model = program.model_proto
+    _without_traces(model)
+    for graph in (model.graph, *model.functions):
+        _without_traces(graph)
+    onnx.checker.check_model(model)
+    return model
+
+
+def _without_traces(part: onnx.ModelProto | onnx.GraphProto | onnx.FunctionProto) -> None:
+    """Take out what the exporter says of its own run: source lines, with the paths of the machine it ran on."""
+    del part.metadata_props[:]
+    if isinstance(part, onnx.ModelProto):
+        return
+    for value in part.value_info:
+        del value.metadata_props[:]
+    for node in part.node:
+        del node.metadata_props[:]
+        node.doc_string = ""
+        for attribute in node.attribute:
+            if attribute.type == onnx.AttributeProto.GRAPH:  # the body of a loop
+                _without_traces(attribute.g)
+
+
+def onnx_bytes(model: onnx.ModelProto, about: Mapping[str, Any]) -> bytes:
+    """Get the content of a file whose metadata say what the policy has to know, as JSON."""
+    onnx.helper.set_model_props(model, {METADATA: json.dumps(about, sort_keys=True)})
+    content: bytes = model.SerializeToString(deterministic=True)
+    return content

@@ -1,0 +1,58 @@
+"""How good a policy is at what it is for: how many parts its cuts leave of solids that it never learned on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rlacd.clock import Clock
+from rlacd.criteria import Concavity
+from rlacd.cut import CutTree
+from rlacd.cut_and_merge import cut_and_merge
+from rlacd.policies import Policy
+from rlacd.solid.component import Component
+from rlacd.workers import Workers
+
+
+@dataclass(frozen=True)
+class Score:
+    """Parts of each solid: after cutting, and after merging."""
+
+    raw: list[int]
+    merged: list[int]
+
+    def against(self, other: Score) -> dict[str, float]:
+        """Get this score's mean counts, and their geometric means relative to another policy's."""
+        return {
+            "parts": sum(self.raw) / len(self.raw),
+            "merged": sum(self.merged) / len(self.merged),
+            "parts_ratio": mean_ratio(self.raw, other.raw),
+            "merged_ratio": mean_ratio(self.merged, other.merged),
+        }
+
+
+def count_parts(policy: Policy, solids: Sequence[Component], criterion: Concavity, most: float = math.inf) -> Score:
+    """Decompose solids and count, on one thread.
+
+    Parameters
+    ----------
+    policy : Policy
+    solids : sequence of Component
+    criterion : Concavity
+    most : float
+        Parts at which a policy is stopped: some never end. Its counts are then too small, not too large.
+    """
+    raw, merged = [], []
+    with Workers(1) as workers:
+        for solid in solids:
+            done = cut_and_merge(CutTree(solid, policy, workers), criterion, workers, Clock(), most=most)
+            raw.append(len(done.pieces))
+            merged.append(len(done.parts))
+    return Score(raw, merged)
+
+
+def mean_ratio(counts: Sequence[int], others: Sequence[int]) -> float:
+    """Get the geometric mean of the ratios; a solid of no parts counts as one of one, no solids at all give 1."""
+    logs = [math.log(max(a, 1) / max(b, 1)) for a, b in zip(counts, others, strict=True)]
+    return math.exp(sum(logs) / len(logs)) if logs else 1.0
