@@ -76,8 +76,8 @@ def train(
     environments: int = 4,
 ) -> None:
     """Train a little and tell cuts a second and processor seconds, of the learner and of those who play."""
-    import rlacd.learn.train as module
-    from rlacd.learn.options import TrainOptions
+    import rlacd.learn.paper.train as module
+    from rlacd.learn.paper.options import TrainOptions
 
     module.export_policy = lambda path, *_: path  # type: ignore[assignment]  # not what is measured
     changes = {"iterations": cuts, "warmup": warmup, "validation": 0, "environments": environments}
@@ -112,9 +112,9 @@ def overhead(count: int = 300, jobs: int = 2, ray: Ray = None) -> None:
 
     from rlacd.learn.encoders import make_encoder
     from rlacd.learn.meshes import NOTHING, SOLID, pack_solid
-    from rlacd.learn.options import TrainOptions
-    from rlacd.learn.qnetwork import QNetwork
-    from rlacd.learn.rollout_server import SERVER
+    from rlacd.learn.paper.options import TrainOptions
+    from rlacd.learn.paper.qnetwork import QNetwork
+    from rlacd.learn.paper.rollout_server import SERVER
 
     torch.set_num_threads(1)
     options = TrainOptions.preset("two-cores")

@@ -273,6 +273,6 @@ class TestArms:
         table = next(block for block in page.blocks if isinstance(block, Table))
         assert [line[0] for line in table.lines] == list(ARMS["paper-curves"])
         assert all(float(str(line[1])) > 0 for line in table.lines)
-        monkeypatch.setattr("rlacd.learn.train.train", None)  # would fail if called
+        monkeypatch.setattr("rlacd.learn.paper.train.train", None)  # would fail if called
         again = train_arms("paper-curves", folder, tmp_path / "run", "quick", 40, say=said.append)
         assert again.markdown() == page.markdown()

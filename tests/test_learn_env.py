@@ -21,8 +21,8 @@ from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.errors import TrainingError
 from rlacd.learn.encoders import Encoder, describe, make_encoder
-from rlacd.learn.mdp import Cutting, terminal_reward
 from rlacd.learn.meshes import Solids, list_meshes
+from rlacd.learn.paper.mdp import Cutting, terminal_reward
 from rlacd.planes.candidates import axis_and_principal
 from rlacd.planes.sweep import sweep
 from rlacd.policies.observe import observe, valid_planes

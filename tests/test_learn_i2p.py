@@ -13,7 +13,7 @@ import pytest
 
 import rlacd
 from rlacd.errors import OptionError, WeightsError
-from rlacd.learn.options import TrainOptions
+from rlacd.learn.paper.options import TrainOptions
 from rlacd.policies import make_policy
 from rlacd.pool import LocalPool, Pool
 from rlacd.solid.component import Component
@@ -25,10 +25,10 @@ pytest.importorskip("torch", reason="needs the extra train")
 import torch
 from manifold3d import Manifold, Mesh64
 
-from rlacd.learn import train as training
 from rlacd.learn.encoders import I2PMAEEncoder, make_encoder
-from rlacd.learn.export import PointsToValues, export_policy
-from rlacd.learn.qnetwork import QNetwork
+from rlacd.learn.paper import train as training
+from rlacd.learn.paper.export import PointsToValues, export_policy
+from rlacd.learn.paper.qnetwork import QNetwork
 from rlacd.planes.candidates import axis_and_principal
 from rlacd.policies.observe import observe
 from rlacd.policies.q_network import OnnxQ

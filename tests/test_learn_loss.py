@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 torch = pytest.importorskip("torch", reason="needs the extra train")
 
 from rlacd.errors import RlacdError  # noqa: E402
-from rlacd.learn.loss import bellman_loss, boltzmann, dual_state_target, soft_value  # noqa: E402
-from rlacd.learn.replay import Replay  # noqa: E402
-from rlacd.learn.sumtree import SumTree  # noqa: E402
+from rlacd.learn.paper.loss import bellman_loss, boltzmann, dual_state_target, soft_value  # noqa: E402
+from rlacd.learn.paper.replay import Replay  # noqa: E402
+from rlacd.learn.paper.sumtree import SumTree  # noqa: E402
 
 Q = torch.tensor([[1.0, 2.0, 3.0], [4.0, 0.0, -1.0]])
 MASK = torch.tensor([[True, True, False], [True, True, True]])

@@ -12,7 +12,7 @@ pytest.importorskip("torch", reason="needs the extra train")
 
 from rlacd.criteria import Concavity
 from rlacd.errors import RlacdError
-from rlacd.learn.tabular import Node, all_nodes, grow, middle_planes, process_of, q_learning
+from rlacd.learn.paper.tabular import Node, all_nodes, grow, middle_planes, process_of, q_learning
 from rlacd.solid.component import Component
 from rlacd.solid.load import load_mesh
 from rlacd.solid.repair import repair

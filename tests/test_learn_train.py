@@ -23,7 +23,7 @@ from typer.testing import CliRunner
 
 from rlacd.cli import app
 from rlacd.errors import MissingExtraError, OptionError, TrainingError
-from rlacd.learn.options import PRESETS, TrainOptions
+from rlacd.learn.paper.options import PRESETS, TrainOptions
 from rlacd.pool import Answer, HerePool, LocalPool, Pool, Request, WorkerDiedError
 from tests.learning import write_meshes
 from tests.pools import pool_processes
@@ -61,7 +61,7 @@ def run(
 ) -> Path:
     """Train; exporting takes longer than all the rest and has tests of its own."""
     pytest.importorskip("torch", reason="needs the extra train")
-    from rlacd.learn import train as module
+    from rlacd.learn.paper import train as module
 
     options = TrainOptions(**{**TINY, **changes})
     with contextlib.ExitStack() as stack:
@@ -133,7 +133,7 @@ def test_every_option_has_help_and_the_command_line_shows_it() -> None:
 
 def test_without_the_extra_the_command_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in list(sys.modules):
-        if name.startswith("rlacd.learn.train"):
+        if name.startswith("rlacd.learn.paper.train"):
             monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "torch", None)
     result = CliRunner().invoke(app, ["train", str(tmp_path), "--run", str(tmp_path / "run")])
@@ -251,8 +251,8 @@ def test_the_exported_policy_computes_what_torch_does(meshes: Path, tmp_path: Pa
     import torch
 
     from rlacd.learn.encoders import make_encoder
-    from rlacd.learn.export import PointsToValues, export_policy
-    from rlacd.learn.qnetwork import QNetwork
+    from rlacd.learn.paper.export import PointsToValues, export_policy
+    from rlacd.learn.paper.qnetwork import QNetwork
     from rlacd.planes.candidates import axis_and_principal
     from rlacd.policies.observe import observe
     from rlacd.policies.q_network import OnnxQ

@@ -13,7 +13,7 @@ import typer
 
 from rlacd.errors import MissingExtraError, OptionError
 from rlacd.exit_codes import exit_codes
-from rlacd.learn.options import PRESETS, TrainOptions
+from rlacd.learn.paper.options import PRESETS, TrainOptions
 from rlacd.learn.pretrain.options import PretrainOptions
 
 EXTRA = ("torch", "gymnasium", "tensorboard", "safetensors", "onnx", "onnxscript", "onnxruntime")
@@ -95,7 +95,7 @@ def train_command() -> Callable[..., None]:
             options = TrainOptions.preset(preset, **_chosen(given))
             if run.exists() and not run.is_dir():
                 raise OptionError(f"--run {run} is a file; give a folder.")
-            learn, limits = _learn("rlacd.learn.train", "train"), Limits(limit, int(memory * 2**30))
+            learn, limits = _learn("rlacd.learn.paper.train", "train"), Limits(limit, int(memory * 2**30))
             with open_pool(jobs, ray) as pool:
                 learn(meshes, run, options, resume=resume, say=typer.echo, pool=pool, limits=limits)
 

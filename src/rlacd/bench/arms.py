@@ -15,7 +15,7 @@ from rlacd.bench.charts import Curve, curves_chart
 from rlacd.bench.page import Figure, Heading, Page, Text
 from rlacd.bench.tables import Table
 from rlacd.errors import MissingExtraError, OptionError
-from rlacd.learn.options import TrainOptions
+from rlacd.learn.paper.options import TrainOptions
 
 Changes = Mapping[str, Any]
 
@@ -80,7 +80,7 @@ def train_arms(
     folder : Path
         Gets a folder an arm.
     preset : str
-        See `rlacd.learn.options.PRESETS`.
+        See `rlacd.learn.paper.options.PRESETS`.
     iterations : int, optional
         Cuts an arm; the preset's by default.
     seed : int
@@ -135,7 +135,7 @@ def _options(preset: str, iterations: int | None, seed: int, changes: Changes) -
 
 def _train(meshes: Path, run: Path, options: TrainOptions, say: Callable[[str], None]) -> list[dict[str, float]]:
     try:
-        from rlacd.learn.train import train
+        from rlacd.learn.paper.train import train
     except ModuleNotFoundError as error:
         raise MissingExtraError("training needs an extra: run  pip install 'rlacd[train]'  and try again.") from error
 

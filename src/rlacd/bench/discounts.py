@@ -11,7 +11,7 @@ from rlacd.bench.page import Figure, Page, Text
 from rlacd.bench.tables import Table
 from rlacd.criteria import Concavity
 from rlacd.errors import MeshError, RlacdError
-from rlacd.learn.tabular import Node, grow, middle_planes, process_of, q_learning
+from rlacd.learn.paper.tabular import Node, grow, middle_planes, process_of, q_learning
 from rlacd.solid.component import Component
 from rlacd.solid.load import load_mesh
 from rlacd.solid.repair import repair

@@ -16,9 +16,9 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from rlacd.criteria import Concavity
-from rlacd.learn.episodes import Episodes
-from rlacd.learn.mdp import Cutting, Reward
 from rlacd.learn.meshes import Solids, list_meshes
+from rlacd.learn.paper.episodes import Episodes
+from rlacd.learn.paper.mdp import Cutting, Reward
 from rlacd.planes.candidates import OFFSETS_PER_AXIS
 from rlacd.policies.observe import Observation, observe
 from rlacd.solid.arrays import BoolArray

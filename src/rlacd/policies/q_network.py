@@ -1,4 +1,4 @@
-"""A Q network with its encoder as one ONNX file, run by onnxruntime (`rlacd.learn.export` writes it)."""
+"""A Q network with its encoder as one ONNX file, run by onnxruntime (`rlacd.learn.paper.export` writes it)."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ class QPolicy:
     Parameters
     ----------
     values : callable
-        The Q network: in torch (`rlacd.learn.torch_policy`) or as exported (`rlacd.policies.q_network.OnnxQ`).
+        The Q network: in torch (`rlacd.learn.paper.torch_policy`) or as exported (`rlacd.policies.q_network.OnnxQ`).
     threshold : float
         The criterion's.
     points : int

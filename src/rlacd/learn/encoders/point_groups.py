@@ -15,7 +15,7 @@ from torch import Tensor
 def farthest_points(points: Tensor, count: int) -> Tensor:
     """Choose points that lie far apart: the first one, then each time the one farthest from those chosen.
 
-    A torch operator of its own, so that its loop is exported as a loop (`rlacd.learn.export`) instead of `count`
+    A torch operator of its own, so that its loop is exported as a loop (`rlacd.learn.paper.export`) instead of `count`
     copies of its body.
 
     Parameters

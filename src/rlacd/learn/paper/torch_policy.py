@@ -5,8 +5,8 @@ from __future__ import annotations
 import torch
 
 from rlacd.learn.encoders import Encoder, describe
-from rlacd.learn.options import TrainOptions
-from rlacd.learn.qnetwork import QNetwork
+from rlacd.learn.paper.options import TrainOptions
+from rlacd.learn.paper.qnetwork import QNetwork
 from rlacd.policies.observe import Float32Array, Observation
 from rlacd.policies.qpolicy import QPolicy
 

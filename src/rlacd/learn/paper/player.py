@@ -12,11 +12,11 @@ import torch
 from numpy.typing import NDArray
 
 from rlacd.learn.encoders import Encoder, describe
-from rlacd.learn.loss import boltzmann
-from rlacd.learn.mdp import Cutting, Reward
-from rlacd.learn.options import TrainOptions
-from rlacd.learn.qnetwork import QNetwork
-from rlacd.learn.record import ENDED, Record
+from rlacd.learn.paper.loss import boltzmann
+from rlacd.learn.paper.mdp import Cutting, Reward
+from rlacd.learn.paper.options import TrainOptions
+from rlacd.learn.paper.qnetwork import QNetwork
+from rlacd.learn.paper.record import ENDED, Record
 from rlacd.policies.observe import Float32Array, observe
 from rlacd.solid.arrays import BoolArray, FloatArray
 from rlacd.solid.component import Component

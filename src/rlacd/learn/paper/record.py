@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd.learn.files import packed, unpacked
-from rlacd.learn.mdp import Reward
+from rlacd.learn.paper.mdp import Reward
 from rlacd.solid.arrays import BoolArray, FloatArray
 
 Longs: TypeAlias = NDArray[np.int64]

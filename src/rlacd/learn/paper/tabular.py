@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd.criteria import Criterion
-from rlacd.learn.mdp import Cutting
+from rlacd.learn.paper.mdp import Cutting
 from rlacd.planes.candidates import OFFSETS_PER_AXIS
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component

@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd.errors import TrainingError
-from rlacd.learn.episodes import TRIES, Start, draw_start, nothing_to_cut
 from rlacd.learn.meshes import SOLID, Solids
-from rlacd.learn.options import TrainOptions
-from rlacd.learn.record import Record
-from rlacd.learn.rollout_server import SERVER
+from rlacd.learn.paper.episodes import TRIES, Start, draw_start, nothing_to_cut
+from rlacd.learn.paper.options import TrainOptions
+from rlacd.learn.paper.record import Record
+from rlacd.learn.paper.rollout_server import SERVER
 from rlacd.pool import Answer, Limits, Pool, Request, Shared, WorkerDiedError, submit_twice
 
 LOST = 10

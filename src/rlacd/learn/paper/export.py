@@ -15,8 +15,8 @@ from torch import Tensor, nn
 from rlacd.errors import TrainingError
 from rlacd.learn.encoders import AnyEncoder
 from rlacd.learn.onnx_file import onnx_bytes, to_onnx
-from rlacd.learn.options import TrainOptions
-from rlacd.learn.qnetwork import QNetwork
+from rlacd.learn.paper.options import TrainOptions
+from rlacd.learn.paper.qnetwork import QNetwork
 from rlacd.policies.observe import SCALE_INPUTS
 from rlacd.policies.q_network import INPUTS, KIND, OUTPUTS, OnnxQ
 

@@ -14,16 +14,16 @@ from safetensors.torch import load
 from rlacd.criteria import Concavity
 from rlacd.learn.device import pick_device
 from rlacd.learn.encoders import AnyEncoder, make_encoder
-from rlacd.learn.episodes import begin
 from rlacd.learn.meshes import take_solid, turned
-from rlacd.learn.options import TrainOptions
-from rlacd.learn.player import Player, one_thread
-from rlacd.learn.qnetwork import QNetwork
-from rlacd.learn.record import Record
+from rlacd.learn.paper.episodes import begin
+from rlacd.learn.paper.options import TrainOptions
+from rlacd.learn.paper.player import Player, one_thread
+from rlacd.learn.paper.qnetwork import QNetwork
+from rlacd.learn.paper.record import Record
 from rlacd.policies.observe import SCALE_INPUTS
 from rlacd.pool import Blobs, Shared
 
-SERVER = "rlacd.learn.rollout_server:RolloutServer"
+SERVER = "rlacd.learn.paper.rollout_server:RolloutServer"
 
 
 class RolloutServer:

@@ -9,8 +9,8 @@ import numpy as np
 
 from rlacd.criteria import Criterion
 from rlacd.errors import TrainingError
-from rlacd.learn.mdp import Cutting
 from rlacd.learn.meshes import TURNS, Solids
+from rlacd.learn.paper.mdp import Cutting
 from rlacd.solid.component import Component
 
 TRIES = 1000

@@ -1,9 +1,9 @@
 """RL-ACD's training, from top to bottom as the paper tells it: cut, remember, learn from what a cut left behind.
 
-Deep soft Q-learning on the dual-state Bellman equation (`rlacd.learn.loss`), with components as states
-(`rlacd.learn.mdp`). A pool of processes plays episodes (`rlacd.learn.rollouts`), and they are learned from here. On CPU
-the same meshes, options and seed give the same weights bit for bit, wherever episodes are played and whether the run
-was interrupted or not: a checkpoint holds everything that decides what comes next.
+Deep soft Q-learning on the dual-state Bellman equation (`rlacd.learn.paper.loss`), with components as states
+(`rlacd.learn.paper.mdp`). A pool of processes plays episodes (`rlacd.learn.paper.rollouts`), and this process learns
+from them. On CPU the same meshes, options and seed give the same weights bit for bit, wherever episodes are played and
+whether the run was interrupted or not: a checkpoint holds everything that decides what comes next.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ from rlacd.learn.checkpoint import Checkpoint, adam_state, load_checkpoint, rest
 from rlacd.learn.curves import Curves
 from rlacd.learn.device import pick_device
 from rlacd.learn.encoders import AnyEncoder, I2PMAEEncoder, make_encoder
-from rlacd.learn.export import export_policy
 from rlacd.learn.fields import require_same
-from rlacd.learn.loss import bellman_loss, dual_state_target, soft_value
-from rlacd.learn.mdp import Reward
 from rlacd.learn.meshes import MeshList, Solids, list_once
-from rlacd.learn.options import TrainOptions
+from rlacd.learn.paper.export import export_policy
+from rlacd.learn.paper.loss import bellman_loss, dual_state_target, soft_value
+from rlacd.learn.paper.mdp import Reward
+from rlacd.learn.paper.options import TrainOptions
+from rlacd.learn.paper.qnetwork import PLANES, QNetwork
+from rlacd.learn.paper.record import Record
+from rlacd.learn.paper.replay import Replay
+from rlacd.learn.paper.rollouts import Acting, Rollouts
+from rlacd.learn.paper.torch_policy import torch_policy
 from rlacd.learn.parts import Score, count_parts
-from rlacd.learn.qnetwork import PLANES, QNetwork
-from rlacd.learn.record import Record
-from rlacd.learn.replay import Replay
-from rlacd.learn.rollouts import Acting, Rollouts
-from rlacd.learn.torch_policy import torch_policy
 from rlacd.policies import Greedy
 from rlacd.policies.observe import SCALE_INPUTS
 from rlacd.pool import HerePool, Limits, Pool, Shared

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd.errors import RlacdError
-from rlacd.learn.sumtree import SumTree
+from rlacd.learn.paper.sumtree import SumTree
 from rlacd.policies.observe import Float32Array
 from rlacd.solid.arrays import BoolArray
 
