@@ -17,6 +17,10 @@ void bind_union(nanobind::module_& m);
 NB_MODULE(_native, m) {
   m.doc() =
       "C++ kernels of rlacd. Arrays are float64 points [N, 3] and int32 faces [F, 3]; the GIL is released inside.";
+#ifdef NDEBUG
+  // A thread that is still at work when Python ends holds objects: that is no leak, and nothing to tell a user.
+  nanobind::set_leak_warnings(false);
+#endif
   rlacd::bind_concave_edges(m);
   rlacd::bind_concavity(m);
   rlacd::bind_distance(m);

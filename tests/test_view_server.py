@@ -8,6 +8,7 @@ import http.client
 import io
 import json
 import re
+import shlex
 import signal
 import socket
 import subprocess
@@ -29,7 +30,8 @@ from rlacd.criteria import NavigableSpace
 from rlacd.errors import MeshFileError, OptionError
 from rlacd.options import Options
 from rlacd.show.downloads import offered
-from rlacd.show.viewer import Viewer, Wishes, open_viewer, read_wishes
+from rlacd.show.viewer import Viewer, open_viewer, read_wishes
+from rlacd.show.wishes import Wishes
 
 PATIENCE = 60.0
 NAME = "an elbow 'n ümläut"
@@ -176,12 +178,14 @@ def test_the_heat_map_belongs_to_the_hulls_shown(viewer: Viewer) -> None:
 def test_everything_offered_can_be_downloaded_and_read(viewer: Viewer) -> None:
     settled(viewer, run=1)
     volume = sum(hull.volume for hull in viewer.session.result[1])  # type: ignore[index]
-    for name, hint in offered():
+    for offer in offered():
+        name = offer.name
         if name in ("usd", "balls.csv"):  # an extra; not with this criterion
             continue
         answer = ask(viewer, "GET", f"/download?format={urllib.parse.quote(name)}")
         assert answer.status == 200, (name, answer.body[:200])
-        assert hint
+        assert offer.label
+        assert offer.hint.endswith(".")
         disposition = answer.headers["Content-Disposition"]
         assert disposition.startswith("attachment; ")
         exact = urllib.parse.unquote(disposition.split("filename*=UTF-8''")[1])
@@ -225,6 +229,127 @@ def test_bad_options_are_answered_in_a_sentence_and_change_nothing(viewer: Viewe
     assert answer.json["error"].endswith(".")
     assert viewer.session.state.state == "idle"
     assert viewer.session.state.run == 1
+
+
+def test_what_needs_an_extra_is_offered_as_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pxr", None)
+    missing = {offer.name: offer.missing for offer in offered() if offer.missing}
+    assert list(missing) == ["usd"]
+    assert "pip install 'rlacd[usd]'" in str(missing["usd"])
+
+
+def test_no_two_downloads_have_one_name(viewer: Viewer) -> None:
+    settled(viewer, run=1)
+    names = [
+        ask(viewer, "GET", f"/download?format={urllib.parse.quote(offer.name)}").headers["Content-Disposition"]
+        for offer in offered()
+        if offer.name != "balls.csv" and not offer.missing
+    ]
+    assert len(set(names)) == len(names)
+
+
+def test_the_input_is_there_before_any_hull(mesh: Path) -> None:
+    with open_viewer(mesh, {"quality": "best"}, port=0) as viewer:
+        scene = ask(viewer, "GET", "/scene").json
+        if scene["report"] is None:  # a machine may be quicker than this
+            assert scene["parts"] == []
+        assert scene["name"] == NAME
+        assert scene["input"]["faces"]
+        assert scene["scale"] == pytest.approx(1.0)
+
+
+def test_a_first_pass_is_shown_while_the_search_goes_on(viewer: Viewer) -> None:
+    settled(viewer, run=1)
+    seen = events_of_a_run(viewer, {"threshold": 0.04, "quality": "balanced"})
+    drafts = [state for state in seen if state["draft"]]
+    assert drafts
+    assert all(state["state"] == "working" for state in drafts)
+    assert seen[-1]["version"] > drafts[0]["version"]
+    assert not seen[-1]["draft"]
+
+
+def post_file(viewer: Viewer, name: str, content: bytes, **headers: str) -> Answer:
+    kind = {"Content_Type": "application/octet-stream", **headers}
+    return ask(viewer, "POST", f"/open?{urllib.parse.urlencode({'name': name})}", content, **kind)
+
+
+def test_another_mesh_is_opened(viewer: Viewer) -> None:
+    settled(viewer, run=1)
+    content = trimesh.creation.icosphere(1).export(file_type="glb")
+    assert post_file(viewer, "../../a ball.glb", content).status == 202
+    settled(viewer, run=2)
+    scene = ask(viewer, "GET", "/scene").json
+    assert (scene["name"], scene["up"], scene["unit"], len(scene["parts"])) == ("a ball", "y", "m", 1)
+    folder = viewer.folder
+    assert folder is not None
+    assert [path.name for path in folder.iterdir()] == ["a ball.glb"]
+    assert post_file(viewer, "cube.stl", trimesh.creation.box().export(file_type="stl")).status == 202
+    assert not folder.exists(), "one file is kept at a time"
+    settled(viewer, run=3)
+    assert (
+        ask(viewer, "GET", "/download?format=glb")
+        .headers["Content-Disposition"]
+        .startswith('attachment; filename="cube_hulls.glb"')
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "status", "says"),
+    [
+        ("cube.stl", b"", 400, "empty"),
+        ("cube.stl", b"no mesh at all", 400, "cube.stl"),
+        ("page.html", b"<html>", 400, "html"),
+        ("", b"solid", 400, "mesh"),
+    ],
+)
+def test_a_file_that_is_no_mesh_is_refused_and_nothing_is_lost(
+    viewer: Viewer, name: str, content: bytes, status: int, says: str
+) -> None:
+    settled(viewer, run=1)
+    answer = post_file(viewer, name, content)
+    assert answer.status == status
+    assert says in answer.json["error"]
+    assert viewer.session.state.run == 1
+    assert len(ask(viewer, "GET", "/scene").json["parts"]) == 2
+
+
+def test_files_come_from_the_own_page_only(viewer: Viewer) -> None:
+    settled(viewer, run=1)
+    content = trimesh.creation.box().export(file_type="stl")
+    assert post_file(viewer, "cube.stl", content, Origin="http://evil.example").status == 403
+    assert post_file(viewer, "cube.stl", content, Content_Type="text/plain").status == 415
+    assert post_file(viewer, "cube.stl", content, Content_Length=str(2**29)).status == 413
+    assert viewer.session.state.run == 1
+
+
+@pytest.mark.parametrize(
+    ("wanted", "says"),
+    [
+        ({}, []),
+        ({"threshold": 0.02, "quality": "best"}, ["--threshold 0.02", "--quality best"]),
+        ({"preset": "mujoco", "max_hulls": 9}, ["--preset mujoco", "--max-hulls 9"]),
+        ({"criterion": "navigable", "radius": 0.07}, ["--criterion navigable", "--radius 0.07"]),
+    ],
+)
+def test_the_options_are_a_command(viewer: Viewer, mesh: Path, wanted: dict[str, Any], says: list[str]) -> None:
+    command = ask(viewer, "POST", "/command", wanted).json["command"]
+    words = shlex.split(command)
+    assert words[:3] == ["rlacd", "decompose", str(mesh)]
+    assert words[-2:] == ["-o", f"{NAME}_hulls.glb"]
+    for said in says:
+        assert said in command
+    assert len(words) == 5 + sum(len(said.split()) for said in says)
+
+
+def test_the_command_gives_the_hulls_that_are_shown(viewer: Viewer, tmp_path: Path) -> None:
+    settled(viewer, run=1)
+    wanted = {"threshold": 0.03, "quality": "fast", "max_vertices": 12}
+    events_of_a_run(viewer, wanted)
+    words = shlex.split(ask(viewer, "POST", "/command", wanted).json["command"])
+    place = tmp_path / words[-1]
+    run = CliRunner().invoke(app, [*words[1:-1], str(place)])
+    assert run.exit_code == 0, run.output
+    assert ask(viewer, "GET", "/download?format=glb").body == place.read_bytes()
 
 
 def test_what_is_not_there_is_said(viewer: Viewer, monkeypatch: pytest.MonkeyPatch) -> None:

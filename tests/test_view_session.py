@@ -150,3 +150,39 @@ def test_quiet_is_told_and_closing_lets_everyone_go(work: Work) -> None:
     assert next(changes) is None
     session.close()
     assert [state.state for state in changes if state is not None] == ["closed"]
+
+
+def test_a_draft_is_shown_until_better_hulls_come(session: Session, work: Work) -> None:
+    session.decompose({"quality": "best"}, {"quality": "fast"})
+    work.go_on(3)
+    while not (state := until(session, "working")).draft:
+        pass
+    assert (state.run, state.version) == (None, 1)
+    assert options_of(session) == {"quality": "fast"}
+    work.go_on(3)
+    state = until(session, "idle", run=1)
+    assert (state.draft, state.version) == (False, 2)
+    assert options_of(session) == {"quality": "best"}
+
+
+def test_stopping_keeps_the_draft_rather_than_less(session: Session, work: Work) -> None:
+    session.decompose({"quality": "best"}, {"quality": "fast"})
+    work.go_on(3)
+    while not until(session, "working").draft:
+        pass
+    work.wait_until_it_began()
+    session.stop()
+    work.go_on(1)
+    state = until(session, "idle", run=1)
+    assert (state.draft, state.version) == (True, 1)
+    assert options_of(session) == {"quality": "fast"}
+
+
+def test_another_input_drops_the_hulls(session: Session, work: Work) -> None:
+    session.decompose({})
+    work.go_on()
+    until(session, "idle", run=1)
+    session.decompose({}, other_input=True)
+    assert session.result is None
+    work.go_on()
+    assert until(session, "idle", run=2).version == 3

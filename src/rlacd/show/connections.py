@@ -35,6 +35,9 @@ ANSWER_SECONDS = 120.0
 QUIET_SECONDS = 20.0
 """For a single send or receive."""
 
+LAST_WORDS = 0.3
+"""Seconds that connections have to end by themselves when the server does."""
+
 FULL = "too many connections to this viewer are open; close a page and reload this one."
 
 
@@ -70,10 +73,13 @@ class BoundedServer(ThreadingHTTPServer):
         """Take no more connections and end those that are open; tells whether all have ended in so many seconds."""
         self.shutdown()
         self.server_close()
+        until = time.monotonic() + seconds
         with self._changed:
+            # Those that send something say their last word first.
+            self._changed.wait_for(lambda: not self._deadlines, timeout=min(LAST_WORDS, max(0.0, seconds)))
             for connection in self._deadlines:
                 _hang_up(connection)
-            return self._changed.wait_for(lambda: not self._deadlines, timeout=max(0.0, seconds))
+            return self._changed.wait_for(lambda: not self._deadlines, timeout=max(0.0, until - time.monotonic()))
 
     def process_request(self, request: Any, client_address: Any) -> None:
         """Give a connection its thread, or turn it away."""

@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import cast
 
 from rlacd.decomposition import Axis, Decomposition
-from rlacd.errors import OptionError
+from rlacd.errors import MissingExtraError, OptionError
 from rlacd.formats import FORMATS, MODELS, file_stem
+from rlacd.formats.target import WITH_MESHES
+from rlacd.formats.usd import require_usd
 from rlacd.plain_json import to_json
 from rlacd.show.html_report import report_page
 
@@ -27,16 +29,74 @@ class Download:
     content: bytes
 
 
-def offered() -> list[tuple[str, str]]:
-    """Name what can be downloaded, each with a hint."""
+@dataclass(frozen=True)
+class Offer:
+    """Something that can be downloaded.
+
+    Attributes
+    ----------
+    name
+        What `download` is asked for.
+    label
+        What people call it.
+    hint
+        What it holds, in a sentence.
+    group
+        What it stands under.
+    missing
+        Why it cannot be had here; None where it can.
+    """
+
+    name: str
+    label: str
+    hint: str
+    group: str
+    missing: str | None = None
+
+
+_MODEL_NAMES = {
+    "mjcf": ("MJCF", "MuJoCo"),
+    "urdf": ("URDF", "ROS, Bullet and most robot simulators"),
+    "sdf": ("SDF", "Gazebo"),
+    "usd": ("USD", "Isaac Sim and PhysX"),
+    "unreal": ("Unreal", "Unreal Engine"),
+    "godot": ("Godot", "Godot"),
+}
+
+
+def offered() -> list[Offer]:
+    """Name what can be downloaded."""
     return [
-        *((ending, f"All hulls in one .{ending} file") for ending in FORMATS),
-        *((f"{ending}.zip", f"A .{ending} file a hull, zipped") for ending in FOLDERS),
-        *((model, f"A model with the input and its hulls (.{MODELS[model][0]})") for model in MODELS),
-        ("balls.csv", "The balls that no hull touches: x, y, z, radius"),
-        ("report.html", "A page with all there is to see, for others"),
-        ("report.json", "Everything measured"),
+        *(Offer(ending, ending.upper(), f"All hulls in one .{ending} file.", "Hulls") for ending in FORMATS),
+        *(
+            Offer(f"{ending}.zip", f"{ending.upper()} zip", f"One .{ending} file per hull, zipped.", "Hulls")
+            for ending in FOLDERS
+        ),
+        *(
+            Offer(
+                model,
+                _MODEL_NAMES[model][0],
+                f"The mesh with its hulls as collision shapes, for {_MODEL_NAMES[model][1]}"
+                f" (.{MODELS[model][0]}{' and its meshes, zipped' if model in WITH_MESHES else ''}).",
+                "Models",
+                _missing(model),
+            )
+            for model in MODELS
+        ),
+        Offer("report.html", "Report", "This view as one HTML file that opens anywhere, offline.", "More"),
+        Offer("report.json", "Numbers", "Everything that was measured, as JSON.", "More"),
+        Offer("balls.csv", "Balls", "The balls that no hull touches: x, y, z and radius.", "More"),
     ]
+
+
+def _missing(model: str) -> str | None:
+    if model != "usd":
+        return None
+    try:
+        require_usd()
+    except MissingExtraError as error:
+        return str(error)
+    return None
 
 
 def download(decomposition: Decomposition, wanted: str, *, up: str = "z") -> Download:
@@ -59,8 +119,9 @@ def download(decomposition: Decomposition, wanted: str, *, up: str = "z") -> Dow
     MissingExtraError
         The format needs an extra that is not installed.
     """
-    if wanted not in dict(offered()):
-        raise OptionError(f"{wanted!r} cannot be downloaded; choose one of {', '.join(dict(offered()))}.")
+    names = [offer.name for offer in offered()]
+    if wanted not in names:
+        raise OptionError(f"{wanted!r} cannot be downloaded; choose one of {', '.join(names)}.")
     stem = file_stem(decomposition.name)
     if wanted == "report.html":
         return Download(f"{stem}_hulls.html", report_page(decomposition, up=up).encode())
@@ -71,7 +132,7 @@ def download(decomposition: Decomposition, wanted: str, *, up: str = "z") -> Dow
         if wanted == "balls.csv":
             decomposition.save_balls(folder / f"{stem}_balls.csv")
         elif wanted in MODELS:
-            place = folder / f"{stem}.{MODELS[wanted][0]}"
+            place = folder / f"{stem if wanted in WITH_MESHES else f'{stem}_{wanted}'}.{MODELS[wanted][0]}"
             decomposition.save(place, file_format=wanted, up=cast(Axis, up))
         elif wanted.endswith(".zip"):
             decomposition.save(folder, file_format=wanted.removesuffix(".zip"))

@@ -92,7 +92,7 @@ def report_page(decomposition: Decomposition, *, up: str = "z", picture: bool = 
 def _picture(decomposition: Decomposition, up: str) -> dict[str, str]:
     """The picture as an address, or a note why there is none."""
     try:
-        png = picture_bytes(decomposition, width=PICTURE_WIDTH, up=up)
+        png = picture_bytes(decomposition, width=PICTURE_WIDTH, up=up, clear=True)
     except MissingExtraError as error:
         return {"note": f"The picture is left out: {error}"}
     return {"picture": "data:image/png;base64," + base64.b64encode(png).decode("ascii")}

@@ -19,7 +19,7 @@ from typing import Any
 
 from rlacd.plain_json import to_json
 
-MODULES = ("arrays", "camera", "controls", "facts", "keys", "link", "list", "stage", "widgets")
+MODULES = ("arrays", "camera", "controls", "facts", "ground", "hints", "keys", "link", "list", "stage", "widgets")
 """Modules of the page beside ``main``; ``import ... from "page/list"``."""
 
 POLICY = (

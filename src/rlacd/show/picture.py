@@ -14,7 +14,8 @@ from scipy.spatial import cKDTree
 
 from rlacd.errors import OptionError, OutputError
 from rlacd.formats import check_file, write_file
-from rlacd.formats.palette import hull_colors, linear_from_srgb
+from rlacd.formats.palette import linear_from_srgb
+from rlacd.show.coloring import color_hulls
 from rlacd.show.render import Body, Spheres, render, require_extra
 from rlacd.solid.balls import Balls
 
@@ -102,8 +103,13 @@ def draw_picture(
     return place
 
 
-def picture_bytes(decomposition: Decomposition, *, width: int = 1600, samples: int = 16, up: str = "z") -> bytes:
-    """Draw the picture as the bytes of a PNG file; see `draw_picture`."""
+def picture_bytes(
+    decomposition: Decomposition, *, width: int = 1600, samples: int = 16, up: str = "z", clear: bool = False
+) -> bytes:
+    """Draw the picture as the bytes of a PNG file; see `draw_picture`.
+
+    With `clear` it has no paper and no header, so that a page can put it on any ground.
+    """
     if not 300 <= width <= 8000:
         raise OptionError(f"a picture cannot be {width} pixels wide; choose from 300 to 8000.")
     if samples < 1:
@@ -124,21 +130,23 @@ def picture_bytes(decomposition: Decomposition, *, width: int = 1600, samples: i
     panel_width = width // columns
     panel_height = round(panel_width * 0.92 if rows == 1 else panel_width * 0.62)
     unit = width / 1600
-    header, footer = round(104 * unit), round(44 * unit)
-    sheet = image.new("RGB", (width, header + rows * (panel_height + footer)), PAPER)
+    header, footer = 0 if clear else round(104 * unit), round(44 * unit)
+    size = width, header + rows * (panel_height + footer)
+    sheet = image.new("RGBA", size, (*PAPER, 0)) if clear else image.new("RGB", size, PAPER)
     for number, (title, bodies, veil) in enumerate(panels):
         left = number % columns * panel_width
         top = header + number // columns * (panel_height + footer)
-        pixels = render(bodies, panel_width, panel_height, samples=samples)
+        pixels = render(bodies, panel_width, panel_height, samples=samples, clear=clear)
         if veil is not None:  # the spheres let half of what is behind them through
-            veiled = render(bodies, panel_width, panel_height, samples=samples, spheres=veil)
+            veiled = render(bodies, panel_width, panel_height, samples=samples, spheres=veil, clear=clear)
             pixels = ((pixels.astype(np.uint16) + veiled + 1) // 2).astype(np.uint8)
         sheet.paste(image.fromarray(pixels), (left, top))
         middle = (left + panel_width // 2, top + panel_height + footer // 2)
         _write(sheet, title, middle, round(20 * unit), FADED, anchor="mm")
-    margin = round(32 * unit)
-    _write(sheet, decomposition.name, (margin, round(40 * unit)), round(34 * unit), INK, anchor="lm")
-    _write(sheet, caption(decomposition), (margin, round(79 * unit)), round(21 * unit), FADED, anchor="lm")
+    if not clear:
+        margin = round(32 * unit)
+        _write(sheet, decomposition.name, (margin, round(40 * unit)), round(34 * unit), INK, anchor="lm")
+        _write(sheet, caption(decomposition), (margin, round(79 * unit)), round(21 * unit), FADED, anchor="lm")
 
     encoded = io.BytesIO()
     sheet.save(encoded, format="PNG")
@@ -182,7 +190,7 @@ def apart(balls: Balls) -> Balls:
 def _hull_bodies(decomposition: Decomposition, up: str, *, pull: float) -> list[Body]:
     corners = np.concatenate([hull.bounds for hull in decomposition])
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
-    colors = linear_from_srgb(hull_colors(len(decomposition)))
+    colors = linear_from_srgb(color_hulls(decomposition.hulls).rgb)
     return [
         _body(hull.triangles + pull * (hull.bounds.mean(axis=0) - middle), color, up)
         for hull, color in zip(decomposition, colors, strict=True)

@@ -75,9 +75,15 @@ def _without_native_stderr() -> Iterator[None]:
 
 
 def render(
-    bodies: Sequence[Body], width: int, height: int, *, samples: int, spheres: Spheres | None = None
+    bodies: Sequence[Body],
+    width: int,
+    height: int,
+    *,
+    samples: int,
+    spheres: Spheres | None = None,
+    clear: bool = False,
 ) -> npt.NDArray[np.uint8]:
-    """Render `bodies`, framed to fit, as sRGB bytes [height, width, 3]; the same bytes every time.
+    """Render `bodies`, framed to fit, as sRGB bytes [height, width, 3 or 4]; the same bytes every time.
 
     Parameters
     ----------
@@ -89,6 +95,8 @@ def render(
         Light paths a pixel: more are slower and less grainy.
     spheres : Spheres, optional
         Drawn too; the camera does not look for them.
+    clear : bool
+        Leave the paper out: a fourth channel holds what is covered.
 
     Raises
     ------
@@ -117,6 +125,10 @@ def render(
                 placed = (centre - (low + high) / 2.0) / size
                 scene[f"sphere_{index}"] = _sphere(placed, radius / size, spheres)
         light = np.array(mi.render(mi.load_dict(scene), spp=samples))
+    if clear:
+        covered = np.clip(light[..., 3:], 0.0, 1.0)
+        colors = srgb_from_linear(np.clip(light[..., :3] / np.maximum(covered, 1e-6), 0.0, 1.0))
+        return np.concatenate([colors, np.rint(255.0 * covered).astype(np.uint8)], axis=2)
     return srgb_from_linear(np.clip(light[..., :3] + PAPER * (1.0 - light[..., 3:]), 0.0, 1.0))
 
 

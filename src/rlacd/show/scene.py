@@ -12,15 +12,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rlacd.decomposition import Decomposition
-from rlacd.formats.palette import hull_colors
+from rlacd.show.coloring import color_hulls
 from rlacd.show.heat import HeatMesh, frame_of
 from rlacd.show.picture import apart
+from rlacd.solid.frame import Frame
 
 SHOWN_BALLS = 4000
 """More balls than this are not drawn."""
 
 
-def scene(decomposition: Decomposition, up: str = "z") -> dict[str, Any]:
+def scene(decomposition: Decomposition, up: str = "z", *, unit: str = "") -> dict[str, Any]:
     """Describe a decomposition for the page.
 
     Parameters
@@ -28,19 +29,22 @@ def scene(decomposition: Decomposition, up: str = "z") -> dict[str, Any]:
     decomposition : Decomposition
     up : {"x", "y", "z"}
         The axis of the input that points up.
+    unit : str
+        The input's unit of length, such as ``m``; empty where nobody says.
 
     Returns
     -------
     dict
-        ``name``; ``up``; ``report`` as it is; ``input``, ``{vertices, faces}`` or None for a cloud of points;
-        ``parts``, a list of ``{vertices, faces, color, error, volume}`` with ``error`` what the criterion measures (or
-        None) and ``volume`` in the normalised frame; ``balls``, ``{centres, radii, shown, of}`` or None, with how many
-        balls are shown of how many.
+        ``name``; ``up``; ``unit``; ``scale``, frame units to one of the input's; ``report`` as it is; ``input``,
+        ``{vertices, faces}`` or None for a cloud of points; ``parts``, a list of ``{vertices, faces, color, rank,
+        error, volume}`` with ``rank`` the number of the hue, ``error`` what the criterion measures (or None) and
+        ``volume`` in the normalised frame; ``balls``, ``{centres, radii, shown, of}`` or None, with how many balls are
+        shown of how many.
     """
     frame = frame_of(decomposition)
     source, report = decomposition.source, decomposition.report
     errors = _errors(report, len(decomposition))
-    colors = hull_colors(len(decomposition))
+    colors = color_hulls(decomposition.hulls)
     balls = None
     if decomposition.balls is not None and len(decomposition.balls):
         some = apart(decomposition.balls)
@@ -53,18 +57,37 @@ def scene(decomposition: Decomposition, up: str = "z") -> dict[str, Any]:
     return {
         "name": decomposition.name,
         "up": up,
+        "unit": unit,
+        "scale": frame.scale,
         "report": report,
         "input": _mesh(frame.to_frame(source.vertices), source.faces) if len(source.faces) else None,
         "parts": [
             {
                 **_mesh(frame.to_frame(hull.vertices), hull.faces),
                 "color": "#" + bytes(color.tolist()).hex(),
+                "rank": int(rank),
                 "error": error,
                 "volume": float(hull.volume) * frame.scale**3,
             }
-            for hull, color, error in zip(decomposition, colors, errors, strict=True)
+            for hull, color, rank, error in zip(decomposition, colors.rgb, colors.rank, errors, strict=True)
         ],
         "balls": balls,
+    }
+
+
+def input_scene(name: str, vertices: ArrayLike, faces: ArrayLike, up: str = "z", *, unit: str = "") -> dict[str, Any]:
+    """Describe an input of which there are no hulls yet: as `scene`, without parts or report."""
+    points, corners = np.asarray(vertices, dtype=np.float64), np.asarray(faces)
+    frame = Frame.of(points[np.unique(corners)] if len(corners) else points)
+    return {
+        "name": name,
+        "up": up,
+        "unit": unit,
+        "scale": frame.scale,
+        "report": None,
+        "input": _mesh(frame.to_frame(points), corners) if len(corners) else None,
+        "parts": [],
+        "balls": None,
     }
 
 

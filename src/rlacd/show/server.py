@@ -6,13 +6,15 @@
 ``GET /state``                        the state as it is
 ``GET /scene``, ``GET /heat``         what is drawn; see `rlacd.show.scene`
 ``GET /download?format=NAME``         a file
+``POST /open?name=NAME``              another mesh: the bytes of its file
+``POST /command``                     the options as a command for a terminal
 ``POST /decompose``, ``POST /cancel``  JSON in, JSON out
 ====================================  ===========================================================================
 
 It listens on the loopback address alone. Pages of other sites are kept out: a request must name this server as its
 host, so that no foreign name can be pointed at it, and must not come from a page of another origin. What is held is
-bounded: connections and their time in `rlacd.show.connections`, one decomposition with its scene and heat map, and
-`HEAVY` answers that are worked out at a time.
+bounded: connections and their time in `rlacd.show.connections`, one input of at most `LARGEST_MESH` bytes, one
+decomposition with its scene and heat map, and `HEAVY` answers that are worked out at a time.
 """
 
 from __future__ import annotations
@@ -20,29 +22,38 @@ from __future__ import annotations
 import contextlib
 import errno
 import json
+import re
+import tempfile
 import threading
 import time
 import urllib.parse
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from http import HTTPStatus
+from pathlib import Path
 from typing import Any
 
 from rlacd._version import __version__
 from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError, RlacdError
+from rlacd.formats import MODELS
 from rlacd.plain_json import to_json
+from rlacd.presets import PRESETS
+from rlacd.show.command import as_command
 from rlacd.show.connections import ANSWER_SECONDS, FOREVER, FULL, REQUEST_SECONDS, BoundedHandler, BoundedServer
 from rlacd.show.downloads import download, offered
 from rlacd.show.heat import heat_map
 from rlacd.show.page import live_page, module
 from rlacd.show.picture import check_up
-from rlacd.show.scene import heat_scene, scene
+from rlacd.show.scene import heat_scene, input_scene, scene
 from rlacd.show.session import Session, State
+from rlacd.show.wishes import Subject, Wishes
+from rlacd.solid.load import FORMATS as READ
 
 ADDRESS = "127.0.0.1"
 USUAL_PORT = 8765
 LONGEST_REQUEST = 10_000  # bytes of JSON
+LARGEST_MESH = 2**28  # bytes of a file that a page sends
 QUICKEST = 0.05  # seconds between two reports of progress
 HEARTBEAT = 3.0  # seconds after which a stream in which nothing happens says so, and finds out whether it is read
 HEAVY = 2  # answers that take memory and time, at once
@@ -64,16 +75,16 @@ class ViewServer(BoundedServer):
     Parameters
     ----------
     session : Session
-    name : str
-        Of the mesh, for the page's title.
+    subject : Subject
+        What is looked at first.
     port : int, optional
         Where to listen; without it the usual port, or any free one.
-    options : dict
+    options : Wishes
         What the page's controls hold at first.
-    up : {"x", "y", "z"}
-        The axis of the mesh that points up.
     accept : callable
-        From the page's options to those of the session's run; raises `OptionError`.
+        From the page's options to `Wishes`; raises `OptionError`.
+    read : callable
+        From a path to a `Subject`; raises `MeshError`.
 
     Raises
     ------
@@ -84,18 +95,29 @@ class ViewServer(BoundedServer):
     def __init__(
         self,
         session: Session,
-        name: str,
+        subject: Subject,
         *,
         port: int | None,
-        options: dict[str, Any],
-        up: str,
-        accept: Callable[[dict[str, Any]], dict[str, Any]],
+        options: Wishes,
+        accept: Callable[[dict[str, Any]], Wishes],
+        read: Callable[[Path], Subject],
     ) -> None:
-        self.session, self.up, self.accept = session, up, accept
+        self.session, self.subject, self.accept, self._read = session, subject, accept, read
         self.heavy = threading.BoundedSemaphore(HEAVY)
         self._made: dict[str, tuple[int, bytes]] = {}
         self._making = threading.Lock()
-        page = live_page(name, {"options": options, "downloads": offered(), "version": __version__})
+        self._opening = threading.Lock()
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        page = live_page(
+            subject.name,
+            {
+                "options": asdict(options),
+                "downloads": [asdict(offer) for offer in offered()],
+                "presets": [{"name": name, **preset_words(name)} for name in PRESETS],
+                "formats": list(READ),
+                "version": __version__,
+            },
+        )
         self.page, self.policy = page.text.encode(), f"{page.policy}; frame-ancestors 'none'"
         self._bind(port)
 
@@ -104,20 +126,67 @@ class ViewServer(BoundedServer):
         """Where the page is."""
         return f"http://{ADDRESS}:{self.server_address[1]}/"
 
-    def scene(self, run: int, decomposition: Decomposition) -> bytes:
-        """Give the scene as JSON; worked out once for a decomposition."""
-        return self._once("scene", run, lambda: scene(decomposition, self.up))
+    @property
+    def folder(self) -> Path | None:
+        """Where the mesh lies that a page has sent; None before."""
+        return None if self._folder is None else Path(self._folder.name)
 
-    def heat(self, run: int, decomposition: Decomposition) -> bytes:
+    def decompose(self, wishes: Wishes, *, other_input: bool = False) -> None:
+        """Decompose the subject next: a draft at once, then what is wished for."""
+        mesh = {"mesh": self.subject.path}
+        draft = wishes.draft()
+        self.session.decompose(
+            {**mesh, **wishes.options()}, None if draft is None else {**mesh, **draft}, other_input=other_input
+        )
+
+    def open_mesh(self, name: str, content: bytes, wishes: Wishes) -> None:
+        """Look at another mesh from now on: the content of a file.
+
+        Raises
+        ------
+        MeshError
+            It cannot be read or holds nothing usable; what is looked at stays.
+        """
+        with self._opening:
+            folder = tempfile.TemporaryDirectory(prefix="rlacd-view-", ignore_cleanup_errors=True)
+            try:
+                path = Path(folder.name) / file_name(name)
+                path.write_bytes(content)
+                self.subject = self._read(path)
+            except BaseException:
+                folder.cleanup()
+                raise
+            self.decompose(wishes, other_input=True)
+            if self._folder is not None:
+                self._folder.cleanup()
+            self._folder = folder
+
+    def server_close(self) -> None:
+        """Stop listening, and remove what pages have sent."""
+        super().server_close()
+        if self._folder is not None:
+            self._folder.cleanup()
+
+    def scene(self) -> bytes:
+        """Give the scene as JSON; worked out once for whatever there is to draw."""
+        subject, result = self.subject, self.session.result
+        if result is None:
+            mesh = subject.mesh
+            return to_json(
+                input_scene(subject.name, mesh.vertices, mesh.faces, subject.up, unit=subject.unit), indent=None
+            ).encode()
+        return self._once("scene", result[0], lambda: scene(result[1], subject.up, unit=subject.unit))
+
+    def heat(self, version: int, decomposition: Decomposition) -> bytes:
         """Give the error heat map as JSON; worked out once for a decomposition."""
-        return self._once("heat", run, lambda: heat_scene(heat_map(decomposition)))
+        return self._once("heat", version, lambda: heat_scene(heat_map(decomposition)))
 
-    def _once(self, what: str, run: int, make: Callable[[], dict[str, Any]]) -> bytes:
+    def _once(self, what: str, version: int, make: Callable[[], dict[str, Any]]) -> bytes:
         with self._making:
             made = self._made.get(what)
-            if made is None or made[0] != run:
+            if made is None or made[0] != version:
                 self._made.pop(what, None)
-                made = self._made[what] = run, to_json(make(), indent=None).encode()
+                made = self._made[what] = version, to_json(make(), indent=None).encode()
             return made[1]
 
     def _bind(self, port: int | None) -> None:
@@ -152,14 +221,14 @@ class _Handler(BoundedHandler):
                 self._send_json(asdict(self.server.session.state))
             elif place.path == "/scene":
                 with self.server.heavy:
-                    content = self.server.scene(*self._result())
+                    content = self.server.scene()
                 self._send(content, "application/json")
             elif place.path == "/heat":
                 with self.server.heavy:
                     content = self.server.heat(*self._result())
                 self._send(content, "application/json")
             elif place.path == "/download":
-                self._send_file(query.get("format", [""])[0], query.get("up", [self.server.up])[0])
+                self._send_file(query.get("format", [""])[0], query.get("up", [self.server.subject.up])[0])
             elif (script := module(place.path.removeprefix("/page/").removesuffix(".js"))) is not None:
                 self._send(script.encode(), "text/javascript")
             else:
@@ -168,14 +237,34 @@ class _Handler(BoundedHandler):
     def do_POST(self) -> None:
         with self._answered():
             self._check_sender()
-            given = self._body()
-            if self.path == "/decompose":
-                self.server.session.decompose(self.server.accept(given))
-            elif self.path == "/cancel":
+            place = urllib.parse.urlsplit(self.path)
+            answer: dict[str, Any] = {}
+            if place.path == "/open":
+                self._open(urllib.parse.parse_qs(place.query))
+            elif place.path == "/decompose":
+                self.server.decompose(self.server.accept(self._body()))
+            elif place.path == "/command":
+                answer["command"] = self._command(self._body())
+            elif place.path == "/cancel":
+                self._body()
                 self.server.session.stop()
             else:
                 raise _Refused(HTTPStatus.NOT_FOUND, "there is nothing here.")
-            self._send_json({}, HTTPStatus.ACCEPTED)
+            self._send_json(answer, HTTPStatus.ACCEPTED)
+
+    def _open(self, query: dict[str, list[str]]) -> None:
+        if self.headers.get_content_type() != "application/octet-stream":
+            raise _Refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "a mesh is sent as application/octet-stream.")
+        wishes = self.server.accept(_object(query.get("options", ["{}"])[0]))
+        wishes.options()
+        with self.server.heavy:
+            content = self._read(LARGEST_MESH, ANSWER_SECONDS)
+            self.server.open_mesh(query.get("name", [""])[0], content, wishes)
+
+    def _command(self, given: dict[str, Any]) -> str:
+        wishes = self.server.accept(given)
+        wishes.options()
+        return as_command(self.server.subject.path, asdict(wishes), Wishes())
 
     @contextlib.contextmanager
     def _answered(self) -> Iterator[None]:
@@ -209,22 +298,15 @@ class _Handler(BoundedHandler):
     def _body(self) -> dict[str, Any]:
         if self.headers.get_content_type() != "application/json":  # forms of other sites cannot send this
             raise _Refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "this viewer takes JSON only.")
-        content = self._read(LONGEST_REQUEST)
-        try:
-            given = json.loads(content)
-        except (ValueError, RecursionError):
-            given = None
-        if not isinstance(given, dict):
-            raise OptionError("the request is no JSON object; send {} at least.")
-        return given
+        return _object(self._read(LONGEST_REQUEST, REQUEST_SECONDS))
 
-    def _read(self, longest: int) -> bytes:
+    def _read(self, longest: int, seconds: float) -> bytes:
         told = self.headers.get("Content-Length", "0")
         if "Transfer-Encoding" in self.headers or not (told.isascii() and told.isdigit()):
             raise _Refused(HTTPStatus.LENGTH_REQUIRED, "the request does not say how long it is (Content-Length).")
         if len(told) > len(str(longest)) or int(told) > longest:
             raise _Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"the request is longer than {longest:,} bytes.")
-        self.server.expect(self.connection, REQUEST_SECONDS)
+        self.server.expect(self.connection, seconds)
         content = self.read_body(int(told))
         self.server.expect(self.connection, FOREVER)
         if len(content) != int(told):
@@ -286,6 +368,36 @@ class _Refused(Exception):
     def __init__(self, status: HTTPStatus, said: str) -> None:
         super().__init__(said)
         self.status = status
+
+
+def _object(text: str | bytes) -> dict[str, Any]:
+    try:
+        given = json.loads(text)
+    except (ValueError, RecursionError):
+        given = None
+    if not isinstance(given, dict):
+        raise OptionError("the request is no JSON object; send {} at least.")
+    return given
+
+
+def file_name(name: str) -> str:
+    """The name of a file that a page has sent, without folders and what a file system may not take."""
+    last = re.split(r"[/\\]", name)[-1]
+    plain = re.sub(r'[\x00-\x1f\x7f<>:"|?*]', "_", last).strip(". ")[-120:]
+    return plain.encode(errors="replace").decode() or "mesh"
+
+
+def preset_words(name: str) -> dict[str, Any]:
+    """What the page says of a preset: the engine, its limits, and the format that is for it."""
+    preset = PRESETS[name]
+    ending = preset.ending.lstrip(".")
+    model = next((model for model, endings in MODELS.items() if ending in endings), ending)
+    limits = [
+        f"{limit} {what}"
+        for limit, what in ((preset.max_vertices, "vertices"), (preset.max_faces, "triangles"))
+        if limit
+    ]
+    return {"engine": preset.engine, "format": preset.file_format or model, "limits": " and ".join(limits)}
 
 
 def _calmly(changes: Iterator[State | None]) -> Iterator[State | None]:

@@ -30,7 +30,11 @@ class State:
     ----------
     state : "idle", "working" or "closed"
     run : int or None
-        Number of the decomposition that can be had; None before the first.
+        Number of the last decomposition that was finished; None before the first.
+    version : int
+        Grows whenever there is something else to draw: another input, a draft, a decomposition.
+    draft : bool
+        Whether the hulls there are come of a quick first pass, which better ones may replace.
     stage, done, total, parts, seconds
         Of the work under way; see `rlacd.progress.Progress`.
     error : str or None
@@ -39,6 +43,8 @@ class State:
 
     state: str = "idle"
     run: int | None = None
+    version: int = 0
+    draft: bool = False
     stage: str = "load"
     done: int = 0
     total: int | None = None
@@ -65,7 +71,7 @@ class Session:
         self._changed = threading.Condition()
         self._state = State()
         self._count = 0  # changes of the state so far
-        self._wanted: dict[str, Any] | None = None
+        self._wanted: list[dict[str, Any]] | None = None  # options of the draft, if any, and of the result
         self._stopped = False
         self._result: Decomposition | None = None
         self._thread = threading.Thread(target=self._work, name="rlacd-view", daemon=True)
@@ -86,20 +92,36 @@ class Session:
 
     @property
     def result(self) -> tuple[int, Decomposition] | None:
-        """The last decomposition and its number; None before the first."""
+        """The hulls there are and their version; None before the first and after another input came."""
         with self._changed:
-            return None if self._result is None else (int(self._state.run or 0), self._result)
+            return None if self._result is None else (self._state.version, self._result)
 
     @property
     def ended(self) -> bool:
         """Whether the session is closed and its work has ended."""
         return not self._thread.is_alive()
 
-    def decompose(self, options: dict[str, Any]) -> None:
-        """Decompose with these options next, instead of what is under way."""
+    def decompose(
+        self, options: dict[str, Any], draft: dict[str, Any] | None = None, *, other_input: bool = False
+    ) -> None:
+        """Decompose with these options next, instead of what is under way.
+
+        Parameters
+        ----------
+        options : dict
+        draft : dict, optional
+            Options of a quick pass that comes first, whose hulls are there until better ones are.
+        other_input : bool
+            Drop the hulls there are: they belong to another input.
+        """
         with self._changed:
-            self._wanted, self._stopped = dict(options), False
-            self._tell(State("working", run=self._state.run))
+            self._wanted, self._stopped = [dict(draft)] if draft else [], False
+            self._wanted.append(dict(options))
+            now = State("working", run=self._state.run, version=self._state.version, draft=self._state.draft)
+            if other_input:
+                self._result = None
+                now = replace(now, version=now.version + 1, draft=False)
+            self._tell(now)
 
     def stop(self) -> None:
         """End the work under way and keep what it reached."""
@@ -135,17 +157,30 @@ class Session:
                 self._changed.wait_for(lambda: self._wanted is not None or self._state.state == "closed")
                 if self._state.state == "closed" or self._wanted is None:
                     return
-                options, self._wanted = self._wanted, None
+                passes, self._wanted = self._wanted, None
+            self._take(passes)
+
+    def _take(self, passes: list[dict[str, Any]]) -> None:
+        """Make a draft, if one is wanted, and then the result."""
+        for number, options in enumerate(passes, start=1):
             result, error = self._attempt(options)
             with self._changed:
-                if self._state.state == "closed":
+                if self._state.state == "closed" or self._wanted is not None:
                     return
-                if self._wanted is not None:
-                    continue
+                is_last = number == len(passes) or self._stopped or error is not None
+                # Cut short before its search, a pass is worth less than the draft, which is finished.
+                if number > 1 and result is not None and _is_cut_short(result):
+                    result = None
+                state = self._state
                 if result is not None:
                     self._result = result
-                run = self._state.run if result is None else (self._state.run or 0) + 1
-                self._tell(replace(self._state, state="idle", run=run, error=error))
+                    state = replace(state, version=state.version + 1, draft=number < len(passes))
+                if is_last:
+                    done = result is not None or (number > 1 and error is None)
+                    state = replace(state, state="idle", run=(state.run or 0) + 1 if done else state.run, error=error)
+                self._tell(state)
+                if is_last:
+                    return
 
     def _attempt(self, options: dict[str, Any]) -> tuple[Decomposition | None, str | None]:
         try:
@@ -169,6 +204,11 @@ class Session:
         self._state = state
         self._count += 1
         self._changed.notify_all()
+
+
+def _is_cut_short(result: Decomposition) -> bool:
+    """Whether the work was stopped before its first pass was done."""
+    return result.report.get("complete") is False and result.report.get("search") is None
 
 
 @atexit.register

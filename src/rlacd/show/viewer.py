@@ -13,53 +13,16 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rlacd.criteria import NavigableSpace
 from rlacd.decompose_mesh import decompose
 from rlacd.errors import OptionError
-from rlacd.options import CONCAVITY, QUALITIES, Options
+from rlacd.options import Options
 from rlacd.show.picture import check_up
 from rlacd.show.server import ViewServer
 from rlacd.show.session import AT_EXIT, Session
+from rlacd.show.wishes import Subject, Wishes
 from rlacd.solid.load import load_mesh
 
-NAVIGABLE = "navigable"
 LEAVING = 0.8  # seconds that work under way has to end when the viewer is closed
-_DEFAULTS, _SPACE = Options(), NavigableSpace()
-
-
-@dataclasses.dataclass(frozen=True)
-class Wishes:
-    """What the page's controls hold; see `rlacd.decompose` for the meaning of each."""
-
-    criterion: str = CONCAVITY
-    threshold: float = _DEFAULTS.threshold
-    radius: float = _SPACE.radius or 0.0
-    tolerance: float = _SPACE.tolerance or 0.0
-    quality: str = _DEFAULTS.quality or QUALITIES[0]
-    max_hulls: int | None = None
-    max_vertices: int | None = None
-
-    def options(self) -> dict[str, Any]:
-        """Get the options of `rlacd.decompose`.
-
-        Raises
-        ------
-        OptionError
-            A value is out of range.
-        """
-        if self.criterion not in (CONCAVITY, NAVIGABLE):
-            raise OptionError(f"criterion is {self.criterion!r}; it has to be {CONCAVITY} or {NAVIGABLE}.")
-        goal: dict[str, Any] = {"threshold": self.threshold}
-        if self.criterion == NAVIGABLE:
-            goal = {"criterion": NavigableSpace(radius=self.radius, tolerance=self.tolerance)}
-        options = {
-            **goal,
-            "quality": self.quality,
-            "max_hulls": self.max_hulls,
-            "max_vertices": self.max_vertices,
-        }
-        Options(**options)
-        return options
 
 
 @contextlib.contextmanager
@@ -100,27 +63,19 @@ def open_viewer(
         An option is out of range, or the port is in use.
     """
     check_up(up)
-    axis = up or ("y" if Path(mesh).suffix.lower() in (".glb", ".gltf") else "z")
     wishes = read_wishes(options or {})
-    first = wishes.options()
+    wishes.options()
     Options(threads=threads)
-    name = Path(load_mesh(mesh).name).stem
-    session = Session(functools.partial(decompose, mesh, threads=threads))
+    subject = read_subject(mesh, up)
+    session = Session(functools.partial(decompose, threads=threads))
     try:
-        server = ViewServer(
-            session,
-            name,
-            port=port,
-            options=dataclasses.asdict(wishes),
-            up=axis,
-            accept=lambda given: read_wishes(given).options(),
-        )
+        server = ViewServer(session, subject, port=port, options=wishes, accept=read_wishes, read=read_subject)
     except BaseException:
         session.close()
         raise
     thread = threading.Thread(target=server.serve_forever, args=(0.1,), name="rlacd-view-server", daemon=True)
     thread.start()
-    session.decompose(first)
+    server.decompose(wishes)
     try:
         yield Viewer(session, server, thread)
     finally:
@@ -156,6 +111,11 @@ class Viewer:
         return self._server.connections
 
     @property
+    def folder(self) -> Path | None:
+        """Where the mesh lies that a page has sent; None before."""
+        return self._server.folder
+
+    @property
     def at_work(self) -> bool:
         """Whether work goes on, even after the viewer is closed: a kernel ends what it has begun."""
         return not self.session.ended or self.connections > 0
@@ -165,6 +125,19 @@ class Viewer:
         with contextlib.suppress(KeyboardInterrupt):
             while self._thread.is_alive():  # a wait without end would not hear Ctrl-C on Windows
                 self._thread.join(0.5)
+
+
+def read_subject(mesh: str | os.PathLike[str], up: str | None = None) -> Subject:
+    """Read the mesh that is to be looked at.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be read or holds nothing usable.
+    """
+    read = load_mesh(mesh)
+    is_gltf = Path(mesh).suffix.lower() in (".glb", ".gltf")
+    return Subject(Path(mesh), Path(read.name).stem, up or ("y" if is_gltf else "z"), "m" if is_gltf else "", read)
 
 
 def read_wishes(given: dict[str, Any]) -> Wishes:

@@ -1,5 +1,5 @@
 // The controls that decompose anew: what they hold is what `rlacd.decompose` is asked for.
-import { choice, digits, make } from "page/widgets";
+import { choice, make, measure } from "page/widgets";
 
 /** Lengths are shares of the longest side or of the frame; the slider moves by equal ratios. */
 class Length {
@@ -24,11 +24,11 @@ class Length {
     });
     this.element = make(
       "div",
-      { class: "length", title: hint },
-      make("label", { for: id }, label),
+      { class: "length" },
+      make("label", { for: id }, make("span", { class: "term", "data-hint": hint }, label)),
+      this.note,
       this.box,
       this.slider,
-      this.note,
     );
   }
 
@@ -40,10 +40,10 @@ class Length {
     this.tell();
   }
 
-  /** Say what the length is in the input's unit, `unit` of which are 1 here. */
-  tell(unit = this.unit) {
-    this.unit = unit;
-    this.note.textContent = unit ? `${digits(this.value * unit)} in the file's unit` : "";
+  /** Say what the length is in the input's unit; 1 here is `frame` of the frame of `scene`. */
+  tell(scene = this.scene, frame = this.frame) {
+    [this.scene, this.frame] = [scene, frame];
+    this.note.textContent = scene ? `= ${measure(this.value * frame, scene)}` : "";
   }
 }
 
@@ -56,7 +56,7 @@ export class Controls {
     this.threshold = new Length(
       "threshold",
       "Threshold",
-      "The concavity a hull may have, where the longest side of the mesh is 2. Smaller is tighter, with more hulls.",
+      "How far a hull may lie from the surface, at the worst place. 0.05 is 2.5 % of the longest side, which counts as 2. Smaller is tighter, with more hulls.",
       [0.01, 0.5],
       given.threshold,
       this.changed,
@@ -64,7 +64,7 @@ export class Controls {
     this.radius = new Length(
       "radius",
       "Ball radius",
-      "The ball's radius, as a share of the longest side of the mesh.",
+      "The smallest thing that has to fit in between, as a share of the longest side.",
       [0.01, 0.3],
       given.radius,
       this.changed,
@@ -72,7 +72,7 @@ export class Controls {
     this.tolerance = new Length(
       "tolerance",
       "Tolerance",
-      "Space nearer to the surface than this may be filled; a share of the longest side.",
+      "Space nearer to the surface than this may be filled, as a share of the longest side.",
       [0.005, 0.2],
       given.tolerance,
       this.changed,
@@ -81,8 +81,8 @@ export class Controls {
       "Criterion",
       "criterion",
       [
-        ["concavity", "Concavity", "A hull may lie so far from the surface, everywhere"],
-        ["navigable", "Navigable space", "Hulls stay out of where a ball can go; what nobody reaches costs nothing"],
+        ["concavity", "Concavity", "Every hull stays within the threshold of the surface, everywhere."],
+        ["navigable", "Navigable space", "Hulls stay out of where a ball can go. Dents too narrow for the ball are filled, which saves hulls."],
       ],
       given.criterion,
       (value) => {
@@ -90,23 +90,25 @@ export class Controls {
         this.#arrange();
         this.changed();
       },
+      "When a hull is tight enough.",
     );
     this.quality = choice(
       "Quality",
       "quality",
       [
-        ["fast", "Fast", "One pass of cuts"],
-        ["balanced", "Balanced", "Searches about a second for fewer hulls"],
-        ["best", "Best", "Searches five seconds for fewer hulls"],
+        ["fast", "Fast", "One pass of cuts: a fraction of a second for most meshes."],
+        ["balanced", "Balanced", "A pass, then a short search for fewer hulls."],
+        ["best", "Best", "A pass, then five seconds or more of search for fewer hulls."],
       ],
       given.quality,
       (value) => {
         this.options.quality = value;
         this.changed();
       },
+      "How long to search for a decomposition with fewer hulls. Never looser than the threshold.",
     );
-    this.hulls = this.#limit("max_hulls", "At most", "hulls", "The threshold may then be exceeded");
-    this.corners = this.#limit("max_vertices", "At most", "vertices each", "64 for PhysX on a GPU");
+    this.hulls = this.#limit("max_hulls", "Hulls, at most", "No more hulls than this. The threshold may then be exceeded.");
+    this.corners = this.#limit("max_vertices", "Vertices each", "Corners that each hull may have. Engines have limits, and every corner costs time in a contact.");
     this.element = make(
       "section",
       { id: "controls", "aria-label": "Decompose" },
@@ -126,7 +128,13 @@ export class Controls {
       criterion === "navigable"
         ? { radius: this.radius.value, tolerance: this.tolerance.value }
         : { threshold: this.threshold.value };
-    return { ...size, criterion, quality, max_hulls: this.hulls.value(), max_vertices: this.corners.value() };
+    return { ...size, criterion, quality, max_hulls: this.hulls.value(), max_vertices: this.corners.value(), preset: this.options.preset ?? null };
+  }
+
+  /** Take another engine's limits. */
+  setPreset(preset) {
+    this.options.preset = preset;
+    this.changed();
   }
 
   /** Make the threshold larger or smaller by a step, from the keyboard. */
@@ -136,11 +144,11 @@ export class Controls {
     length.box.dispatchEvent(new Event("change"));
   }
 
-  /** Lengths are also told in the input's unit; `scale` frame units are one of them. */
-  setScale(scale) {
-    this.threshold.tell(1 / scale);
-    this.radius.tell(2 / scale);
-    this.tolerance.tell(2 / scale);
+  /** Lengths are also told in the unit of what is shown. */
+  setScale(scene) {
+    this.threshold.tell(scene, 1);
+    this.radius.tell(scene, 2);
+    this.tolerance.tell(scene, 2);
   }
 
   #arrange() {
@@ -149,10 +157,10 @@ export class Controls {
     this.radius.element.hidden = this.tolerance.element.hidden = !navigable;
   }
 
-  #limit(id, before, after, hint) {
+  #limit(id, label, hint) {
     const box = make("input", { type: "number", min: 1, id, placeholder: "any", value: this.options[id], onchange: this.changed });
     return {
-      element: make("label", { title: hint }, before, box, after),
+      element: make("label", {}, make("span", { class: "term", "data-hint": hint }, label), box),
       value: () => (box.value === "" ? null : Number(box.value)),
     };
   }

@@ -1,5 +1,6 @@
 // What the report says, in words and tables: fit, warnings, repair, times, options.
-import { digits, make, plural } from "page/widgets";
+import { term } from "page/hints";
+import { digits, make, measure, plural } from "page/widgets";
 
 const STEPS = {
   closed: "Closed as it was",
@@ -25,35 +26,69 @@ const STAGES = {
 
 export const stageName = (stage) => STAGES[stage] ?? stage;
 
-/** One line: hulls, triangles, how tight, how long. */
-export function summary({ report, parts }) {
-  const faces = report.faces ?? parts.length;
-  const words = [plural(parts.length, "hull"), plural(faces, "triangle")];
-  if (report.concavity) words.push(`concavity ${digits(report.concavity.max)}`);
-  if (report.navigable) words.push(`${plural(report.navigable.balls, "ball")} left free`);
-  if (report.seconds?.total != null) words.push(`${report.seconds.total.toFixed(2)} s`);
-  if (report.complete === false) words.push("stopped early");
-  return words.join(" · ");
+export const HINTS = {
+  hull: "A convex body: it has no dents. Physics engines collide these fast and reliably.",
+  triangles: "Of all hulls together. Fewer are faster to collide.",
+  concavity:
+    "The farthest that a part's surface and its hull's lie apart, anywhere: how much room the worst dent has that a hull fills.",
+  intrusion: "How deep a hull reaches into the space that a ball can get to.",
+  balls: "Places that a ball of the chosen radius can reach and no hull covers.",
+  over: "The farthest that the hulls' surface lies outside the input's.",
+  under: "The farthest that the input's surface lies outside the hulls.",
+  seconds: "Time for the whole decomposition, from reading the file to measuring the result.",
+  draft: "The first hulls found, in one quick pass. A search for fewer hulls follows.",
+  early: "The work was stopped. The hulls cover the input, but may be coarser or more than with more time.",
+  shell:
+    "An open surface has no inside, so it was given a small thickness. Its hulls follow that thin wall, which takes many of them; close the surface in your modeller to have a solid instead.",
+  wrapped: "The surface was too damaged to close face by face, so a tight skin was wrapped around it.",
+};
+
+/** One line: hulls, triangles, how tight, how long; each with its explanation. */
+export function summary(scene, { draft = false } = {}) {
+  const { report, parts } = scene;
+  if (!report) return [];
+  const { concavity, navigable, seconds } = report;
+  const words = [
+    term(plural(parts.length, "hull"), HINTS.hull),
+    term(plural(report.faces ?? parts.length, "triangle"), HINTS.triangles),
+    concavity && term(`concavity\u00a0${measure(concavity.max, scene)}`, HINTS.concavity),
+    navigable && term(`${plural(navigable.balls, "ball")} left free`, HINTS.balls),
+    !draft && seconds?.total != null && term(`${seconds.total.toFixed(2)}\u00a0s`, HINTS.seconds),
+    draft && term("first pass", HINTS.draft),
+    report.complete === false && term("stopped early", HINTS.early),
+  ].filter(Boolean);
+  return words.flatMap((word, i) => (i ? [" · ", word] : [word]));
+}
+
+/** What repair made of open bodies, in a sentence, with its explanation. */
+export function notes({ report }) {
+  const count = (...steps) => (report?.repair ?? []).filter(({ step }) => steps.includes(step)).length;
+  const [shells, wrapped] = [count("slab"), count("wrapped")];
+  const bodies = (n) => (n === 1 ? "1 open body" : `${n.toLocaleString("en")} open bodies`);
+  return [
+    shells && term(`${bodies(shells)} became ${shells === 1 ? "a thin shell" : "thin shells"}`, HINTS.shell),
+    wrapped && term(`${bodies(wrapped)} ${wrapped === 1 ? "was" : "were"} wrapped`, HINTS.wrapped),
+  ].filter(Boolean).flatMap((word, i) => (i ? [" · ", word] : [word]));
 }
 
 export function warnings(report) {
   return (report.warnings ?? []).map((text) => make("p", { class: "warning" }, text));
 }
 
-/** How well the hulls fit: lengths of the frame, and in the input's unit. */
-export function fitTable(report) {
+/** How well the hulls fit: lengths in the input's unit, and as shares of its longest side. */
+export function fitTable(report, scene) {
   const rows = [];
-  const add = (name, value) => {
-    if (value != null) rows.push([name, digits(value), digits(value / report.scale)]);
+  const add = (name, value, hint) => {
+    if (value != null) rows.push([term(name, hint), measure(value, scene), `${digits(50 * value, 2)}\u00a0%`]);
   };
-  add("Largest concavity", report.concavity?.max);
-  add("Deepest intrusion", report.navigable?.intrusion?.max);
-  add("Hulls beyond the input", report.hausdorff?.over);
-  add("Input beyond the hulls", report.hausdorff?.under);
-  return table("Fit", ["", "longest side 2", "file's unit"], rows);
+  add("Largest concavity", report.concavity?.max, HINTS.concavity);
+  add("Deepest intrusion", report.navigable?.intrusion?.max, HINTS.intrusion);
+  add("Hulls beyond the input", report.hausdorff?.over, HINTS.over);
+  add("Input beyond the hulls", report.hausdorff?.under, HINTS.under);
+  return table("Fit", ["", "", "of its size"], rows);
 }
 
-export function repairTable(report) {
+export function repairTable(report, scene) {
   const groups = new Map();
   for (const { step, faces_in, faces_out, deviation } of report.repair ?? []) {
     const group = groups.get(step) ?? { bodies: 0, before: 0, after: 0, moved: 0 };
@@ -67,7 +102,7 @@ export function repairTable(report) {
     STEPS[step] ?? step,
     bodies.toLocaleString("en"),
     `${before.toLocaleString("en")} → ${after.toLocaleString("en")}`,
-    moved < 1e-9 ? "0" : digits(moved / report.scale),
+    moved < 1e-9 ? "0" : measure(moved, scene),
   ]);
   return table("Repair", ["", "bodies", "faces", "moved"], rows);
 }
@@ -103,5 +138,5 @@ function table(title, heads, rows) {
   const body = rows.map(([name, ...cells]) =>
     make("tr", {}, make("th", { scope: "row" }, name), ...cells.map((text) => make("td", {}, text))),
   );
-  return make("section", { class: "facts" }, make("h2", {}, title), make("table", {}, head || null, make("tbody", {}, ...body)));
+  return make("section", { class: heads.some(Boolean) ? "facts" : "facts long" }, make("h2", {}, title), make("table", {}, head || null, make("tbody", {}, ...body)));
 }

@@ -5,7 +5,7 @@ import { make } from "page/widgets";
 export function bindKeys(bindings) {
   addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const typing = event.target.matches?.("input[type=number], input[type=text], textarea");
+    const typing = event.target.matches?.("input[type=number], input[type=text], select, textarea");
     if (typing && event.key !== "Escape") return;
     const binding = bindings.find(([key]) => key.split(" ").includes(event.key) || key === event.key);
     if (!binding) return;
@@ -22,6 +22,7 @@ export function helpText(bindings) {
     ["scroll", "zoom"],
     ["← ↑ → ↓", "turn, in the 3-D view; walk, in the list; change, on a slider"],
     ["click", "show one part alone; again, or beside it: all"],
+    ["drop", "a file, anywhere: look at that mesh"],
   ];
   const rows = [...extra, ...bindings.filter(([, text]) => text)].map(([key, text]) =>
     make("tr", {}, make("td", {}, ...String(key).split(" ").flatMap((each, i) => [i ? " " : "", make("kbd", {}, each)])), make("td", {}, text)),

@@ -1,11 +1,18 @@
 // The viewer's server: what it is doing, what it has, and what it is asked for.
 
 export class Link {
-  /** `onState(state)` is called with every change; `onLost()` when the server has gone. */
+  /** `onState(state)` is called with every change; `onLost(why)` when there are no more: the server has gone, or
+   * says why. */
   constructor({ onState, onLost }) {
     this.events = new EventSource("events");
     this.events.onmessage = (event) => onState(JSON.parse(event.data));
-    this.events.onerror = () => onLost();
+    this.events.onerror = async () => {
+      const answer = await fetch("events").catch(() => null);
+      const refused = answer && !answer.ok;
+      const why = refused ? (await answer.json()).error : null;
+      answer?.body?.cancel().catch(() => null);
+      if (!answer || refused) onLost(why);
+    };
   }
 
   scene = () => get("scene");
@@ -13,6 +20,19 @@ export class Link {
   heat = () => get("heat");
 
   decompose = (options) => post("decompose", options);
+
+  command = (options) => post("command", options).then(({ command }) => command);
+
+  /** Look at another mesh: a file of the user's. */
+  async open(file, options) {
+    const query = new URLSearchParams({ name: file.name, options: JSON.stringify(options) });
+    const answer = await fetch(`open?${query}`, {
+      method: "POST",
+      headers: { "Content-Type": "application/octet-stream" },
+      body: file,
+    });
+    if (!answer.ok) throw new Error((await answer.json()).error);
+  }
 
   cancel = () => post("cancel", {});
 

@@ -1,4 +1,5 @@
 // The list of parts. Hovering highlights, clicking shows one part alone; arrow keys walk through it.
+import { HINTS } from "page/facts";
 import { digits, make } from "page/widgets";
 
 export class PartList {
@@ -23,9 +24,10 @@ export class PartList {
   }
 
   load(scene) {
-    const navigable = Boolean(scene.report.navigable);
+    this.scene = scene;
+    const navigable = Boolean(scene.report?.navigable);
     const all = scene.parts.reduce((sum, part) => sum + part.volume, 0) || 1;
-    this.limit = navigable ? null : scene.report.options?.threshold;
+    this.limit = navigable ? null : scene.report?.options?.threshold;
     this.data = scene.parts.map((part, index) => ({
       index,
       color: part.color,
@@ -33,17 +35,16 @@ export class PartList {
       share: part.volume / all,
       error: part.error,
     }));
+    const unit = scene.unit ? `, ${scene.unit}` : "";
     this.columns = [
-      ["index", "Part", "In the order of the file"],
-      ["faces", "Faces", "Triangles of the hull"],
-      ["share", "Volume", "Share of the hulls' volumes"],
-      navigable
-        ? ["error", "Intrusion", "How deep the hull reaches into a ball; the input's longest side is 2"]
-        : ["error", "Concavity", "How far the part's surface and its hull's lie apart; the input's longest side is 2"],
+      ["index", "Part", "In the order of the file."],
+      ["faces", "Faces", "Triangles of the hull."],
+      ["share", "Volume", "Share of all hulls' volume."],
+      navigable ? ["error", `Intrusion${unit}`, HINTS.intrusion] : ["error", `Concavity${unit}`, `${HINTS.concavity} The bar is full at the threshold.`],
     ];
     this.head.replaceChildren(
       ...this.columns.map(([key, text, hint]) =>
-        make("th", { scope: "col", title: hint }, make("button", { type: "button", onclick: () => this.#sort(key) }, text)),
+        make("th", { scope: "col", "data-hint": hint }, make("button", { type: "button", onclick: () => this.#sort(key) }, text)),
       ),
     );
     this.#fill();
@@ -87,8 +88,8 @@ export class PartList {
       { "aria-selected": "false", "data-part": part.index },
       make("td", {}, swatch, String(part.index).padStart(3, "0")),
       make("td", {}, String(part.faces)),
-      make("td", {}, `${digits(100 * part.share, 2)} %`),
-      make("td", { class: "error" }, digits(part.error), this.limit ? make("span", { class: "track" }, gauge) : null),
+      make("td", {}, `${digits(100 * part.share, 2)}\u00a0%`),
+      make("td", { class: "error" }, part.error == null ? "–" : digits(part.error / this.scene.scale, 2), this.limit ? make("span", { class: "track" }, gauge) : null),
     );
     row.number = part.index;
     return row;

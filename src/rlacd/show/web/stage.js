@@ -1,6 +1,7 @@
 // The 3-D view: input, hulls, balls and the error heat map. It draws only when something changed.
 import { floats, indices } from "page/arrays";
 import { Camera } from "page/camera";
+import { makeGrid } from "page/ground";
 const { Box3, BufferAttribute, BufferGeometry, Color, Group, Mesh, MeshBasicMaterial, MeshLambertMaterial, Vector3 } = THREE;
 
 const CREASE = 18; // degrees between facets from which their edge is drawn
@@ -10,8 +11,10 @@ const WALL = new Color("#c3c9d1");
 const [X, Y, Z, BACK] = [new Vector3(1, 0, 0), new Vector3(0, 1, 0), new Vector3(0, 0, 1), new Vector3(0, 0, -1)];
 
 export class Stage {
-  /** `onHover(part or null, x, y)` and `onPick(part or null)` tell what the pointer does. */
-  constructor(canvas, { onHover, onPick }) {
+  /** `onHover(part or null, x, y)` and `onPick(part or null)` tell what the pointer does, `onView(pixels)` how long
+   * a frame unit is in the middle of the view. */
+  constructor(canvas, { onHover, onPick, onView }) {
+    this.onView = onView;
     this.canvas = canvas;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true, preserveDrawingBuffer: true });
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
@@ -24,34 +27,58 @@ export class Stage {
     this.parts = [];
     this.heat = null;
     this.balls = null;
-    this.look = { input: "ghost", hulls: "solid", edges: true, heat: false, balls: false, pull: 0 };
+    this.look = { input: "ghost", hulls: "solid", edges: true, heat: false, balls: false, grid: true, pull: 0 };
+    this.grid = null;
     this.hovered = this.picked = null;
     this.#watchPointer(onHover, onPick);
     new ResizeObserver(() => this.#resize()).observe(canvas.parentElement);
     this.#resize();
   }
 
-  /** Show another decomposition; the camera stays where it is, except for the first. */
-  load(scene) {
-    const first = this.parts.length === 0 && this.input === null;
+  /** Show another decomposition, or an input without hulls; the camera stays where it is unless told to frame it. */
+  load(scene, { frame = false } = {}) {
     this.#empty();
     this.input = scene.input && this.#addLayers(scene.input, "#9aa3ae");
     this.parts = scene.parts.map((part, index) => this.#addPart(part, index));
-    this.middle = this.parts.reduce((box, part) => box.union(part.box), new Box3()).getCenter(new Vector3());
+    const boxes = this.parts.length ? this.parts.map((part) => part.box) : [this.#inputBox()];
+    this.middle = boxes.reduce((all, box) => all.union(box), new Box3()).getCenter(new Vector3());
     this.balls = scene.balls && this.#addBalls(scene.balls);
+    this.grid = makeGrid(scene.scale);
+    this.scene.add(this.grid);
     this.hovered = this.picked = null;
     this.refresh();
-    if (first) this.turn(scene.up);
+    if (frame) this.turn(scene.up);
+    else this.#ground();
   }
 
   /** Let an axis of the input, "x", "y" or "z", point up; nothing is mirrored. */
   turn(up) {
     const [x, y, z] = { x: [Y, X, BACK], y: [X, Y, Z], z: [X, BACK, Y] }[up]; // where its axes go
     this.root.quaternion.setFromRotationMatrix(new THREE.Matrix4().makeBasis(x, y, z));
+    this.#ground();
     this.fit(false);
   }
 
-  /** Take over an error heat map, which belongs to the decomposition shown. */
+  /** Put the grid under what there is. */
+  #ground() {
+    if (!this.grid) return;
+    this.root.updateMatrixWorld(true);
+    const rest = this.parts.map((part) => part.box).concat(this.input ? [this.#inputBox()] : []);
+    const points = rest.flatMap(cornersOf).map((corner) => this.root.localToWorld(corner));
+    if (points.length === 0) return;
+    const box = new Box3().setFromPoints(points);
+    const middle = box.getCenter(new Vector3());
+    this.grid.position.set(middle.x, box.min.y - 1e-3, middle.z);
+    this.draw();
+  }
+
+  #inputBox() {
+    const geometry = this.input?.body.geometry;
+    if (!geometry) return new Box3(new Vector3(-1, -1, -1), new Vector3(1, 1, 1));
+    if (!geometry.boundingBox) geometry.computeBoundingBox();
+    return geometry.boundingBox;
+  }
+
   loadHeat(heat) {
     this.heat = heat.parts.map((part, index) => {
       const geometry = geometryOf(part);
@@ -85,15 +112,18 @@ export class Stage {
 
   fit(again = true) {
     this.root.updateMatrixWorld(true);
-    const corners = this.parts.flatMap((part) => cornersOf(part.box).map((corner) => part.group.localToWorld(corner)));
+    const corners = this.parts.length
+      ? this.parts.flatMap((part) => cornersOf(part.box).map((corner) => part.group.localToWorld(corner)))
+      : cornersOf(this.#inputBox()).map((corner) => this.root.localToWorld(corner));
     if (corners.length) this.camera.frame(corners, { again });
     this.draw();
   }
 
   /** Bring every object in line with `look`. */
   refresh() {
-    const { input, hulls, edges, heat, balls, pull } = this.look;
-    if (this.input) this.input.show(input);
+    const { input, hulls, edges, heat, balls, grid, pull } = this.look;
+    if (this.input) this.input.show(this.parts.length ? input : "solid");
+    if (this.grid) this.grid.visible = grid && pull === 0;
     this.parts.forEach((part, index) => {
       const alone = this.picked !== null;
       const mine = index === this.picked;
@@ -119,6 +149,9 @@ export class Stage {
       this.lights.position.copy(this.camera.lens.position);
       this.lights.quaternion.copy(this.camera.lens.quaternion);
       this.renderer.render(this.scene, this.camera.lens);
+      const { lens, orbit } = this.camera;
+      const across = 2 * Math.tan((lens.fov / 2) * (Math.PI / 180)) * lens.position.distanceTo(orbit.target);
+      this.onView(this.canvas.clientHeight / across);
     });
   }
 
@@ -144,7 +177,7 @@ export class Stage {
     const geometry = geometryOf(part);
     const color = new Color(part.color);
     const group = new Group();
-    const layers = new Layers(geometry, color, index);
+    const layers = new Layers(geometry, color, index, part.rank ?? 0);
     const line = color.clone().multiplyScalar(0.35);
     const edges = new THREE.LineSegments(
       new THREE.EdgesGeometry(geometry, CREASE),
@@ -174,15 +207,15 @@ export class Stage {
   }
 
   #empty() {
-    for (const thing of [this.input, this.balls, ...this.parts.map((part) => part.group)]) {
+    for (const thing of [this.input, this.balls, this.grid, ...this.parts.map((part) => part.group)]) {
       if (!thing) continue;
       thing.traverse((node) => {
         node.geometry?.dispose();
         node.material?.dispose();
       });
-      this.root.remove(thing);
+      thing.removeFromParent();
     }
-    this.heat = this.balls = this.input = null;
+    this.heat = this.balls = this.input = this.grid = null;
     this.parts = [];
   }
 
@@ -190,8 +223,9 @@ export class Stage {
     const { clientWidth, clientHeight } = this.canvas.parentElement;
     if (!clientWidth || !clientHeight) return;
     this.renderer.setSize(clientWidth, clientHeight, false);
-    const covered = document.getElementById("toolbar").offsetHeight + 24;
-    this.camera.resize(clientWidth, clientHeight, { top: 76, bottom: Math.min(covered, clientHeight / 3) });
+    const toolbar = document.getElementById("toolbar");
+    const covered = getComputedStyle(toolbar).position === "absolute" ? toolbar.offsetHeight + 24 : 32;
+    this.camera.resize(clientWidth, clientHeight, { top: 84, bottom: Math.min(covered, clientHeight / 3) });
     this.draw();
   }
 
@@ -222,21 +256,25 @@ export class Stage {
   }
 }
 
-// Faces are pushed back a little so that edges lie on them, and veils more: where a hull has a face in common with the
-// input, the hull is seen.
+// Faces are pushed back a little so that edges lie on them. Hulls that overlap can have a facet in one plane: each hue,
+// which no neighbour has, is pushed back by another step, so that one of them is seen and they do not flicker. Veils and
+// the input are pushed most: where a hull has a face in common with the input, the hull is seen.
+const STEP = 6; // smallest differences of depth
 const BODY = { side: THREE.DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 };
 const FLAT = { ...BODY, flatShading: true };
-const VEIL = { ...FLAT, transparent: true, depthWrite: false, polygonOffsetFactor: 2, polygonOffsetUnits: 4 };
+const VEIL = { ...FLAT, transparent: true, depthWrite: false };
+const pushed = (rank) => ({ polygonOffsetFactor: 1 + rank / 16, polygonOffsetUnits: 1 + STEP * rank });
+const BACKMOST = 13;
 
 /** A body that is solid, glass or ghost. Glass and ghost first fill the depth, so that only their front is seen. */
 class Layers extends Group {
-  constructor(geometry, color, part = null) {
+  constructor(geometry, color, part = null, rank = BACKMOST) {
     super();
     this.color = color;
-    this.body = new Mesh(geometry, new MeshLambertMaterial({ color, ...FLAT }));
+    this.body = new Mesh(geometry, new MeshLambertMaterial({ color, ...FLAT, ...pushed(rank) }));
     this.body.userData.part = part;
-    this.depth = new Mesh(geometry, new MeshBasicMaterial({ ...BODY, polygonOffsetFactor: 2, polygonOffsetUnits: 4, colorWrite: false }));
-    this.veil = new Mesh(geometry, new MeshLambertMaterial({ color, ...VEIL }));
+    this.depth = new Mesh(geometry, new MeshBasicMaterial({ ...BODY, ...pushed(rank + 1), colorWrite: false }));
+    this.veil = new Mesh(geometry, new MeshLambertMaterial({ color, ...VEIL, ...pushed(rank + 1) }));
     this.depth.renderOrder = 2;
     this.veil.renderOrder = 3;
     this.add(this.body, this.depth, this.veil);

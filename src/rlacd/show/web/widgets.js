@@ -14,16 +14,16 @@ export function make(tag, attributes = {}, ...children) {
 }
 
 /** One of several choices, as radio buttons that look like one bar; arrow keys move in it. */
-export function choice(label, name, options, chosen, onChange) {
+export function choice(label, name, options, chosen, onChange, explained = null) {
   const buttons = options.map(([value, text, hint]) =>
     make(
       "label",
-      { title: hint },
+      { "data-hint": hint },
       make("input", { type: "radio", name, value, checked: value === chosen, onchange: () => onChange(value) }),
       make("span", {}, text),
     ),
   );
-  const bar = make("fieldset", { class: "choice", id: name }, make("legend", {}, label), ...buttons);
+  const bar = make("fieldset", { class: "choice", id: name }, make("legend", explained ? { class: "term", "data-hint": explained } : {}, label), ...buttons);
   bar.choose = (value, { silently = false } = {}) => {
     const input = bar.querySelector(`input[value="${value}"]`);
     if (input && !input.disabled && !input.checked) {
@@ -36,7 +36,7 @@ export function choice(label, name, options, chosen, onChange) {
 
 /** A button that is on or off. */
 export function toggle(id, text, on, hint, onChange) {
-  const button = make("button", { type: "button", id, class: "toggle", title: hint, "aria-pressed": on }, text);
+  const button = make("button", { type: "button", id, class: "toggle", "data-hint": hint, "aria-pressed": on }, text);
   button.set = (value) => {
     button.setAttribute("aria-pressed", value);
     onChange(value);
@@ -48,5 +48,9 @@ export function toggle(id, text, on, hint, onChange) {
 /** A length of the normalised frame for people: three significant digits. */
 export const digits = (value, count = 3) =>
   value == null ? "–" : value === 0 ? "0" : Math.abs(value) < 1e-4 ? "< 0.0001" : String(+value.toPrecision(count));
+
+/** A length of the frame in the input's unit, in plain words: "0.0226 m", or "0.0226 units" where nobody says which. */
+export const measure = (value, { scale, unit }, count = 3) =>
+  value == null ? "–" : `${value / scale < 1e-4 && value > 0 ? (value / scale).toExponential(1) : digits(value / scale, count)}\u00a0${unit || "units"}`;
 
 export const plural = (count, word) => `${count.toLocaleString("en")} ${word}${count === 1 ? "" : "s"}`;

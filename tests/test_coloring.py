@@ -1,0 +1,72 @@
+"""Colours by adjacency: hulls that touch never share a hue."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+import trimesh
+
+from rlacd.formats.palette import hull_colors
+from rlacd.show.coloring import HUES, color_hulls, neighbours
+
+
+def boxes(places: np.ndarray, size: float = 1.0) -> list[trimesh.Trimesh]:
+    return [trimesh.creation.box((size,) * 3, trimesh.transformations.translation_matrix(place)) for place in places]
+
+
+def grid(count: int) -> np.ndarray:
+    return np.array(list(itertools.product(range(count), repeat=3)), dtype=float)
+
+
+def check(hulls: list[trimesh.Trimesh]) -> None:
+    coloring = color_hulls(hulls)
+    for one, others in enumerate(neighbours(hulls)):
+        assert all(coloring.rank[one] != coloring.rank[other] for other in others)
+    hues = {bytes(color) for color in hull_colors(HUES)}
+    assert {bytes(color) for color in coloring.rgb[: min(len(hulls), 4)]} <= hues or len(hulls) > HUES
+
+
+def test_a_wall_of_touching_boxes_has_neighbours_in_other_hues() -> None:
+    hulls = boxes(grid(5))
+    beside = neighbours(hulls)
+    assert max(map(len, beside)) == 26
+    check(hulls)
+
+
+def test_boxes_that_are_apart_are_no_neighbours() -> None:
+    assert neighbours(boxes(grid(3) * 1.05)) == [set() for _ in range(27)]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_overlapping_boxes_found_by_brute_force(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    hulls = boxes(random.random((40, 3)) * 6.0)
+    for hull in hulls:
+        hull.apply_transform(trimesh.transformations.random_rotation_matrix(random.random(3), True))
+    beside = neighbours(hulls)
+    for one, other in itertools.combinations(range(len(hulls)), 2):
+        inside = hulls[one].contains(hulls[other].vertices).any() or hulls[other].contains(hulls[one].vertices).any()
+        if inside:
+            assert other in beside[one]
+            assert one in beside[other]
+    check(hulls)
+
+
+def test_legs_under_a_plate_share_hues_with_each_other_only() -> None:
+    plate = trimesh.creation.box(bounds=[(-1, -1, 0), (60, 3, 1)])
+    legs = [trimesh.creation.box(bounds=[(x, 0, -5), (x + 1, 1, 0)]) for x in range(0, 58, 2)]
+    coloring = color_hulls([*legs, plate])
+    assert coloring.rank[-1] not in coloring.rank[:-1]
+    assert len(np.unique(coloring.rgb, axis=0)) == len(legs) + 1
+
+
+def test_nothing_and_one() -> None:
+    assert len(color_hulls([]).rgb) == 0
+    assert color_hulls(boxes(np.zeros((1, 3)))).rgb.tolist() == hull_colors(1).tolist()
+
+
+def test_more_hulls_in_one_place_than_there_are_hues_all_differ() -> None:
+    coloring = color_hulls(boxes(np.zeros((30, 3))))
+    assert len(np.unique(coloring.rgb, axis=0)) == 30
