@@ -41,7 +41,7 @@ def main() -> None:
         # One size for all, on the ground: simulators are tuned for things of a metre.
         standing = ((mesh.vertices - low) / size, mesh.faces)
         result = rlacd.decompose(standing, policy="navacd", quality="fast", preset=options.preset, threads=1)
-        mass = result.report["mass"]["volume_m"] * 1000.0
+        mass = result.report["mass"]["volume_abs"] * 1000.0
         for kind, ending, fall in (
             ("MuJoCo", "xml", fall_in_mujoco),
             ("Bullet", "urdf", fall_in_bullet),

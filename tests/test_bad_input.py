@@ -191,7 +191,7 @@ def test_what_is_no_mesh_is_one_sentence(mesh: Any, error: type[RlacdError]) -> 
 NAN, INFINITE = float("nan"), float("inf")
 WRONG_OPTIONS = {
     "threshold": [0, -1, NAN, INFINITE, 3, 0.0009, "a", None, True, [0.1]],
-    "threshold_m": [0, -1, NAN, INFINITE, "a", 1e9, 1e-9],
+    "threshold_abs": [0, -1, NAN, INFINITE, "a", 1e9, 1e-9],
     "max_hulls": [0, -1, 2.5, "2", True, NAN],
     "max_vertices": [3, 0, -8, 4.5, "8"],
     "max_faces": [3, 0, 12.0, "x"],

@@ -101,7 +101,7 @@ def test_quiet_says_nothing(mesh: Path, stand_in: StandIn) -> None:
 def test_every_option_reaches_the_decomposition(mesh: Path, stand_in: StandIn) -> None:
     options = {
         "threshold": 0.1,
-        "threshold_m": 0.2,
+        "threshold_abs": 0.2,
         "max_hulls": 5,
         "max_vertices": 32,
         "max_faces": 60,

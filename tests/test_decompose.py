@@ -103,10 +103,10 @@ def test_input_frame_and_unit_are_kept() -> None:
 def test_threshold_in_the_unit_of_the_input() -> None:
     mesh = table()
     mesh.apply_scale(50)  # longest side 100: one unit is 0.02 in the frame
-    metric = rlacd.decompose(mesh, threshold_m=2.5)
+    metric = rlacd.decompose(mesh, threshold_abs=2.5)
     assert metric.report["options"]["threshold"] == pytest.approx(0.05)
-    with pytest.raises(rlacd.OptionError, match="threshold_m"):
-        rlacd.decompose(mesh, threshold_m=1e-6)
+    with pytest.raises(rlacd.OptionError, match="threshold_abs"):
+        rlacd.decompose(mesh, threshold_abs=1e-6)
 
 
 @pytest.mark.parametrize("source", ["path", "trimesh", "scene", "arrays", "lists"])
@@ -228,7 +228,7 @@ def test_timeout_returns_what_is_reached() -> None:
         {"threshold": 0},
         {"threshold": float("nan")},
         {"threshold": 3},
-        {"threshold_m": -1},
+        {"threshold_abs": -1},
         {"max_hulls": 0},
         {"max_vertices": 3},
         {"max_faces": 2},

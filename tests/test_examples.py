@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.util
 import inspect
 from pathlib import Path
@@ -12,6 +13,8 @@ import typer
 
 import rlacd
 from rlacd.cli import app
+from rlacd.options import Options
+from tests.readme_table import options_table
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -41,16 +44,27 @@ def test_the_sample_is_the_same_every_time() -> None:
     assert script.sample().export(file_type="glb") == script.sample().export(file_type="glb")
 
 
-def test_the_readme_names_every_option() -> None:
+def test_the_readme_holds_the_table_of_options() -> None:
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert options_table() in readme, "run  python -m tests.readme_table"
+
+
+def test_the_table_names_every_option() -> None:
+    table = options_table()
     command = typer.main.get_command(app).commands["decompose"]  # type: ignore[attr-defined]
-    options = {name for parameter in command.params for name in parameter.opts if name.startswith("--")}
-    missing = {
-        name for name in options - {"--help", "--quiet"} if f"{name}`" not in readme and f"{name}/" not in readme
-    }
-    assert missing == set()
-    arguments = set(inspect.signature(rlacd.decompose).parameters) - {"mesh"}
-    assert {name for name in arguments if f"`{name}`" not in readme} == set()
+    options = {name for p in command.params if not p.hidden for name in p.opts if name.startswith("--")} - {"--help"}
+    assert {name for name in options if f"`{name}`" not in table and f"{name}/" not in table} == set()
+    arguments = set(inspect.signature(rlacd.decompose).parameters) - {"mesh", "threshold_m"}
+    assert {name for name in arguments if f"`{name}`" not in table} == set()
+
+
+def test_the_function_has_the_options_as_they_are_stated_once() -> None:
+    given = inspect.signature(rlacd.decompose).parameters
+    for field in dataclasses.fields(Options):
+        assert given[field.name].default == field.default
+        if field.name != "criterion":  # a class that has the criterion's own methods
+            assert given[field.name].annotation == field.type
+    assert set(given) == {field.name for field in dataclasses.fields(Options)} | {"mesh", "progress", "threshold_m"}
 
 
 def test_the_command_offers_every_argument_of_the_function() -> None:

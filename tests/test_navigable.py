@@ -174,7 +174,7 @@ def test_a_convex_solid_has_no_balls() -> None:
 def test_the_hole_of_a_torus_is_open_when_the_ball_fits(turn: int, hole: float, share: float, is_open: bool) -> None:
     """A ball too large for it sinks into the hole from both sides, but not to its middle."""
     solid = solid_of(turned(torus(hole), turn))
-    nav = NavigableSpace(radius_m=0.7 * share * hole, tolerance_m=0.3 * share * hole).prepare(solid)
+    nav = NavigableSpace(radius_abs=0.7 * share * hole, tolerance_abs=0.3 * share * hole).prepare(solid)
     centres = solid.frame.to_input(nav.balls.centres)
     assert len(centres) > 0
     assert (np.linalg.norm(centres, axis=1) < 0.43 * hole).any() == is_open
@@ -185,7 +185,7 @@ def test_the_hole_of_a_torus_is_open_when_the_ball_fits(turn: int, hole: float, 
 def test_a_tube_is_open_exactly_when_the_ball_fits(turn: int, share: float, is_open: bool) -> None:
     hole = manifold3d.Manifold.cylinder(4, 0.2, circular_segments=256, center=True)
     solid = solid_of(turned(manifold3d.Manifold.cylinder(2, 0.5, circular_segments=64, center=True) - hole, turn))
-    nav = NavigableSpace(radius_m=0.15 * share, tolerance_m=0.05 * share).prepare(solid)
+    nav = NavigableSpace(radius_abs=0.15 * share, tolerance_abs=0.05 * share).prepare(solid)
     centres = solid.frame.to_input(nav.balls.centres)
     assert (np.linalg.norm(centres, axis=1) < 0.15).any() == is_open
 
@@ -196,7 +196,7 @@ def test_a_tube_is_open_exactly_when_the_ball_fits(turn: int, share: float, is_o
 def test_a_door_lets_in_what_is_narrower(turn: int, wall: float, share: float) -> None:
     diameter = 0.2
     home = turned(house(share * diameter, wall), turn)
-    nav = NavigableSpace(radius_m=diameter / 2, tolerance_m=0.02).prepare(solid_of(home))
+    nav = NavigableSpace(radius_abs=diameter / 2, tolerance_abs=0.02).prepare(solid_of(home))
     assert inside_house(nav, home, turn).any() == (share > 1)
 
 
@@ -207,7 +207,7 @@ def test_a_round_hole_lets_in_what_is_narrower(turn: int, share: float, wall: fl
     radius = 0.1
     hole = manifold3d.Manifold.cylinder(2, share * radius, circular_segments=256).rotate((0, 90, 0))
     home = turned(house(None, wall) - hole.translate((0.5, 0.2, 0.23)), turn)
-    nav = NavigableSpace(radius_m=radius, tolerance_m=0.01).prepare(solid_of(home))
+    nav = NavigableSpace(radius_abs=radius, tolerance_abs=0.01).prepare(solid_of(home))
     assert inside_house(nav, home, turn).any() == (share > 1)
 
 
@@ -222,13 +222,13 @@ def test_a_winding_passage_is_followed(turn: int, share: float) -> None:
         box((0.9 - half, 0.4 - half, -half), (2, 0.4 + half, half)),
     ]
     home = turned(house(None, 0.6) - manifold3d.Manifold.batch_boolean(legs, manifold3d.OpType.Add), turn)
-    nav = NavigableSpace(radius_m=0.1, tolerance_m=0.01).prepare(solid_of(home))
+    nav = NavigableSpace(radius_abs=0.1, tolerance_abs=0.01).prepare(solid_of(home))
     assert inside_house(nav, home, turn).any() == (share > 1)
 
 
 def test_of_two_doors_the_wider_one_counts() -> None:
     home = house(0.98 * 0.2) - box((-2, -0.2, -0.1), (0, -0.2 + 1.02 * 0.2, 0.4))
-    nav = NavigableSpace(radius_m=0.1, tolerance_m=0.01).prepare(solid_of(home))
+    nav = NavigableSpace(radius_abs=0.1, tolerance_abs=0.01).prepare(solid_of(home))
     assert inside_house(nav, home, 0).any()
 
 
@@ -303,7 +303,7 @@ def test_lengths_in_the_unit_of_the_input() -> None:
     here, there = (table().scale((s,) * 3).translate((1, 2, 3)) for s in (1, 0.01))
     # The longest side is 2 and 0.02.
     a = prepare(here, 0.05, 0.02)
-    b = NavigableSpace(radius_m=0.001, tolerance_m=0.0004).prepare(solid_of(there))
+    b = NavigableSpace(radius_abs=0.001, tolerance_abs=0.0004).prepare(solid_of(there))
     assert (b.radius, b.tolerance) == pytest.approx((a.radius, a.tolerance))
     assert len(b.balls) == pytest.approx(len(a.balls), rel=0.01)  # rounding decides between equals
     assert cKDTree(a.balls.centres).query(b.balls.centres)[0].max() < a.radius / 2
@@ -319,8 +319,8 @@ def test_lengths_in_the_unit_of_the_input() -> None:
         ({"tolerance": float("inf")}, "tolerance is inf"),
         ({"radius": None}, "radius is None"),
         ({"radius": "wide"}, "radius is 'wide'"),
-        ({"radius_m": 0.0}, "radius_m is 0"),
-        ({"tolerance_m": -1}, "tolerance_m is -1"),
+        ({"radius_abs": 0.0}, "radius_abs is 0"),
+        ({"tolerance_abs": -1}, "tolerance_abs is -1"),
         ({"seeds": [(0, 0)]}, "seeds"),
         ({"seeds": []}, "seeds"),
         ({"seeds": [(0, 0, float("nan"))]}, "seeds"),

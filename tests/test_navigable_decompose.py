@@ -110,7 +110,7 @@ def test_the_hole_of_a_torus_is_free_exactly_when_the_ball_fits(ball: float) -> 
 def test_a_pipe_stays_open_exactly_when_the_ball_fits(ball: float) -> None:
     outside, inside = Manifold.cylinder(2, 0.4, 0.4, 48, True), Manifold.cylinder(3, 0.3, 0.3, 48, True)
     pipe = mesh_of((outside - inside).rotate((10, 20, 30)))
-    space = rlacd.NavigableSpace(radius_m=(0.3 - 0.02) * np.cos(np.pi / 48) * ball, tolerance_m=0.02)
+    space = rlacd.NavigableSpace(radius_abs=(0.3 - 0.02) * np.cos(np.pi / 48) * ball, tolerance_abs=0.02)
     result = rlacd.decompose(pipe, criterion=space)
     assert result.balls is not None
     a_ball_is_in_the_middle = bool((np.linalg.norm(result.balls.centres, axis=1) < result.balls.radii).any())
@@ -138,7 +138,7 @@ def test_lengths_in_the_meshs_own_unit() -> None:
     mesh = ell()
     by_share = rlacd.decompose(mesh, criterion=rlacd.NavigableSpace(0.05, 0.02))
     mesh.apply_scale(1000)
-    by_length = rlacd.decompose(mesh, criterion=rlacd.NavigableSpace(radius_m=100.0, tolerance_m=40.0))
+    by_length = rlacd.decompose(mesh, criterion=rlacd.NavigableSpace(radius_abs=100.0, tolerance_abs=40.0))
     assert by_share.balls is not None
     assert by_length.balls is not None
     assert len(by_share) == len(by_length) == 2
@@ -223,7 +223,7 @@ def test_the_command_writes_the_balls(mesh: Path, tmp_path: Path) -> None:
 
 
 def test_the_command_takes_seeds_and_planes(mesh: Path, tmp_path: Path) -> None:
-    words = ["--criterion", "navigable", "--radius-m", 0.2, "--tolerance-m", 0.05, "--report", "-", "-q"]
+    words = ["--criterion", "navigable", "--radius-abs", 0.2, "--tolerance-abs", 0.05, "--report", "-", "-q"]
     place = ["--seed-point", "1.5,0.2,1.5", "--closed-plane", "0,0,1,0"]
     done = run("decompose", mesh, "-o", tmp_path / "out.glb", *words, *place)
     assert done.exit_code == 0, done.output

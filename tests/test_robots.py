@@ -186,7 +186,7 @@ def test_lengths_are_in_the_robots_unit(tmp_path: Path) -> None:
         '<robot name="r"><link name="l"><collision><geometry><mesh filename="big.stl" scale="0.001 0.001 0.001"/>'
         "</geometry></collision></link></robot>"
     )
-    done = rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "out.urdf", threshold_m=0.004, threads=1)
+    done = rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "out.urdf", threshold_abs=0.004, threads=1)
     assert done.meshes[0].result.report["options"]["threshold"] == pytest.approx(0.004 * 2 / 0.4)
     (hulls,) = [trimesh.util.concatenate(collisions(done.path))]
     assert hulls.bounds == pytest.approx(table().bounds, abs=1e-6)

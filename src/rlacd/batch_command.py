@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import inspect
 import signal
 import threading
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rlacd.command_options import HOW, decompose_options
+from rlacd.command_options import decompose_options, how_parameters
+from rlacd.command_parameters import REQUIRED, Parameters, command, option_parameters
 from rlacd.errors import OptionError
 from rlacd.exit_codes import ExitCode, exit_codes
+from rlacd.output_options import OutputOptions
 from rlacd.workers import available_cpus
 
 if TYPE_CHECKING:
@@ -53,25 +54,18 @@ BATCH = "Batch"
 WRITTEN = ("density", "up", "one_mesh")
 """Options of decompose that say how hulls are written."""
 
-Parameters = dict[str, inspect.Parameter]
 
+def _option(default: Any, kind: Any, *names: str, **about: Any) -> tuple[Any, Any]:
+    return default, Annotated[kind, typer.Option(*names, rich_help_panel=BATCH, **about)]
 
-def _option(default: Any, kind: Any, *names: str, **about: Any) -> inspect.Parameter:
-    option = typer.Option(*names, rich_help_panel=BATCH, **about)
-    annotation = Annotated[kind, option]
-    return inspect.Parameter("_", inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
-
-
-_NEEDED = inspect.Parameter.empty
 
 _OWN: Parameters = {
-    "assets": inspect.Parameter(
-        "assets",
-        inspect.Parameter.KEYWORD_ONLY,
-        annotation=Annotated[Path, typer.Argument(metavar="ASSETS", help="A folder of meshes, of any depth.")],
+    "assets": (
+        REQUIRED,
+        Annotated[Path, typer.Argument(metavar="ASSETS", help="A folder of meshes, of any depth.")],
     ),
     "out": _option(
-        _NEEDED,
+        REQUIRED,
         str,
         "--output",
         "-o",
@@ -107,30 +101,21 @@ _OWN: Parameters = {
 }
 
 
-def batch_command(decompose: Callable[..., None]) -> Callable[..., None]:
-    """Build the command; `decompose` lends its options."""
+def batch_command() -> Callable[..., None]:
+    """Build the command."""
 
     def batch(**given: Any) -> None:
         with exit_codes():
             own = {name: given.pop(name) for name in _OWN}
-            quiet = given.pop("quiet")
+            quiet = bool(given.pop("quiet"))
             work = _batch(own, given)
             if own["dry_run"]:
                 _tell_plan(work)
             else:
                 _run(work, own, quiet=quiet)
 
-    hints = get_type_hints(decompose, include_extras=True)
-    lent = {
-        name: parameter.replace(annotation=hints[name], kind=inspect.Parameter.KEYWORD_ONLY)
-        for name, parameter in inspect.signature(decompose).parameters.items()
-        if name in (*HOW, *WRITTEN, "quiet") and name not in _OWN
-    }
-    parameters = {name: parameter.replace(name=name) for name, parameter in {**_OWN, **lent}.items()}
-    batch.__signature__ = inspect.Signature(list(parameters.values()))  # type: ignore[attr-defined]
-    batch.__annotations__ = {name: parameter.annotation for name, parameter in parameters.items()}
-    batch.__doc__ = HELP
-    return batch
+    written = option_parameters(OutputOptions, only=(*WRITTEN, "quiet"))
+    return command(batch, HELP, {**_OWN, **{k: p for k, p in {**written, **how_parameters()}.items() if k not in _OWN}})
 
 
 def _batch(own: dict[str, Any], given: dict[str, Any]) -> Batch:
@@ -141,9 +126,18 @@ def _batch(own: dict[str, Any], given: dict[str, Any]) -> Batch:
         raise OptionError(f"--redo is {own['redo']!r}; it has to be one of {', '.join(REDO)}.")
     if own["out"] == "-":
         raise OptionError("a batch cannot be written to stdout; give -o a folder.")
-    written = {name: given.pop(name) for name in WRITTEN}
-    options = decompose_options({**given, "threads": own["threads"], "timeout": own["timeout"]})
-    order = Order.of(options, file_format=own["folder_format"], folders=own["folders"], **written)
+    from rlacd.terminal import say
+
+    written = OutputOptions(**{name: given.pop(name) for name in WRITTEN})
+    options = decompose_options({**given, "threads": own["threads"], "timeout": own["timeout"]}, warn=say)
+    order = Order.of(
+        options,
+        file_format=own["folder_format"],
+        folders=own["folders"],
+        density=written.density,
+        up=written.up,
+        one_mesh=bool(written.one_mesh),
+    )
     limits = Limits(own["limit"], int(own["memory"] * 2**30))
     return Batch(own["assets"], own["out"], order, limits, own["fallback"], own["glob"], own["redo"])
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import inspect
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
+from rlacd.command_parameters import REQUIRED, Parameters, command
 from rlacd.errors import MeshFileError, OptionError, OutputError
 from rlacd.exit_codes import exit_codes
 
@@ -43,7 +43,7 @@ Ranking = Annotated[str, typer.Option(help="What ranks the planes along the axes
 MeanError = Annotated[list[float] | None, typer.Option(help="Mean D_h to tune to; may be repeated.")]
 Close = Annotated[float, typer.Option(min=0.001, help="How far from it the mean may be, relative to it.")]
 
-Runs: dict[str, tuple[Any, Any]] = {
+Runs: Parameters = {
     "listed": (
         None,
         Annotated[
@@ -72,23 +72,14 @@ def experiment(name: str) -> Callable[[Callable[..., Page]], Callable[..., Page]
     def register(make_page: Callable[..., Page]) -> Callable[..., Page]:
         hints = get_type_hints(make_page, {**globals(), "Bench": Any, "Page": Any}, include_extras=True)
         own = {key: (p.default, hints[key]) for key, p in list(inspect.signature(make_page).parameters.items())[1:]}
-        required = inspect.Parameter.empty
-        parameters = {"meshes": (required, Meshes), "out": (required, Out), **own, **Runs}
+        parameters: Parameters = {"meshes": (REQUIRED, Meshes), "out": (REQUIRED, Out), **own, **Runs}
 
-        @functools.wraps(make_page)
-        def command(**given: Any) -> None:
+        def run(**given: Any) -> None:
             chosen = {key: given.pop(key) for key in own}
             with exit_codes(), _open(**given) as opened:
                 _save(opened, make_page(opened, **chosen), name)
 
-        command.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
-            [
-                inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
-                for key, (default, annotation) in parameters.items()
-            ]
-        )
-        command.__annotations__ = {key: annotation for key, (_, annotation) in parameters.items()}
-        app.command(name)(command)
+        app.command(name)(command(run, inspect.getdoc(make_page) or "", parameters))
         return make_page
 
     return register

@@ -10,7 +10,7 @@ import typer
 from rlacd import __version__
 from rlacd.batch_command import BATCH_EPILOG, batch_command
 from rlacd.bench_command import app as bench
-from rlacd.decompose_command import decompose
+from rlacd.decompose_command import decompose_command
 from rlacd.exit_codes import EPILOG, exit_codes
 from rlacd.train_command import pretrain_command, train_command
 from rlacd.view_command import view
@@ -46,7 +46,7 @@ def common(
     """Approximate convex decomposition: any mesh in, few tight convex hulls out."""
 
 
-app.command(epilog=EPILOG)(decompose)
+app.command("decompose", epilog=EPILOG)(decompose_command())
 
 
 @app.command(epilog=EPILOG)
@@ -70,7 +70,7 @@ def info(
 
 
 app.command("view", epilog=EPILOG)(view)
-app.command("batch", epilog=BATCH_EPILOG)(batch_command(decompose))
+app.command("batch", epilog=BATCH_EPILOG)(batch_command())
 app.add_typer(bench, name="bench")
 app.command("train", epilog=EPILOG)(train_command())
 app.command("pretrain", epilog=EPILOG)(pretrain_command())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from pathlib import Path
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 import trimesh
@@ -16,12 +16,14 @@ from rlacd.criteria import Concavity, Criterion, NavigableSpace
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.decomposition import Decomposition
-from rlacd.errors import OptionError
+from rlacd.fields import check_callback
 from rlacd.finish import drop_slivers, in_input, limit_part, merge_to_count, with_limits
-from rlacd.options import CONCAVITY, DEFAULT_RESOLUTION, DEFAULT_THRESHOLD, Options
+from rlacd.options import CONCAVITY, DEFAULT_RESOLUTION, DEFAULT_THRESHOLD, OPTION_NAMES, Options, QualityName
 from rlacd.planes.views import Views
 from rlacd.policies import AS_PUBLISHED, make_policy
+from rlacd.presets import PresetName
 from rlacd.progress import ProgressCallback
+from rlacd.renamed import with_former
 from rlacd.report import make_report
 from rlacd.search import do_without, level, search
 from rlacd.solid.component import Component, Part
@@ -39,9 +41,9 @@ COARSER = 1.5
 def decompose(
     mesh: MeshLike,
     *,
-    criterion: str | NavigableSpace = CONCAVITY,
+    criterion: Literal["concavity"] | NavigableSpace = CONCAVITY,
     threshold: float = DEFAULT_THRESHOLD,
-    threshold_m: float | None = None,
+    threshold_abs: float | None = None,
     max_hulls: int | None = None,
     max_vertices: int | None = None,
     max_faces: int | None = None,
@@ -51,11 +53,12 @@ def decompose(
     seed: int = 0,
     threads: int | None = None,
     timeout: float | None = None,
-    quality: str | None = None,
+    quality: QualityName | None = None,
     budget: float | None = None,
     search_steps: int | None = None,
-    preset: str | None = None,
+    preset: PresetName | None = None,
     progress: ProgressCallback | None = None,
+    threshold_m: float | None = None,
 ) -> Decomposition:
     """Decompose a mesh into few convex hulls that fit it tightly.
 
@@ -68,8 +71,8 @@ def decompose(
         that a ball of a given size can reach.
     threshold : float
         Largest concavity of a part, in the frame where the input's longest side is 2 (CoACD's measure and frame):
-        the farthest that a part's surface and its hull's surface may lie apart. Between 0.001 and 1.
-    threshold_m : float, optional
+        the farthest that a part's surface and its hull's surface may lie apart. Between 0.001 and 2.
+    threshold_abs : float, optional
         The same in the input's unit; replaces `threshold`.
     max_hulls : int, optional
         No more hulls than this: the decomposition with the least concavity among those found. It may exceed the
@@ -81,7 +84,7 @@ def decompose(
     merge : bool
         Unite parts whose joint hull still meets the threshold.
     policy : str
-        Who chooses the cuts: ``greedy``, ``greedy-SCORE``, ``navacd``, ``learned`` or the path of an ONNX file (see
+        What chooses the cuts: ``greedy``, ``greedy-SCORE``, ``navacd``, ``learned`` or the path of an ONNX file (see
         `rlacd.policies.make_policy`).
     resolution : int
         Cells along the longest side of the grid on which repair looks for enclosed rooms.
@@ -108,6 +111,8 @@ def decompose(
         what it will not take; see `rlacd.PRESETS`.
     progress : callable, optional
         Called with a `Progress` between steps; when it returns False, the decomposition reached so far is returned.
+    threshold_m : float, optional
+        The former name of `threshold_abs`.
 
     Returns
     -------
@@ -119,30 +124,14 @@ def decompose(
     MeshError
         The input cannot be read or holds nothing to decompose.
     OptionError
-        An option is out of range.
+        An option is of the wrong type or out of its range; nothing has been done yet.
     MissingExtraError
         A learned policy is asked for without the extra ``learned``.
     """
-    options = Options(
-        criterion=criterion,
-        threshold=threshold,
-        threshold_m=threshold_m,
-        max_hulls=max_hulls,
-        max_vertices=max_vertices,
-        max_faces=max_faces,
-        merge=merge,
-        policy=policy,
-        resolution=resolution,
-        seed=seed,
-        threads=threads,
-        timeout=timeout,
-        quality=quality,
-        budget=budget,
-        search_steps=search_steps,
-        preset=preset,
-    )
-    if progress is not None and not callable(progress):
-        raise OptionError(f"progress is {progress!r}; it has to be a function that takes a `rlacd.Progress`.")
+    given = locals()
+    chosen = with_former(Options, {name: given[name] for name in OPTION_NAMES}, {"threshold_m": threshold_m})
+    options = Options(**chosen)
+    check_callback("progress", progress, "a `rlacd.Progress`")
     make_policy(options.policy)  # what is wrong with a network is said before any work is done
     clock = Clock(options.timeout, progress)
     with Workers(options.threads) as workers:
@@ -155,8 +144,7 @@ def decompose(
                 threads=workers.threads,
                 keep_cavities=isinstance(criterion, NavigableSpace) and criterion.sees_cavities,
             )
-        if options.threshold_m is not None:
-            options = options.with_threshold(options.threshold_m * solid.frame.scale)
+        options = options.at_scale(solid.frame.scale)
         goal = _prepared(options, solid, workers, clock)
         if options.max_hulls is None:  # otherwise the threshold may be exceeded anyway
             goal = with_limits(goal, options.max_vertices, options.max_faces)

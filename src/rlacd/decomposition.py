@@ -6,14 +6,13 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import trimesh
 
 from rlacd.errors import OutputError
+from rlacd.output_options import Axis
 from rlacd.solid.balls import Balls
-
-Axis = Literal["x", "y", "z"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,8 +54,8 @@ class Decomposition:
         ``scale`` : float
             What one unit of the input measures in that frame: divide a length by it to have it in the input's unit.
         ``mass`` : dict
-            Of the repaired solid at density one, in the input's unit: ``volume_m``, ``centre_m`` and, about that
-            centre, ``inertia_m`` (3 by 3).
+            Of the repaired solid at density one, in the input's unit: ``volume_abs``, ``centre_abs`` and, about that
+            centre, ``inertia_abs`` (3 by 3).
         ``search`` : dict or None
             What the search of a quality level has done: ``level``, ``steps``, ``accepted``, ``seconds``, whether it was
             ``exhausted``, and the parts of the ``first_pass``, of the best of the ``portfolio``, and at its end.

@@ -1,25 +1,24 @@
-"""The options of a decomposition, checked before any work is done."""
+"""The options of a decomposition, each stated once: its type, default, range and help, and how they are checked.
+
+`rlacd.decompose`, the command line and its help, and the README's table are made from them.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-import math
-import numbers
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
 
-import numpy as np
-
-from rlacd.criteria import NavigableSpace
 from rlacd.errors import OptionError
-from rlacd.policies import POLICIES, is_policy
-from rlacd.presets import find_preset
+from rlacd.fields import check_fields, custom, integer, number, one_of, option, text
+from rlacd.policy_names import POLICIES, is_policy
+from rlacd.presets import PRESETS, PresetName, find_preset
+from rlacd.space_options import NAVIGABLE, SpaceOptions
 
 DEFAULT_RESOLUTION = 100
 """Cells along the longest side of the grid on which repair looks for rooms that nothing can enter."""
 
-CONCAVITY = "concavity"
+CONCAVITY: Literal["concavity"] = "concavity"
 """The default criterion's name."""
 
 DEFAULT_THRESHOLD = 0.05
@@ -28,16 +27,33 @@ DEFAULT_THRESHOLD = 0.05
 MIN_THRESHOLD = 0.001
 """Least concavity that can be asked for; the longest side of the input is 2."""
 
+MAX_THRESHOLD = 2.0
+"""A hull that lies farther from its part than that does not fit into the frame."""
 
 RESOLUTIONS = (20, 400)
 """The grid that repair looks for rooms on has this number cubed of cells: with fewer than 20 along a side, a wrap drawn
 onto the surface folds over itself; more than 400 would take over 4 GB."""
 
-QUALITIES = ("fast", "balanced", "best")
+QualityName = Literal["fast", "balanced", "best"]
+
+QUALITIES: tuple[QualityName, ...] = get_args(QualityName)
 """Levels of search; see `rlacd.search`."""
 
 MAX_THREADS = 1024
 MAX_SEED = 2**63 - 1
+
+TIGHT, LIMITS, METHOD, RUN = "How tight", "Limits", "Method", "Running"
+"""Headings of the command's help."""
+
+
+def _criterion(given: Any) -> Any:
+    if isinstance(given, SpaceOptions) and hasattr(given, "prepare"):
+        return given
+    return CRITERION.read(given)
+
+
+CRITERION = one_of((CONCAVITY,))
+_SECONDS = number(above=0, rule="a positive number of seconds")
 
 
 @dataclass(frozen=True)
@@ -47,58 +63,133 @@ class Options:
     Raises
     ------
     OptionError
-        A value is out of range.
+        A value is of the wrong type or out of its range.
     """
 
-    criterion: str | NavigableSpace = CONCAVITY
-    threshold: float = DEFAULT_THRESHOLD
-    threshold_m: float | None = None
-    max_hulls: int | None = None
-    max_vertices: int | None = None
-    max_faces: int | None = None
-    merge: bool = True
-    policy: str = "greedy"
-    resolution: int = DEFAULT_RESOLUTION
-    seed: int = 0
-    threads: int | None = None
-    timeout: float | None = None
-    quality: str | None = None
-    budget: float | None = None
-    search_steps: int | None = None
-    preset: str | None = None
+    criterion: Literal["concavity"] | SpaceOptions = option(
+        CONCAVITY,
+        "When a hull is tight enough: concavity (see --threshold), or navigable: it stays out of the space that a ball "
+        "of --radius can reach, and what no ball can reach may be filled.",
+        custom(f'"{CONCAVITY}" or an `rlacd.NavigableSpace`', _criterion, f"{CONCAVITY} {NAVIGABLE}"),
+        panel=TIGHT,
+        metavar=f"{CONCAVITY}|{NAVIGABLE}",
+    )
+    threshold: float = option(
+        DEFAULT_THRESHOLD,
+        "The concavity a hull may have, where the longest side of the mesh is 2. Smaller is tighter, with more hulls: "
+        "0.02 is fine, 0.2 coarse. Also as a share of the longest side (2.5%) or, where the file is in metres, as a "
+        "length (0.05m).",
+        number(MIN_THRESHOLD, MAX_THRESHOLD, typed=str),
+        panel=TIGHT,
+        flags=("--threshold", "-t"),
+        metavar="NUMBER",
+    )
+    threshold_abs: float | None = option(
+        None,
+        "The same as a length in the mesh's own unit, such as 2 for 2 mm in a file in millimetres.",
+        number(above=0, rule="a positive length in the input's unit"),
+        panel=TIGHT,
+        former="threshold_m",
+    )
+    max_hulls: int | None = option(
+        None,
+        "At most this many hulls, even if the threshold must be exceeded; the report says by how much.",
+        integer(1),
+        panel=LIMITS,
+    )
+    max_vertices: int | None = option(
+        None,
+        "At most this many vertices per hull, such as 64 for PhysX on a GPU; below 24 the threshold may be exceeded.",
+        integer(4, rule="an integer, at least 4 (a tetrahedron)"),
+        panel=LIMITS,
+    )
+    max_faces: int | None = option(
+        None,
+        "At most this many triangles per hull; below 44 the threshold may be exceeded.",
+        integer(4, rule="an integer, at least 4 (a tetrahedron)"),
+        panel=LIMITS,
+    )
+    merge: bool = option(
+        True,
+        "Join hulls where one is tight enough, also across what lies between them.",
+        panel=METHOD,
+        usual="merge",
+        flags=("--merge/--no-merge",),
+    )
+    policy: str = option(
+        "greedy",
+        "What chooses the next cut: navacd is the quickest, learned asks a network, FILE.onnx is one of yours "
+        "(both: extra rlacd[learned]).",
+        text(f"one of {', '.join(POLICIES)}, or an .onnx file", "greedy navacd learned FILE.onnx …", is_policy),
+        panel=METHOD,
+        metavar="NAME",
+    )
+    resolution: int = option(
+        DEFAULT_RESOLUTION,
+        "Grid cells along the longest side when bodies that are not closed are repaired.",
+        integer(*RESOLUTIONS),
+        panel=METHOD,
+    )
+    seed: int = option(0, "The same seed, input and options give the same bytes.", integer(0, MAX_SEED), panel=RUN)
+    threads: int | None = option(
+        None,
+        "Threads to use; the result does not depend on it.",
+        integer(1, MAX_THREADS),
+        panel=RUN,
+        usual="all cores",
+    )
+    timeout: float | None = option(
+        None,
+        "Stop after this time and keep what is reached.",
+        _SECONDS,
+        panel=RUN,
+        metavar="SECONDS",
+    )
+    quality: QualityName | None = option(
+        None,
+        "How long to search for fewer hulls: fast hardly, balanced about a second, best until --budget ends.",
+        one_of(QUALITIES),
+        panel=METHOD,
+        usual="balanced; fast with --no-merge",
+        metavar="|".join(QUALITIES),
+    )
+    budget: float | None = option(
+        None,
+        "How long the search may take.",
+        _SECONDS,
+        panel=METHOD,
+        usual="5 with --quality best",
+        metavar="SECONDS",
+    )
+    search_steps: int | None = option(
+        None,
+        "How many steps the search may take; unlike --budget, this gives the same bytes however busy the machine is.",
+        integer(0),
+        panel=METHOD,
+        usual="16 with --quality balanced",
+    )
+    preset: PresetName | None = option(
+        None,
+        "The limits and the file format of an engine. Other options override it.",
+        one_of(tuple(PRESETS)),
+        panel=LIMITS,
+        metavar="ENGINE",
+    )
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if self.preset is not None:
             engine = find_preset(self.preset)
             for name in ("max_vertices", "max_faces"):
                 if getattr(self, name) is None:
                     object.__setattr__(self, name, getattr(engine, name))
-        _require(
-            self.criterion == CONCAVITY or isinstance(self.criterion, NavigableSpace),
-            "criterion",
-            self.criterion,
-            f'"{CONCAVITY}" or an `rlacd.NavigableSpace`',
-        )
-        if isinstance(self.criterion, NavigableSpace):
-            unused = self.threshold_m is not None or self.threshold != DEFAULT_THRESHOLD
-            _require(not unused, "threshold", self.threshold_m or self.threshold, "left out: a NavigableSpace has none")
-        self._as_number("threshold", lambda x: MIN_THRESHOLD <= x <= 2, f"between {MIN_THRESHOLD} and 2")
-        self._as_number("threshold_m", lambda x: 0 < x < math.inf, "a positive length in the input's unit", None)
-        self._as_integer("max_hulls", 1, None, "at least 1", None)
-        self._as_integer("max_vertices", 4, None, "at least 4 (a tetrahedron)", None)
-        self._as_integer("max_faces", 4, None, "at least 4 (a tetrahedron)", None)
-        _require(isinstance(self.merge, (bool, np.bool_)), "merge", self.merge, "True or False")
-        object.__setattr__(self, "merge", bool(self.merge))
-        _require(is_policy(self.policy), "policy", self.policy, f"one of {', '.join(POLICIES)}, or an .onnx file")
-        self._as_integer("resolution", *RESOLUTIONS, "between {} and {}".format(*RESOLUTIONS))
-        self._as_integer("seed", 0, MAX_SEED, "between 0 and 2**63 - 1")
-        self._as_integer("threads", 1, MAX_THREADS, f"between 1 and {MAX_THREADS}", None)
-        self._as_number("timeout", lambda x: 0 < x < math.inf, "a positive number of seconds", None)
+        if isinstance(self.criterion, SpaceOptions):
+            unused = self.threshold_abs is not None or self.threshold != DEFAULT_THRESHOLD
+            _require(
+                not unused, "threshold", self.threshold_abs or self.threshold, "left out: a NavigableSpace has none"
+            )
         if self.quality is None:  # searching means merging
             object.__setattr__(self, "quality", "balanced" if self.merge else "fast")
-        _require(self.quality in QUALITIES, "quality", self.quality, "one of " + ", ".join(QUALITIES))
-        self._as_number("budget", lambda x: 0 < x < math.inf, "a positive number of seconds", None)
-        self._as_integer("search_steps", 0, None, "at least 0", None)
         for name in ("budget", "search_steps"):
             unused = getattr(self, name) is not None and self.quality == "fast"
             _require(not unused, name, getattr(self, name), "left out with quality='fast', which does not search")
@@ -106,45 +197,30 @@ class Options:
             rule = "'fast', or left out, without merge: searching means merging"
             _require(self.quality == "fast", "quality", self.quality, rule)
 
-    def _as_number(self, name: str, allowed: Callable[[float], bool], rule: str, *absent: None) -> None:
-        """Make the option a plain float, so that the report is plain too, whichever library its number came from."""
-        given = getattr(self, name)
-        if given is None and absent:
-            return
-        is_number = isinstance(given, (numbers.Real, np.number)) and not isinstance(given, bool)
-        value = float(given) if is_number else math.nan
-        _require(allowed(value), name, given, rule)
-        object.__setattr__(self, name, value)
-
-    def _as_integer(self, name: str, least: int, most: int | None, rule: str, *absent: None) -> None:
-        """Make the option a plain int."""
-        given = getattr(self, name)
-        if given is None and absent:
-            return
-        is_integer = isinstance(given, (numbers.Integral, np.integer)) and not isinstance(given, bool)
-        value = int(given) if is_integer else -1
-        _require(value >= least and (most is None or value <= most), name, given, f"an integer, {rule}")
-        object.__setattr__(self, name, value)
-
     def as_plain(self) -> dict[str, Any]:
         """Everything as plain values, the criterion by its name or its own options."""
-        return asdict(self)
+        return dataclasses.asdict(self)
 
-    def with_threshold(self, threshold: float) -> Options:
-        """Get the same options with another threshold, which has to be in range too.
+    def at_scale(self, scale: float) -> Options:
+        """Get the same options with the threshold in the frame, of which one of the input's units takes `scale`.
 
         Raises
         ------
         OptionError
-            `threshold_m` is too small or too large for the object.
+            `threshold_abs` is too small or too large for the object.
         """
-        if not MIN_THRESHOLD <= threshold <= 2:
-            unit = self.threshold_m / threshold if self.threshold_m is not None else 1.0
+        if self.threshold_abs is None:
+            return self
+        threshold = self.threshold_abs * scale
+        if not MIN_THRESHOLD <= threshold <= MAX_THRESHOLD:
             raise OptionError(
-                f"threshold_m is {self.threshold_m!r}; for this object it has to be between "
-                f"{MIN_THRESHOLD * unit:.4g} and {2 * unit:.4g} (0.05 % and 100 % of its longest side)."
+                f"threshold_abs is {self.threshold_abs!r}; for this object it has to be between "
+                f"{MIN_THRESHOLD / scale:.4g} and {MAX_THRESHOLD / scale:.4g} (0.05 % and 100 % of its longest side)."
             )
         return dataclasses.replace(self, threshold=threshold)
+
+
+OPTION_NAMES = tuple(field.name for field in dataclasses.fields(Options))
 
 
 def _require(holds: bool, name: str, value: object, rule: str) -> None:

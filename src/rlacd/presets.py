@@ -17,10 +17,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
 
-from rlacd.errors import OptionError
-from rlacd.finish.slivers import is_sliver
-from rlacd.solid.hull import Hull
+from rlacd.fields import one_of, read
+
+if TYPE_CHECKING:
+    from rlacd.solid.hull import Hull
+
+PresetName = Literal["mujoco", "physx", "physx-gpu", "unity", "unreal", "newton", "bullet"]
 
 
 @dataclass(frozen=True)
@@ -50,6 +54,8 @@ class Preset:
 
     def shortcomings(self, hulls: Sequence[Hull]) -> list[str]:
         """Check hulls against the limits: a sentence for each that is broken, none when all is well."""
+        from rlacd.finish.slivers import is_sliver  # not for --help, which only wants the names
+
         said = []
         for what, limit, counts in (
             ("vertices", self.max_vertices, [len(hull.vertices) for hull in hulls]),
@@ -70,7 +76,7 @@ class Preset:
         return said
 
 
-PRESETS: dict[str, Preset] = {
+PRESETS: dict[PresetName, Preset] = {
     "mujoco": Preset("MuJoCo", 64, None, ".xml"),
     "physx": Preset("PhysX", 255, 255, ".usd"),
     "physx-gpu": Preset("PhysX on a GPU", 64, 62, ".usd", slivers=False),
@@ -90,9 +96,8 @@ def find_preset(name: str) -> Preset:
     OptionError
         There is none of that name.
     """
-    if name not in PRESETS:
-        raise OptionError(f"preset is {name!r}; it has to be one of {', '.join(PRESETS)}.")
-    return PRESETS[name]
+    known: PresetName = read(one_of(tuple(PRESETS)), "preset", name)
+    return PRESETS[known]
 
 
 def _hulls(count: int, one: str, many: str) -> str:

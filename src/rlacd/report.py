@@ -18,7 +18,7 @@ from rlacd.presets import find_preset
 from rlacd.solid.component import Part
 from rlacd.solid.distance import hull_distances
 from rlacd.solid.hull import Hull
-from rlacd.solid.mass import mass_of
+from rlacd.solid.mass import Mass, mass_of
 from rlacd.solid.solid import Solid
 from rlacd.workers import Workers
 
@@ -46,7 +46,7 @@ def make_report(
         over, under = distances.over[1], distances.under[1]
     return {
         "version": __version__,
-        "options": options.as_plain(),
+        "options": _options(options),
         "complete": clock.stopped_by is None,
         "stopped_by": clock.stopped_by,
         "parts": len(hulls),
@@ -55,7 +55,7 @@ def make_report(
         **account.entries,
         "hausdorff": {"over": over, "under": under},
         "scale": solid.frame.scale,
-        "mass": {"volume_m": mass.volume_m, "centre_m": mass.centre_m.tolist(), "inertia_m": mass.inertia_m.tolist()},
+        "mass": _mass(mass),
         "repair": [asdict(body) for body in solid.bodies],
         "warnings": [
             *solid.warnings,
@@ -72,6 +72,21 @@ def make_report(
             *(_out_of_the_box([part.hull for part in parts], solid) if criterion.obstacles is not None else []),
         ],
     }
+
+
+def _options(options: Options) -> dict[str, Any]:
+    """The options as they were used; lengths under their former names, ending in ``_m``, for one version more."""
+    plain = options.as_plain()
+    if isinstance(plain["criterion"], dict):
+        plain["criterion"] |= {f"{name}_m": plain["criterion"][f"{name}_abs"] for name in ("radius", "tolerance")}
+    return plain | {"threshold_m": options.threshold_abs}
+
+
+def _mass(mass: Mass) -> dict[str, Any]:
+    """The mass in the input's unit; under its former names too, for one version more."""
+    volume, centre, inertia = mass.volume_abs, mass.centre_abs.tolist(), mass.inertia_abs.tolist()
+    now = {"volume_abs": volume, "centre_abs": centre, "inertia_abs": inertia}
+    return now | {"volume_m": volume, "centre_m": centre, "inertia_m": inertia}
 
 
 def _coarse(solid: Solid) -> list[str]:

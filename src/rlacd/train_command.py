@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import dataclasses
 import importlib
-import inspect
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from rlacd.command_parameters import REQUIRED, Parameters, chosen, command, option_parameters
 from rlacd.errors import MissingExtraError, OptionError
 from rlacd.exit_codes import exit_codes
 from rlacd.learn.paper.options import PRESETS, TrainOptions
 from rlacd.learn.pretrain.options import PretrainOptions
 
 EXTRA = ("torch", "gymnasium", "tensorboard", "safetensors", "onnx", "onnxscript", "onnxruntime")
-
-Parameters = dict[str, tuple[Any, Any]]
-"""Of a command: name to default and annotation."""
 
 DEFAULT_PRESET = "two-cores"
 
@@ -52,7 +48,7 @@ Most of a point cloud is hidden, and the encoder learns to say what was there (t
 Beside the weights a folder, weights.run, gets the curves and a checkpoint to --resume from.
 """
 
-MESHES = (inspect.Parameter.empty, Annotated[Path, typer.Argument(help="A folder of meshes, of any depth.")])
+MESHES = (REQUIRED, Annotated[Path, typer.Argument(help="A folder of meshes, of any depth.")])
 WHERE: Parameters = {
     "jobs": (
         None,
@@ -92,7 +88,7 @@ def train_command() -> Callable[..., None]:
             from rlacd.pool import Limits, open_pool
 
             jobs, ray, limit, memory = (given.pop(name) for name in WHERE)
-            options = TrainOptions.preset(preset, **_chosen(given))
+            options = TrainOptions.preset(preset, **chosen(given))
             if run.exists() and not run.is_dir():
                 raise OptionError(f"--run {run} is a file; give a folder.")
             learn, limits = _learn("rlacd.learn.paper.train", "train"), Limits(limit, int(memory * 2**30))
@@ -101,12 +97,12 @@ def train_command() -> Callable[..., None]:
 
     own: Parameters = {
         "meshes": MESHES,
-        "run": (inspect.Parameter.empty, Annotated[Path, typer.Option("--run", "-o", help="A folder for this run.")]),
+        "run": (REQUIRED, Annotated[Path, typer.Option("--run", "-o", help="A folder for this run.")]),
         "preset": (DEFAULT_PRESET, Annotated[str, typer.Option(help=f"One of {', '.join(PRESETS)}.")]),
         "resume": RESUME,
         **WHERE,
     }
-    return _command(train, TRAIN_HELP, own | _parameters(TrainOptions, "without a preset: "))
+    return command(train, TRAIN_HELP, own | option_parameters(TrainOptions, note="without a preset: "))
 
 
 def pretrain_command() -> Callable[..., None]:
@@ -115,42 +111,13 @@ def pretrain_command() -> Callable[..., None]:
     def pretrain(**given: Any) -> None:
         with exit_codes():
             meshes, out, resume = (given.pop(name) for name in ("meshes", "out", "resume"))
-            options = PretrainOptions(**_chosen(given))
+            options = PretrainOptions(**chosen(given))
             _learn("rlacd.learn.pretrain.run", "pretrain")(meshes, out, options, resume=resume, say=typer.echo)
             typer.echo(f"{out}: give it to  rlacd train --encoder i2p-mae --encoder-weights")
 
     out = typer.Option("--out", "-o", metavar="FILE.safetensors", help="Where the weights go.")
-    own: Parameters = {"meshes": MESHES, "out": (inspect.Parameter.empty, Annotated[Path, out]), "resume": RESUME}
-    return _command(pretrain, PRETRAIN_HELP, own | _parameters(PretrainOptions, "default: "))
-
-
-def _command(run: Callable[..., None], text: str, parameters: Parameters) -> Callable[..., None]:
-    """Give a function the parameters, as typer looks them up, and the help."""
-    run.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
-        [
-            inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
-            for name, (default, annotation) in parameters.items()
-        ]
-    )
-    run.__annotations__ = {name: annotation for name, (_, annotation) in parameters.items()}
-    run.__doc__ = text
-    return run
-
-
-def _parameters(options: type[Any], note: str) -> Parameters:
-    """Make a parameter of each field; None where it is not given."""
-    parameters: Parameters = {}
-    for option in dataclasses.fields(options):
-        default = str(option.default).lower() if isinstance(option.default, bool) else option.default
-        shown = "none" if default == "" else default
-        text = f"{option.metadata['help']} [dim]\\[{note}{shown}][/dim]"
-        kind = type(option.default)
-        parameters[option.name] = (None, Annotated[kind | None, typer.Option(help=text, show_default=False)])
-    return parameters
-
-
-def _chosen(given: dict[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in given.items() if value is not None}
+    own: Parameters = {"meshes": MESHES, "out": (REQUIRED, Annotated[Path, out]), "resume": RESUME}
+    return command(pretrain, PRETRAIN_HELP, own | option_parameters(PretrainOptions))
 
 
 def _learn(module: str, name: str) -> Callable[..., Path]:

@@ -158,7 +158,7 @@ def _rlacd(policy: str, quality: str, space: bool) -> Run:
         result = rlacd.decompose(
             (vertices, faces),
             policy=policy,
-            quality=quality,
+            quality=quality,  # type: ignore[arg-type]
             search_steps=STEPS.get(quality),
             threads=threads,
             **goal,  # type: ignore[arg-type]

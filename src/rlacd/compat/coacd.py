@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from rlacd.compat.unused import say_unused
 from rlacd.decompose_mesh import decompose
-from rlacd.errors import OptionError
+from rlacd.fields import flag, integer, number, one_of, read
 from rlacd.options import DEFAULT_THRESHOLD, MIN_THRESHOLD
 
 __all__ = ["Mesh", "run_coacd", "set_log_level"]
@@ -97,13 +97,15 @@ extrude_margin
     """
     given = locals()
     say_unused("run_coacd", given, _defaults(), _UNUSED)
-    if apx_mode not in ("ch", "box"):
-        raise OptionError(f"apx_mode is {apx_mode!r}; it has to be 'ch' or 'box'.")
+    apx_mode = read(one_of(("ch", "box")), "apx_mode", apx_mode)
+    threshold = read(number(above=0), "threshold", threshold)
+    most_hulls = read(integer(-(2**31)), "max_convex_hull", max_convex_hull)
+    decimate, real_metric = read(flag(), "decimate", decimate), read(flag(), "real_metric", real_metric)
     result = decompose(
         (mesh.vertices, mesh.indices),
         threshold=DEFAULT_THRESHOLD if real_metric else max(threshold, MIN_THRESHOLD),
-        threshold_m=threshold if real_metric else None,
-        max_hulls=None if max_convex_hull < 1 else max_convex_hull,
+        threshold_abs=threshold if real_metric else None,
+        max_hulls=None if most_hulls < 1 else most_hulls,
         max_vertices=max_ch_vertex if decimate else None,
         merge=merge,
         seed=seed,

@@ -18,6 +18,11 @@ def say_unused(
 ) -> None:
     """Warn of the options in `reasons` whose value is not the default, each once in the life of the program."""
     for name, reason in reasons.items():
-        if given[name] != defaults[name] and (function, name) not in _SAID:
+        if not _same(given[name], defaults[name]) and (function, name) not in _SAID:
             _SAID.add((function, name))
             warnings.warn(f"{function}: {name} does nothing in rlacd: {reason}.", UnusedOptionWarning, stacklevel=3)
+
+
+def _same(given: Any, default: Any) -> bool:
+    """Whether an option was left alone; an array or the like is no default."""
+    return isinstance(given, (str, bool, int, float)) and bool(given == default)

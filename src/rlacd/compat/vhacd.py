@@ -14,6 +14,7 @@ import numpy.typing as npt
 from rlacd.compat.unused import say_unused
 from rlacd.decompose_mesh import decompose
 from rlacd.errors import MeshDataError
+from rlacd.fields import flag, integer, read
 
 __all__ = ["compute_vhacd"]
 
@@ -76,9 +77,9 @@ def compute_vhacd(
     say_unused("compute_vhacd", given, defaults, _UNUSED)
     result = decompose(
         (np.asarray(points, dtype=np.float64), _triangles(faces)),
-        max_hulls=maxConvexHulls,
-        max_vertices=maxNumVerticesPerCH,
-        threads=None if asyncACD else 1,
+        max_hulls=read(integer(1), "maxConvexHulls", maxConvexHulls),
+        max_vertices=read(integer(4), "maxNumVerticesPerCH", maxNumVerticesPerCH),
+        threads=None if read(flag(), "asyncACD", asyncACD) else 1,
     )
     return [(np.array(hull.vertices, dtype=np.float64), np.array(hull.faces, dtype=np.uint32)) for hull in result]
 

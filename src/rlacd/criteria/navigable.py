@@ -17,8 +17,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
-from typing import TypeAlias
+from dataclasses import asdict, dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -32,8 +31,7 @@ from rlacd.solid.balls import Balls
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.solid import Solid
-
-Point: TypeAlias = tuple[float, float, float]
+from rlacd.space_options import Point, SpaceOptions
 
 MOST_CELLS = 256
 """Cells along the longest side of the grid: where a radius asks for more, balls stand wider apart than it."""
@@ -48,7 +46,7 @@ _OPEN = ("capped", "slab", "wrapped", "hull")
 
 
 @dataclass(frozen=True)
-class NavigableSpace:
+class NavigableSpace(SpaceOptions):
     """The criterion "no hull intrudes into the space that a ball can reach".
 
     Parameters
@@ -65,36 +63,16 @@ class NavigableSpace:
     closed_planes : sequence of (normal [3], offset)
         Half-spaces n.x < offset, in the input's frame and unit, that balls cannot enter: ``((0, 0, 1), 0)`` is a ground
         at z = 0. The normal need not have length 1; the offset goes with the normal as given.
-    radius_m, tolerance_m : float, optional
+    radius_abs, tolerance_abs : float, optional
         In the input's unit; they replace `radius` and `tolerance`.
+    radius_m, tolerance_m : float, optional
+        The former names of those.
 
     Raises
     ------
     OptionError
-        A length is not positive, or seeds or planes do not have the right shape.
+        A length is out of its range, or seeds or planes do not have the right shape.
     """
-
-    radius: float | None = 0.025
-    tolerance: float | None = 0.05
-    reachable_only: bool = field(default=True, kw_only=True)
-    seeds: tuple[Point, ...] | None = field(default=None, kw_only=True)
-    closed_planes: tuple[tuple[Point, float], ...] = field(default=(), kw_only=True)
-    radius_m: float | None = field(default=None, kw_only=True)
-    tolerance_m: float | None = field(default=None, kw_only=True)
-
-    def __post_init__(self) -> None:
-        for name in ("radius", "tolerance"):
-            if getattr(self, f"{name}_m") is not None:
-                object.__setattr__(self, name, None)
-                self._require_length(f"{name}_m")
-            else:
-                self._require_length(name)
-        if not isinstance(self.reachable_only, (bool, np.bool_)):
-            raise OptionError(f"reachable_only is {self.reachable_only!r}; it has to be True or False.")
-        object.__setattr__(self, "reachable_only", bool(self.reachable_only))
-        if self.seeds is not None:
-            object.__setattr__(self, "seeds", _as_seeds(self.seeds))
-        object.__setattr__(self, "closed_planes", _as_planes(self.closed_planes))
 
     def prepare(self, solid: Solid, threads: int = 0) -> Navigable:
         """Find the space around a solid and spread its balls.
@@ -109,7 +87,8 @@ class NavigableSpace:
         Raises
         ------
         OptionError
-            A seed lies inside the solid, nearer than the radius to it, or in a closed half-space.
+            A seed lies inside the solid, nearer than the radius to it, or in a closed half-space; or a length in the
+            input's unit is too small or too large for the object.
 
         Notes
         -----
@@ -122,8 +101,7 @@ class NavigableSpace:
         unseen, and hardly ever a third.
         """
         scale = solid.frame.scale
-        radius = _in_frame(self.radius, self.radius_m, scale)
-        tolerance = _in_frame(self.tolerance, self.tolerance_m, scale)
+        radius, tolerance = self.in_frame(scale)
         warnings = list(_warnings(solid))
         vertices, faces = _surface_of(solid)
         surface = _native.Surface(vertices, faces)
@@ -163,14 +141,6 @@ class NavigableSpace:
     def sees_cavities(self) -> bool:
         """Whether sealed cavities may count, so that repair has to keep them."""
         return not self.reachable_only or self.seeds is not None
-
-    def _require_length(self, name: str) -> None:
-        value = getattr(self, name)
-        number = math.nan if value is None or isinstance(value, (bool, str)) else float(value)
-        if not 0 < number < math.inf:
-            unit = "length in the input's unit" if name.endswith("_m") else "fraction of the longest side"
-            raise OptionError(f"The navigable space's {name} is {value!r}; it has to be a positive {unit}.")
-        object.__setattr__(self, name, number)
 
 
 @dataclass(frozen=True)
@@ -393,39 +363,6 @@ class _Intrusions:
     def _recall(self, part: Part) -> tuple[IntArray, FloatArray] | None:
         with self._lock:
             return self._known.get(part)
-
-
-def _as_seeds(given: object) -> tuple[Point, ...]:
-    try:
-        points = np.asarray(given, dtype=np.float64)
-    except (TypeError, ValueError):
-        points = np.empty(0)
-    if points.ndim != 2 or points.shape[1:] != (3,) or len(points) == 0 or not np.isfinite(points).all():
-        raise OptionError(f"seeds is {given!r}; it has to be a list of at least one finite point [x, y, z].")
-    return tuple((x, y, z) for x, y, z in points.tolist())
-
-
-def _as_planes(given: object) -> tuple[tuple[Point, float], ...]:
-    planes: list[tuple[Point, float]] = []
-    try:
-        for normal, offset in given:  # type: ignore[attr-defined]
-            x, y, z = (float(c) for c in normal)
-            if not (math.isfinite(float(offset)) and 0 < math.hypot(x, y, z) < math.inf):
-                raise ValueError
-            planes.append(((x, y, z), float(offset)))
-    except (TypeError, ValueError):
-        raise OptionError(
-            f"closed_planes is {given!r}; it has to be a list of (normal, offset) pairs, every normal a finite vector "
-            "[x, y, z] that is not zero."
-        ) from None
-    return tuple(planes)
-
-
-def _in_frame(fraction: float | None, length_m: float | None, scale: float) -> float:
-    if length_m is not None:
-        return length_m * scale
-    assert fraction is not None, "checked when the space was made"
-    return 2 * fraction
 
 
 def _surface_of(solid: Solid) -> tuple[FloatArray, IntArray]:

@@ -17,11 +17,12 @@ from rlacd.formats.encode import ENCODERS
 from rlacd.formats.engines import encode_godot, encode_unreal
 from rlacd.formats.folder import check_names, write_folder
 from rlacd.formats.mjcf import encode_mjcf
-from rlacd.formats.model import DENSITY, Model, check_model_options, mesh_files, model_of
+from rlacd.formats.model import Model, check_model_options, mesh_files, model_of
 from rlacd.formats.sdf import encode_sdf
 from rlacd.formats.target import FORMATS, MODELS, WITH_MESHES, Target, check_file, check_name, hull_target, mesh_folder
 from rlacd.formats.urdf import encode_urdf
 from rlacd.formats.usd import encode_usd
+from rlacd.output_options import DENSITY
 
 if TYPE_CHECKING:
     from rlacd.decomposition import Decomposition

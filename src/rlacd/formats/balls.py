@@ -9,6 +9,7 @@ import numpy as np
 import trimesh
 
 from rlacd.errors import OutputError
+from rlacd.fields import path_like, read
 from rlacd.formats.atomic import write_file
 from rlacd.formats.target import check_file
 from rlacd.solid.balls import Balls
@@ -24,7 +25,7 @@ def check_balls(path: str | os.PathLike[str]) -> Path:
     OutputError
         The ending is unknown, or the place cannot be written to.
     """
-    place = Path(path)
+    place = Path(read(path_like(), "path", path))
     if place.suffix.lower() not in _ENCODERS:
         raise OutputError(f"cannot write the balls {place}: the name must end in {' or '.join(_ENCODERS)}; rename it.")
     check_file(place)

@@ -19,7 +19,7 @@ def encode_mjcf(model: Model, hulls: list[MeshFile], visual: MeshFile | None, fo
     """
     root = etree.Element("mujoco", model=model.name)
     compiler = etree.SubElement(root, "compiler", angle="radian")
-    if min(model.mass.volume_m, *np.linalg.eigvalsh(model.mass.inertia_m)) < LEAST_INERTIA:
+    if min(model.mass.volume_abs, *np.linalg.eigvalsh(model.mass.inertia_abs)) < LEAST_INERTIA:
         compiler.set("boundmass", repr(LEAST_INERTIA))
         compiler.set("boundinertia", repr(LEAST_INERTIA))
     default = etree.SubElement(root, "default")
@@ -34,12 +34,12 @@ def encode_mjcf(model: Model, hulls: list[MeshFile], visual: MeshFile | None, fo
     if model.up != "z":
         body.set("quat", numbers(TO_Z_UP[model.up]))
     etree.SubElement(body, "freejoint", name=model.name)
-    mass, inertia = model.mass, model.mass.inertia_m
+    mass, inertia = model.mass, model.mass.inertia_abs
     etree.SubElement(
         body,
         "inertial",
-        pos=numbers(mass.centre_m),
-        mass=numbers([mass.volume_m]),
+        pos=numbers(mass.centre_abs),
+        mass=numbers([mass.volume_abs]),
         fullinertia=numbers([*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]]),
     )
 

@@ -11,18 +11,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 import trimesh
 
-from rlacd.errors import OptionError, OutputError
+from rlacd.errors import OutputError
+from rlacd.fields import about, read
 from rlacd.formats.encode import encode_obj, encode_plain_obj, hull_name
 from rlacd.formats.single_precision import placed_hull, placed_mesh
+from rlacd.output_options import DENSITY, OutputOptions
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import Frame
 from rlacd.solid.mass import Mass, mass_of_triangles
 
 if TYPE_CHECKING:
     from rlacd.decomposition import Decomposition
-
-DENSITY = 1000.0
-"""Water, where the unit is the metre."""
 
 TO_Z_UP = {
     "x": (math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0),
@@ -86,12 +85,12 @@ def model_of(result: Decomposition, *, density: float = DENSITY, up: str = "z") 
     OptionError
         `density` is not positive, or `up` is no axis.
     """
-    check_model_options(density, up)
+    density, up = check_model_options(density, up)
     if not result.hulls:
         raise OutputError("there are no hulls to write; decompose a mesh first.")
     mass = _mass(result).scaled(density)
-    if not (0 < mass.volume_m < math.inf and np.isfinite(mass.inertia_m).all()):
-        raise OutputError(f"the mass of {result.name} at density {density:g} is {mass.volume_m:g}; scale the mesh.")
+    if not (0 < mass.volume_abs < math.inf and np.isfinite(mass.inertia_abs).all()):
+        raise OutputError(f"the mass of {result.name} at density {density:g} is {mass.volume_abs:g}; scale the mesh.")
     visual = result.source if len(result.source.faces) else None
     name = printable_name(result.name).replace("::", "_")  # which parts names in SDF
     if name == "world" or re.fullmatch("__.*__", name):
@@ -99,14 +98,12 @@ def model_of(result: Decomposition, *, density: float = DENSITY, up: str = "z") 
     return Model(name, result.hulls, visual, mass, up)
 
 
-def check_model_options(density: float, up: str) -> None:
-    """Raise OptionError unless `density` is a positive number and `up` is x, y or z."""
-    if not (isinstance(density, (int, float, np.number)) and 0 < density < math.inf):
-        raise OptionError(
-            f"density is {density!r}; it has to be a positive mass per cubic unit, such as 1000 for water."
-        )
-    if up not in TO_Z_UP:
-        raise OptionError(f"{up!r} is no axis that can point up; choose x, y or z.")
+def check_model_options(density: float, up: str) -> tuple[float, str]:
+    """Get both as plain values; raises OptionError unless `density` is a positive number and `up` is x, y or z."""
+    return (
+        read(about(OutputOptions, "density").kind, "density", density),
+        read(about(OutputOptions, "up").kind, "up", up),
+    )
 
 
 def printable_name(name: str) -> str:
@@ -166,4 +163,4 @@ def _mass(result: Decomposition) -> Mass:
     if said is None:  # a result from elsewhere: its hulls stand for the solid
         hulls = trimesh.util.concatenate(result.hulls)
         return mass_of_triangles(hulls.triangles, Frame(np.zeros(3), 1.0))
-    return Mass(float(said["volume_m"]), np.array(said["centre_m"]), np.array(said["inertia_m"]))
+    return Mass(float(said["volume_abs"]), np.array(said["centre_abs"]), np.array(said["inertia_abs"]))

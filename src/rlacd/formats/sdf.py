@@ -19,12 +19,12 @@ def encode_sdf(model: Model, hulls: list[MeshFile], visual: MeshFile | None, fol
         pose.text = f"0 0 0 {numbers([x, y, z, w])}"
     link = etree.SubElement(described, "link", name=model.name)
     inertial = etree.SubElement(link, "inertial")
-    _text(inertial, "pose", f"{numbers(model.mass.centre_m)} 0 0 0")
-    _text(inertial, "mass", numbers([model.mass.volume_m]))
+    _text(inertial, "pose", f"{numbers(model.mass.centre_abs)} 0 0 0")
+    _text(inertial, "mass", numbers([model.mass.volume_abs]))
     inertia = etree.SubElement(inertial, "inertia")
     axes = {"x": 0, "y": 1, "z": 2}
     for a, b in ("xx", "xy", "xz", "yy", "yz", "zz"):
-        _text(inertia, f"i{a}{b}", numbers([model.mass.inertia_m[axes[a], axes[b]]]))
+        _text(inertia, f"i{a}{b}", numbers([model.mass.inertia_abs[axes[a], axes[b]]]))
 
     def add(kind: str, file: MeshFile, name: str) -> etree._Element:
         shape = etree.SubElement(link, kind, name=name)

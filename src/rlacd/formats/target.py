@@ -8,8 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rlacd.errors import OptionError, OutputError
+from rlacd.fields import checked, flag, path_like, read
 from rlacd.formats.atomic import output_errors
 from rlacd.formats.usd import require_usd
+from rlacd.output_options import OutputOptions
 
 FORMATS = ("glb", "obj", "ply", "stl")
 """Hulls and nothing else; also what the files of a folder may be."""
@@ -74,14 +76,15 @@ def hull_target(path: str | os.PathLike[str], file_format: str | None = None, *,
     OptionError
         `file_format` is unknown, or given for a single file with another ending; or `one_mesh` for anything but URDF.
     """
-    target = _target(path, file_format)
+    file_format = checked(OutputOptions, "file_format", file_format)
+    one_mesh = read(flag(), "one_mesh", one_mesh)
+    target = _target(read(path_like(), "path", path), file_format)
     if one_mesh and target.file_format != "urdf":
         raise OptionError(f"one mesh for all hulls is for .urdf files, not for {target.path}: leave it out.")
     return target
 
 
-def _target(path: str | os.PathLike[str], file_format: str | None) -> Target:
-    text = os.fspath(path)
+def _target(text: str, file_format: str | None) -> Target:
     if not text:
         raise OutputError("the output has no name; give a file such as hulls.glb, or a folder such as hulls/.")
     place = Path(text)

@@ -15,14 +15,14 @@ def encode_urdf(model: Model, hulls: list[MeshFile], visual: MeshFile | None, fo
     etree.SubElement(extension, "compiler", strippath="false", discardvisual="false")
     link = etree.SubElement(robot, "link", name=model.name)
     inertial = etree.SubElement(link, "inertial")
-    etree.SubElement(inertial, "origin", xyz=numbers(model.mass.centre_m), rpy="0 0 0")
-    etree.SubElement(inertial, "mass", value=numbers([model.mass.volume_m]))
+    etree.SubElement(inertial, "origin", xyz=numbers(model.mass.centre_abs), rpy="0 0 0")
+    etree.SubElement(inertial, "mass", value=numbers([model.mass.volume_abs]))
     axes = {"x": 0, "y": 1, "z": 2}
     etree.SubElement(
         inertial,
         "inertia",
         {
-            f"i{a}{b}": numbers([model.mass.inertia_m[axes[a], axes[b]]])
+            f"i{a}{b}": numbers([model.mass.inertia_abs[axes[a], axes[b]]])
             for a, b in ("xx", "xy", "xz", "yy", "yz", "zz")
         },
     )

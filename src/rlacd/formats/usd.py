@@ -105,11 +105,11 @@ def _mesh(stage: Any, path: Any, mesh: trimesh.Trimesh, shift: np.ndarray[Any, A
 def _set_mass(api: Any, model: Model) -> None:
     from pxr import Gf
 
-    moments, axes = np.linalg.eigh(model.mass.inertia_m)
+    moments, axes = np.linalg.eigh(model.mass.inertia_abs)
     axes[:, 2] *= np.sign(np.linalg.det(axes))  # a rotation, not a mirror
     turn = Gf.Matrix3d(*axes.T.ravel().tolist()).ExtractRotation().GetQuat()  # Gf multiplies rows from the left
-    api.CreateMassAttr(model.mass.volume_m)
-    api.CreateCenterOfMassAttr(Gf.Vec3f(*model.mass.centre_m.tolist()))
+    api.CreateMassAttr(model.mass.volume_abs)
+    api.CreateCenterOfMassAttr(Gf.Vec3f(*model.mass.centre_abs.tolist()))
     api.CreateDiagonalInertiaAttr(Gf.Vec3f(*moments.tolist()))
     api.CreatePrincipalAxesAttr(Gf.Quatf(turn))
 

@@ -5,26 +5,7 @@ from rlacd.policies.greedy import SCORES, Greedy
 from rlacd.policies.navacd import CONCAVE_EDGES, NavACD
 from rlacd.policies.policy import Policy
 from rlacd.policies.qpolicy import QPolicy
-
-EDGES = "+edges"
-
-AS_PUBLISHED = (
-    *(f"greedy-{score}" for score in SCORES),
-    *(f"greedy-{score}{EDGES}" for score in SCORES),
-    "navacd",
-)
-"""Policies of published methods, for comparison: one pass is cuts and merging, and nothing else."""
-
-POLICIES = ("greedy", *AS_PUBLISHED, "learned")
-"""Names that `make_policy` knows."""
-
-WEIGHTS_ENDING = ".onnx"
-"""A policy's name that ends so is the path of a network to use in place of the shipped one."""
-
-
-def is_policy(name: object) -> bool:
-    """Tell whether `make_policy` knows the name."""
-    return isinstance(name, str) and (name in POLICIES or name.endswith(WEIGHTS_ENDING))
+from rlacd.policy_names import AS_PUBLISHED, EDGES, POLICIES, WEIGHTS_ENDING, is_policy
 
 
 def make_policy(name: str, views: Views | None = None, scale: float | None = None) -> Policy:

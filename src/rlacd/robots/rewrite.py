@@ -14,9 +14,11 @@ import trimesh
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError, MeshFileError, OptionError, OutputError
+from rlacd.fields import checked, path_like, read, shown
 from rlacd.formats import check_file, check_name, file_stem, write_file
 from rlacd.formats.encode import encode_plain_obj
 from rlacd.formats.folder import check_names, write_folder
+from rlacd.output_options import OutputOptions
 from rlacd.read_file import read_file
 from rlacd.robots.collada import collada_unit
 from rlacd.robots.mjcf import mesh_folder, plan_mjcf
@@ -91,7 +93,7 @@ def rewrite_robot(
     package_dirs : sequence of str
         ``NAME=FOLDER`` says where a package is; ``FOLDER`` alone may be read and searched for packages.
     **options
-        Those of `rlacd.decompose`, for each mesh. Lengths such as `threshold_m` are in the robot's unit, behind the
+        Those of `rlacd.decompose`, for each mesh. Lengths such as `threshold_abs` are in the robot's unit, behind the
         scale of a mesh; a `timeout` is for each mesh.
 
     Returns
@@ -107,7 +109,8 @@ def rewrite_robot(
     OutputError
         The place cannot be written to.
     """
-    source, place = Path(robot), Path(output)
+    source, place = Path(read(path_like(), "robot", robot)), Path(read(path_like(), "output", output))
+    packages = checked(OutputOptions, "package_dirs", package_dirs, called="package_dirs") or ()
     check_rewrite(source, place)
     kind = ENDINGS[source.suffix.lower()]
     document = parse(source, _read(source))
@@ -115,7 +118,7 @@ def rewrite_robot(
         raise MeshFileError(
             f"{source} is no {kind.upper()}: it starts with <{document.root.tag}>, not <{ROOTS[kind]}>."
         )
-    references = References(source, package_dirs)
+    references = References(source, packages)
     folder = place.with_name(f"{place.stem}_{kind}")
     plan, warnings = _plan(document, kind, references, place, folder)
     if not plan.uses:
@@ -148,7 +151,7 @@ def check_rewrite(source: Path, place: Path) -> None:
     if not is_robot(source):
         raise MeshFileError(f"{source} is no robot: its name has to end in {' or '.join(ENDINGS)}.")
     if place.suffix.lower() != source.suffix.lower():
-        raise OptionError(f"{source} can only be rewritten as another {source.suffix}, not as {place}.")
+        raise OptionError(f"{source} can only be rewritten as another {source.suffix}, not as {shown(str(place))}.")
     if os.path.realpath(source) == os.path.realpath(place):
         raise OptionError(f"{place} would overwrite the input; choose another name.")
     check_name(place)

@@ -9,11 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
-from rlacd.decomposition import Axis, Decomposition
+from rlacd.decomposition import Decomposition
 from rlacd.errors import MissingExtraError, OptionError
 from rlacd.formats import FORMATS, MODELS, file_stem
 from rlacd.formats.target import WITH_MESHES
 from rlacd.formats.usd import require_usd
+from rlacd.output_options import Axis
 from rlacd.plain_json import to_json
 from rlacd.show.html_report import report_page
 

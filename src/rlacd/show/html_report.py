@@ -10,6 +10,7 @@ from typing import Any
 from rlacd._version import __version__
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MissingExtraError, OutputError
+from rlacd.fields import path_like, read
 from rlacd.formats import check_file, write_file
 from rlacd.show.heat import heat_map
 from rlacd.show.page import still_page
@@ -37,7 +38,7 @@ def check_report_page(path: str | os.PathLike[str], up: str | None = None) -> Pa
     OptionError
         `up` is no axis.
     """
-    place = Path(path)
+    place = Path(read(path_like(), "path", path))
     if not is_html(place):
         raise OutputError(f"cannot write the report {place}: it must end in .html; rename it.")
     check_up(up)

@@ -12,9 +12,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from rlacd.errors import OptionError, OutputError
+from rlacd.errors import OutputError
+from rlacd.fields import checked, integer, path_like, read
 from rlacd.formats import check_file, write_file
 from rlacd.formats.palette import linear_from_srgb
+from rlacd.output_options import OutputOptions
 from rlacd.show.coloring import color_hulls
 from rlacd.show.render import Body, Spheres, render, require_extra
 from rlacd.solid.balls import Balls
@@ -45,7 +47,7 @@ def check_picture(path: str | os.PathLike[str], up: str | None = None) -> Path:
     OptionError
         `up` is no axis.
     """
-    place = Path(path)
+    place = Path(read(path_like(), "path", path))
     check_up(up)
     if place.suffix.lower() != ".png":
         raise OutputError(f"cannot write the picture {place}: it must end in .png; rename it.")
@@ -57,8 +59,7 @@ def check_picture(path: str | os.PathLike[str], up: str | None = None) -> Path:
 
 def check_up(up: str | None) -> None:
     """Raise `OptionError` if `up` is no axis; None leaves the choice to others."""
-    if up is not None and up not in TO_Z_UP:
-        raise OptionError(f"{up!r} is no axis that can point up; choose x, y or z.")
+    checked(OutputOptions, "up", up)
 
 
 def draw_picture(
@@ -110,10 +111,8 @@ def picture_bytes(
 
     With `clear` it has no paper and no header, so that a page can put it on any ground.
     """
-    if not 300 <= width <= 8000:
-        raise OptionError(f"a picture cannot be {width} pixels wide; choose from 300 to 8000.")
-    if samples < 1:
-        raise OptionError(f"a picture cannot be drawn with {samples} samples; choose 1 or more.")
+    width = read(integer(300, 8000, rule="a number of pixels between 300 and 8000"), "width", width)
+    samples = read(integer(1, 10_000), "samples", samples)
 
     image = require_extra("PIL.Image")
     panels: list[tuple[str, list[Body], Spheres | None]] = [

@@ -21,21 +21,21 @@ class Mass:
 
     Attributes
     ----------
-    volume_m
+    volume_abs
         Its mass at density one.
-    centre_m
+    centre_abs
         ``[3]``, the centre of mass.
-    inertia_m
+    inertia_abs
         ``[3, 3]`` at density one, about the centre, along the input's axes.
     """
 
-    volume_m: float
-    centre_m: FloatArray
-    inertia_m: FloatArray
+    volume_abs: float
+    centre_abs: FloatArray
+    inertia_abs: FloatArray
 
     def scaled(self, density: float) -> Mass:
         """Get the same body at another density."""
-        return Mass(self.volume_m * density, self.centre_m, self.inertia_m * density)
+        return Mass(self.volume_abs * density, self.centre_abs, self.inertia_abs * density)
 
 
 def mass_of(solid: Solid) -> Mass:

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Any
 
 from rlacd.errors import OptionError
-from rlacd.learn.fields import check_fields, option, refuse_unknown
+from rlacd.fields import check_fields, option, refuse_unknown
 
 
 @dataclass(frozen=True)

@@ -22,11 +22,11 @@ from safetensors.torch import save as save_tensors
 
 from rlacd.criteria import Concavity
 from rlacd.errors import OptionError, TrainingError
+from rlacd.fields import require_same
 from rlacd.learn.checkpoint import Checkpoint, adam_state, load_checkpoint, restore_adam, save_checkpoint
 from rlacd.learn.curves import Curves
 from rlacd.learn.device import pick_device
 from rlacd.learn.encoders import AnyEncoder, I2PMAEEncoder, make_encoder
-from rlacd.learn.fields import require_same
 from rlacd.learn.meshes import MeshList, Solids, list_once
 from rlacd.learn.paper.export import export_policy
 from rlacd.learn.paper.loss import bellman_loss, dual_state_target, soft_value

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rlacd.learn.fields import check_fields, option
+from rlacd.fields import check_fields, option
 
 
 @dataclass(frozen=True)

@@ -17,12 +17,12 @@ import torch
 
 from rlacd import __version__
 from rlacd.errors import OptionError, TrainingError
+from rlacd.fields import require_same
 from rlacd.learn.checkpoint import Checkpoint, adam_state, load_checkpoint, restore_adam, save_checkpoint
 from rlacd.learn.curves import Curves
 from rlacd.learn.device import pick_device
 from rlacd.learn.encoders.i2p_mae import SIZES
 from rlacd.learn.encoders.weights_file import save_weights
-from rlacd.learn.fields import require_same
 from rlacd.learn.meshes import MeshList, list_once
 from rlacd.learn.pretrain.clouds import Clouds, augmented, epoch_rows
 from rlacd.learn.pretrain.masked import MaskedAutoencoder

@@ -1,0 +1,99 @@
+"""Commands made of options that are stated once: the parameters that typer looks up, from the fields of a dataclass."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+from collections.abc import Callable, Collection
+from typing import Annotated, Any
+
+import typer
+
+from rlacd.fields import About
+
+Parameters = dict[str, tuple[Any, Any]]
+"""Of a command: name to default and annotation."""
+
+REQUIRED = inspect.Parameter.empty
+"""The default of a parameter that has to be given."""
+
+
+def command(run: Callable[..., None], text: str, parameters: Parameters) -> Callable[..., None]:
+    """Give a function that takes keywords its parameters, as typer looks them up, and its help."""
+    run.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        [
+            inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+            for name, (default, annotation) in parameters.items()
+        ]
+    )
+    run.__annotations__ = {name: annotation for name, (_, annotation) in parameters.items()}
+    run.__doc__ = text
+    return run
+
+
+def option_parameters(
+    options: type[Any], *, only: Collection[str] | None = None, note: str = "default: ", panel: str | None = None
+) -> Parameters:
+    """Make a parameter of each field of a dataclass, of its former name too; None where it is not given.
+
+    Parameters
+    ----------
+    options : type
+        A dataclass of fields declared with `rlacd.fields.option`.
+    only : collection of str, optional
+        The fields to take.
+    note : str
+        What stands before each default.
+    panel : str, optional
+        The heading they stand under, in place of their own.
+    """
+    parameters: Parameters = {}
+    for field in dataclasses.fields(options):
+        known: About = field.metadata["option"]
+        if known.flags == () or (only is not None and field.name not in only):
+            continue
+        names = known.flags or ((f"--{field.name.replace('_', '-')}",) if known.kind.typed is not bool else ())
+        kind = list[known.kind.typed] if known.repeated else known.kind.typed  # type: ignore[name-defined]
+        declared = typer.Option(
+            *names,
+            help=_help(known, usual_value(field), note),
+            metavar=known.metavar,
+            rich_help_panel=panel or known.panel,
+            show_default=False,
+        )
+        parameters[field.name] = (None, Annotated[kind | None, declared])
+        if known.former is not None:
+            hidden = typer.Option(f"--{known.former.replace('_', '-')}", hidden=True)
+            parameters[known.former] = (None, Annotated[kind | None, hidden])
+    return parameters
+
+
+def usual_value(field: dataclasses.Field[Any]) -> str:
+    """Get the default of an option in words; empty where leaving it out means nothing more than that."""
+    known: About = field.metadata["option"]
+    if known.usual is not None:
+        return known.usual
+    if isinstance(field.default, bool):
+        return str(field.default).lower()
+    return "" if field.default is None else "none" if field.default == "" else str(field.default)
+
+
+def chosen(given: dict[str, Any]) -> dict[str, Any]:
+    """Keep what the user gave: defaults are stated once, by the fields."""
+    return {name: value for name, value in given.items() if value is not None and value != []}
+
+
+def taken(given: dict[str, Any], options: type[Any]) -> dict[str, Any]:
+    """Take what was given for the fields of a dataclass out of `given`."""
+    names = {field.name for field in dataclasses.fields(options)} & set(given)
+    return chosen({name: given.pop(name) for name in sorted(names)})
+
+
+def _help(known: About, usual: str, note: str) -> str:
+    """One text for the help; ``[`` begins markup there."""
+    values = known.kind.values if known.metavar is None or known.kind.values not in known.metavar.split("|") else ""
+    facts = [f"{note}{usual}"] if usual not in ("", "–") else []
+    if known.kind.typed is not bool and values and values.replace(" ", "|") != known.metavar:
+        facts.append(values)
+    behind = f" [dim]\\[{'; '.join(facts)}][/dim]" if facts else ""
+    return known.help.replace("[", "\\[") + behind

@@ -1,0 +1,30 @@
+"""Names of the policies that choose cuts; `rlacd.policies.make_policy` builds them."""
+
+from __future__ import annotations
+
+import os
+
+EDGES = "+edges"
+
+SCORES = ("hull-sum", "max-excess", "excess-norm")
+"""What a greedy policy may order planes by."""
+
+AS_PUBLISHED = (*(f"greedy-{score}" for score in SCORES), *(f"greedy-{score}{EDGES}" for score in SCORES), "navacd")
+"""Policies of published methods, for comparison: one pass is cuts and merging, and nothing else."""
+
+POLICIES = ("greedy", *AS_PUBLISHED, "learned")
+
+WEIGHTS_ENDING = ".onnx"
+"""A policy's name that ends so is the path of a network to use in place of the shipped one."""
+
+
+def is_policy(name: object) -> bool:
+    """Tell whether this is the name of a policy, or may be the path of one."""
+    return isinstance(name, str) and (name in POLICIES or (name.endswith(WEIGHTS_ENDING) and _can_be_a_path(name)))
+
+
+def _can_be_a_path(name: str) -> bool:
+    try:
+        return b"\0" not in os.fsencode(name)
+    except UnicodeError:
+        return False

@@ -1,0 +1,181 @@
+"""The options of navigable space, each stated once; `rlacd.criteria.navigable` says what they mean to a solid."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import InitVar, dataclass
+from typing import Any, TypeAlias
+
+from rlacd.errors import OptionError
+from rlacd.fields import check_fields, custom, number, option
+from rlacd.renamed import take_former
+
+Point: TypeAlias = tuple[float, float, float]
+
+NAVIGABLE = "navigable"
+"""The criterion's name on the command line."""
+
+PANEL = "Navigable space (--criterion navigable)"
+
+LENGTHS = (1e-4, 10.0)
+"""Shares of the longest side that radius and tolerance may be: less takes no end of balls, more fills everything."""
+
+LARGEST = 1e100
+"""Coordinates of seeds and planes: of larger ones, products would be infinite."""
+
+
+def _coordinate(value: Any) -> float:
+    """Take a number, of numpy's too; raise where it is none."""
+    return float(_COORDINATE.read(value))
+
+
+_COORDINATE = number(-LARGEST, LARGEST)
+
+
+def _rows(given: Any) -> Sequence[Any]:
+    """Take a list, a tuple or an array; raise for other things, some of which never end."""
+    rows = given.tolist() if type(given).__name__ == "ndarray" else given
+    if not isinstance(rows, (list, tuple)):
+        raise TypeError
+    return rows
+
+
+def _point(given: Any) -> Point:
+    x, y, z = (_coordinate(value) for value in _rows(given))
+    return x, y, z
+
+
+def _seeds(given: Any) -> tuple[Point, ...]:
+    points = tuple(_point(row) for row in _rows(given))
+    if not points:
+        raise ValueError
+    return points
+
+
+def _planes(given: Any) -> tuple[tuple[Point, float], ...]:
+    planes = []
+    for row in _rows(given):
+        normal, offset = _rows(row)
+        point = _point(normal)
+        if not math.hypot(*point) > 0:
+            raise ValueError
+        planes.append((point, _coordinate(offset)))
+    return tuple(planes)
+
+
+_LENGTH = "a positive length in the input's unit"
+_SHARE = "a share of the longest side between {:g} and {:g}".format(*LENGTHS)
+
+
+@dataclass(frozen=True)
+class SpaceOptions:
+    """The options of `rlacd.NavigableSpace`, checked.
+
+    Raises
+    ------
+    OptionError
+        A value is of the wrong type or out of its range.
+    """
+
+    radius: float | None = option(
+        0.025,
+        "Radius of the ball, as a share of the longest side of the mesh.",
+        number(*LENGTHS, rule=_SHARE, typed=str),
+        panel=PANEL,
+        metavar="NUMBER",
+        python="NavigableSpace(radius=)",
+    )
+    tolerance: float | None = option(
+        0.05,
+        "Space nearer to the surface than this may be filled; the same share.",
+        number(*LENGTHS, rule=_SHARE, typed=str),
+        panel=PANEL,
+        metavar="NUMBER",
+        python="NavigableSpace(tolerance=)",
+    )
+    reachable_only: bool = option(
+        True,
+        "Count only what a ball can reach from outside, or every room.",
+        keyword=True,
+        panel=PANEL,
+        flags=("--reachable-only/--everywhere",),
+        usual="reachable-only",
+        python="NavigableSpace(reachable_only=)",
+    )
+    seeds: tuple[Point, ...] | None = option(
+        None,
+        "A place that balls come from instead of outside, in the mesh's own unit; may be repeated.",
+        custom("a list of at least one finite point [x, y, z]", _seeds),
+        keyword=True,
+        panel=PANEL,
+        flags=("--seed-point",),
+        metavar="X,Y,Z",
+        repeated=True,
+        usual="outside",
+        python="NavigableSpace(seeds=)",
+    )
+    closed_planes: tuple[tuple[Point, float], ...] = option(
+        (),
+        "A plane that balls do not cross, such as the ground 0,0,1,0: they stay where the normal X,Y,Z points, D its "
+        "distance from the origin; may be repeated.",
+        custom("a list of (normal, offset) pairs, every normal a finite vector [x, y, z] that is not zero", _planes),
+        keyword=True,
+        panel=PANEL,
+        flags=("--closed-plane",),
+        metavar="X,Y,Z,D",
+        repeated=True,
+        usual="–",
+        python="NavigableSpace(closed_planes=)",
+    )
+    radius_abs: float | None = option(
+        None,
+        "The same as --radius, as a length in the mesh's own unit.",
+        number(above=0, rule=_LENGTH),
+        keyword=True,
+        panel=PANEL,
+        former="radius_m",
+        python="NavigableSpace(radius_abs=)",
+    )
+    tolerance_abs: float | None = option(
+        None,
+        "The same as --tolerance, as a length in the mesh's own unit.",
+        number(above=0, rule=_LENGTH),
+        keyword=True,
+        panel=PANEL,
+        former="tolerance_m",
+        python="NavigableSpace(tolerance_abs=)",
+    )
+    radius_m: InitVar[float | None] = None
+    tolerance_m: InitVar[float | None] = None
+
+    def __post_init__(self, radius_m: float | None, tolerance_m: float | None) -> None:
+        take_former(self, {"radius_m": radius_m, "tolerance_m": tolerance_m})
+        absolute = [name for name in ("radius", "tolerance") if getattr(self, f"{name}_abs") is not None]
+        for name in absolute:
+            object.__setattr__(self, name, LENGTHS[1])  # anything in range, for the check
+        check_fields(self)
+        for name in absolute:
+            object.__setattr__(self, name, None)
+
+    def in_frame(self, scale: float) -> tuple[float, float]:
+        """Get radius and tolerance in the frame where the longest side is 2; `scale` is its units per the input's.
+
+        Raises
+        ------
+        OptionError
+            `radius_abs` or `tolerance_abs` is too small or too large for the object.
+        """
+        return self._in_frame("radius", scale), self._in_frame("tolerance", scale)
+
+    def _in_frame(self, name: str, scale: float) -> float:
+        share, length = getattr(self, name), getattr(self, f"{name}_abs")
+        if length is None:
+            return 2.0 * float(share)
+        if not 2 * LENGTHS[0] <= length * scale <= 2 * LENGTHS[1]:
+            low, high = (2 * bound / scale for bound in LENGTHS)
+            raise OptionError(
+                f"{name}_abs is {length!r}; for this object it has to be between {low:.4g} and {high:.4g} "
+                f"({LENGTHS[0]:.2%} and {LENGTHS[1]:.0%} of its longest side)."
+            )
+        return float(length * scale)

@@ -1,0 +1,49 @@
+"""The README's table of options, made from where they are stated: ``python -m tests.readme_table`` writes it there."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from rlacd.command_parameters import usual_value
+from rlacd.fields import About
+from rlacd.options import Options
+from rlacd.output_options import OutputOptions
+from rlacd.space_options import SpaceOptions
+
+README = Path(__file__).parents[1] / "README.md"
+
+HEAD = ["| command line | Python | default | values | meaning |", "|---|---|---|---|---|"]
+
+PROGRESS = "| – | `progress` | – | | a function called between steps; returning `False` stops |"
+
+
+def options_table() -> str:
+    """All options in Markdown, one per row."""
+    rows = [*_rows(Options), PROGRESS, *_rows(SpaceOptions), *_rows(OutputOptions)]
+    return "\n".join([*HEAD, *rows, ""])
+
+
+def _rows(options: type[Any]) -> Iterator[str]:
+    for field in dataclasses.fields(options):
+        known: About = field.metadata["option"]
+        names = known.flags or (f"--{field.name.replace('_', '-')}",)
+        typed = ", ".join(f"`{name}`" for name in sorted(names, key=len))
+        called = field.name if known.python is None else known.python
+        python = f"`{called}`".replace(", ", "`, `") if called else "–"
+        cells = [typed, python, usual_value(field) or "–", known.kind.values, known.help]
+        yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def written(readme: str) -> str:
+    """The README with the table in place of the one it has."""
+    lines = readme.splitlines()
+    begin = next(i for i, line in enumerate(lines) if line.startswith("| command line | Python |"))
+    end = next(i for i in range(begin, len(lines)) if not lines[i].startswith("|"))
+    return "\n".join([*lines[:begin], *options_table().splitlines(), *lines[end:], ""])
+
+
+if __name__ == "__main__":
+    README.write_text(written(README.read_text(encoding="utf-8")), encoding="utf-8")

@@ -1,0 +1,292 @@
+"""Every option with every odd value: accepted, or an OptionError in one sentence before any work."""
+
+from __future__ import annotations
+
+import dataclasses
+import fractions
+import inspect
+import itertools
+import typing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from trimesh import creation
+from typer.testing import CliRunner
+
+import rlacd
+from rlacd.cli import app
+from rlacd.command_options import decompose_options
+from rlacd.compat import coacd, vhacd
+from rlacd.errors import MeshFileError, OptionError, RlacdError, WeightsError
+from rlacd.fields import check_callback
+from rlacd.options import CONCAVITY, OPTION_NAMES, Options
+from rlacd.policies.greedy import SCORES
+from rlacd.policy_names import SCORES as SCORE_NAMES
+from rlacd.space_options import SpaceOptions
+
+
+class Hostile:
+    """An object that raises whatever it is asked."""
+
+    def _raise(self, *_: Any) -> Any:
+        raise RuntimeError("asked")
+
+    __eq__ = __bool__ = __len__ = __iter__ = __float__ = __int__ = __index__ = __repr__ = __str__ = _raise  # type: ignore[assignment]
+    __hash__ = __getitem__ = __contains__ = __fspath__ = __call__ = _raise  # type: ignore[assignment]
+
+
+ODD: dict[str, Any] = {
+    "None": None,
+    "True": True,
+    "False": False,
+    "bool of numpy": np.True_,
+    "0": 0,
+    "1": 1,
+    "-1": -1,
+    "7": 7,
+    "huge": 10**30,
+    "too long to print": 10**5000,
+    "too small": -(10**5000),
+    "0.5": 0.5,
+    "-0.0": -0.0,
+    "denormal": 1e-320,
+    "1e300": 1e300,
+    "NaN": float("nan"),
+    "infinity": float("inf"),
+    "minus infinity": float("-inf"),
+    "float16": np.float16(0.5),
+    "int8": np.int8(5),
+    "uint64": np.uint64(2**64 - 1),
+    "datetime": np.datetime64("2000-01-01"),
+    "0-d array": np.array(0.1),
+    "array": np.array([0.1, 0.2]),
+    "matrix": np.eye(3),
+    "strings in an array": np.array([["1", "2", "3"]]),
+    "empty array": np.empty((0, 3)),
+    "objects": np.array([[10**400, 1, 2]], dtype=object),
+    "complex": 1 + 2j,
+    "fraction": fractions.Fraction(1, 3),
+    "huge fraction": fractions.Fraction(10**400, 3),
+    "empty": "",
+    "word": "word",
+    "number in words": "0.05",
+    "name": "fast",
+    "NUL": "a\0b",
+    "surrogate": "\ud800.onnx",
+    "two lines": "two\nlines",
+    "bytes": b"fast",
+    "list": [],
+    "list of one": [1],
+    "list of lists": [[1, 2, 3]],
+    "ragged": [[1, 2], [3]],
+    "planes of words": [("abc", "d")],
+    "planes": [((0, 0, 1), 0)],
+    "planes of NaN": [((0, 0, float("nan")), 0)],
+    "dict": {},
+    "set": {1},
+    "endless": itertools.count(),
+    "endless planes": itertools.repeat(((0, 0, 1), 0)),
+    "class": int,
+    "class of options": rlacd.NavigableSpace,
+    "space": rlacd.NavigableSpace(),
+    "bare space": SpaceOptions(),
+    "function": lambda: None,
+    "hostile": Hostile(),
+    "hostile in a list": [Hostile()],
+    "object": object(),
+    "path": Path("a/b"),
+    "Ellipsis": ...,
+}
+
+
+def assert_accepted_or_told(call: Any, *others: type[Exception]) -> None:
+    """Whatever is not accepted is one sentence."""
+    told = "one sentence of some length"
+    try:
+        call()
+    except OptionError as error:
+        told = str(error)
+    except others:
+        pass
+    assert len(told.splitlines()) == 1
+    assert 20 < len(told) < 500
+
+
+@pytest.mark.filterwarnings("ignore:.*is now called:DeprecationWarning")
+@pytest.mark.parametrize("odd", ODD.values(), ids=ODD.keys())
+def test_options_of_decompose_are_checked_before_any_work(odd: Any) -> None:
+    for name in (*OPTION_NAMES, "progress", "threshold_m"):
+        assert_accepted_or_told(
+            lambda name=name: rlacd.decompose("no such file.obj", **{name: odd}), MeshFileError, WeightsError
+        )
+
+
+@pytest.mark.filterwarnings("ignore:.*is now called:DeprecationWarning")
+@pytest.mark.parametrize("odd", ODD.values(), ids=ODD.keys())
+def test_options_of_navigable_space_are_checked_when_it_is_made(odd: Any) -> None:
+    for name in inspect.signature(rlacd.NavigableSpace).parameters:
+        assert_accepted_or_told(lambda name=name: hash(rlacd.NavigableSpace(**{name: odd})))
+
+
+@pytest.fixture(scope="module")
+def result() -> rlacd.Decomposition:
+    return rlacd.decompose(creation.box(), quality="fast")
+
+
+@pytest.mark.parametrize("odd", ODD.values(), ids=ODD.keys())
+def test_options_of_what_is_written_are_checked(odd: Any, result: rlacd.Decomposition, tmp_path: Path) -> None:
+    for name in ("file_format", "density", "up", "one_mesh"):
+        assert_accepted_or_told(lambda name=name: result.save(tmp_path / "box.urdf", **{name: odd}), RlacdError)
+    for place in (tmp_path / "box.png", odd):
+        for name in ("width", "up"):  # a wrong ending, so that no picture is drawn
+            given = {name: odd}
+            assert_accepted_or_told(
+                lambda p=place, g=given: result.picture(Path(str(p) + "x") if p is not odd else p, **g), RlacdError
+            )
+    assert_accepted_or_told(lambda: result.save_report(tmp_path / "no folder" / "a.html", up=odd), RlacdError)
+
+
+@pytest.mark.parametrize("odd", ODD.values(), ids=ODD.keys())
+def test_options_of_the_other_functions_are_checked(odd: Any, tmp_path: Path) -> None:
+    missing = tmp_path / "missing.urdf"
+    for name in ("robot", "output", "package_dirs"):
+        given = {"robot": missing, "output": tmp_path / "out.urdf", name: odd}
+        assert_accepted_or_told(lambda given=given: rlacd.rewrite_robot(**given), RlacdError)
+    nothing = coacd.Mesh()
+    for name in (
+        "threshold",
+        "max_convex_hull",
+        "merge",
+        "decimate",
+        "max_ch_vertex",
+        "apx_mode",
+        "seed",
+        "real_metric",
+    ):
+        assert_accepted_or_told(lambda name=name: coacd.run_coacd(nothing, **{name: odd}), RlacdError)
+    for name in ("maxConvexHulls", "maxNumVerticesPerCH", "asyncACD"):
+        assert_accepted_or_told(lambda name=name: vhacd.compute_vhacd([], [], **{name: odd}), RlacdError)
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"threshold": "0.05"}, r"threshold is '0\.05', a string; it has to be a number between 0\.001 and 2\."),
+        ({"threshold": [0.1]}, r"threshold is \[0\.1\]; it has to be a number between 0\.001 and 2\."),
+        ({"max_hulls": 2.5}, r"max_hulls is 2\.5; it has to be an integer, at least 1\."),
+        ({"preset": []}, r"preset is \[\]; it has to be one of mujoco, physx, "),
+        ({"quality": np.eye(2)}, r"quality is array\(\[\[1\., 0\.\], \[0\., 1\.\]\]\); it has to be one of fast, "),
+        (
+            {"criterion": np.zeros(2)},
+            r'criterion is array\(.*\); it has to be "concavity" or an `rlacd\.NavigableSpace`',
+        ),
+        ({"seed": 10**5000}, "seed is an object of type int; it has to be an integer between 0 and"),
+        (
+            {"progress": lambda: None},
+            r"progress is <function .*; it has to be a function that takes a `rlacd\.Progress`",
+        ),
+        ({"progress": int}, "progress is <class 'int'>"),
+    ],
+)
+def test_the_message_shows_the_value_and_what_it_has_to_be(given: dict[str, Any], says: str) -> None:
+    with pytest.raises(OptionError, match=says):
+        rlacd.decompose("no such file.obj", **given)
+
+
+def test_callbacks_that_take_one_argument_are_accepted() -> None:
+    async def later(progress: Any) -> None: ...
+
+    for fits in (print, lambda p: None, lambda p, q=1: None, lambda *p: None, [].append, Options.__init__.__get__):
+        check_callback("progress", fits, "one")
+    for wrong in (lambda p, q: None, lambda *, p: None, later, dict, 3):
+        with pytest.raises(OptionError):
+            check_callback("progress", wrong, "one")
+
+
+@pytest.mark.parametrize("given", [{"radius": 1e-320}, {"tolerance": 1e300}, {"radius": 11}, {"tolerance": 1e-9}])
+def test_shares_that_no_object_can_have_are_refused(given: dict[str, float]) -> None:
+    with pytest.raises(OptionError, match=r"a share of the longest side between 0\.0001 and 10"):
+        rlacd.NavigableSpace(**given)
+
+
+@pytest.mark.parametrize("given", [{"radius_abs": 1e-320}, {"tolerance_abs": 1e300}, {"radius_abs": 1e-5}])
+def test_lengths_that_do_not_fit_the_object_are_refused(given: dict[str, float]) -> None:
+    with pytest.raises(OptionError, match=r"for this object it has to be between 0\.0001 and 10"):
+        rlacd.decompose(creation.box(), criterion=rlacd.NavigableSpace(**given))
+
+
+# --- former names -----------------------------------------------------------------------------------------------------
+
+
+def test_former_names_are_taken_with_a_warning() -> None:
+    mesh = creation.box((1, 2, 20))
+    with pytest.warns(DeprecationWarning, match="threshold_m is now called threshold_abs") as caught:
+        former = rlacd.decompose(mesh, threshold_m=0.4)
+    assert caught[0].filename == __file__
+    now = rlacd.decompose(mesh, threshold_abs=0.4)
+    assert former.report["options"] == now.report["options"]
+    assert now.report["options"]["threshold_m"] == now.report["options"]["threshold_abs"] == 0.4
+    for name in ("volume", "centre", "inertia"):
+        assert now.report["mass"][f"{name}_m"] == now.report["mass"][f"{name}_abs"]
+    with pytest.warns(DeprecationWarning, match="radius_m is now called radius_abs") as caught:
+        space = rlacd.NavigableSpace(radius_m=0.1)
+    assert space == rlacd.NavigableSpace(radius_abs=0.1)
+    with pytest.raises(OptionError, match="one of the two"):
+        rlacd.decompose(mesh, threshold_m=0.4, threshold_abs=0.4)
+
+
+def test_former_names_on_the_command_line(tmp_path: Path) -> None:
+    said: list[str] = []
+    assert decompose_options({"threshold_m": 0.4}, warn=said.append) == {"threshold_abs": 0.4}
+    assert said == ["--threshold-m is now called --threshold-abs; the old name will go."]
+    mesh = tmp_path / "box.stl"
+    creation.box().export(mesh)
+    run = CliRunner().invoke(app, ["decompose", str(mesh), "--threshold-m", "0.1", "--quality", "fast"])
+    assert run.exit_code == 0
+    assert run.stderr.startswith("--threshold-m is now called --threshold-abs")
+
+
+# --- lengths in words -------------------------------------------------------------------------------------------------
+
+
+def test_a_length_may_be_a_share_or_in_metres() -> None:
+    assert decompose_options({"threshold": "0.1"}) == {"threshold": 0.1}
+    assert decompose_options({"threshold": "5%"}) == {"threshold": 0.1}
+    assert decompose_options({"threshold": "0.05m"}, metres=True) == {"threshold_abs": 0.05}
+    assert decompose_options({"threshold": "5 mm"}, metres=True) == {"threshold_abs": 0.005}
+    space = decompose_options({"criterion": "navigable", "radius": "4%", "tolerance": "2cm"}, metres=True)["criterion"]
+    assert (space.radius, space.tolerance_abs) == (0.04, 0.02)
+    with pytest.raises(OptionError, match="does not say its unit; give --threshold-abs"):
+        decompose_options({"threshold": "0.05m"})
+    for word in ("tight", "5 %%", "", "1e", "m", "0.1 miles"):
+        with pytest.raises(OptionError, match="--threshold is"):
+            decompose_options({"threshold": word}, metres=True)
+
+
+# --- stated once ------------------------------------------------------------------------------------------------------
+
+
+def test_every_option_of_names_has_a_literal_type() -> None:
+    hints = typing.get_type_hints(Options)
+    for field in dataclasses.fields(Options):
+        known = field.metadata["option"]
+        if known.kind.rule.startswith("one of") and field.name != "policy":
+            literal = next(
+                part
+                for part in (hints[field.name], *typing.get_args(hints[field.name]))
+                if typing.get_origin(part) is typing.Literal
+            )
+            assert " ".join(typing.get_args(literal)) == known.kind.values
+
+
+def test_the_names_of_scores_are_those_that_are_known() -> None:
+    assert set(SCORE_NAMES) == set(SCORES)
+
+
+def test_plain_values_are_kept() -> None:
+    options = Options(threshold=np.float32(0.5), seed=np.uint8(3), merge=np.False_, policy=np.str_("navacd"))
+    kinds = [type(value) for value in (options.threshold, options.seed, options.merge, options.policy)]
+    assert kinds == [float, int, bool, str]
+    assert options.criterion == CONCAVITY
