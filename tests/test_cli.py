@@ -148,10 +148,10 @@ def test_a_concavity_above_the_threshold_is_said(mesh: Path, stand_in: StandIn) 
     ("words", "code", "says"),
     [
         (["-o", "{dir}/out.fbx"], 3, ".glb, .obj, .ply, .stl"),
-        (["-o", "{dir}/no/out.glb"], 3, "does not exist"),
+        (["-o", "{dir}/ell.stl/out.glb"], 3, "is a file, not a folder"),
         (["-o", "-"], 2, "stdout"),
         (["-o", "{dir}/ell.stl"], 2, "overwrite the input"),
-        (["--report", "{dir}/no/r.json"], 3, "does not exist"),
+        (["--report", "{dir}/ell.stl/r.json"], 3, "is a file, not a folder"),
         (["--report", "{dir}"], 3, "it is a folder"),
         (["--report", "{dir}/ell_hulls.glb"], 2, "overwrite what -o writes"),
         (["--picture", "{dir}/p.jpg"], 3, ".png"),
@@ -194,6 +194,41 @@ def test_errors_are_one_sentence_and_a_code(mesh: Path, stand_in: StandIn, error
     assert "Traceback" not in run.output
     assert ("RLACD_DEBUG=1" in run.stderr) == (code == 1)
     assert not mesh.with_name("ell_hulls.glb").exists()
+
+
+def test_a_missing_input_is_said_to_be_missing(tmp_path: Path) -> None:
+    run = rlacd("decompose", tmp_path / "no" / "chair.glb")
+    assert run.exit_code == 2
+    assert run.stderr == f"rlacd: {tmp_path}/no/chair.glb does not exist: check the spelling and the folder\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "typed"),
+    [
+        (["chair.glb"], "rlacd decompose chair.glb"),
+        (["chair one.glb", "-t", "0.02"], "rlacd decompose 'chair one.glb' -t 0.02"),
+        (["robot.urdf"], "rlacd decompose robot.urdf"),
+        (["{dir}"], "rlacd batch {dir}"),
+    ],
+)
+def test_a_file_in_place_of_a_command_tells_what_to_type(mesh: Path, words: list[str], typed: str) -> None:
+    run = rlacd(*(word.format(dir=mesh.parent) for word in words))
+    assert run.exit_code == 2
+    assert run.stderr.endswith(f"did you mean  {typed.format(dir=mesh.parent)}\n")
+    assert "No such command" in rlacd("decompsoe").stderr
+
+
+def test_folders_that_are_missing_are_made(mesh: Path, stand_in: StandIn) -> None:
+    new = mesh.parent / "new"
+    assert rlacd("decompose", mesh, "-o", new / "a" / "out.glb", "--report", new / "b" / "r.json").exit_code == 0
+    assert (new / "a" / "out.glb").exists()
+    assert (new / "b" / "r.json").exists()
+
+
+def test_viewing_a_robot_is_refused_for_what_it_is() -> None:
+    run = rlacd("view", "robot.urdf")
+    assert run.exit_code == 2
+    assert "is a robot; view shows one mesh" in run.stderr
 
 
 def test_debugging_lets_the_traceback_through(mesh: Path, stand_in: StandIn, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import shutil
+import webbrowser
 from pathlib import Path
 
 import pytest
 import trimesh
 
+from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import OutputError
 from tests.hulls import random_hull
@@ -24,6 +27,46 @@ def test_it_is_a_collection_of_hulls() -> None:
     cup = result(3)
     assert len(cup) == 3
     assert list(cup) == cup.hulls
+
+
+def test_hulls_are_got_by_index_and_slice() -> None:
+    cup = result(3)
+    assert cup[0] is cup.hulls[0]
+    assert cup[-1] is cup.hulls[2]
+    assert cup[1:] == cup.hulls[1:]
+    with pytest.raises(IndexError):
+        cup[3]
+
+
+def test_the_scene_has_a_node_per_hull_in_colours() -> None:
+    cup = result(3)
+    scene = cup.scene()
+    assert list(scene.geometry) == list(scene.graph.nodes_geometry) == ["hull_000", "hull_001", "hull_002"]
+    for hull, geometry in zip(cup, scene.geometry.values(), strict=True):
+        assert (geometry.vertices == hull.vertices).all()
+        assert (geometry.faces == hull.faces).all()
+    assert len({tuple(geometry.visual.face_colors[0]) for geometry in scene.geometry.values()}) == 3
+
+
+@pytest.fixture(scope="module")
+def real() -> Decomposition:
+    return decompose(SOURCE, quality="fast")
+
+
+def test_a_notebook_shows_the_view_in_a_frame(real: Decomposition) -> None:
+    page = real._repr_html_()
+    assert page.startswith('<iframe srcdoc="')
+    assert page.count('"') == 4, "the page is one attribute"
+    assert "&lt;script" in page
+
+
+def test_show_opens_a_page_in_the_browser(real: Decomposition, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", opened.append)
+    page = real.show(up="y")
+    assert opened == [page.as_uri()]
+    assert page.read_text(encoding="utf-8").startswith("<!")
+    shutil.rmtree(page.parent)
 
 
 def test_it_describes_itself_in_one_line() -> None:

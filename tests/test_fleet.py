@@ -22,6 +22,7 @@ from rlacd.fleet import Order, find_assets
 from rlacd.fleet.assets import _places, content_hash
 from rlacd.fleet.ledger import Ledger
 from rlacd.fleet.store import FolderStore, Store, open_store
+from rlacd.formats import save_hulls
 from rlacd.options import Options
 from tests.trouble import write_ell
 
@@ -40,6 +41,14 @@ def test_meshes_of_all_depths_are_found_in_order_and_nothing_else(tmp_path: Path
     touch(tmp_path, "b/椅子.OBJ", "a.stl", "notes.txt", ".hidden/c.obj", "b/.d.obj", "out/e.glb", "b/deep/er/f.3mf")
     names = [asset.name for asset in find_assets(tmp_path, leave_out=tmp_path / "out")]
     assert names == ["a.stl", "b/deep/er/f.3mf", "b/椅子.OBJ"]
+
+
+def test_hulls_that_decompose_wrote_among_the_meshes_are_passed_over(tmp_path: Path) -> None:
+    touch(tmp_path, "a.stl", "a_hulls.glb", "b/c.obj", "b/c_hulls.stl", "own_hulls.glb", "b/a_hulls.obj")
+    save_hulls([trimesh.creation.box()], f"{tmp_path}/b/hulls/", stem="mesh", file_format="stl")
+    touch(tmp_path, "b/hulls/mesh_001.stl")
+    names = [asset.name for asset in find_assets(tmp_path)]
+    assert names == ["a.stl", "b/a_hulls.obj", "b/c.obj", "b/hulls/mesh_001.stl", "own_hulls.glb"]
 
 
 @pytest.mark.parametrize(

@@ -182,18 +182,24 @@ def test_endings_in_capitals_are_known(tmp_path: Path) -> None:
     assert save_hulls(THREE, tmp_path / "HULLS.STL").stat().st_size > 0
 
 
+@pytest.mark.parametrize("place", ["new/out.glb", "new/deep/out.stl", "new/", "new/deep/er/"])
+def test_missing_folders_are_made_with_the_file(tmp_path: Path, place: str) -> None:
+    hull_target(f"{tmp_path}/{place}")
+    assert list(tmp_path.iterdir()) == [], "checking makes nothing"
+    written = save_hulls(THREE, f"{tmp_path}/{place}")
+    assert written.is_dir() if place.endswith("/") else written.stat().st_size > 0
+
+
 def test_places_that_cannot_be_written_are_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("mine")
     (tmp_path / "folder.glb").mkdir()
-    with pytest.raises(OutputError, match="does not exist; create it first"):
-        hull_target(tmp_path / "missing" / "out.glb")
-    with pytest.raises(OutputError, match="does not exist; create it first"):
-        hull_target(f"{tmp_path}/missing/out/")
+    with pytest.raises(OutputError, match="is a file, not a folder"):
+        hull_target(f"{tmp_path}/file/new/out/")
     with pytest.raises(OutputError, match="it is a folder"):
         hull_target(tmp_path / "folder.glb")
     with pytest.raises(OutputError, match="it is a file, not a folder"):
         hull_target(f"{tmp_path}/file/")
-    with pytest.raises(OutputError, match="does not exist"):
+    with pytest.raises(OutputError, match="is a file, not a folder"):
         hull_target(tmp_path / "file" / "out.glb")
     with pytest.raises(OutputError, match="no name"):
         hull_target("")

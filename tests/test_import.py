@@ -75,7 +75,8 @@ WITHOUT_ONNXRUNTIME = "import sys\nsys.modules['onnxruntime'] = None\n"
 @pytest.mark.parametrize("policy", ["learned", "own.onnx"])
 def test_a_learned_policy_without_its_extra_is_one_sentence_before_any_work(policy: str, tmp_path: Path) -> None:
     (tmp_path / "own.onnx").write_bytes(files("rlacd.weights").joinpath("guide.onnx").read_bytes())
-    command = ["decompose", "missing.stl", "--policy", policy]
+    (tmp_path / "broken.stl").touch()
+    command = ["decompose", "broken.stl", "--policy", policy]
     done = subprocess.run(
         [sys.executable, "-c", f"{WITHOUT_ONNXRUNTIME}from rlacd.cli import app\napp({command!r})"],
         capture_output=True,
@@ -85,7 +86,7 @@ def test_a_learned_policy_without_its_extra_is_one_sentence_before_any_work(poli
     assert done.returncode == 2
     assert "pip install 'rlacd[learned]'" in done.stderr
     assert "Traceback" not in done.stderr
-    assert "missing.stl" not in done.stderr
+    assert "broken.stl" not in done.stderr
 
 
 def test_every_other_policy_needs_no_extra() -> None:

@@ -313,7 +313,6 @@ def test_usd_without_its_extra_is_one_sentence_before_any_work(
         ("table.xml", {"density": 0.0}, OptionError, "density is 0.0"),
         ("table.xml", {"density": float("nan")}, OptionError, "density"),
         ("table.xml", {"up": "w"}, OptionError, "x, y or z"),
-        ("no/table.xml", {}, OutputError, "does not exist; create it first"),
         ("table.xml", {"one_mesh": True}, OptionError, r"one mesh for all hulls is for \.urdf"),
         ("table.blend", {}, OutputError, r"\.xml, \.urdf, \.sdf, \.usd"),
     ],

@@ -99,8 +99,9 @@ def test_the_caption_tells_the_numbers_that_are_known() -> None:
 def test_bad_places_and_options_are_refused_before_drawing(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match=r"must end in \.png"):
         check_picture(tmp_path / "out.jpg")
-    with pytest.raises(OutputError, match="does not exist"):
-        check_picture(tmp_path / "missing" / "out.png")
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(OutputError, match="is a file, not a folder"):
+        check_picture(tmp_path / "file" / "out.png")
     for options in ({"width": 10}, {"width": 100_000}, {"samples": 0}, {"up": "w"}):
         with pytest.raises(OptionError):
             draw_picture(towers(), tmp_path / "out.png", **options)

@@ -150,14 +150,14 @@ def _pool(own: dict[str, Any]) -> Pool:
 
 def _tell_plan(batch: Batch) -> None:
     from rlacd.plain_json import printable
-    from rlacd.terminal import say
+    from rlacd.terminal import counted, say
 
     plan = batch.plan()
     for asset, finished in plan:
         if not finished:
             typer.echo(printable(f"{asset.name} -> {asset.place}{batch.order.ending or '/'}"))
     done = sum(finished for _, finished in plan)
-    say(f"{len(plan)} meshes: {done} done, {len(plan) - done} to do; nothing was written")
+    say(f"{counted(len(plan), 'mesh', 'meshes')}: {done} done, {len(plan) - done} to do; nothing was written")
 
 
 def _run(batch: Batch, own: dict[str, Any], *, quiet: bool) -> None:

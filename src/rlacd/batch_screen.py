@@ -12,7 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsed
 from rich.progress import Progress as Bars
 
 from rlacd.plain_json import printable
-from rlacd.terminal import say
+from rlacd.terminal import counted, say
 
 if TYPE_CHECKING:
     from rlacd.fleet import Asset, Summary
@@ -97,7 +97,8 @@ def failure_line(row: Row) -> str:
 def summary_lines(summary: Summary, out: str) -> list[str]:
     """Tell what a run did, what failed, and what took longest."""
     made = sum(summary.status.values()) - summary.passed_over
-    words = [f"{summary.status['done']} of {summary.meshes} meshes are done"]
+    meshes = counted(summary.meshes, "mesh", "meshes")
+    words = [f"{summary.status['done']} of {meshes} {'is' if summary.meshes == 1 else 'are'} done"]
     words += [f"{summary.status[status]} {status}" for status in ("fallback", "failed") if summary.status[status]]
     rate = f", {60 * made / summary.seconds:.0f} a minute" if made and summary.seconds > 0 else ""
     lines = [

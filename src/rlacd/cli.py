@@ -2,21 +2,40 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from rlacd import __version__
 from rlacd.batch_command import BATCH_EPILOG, batch_command
 from rlacd.bench_command import app as bench
 from rlacd.decompose_command import decompose_command
-from rlacd.exit_codes import EPILOG, exit_codes
+from rlacd.exit_codes import EPILOG, ExitCode, exit_codes
+from rlacd.plain_json import printable
 from rlacd.train_command import pretrain_command, train_command
 from rlacd.view_command import view
 
+
+class Commands(TyperGroup):
+    """Tells those who give a file where a command belongs what to type instead."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Look the command up that the words begin with."""
+        word = args[0]
+        if self.get_command(ctx, word) is None and (Path(word).suffix or Path(word).exists()):
+            verb = "batch" if Path(word).is_dir() else "decompose"
+            typed = shlex.join(["rlacd", verb, *args])
+            typer.echo(f"rlacd: {printable(word)} is no command; did you mean  {printable(typed)}", err=True)
+            raise typer.Exit(ExitCode.BAD_INPUT)
+        return super().resolve_command(ctx, args)
+
+
 app = typer.Typer(
     name="rlacd",
+    cls=Commands,
     help="Approximate convex decomposition: any mesh in, few tight convex hulls out.",
     epilog=EPILOG,
     no_args_is_help=True,

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 import trimesh
 
@@ -19,7 +19,7 @@ from rlacd.solid.balls import Balls
 class Decomposition:
     """A mesh as convex hulls.
 
-    Iterating gives the hulls, ``len`` counts them.
+    Iterating gives the hulls, ``len`` counts them, an index gets one. In a notebook it is shown in 3-D.
 
     Attributes
     ----------
@@ -210,6 +210,60 @@ class Decomposition:
         from rlacd.show import save_report_page
 
         return save_report_page(self, path, up=up)
+
+    def scene(self) -> trimesh.Scene:
+        """Get the hulls as a scene of trimesh: a node and geometry each, ``hull_000`` and so on, in its colour."""
+        from rlacd.formats.encode import hull_name
+        from rlacd.formats.palette import hull_colors
+
+        scene = trimesh.Scene()
+        for index, (hull, color) in enumerate(zip(self.hulls, hull_colors(len(self)), strict=True)):
+            colored = trimesh.Trimesh(hull.vertices, hull.faces, process=False)
+            colored.visual.face_colors = [*color, 255]
+            scene.add_geometry(colored, node_name=hull_name(index), geom_name=hull_name(index))
+        return scene
+
+    def show(self, *, up: Axis = "z") -> Path:
+        """Open a 3-D view of the input and its hulls in the browser; needs no extra and no network.
+
+        Parameters
+        ----------
+        up : {"x", "y", "z"}
+            The axis of the input that points up; files from glTF have y.
+
+        Returns
+        -------
+        pathlib.Path
+            The page, a temporary file: `save_report` writes one to keep.
+
+        Raises
+        ------
+        OptionError
+            `up` is none of those above.
+        """
+        import tempfile
+        import webbrowser
+
+        page = Path(tempfile.mkdtemp(prefix="rlacd-")) / "hulls.html"
+        self.save_report(page, up=up)
+        webbrowser.open(page.as_uri())
+        return page
+
+    def _repr_html_(self) -> str:
+        """Show the 3-D view in a notebook."""
+        from html import escape
+
+        from rlacd.show.html_report import report_page
+
+        page = escape(report_page(self, picture=False))
+        return f'<iframe srcdoc="{page}" style="width:100%;height:600px;border:0"></iframe>'
+
+    @overload
+    def __getitem__(self, index: int) -> trimesh.Trimesh: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[trimesh.Trimesh]: ...
+    def __getitem__(self, index: int | slice) -> trimesh.Trimesh | list[trimesh.Trimesh]:
+        return self.hulls[index]
 
     def __len__(self) -> int:
         return len(self.hulls)

@@ -88,14 +88,19 @@ def summary(result: Decomposition, written: str) -> str:
 def rewrite_summary(done: Rewritten) -> str:
     """Tell the same of a robot: its meshes, each with its number of hulls."""
     total = sum(len(mesh.files) for mesh in done.meshes)
-    lines = [f"{done.path}: {len(done.meshes)} meshes, {total} hulls in {done.folder}"]
+    lines = [f"{done.path}: {counted(len(done.meshes), 'mesh', 'meshes')}, {_count(total)} in {done.folder}"]
     lines += [f"  {mesh.path.name}: {_count(len(mesh.files))}; {_fit(mesh.result.report)}" for mesh in done.meshes]
     lines += [f"  warning: {warning}" for warning in done.warnings]
     return "\n".join(lines)
 
 
+def counted(count: int, one: str, many: str) -> str:
+    """Say how many there are of something."""
+    return f"{count} {one if count == 1 else many}"
+
+
 def _count(hulls: int) -> str:
-    return f"{hulls} hull{'s' * (hulls != 1)}"
+    return counted(hulls, "hull", "hulls")
 
 
 def _time(report: dict[str, Any]) -> str:

@@ -8,11 +8,13 @@ from typing import Annotated
 
 import typer
 
+from rlacd.decompose_command import ROBOTS
+from rlacd.errors import OptionError
 from rlacd.exit_codes import exit_codes, leave
 
 
 def view(
-    mesh: Annotated[Path, typer.Argument(metavar="IN", help="The mesh, as for decompose.")],
+    mesh: Annotated[Path, typer.Argument(metavar="IN", help="The mesh, as for decompose; not a robot.")],
     threshold: Annotated[
         float | None, typer.Option("--threshold", "-t", help="As for decompose; the page changes it.")
     ] = None,
@@ -52,6 +54,8 @@ def view(
     format. Nothing leaves this machine. Ctrl-C ends it.
     """
     with exit_codes():
+        if mesh.suffix.lower() in ROBOTS:
+            raise OptionError(f"{mesh} is a robot; view shows one mesh: give one of those that it names.")
         from rlacd.show.viewer import open_viewer
 
         chosen = {"threshold": threshold, "criterion": criterion, "quality": quality, "max_hulls": max_hulls}

@@ -12,12 +12,16 @@ from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
 
 from rlacd.errors import MeshFileError
+from rlacd.formats.folder import listed_hulls
 from rlacd.solid.files import mesh_files
 
 ENDINGS = (".obj", ".stl", ".ply", ".off", ".glb", ".gltf", ".dae", ".3mf")
 """Of the files that count as meshes, whatever their case."""
 
 EVERYTHING = "**"
+
+HULLS = "_hulls"
+"""What `rlacd decompose` adds to the name of a mesh for that of its hulls."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +69,8 @@ def find_assets(folder: Path, glob: str = EVERYTHING, leave_out: Path | None = N
     Parameters
     ----------
     folder : Path
-        Hidden files and folders in it are passed over, and so are links to folders; links to files are followed.
+        Hidden files and folders in it are passed over, and so are links to folders and hulls that `rlacd decompose` has
+        written there; links to files are followed.
     glob : str
         Which of them: compared with the name if it holds a slash, else with its last part. ``*`` takes slashes too.
     leave_out : Path, optional
@@ -89,9 +94,20 @@ def _names(folder: Path, leave_out: Path | None) -> Iterator[str]:
     for at, folders, files in os.walk(folder, onerror=_refuse):
         here = Path(at)
         folders[:] = [f for f in folders if not f.startswith(".") and (here / f).resolve() != leave_out]
+        hulls = _written_hulls(here, files)
         for file in files:
-            if not file.startswith(".") and PurePosixPath(file).suffix.lower() in ENDINGS:
+            if not file.startswith(".") and PurePosixPath(file).suffix.lower() in ENDINGS and file not in hulls:
                 yield (here / file).relative_to(folder).as_posix()
+
+
+def _written_hulls(folder: Path, files: Sequence[str]) -> set[str]:
+    """Files that `rlacd decompose` wrote beside meshes: ``chair_hulls.glb`` of ``chair.obj``, and those it listed."""
+    meshes = {PurePosixPath(file).stem for file in files if PurePosixPath(file).suffix.lower() in ENDINGS}
+    beside = {
+        file for file in files if (stem := PurePosixPath(file).stem).endswith(HULLS) and stem[: -len(HULLS)] in meshes
+    }
+    listings = [file for file in files if file.endswith(f"{HULLS}.json")]
+    return beside.union(*(listed_hulls(folder / name, name.removesuffix(f"{HULLS}.json")) for name in listings))
 
 
 def _refuse(error: OSError) -> None:

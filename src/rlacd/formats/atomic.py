@@ -16,17 +16,19 @@ def write_file(path: Path, data: bytes) -> None:
     """Put `data` at `path`, whole or not at all.
 
     The bytes go to a hidden file in the same folder, reach the disk, and only then take the name `path`, which
-    replaces an older file in one step. A link is followed: the file it points to is replaced.
+    replaces an older file in one step. A link is followed: the file it points to is replaced. Folders that are missing
+    are made.
 
     Raises
     ------
     OutputError
-        The folder is missing or read-only, the disk is full, ...; what was at `path` is untouched.
+        The folder is read-only, the disk is full, ...; what was at `path` is untouched.
     """
     with output_errors(path):
         final = path.resolve()
         # Not made of the final name, which may be as long as a name can be.
         temporary = final.with_name(f".rlacd-{secrets.token_hex(8)}.tmp")
+        final.parent.mkdir(parents=True, exist_ok=True)
         try:
             _write_to_disk(temporary, data)
             os.replace(temporary, final)

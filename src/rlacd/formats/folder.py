@@ -35,12 +35,13 @@ def write_folder(
         exists = folder.is_dir()
         # Inside an existing folder, not beside it: it may be the root of a disk, and renames cannot leave a disk.
         parent = folder if exists else folder.resolve().parent
+        parent.mkdir(parents=True, exist_ok=True)
         staging = Path(tempfile.mkdtemp(prefix=".rlacd-", suffix=".tmp", dir=parent))
         try:
             for name, data in {**files, listing: contents}.items():
                 write_file(staging / name, data)
             if exists:
-                stale = _listed(folder / listing, stem) - set(files)
+                stale = listed_hulls(folder / listing, stem) - set(files)
                 for name in (*files, listing):
                     os.replace(staging / name, folder / name)
                 then()
@@ -58,7 +59,7 @@ def write_folder(
 def check_names(folder: Path, stem: str, names: Sequence[str]) -> None:
     """Raise OutputError if a file that no run of rlacd has listed would be replaced in a folder of its own naming."""
     with output_errors(folder):
-        ours = _listed(folder / f"{stem}_hulls.json", stem)
+        ours = listed_hulls(folder / f"{stem}_hulls.json", stem)
         taken = [name for name in names if name not in ours and (folder / name).exists()]
     if taken:
         raise OutputError(
@@ -67,7 +68,7 @@ def check_names(folder: Path, stem: str, names: Sequence[str]) -> None:
         )
 
 
-def _listed(listing: Path, stem: str) -> set[str]:
+def listed_hulls(listing: Path, stem: str) -> set[str]:
     """Hull files an earlier run wrote; only names of the form it writes, whatever the list says by now."""
     try:
         names = json.loads(listing.read_bytes())["files"]

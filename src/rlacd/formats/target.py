@@ -72,7 +72,7 @@ def hull_target(path: str | os.PathLike[str], file_format: str | None = None, *,
     Raises
     ------
     OutputError
-        Unknown ending, missing parent folder, no permission, or a folder where a file is meant or the reverse.
+        Unknown ending, no permission, or a folder where a file is meant or the reverse.
     OptionError
         `file_format` is unknown, or given for a single file with another ending; or `one_mesh` for anything but URDF.
     """
@@ -168,9 +168,11 @@ def _check_folder(folder: Path) -> None:
 
 
 def _check_parent(path: Path) -> None:
-    # resolve() follows a link to where the bytes will really go.
+    # resolve() follows a link to where the bytes will really go. Folders that are missing are made with the file.
     parent = path.resolve().parent
+    while not parent.exists() and parent != parent.parent:
+        parent = parent.parent
     if not parent.is_dir():
-        raise OutputError(f"cannot write {path}: the folder {parent} does not exist; create it first.")
+        raise OutputError(f"cannot write {path}: {parent} is a file, not a folder; choose another name.")
     if not os.access(parent, os.W_OK | os.X_OK):
         raise OutputError(f"cannot write {path}: you may not write to {parent}; choose another place.")
