@@ -10,8 +10,9 @@ from typing import Any
 from rlacd._version import __version__
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MissingExtraError, OutputError
-from rlacd.fields import path_like, read
+from rlacd.fields import about, path_like, read
 from rlacd.formats import check_file, write_file
+from rlacd.output_options import OutputOptions
 from rlacd.show.heat import heat_map
 from rlacd.show.page import still_page
 from rlacd.show.picture import check_up, picture_bytes
@@ -75,7 +76,7 @@ def save_report_page(
     OutputError, OptionError
         As for `check_report_page`.
     """
-    place = check_report_page(path, up)
+    place = check_report_page(path, read(about(OutputOptions, "up").kind, "up", up))
     write_file(place, report_page(decomposition, up=up, picture=picture).encode())
     return place
 

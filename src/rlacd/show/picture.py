@@ -13,7 +13,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from rlacd.errors import OutputError
-from rlacd.fields import checked, integer, path_like, read
+from rlacd.fields import about, checked, integer, path_like, read
 from rlacd.formats import check_file, write_file
 from rlacd.formats.palette import linear_from_srgb
 from rlacd.output_options import OutputOptions
@@ -99,7 +99,7 @@ def draw_picture(
     OptionError
         `width`, `samples` or `up` is out of range.
     """
-    place = check_picture(path, up)
+    place = check_picture(path, read(about(OutputOptions, "up").kind, "up", up))
     write_file(place, picture_bytes(decomposition, width=width, samples=samples, up=up))
     return place
 
