@@ -76,7 +76,7 @@ class Preset:
         return said
 
 
-PRESETS: dict[PresetName, Preset] = {
+PRESETS: dict[str, Preset] = {
     "mujoco": Preset("MuJoCo", 64, None, ".xml"),
     "physx": Preset("PhysX", 255, 255, ".usd"),
     "physx-gpu": Preset("PhysX on a GPU", 64, 62, ".usd", slivers=False),
@@ -96,7 +96,7 @@ def find_preset(name: str) -> Preset:
     OptionError
         There is none of that name.
     """
-    known: PresetName = read(one_of(tuple(PRESETS)), "preset", name)
+    known: str = read(one_of(tuple(PRESETS)), "preset", name)
     return PRESETS[known]
 
 
