@@ -72,6 +72,7 @@ class Polytope:
         usable = length > 1e-13 * max(1e-300, length.max(initial=0))
         self.normals = normal[usable] / length[usable, None]
         self.offsets = (vertices @ self.normals.T).max(axis=0)
+        self.area = float(length.sum() / 2)
 
     def height(self, points: Floats) -> Floats:
         """How far [N] points are above the highest facet's plane; negative inside."""

@@ -17,7 +17,8 @@ import numpy.typing as npt
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from fuzz.geometry import Floats, Ints, Polytope, distance_to_triangles, distance_to_union, sampled, why_not_convex
+from fuzz.eye import LEAST_A_HULL, farthest_from_triangles, in_frame, seen_over, seen_under
+from fuzz.geometry import Floats, Ints, Polytope, distance_to_union, sampled, why_not_convex
 from fuzz.recipes import Shape
 from rlacd import PRESETS, NavigableSpace
 
@@ -32,9 +33,6 @@ HAIR = 1e-6
 SAMPLES = 400
 
 THIN = 1e-3
-
-MANY_FACES = 20_000
-"""Unions with more faces are not judged by trying all of them."""
 
 
 @dataclass(frozen=True)
@@ -67,31 +65,26 @@ def finite_faces(shape: Shape) -> Ints:
     return shape.faces[finite[shape.faces].all(axis=1)]
 
 
-def judge(case: Case) -> list[str]:
-    """Ask all judges."""
+def judge(case: Case, samples: int = SAMPLES) -> list[str]:
+    """Ask all judges, who look at about `samples` points of the input and of the hulls each."""
     found = [f"hull {i}: {why}" for i, hull in enumerate(case.hulls) if (why := why_not_convex(*hull))]
     found += limits(case)
     faces = finite_faces(case.shape)
-    used = case.shape.vertices[np.unique(faces)]
-    lower, upper = used.min(axis=0), used.max(axis=0)
-    size = float((upper - lower).max()) / 2
-    if size == 0 or found or "tell nothing apart" in case.warned:
+    if (
+        found
+        or "tell nothing apart" in case.warned
+        or len(np.unique(case.shape.vertices[np.unique(faces)], axis=0)) < 2
+    ):
         return found
-    center = lower / 2 + upper / 2
-    where = np.zeros_like(case.shape.vertices)
-    where[np.unique(faces)] = (used - center) / size
-    corners = where[faces]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    faces = faces[area > 0]
-    hulls = [Polytope((vertices - center) / size, hull_faces) for vertices, hull_faces in case.hulls]
+    where, faces, hulls = in_frame(case.shape.vertices, faces, case.hulls)
     random = np.random.default_rng(0)
     if len(faces):
-        found += coverage(case, where, faces, hulls, random)
-        found += overhang(case, corners, hulls, random)
+        found += coverage(case, where, faces, hulls, random, samples)
+        found += overhang(case, where[faces], hulls, random, samples)
     if case.shape.is_closed:
         solid = filled_solid(where, faces)
         if solid is not None:
-            found += concavity(case, solid, hulls, random)
+            found += concavity(case, solid, hulls, random, samples)
             found += free_space(case, solid, hulls, random)
     return found
 
@@ -112,40 +105,36 @@ def limits(case: Case) -> list[str]:
     return found
 
 
-def coverage(case: Case, where: Floats, faces: Ints, hulls: list[Polytope], random: np.random.Generator) -> list[str]:
+def coverage(
+    case: Case, where: Floats, faces: Ints, hulls: list[Polytope], random: np.random.Generator, samples: int
+) -> list[str]:
     """Every point of the input lies in a hull, or as near as the report says, and says in words if that is far."""
-    missed = float(distance_to_union(sampled(where, faces, SAMPLES, random), hulls).max())
+    missed = seen_under(hulls, where, faces, samples, random)
     said = case.report["hausdorff"]["under"]
     found = []
-    if said is not None and missed > said + ROUNDING:
-        found.append(f"the input leads {missed:.6g} out of the hulls, the report says {said:.6g}")
-    if missed > HONEST_WITHIN + ROUNDING and "from the hulls" not in case.warned:
-        found.append(f"the input leads {missed:.6g} out of the hulls, and no word of it")
+    if said is not None and missed.distance > said + ROUNDING:
+        found.append(f"the input leads {missed.distance:.6g} out of the hulls, the report says {said:.6g}")
+    if missed.distance > HONEST_WITHIN + ROUNDING and "from the hulls" not in case.warned:
+        found.append(f"the input leads {missed.distance:.6g} out of the hulls, and no word of it")
     return found
 
 
-def overhang(case: Case, corners: Floats, hulls: list[Polytope], random: np.random.Generator) -> list[str]:
+def overhang(
+    case: Case, corners: Floats, hulls: list[Polytope], random: np.random.Generator, samples: int
+) -> list[str]:
     """No point of the hulls' outside is farther from the input than the report says, or than the threshold says.
 
     Faces without an area need not be covered, but hulls may reach for them.
     """
-    if len(corners) > MANY_FACES:
-        return []
-    reached = 0.0
-    for hull in hulls:
-        points = sampled(hull.vertices, hull.faces, 60, random)
-        for other in hulls:
-            if other is not hull and len(points):
-                points = points[other.height(points) > 1e-5]
-        if len(points):
-            reached = max(reached, float(distance_to_triangles(points, corners).max()))
+    reached = seen_over(hulls, corners, samples, random)
     said = case.report["hausdorff"]["over"]
     found = []
-    if said is not None and reached > said + 2 * ROUNDING:
-        found.append(f"the hulls reach {reached:.6g} beyond the input, the report says {said:.6g}")
+    if said is not None and reached.distance > said + 2 * ROUNDING:
+        found.append(f"the hulls reach {reached.distance:.6g} beyond the input, the report says {said:.6g}")
     allowed = case.options.get("threshold", math.inf) + HONEST_WITHIN + ROUNDING
-    if reached > allowed and not any(word in case.warned for word in ("exceed", "beyond the input", "Incomplete")):
-        found.append(f"the hulls reach {reached:.6g} beyond the input, and no word of it")
+    is_said = any(word in case.warned for word in ("exceed", "beyond the input", "Incomplete"))
+    if reached.distance > allowed and not is_said:
+        found.append(f"the hulls reach {reached.distance:.6g} beyond the input, and no word of it")
     return found
 
 
@@ -164,7 +153,9 @@ def triangles_of(solid: manifold3d.Manifold) -> tuple[Floats, Ints]:
     return np.array(mesh.vert_properties[:, :3], dtype=np.float64), np.array(mesh.tri_verts, dtype=np.int64)
 
 
-def concavity(case: Case, solid: manifold3d.Manifold, hulls: list[Polytope], random: np.random.Generator) -> list[str]:
+def concavity(
+    case: Case, solid: manifold3d.Manifold, hulls: list[Polytope], random: np.random.Generator, samples: int
+) -> list[str]:
     """What the solid fills of each hull shows how concave its part is at least.
 
     The part lies in the hull's share of the solid, so the share leaves no more of the hull empty than the part does,
@@ -185,18 +176,20 @@ def concavity(case: Case, solid: manifold3d.Manifold, hulls: list[Polytope], ran
         shares = [share for share in (solid ^ body, solid ^ _a_hair_larger(body)) if not share.is_empty()]
         if body.is_empty() or not shares:
             continue  # thinner than booleans can tell
-        points = sampled(hull.vertices, hull.faces, 60, random)
-        least = min(_least_concavity(body, share, points) for share in shares)
+        points = sampled(hull.vertices, hull.faces, max(LEAST_A_HULL, samples // len(hulls)), random)
+        least = min(_least_concavity(body, share, points, random) for share in shares)
         if least > told + 1e-3:
             found.append(f"hull {i} is {least:.6g} concave, the report says {told:.6g} at most")
     return found
 
 
-def _least_concavity(body: manifold3d.Manifold, share: manifold3d.Manifold, points: Floats) -> float:
+def _least_concavity(
+    body: manifold3d.Manifold, share: manifold3d.Manifold, points: Floats, random: np.random.Generator
+) -> float:
     """Bound from below the concavity of a part that lies in a hull's share of the solid, by points of the hull."""
     radius = math.pow(max(0.0, 3 * (body.volume() - share.volume()) / (4 * math.pi)), 1 / 3)
     vertices, faces = triangles_of(share)
-    return max(0.3 * radius, float(distance_to_triangles(points, vertices[faces]).max()))
+    return max(0.3 * radius, farthest_from_triangles(points, vertices[faces], random).distance)
 
 
 def _a_hair_larger(body: manifold3d.Manifold) -> manifold3d.Manifold:

@@ -12,6 +12,7 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import ConvexHull
 
 from rlacd import _native
 from rlacd.errors import OptionError
@@ -156,6 +157,45 @@ def of_facets(hull: Hull, others: list[Hull]) -> Floats:
         if len(points) == 0:
             break
     return points
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, 2**32 - 1), st.integers(2, 7), st.sampled_from([np.float32, np.float64]))
+def test_seams_between_hulls_are_no_surface_of_the_union(seed: int, cuts: int, precision: type) -> None:
+    """Pieces of a cut ball, rounded as a file rounds them: what is outer is what leads out of all pieces.
+
+    The reference asks Qhull's planes: a point of a facet is outer where a step of 1e-5 along its normal leads into no
+    piece, and hidden where it does.
+    """
+    rng = np.random.default_rng(seed)
+    pieces = [manifold3d.Manifold.sphere(1.0, 24)]
+    for _ in range(cuts):
+        normal = rng.normal(size=3)
+        largest = pieces.pop(int(np.argmax([piece.volume() for piece in pieces])))
+        pieces += largest.split_by_plane(normal / np.linalg.norm(normal), rng.uniform(-0.2, 0.2))
+    solids = [from_manifold(piece) for piece in pieces if piece.volume() > 1e-9]
+    hulls = [hull for solid in solids if (hull := Hull.of(solid.vertices.astype(precision).astype(np.float64)))]
+    planes = [ConvexHull(hull.vertices).equations for hull in hulls]
+    points, normals = (np.vstack(both) for both in zip(*map(of_hull, hulls), strict=True))
+    stepped = points + 1e-5 * normals
+    height = np.min([(stepped @ e[:, :3].T + e[:, 3]).max(axis=1) for e in planes], axis=0)
+    vertices, faces = hull_union(hulls).exposed()
+    away = _native.Surface(vertices, faces).distance(points)
+    assert away[height > 1e-6].max() < 5e-6
+    deep = height < -5e-6  # not at the rim of a seam, where both are near
+    assert deep.sum() > 100
+    assert (away[deep] > 1e-6).all()
+    ball = from_manifold(manifold3d.Manifold.sphere(1.0, 24))
+    assert hull_distances(hulls, ball.vertices, ball.faces, TOLERANCE).over[1] < 2 * TOLERANCE
+    assert _native.Surface(ball.vertices, ball.faces).distance(points[deep]).max() > 0.2  # what the seams would say
+
+
+def of_hull(hull: Hull) -> tuple[Floats, Floats]:
+    """Points of the facets, by area, and the facets' normals."""
+    points, faces = _native.sample_surface(hull.vertices, hull.faces, 3000, 1)
+    corners = hull.vertices[hull.faces[faces]]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return points, normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
 def test_distance_to_the_union_is_that_to_the_nearest_hull() -> None:

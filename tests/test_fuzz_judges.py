@@ -12,6 +12,7 @@ from trimesh import creation
 
 import rlacd
 from fuzz.choices import draw_options
+from fuzz.eye import farthest_from_triangles, in_frame, outer_points, seen_over, seen_under
 from fuzz.files import read_hulls, write_mesh
 from fuzz.geometry import Polytope, distance_to_triangles, distance_to_union, why_not_convex
 from fuzz.judges import Case, judge
@@ -109,6 +110,58 @@ def _cubes() -> list[tuple[Any, Any]]:
         (solid.vertices, solid.faces)
         for solid in map(from_manifold, (box((0, 0, 0), (1, 1, 1)), box((1, 0, 0), (3, 1, 1))))
     ]
+
+
+def test_the_farthest_point_is_that_of_trying_all() -> None:
+    random = np.random.default_rng(5)
+    for size in (0.01, 0.3, 2.0):
+        corners = random.uniform(-1, 1, (300, 1, 3)) + size * random.normal(size=(300, 3, 3))
+        points = 2 * random.normal(size=(1000, 3))
+        distance = distance_to_triangles(points, corners)
+        found = farthest_from_triangles(points, corners, random)
+        assert found.distance == pytest.approx(distance.max(), abs=1e-12)
+        np.testing.assert_array_equal(found.point, points[distance.argmax()])
+    assert farthest_from_triangles(np.zeros((0, 3)), corners, random).distance == 0
+
+
+@pytest.mark.parametrize("step", [0, 1e-7, -1e-7])
+def test_a_seam_between_hulls_is_not_outer(step: float) -> None:
+    cubes = [
+        (np.add(vertices, [step * (i == 1), 0, 0]), faces.astype(np.int64))
+        for i, (vertices, faces) in enumerate(_cubes())
+    ]
+    hulls = [Polytope(*cube) for cube in cubes]
+    points = outer_points(hulls, 20_000, np.random.default_rng(1))
+    on_seam = (np.abs(points[:, 0] - 1) < 1e-5) & (np.abs(points[:, 1:] - 0.5) < 0.49).all(axis=1)
+    assert len(points) > 10_000
+    assert not on_seam.any()
+    apart = [hulls[0], Polytope(cubes[1][0] + [1e-3, 0, 0], cubes[1][1])]
+    points = outer_points(apart, 20_000, np.random.default_rng(1))
+    assert ((points[:, 0] == 1) & (np.abs(points[:, 1:] - 0.5) < 0.49).all(axis=1)).sum() > 100
+
+
+def test_samples_come_as_near_as_a_report_may_be_off() -> None:
+    """What the eye sees is never more than certified, and with enough samples hardly less."""
+    for seed in (2, 5, 12):
+        shape = make_shape(seed)
+        result = rlacd.decompose((shape.vertices, shape.faces), quality="fast")
+        hulls = [(np.array(hull.vertices), np.array(hull.faces, dtype=np.int64)) for hull in result]
+        where, faces, placed = in_frame(shape.vertices, shape.faces, hulls)
+        over = seen_over(placed, where[faces], 20_000, np.random.default_rng(0)).distance
+        under = seen_under(placed, where, faces, 20_000, np.random.default_rng(0)).distance
+        said = result.report["hausdorff"]
+        assert over <= said["over"] + 1e-5
+        assert over >= said["over"] - 0.01
+        assert under <= said["under"] + 1e-5
+        assert under >= said["under"] - 0.01
+
+
+def test_hulls_a_little_too_large_or_too_small_are_seen() -> None:
+    good = case()
+    assert judge(good, samples=5000) == []
+    for factor, words in ((1.1, "beyond the input"), (0.98, "out of the hulls")):
+        other = [(factor * (points - points.mean(axis=0)) + points.mean(axis=0), faces) for points, faces in good.hulls]
+        assert any(words in found for found in judge(replace(good, hulls=other), samples=5000))
 
 
 @pytest.mark.parametrize("ending", ["obj", "ply"])
