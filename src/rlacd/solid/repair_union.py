@@ -8,17 +8,40 @@ from manifold3d import Error, Manifold, Mesh64, OpType
 
 from rlacd import _native
 from rlacd.solid.frame import FloatArray
-from rlacd.solid.topology import IntArray
+from rlacd.solid.topology import IntArray, face_areas, signed_tetrahedra
+
+# Where manifold3d moves faces by more than `_MOVED` on average, corners are moved by less than `_HAIR` (frame units).
+_MOVED, _HAIR = 1e-5, 1e-9
 
 # Uniting takes time per mesh even where nothing overlaps; above this many, meshes are put side by side instead.
 MOST_UNITED = 4000
 
 
 def to_manifold(vertices: FloatArray, faces: IntArray) -> Manifold:
-    """Return the solid a closed, oriented mesh bounds; the solid is empty if the mesh is not closed."""
+    """Return the solid a closed, oriented mesh bounds; the solid is empty if the mesh is not closed.
+
+    Where a face is folded back onto its neighbour, in one plane, manifold3d takes it for degenerate and flips its edges
+    and those around it: surfaces came back up to 0.1 away. Such a solid is built again, each corner moved by a hair, so
+    that no two faces lie in one plane.
+    """
+    manifold = _taken_over(vertices, faces)
+    if manifold.is_empty() or (moved := _moved(manifold, vertices, faces)) <= _MOVED:
+        return manifold
+    hair = np.random.default_rng(0).uniform(-_HAIR / 2, _HAIR / 2, np.shape(vertices))
+    other = _taken_over(vertices + hair, faces)
+    return manifold if other.is_empty() or _moved(other, vertices, faces) >= moved else other
+
+
+def _taken_over(vertices: FloatArray, faces: IntArray) -> Manifold:
     mesh = Mesh64(np.ascontiguousarray(vertices, dtype=np.float64), np.ascontiguousarray(faces, dtype=np.uint64))
     manifold = Manifold(mesh)
     return manifold if manifold.status() == Error.NoError else Manifold()
+
+
+def _moved(manifold: Manifold, vertices: FloatArray, faces: IntArray) -> float:
+    """How far manifold3d moved the faces, on average, as far as the volume tells."""
+    area = float(face_areas(vertices, faces).sum())
+    return abs(manifold.volume() - float(signed_tetrahedra(vertices, faces).sum())) / area if area > 0 else 0.0
 
 
 def to_arrays(manifold: Manifold) -> tuple[FloatArray, IntArray]:
