@@ -6,12 +6,13 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from rlacd.errors import EmptyMeshError
 from rlacd.solid.load import load_mesh
 from rlacd.solid.repair import GAP, HALF_THICKNESS, repair
 from rlacd.solid.repair_caps import HOLE
-from rlacd.solid.repair_union import to_arrays
+from rlacd.solid.repair_union import to_arrays, to_manifold
 
 BOX = trimesh.creation.box(extents=(2, 2, 2))
 
@@ -468,3 +469,28 @@ def test_bodies_side_by_side_are_no_cavities_whatever_their_windings():
     ball = trimesh.creation.icosphere(subdivisions=2)
     mesh = join(moved(ball, -2, 0, 0), inverted(moved(ball, 2, 0, 0)))
     assert volume(solid_of(mesh, keep_cavities=True)) == pytest.approx(2 * ball.volume)
+
+
+FOLDED = (
+    np.array([[2.0, 1, 0], [0, 1, 0], [0, 1, 1], [2, 1, 1], [0, 0, 0], [2, 0, 0], [2, 0, 1]]),
+    np.array(
+        [[0, 1, 2], [0, 2, 3], [4, 0, 5], [0, 4, 1], [4, 2, 1], [6, 0, 3], [0, 6, 5], [4, 5, 2], [5, 3, 2], [5, 6, 3]]
+    ),
+)
+"""A wedge of volume 1, its last face folded back onto its neighbours; turned, most come out of manifold3d changed."""
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_folded_faces_stay_where_they_are(seed):
+    vertices, faces = FOLDED
+    turned = np.ascontiguousarray(vertices @ Rotation.random(random_state=seed).as_matrix())
+    assert to_manifold(turned, faces).volume() == pytest.approx(1, abs=1e-4)
+
+
+def test_a_closed_mesh_with_folds_is_kept(corpus):
+    solid = repair(load_mesh(corpus / "train/kenney_cc0/graveyard_kit__debris.ply"))
+    check_closed(solid)
+    vertices, faces = solid.surface
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    assert steps(solid) == ["closed"]
+    assert solid.manifold.volume() == pytest.approx(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6, abs=1e-6)
