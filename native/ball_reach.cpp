@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "stop.hpp"
+
 namespace rlacd {
 namespace {
 
@@ -142,6 +144,7 @@ bool BallReach::may_be_reached(const std::vector<std::int32_t>& cells, std::int3
   for (const std::int32_t cell : cells)
     if (mark_[cell] != kShut && enter(cell)) return true;
   for (std::size_t next = 0; next < open.size(); ++next) {
+    poll_stop();
     bool found = false;
     for_neighbours(open[next], [&](std::int32_t cell) {
       if (!found && mark_[cell] != kShut && may_be_free(cell)) found = enter(cell);
@@ -172,6 +175,7 @@ void BallReach::grow(const std::vector<std::int32_t>& points, const std::vector<
     });
   }
   for (std::size_t next = 0; next < open.size() && !reached(points[0]); ++next) {
+    poll_stop();
     const std::int32_t cell = open[next];
     for_neighbours(cell, [&](std::int32_t neighbour) {
       if (mark_[neighbour] == region) return;
@@ -203,6 +207,7 @@ void BallReach::look_closely(const std::vector<std::int32_t>& points, int thread
   }
   mark_.assign(grid_.size(), -1);
   for (std::size_t r = 0; r < regions.size(); ++r) {
+    poll_stop();
     if (reached(regions[r][0])) continue;  // through a region that came before
     std::vector<std::int32_t> cells;
     for (const std::int32_t point : regions[r]) {

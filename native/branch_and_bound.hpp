@@ -23,6 +23,7 @@
 
 #include "geometry.hpp"
 #include "parallel.hpp"
+#include "stop.hpp"
 
 namespace rlacd {
 
@@ -137,6 +138,7 @@ Interval maximize(Field& field, const Mesh& mesh, const Goal& goal) {
   std::vector<Sample> at_vertex(mesh.vertices.size());
   std::vector<Cell> heap;
   for (const Triangle& face : mesh.faces) {
+    poll_stop();
     Cell cell;
     cell.corner = corners_of(mesh, face);
     cell.upper = field.quick_upper(cell.corner);
@@ -173,6 +175,7 @@ Interval maximize(Field& field, const Mesh& mesh, const Goal& goal) {
 
   std::make_heap(heap.begin(), heap.end(), lower_first);
   for (std::size_t looked_at = 0; !heap.empty() && looked_at < kMostCells; ++looked_at) {
+    poll_stop();
     if (heap.front().upper <= needed()) break;
     std::pop_heap(heap.begin(), heap.end(), lower_first);
     const Cell cell = heap.back();

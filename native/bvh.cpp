@@ -2,6 +2,8 @@
 
 #include <numeric>
 
+#include "stop.hpp"
+
 namespace rlacd {
 namespace {
 
@@ -105,6 +107,7 @@ Bvh::Bvh(const Mesh& mesh) {
   nodes_.emplace_back();
   std::vector<Range> open = {{items.begin(), items.end(), 0, 0}};
   while (!open.empty()) {
+    poll_stop();
     const Range range = open.back();
     open.pop_back();
     // A mesh of one triangle has no two halves: its second child stays an empty leaf.

@@ -5,6 +5,8 @@
 #include <array>
 #include <numeric>
 
+#include "stop.hpp"
+
 namespace rlacd {
 
 namespace {
@@ -165,6 +167,7 @@ std::vector<ReflexEdge> spread_out(std::vector<Contender>& contenders, const Pla
   std::vector<ReflexEdge> chosen;
   std::vector<double> score(contenders.size());
   while (chosen.size() < count) {
+    poll_stop();
     std::transform(contenders.begin(), contenders.end(), score.begin(), [](const Contender& c) { return c.score(); });
     const double enough = (1 - kTie) * *std::max_element(score.begin(), score.end());
     const auto place = std::find_if(score.begin(), score.end(), [enough](double s) { return s >= enough; });

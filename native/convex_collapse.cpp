@@ -5,6 +5,8 @@
 #include <map>
 #include <utility>
 
+#include "stop.hpp"
+
 namespace rlacd {
 namespace {
 
@@ -145,6 +147,7 @@ std::optional<ConvexCollapse::Collapse> ConvexCollapse::plan(std::int32_t from, 
 }
 
 void ConvexCollapse::schedule(std::int32_t from, std::int32_t to) {
+  poll_stop();
   if (const std::optional<Collapse> collapse = plan(from, to)) {
     heap_.push_back(*collapse);
     std::push_heap(heap_.begin(), heap_.end());

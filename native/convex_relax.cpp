@@ -5,6 +5,7 @@
 
 #include "hull.hpp"
 #include "linear_program.hpp"
+#include "stop.hpp"
 
 namespace rlacd {
 namespace {
@@ -53,6 +54,7 @@ Mesh relax_around(Mesh outer, const Mesh& inner, int sweeps) {
     const std::vector<std::vector<RingEdge>> around = rings(outer);
     std::vector<Vec3>& v = outer.vertices;
     for (std::size_t w = 0; w < v.size(); ++w) {
+      poll_stop();
       constraints.clear();
       Vec3 objective;
       bool sound = true;

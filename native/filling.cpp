@@ -4,6 +4,7 @@
 #include <queue>
 
 #include "hull.hpp"
+#include "stop.hpp"
 
 namespace rlacd {
 namespace {
@@ -172,6 +173,7 @@ bool Filling::comes_deeper(const Mesh& hull, double threshold) const {
   const std::vector<Bvh::Node>& nodes = surface_.bvh().nodes();
   std::vector<std::int32_t> open = {0};
   while (!open.empty()) {
+    poll_stop();
     const Bvh::Node& node = nodes[open.back()];
     open.pop_back();
     for (int side = 0; side < 2; ++side) {
@@ -193,6 +195,7 @@ bool Filling::is_missed(const Mesh& hull, const std::vector<Triangle>& facets, d
   std::priority_queue<Cell> open;
   // Whether the middle of a cell is missed; the cell stays open where another point of it may be.
   const auto look_at = [&](Cell cell) {
+    poll_stop();
     if (cell.radius < kSmall * threshold) return false;
     const double enough = std::max(0.0, threshold - cell.radius), within = threshold + cell.radius;
     const Bvh::Hit hit = surface_.bvh().closest(cell.middle, cell.hint, enough, within);

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "stop.hpp"
+
 namespace rlacd {
 
 namespace {
@@ -142,6 +144,7 @@ void append_untouched(Mesh& out, const Mesh& a, const Mesh& b, const Box& common
   out.vertices.insert(out.vertices.end(), a.vertices.begin(), a.vertices.end());
   std::vector<Polygon> polygons;
   for (const Triangle& face : a.faces) {
+    poll_stop();
     const Facet facet(a, face);
     if (facet.height <= kCoincident) continue;  // its edges are those of its neighbours
     bool whole = true;
@@ -210,6 +213,7 @@ std::vector<Vec3> outward_where_touching(const Mesh& a, const Mesh& b) {
   const std::vector<Facet> others = facets_within(b, box_a);
   std::vector<Vec3> outward(a.vertices.size());
   for (const Triangle& face : a.faces) {
+    poll_stop();
     const Facet facet(a, face);
     if (facet.height <= kCoincident || !overlap(facet.box, box_b)) continue;
     if (std::none_of(others.begin(), others.end(), [&](const Facet& other) { return share_area(facet, other); }))

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "predicates.hpp"
+#include "stop.hpp"
 
 namespace rlacd {
 
@@ -13,7 +14,8 @@ namespace {
 
 constexpr double kRoundoff = 0x1p-53;
 constexpr int kExactRange = 100;  // largest binary exponent of coordinates, either way, that is not scaled away
-constexpr double kFat = 1e-2;     // least ratio of inradius to extent for which the tolerance applies
+constexpr std::int32_t kBetweenPolls = 4096;
+constexpr double kFat = 1e-2;  // least ratio of inradius to extent for which the tolerance applies
 
 }  // namespace
 
@@ -178,7 +180,10 @@ void HullBuilder::add(const std::vector<Vec3>& points) {
   const auto clearly = [this, fat](const Facet& f, Vec3 p) {
     return (!fat || height(f, p) >= tolerance_ * norm(f.normal)) && sees(f, p);
   };
-  for (auto i = first; i < static_cast<std::int32_t>(points_.size()); ++i) assign(i, alive, clearly);
+  for (auto i = first; i < static_cast<std::int32_t>(points_.size()); ++i) {
+    if ((i - first) % kBetweenPolls == 0) poll_stop();
+    assign(i, alive, clearly);
+  }
   std::vector<std::int32_t> pending;
   for (const std::int32_t id : alive)
     if (facets_[id].outside >= 0) pending.push_back(id);
@@ -189,6 +194,7 @@ void HullBuilder::add(const std::vector<Vec3>& points) {
 // every facet with such a list is in `pending`.
 void HullBuilder::expand(std::vector<std::int32_t>& pending) {
   while (!pending.empty()) {
+    poll_stop();
     const std::int32_t id = pending.back();
     const Facet& f = facets_[id];
     if (!f.alive || f.outside < 0) {

@@ -1,6 +1,14 @@
 #include "hull_balls.hpp"
 
+#include "stop.hpp"
+
 namespace rlacd {
+
+namespace {
+
+constexpr std::size_t kBetweenPolls = 256;
+
+}  // namespace
 
 std::vector<Intrusion> intrusions(const ConvexBody& hull, const std::vector<Vec3>& centres,
                                   const std::vector<double>& radii, const std::vector<std::int32_t>* candidates,
@@ -10,6 +18,7 @@ std::vector<Intrusion> intrusions(const ConvexBody& hull, const std::vector<Vec3
   const std::size_t count = candidates != nullptr ? candidates->size() : centres.size();
   std::int32_t separating = 0;
   for (std::size_t i = 0; i < count; ++i) {
+    if (i % kBetweenPolls == 0) poll_stop();
     const std::int32_t ball = candidates != nullptr ? (*candidates)[i] : static_cast<std::int32_t>(i);
     const Vec3 c = centres[ball];
     const double radius = radii[ball], enough = radius - least;

@@ -6,6 +6,8 @@
 #include <numeric>
 #include <unordered_map>
 
+#include "stop.hpp"
+
 namespace rlacd {
 
 namespace {
@@ -39,6 +41,7 @@ class Cutter {
     std::vector<Triangle> faces;
     std::vector<Edge> in_plane;
     for (const Triangle& f : mesh_.faces) {
+      poll_stop();
       const int s[3] = {which * sides_[f[0]], which * sides_[f[1]], which * sides_[f[2]]};
       if (std::max({s[0], s[1], s[2]}) <= 0 && (std::min({s[0], s[1], s[2]}) < 0 || !bounds(f, which))) continue;
       std::int32_t polygon[4];

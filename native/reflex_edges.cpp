@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "stop.hpp"
+
 namespace rlacd {
 
 namespace {
@@ -69,6 +71,7 @@ std::vector<ReflexEdge> reflex_edges(const Mesh& mesh) {
 
   Buckets buckets = by_smaller_vertex(mesh);
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    poll_stop();
     const auto begin = buckets.halfedges.begin() + static_cast<std::ptrdiff_t>(buckets.start[v]);
     const auto end = buckets.halfedges.begin() + static_cast<std::ptrdiff_t>(buckets.start[v + 1]);
     std::sort(begin, end, [](const Halfedge& h, const Halfedge& g) {

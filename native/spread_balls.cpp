@@ -6,6 +6,7 @@
 
 #include "ball_reach.hpp"
 #include "parallel.hpp"
+#include "stop.hpp"
 
 namespace rlacd {
 namespace {
@@ -284,6 +285,7 @@ class Spreading {
     std::vector<Taken> by_size;  // spacings of [2^i, 2^(i + 1)) times the least
     std::vector<std::int32_t> taken;
     for (const std::int32_t c : order) {
+      poll_stop();
       const double spacing = kBallSpacing * candidates[c].radius;
       if (std::any_of(by_size.begin(), by_size.end(),
                       [&](const Taken& some) { return some.blocks(candidates[c].at, spacing, candidates); }))

@@ -3,6 +3,7 @@
 #include <unordered_map>
 
 #include "clip.hpp"
+#include "stop.hpp"
 #include "surface_field.hpp"
 
 namespace rlacd {
@@ -154,6 +155,7 @@ HullUnion::Exposed HullUnion::exposed(double gap, int threads) const {
     std::vector<std::int32_t> between(members_.size(), -1);  // the plane that the last facet lay beyond
     Clipper clipper;
     for (const Triangle& face : mesh.faces) {
+      poll_stop();
       const Corners corner = corners_of(mesh, face);
       const Vec3 normal = normalized(cross(corner[1] - corner[0], corner[2] - corner[0]));
       const Box box = box_of(corner);
@@ -223,6 +225,7 @@ Interval HullUnion::under(const Mesh& surface, double tolerance, int threads) co
   });
   std::vector<std::vector<Polygon>> outside(surface.faces.size());
   for_each(outside.size(), [&](std::size_t f, Clipper& clipper) {
+    poll_stop();
     const auto [a, b, c] = surface.faces[f];
     if (have_common(holders[a], holders[b], holders[c])) return;
     const Corners corner = corners_of(surface, surface.faces[f]);

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 from rlacd import _native
+from rlacd._native import Stopped
 from rlacd.clock import Clock
 from rlacd.criteria import Criterion
 from rlacd.policies import Policy
@@ -99,14 +100,19 @@ class CutTree:
         left: list[Component] = []
         frontier = [self.root]
         while frontier:
-            verdicts = self._workers.map(criterion.is_met, frontier)
-            done += [c for c, met in zip(frontier, verdicts, strict=True) if met]
-            unmet = [c for c, met in zip(frontier, verdicts, strict=True) if not met]
-            if not clock.step(len(done), None, len(done) + len(left) + len(unmet)):
+            unmet = frontier
+            try:
+                verdicts = self._workers.map(criterion.is_met, frontier)
+                done += [c for c, met in zip(frontier, verdicts, strict=True) if met]
+                unmet = [c for c, met in zip(frontier, verdicts, strict=True) if not met]
+                if not clock.step(len(done), None, len(done) + len(left) + len(unmet)):
+                    return done, left + unmet
+                if len(done) + len(left) + 2 * len(unmet) > most:  # each becomes two at least
+                    return done, left + unmet
+                self._divide([c for c in unmet if c not in self._children])
+            except Stopped:
+                clock.note_stop()
                 return done, left + unmet
-            if len(done) + len(left) + 2 * len(unmet) > most:  # each becomes two at least
-                return done, left + unmet
-            self._divide([c for c in unmet if c not in self._children])
             frontier = []
             for component in unmet:
                 frontier += self._children[component]
@@ -120,7 +126,7 @@ class CutTree:
         whole = [c for c, own in zip(components, pieces, strict=True) if own == [c]]
         threads = self._workers.share(len(whole))
         planes = self._workers.map(lambda c: self._policy.choose(c, threads), whole)
-        self._children.update(zip(components, pieces, strict=True))
+        self._children.update((c, own) for c, own in zip(components, pieces, strict=True) if own != [c])
         for component, plane in zip(whole, planes, strict=True):
             self._children[component] = [] if plane is None else self._divisions.sides(component, plane)
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+from rlacd._native import Stopped
 from rlacd.clock import Clock
 from rlacd.criteria import Criterion
 from rlacd.cut import CutTree
 from rlacd.finish import drop_slivers, merge_parts
-from rlacd.solid.component import Part
+from rlacd.solid.component import Component, Part
 from rlacd.workers import Workers
 
 
@@ -67,15 +69,30 @@ def cut_and_merge(
         pieces: list[Part] = [*done, *left]
         if strict and len(pieces) > most:
             return Pass(pieces, [*left], pieces, criterion)
-        if clock.stopped_by is None:
-            pieces = drop_slivers(pieces, workers, suspects=left)
-            criterion = criterion.settled(pieces)
+        try:
+            if clock.stopped_by is None:
+                pieces = drop_slivers(pieces, workers, suspects=left)
+                criterion = criterion.settled(pieces)
+        except Stopped:
+            clock.note_stop()
+        if clock.stopped_by is not None and not strict:
+            left = _apart(left, clock)
+            pieces = [*done, *left]
         kept = {id(part) for part in pieces}
         unmet: list[Part] = [part for part in left if id(part) in kept]
     if not merge or (strict and unmet):
         return Pass(pieces, unmet, pieces, criterion)
     with clock.stage("merge"):
         parts = merge_parts(pieces, criterion, workers, clock, solid=tree.root)
-        if clock.stopped_by is None:
-            parts = drop_slivers(parts, workers)
+        try:
+            if clock.stopped_by is None:
+                parts = drop_slivers(parts, workers)
+        except Stopped:
+            clock.note_stop()
     return Pass(pieces, unmet, parts, criterion)
+
+
+def _apart(components: Sequence[Component], clock: Clock) -> list[Component]:
+    """Components that there was no time to cut: the connected pieces of each are its own at least."""
+    with clock.shielded():
+        return [piece for component in components for piece in component.pieces()]

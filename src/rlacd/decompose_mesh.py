@@ -5,19 +5,20 @@ from __future__ import annotations
 import math
 import os
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
+from rlacd._native import Stopped
 from rlacd.clock import Clock
 from rlacd.criteria import Concavity, Criterion, NavigableSpace
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.decomposition import Decomposition
 from rlacd.fields import check_callback
-from rlacd.finish import drop_slivers, in_input, limit_part, merge_to_count, with_limits
+from rlacd.finish import drop_slivers, in_input, limit_part, limit_roughly, merge_to_count, with_limits
 from rlacd.options import CONCAVITY, DEFAULT_RESOLUTION, DEFAULT_THRESHOLD, OPTION_NAMES, Options, QualityName
 from rlacd.planes.views import Views
 from rlacd.policies import AS_PUBLISHED, make_policy
@@ -26,8 +27,10 @@ from rlacd.progress import ProgressCallback
 from rlacd.renamed import with_former
 from rlacd.report import make_report
 from rlacd.search import do_without, level, search
+from rlacd.search.levels import Account
 from rlacd.solid.component import Component, Part
-from rlacd.solid.load import load_mesh
+from rlacd.solid.cover import cover
+from rlacd.solid.load import InputMesh, load_mesh
 from rlacd.solid.repair import repair
 from rlacd.solid.solid import Solid
 from rlacd.workers import Workers
@@ -93,7 +96,8 @@ def decompose(
     threads : int, optional
         Threads to use; all processors by default. The result does not depend on it.
     timeout : float, optional
-        Seconds after which the decomposition reached so far is returned.
+        Seconds after which the decomposition reached so far is returned: at most 1 s and 10 % later for inputs of up to
+        a million triangles. It covers the input in any case, at worst with a hull for each of its bodies.
     quality : str, optional
         ``fast``: one pass of cuts; on navigable space, parts that can be divided among others go then, unless the
         policy stands for a published method (``navacd``, ``greedy-SCORE``). ``balanced``, the default where parts are
@@ -110,7 +114,8 @@ def decompose(
         ``bullet``. Its limits hold where `max_vertices` and `max_faces` are not given, and ``report["warnings"]`` says
         what it will not take; see `rlacd.PRESETS`.
     progress : callable, optional
-        Called with a `Progress` between steps; when it returns False, the decomposition reached so far is returned.
+        Called with a `Progress` between steps, and several times a second during long ones; when it returns False, the
+        decomposition reached so far is returned as soon as after a timeout.
     threshold_m : float, optional
         The former name of `threshold_abs`.
 
@@ -134,29 +139,81 @@ def decompose(
     check_callback("progress", progress, "a `rlacd.Progress`")
     make_policy(options.policy)  # what is wrong with a network is said before any work is done
     clock = Clock(options.timeout, progress)
-    with Workers(options.threads) as workers:
+    with clock.running(), Workers(options.threads, clock.stop) as workers:
         with clock.stage("load"):
             source = load_mesh(mesh)
+        reached = _decomposed(source, options, workers, clock)
+        solid, goal = reached.solid, reached.goal
+        clock.nothing_left_to_stop()
+        with clock.stage("finish"):
+            limits = options.max_vertices, options.max_faces
+            parts = clock.if_in_time(
+                lambda: _cleaned(reached, *limits, workers),
+                lambda: [limit_roughly(part, *limits) for part in reached.parts],
+            )
+            with clock.shielded():
+                hulls = workers.map(lambda part: in_input(part.hull, solid.frame, *limits), parts)
+        with clock.stage("measure"):
+            report = make_report(solid, parts, hulls, reached.options, goal, workers, clock)
+    report = {
+        "name": Path(source.name).stem if isinstance(mesh, (str, os.PathLike)) else "mesh",
+        **report,
+        "search": None if reached.found is None else reached.found.as_plain(),
+        "seconds": {**clock.seconds, "total": clock.elapsed},
+    }
+    return Decomposition(
+        hulls,
+        report,
+        trimesh.Trimesh(source.vertices, source.faces, process=False),
+        goal.obstacles.in_input(solid.frame) if goal.obstacles is not None else None,
+    )
+
+
+class _Reached(NamedTuple):
+    """What a decomposition has come to: as asked for, or what there was when it was stopped."""
+
+    solid: Solid
+    options: Options
+    goal: Criterion
+    parts: list[Part]
+    found: Account | None = None
+
+
+def _cleaned(reached: _Reached, max_vertices: int | None, max_faces: int | None, workers: Workers) -> list[Part]:
+    """The parts without slivers, inside the limits."""
+    parts = drop_slivers(reached.parts, workers)
+    return workers.map(lambda part: limit_part(part, max_vertices, max_faces), parts)
+
+
+def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Clock) -> _Reached:
+    """Repair, cut, merge and search, until all is done or the clock stops it."""
+    try:
         with clock.stage("repair"):
             solid = repair(
                 source,
                 resolution=options.resolution,
                 threads=workers.threads,
-                keep_cavities=isinstance(criterion, NavigableSpace) and criterion.sees_cavities,
+                keep_cavities=isinstance(options.criterion, NavigableSpace) and options.criterion.sees_cavities,
             )
         options = options.at_scale(solid.frame.scale)
         goal = _prepared(options, solid, workers, clock)
-        if options.max_hulls is None:  # otherwise the threshold may be exceeded anyway
-            goal = with_limits(goal, options.max_vertices, options.max_faces)
         root = Component(solid.manifold)
-        views = Views()
-        tree = CutTree(root, make_policy(options.policy, views, _scale(goal)), workers)
-        parts, goal = _parts(tree, goal, options, workers, clock)
-        may_be_divided = options.merge and goal.obstacles is not None and options.policy not in AS_PUBLISHED
+    except Stopped:
+        clock.note_stop()
+        solid, parts = cover(source, clock)
+        options = options.at_scale(solid.frame.scale)
+        return _Reached(solid, options, _unprepared(options, solid), parts)
+    if options.max_hulls is None:  # otherwise the threshold may be exceeded anyway
+        goal = with_limits(goal, options.max_vertices, options.max_faces)
+    views = Views()
+    tree = CutTree(root, make_policy(options.policy, views, _scale(goal)), workers)
+    parts, goal = _parts(tree, goal, options, workers, clock)
+    may_be_divided = options.merge and goal.obstacles is not None and options.policy not in AS_PUBLISHED
+    found = None
+    try:
         if may_be_divided and clock.stopped_by is None:
             with clock.stage("search"):
                 parts = do_without(root, parts, goal, workers, clock, options.seed)
-        found = None
         assert options.quality is not None
         if options.quality != "fast" and clock.stopped_by is None:
             bounds = level(options.quality, options.budget, options.search_steps)
@@ -174,27 +231,9 @@ def decompose(
                     options.max_hulls,
                     first=options.policy,
                 )
-        clock.nothing_left_to_stop()
-        with clock.stage("finish"):
-            parts = drop_slivers(parts, workers)
-            parts = workers.map(lambda part: limit_part(part, options.max_vertices, options.max_faces), parts)
-            hulls = workers.map(
-                lambda part: in_input(part.hull, solid.frame, options.max_vertices, options.max_faces), parts
-            )
-        with clock.stage("measure"):
-            report = make_report(solid, parts, hulls, options, goal, workers, clock)
-    report = {
-        "name": Path(source.name).stem if isinstance(mesh, (str, os.PathLike)) else "mesh",
-        **report,
-        "search": None if found is None else found.as_plain(),
-        "seconds": {**clock.seconds, "total": clock.elapsed},
-    }
-    return Decomposition(
-        hulls,
-        report,
-        trimesh.Trimesh(source.vertices, source.faces, process=False),
-        goal.obstacles.in_input(solid.frame) if goal.obstacles is not None else None,
-    )
+    except Stopped:
+        clock.note_stop()
+    return _Reached(solid, options, goal, parts, found)
 
 
 def _scale(criterion: Criterion) -> float | None:
@@ -206,6 +245,12 @@ def _prepared(options: Options, solid: Solid, workers: Workers, clock: Clock) ->
     if isinstance(options.criterion, NavigableSpace):
         with clock.stage("space"):
             return options.criterion.prepare(solid, workers.threads)
+    return Concavity(options.threshold)
+
+
+def _unprepared(options: Options, solid: Solid) -> Criterion:
+    if isinstance(options.criterion, NavigableSpace):
+        return options.criterion.unprepared(solid.frame.scale)
     return Concavity(options.threshold)
 
 
@@ -222,7 +267,11 @@ def _parts(
     while True:
         with clock.stage("merge"):
             few = merge_to_count(parts, options.max_hulls, criterion, workers, clock, worst=least)
-            error = max(workers.map(criterion.error, few)) if few else np.inf
+            try:
+                error = max(workers.map(criterion.error, few)) if few else np.inf
+            except Stopped:
+                clock.note_stop()
+                error = np.inf
         if few and (not best or (len(few) <= options.max_hulls and error < least)):
             best, least = few, error
         if len(parts) <= options.max_hulls or clock.stopped_by is not None:

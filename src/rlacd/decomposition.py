@@ -43,7 +43,8 @@ class Decomposition:
         ``parts``, ``faces``, ``vertices`` : int
             Number of hulls, and of all their triangles and vertices.
         ``concavity`` : dict
-            ``per_part`` lists the concavity of each hull's part in the order of ``hulls``; ``max`` is the worst.
+            ``per_part`` lists the concavity of each hull's part in the order of ``hulls``; ``max`` is the worst. Both
+            are None where there was no time to measure them; so are the distances below. ``warnings`` says so.
         ``navigable`` : dict
             Instead of ``concavity`` with `NavigableSpace`: ``radius`` and ``tolerance``; ``balls``, their number;
             ``shrunk`` and ``dropped``, how many had to give way to parts that no cut could keep off them, and ``most``,

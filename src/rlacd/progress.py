@@ -32,4 +32,5 @@ class Progress:
 
 
 ProgressCallback = Callable[[Progress], bool | None]
-"""Called between steps; returning False (not None) stops the work and keeps what was reached."""
+"""Called between steps and several times a second in long ones; returning False (not None) stops the work and keeps
+what was reached."""

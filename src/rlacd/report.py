@@ -18,7 +18,7 @@ from rlacd.presets import find_preset
 from rlacd.solid.component import Part
 from rlacd.solid.distance import hull_distances
 from rlacd.solid.hull import Hull
-from rlacd.solid.mass import Mass, mass_of
+from rlacd.solid.mass import Mass, mass_of, mass_of_triangles
 from rlacd.solid.solid import Solid
 from rlacd.workers import Workers
 
@@ -35,15 +35,22 @@ def make_report(
     workers: Workers,
     clock: Clock,
 ) -> dict[str, Any]:
-    """Measure a finished decomposition; the keys are those of `rlacd.Decomposition`, without name and seconds."""
-    errors = workers.map(criterion.error, parts)
+    """Measure a finished decomposition; the keys are those of `rlacd.Decomposition`, without name and seconds.
+
+    What there is no time to measure is None.
+    """
+    is_cover = solid.manifold.is_empty()  # hulls of what was not repaired: nothing is known of the parts in them
+    errors = None if is_cover else clock.if_in_time(lambda: workers.map(criterion.error, parts), lambda: None)
     account = criterion.account(errors)
     over = under = None
-    mass = mass_of(solid)
-    vertices, faces = solid.surface
-    if len(faces):  # a cloud of points has no surface
-        distances = hull_distances([part.hull for part in parts], vertices, faces, threads=workers.threads)
-        over, under = distances.over[1], distances.under[1]
+    has_surface = len(solid.surface[1]) > 0  # a cloud of points has none
+    if has_surface:
+        over, under = clock.if_in_time(lambda: _distances(solid, parts, workers), lambda: (None, None))
+    mass = (
+        mass_of_triangles(np.concatenate([part.hull.vertices[part.hull.faces] for part in parts]), solid.frame)
+        if is_cover
+        else mass_of(solid)
+    )
     return {
         "version": __version__,
         "options": _options(options),
@@ -61,6 +68,11 @@ def make_report(
             *solid.warnings,
             *_coarse(solid),
             *_early_end(clock),
+            *(
+                ["There was no time to measure how far hulls and input are apart."]
+                if has_surface and over is None
+                else []
+            ),
             *account.warnings,
             *_shortcomings(
                 [part.hull for part in parts],
@@ -69,7 +81,11 @@ def make_report(
                 options,
                 criterion.overhang if not account.warnings else math.inf,
             ),
-            *(_out_of_the_box([part.hull for part in parts], solid) if criterion.obstacles is not None else []),
+            *(
+                _out_of_the_box([part.hull for part in parts], solid)
+                if criterion.obstacles is not None and not is_cover
+                else []
+            ),
         ],
     }
 
@@ -87,6 +103,11 @@ def _mass(mass: Mass) -> dict[str, Any]:
     volume, centre, inertia = mass.volume_abs, mass.centre_abs.tolist(), mass.inertia_abs.tolist()
     now = {"volume_abs": volume, "centre_abs": centre, "inertia_abs": inertia}
     return now | {"volume_m": volume, "centre_m": centre, "inertia_m": inertia}
+
+
+def _distances(solid: Solid, parts: Sequence[Part], workers: Workers) -> tuple[float, float]:
+    distances = hull_distances([part.hull for part in parts], *solid.surface, threads=workers.threads)
+    return distances.over[1], distances.under[1]
 
 
 def _coarse(solid: Solid) -> list[str]:

@@ -122,7 +122,9 @@ def _fit(report: dict[str, Any]) -> str:
     if space is not None:
         intruding = space["intrusion"]["max"]
         words.append(
-            f"no hull touches any of the {space['balls']} balls"
+            f"there are {space['balls']} balls"
+            if intruding is None
+            else f"no hull touches any of the {space['balls']} balls"
             if intruding <= 0
             else f"hulls reach {intruding:.4f} into the {space['balls']} balls"
         )

@@ -5,30 +5,68 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import cache
 from typing import TypeVar
 
 from manifold3d import Manifold
+
+from rlacd._native import Stop, Stopped, poll_stop, use_stop
+
+BETWEEN_POLLS = 0.05
+"""Seconds between two looks, while others work, at whether they have to stop."""
 
 _T = TypeVar("_T")
 _R = TypeVar("_R")
 
 
 class Workers:
-    """A pool of threads whose results come in the order of the items, whatever their number."""
+    """A pool of threads whose results come in the order of the items, whatever their number.
 
-    def __init__(self, threads: int | None = None) -> None:
+    Parameters
+    ----------
+    threads : int, optional
+        All processors by default.
+    stop : Stop, optional
+        What interrupts them; it has to live as long as they do.
+    """
+
+    def __init__(self, threads: int | None = None, stop: Stop | None = None) -> None:
         self.threads = threads or available_cpus()
+        self._stop = stop
         _start_booleans(self.threads)
-        self._pool = ThreadPoolExecutor(self.threads)
+        self._pool = ThreadPoolExecutor(self.threads, initializer=use_stop, initargs=(stop,))
 
     def map(self, function: Callable[[_T], _R], items: Iterable[_T]) -> list[_R]:
-        """Apply `function` to every item."""
+        """Apply `function` to every item; when an exception leaves this, no thread works on any of them any more."""
         items = list(items)
         if self.threads == 1 or len(items) < 2:
-            return [function(item) for item in items]
-        return list(self._pool.map(function, items))
+            return [self._polled(function, item) for item in items]
+        futures = [self._pool.submit(self._polled, function, item) for item in items]
+        try:
+            self._watch(futures)
+            return [future.result() for future in futures]
+        except BaseException as error:
+            for future in futures:
+                future.cancel()
+            if self._stop is not None and not isinstance(error, (Exception, Stopped)):  # Ctrl-C does not wait
+                self._stop.trip()
+            wait(futures)
+            raise
+
+    @staticmethod
+    def _polled(function: Callable[[_T], _R], item: _T) -> _R:
+        poll_stop()
+        return function(item)
+
+    def _watch(self, futures: list[Future[_R]]) -> None:
+        """Wait until all are done or one has failed; only this thread can look whether they have to stop."""
+        waiting: set[Future[_R]] = set(futures)
+        while waiting:
+            done, waiting = wait(waiting, None if self._stop is None else BETWEEN_POLLS, "FIRST_EXCEPTION")
+            if any(future.exception() is not None for future in done):
+                return
+            poll_stop()
 
     def share(self, count: int) -> int:
         """Threads for each of `count` items that run at the same time."""

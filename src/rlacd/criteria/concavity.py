@@ -135,8 +135,11 @@ class Concavity:
     def obstacles(self) -> None:
         """None: concavity is not about space."""
 
-    def account(self, errors: Sequence[float]) -> Account:
+    def account(self, errors: Sequence[float] | None) -> Account:
         """The concavity of each part, and how many exceed the threshold."""
+        if errors is None:
+            sentence = "There was no time to measure the concavity of the parts."
+            return Account({"concavity": {"per_part": None, "max": None}}, (sentence,))
         exceeding = [error for error in errors if error > self.threshold]
         warning = (
             f"{len(exceeding)} of {len(errors)} parts exceed the concavity {self.threshold:.4g}; "

@@ -126,5 +126,5 @@ class Criterion(Protocol):
     def obstacles(self) -> Balls | None:
         """Balls that no hull may touch, where the criterion is made of them."""
 
-    def account(self, errors: Sequence[float]) -> Account:
-        """Tell how well finished parts meet the criterion, given the error of each."""
+    def account(self, errors: Sequence[float] | None) -> Account:
+        """Tell how well finished parts meet the criterion, given the error of each; None where they are not known."""

@@ -137,6 +137,18 @@ class NavigableSpace(SpaceOptions):
             )
         return Navigable(self, radius, tolerance, balls, tuple(warnings))
 
+    def unprepared(self, scale: float) -> Navigable:
+        """Stand in for the space around a solid that there was no time to look for: there are no balls.
+
+        Parameters
+        ----------
+        scale : float
+            Frame units per unit of the input.
+        """
+        radius, tolerance = self.in_frame(scale)
+        warning = "There was no time to find the navigable space: nothing is known of it, and there are no balls."
+        return Navigable(self, radius, tolerance, Balls(np.empty((0, 3)), np.empty(0)), (warning,))
+
     @property
     def sees_cavities(self) -> bool:
         """Whether sealed cavities may count, so that repair has to keep them."""
@@ -242,17 +254,19 @@ class Navigable:
         """The balls."""
         return self.balls
 
-    def account(self, errors: Sequence[float]) -> Account:
+    def account(self, errors: Sequence[float] | None) -> Account:
         """How many balls there are, what became of them, and how deep the parts' hulls reach into them."""
-        exceeding = [error for error in errors if error > 0]
+        exceeding = [error for error in errors or () if error > 0]
         sentences = list(self.warnings)
+        if errors is None:
+            sentences.append("There was no time to measure how deep the hulls reach into balls.")
         given_way = self.conflicts.shrunk + self.conflicts.dropped
         if given_way:
             sentences.append(
                 f"{given_way} balls gave way to parts that no cut could keep off them: {self.conflicts.shrunk} shrank, "
                 f"{self.conflicts.dropped} were dropped; the largest loss of radius is {self.conflicts.most:.4g}."
             )
-        if exceeding:
+        if errors is not None and exceeding:
             sentences.append(
                 f"{len(exceeding)} of {len(errors)} hulls reach into balls of the navigable space, "
                 f"up to {max(exceeding):.4g} deep."
@@ -262,7 +276,7 @@ class Navigable:
             "tolerance": self.tolerance,
             "balls": len(self.balls),
             **asdict(self.conflicts),
-            "intrusion": {"per_part": list(errors), "max": max(errors)},
+            "intrusion": {"per_part": errors and list(errors), "max": errors and max(errors)},
         }
         return Account({"navigable": entries}, tuple(sentences))
 

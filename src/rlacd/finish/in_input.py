@@ -35,10 +35,16 @@ def in_input(
     points = frame.to_input(hull.vertices)
     there = Hull.of(points)
     if there is None:
-        fits = (max_vertices or _BOX_VERTICES) >= _BOX_VERTICES and (max_faces or _BOX_FACES) >= _BOX_FACES
-        there = Hull.of(_box_around(points) if fits else _tetrahedron_around(points))
-        assert there is not None
+        there = plain_hull(points, max_vertices, max_faces)
     return trimesh.Trimesh(there.vertices, there.faces, process=False)
+
+
+def plain_hull(points: FloatArray, max_vertices: int | None, max_faces: int | None) -> Hull:
+    """Take a box around points [N, 3], or a tetrahedron where a box has too many vertices or triangles."""
+    fits = (max_vertices or _BOX_VERTICES) >= _BOX_VERTICES and (max_faces or _BOX_FACES) >= _BOX_FACES
+    hull = Hull.of(_box_around(points) if fits else _tetrahedron_around(points))
+    assert hull is not None
+    return hull
 
 
 def _box_around(points: FloatArray) -> FloatArray:

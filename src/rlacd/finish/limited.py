@@ -9,6 +9,7 @@ from rlacd import _native
 from rlacd.criteria import Criterion
 from rlacd.criteria.criterion import Account, Chance
 from rlacd.criteria.criterion import Part as PartLike
+from rlacd.finish.in_input import plain_hull
 from rlacd.finish.limits import limit_hull
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.balls import Balls
@@ -95,7 +96,7 @@ class Limited:
         """The underlying criterion's."""
         return self.criterion.obstacles
 
-    def account(self, errors: Sequence[float]) -> Account:
+    def account(self, errors: Sequence[float] | None) -> Account:
         """The underlying criterion's."""
         return self.criterion.account(errors)
 
@@ -122,6 +123,14 @@ def with_limits(criterion: Criterion, max_vertices: int | None, max_faces: int |
     if (max_vertices or FEWEST_VERTICES) < FEWEST_VERTICES or (max_faces or FEWEST_FACES) < FEWEST_FACES:
         return criterion
     return Limited(criterion, max_vertices, max_faces)
+
+
+def limit_roughly(part: Part, max_vertices: int | None, max_faces: int | None) -> Part:
+    """Get the part with a hull inside the limits at no cost: where its own is not, a box or a tetrahedron around it."""
+    vertices, faces = len(part.hull.vertices), len(part.hull.faces)
+    if vertices <= (max_vertices or vertices) and faces <= (max_faces or faces):
+        return part
+    return part.with_hull(plain_hull(part.hull.vertices, max_vertices, max_faces))
 
 
 def limit_part(part: Part, max_vertices: int | None, max_faces: int | None) -> Part:

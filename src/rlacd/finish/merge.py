@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from rlacd import _native
+from rlacd._native import Stopped, poll_stop
 from rlacd.clock import Clock
 from rlacd.criteria.criterion import Chance, Criterion
 from rlacd.solid.arrays import BoolArray, FloatArray, IntArray
@@ -22,7 +23,7 @@ FEW = 100
 
 
 AT_ONCE = 512
-"""The clock is asked before so many pairs are held against the solid."""
+"""The clock is asked before so many pairs are held against the solid, or parts against all others."""
 
 
 class _Pair(NamedTuple):
@@ -90,38 +91,41 @@ def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, workers: Wo
         refused[first].add(second)
         refused[second].add(first)
 
-    queue, never = pairing.pairs(alive, range(new))
-    heapq.heapify(queue)
-    for first, second in never:
-        refuse(first, second)
-    verdicts: dict[_Pair, tuple[Part | None, bool]] = {}  # on pairs that are back in the queue
-    count = newest = len(alive)
-    while queue and clock.step(count - len(alive), None, len(alive)):
-        batch = _cheapest(queue, alive, 2 * workers.threads)
-        fresh = [pair for pair in batch if pair not in verdicts]
-        verdicts.update(
-            zip(fresh, workers.map(lambda p: pairing.unite(alive[p.first], alive[p.second]), fresh), strict=True)
-        )
-        for taken, pair in enumerate(batch, start=1):
-            union, for_good = verdicts.pop(pair)
-            if union is None:
-                if for_good:
-                    refuse(pair.first, pair.second)
-                continue
-            origin[newest] = min(origin[pair.first], origin[pair.second])
-            del alive[pair.first], alive[pair.second]
-            alive[newest] = union
-            refused[newest] = refused.pop(pair.first) | refused.pop(pair.second)
-            for i in refused[newest] & alive.keys():
-                refused[i].add(newest)
-            asked = {i: part for i, part in alive.items() if i not in refused[newest]}
-            found, never = pairing.pairs(asked, [newest])
-            for first, second in never:
-                refuse(first, second)
-            for other in [*batch[taken:], *found]:
-                heapq.heappush(queue, other)
-            newest += 1
-            break
+    try:
+        queue, never = pairing.pairs(alive, range(new))
+        heapq.heapify(queue)
+        for first, second in never:
+            refuse(first, second)
+        verdicts: dict[_Pair, tuple[Part | None, bool]] = {}  # on pairs that are back in the queue
+        count = newest = len(alive)
+        while queue and clock.step(count - len(alive), None, len(alive)):
+            batch = _cheapest(queue, alive, 2 * workers.threads)
+            fresh = [pair for pair in batch if pair not in verdicts]
+            verdicts.update(
+                zip(fresh, workers.map(lambda p: pairing.unite(alive[p.first], alive[p.second]), fresh), strict=True)
+            )
+            for taken, pair in enumerate(batch, start=1):
+                union, for_good = verdicts.pop(pair)
+                if union is None:
+                    if for_good:
+                        refuse(pair.first, pair.second)
+                    continue
+                origin[newest] = min(origin[pair.first], origin[pair.second])
+                del alive[pair.first], alive[pair.second]
+                alive[newest] = union
+                refused[newest] = refused.pop(pair.first) | refused.pop(pair.second)
+                for i in refused[newest] & alive.keys():
+                    refused[i].add(newest)
+                asked = {i: part for i, part in alive.items() if i not in refused[newest]}
+                found, never = pairing.pairs(asked, [newest])
+                for first, second in never:
+                    refuse(first, second)
+                for other in [*batch[taken:], *found]:
+                    heapq.heappush(queue, other)
+                newest += 1
+                break
+    except Stopped:  # between two unions
+        clock.note_stop()
     return [alive[i] for i in sorted(alive, key=origin.__getitem__)]
 
 
@@ -246,7 +250,9 @@ def _near_pairs(
     near = _near(boxes[rows], boxes, reach)
     if across:
         between = near.any(axis=0)
-        near |= near[:, between].astype(np.float32) @ _near(boxes[between], boxes, reach).astype(np.float32) > 0
+        beyond = _near(boxes[between], boxes, reach).astype(np.float32)
+        for some in _rows(len(near)):
+            near[some] |= near[some][:, between].astype(np.float32) @ beyond > 0
     k, other = np.nonzero(near)
     once = (rows[k] < other) | ~is_new[other]  # two new parts find each other twice
     pairs = np.sort(np.stack([rows[k], other], axis=1)[once], axis=1)
@@ -255,9 +261,18 @@ def _near_pairs(
 
 def _near(some: FloatArray, boxes: FloatArray, reach: float) -> BoolArray:
     """Which boxes [N, 2, 3] lie within reach of which others [S, 2, 3]: [S, N]."""
-    gap = np.maximum(some[:, None, 0] - boxes[:, 1], boxes[:, 0] - some[:, None, 1])
-    near: BoolArray = np.sqrt(np.square(np.maximum(gap, 0.0)).sum(axis=2)) <= reach
+    near = np.empty((len(some), len(boxes)), dtype=bool)
+    for rows in _rows(len(some)):
+        gap = np.maximum(some[rows, None, 0] - boxes[:, 1], boxes[:, 0] - some[rows, None, 1])
+        near[rows] = np.sqrt(np.square(np.maximum(gap, 0.0)).sum(axis=2)) <= reach
     return near
+
+
+def _rows(count: int) -> Iterator[slice]:
+    """Rows of a table, some at a time: between them the work may be stopped."""
+    for first in range(0, count, AT_ONCE):
+        poll_stop()
+        yield slice(first, first + AT_ONCE)
 
 
 def merge_to_count(
@@ -289,23 +304,27 @@ def merge_to_count(
     origin = {i: i for i in alive}
     newest = len(parts)
     reach = criterion.reach
-    queue = _bounded_pairs(alive, list(alive), reach, criterion, workers)
-    while len(alive) > count and clock.step(len(parts) - len(alive), len(parts) - count, len(alive)):
-        pair = _pop_least(queue, alive, criterion)
-        if pair is None:
-            if reach == np.inf:
-                break
-            reach = np.inf
-            queue = _bounded_pairs(alive, list(alive), reach, criterion, workers)
-            continue
-        if pair.error >= worst:
-            return None
-        union = Part.glued(alive.pop(pair.first), alive.pop(pair.second))
-        origin[newest] = min(origin[pair.first], origin[pair.second])
-        alive[newest] = union
-        queue += _bounded_pairs(alive, [newest], reach, criterion, workers)
-        heapq.heapify(queue)
-        newest += 1
+    try:
+        queue = _bounded_pairs(alive, list(alive), reach, criterion, workers)
+        while len(alive) > count and clock.step(len(parts) - len(alive), len(parts) - count, len(alive)):
+            pair = _pop_least(queue, alive, criterion)
+            if pair is None:
+                if reach == np.inf:
+                    break
+                reach = np.inf
+                queue = _bounded_pairs(alive, list(alive), reach, criterion, workers)
+                continue
+            if pair.error >= worst:
+                return None
+            union = Part.glued(alive[pair.first], alive[pair.second])
+            del alive[pair.first], alive[pair.second]
+            origin[newest] = min(origin[pair.first], origin[pair.second])
+            alive[newest] = union
+            queue += _bounded_pairs(alive, [newest], reach, criterion, workers)
+            heapq.heapify(queue)
+            newest += 1
+    except Stopped:  # between two unions
+        clock.note_stop()
     return [alive[i] for i in sorted(alive, key=origin.__getitem__)]
 
 

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rlacd._native import Stopped
 from rlacd.criteria.criterion import Criterion
 from rlacd.planes.views import Views
 from rlacd.search.dissolve import dissolve
@@ -120,16 +121,20 @@ class Neighbourhood:
 
         An opening comes first: a few steps, then every part is tried to be done without. Such rounds are no steps.
         """
-        if most > 0:
-            with pace.share(OPENING_SHARE):
-                self._walk(pace, min(most, OPENING), enough)
-            for _ in range(ROUNDS):
-                self.dissolve_all(pace, enough)
-        pace.hurry()
         exhausted = len(self._here.parts) == 1
-        while not exhausted and self._steps < most and len(self._here.parts) > enough and not pace.is_over:
-            exhausted = self._walk(pace, min(most, self._steps + STEPS_PER_PART * len(self._here.parts)), enough)
-            self.dissolve_all(pace, enough)
+        try:
+            if most > 0:
+                with pace.share(OPENING_SHARE):
+                    self._walk(pace, min(most, OPENING), enough)
+                for _ in range(ROUNDS):
+                    self.dissolve_all(pace, enough)
+            pace.hurry()
+            exhausted = len(self._here.parts) == 1
+            while not exhausted and self._steps < most and len(self._here.parts) > enough and not pace.is_over:
+                exhausted = self._walk(pace, min(most, self._steps + STEPS_PER_PART * len(self._here.parts)), enough)
+                self.dissolve_all(pace, enough)
+        except Stopped:  # between two exchanges: the best so far stays
+            pace.note_stop()
         return Outcome(self._best, self._steps, self._accepted, exhausted)
 
     def _walk(self, pace: Pace, most: float, enough: int) -> bool:

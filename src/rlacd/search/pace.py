@@ -51,6 +51,10 @@ class Pace(Clock):
         """Report to the other clock; True when the work may go on."""
         return self._outer.step(self.steps, None, self.parts) and not self.is_over
 
+    def note_stop(self) -> None:
+        """Tell the other clock."""
+        self._outer.note_stop()
+
     @contextmanager
     def share(self, among: int) -> Iterator[None]:
         """Leave only an equal share of the time that is left to what is done inside."""

@@ -118,5 +118,5 @@ def _mesh(vertices: ArrayLike, faces: ArrayLike) -> dict[str, str]:
 def _errors(report: dict[str, Any], count: int) -> list[float | None]:
     """What the criterion measured of each part, whichever it was."""
     measured = report.get("concavity") or report.get("navigable", {}).get("intrusion") or {}
-    per_part = measured.get("per_part", [])
+    per_part = measured.get("per_part") or []
     return list(per_part) if len(per_part) == count else [None] * count

@@ -14,6 +14,7 @@ from manifold3d import Manifold, Mesh64, triangulate
 
 from rlacd import _native
 from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.boolean_time import require_time_for
 from rlacd.solid.hull import Hull
 
 NEGLIGIBLE_VOLUME = 1e-12
@@ -184,6 +185,7 @@ class Share(Part):
     """
 
     def __init__(self, solid: Component, first: Part, second: Part, hull: Hull) -> None:
+        require_time_for(len(solid.faces))
         body = Manifold(Mesh64(hull.vertices, hull.faces.astype(np.uint64)))
         vertices, faces = _surface_of(solid.manifold ^ body)
         volume = _native.mesh_volume(vertices, faces) if len(faces) else 0.0
@@ -259,6 +261,7 @@ class Component(Part):
         open_sides = _native.cut_by_plane(self.vertices, self.faces, *plane.normal, plane.offset)
         (below, below_folded), (above, above_folded) = (_capped(*side) for side in open_sides)
         if max(below_folded, above_folded) > FOLDED and abs(self.manifold.volume() - self.volume) <= LOST * self.volume:
+            require_time_for(len(self.faces))
             upper, lower = self.manifold.split_by_plane(plane.normal, plane.offset)
             return _component(lower, self), _component(upper, self)
         return _component(below, self), _component(above, self)

@@ -22,6 +22,7 @@ from functools import cached_property
 import numpy as np
 from manifold3d import Manifold
 
+from rlacd._native import poll_stop
 from rlacd.errors import EmptyMeshError
 from rlacd.solid.frame import FloatArray, Frame
 from rlacd.solid.load import InputMesh
@@ -95,7 +96,10 @@ def repair(mesh: InputMesh, *, resolution: int = 100, threads: int | None = None
     ------
     EmptyMeshError
         There is no point.
+    Stopped
+        There is no time left: `rlacd.solid.cover` is what needs next to none.
     """
+    poll_stop()
     warnings = list(mesh.warnings)
     points = mesh.vertices[np.unique(mesh.faces)] if len(mesh.faces) else mesh.vertices
     if len(points) == 0:
@@ -105,6 +109,7 @@ def repair(mesh: InputMesh, *, resolution: int = 100, threads: int | None = None
     used, corner = np.unique(mesh.faces, return_inverse=True)
     vertices, index = merge_equal_vertices(frame.to_frame(mesh.vertices[used]))
     faces = index[corner.reshape(-1, 3)]
+    poll_stop()
     faces = faces[nondegenerate(faces)]
     faces = faces[first_of_doubled(faces, len(vertices))]
     surface = (vertices, np.ascontiguousarray(faces, dtype=np.int32))
@@ -158,6 +163,7 @@ class _Repair:
         self._note(body[(faces != surface.faces[origin]).any(axis=1)], "welded")
 
         soup = Soup(surface.vertices, faces, body)
+        poll_stop()
         if self._is_oriented(soup):
             parts = self._as_they_are(soup)
         else:
@@ -228,6 +234,7 @@ class _Repair:
         share = soup.sheet_share(self.bodies)
         hidden = np.zeros(len(soup.faces), dtype=bool)
         for body in np.flatnonzero(crowded & (share > FLAPS)):
+            poll_stop()
             some = np.flatnonzero(soup.body == body)
             hidden[some] = hidden_faces(soup.vertices, soup.faces[some])
         if not hidden.any():
@@ -277,6 +284,7 @@ class _Repair:
         self._note(soup.body[~wall & ~sheet], "outer skin")
         self._note(soup.body[soup.at_valence(soup.edges.valence > 2)], "outer skin")
         self._note(soup.body[sheet], "slab")
+        poll_stop()
         mixed = np.bincount(soup.body[sheet], minlength=self.bodies) > 0
         return self._skins(soup.only(~sheet & (wall | ~mixed[soup.body]))) + self._skins(soup.only(sheet).in_patches())
 
@@ -311,6 +319,7 @@ class _Repair:
         solids = [to_manifold(v, f) for v, f in split_labels(vertices, faces, label)]
         # Sheets narrower than they shall be thick can cross themselves, and come out inside out.
         for i in np.flatnonzero(has_sheet[built] | flat[built]):
+            poll_stop()
             if solids[i].volume() <= 0:
                 some = (sides.label.reshape(-1, 2) == built[i]).any(axis=1)
                 solids[i] = slab_of_faces(soup.vertices, soup.faces[some], HALF_THICKNESS)
@@ -380,6 +389,7 @@ class _Repair:
         if self.step.max() < STEPS.index("outer skin"):
             return
         solid = SurfaceQuery(*to_arrays(self.solid), self.input.threads)
+        poll_stop()
         points, _ = spread_points(solid.vertices, solid.faces, GAP)
         closest, face = self.input.closest(points)
         np.maximum.at(self.deviation, self.body_of_input[face], np.linalg.norm(points - closest, axis=1))
@@ -395,6 +405,8 @@ class _Repair:
 def _crossings(boxes: FloatArray) -> int:
     """Count the pairs of boxes [N, 2, 3] that meet."""
     lower, upper = boxes[:, 0], boxes[:, 1]
-    return sum(
-        int(((lower[i] <= upper[i + 1 :]) & (lower[i + 1 :] <= upper[i])).all(axis=1).sum()) for i in range(len(boxes))
-    )
+    count = 0
+    for i in range(len(boxes)):
+        poll_stop()
+        count += int(((lower[i] <= upper[i + 1 :]) & (lower[i + 1 :] <= upper[i])).all(axis=1).sum())
+    return count

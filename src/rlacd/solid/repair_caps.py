@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rlacd._native import poll_stop
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.repair_distance import SurfaceQuery, spread_points
 from rlacd.solid.repair_holes import LONGEST_EXACT_LOOP, cap
@@ -160,6 +161,7 @@ def _caps(soup: Soup, rims: Rims) -> tuple[IntArray, IntArray]:
     across: dict[int, list[int]] = {}
     caps = []
     for loop, beside in zip(rims.loops, rims.beside, strict=True):
+        poll_stop()
         taken = None
         if 3 < len(loop) <= LONGEST_EXACT_LOOP:
             low, high = np.minimum(loop[:, None], loop), np.maximum(loop[:, None], loop)

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rlacd._native import Surface
+from rlacd._native import Surface, poll_stop
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.topology import BoolArray, IntArray
 
@@ -71,9 +71,11 @@ def spread_points(vertices: FloatArray, faces: IntArray, spacing: float) -> tupl
     for pattern in np.unique(columns * _LARGEST + rows):
         n, m = divmod(int(pattern), _LARGEST)
         some = np.flatnonzero((columns == n) & (rows == m))
+        poll_stop()
         v, u = np.divmod(np.arange(n * m + m), n + 1)
         u, v = np.append(u / n, 0.0)[None, :, None], np.append(v / m, 1.0)[None, :, None]
         for chunk in np.array_split(some, max(1, len(some) * u.size // _CHUNK)):
+            poll_stop()
             row_start, row_end = (
                 a[chunk, None] * (1 - v) + c[chunk, None] * v,
                 b[chunk, None] * (1 - v) + c[chunk, None] * v,

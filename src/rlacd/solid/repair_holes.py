@@ -12,6 +12,7 @@ import mapbox_earcut
 import numpy as np
 from scipy.spatial import cKDTree
 
+from rlacd._native import poll_stop
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.topology import BoolArray, Edges, IntArray, components, first_of_doubled, nondegenerate
 
@@ -24,6 +25,9 @@ LONGEST_EXACT_LOOP = 250
 _AREA = 0.1
 # What an edge that is there already weighs: more than anything else, but it is better than no cap.
 _TAKEN = 1e3
+
+# Edges whose neighbours are looked up before the next look at whether the work has to stop.
+_AT_ONCE = 1000
 
 
 # Tracing loops is the one step of a repair that walks edge by edge; a soup with more free edges is no scan with holes.
@@ -40,6 +44,7 @@ def close_cracks(vertices: FloatArray, faces: IntArray, tolerances: Sequence[flo
     origin = np.arange(len(faces))
     free = len(free_edges(faces, len(vertices)))
     for tolerance in tolerances:
+        poll_stop()
         if free == 0 or free > MOST_FREE_EDGES:
             break
         split, parent = split_at_free_vertices(vertices, weld_free_vertices(vertices, faces, tolerance), tolerance)
@@ -89,7 +94,12 @@ def split_at_free_vertices(vertices: FloatArray, faces: IntArray, tolerance: flo
     span = vertices[b] - vertices[a]
     length = np.linalg.norm(span, axis=1)
     tree = cKDTree(vertices[free])
-    found = tree.query_ball_point((vertices[a] + vertices[b]) / 2, length / 2 + tolerance, return_sorted=True)
+    found: list[list[int]] = []
+    for begin in range(0, len(a), _AT_ONCE):
+        poll_stop()
+        some = slice(begin, begin + _AT_ONCE)
+        middle, reach = (vertices[a[some]] + vertices[b[some]]) / 2, length[some] / 2 + tolerance
+        found += list(tree.query_ball_point(middle, reach, return_sorted=True))
     count = np.array([len(x) for x in found])
     if count.sum() > 50_000_000 or count.sum() == 0:
         return none
@@ -194,6 +204,7 @@ def _least_bent(points: FloatArray, beside: FloatArray, taken: BoolArray | None)
     span_of = np.linalg.norm(points[:, None] - points, axis=2)
     per_area = _AREA / max(float(span_of.max()), np.finfo(float).tiny)
     for span in range(2, n):
+        poll_stop()
         first = np.arange(n - span)[:, None]
         middle, last = first + np.arange(1, span), first + span
         cross = np.cross(points[middle] - points[first], points[last] - points[first])

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rlacd._native import poll_stop
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.repair_distance import SurfaceQuery
 from rlacd.solid.repair_soup import Soup, across
@@ -201,6 +202,7 @@ def _followers(
     single = (last_in - first_in == 1) & (last_out - first_out == 1)
     follower[ends[first_in[single]]] = begins[first_out[single]]
     for i in np.flatnonzero(~single & (last_out > first_out)):
+        poll_stop()
         arriving, leaving = ends[first_in[i] : last_in[i]], begins[first_out[i] : last_out[i]]
         here, axis = vertices[vertex[i]], normals[vertex[i]]
         axis = axis / max(float(np.linalg.norm(axis)), np.finfo(float).tiny)

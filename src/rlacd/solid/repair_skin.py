@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rlacd._native import poll_stop
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.topology import BoolArray, IntArray, Sides, components, facing_sides
 
@@ -75,6 +76,7 @@ def skin(
     base = np.empty(number, dtype=np.int64)
     base[fan] = corner_vertex
     positions = vertices[base].copy()
+    poll_stop()
     positions += half_thickness * _fan_offsets(vertices, faces[face_of_side], back, thin[face_of_side], fan, number)
 
     triangles = fan.reshape(-1, 3).copy()

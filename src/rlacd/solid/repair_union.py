@@ -7,6 +7,8 @@ import numpy as np
 from manifold3d import Error, Manifold, Mesh64, OpType
 
 from rlacd import _native
+from rlacd._native import poll_stop
+from rlacd.solid.boolean_time import require_time_for
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.topology import IntArray, face_areas, signed_tetrahedra
 
@@ -16,6 +18,9 @@ _HAIRS = 4  # one in a hundred leaves two faces so nearly in one plane that it d
 
 # Uniting takes time per mesh even where nothing overlaps; above this many, meshes are put side by side instead.
 MOST_UNITED = 4000
+
+# So many triangles are united in one go; between two goes the work may be stopped.
+_AT_ONCE = 20_000
 
 
 def to_manifold(vertices: FloatArray, faces: IntArray) -> Manifold:
@@ -40,6 +45,7 @@ def to_manifold(vertices: FloatArray, faces: IntArray) -> Manifold:
 
 
 def _taken_over(vertices: FloatArray, faces: IntArray) -> Manifold:
+    require_time_for(len(faces))
     mesh = Mesh64(np.ascontiguousarray(vertices, dtype=np.float64), np.ascontiguousarray(faces, dtype=np.uint64))
     manifold = Manifold(mesh)
     return manifold if manifold.status() == Error.NoError else Manifold()
@@ -63,6 +69,7 @@ def split_labels(vertices: FloatArray, faces: IntArray, label: IntArray) -> list
     cuts = np.flatnonzero(np.diff(label[order])) + 1
     parts = []
     for some in np.split(order, cuts) if len(order) else []:
+        poll_stop()
         used, index = np.unique(faces[some], return_inverse=True)
         parts.append((vertices[used], index.reshape(-1, 3).astype(np.int64)))
     return parts
@@ -75,7 +82,7 @@ def unite(solids: list[Manifold], *, keep_cavities: bool = False) -> Manifold:
         return Manifold()
     if len(solids) > MOST_UNITED:
         return Manifold.compose(solids)
-    united = solids[0] if len(solids) == 1 else Manifold.batch_boolean(solids, OpType.Add)
+    united = _united(solids)
     # More cavities than solid are none: shells that came out inside out.
     return united if keep_cavities and united.volume() > 0 else _without_cavities(united)
 
@@ -107,6 +114,7 @@ def _around(solids: list[Manifold]) -> list[list[int]]:
     boxes = np.reshape([solid.bounding_box() for solid in solids], (-1, 2, 3))
     around: list[list[int]] = [[] for _ in solids]
     for j, solid in enumerate(solids):
+        poll_stop()
         inner = (boxes[:, 0] >= boxes[j, 0]).all(axis=1) & (boxes[:, 1] <= boxes[j, 1]).all(axis=1)
         inner[j] = False
         if not inner.any():
@@ -126,11 +134,33 @@ def _without_cavities(solid: Manifold) -> Manifold:
     if len(outer) == len(shells) or not outer:
         return solid
     # What lay inside a cavity overlaps the filled solid now.
-    return outer[0] if len(outer) == 1 else Manifold.batch_boolean(outer, OpType.Add)
+    return _united(outer)
+
+
+def _united(solids: list[Manifold]) -> Manifold:
+    """Unite solids, neighbours in the list first, and what comes of them."""
+    while len(solids) > 1:
+        united, group, triangles = [], [solids[0]], solids[0].num_tri()
+        for solid in solids[1:]:
+            if len(group) > 1 and triangles + solid.num_tri() > _AT_ONCE:
+                united.append(_united_at_once(group, triangles))
+                group, triangles = [], 0
+            group.append(solid)
+            triangles += solid.num_tri()
+        solids = [*united, _united_at_once(group, triangles)]
+    return solids[0]
+
+
+def _united_at_once(solids: list[Manifold], triangles: int) -> Manifold:
+    if len(solids) == 1:
+        return solids[0]
+    require_time_for(triangles)
+    return Manifold.batch_boolean(solids, OpType.Add)
 
 
 def hull_of_points(points: FloatArray, half_thickness: float) -> Manifold:
     """Return the hull of points ``[N, 3]``, given thickness along the axes in which they have none."""
+    poll_stop()
     points = np.unique(points, axis=0)
     middle = points.mean(axis=0)
     _, _, axes = np.linalg.svd(np.concatenate([points - middle, np.zeros((3, 3))]), full_matrices=False)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from rlacd._native import poll_stop
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.repair_distance import SurfaceQuery, spread_points
 from rlacd.solid.topology import BoolArray, IntArray
@@ -54,9 +55,12 @@ class Reach:
         cell = np.rint((points - origin) / pitch).astype(np.int64)
         occupied = np.zeros(cell.max(axis=0) + 1 + margin, dtype=bool)
         occupied[tuple(cell.T)] = True
+        poll_stop()
         depth = ndimage.distance_transform_edt(~occupied) * pitch
+        poll_stop()
         label, _ = ndimage.label(depth > radius)
         outside = label == label[0, 0, 0]
+        poll_stop()
         reached = ndimage.distance_transform_edt(~outside) * pitch <= radius
         room = np.where(outside, 0, label)
         return cls(origin, pitch, radius, reached, depth, room)
@@ -163,5 +167,6 @@ def _smooth(points: FloatArray, quads: IntArray, free: BoolArray, rounds: int = 
     tail, head = tail[some], head[some]
     degree = np.maximum(np.bincount(tail, minlength=len(points)), 1)
     for _ in range(rounds):
+        poll_stop()
         mean = np.stack([np.bincount(tail, points[head, k], len(points)) for k in range(3)], axis=1)
         points[free] = (mean / degree[:, None])[free]

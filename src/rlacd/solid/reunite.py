@@ -13,6 +13,7 @@ from manifold3d import Manifold, Mesh64, OpType
 
 from rlacd import _native
 from rlacd.solid.arrays import FloatArray
+from rlacd.solid.boolean_time import require_time_for
 from rlacd.solid.component import LOST, Component, Part, Share
 
 TOUCHING = 1e-8
@@ -46,6 +47,7 @@ def reunite(components: Sequence[Component]) -> Component | None:
     components = _joined_again(components)
     if len(components) == 1:
         return components[0]
+    require_time_for(sum(len(component.faces) for component in components))
     united = Manifold.batch_boolean([_overlapping(i, components) for i in range(len(components))], OpType.Add)
     volume = sum(component.volume for component in components)
     area = sum(_native.mesh_area(component.vertices, component.faces) for component in components)

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from rlacd._native import poll_stop
 from rlacd.solid.frame import FloatArray
 
 IntArray = NDArray[np.int64]
@@ -38,6 +39,7 @@ def merge_equal_vertices(vertices: FloatArray) -> tuple[FloatArray, IntArray]:
         return vertices, np.empty(0, dtype=np.int64)
     bits = vertices.view(np.uint64).reshape(-1, 3)
     key = np.zeros(len(bits), dtype=np.uint64)
+    poll_stop()
     for axis in range(3):  # one 64-bit word per vertex sorts several times faster than rows do
         key = (key ^ (bits[:, axis] >> np.uint64(29)) ^ bits[:, axis]) * np.uint64(0x9E3779B97F4A7C15)
         key ^= key >> np.uint64(32)
@@ -108,6 +110,7 @@ class Edges:
     @classmethod
     def of(cls, faces: IntArray, count: int) -> Edges:
         """Collect the edges of faces ``[F, 3]`` over ``count`` vertices."""
+        poll_stop()
         start, end = faces.ravel(), faces[:, _NEXT].ravel()
         key = np.minimum(start, end) * count + np.maximum(start, end)
         distinct, inverse, valence = np.unique(key, return_inverse=True, return_counts=True)
@@ -174,6 +177,7 @@ def wedges_of(vertices: FloatArray, faces: IntArray, edges: Edges, trusted: Bool
 
     Around an edge with ``trusted`` ``[F]`` faces only, they alternate as their windings ask, whatever the angles.
     """
+    poll_stop()
     angle = np.zeros(3 * len(faces))
     crowded = np.flatnonzero(edges.valence[edges.of_halfedge] > 2)  # the order of one or two faces needs no angle
     if len(crowded):
@@ -209,6 +213,7 @@ def _order_ties(order: IntArray, angle: FloatArray, edges: Edges, forward: BoolA
     gap[trusted[edges.of_halfedge[order]]] = 0
     tied[edges.of_halfedge[order[gap < _SAME_ANGLE]]] = True
     for edge in np.flatnonzero(tied & (edges.valence > 2)):
+        poll_stop()
         here = slice(start[edge], start[edge + 1])
         ring, gaps = order[here], gap[here]
         alone = (gaps >= _SAME_ANGLE) & (np.roll(gaps, 1) >= _SAME_ANGLE)
@@ -255,8 +260,10 @@ def _sums(group: IntArray, values: FloatArray, number: int) -> FloatArray:
 def sides_of(vertices: FloatArray, faces: IntArray, edges: Edges, trusted: BoolArray | None = None) -> Sides:
     """Join the sides of all faces across their wedges; see `wedges_of`."""
     wedges = wedges_of(vertices, faces, edges, trusted)
+    poll_stop()
     first, second = facing_sides(faces, wedges)
     number, label = components(2 * len(faces), first, second)
+    poll_stop()
     tetrahedra = signed_tetrahedra(vertices, faces)
     area = face_areas(vertices, faces)
     front, back = label[0::2], label[1::2]

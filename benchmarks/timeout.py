@@ -1,0 +1,142 @@
+"""How late a decomposition ends when it is told to: by `timeout`, and by Ctrl-C on the command line.
+
+    python benchmarks/timeout.py timeout [--seconds 2] [SHAPE ...]
+    python benchmarks/timeout.py interrupt [--seconds 2] [SHAPE ...]
+
+SHAPE is a name in `tests/shapes_large.py` (all of them by default) or the path of a mesh. Every run is a fresh process.
+Lateness is wall time: of `rlacd.decompose`, from its call, beyond the timeout, with the seconds of each stage in that;
+and of the command, from SIGINT, so many seconds after it began, to its exit. It grows when others use the machine, so
+the load (1 minute) is printed beside it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from tests.shapes_large import LARGE
+
+PROMISE, SHARE = 1.0, 0.1
+"""No more than so many seconds late, and this share of the timeout."""
+
+GIVE_UP = 120.0
+
+
+def mesh_of(shape: str) -> Any:
+    return LARGE[shape]() if shape in LARGE else shape
+
+
+def one(shape: str, seconds: float) -> dict[str, Any]:
+    """Decompose here, and tell how long each stage lasted beyond the timeout."""
+    import rlacd
+
+    mesh = mesh_of(shape)
+    decompose = rlacd.decompose  # loads the libraries
+    began: list[tuple[float, str]] = []
+    start = time.perf_counter()
+
+    def note(progress: rlacd.Progress) -> None:
+        if not began or began[-1][1] != progress.stage:
+            began.append((time.perf_counter() - start, progress.stage))
+
+    result = decompose(mesh, timeout=seconds, progress=note)
+    end = time.perf_counter() - start
+    ends = [*(at for at, _ in began[1:]), end]
+    late = [(round(b - max(a, seconds), 2), stage) for (a, stage), b in zip(began, ends, strict=True) if b > seconds]
+    return {
+        "late": end - seconds,
+        "parts": len(result),
+        "stopped_by": result.report["stopped_by"],
+        "stages": late,
+        "under": result.report["hausdorff"]["under"],
+        "warnings": [warning for warning in result.report["warnings"] if "ncomplete" in warning or "time" in warning],
+    }
+
+
+def timeout(shape: str, seconds: float) -> str:
+    command = [sys.executable, __file__, "one", shape, "--seconds", str(seconds)]
+    try:
+        run = subprocess.run(command, capture_output=True, text=True, timeout=seconds + GIVE_UP)
+    except subprocess.TimeoutExpired:
+        return f"more than {GIVE_UP:.0f} | | |"
+    if run.returncode:
+        return f"failed: {run.stderr.strip().splitlines()[-1:]} | | |"
+    told = json.loads(run.stdout)
+    late = ", ".join(f"{stage} {more}" for more, stage in told["stages"] if more >= 0.05)
+    under = "–" if told["under"] is None else f"{told['under']:.3f}"
+    return f"{told['late']:.2f} | {late} | {told['parts']} | {under}"
+
+
+def _ignore_interrupts() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _ignores_interrupts(process: int) -> bool:
+    """Whether the command has not begun yet: then it minds SIGINT (Linux)."""
+    ignored = next(line for line in Path(f"/proc/{process}/status").read_text().splitlines() if "SigIgn" in line)
+    return bool(int(ignored.split()[1], 16) >> (signal.SIGINT - 1) & 1)
+
+
+def interrupt(shape: str, seconds: float) -> str:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(shape)
+        if shape in LARGE:
+            import trimesh
+
+            path = Path(folder) / "mesh.ply"
+            trimesh.Trimesh(*mesh_of(shape), process=False).export(path)
+        command = [sys.executable, "-c", "from rlacd.cli import main; main()", "decompose", str(path)]
+        command += ["-o", str(Path(folder) / "hulls.glb"), "--report", "-"]
+        told = Path(folder) / "report.json"
+        with told.open("w") as out:
+            run = subprocess.Popen(command, stdout=out, stderr=subprocess.DEVNULL, preexec_fn=_ignore_interrupts)
+            while run.poll() is None and _ignores_interrupts(run.pid):
+                time.sleep(0.01)
+            time.sleep(seconds)
+            before = run.poll()
+            start = time.perf_counter()
+            run.send_signal(signal.SIGINT)
+            try:
+                code = run.wait(GIVE_UP)
+            except subprocess.TimeoutExpired:
+                run.kill()
+                run.wait()
+                return f"more than {GIVE_UP:.0f} | | |"
+            late = time.perf_counter() - start
+        if before is not None or code not in (0, 4):
+            return f"exit code {code} | | |"
+        report = json.loads(told.read_text())
+        stages = ", ".join(f"{k} {v:.1f}" for k, v in report["seconds"].items() if k != "total")
+        return f"{late:.2f} | {stages} | {report['parts']} | exit code {code}"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=("timeout", "interrupt", "one"))
+    parser.add_argument("shapes", nargs="*")
+    parser.add_argument("--seconds", type=float, default=2.0)
+    given = parser.parse_args()
+    if given.what == "one":
+        print(json.dumps(one(given.shapes[0], given.seconds)))
+        return
+    measure = timeout if given.what == "timeout" else interrupt
+    allowed = PROMISE + (SHARE * given.seconds if given.what == "timeout" else 0.0)
+    print(f"{given.what} {given.seconds:g} s; at most {allowed:g} s late\n")
+    print("| shape | seconds late | of that | hulls | |\n|---|--:|---|--:|--:|")
+    for shape in given.shapes or LARGE:
+        told = measure(shape, given.seconds)
+        print(f"| {Path(shape).stem} | {told} | load {os.getloadavg()[0]:.0f} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,87 @@
+// Work that can be stopped from outside: by a deadline, by a caller who has lost interest, by Ctrl-C.
+//
+// Whoever starts the work installs a Stop in each of its threads (ThisStop). Kernels call poll_stop() in every loop
+// that may run for more than some hundredths of a second; it throws Stopped once the Stop is tripped. Polling reads one
+// atomic, does nothing where no Stop is installed, and never changes a result that is reached.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <mutex>
+#include <thread>
+
+namespace rlacd {
+
+struct Stopped : std::exception {
+  const char* what() const noexcept override { return "the work was stopped"; }
+};
+
+class Stop {
+ public:
+  ~Stop() { end(); }
+
+  // Starts to watch the deadline, and asks `look` (which may throw) some ten times a second in the thread that calls
+  // this, as long as that thread polls.
+  void begin(std::function<void()> look);
+  void end();
+
+  // From now on, the work has so many seconds; infinity lifts the deadline. A Stop that was tripped no longer is.
+  void arm(double seconds);
+  void trip() { attention_ |= kTripped; }
+  // Trips at this poll from now on: for tests that need no time.
+  void trip_after(std::int64_t polls);
+  // While it is shielded, what must be done is done: polls do not throw.
+  void shield(bool on) { shielded_ = on; }
+
+  // Until the deadline; infinite where there is none, or nothing is stopped for now.
+  double seconds_left() const;
+  bool is_tripped() const { return (attention_ & kTripped) != 0; }
+  void poll() {
+    if (attention_.load(std::memory_order_relaxed) != 0) attend();
+  }
+
+ private:
+  using Time = std::chrono::steady_clock::time_point;
+  enum : std::uint32_t { kTripped = 1, kLook = 2, kCounting = 4, kUnwatched = 8 };
+
+  void attend();
+  void watch();
+  bool is_late() const { return std::chrono::steady_clock::now() >= deadline_.load(); }
+
+  std::atomic<std::uint32_t> attention_{0};  // why a poll has to do more than nothing
+  std::atomic<bool> shielded_{false};
+  std::atomic<std::int64_t> polls_left_{0};
+  std::atomic<Time> deadline_{Time::max()};
+  std::function<void()> look_;
+  bool is_looking_ = false;  // in the thread that looks; what it calls may poll
+  std::thread::id looks_;
+  std::thread watcher_;
+  std::mutex guard_;
+  std::condition_variable changed_;
+  bool is_over_ = false;
+};
+
+// The Stop of this thread, if there is one.
+inline thread_local Stop* this_stop = nullptr;
+
+// Installs a Stop in this thread while it is alive.
+class ThisStop {
+ public:
+  explicit ThisStop(Stop* stop) : before_(this_stop) { this_stop = stop; }
+  ~ThisStop() { this_stop = before_; }
+  ThisStop(const ThisStop&) = delete;
+  ThisStop& operator=(const ThisStop&) = delete;
+
+ private:
+  Stop* before_;
+};
+
+inline void poll_stop() {
+  if (this_stop != nullptr) this_stop->poll();
+}
+
+}  // namespace rlacd

@@ -1,0 +1,150 @@
+"""What stands in for a decomposition that had no time to begin: a hull for every body of any input."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from manifold3d import Manifold
+from numpy.typing import NDArray
+from scipy.spatial import HalfspaceIntersection, QhullError
+
+from rlacd import _native
+from rlacd._native import Stopped
+from rlacd.clock import Clock
+from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.component import Part
+from rlacd.solid.frame import Frame
+from rlacd.solid.hull import Hull
+from rlacd.solid.load import InputMesh
+from rlacd.solid.solid import Solid
+
+MOST_HULLS = 2000
+"""Where there are more bodies, those that follow each other along a curve through space share a hull."""
+
+SECONDS = 0.3
+"""What has no exact hull after this time gets a wider one: hulls with half a million corners take seconds."""
+
+FEW = 10_000
+"""Of bodies with fewer points, only the box is taken then."""
+
+HALF_THICKNESS = 1e-3
+"""Flat bodies become as thick as repair makes sheets."""
+
+_WIDER = 1e-9
+_DIRECTIONS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+_AT_ONCE = 100_000
+
+
+def cover(mesh: InputMesh, clock: Clock) -> tuple[Solid, list[Part]]:
+    """Take the hull of every body of an input, without repairing anything.
+
+    Faces that share a corner, or have corners in one place, are one body. The hull of a body holds all of its points;
+    where it has too many corners to be found in little time, the planes that touch the body in 26 directions do.
+
+    Parameters
+    ----------
+    mesh : InputMesh
+        With a point at least.
+    clock : Clock
+        Has stopped, and does not interrupt this.
+
+    Returns
+    -------
+    solid : Solid
+        An empty one: nothing was repaired.
+    parts : list of Part
+        Each is its own hull.
+    """
+    with clock.shielded():
+        used = mesh.vertices if len(mesh.faces) == 0 else mesh.vertices[_used(mesh)]
+        frame = Frame.of(used)
+        vertices = frame.to_frame(mesh.vertices)
+        faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
+        bodies = _bodies(vertices, faces) if len(faces) else [frame.to_frame(used)]
+    clock.stop.arm(SECONDS)
+    hulls = [_hull(points, clock) for points in bodies]
+    clock.stop.trip()
+    warning = (
+        f"Repair had no time: {len(hulls)} hulls around the bodies as they are in the input stand in for everything; "
+        "mass is that of the hulls."
+    )
+    solid = Solid(Manifold(), (vertices, faces), frame, (), (*mesh.warnings, warning))
+    return solid, [Part(hull.vertices, hull.faces, hull.volume, hull) for hull in hulls]
+
+
+def _used(mesh: InputMesh) -> NDArray[np.bool_]:
+    used = np.zeros(len(mesh.vertices), dtype=bool)
+    used[mesh.faces] = True
+    return used
+
+
+def _bodies(vertices: FloatArray, faces: IntArray) -> list[FloatArray]:
+    """The points [N, 3] of each body, or of several that lie near each other."""
+    body = _native.point_bodies(vertices, faces)
+    count = int(body.max()) + 1
+    order = np.argsort(body, kind="stable")[int((body < 0).sum()) :]
+    first = np.searchsorted(body[order], np.arange(count))
+    if count > MOST_HULLS:
+        group = np.empty(count, dtype=np.int64)
+        group[np.argsort(_along_a_curve(vertices[order[first]]), kind="stable")] = (
+            np.arange(count) * MOST_HULLS // count
+        )
+        order = order[np.argsort(group[body[order]], kind="stable")]
+        first = np.searchsorted(group[body[order]], np.arange(MOST_HULLS))
+    placed = vertices[order]
+    return np.split(placed, first[1:])
+
+
+def _along_a_curve(points: FloatArray) -> NDArray[np.int64]:
+    """Places [N] of points [N, 3] of the frame along a Z-order curve."""
+    cell = np.clip((points + 1) * 512, 0, 1023).astype(np.int64)
+    place = np.zeros(len(points), dtype=np.int64)
+    for bit, axis in itertools.product(range(10), range(3)):
+        place |= (cell[:, axis] >> bit & 1) << (3 * bit + axis)
+    return place
+
+
+def _hull(points: FloatArray, clock: Clock) -> Hull:
+    try:
+        exact = Hull.of(points)
+        if exact is not None:
+            return exact
+    except Stopped:
+        with clock.shielded():
+            return _touching(points) if len(points) > FEW else _box(points)
+    with clock.shielded():
+        return Hull.of(_thickened(points)) or _box(points)
+
+
+def _thickened(points: FloatArray) -> FloatArray:
+    """Points [N, 3] and others beside them, along the axes in which they have no extent."""
+    middle = points.mean(axis=0)
+    _, _, axes = np.linalg.svd(np.concatenate([points - middle, np.zeros((3, 3))]), full_matrices=False)
+    extent = np.ptp((points - middle) @ axes.T, axis=0)
+    for axis in axes[extent < HALF_THICKNESS]:
+        points = np.concatenate([points - HALF_THICKNESS * axis, points + HALF_THICKNESS * axis])
+    return np.ascontiguousarray(points)
+
+
+def _touching(points: FloatArray) -> Hull:
+    """What the planes that touch points [N, 3] in `_DIRECTIONS` hold."""
+    reach = np.full(len(_DIRECTIONS), -np.inf)
+    for first in range(0, len(points), _AT_ONCE):
+        np.maximum(reach, (points[first : first + _AT_ONCE] @ _DIRECTIONS.T).max(axis=0), out=reach)
+    reach += 2 * _WIDER
+    try:
+        corners = HalfspaceIntersection(np.column_stack([_DIRECTIONS, -reach]), points.mean(axis=0)).intersections
+    except QhullError:  # flat
+        return _box(points)
+    return Hull.of(np.ascontiguousarray(corners[np.isfinite(corners).all(axis=1)])) or _box(points)
+
+
+def _box(points: FloatArray) -> Hull:
+    """The box around points [N, 3], no thinner than sheets are made."""
+    box = np.array([points.min(axis=0), points.max(axis=0)])
+    is_thin = box[1] - box[0] < HALF_THICKNESS
+    box += np.where(is_thin, HALF_THICKNESS, _WIDER) * np.array([[-1.0], [1.0]])
+    hull = Hull.of(np.array(list(itertools.product(*box.T))))
+    assert hull is not None, "a box with a thickness has a hull"
+    return hull

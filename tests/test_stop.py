@@ -1,0 +1,296 @@
+"""Whenever the work is stopped, what is returned covers the input, soon, and the report says what it is."""
+
+from __future__ import annotations
+
+import itertools
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+import rlacd
+from rlacd import _native
+from rlacd.clock import Clock
+from rlacd.solid.cover import MOST_HULLS, cover
+from rlacd.solid.distance import hull_distances
+from rlacd.solid.hull import Hull
+from rlacd.solid.load import load_mesh
+from rlacd.workers import Workers
+from tests.hulls import assert_convex_hull
+from tests.shapes_large import LARGE, Mesh, boxes, bristles, noisy_ball, screws, sheet, spiked_ball, sponge, terrain
+
+SMALL: dict[str, Mesh] = {
+    "boxes": boxes(12),
+    "bristles": bristles(6),
+    "screws": screws(5, sides=6),
+    "sponge": sponge(1),
+    "spike": spiked_ball(1e6, 200),
+    "terrain": terrain(8),
+    "sheet": sheet(60),
+    "ball": noisy_ball(300, 0.05),
+}
+
+PATIENCE = 30.0
+"""Seconds beyond the promise that a busy machine may take."""
+
+
+def assert_covers(result: rlacd.Decomposition, mesh: Mesh, within: float = 5e-3) -> None:
+    """Every hull is valid, and the input's surface is not farther from them than repair may move it."""
+    assert len(result) >= 1
+    hulls = []
+    for hull in result:
+        assert_convex_hull(hull)
+        assert hull.volume > 0
+        hulls.append(Hull(np.asarray(hull.vertices), np.asarray(hull.faces, dtype=np.int32), hull.volume))
+    vertices, faces = mesh
+    under = hull_distances(hulls, vertices, faces, tolerance=1e-3 * np.ptp(vertices, axis=0).max()).under[0]
+    assert under <= within * np.ptp(vertices, axis=0).max() / 2
+
+
+@pytest.fixture
+def polls(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Trips the clock of the next decomposition at the poll whose number is put in here: no time is needed for that."""
+    wanted: list[int] = []
+    arm = Clock.running
+
+    def running(self: Clock) -> object:
+        context = arm(self)
+
+        class Counting:
+            def __enter__(self_) -> None:
+                context.__enter__()
+                if wanted:
+                    self.stop.trip_after(wanted[0])
+
+            def __exit__(self_, *error: object) -> None:
+                context.__exit__(*error)  # type: ignore[arg-type]
+
+        return Counting()
+
+    monkeypatch.setattr(Clock, "running", running)
+    return wanted
+
+
+def stops(most: int) -> list[int]:
+    """Polls to stop at: close together in the beginning, where the stages change quickly."""
+    return [round(1.7**k) for k in range(60) if 1.7**k < most]
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_stopped_at_any_poll_the_hulls_cover_the_input(polls: list[int], name: str) -> None:
+    stages = set()
+    for number in stops(10**7):
+        polls[:] = [number]
+        result = rlacd.decompose(SMALL[name], threads=1, quality="balanced", search_steps=4)
+        if result.report["stopped_by"] is None:
+            break
+        assert not result.report["complete"]
+        assert any("early" in sentence for sentence in result.report["warnings"])
+        assert_covers(result, SMALL[name])
+        stages |= {stage for stage in result.report["seconds"]}
+    else:
+        pytest.fail("it never came to its end")
+    assert {"repair", "cut"} <= stages
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"max_hulls": 3},
+        {"max_vertices": 8, "max_faces": 12},
+        {"max_vertices": 5},
+        {"criterion": rlacd.NavigableSpace(0.05, 0.05)},
+        {"merge": False},
+        {"threshold_abs": 0.05},
+        {"quality": "fast", "threads": 3},
+    ],
+    ids=str,
+)
+def test_stopped_with_options_that_have_stages_of_their_own(polls: list[int], options: dict[str, object]) -> None:
+    mesh = SMALL["screws"]
+    for number in stops(10**7)[::4]:
+        polls[:] = [number]
+        result = rlacd.decompose(mesh, **{"threads": 1, **options})  # type: ignore[arg-type]
+        if result.report["stopped_by"] is None:
+            break
+        assert_covers(result, mesh)
+        for limit in ("max_vertices", "max_faces"):
+            count = max(len(hull.vertices if limit == "max_vertices" else hull.faces) for hull in result)
+            assert count <= options.get(limit, count)  # type: ignore[operator]
+
+
+def test_a_stop_that_never_comes_changes_no_bit(polls: list[int]) -> None:
+    mesh = SMALL["screws"]
+    plain = rlacd.decompose(mesh)
+    polls[:] = [10**12]
+    for result in (rlacd.decompose(mesh), rlacd.decompose(mesh, timeout=1e6, progress=lambda _: None)):
+        assert len(result) == len(plain)
+        for hull, other in zip(result, plain, strict=True):
+            assert hull.vertices.tobytes() == other.vertices.tobytes()
+            assert hull.faces.tobytes() == other.faces.tobytes()
+
+
+def test_hulls_of_bodies_that_had_no_repair_hold_them() -> None:
+    result = rlacd.decompose(boxes(40), timeout=1e-9)
+    assert len(result) == 40
+    assert sum(hull.volume for hull in result) == pytest.approx(trimesh.Trimesh(*boxes(40)).volume)
+    assert result.report["repair"] == []
+    assert result.report["concavity"] == {"per_part": None, "max": None}
+
+
+def test_corners_in_one_place_make_one_body() -> None:
+    vertices, faces = boxes(1)
+    loose = vertices[faces].reshape(-1, 3)
+    soup = np.concatenate([loose, loose + 5, -0.0 * loose[:3]])
+    triangles = np.arange(len(soup), dtype=np.int32).reshape(-1, 3)
+    assert _native.point_bodies(soup, triangles).tolist() == [0] * 36 + [1] * 36 + [0] * 3
+    assert _native.point_bodies(soup, triangles[12:]).tolist() == [-1] * 36 + [0] * 36 + [1] * 3
+
+
+def test_bodies_by_the_thousand_share_hulls_with_those_near_them() -> None:
+    rng = np.random.default_rng(0)
+    corners = rng.random((3 * MOST_HULLS, 1, 3)) + 1e-3 * rng.random((3 * MOST_HULLS, 3, 3))
+    mesh = corners.reshape(-1, 3), np.arange(9 * MOST_HULLS, dtype=np.int32).reshape(-1, 3)
+    clock = Clock()
+    solid, parts = cover(load_mesh(mesh), clock)
+    assert len(parts) == MOST_HULLS
+    under = hull_distances([part.hull for part in parts], *solid.surface).under[0]
+    assert under < 1e-9
+    assert sum(part.hull.volume for part in parts) < 0.2 * 8  # they are near each other
+
+
+@pytest.mark.parametrize("flat", [False, True])
+def test_a_body_whose_hull_takes_too_long_gets_a_wider_one(flat: bool) -> None:
+    vertices, faces = noisy_ball(20_000, 0.0)
+    vertices = vertices * [1, 1, 0 if flat else 1]
+    mesh = load_mesh((vertices, faces))
+    clock = Clock()
+    with clock.running():
+        clock.stop.trip_after(1)
+        solid, parts = cover(mesh, clock)
+    (hull,) = (part.hull for part in parts)
+    assert hull.volume > 0
+    if not flat:
+        assert hull_distances([hull], *solid.surface).under[0] == 0
+        assert hull.volume < 1.2 * 4 / 3 * np.pi
+
+
+# --- in time --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LARGE)
+def test_a_timeout_is_kept_however_large_the_input(name: str) -> None:
+    mesh = LARGE[name]()
+    start = time.perf_counter()
+    result = rlacd.decompose(mesh, timeout=1.0)
+    late = time.perf_counter() - start - 1.0
+    assert late < 1.0 + 0.1 * 1.0 + PATIENCE
+    assert result.report["stopped_by"] == "timeout"
+    # All corners: for the surface between them there is no time here either.
+    corners = mesh[0][:: max(1, len(mesh[0]) // 2000)]
+    planes = [hull for hull in result]
+    left = np.ones(len(corners), dtype=bool)
+    slack = 2e-3 * np.ptp(mesh[0], axis=0).max()
+    for hull in planes:
+        lower, upper = hull.bounds
+        some = np.flatnonzero(left & (corners >= lower - slack).all(axis=1) & (corners <= upper + slack).all(axis=1))
+        height = np.einsum("pj,fj->pf", corners[some], hull.face_normals) - np.einsum(
+            "fj,fj->f", hull.triangles[:, 0], hull.face_normals
+        )
+        left[some[(height <= slack).all(axis=1)]] = False
+    assert not left.any()
+
+
+def test_a_long_kernel_calls_progress_in_the_thread_of_the_caller() -> None:
+    threads = set()
+
+    def note(progress: rlacd.Progress) -> None:
+        threads.add(threading.get_ident())
+
+    rlacd.decompose(noisy_ball(2000, 0.05), progress=note, threads=2, quality="fast")
+    assert threads == {threading.get_ident()}
+
+
+def test_workers_wait_for_each_other_when_one_fails() -> None:
+    clock = Clock()
+    running = itertools.count()
+    ended = []
+
+    def work(item: int) -> None:
+        next(running)
+        try:
+            if item == 3:
+                raise ValueError("three")
+            for _ in range(20):
+                time.sleep(0.002)
+                _native.poll_stop()
+        finally:
+            ended.append(item)
+
+    with clock.running(), Workers(4, clock.stop) as workers:
+        with pytest.raises(ValueError, match="three"):
+            workers.map(work, range(40))
+        assert len(ended) == next(running)
+        clock.stop.trip()
+        with pytest.raises(_native.Stopped):
+            workers.map(work, range(40))
+        clock.stop.arm(float("inf"))
+        assert workers.map(lambda item: 2 * item, range(10)) == list(range(0, 20, 2))
+
+
+def test_an_error_of_progress_leaves_long_kernels_too() -> None:
+    """It is raised where the kernel is, through threads of its own."""
+
+    class MyError(Exception):
+        pass
+
+    def look() -> None:
+        raise MyError
+
+    stop = _native.Stop()
+    before = _native.use_stop(stop)
+    stop.begin(look)
+    try:
+        surface = _native.Surface(*noisy_ball(2000, 0.0))
+        with pytest.raises(MyError):  # after the tenth of a second between two looks
+            surface.distance(np.zeros((10_000_000, 3)), 3)
+    finally:
+        stop.end()
+        _native.use_stop(before)
+
+
+def test_a_stop_ends_with_its_decomposition() -> None:
+    rlacd.decompose(SMALL["ball"], timeout=1e-9)
+    _native.poll_stop()
+    assert _native.seconds_left() == float("inf")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT to one process")
+@pytest.mark.parametrize("name", ["terrain", "boxes"])
+def test_ctrl_c_is_heeded_in_the_middle_of_a_stage(name: str, tmp_path: Path) -> None:
+    trimesh.Trimesh(*LARGE[name](), process=False).export(tmp_path / "mesh.ply")
+    code = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN); from rlacd.cli import main; main()"
+    run = subprocess.Popen(
+        [sys.executable, "-c", code, "decompose", str(tmp_path / "mesh.ply"), "-o", str(tmp_path / "hulls.glb")],
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        start = time.perf_counter()
+        while run.poll() is None and time.perf_counter() - start < 600:  # before it watches, it ignores us
+            run.send_signal(signal.SIGINT)
+            time.sleep(1.0)
+            break_after = run.poll()
+            if break_after is None and (tmp_path / "hulls.glb").exists():
+                break
+        assert run.wait(PATIENCE) in (4, 130)
+    finally:
+        run.kill()
