@@ -222,6 +222,25 @@ def test_nothing_covers_the_model_on_a_phone(viewer: Viewer, browser: Any) -> No
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
 
 
+def test_hulls_that_share_a_face_do_not_flicker(browser: Any, tmp_path: Path) -> None:
+    beams = [trimesh.creation.box(size) for size in ((2, 0.5, 0.2), (0.5, 2, 0.2))]
+    trimesh.boolean.union(beams, engine="manifold").export(tmp_path / "cross.ply")
+    with open_viewer(tmp_path / "cross.ply", {"quality": "fast"}, port=0) as viewer, open_page(browser) as watched:
+        page = watched.page
+        page.goto(viewer.address)
+        wait_for_run(page, 1)
+        assert rows(page) == 2, "two beams that lie in each other"
+        page.locator("#edges").click()
+        page.locator("#canvas").focus()
+        for _ in range(8):
+            page.keyboard.press("ArrowLeft")
+            settle(page)
+            seen = pixels(page)
+            high, wide = seen.shape[0] // 2, seen.shape[1] // 2
+            shared = seen[high - 55 : high - 35, wide - 20 : wide + 20].reshape(-1, 4)
+            assert (abs(shared - shared[0]).max(axis=1) < 12).all()
+
+
 def test_an_open_sheet_is_explained_in_the_header(browser: Any, tmp_path: Path) -> None:
     sheet = trimesh.Trimesh([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2), (0, 2, 3)])
     sheet.export(tmp_path / "sheet.ply")

@@ -100,7 +100,7 @@ def _missing(model: str) -> str | None:
     return None
 
 
-def download(decomposition: Decomposition, wanted: str, *, up: str = "z") -> Download:
+def download(decomposition: Decomposition, wanted: str, *, up: str = "z", unit: str = "") -> Download:
     """Make one of the files `offered`; what takes several files comes zipped.
 
     Parameters
@@ -110,6 +110,8 @@ def download(decomposition: Decomposition, wanted: str, *, up: str = "z") -> Dow
         The name of what is offered.
     up : {"x", "y", "z"}
         The axis of the input that points up.
+    unit : str
+        The input's unit of length, for the report; empty where nobody says.
 
     Raises
     ------
@@ -125,7 +127,7 @@ def download(decomposition: Decomposition, wanted: str, *, up: str = "z") -> Dow
         raise OptionError(f"{wanted!r} cannot be downloaded; choose one of {', '.join(names)}.")
     stem = file_stem(decomposition.name)
     if wanted == "report.html":
-        return Download(f"{stem}_hulls.html", report_page(decomposition, up=up).encode())
+        return Download(f"{stem}_hulls.html", report_page(decomposition, up=up, unit=unit).encode())
     if wanted == "report.json":
         return Download(f"{stem}_hulls.json", to_json(decomposition.report).encode())
     with tempfile.TemporaryDirectory() as name:

@@ -81,10 +81,10 @@ def save_report_page(
     return place
 
 
-def report_page(decomposition: Decomposition, *, up: str = "z", picture: bool = True) -> str:
+def report_page(decomposition: Decomposition, *, up: str = "z", picture: bool = True, unit: str = "") -> str:
     """Build the text of the report; see `save_report_page`."""
     data: dict[str, Any] = {
-        **scene(decomposition, up),
+        **scene(decomposition, up, unit=unit),
         "heat": heat_scene(heat_map(decomposition, triangles=HEAT_TRIANGLES)),
         **(_picture(decomposition, up) if picture else {}),
     }

@@ -335,7 +335,7 @@ class _Handler(BoundedHandler):
     def _send_file(self, wanted: str, up: str) -> None:
         check_up(up)
         with self.server.heavy:
-            file = download(self._result()[1], wanted, up=up)
+            file = download(self._result()[1], wanted, up=up, unit=self.server.subject.unit)
         plain = file.name.encode("ascii", "replace").decode().replace('"', "_").replace("\\", "_")
         exact = urllib.parse.quote(file.name.encode(errors="replace"))
         named = f"attachment; filename=\"{plain}\"; filename*=UTF-8''{exact}"
