@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 from pathlib import Path
 from typing import Annotated, Any
@@ -25,8 +26,8 @@ class Commands(TyperGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Look the command up that the words begin with."""
         word = args[0]
-        if self.get_command(ctx, word) is None and (Path(word).suffix or Path(word).exists()):
-            verb = "batch" if Path(word).is_dir() else "decompose"
+        if self.get_command(ctx, word) is None and (Path(word).suffix or os.path.exists(word)):
+            verb = "batch" if os.path.isdir(word) else "decompose"
             typed = shlex.join(["rlacd", verb, *args])
             typer.echo(f"rlacd: {printable(word)} is no command; did you mean  {printable(typed)}", err=True)
             raise typer.Exit(ExitCode.BAD_INPUT)

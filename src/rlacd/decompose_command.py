@@ -57,8 +57,7 @@ def decompose_command() -> Callable[..., None]:
 def _decompose(mesh: Path, asked: OutputOptions, how: dict[str, Any]) -> None:
     from rlacd.terminal import say
 
-    if not mesh.exists():
-        raise MeshFileError(f"{mesh} does not exist: check the spelling and the folder")
+    _check_input(mesh)
     wanted = _named(mesh, asked, how.get("preset"))
     robot = mesh.suffix.lower() in ROBOTS
     _check_output(mesh, wanted)
@@ -171,6 +170,16 @@ def _check_robot(asked: OutputOptions, wanted: OutputOptions) -> None:
             raise OptionError(f"--{spelled} belongs to a single mesh; leave it out for a robot.")
     if wanted.report not in (None, STDOUT):
         check_file(Path(wanted.report))
+
+
+def _check_input(mesh: Path) -> None:
+    """Say that the input is missing before anything is said of the output; loading says what else may be wrong."""
+    try:
+        mesh.stat()
+    except FileNotFoundError as error:
+        raise MeshFileError(f"{mesh} does not exist: check the spelling and the folder") from error
+    except (OSError, ValueError):
+        return
 
 
 def _check_output(mesh: Path, wanted: OutputOptions) -> None:
