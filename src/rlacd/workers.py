@@ -16,6 +16,9 @@ from rlacd._native import Stop, Stopped, poll_stop, use_stop
 BETWEEN_POLLS = 0.05
 """Seconds between two looks, while others work, at whether they have to stop."""
 
+SHARES = 16
+"""Many items are handed to the threads in so many portions a thread."""
+
 _T = TypeVar("_T")
 _R = TypeVar("_R")
 
@@ -41,11 +44,12 @@ class Workers:
         """Apply `function` to every item; when an exception leaves this, no thread works on any of them any more."""
         items = list(items)
         if self.threads == 1 or len(items) < 2:
-            return [self._polled(function, item) for item in items]
-        futures = [self._pool.submit(self._polled, function, item) for item in items]
+            return self._each(function, items)
+        some = max(1, len(items) // (SHARES * self.threads))  # thousands of small ones are not handed over one by one
+        futures = [self._pool.submit(self._each, function, items[i : i + some]) for i in range(0, len(items), some)]
         try:
             self._watch(futures)
-            return [future.result() for future in futures]
+            return [result for future in futures for result in future.result()]
         except BaseException as error:
             for future in futures:
                 future.cancel()
@@ -55,9 +59,12 @@ class Workers:
             raise
 
     @staticmethod
-    def _polled(function: Callable[[_T], _R], item: _T) -> _R:
-        poll_stop()
-        return function(item)
+    def _each(function: Callable[[_T], _R], items: list[_T]) -> list[_R]:
+        results = []
+        for item in items:
+            poll_stop()
+            results.append(function(item))
+        return results
 
     def _watch(self, futures: list[Future[_R]]) -> None:
         """Wait until all are done or one has failed; only this thread can look whether they have to stop."""
