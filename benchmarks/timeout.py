@@ -131,7 +131,7 @@ def main() -> None:
     parser.add_argument("what", choices=("timeout", "interrupt", "one"))
     parser.add_argument("shapes", nargs="*")
     parser.add_argument("--seconds", type=float, default=2.0)
-    given = parser.parse_args()
+    given = parser.parse_intermixed_args()
     if given.what == "one":
         print(json.dumps(one(given.shapes[0], given.seconds)))
         return
