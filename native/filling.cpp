@@ -168,8 +168,6 @@ bool Filling::comes_deeper(const Mesh& hull, double threshold) const {
   for (const Vec3 p : hull.vertices) inner.extend(p);
   inner.lower = inner.lower + Vec3{threshold, threshold, threshold};
   inner.upper = inner.upper - Vec3{threshold, threshold, threshold};
-  for (const Vec3 p : solid_.vertices)
-    if (inner.holds(p) && depths.holds(p)) return true;
   const std::vector<Bvh::Node>& nodes = surface_.bvh().nodes();
   std::vector<std::int32_t> open = {0};
   while (!open.empty()) {
@@ -184,7 +182,10 @@ bool Filling::comes_deeper(const Mesh& hull, double threshold) const {
       }
       for (std::int32_t i = 0; i < node.leaf_size[side]; ++i) {
         const Triangle& face = solid_.faces[surface_.bvh().face(~node.child[side] + i)];
-        if (depths.meets(solid_.vertices[face[0]], solid_.vertices[face[1]], solid_.vertices[face[2]])) return true;
+        const Vec3 p = solid_.vertices[face[0]], q = solid_.vertices[face[1]], r = solid_.vertices[face[2]];
+        for (const Vec3 corner : {p, q, r})
+          if (inner.holds(corner) && depths.holds(corner)) return true;
+        if (depths.meets(p, q, r)) return true;
       }
     }
   }

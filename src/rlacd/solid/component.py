@@ -33,6 +33,13 @@ NEGLIGIBLE_FOLD = 1e-9
 """A smaller share than this is rounding."""
 
 
+MARGIN = 1e-3
+"""How far outside a box a solid is cut that is wanted in it, so that no cap touches what lies inside."""
+
+FEW_FACES = 400
+"""A boolean with so few faces takes no longer than cutting them off first."""
+
+
 @dataclass(frozen=True)
 class Plane:
     """The plane n.x = d, n a unit normal; *below* is n.x < d, *above* n.x > d."""
@@ -187,7 +194,7 @@ class Share(Part):
     def __init__(self, solid: Component, first: Part, second: Part, hull: Hull) -> None:
         require_time_for(len(solid.faces))
         body = Manifold(Mesh64(hull.vertices, hull.faces.astype(np.uint64)))
-        vertices, faces = _surface_of(solid.manifold ^ body)
+        vertices, faces = _surface_of(solid.around(hull.box) ^ body)
         volume = _native.mesh_volume(vertices, faces) if len(faces) else 0.0
         super().__init__(vertices, faces, volume, hull, first.piece_hulls + second.piece_hulls)
         self.solid = solid
@@ -265,6 +272,28 @@ class Component(Part):
             upper, lower = self.manifold.split_by_plane(plane.normal, plane.offset)
             return _component(lower, self), _component(upper, self)
         return _component(below, self), _component(above, self)
+
+    def around(self, box: FloatArray) -> Manifold:
+        """Get what the solid has in a box [2, 3] and a margin around it, for booleans with what lies in the box.
+
+        All of the solid where it is small, or where it is not cut cleanly.
+        """
+        vertices, faces = self.vertices, self.faces
+        room = np.stack([box[0] - self.box[0], self.box[1] - box[1]])  # beyond each side of the box
+        for side, axis in sorted(np.argwhere(room > MARGIN).tolist(), key=lambda at: -room[at[0], at[1]]):
+            if len(faces) <= FEW_FACES:
+                break
+            x, y, z = np.eye(3)[axis].tolist()
+            offset = float(box[side, axis] + (MARGIN if side else -MARGIN))
+            inner = _native.cut_by_plane(vertices, faces, x, y, z, offset)[1 - side]
+            (vertices, faces), folded = _capped(*inner)
+            if folded > NEGLIGIBLE_FOLD:
+                return self.manifold
+        if faces is self.faces:
+            return self.manifold
+        clipped = Manifold(Mesh64(vertices, faces.astype(np.uint64)))
+        volume = _native.mesh_volume(vertices, faces) if len(faces) else 0.0
+        return clipped if abs(clipped.volume() - volume) <= NEGLIGIBLE_VOLUME + LOST * volume else self.manifold
 
     def pieces(self) -> list[Component]:
         """Connected pieces, cavities kept inside the piece that encloses them; ``[self]`` when there is but one."""
