@@ -10,6 +10,7 @@ from typing import Literal, TypeVar
 
 from rlacd._native import Stop, Stopped, use_stop
 from rlacd.progress import Progress, ProgressCallback
+from rlacd.work import Work
 
 StoppedBy = Literal["timeout", "cancel"]
 
@@ -34,9 +35,14 @@ class Clock:
     progress : callable or None
         Told about every step, and several times a second in long ones; when it returns False, `stopped_by` becomes
         "cancel".
+    work : Work, optional
+        What may be done; without bound by default. When it is spent, steps say so.
     """
 
-    def __init__(self, timeout: float | None = None, progress: ProgressCallback | None = None) -> None:
+    def __init__(
+        self, timeout: float | None = None, progress: ProgressCallback | None = None, work: Work | None = None
+    ) -> None:
+        self.work = work or Work()
         self.seconds: dict[str, float] = {}
         self.stopped_by: StoppedBy | None = None
         self.stopped_in: str | None = None
@@ -94,7 +100,7 @@ class Clock:
                 self._stop_by("timeout")
             elif told_to_stop:
                 self._stop_by("cancel")
-        return self._nothing_left_to_stop or self.stopped_by is None
+        return self._nothing_left_to_stop or (self.stopped_by is None and not self.work.is_spent)
 
     def goes_on(self) -> bool:
         """Whether the work may go on, between two steps."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from rlacd import _native
+from rlacd import _native, work
 from rlacd._native import Stopped
 from rlacd.clock import Clock
 from rlacd.criteria import Criterion
@@ -100,6 +100,8 @@ class CutTree:
         left: list[Component] = []
         frontier = [self.root]
         while frontier:
+            if not clock.work.pay(sum(work.judging(c.size, len(c.hull.faces)) for c in frontier)):
+                return done, left + frontier
             unmet = frontier
             try:
                 verdicts = self._workers.map(criterion.is_met, frontier)
@@ -109,7 +111,10 @@ class CutTree:
                     return done, left + unmet
                 if len(done) + len(left) + 2 * len(unmet) > most:  # each becomes two at least
                     return done, left + unmet
-                self._divide([c for c in unmet if c not in self._children])
+                new = [c for c in unmet if c not in self._children]
+                if not clock.work.pay(sum(work.choosing(c.size) + work.cutting(c.size) for c in new)):
+                    return done, left + unmet
+                self._divide(new)
             except Stopped:
                 clock.note_stop()
                 return done, left + unmet

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from rlacd import _native
-from rlacd._native import Stopped, poll_stop
+from rlacd import _native, work
+from rlacd._native import Stopped
 from rlacd.clock import Clock
 from rlacd.criteria.criterion import Chance, Criterion
-from rlacd.solid.arrays import BoolArray, FloatArray, IntArray
+from rlacd.finish.boxes import Boxes
+from rlacd.solid.arrays import IntArray
 from rlacd.solid.component import LOST, Component, Part, Share
 from rlacd.solid.hull import Hull
+from rlacd.work import Work
 from rlacd.workers import Workers
 
 FEW = 100
@@ -61,7 +63,7 @@ def merge_parts(
     list of Part
         Parts that could not be united further, in the order of their first piece, those beside last.
     """
-    pairs = _Adjoining(criterion, workers)
+    pairs = _Adjoining(criterion, workers, clock)
     alive = _unite_pairs([*parts, *beside], len(parts), pairs, workers, clock)
     if solid is None:
         return alive
@@ -74,8 +76,16 @@ def merge_parts(
 class _Pairing(Protocol):
     """Which pairs of parts may become one, and how that is found out."""
 
-    def pairs(self, alive: Mapping[int, Part], new: Sequence[int]) -> tuple[list[_Pair], list[tuple[int, int]]]:
-        """Pairs of a new part with any other that may be united, and their costs; and pairs that can never be."""
+    def pairs(
+        self, alive: Mapping[int, Part], boxes: Boxes, new: Sequence[int]
+    ) -> tuple[list[_Pair], list[tuple[int, int]]]:
+        """Pairs of a new part with any other in the boxes that may be united, and their costs; and those never to be.
+
+        Fewer where the clock has no work left for more.
+        """
+
+    def price(self, first: Part, second: Part) -> float:
+        """The work of uniting two parts."""
 
     def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
         """Their union if it meets the criterion; otherwise None, and whether no larger union will either."""
@@ -92,7 +102,8 @@ def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, workers: Wo
         refused[second].add(first)
 
     try:
-        queue, never = pairing.pairs(alive, range(new))
+        boxes = Boxes(alive)
+        queue, never = pairing.pairs(alive, boxes, range(new))
         heapq.heapify(queue)
         for first, second in never:
             refuse(first, second)
@@ -106,6 +117,9 @@ def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, workers: Wo
             )
             for taken, pair in enumerate(batch, start=1):
                 union, for_good = verdicts.pop(pair)
+                # Paid for in the order of the pairs: how many are tested side by side must not matter.
+                if not clock.work.pay(pairing.price(alive[pair.first], alive[pair.second])):
+                    break
                 if union is None:
                     if for_good:
                         refuse(pair.first, pair.second)
@@ -113,11 +127,11 @@ def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, workers: Wo
                 origin[newest] = min(origin[pair.first], origin[pair.second])
                 del alive[pair.first], alive[pair.second]
                 alive[newest] = union
+                boxes.add(newest, union, [pair.first, pair.second])
                 refused[newest] = refused.pop(pair.first) | refused.pop(pair.second)
                 for i in refused[newest] & alive.keys():
                     refused[i].add(newest)
-                asked = {i: part for i, part in alive.items() if i not in refused[newest]}
-                found, never = pairing.pairs(asked, [newest])
+                found, never = pairing.pairs(alive, boxes.without([*refused[newest]]), [newest])
                 for first, second in never:
                     refuse(first, second)
                 for other in [*batch[taken:], *found]:
@@ -145,16 +159,26 @@ class _Adjoining:
 
     criterion: Criterion
     workers: Workers
+    clock: Clock
 
-    def pairs(self, alive: Mapping[int, Part], new: Sequence[int]) -> tuple[list[_Pair], list[tuple[int, int]]]:
+    def pairs(
+        self, alive: Mapping[int, Part], boxes: Boxes, new: Sequence[int]
+    ) -> tuple[list[_Pair], list[tuple[int, int]]]:
         """Those that the volume bound allows."""
         filled = self.criterion.filled
+        pairs = boxes.pairs(new, self.criterion.reach)
+        if not self.clock.work.pay(_sum_over(alive, pairs, work.joining)):
+            return [], []
         found = [
             _Pair(hull_volume - (filled(alive[first]) + filled(alive[second])), first, second)
-            for first, second, volume, hull_volume in neighbours(alive, new, self.criterion.reach, self.workers)
+            for first, second, volume, hull_volume in joint_volumes(alive, pairs, self.workers)
             if not self.criterion.excludes(volume, hull_volume)
         ]
         return found, []
+
+    def price(self, first: Part, second: Part) -> float:
+        """Gluing and judging."""
+        return price_of_gluing(first, second)
 
     def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
         """Glue them."""
@@ -171,45 +195,77 @@ class _Bridged:
     clock: Clock
     solid: Component
 
-    def pairs(self, alive: Mapping[int, Part], new: Sequence[int]) -> tuple[list[_Pair], list[tuple[int, int]]]:
+    def pairs(
+        self, alive: Mapping[int, Part], boxes: Boxes, new: Sequence[int]
+    ) -> tuple[list[_Pair], list[tuple[int, int]]]:
         """Those with a chance: how much the solid fills is not known yet."""
         filled = self.criterion.filled
-        reach = np.inf if len(alive) <= FEW else self.criterion.reach
-        ids, pairs = _near_pairs(alive, new, reach, across=True)
-        hulls = [part.hull for part in alive.values()]
+        reach = np.inf if len(boxes.ids) <= FEW else self.criterion.reach
+        pairs = boxes.pairs(new, reach, across=True)
         found: list[_Pair] = []
         never: list[tuple[int, int]] = []
         for some in np.split(pairs, range(AT_ONCE, len(pairs), AT_ONCE)):
-            if not self.clock.goes_on():
+            if not self.clock.goes_on() or not self.clock.work.pay(_sum_over(alive, some, work.screening)):
                 break
-            volumes, chances = self.criterion.chances(self.solid.filling, hulls, some, self.workers.threads)
-            for (i, j), volume, chance in zip(some.tolist(), volumes.tolist(), chances.tolist(), strict=True):
-                first, second = ids[i], ids[j]
+            used, places = _places(some)
+            hulls = [alive[i].hull for i in used]
+            volumes, chances = self.criterion.chances(self.solid.filling, hulls, places, self.workers.threads)
+            for (first, second), volume, chance in zip(some.tolist(), volumes.tolist(), chances.tolist(), strict=True):
                 if chance == Chance.SOME:
                     found.append(_Pair(volume - (filled(alive[first]) + filled(alive[second])), first, second))
                 elif chance == Chance.NEVER:
                     never.append((first, second))
         return found, never
 
+    def price(self, first: Part, second: Part) -> float:
+        """A boolean and judging."""
+        return price_of_share(first, second, self.solid)
+
     def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
         """Take the solid's share of the joint hull."""
         return _share(first, second, Hull.around(first.hull, second.hull), self.criterion, self.solid), False
 
 
-def unite(first: Part, second: Part, criterion: Criterion, solid: Component, hull: Hull | None = None) -> Part | None:
+def unite(
+    first: Part,
+    second: Part,
+    criterion: Criterion,
+    solid: Component,
+    hull: Hull | None = None,
+    account: Work | None = None,
+) -> Part | None:
     """Unite two parts of a solid, as they are or across what lies between them; None where neither is allowed.
 
-    Their joint hull may be given where it is known.
+    Their joint hull may be given where it is known. None, too, where the account has no work left for it.
     """
     hull = hull or Hull.around(first.hull, second.hull)
+    account = account or Work()
+    if not account.pay(work.holding(len(hull.vertices))):
+        return None
     chance = criterion.chance(solid.filling, hull)
     if chance is Chance.NONE:
         return None
     if is_alone(first) and is_alone(second):  # otherwise they may overlap each other
+        if not account.pay(price_of_gluing(first, second)):
+            return None
         union = Part.glued(first, second, hull)
         if not criterion.excludes(union.volume, hull.volume) and criterion.is_met(union):
             return union
-    return _share(first, second, hull, criterion, solid) if chance is Chance.SOME else None
+    if chance is not Chance.SOME or not account.pay(price_of_share(first, second, solid)):
+        return None
+    return _share(first, second, hull, criterion, solid)
+
+
+def price_of_gluing(first: Part, second: Part) -> float:
+    """The work of gluing two parts and judging the union."""
+    faces, hull_faces = first.size + second.size, len(first.hull.faces) + len(second.hull.faces)
+    return work.gluing(faces) + work.judging(faces, hull_faces)
+
+
+def price_of_share(first: Part, second: Part, solid: Component) -> float:
+    """The work of taking what the solid fills of the joint hull of two parts, and judging it."""
+    faces, hull_faces = first.size + second.size, len(first.hull.faces) + len(second.hull.faces)
+    return work.filling(solid.size, faces, hull_faces) + work.judging(faces, hull_faces)
 
 
 def is_alone(part: Part) -> bool:
@@ -227,52 +283,30 @@ def neighbours(
     alive: Mapping[int, Part], new: Sequence[int], reach: float, workers: Workers
 ) -> list[tuple[int, int, float, float]]:
     """Pairs of a new part with any other whose boxes lie within reach: (first, second, volume, joint hull's volume)."""
-    ids, pairs = _near_pairs(alive, new, reach)
-    parts = list(alive.values())
-    hulls = _native.joint_hull_volumes([part.hull.vertices for part in parts], pairs, workers.threads)
+    return joint_volumes(alive, Boxes(alive).pairs(new, reach), workers)
+
+
+def joint_volumes(alive: Mapping[int, Part], pairs: IntArray, workers: Workers) -> list[tuple[int, int, float, float]]:
+    """Volumes of pairs of parts [P, 2]: (first, second, volume of both, joint hull's volume)."""
+    used, places = _places(pairs)
+    corners = [alive[i].hull.vertices for i in used]
+    hulls = _native.joint_hull_volumes(corners, places, workers.threads)
     return [
-        (ids[i], ids[j], parts[i].volume + parts[j].volume, hull)
+        (i, j, alive[i].volume + alive[j].volume, hull)
         for (i, j), hull in zip(pairs.tolist(), hulls.tolist(), strict=True)
     ]
 
 
-def _near_pairs(
-    alive: Mapping[int, Part], new: Sequence[int], reach: float, across: bool = False
-) -> tuple[list[int], IntArray]:
-    """The ids of all parts, and pairs [P, 2] of places among them: of a new part with any other within reach.
-
-    With `across`, also pairs both of which are within reach of a third.
-    """
-    ids, parts, among = list(alive), list(alive.values()), set(new)
-    is_new = np.array([i in among for i in ids])
-    rows = np.flatnonzero(is_new)
-    boxes = np.array([part.box for part in parts])
-    near = _near(boxes[rows], boxes, reach)
-    if across:
-        between = near.any(axis=0)
-        beyond = _near(boxes[between], boxes, reach).astype(np.float32)
-        for some in _rows(len(near)):
-            near[some] |= near[some][:, between].astype(np.float32) @ beyond > 0
-    k, other = np.nonzero(near)
-    once = (rows[k] < other) | ~is_new[other]  # two new parts find each other twice
-    pairs = np.sort(np.stack([rows[k], other], axis=1)[once], axis=1)
-    return ids, np.ascontiguousarray(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))], dtype=np.int32)
+def _places(pairs: IntArray) -> tuple[list[int], IntArray]:
+    """The ids that pairs [P, 2] are made of, and the pairs as places among them."""
+    used, places = np.unique(pairs, return_inverse=True)
+    return used.tolist(), np.ascontiguousarray(places.reshape(-1, 2), dtype=np.int32)
 
 
-def _near(some: FloatArray, boxes: FloatArray, reach: float) -> BoolArray:
-    """Which boxes [N, 2, 3] lie within reach of which others [S, 2, 3]: [S, N]."""
-    near = np.empty((len(some), len(boxes)), dtype=bool)
-    for rows in _rows(len(some)):
-        gap = np.maximum(some[rows, None, 0] - boxes[:, 1], boxes[:, 0] - some[rows, None, 1])
-        near[rows] = np.sqrt(np.square(np.maximum(gap, 0.0)).sum(axis=2)) <= reach
-    return near
-
-
-def _rows(count: int) -> Iterator[slice]:
-    """Rows of a table, some at a time: between them the work may be stopped."""
-    for first in range(0, count, AT_ONCE):
-        poll_stop()
-        yield slice(first, first + AT_ONCE)
+def _sum_over(alive: Mapping[int, Part], pairs: IntArray, price: Callable[[int], float]) -> float:
+    """The price of the vertices of each pair of hulls, added up."""
+    corners = {i: len(alive[i].hull.vertices) for i in np.unique(pairs).tolist()}
+    return sum(price(corners[i] + corners[j]) for i, j in pairs.tolist())
 
 
 def merge_to_count(

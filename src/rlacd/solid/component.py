@@ -82,6 +82,7 @@ class Part:
         self.hull = hull
         self.piece_hulls = hull.volume if piece_hulls is None else piece_hulls
         self.within: Part | None = None
+        self._size = len(faces)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}(volume {self.volume:.4g}, hull {self.hull.volume:.4g})"
@@ -105,6 +106,11 @@ class Part:
     def box(self) -> FloatArray:
         """Lower and upper corner of the bounding box [2, 3]."""
         return self.hull.box
+
+    @property
+    def size(self) -> int:
+        """Triangles of the surface, before what its pieces touch by is taken away."""
+        return self._size
 
     def with_hull(self, hull: Hull) -> Part:
         """Get the same solid with another hull around it."""
@@ -141,6 +147,7 @@ class _Union(Part):
         self.hull = hull
         self.piece_hulls = first.piece_hulls + second.piece_hulls
         self.within = None
+        self._size = first.size + second.size
         self._members = (*first.members, *second.members)
 
     @property
