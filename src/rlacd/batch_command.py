@@ -109,6 +109,8 @@ def batch_command() -> Callable[..., None]:
             own = {name: given.pop(name) for name in _OWN}
             quiet = bool(given.pop("quiet"))
             work = _batch(own, given)
+            if not quiet:
+                _tell_large(work)
             if own["dry_run"]:
                 _tell_plan(work)
             else:
@@ -146,6 +148,23 @@ def _pool(own: dict[str, Any]) -> Pool:
     from rlacd.pool import open_pool
 
     return open_pool(own["jobs"] or (None if own["ray"] else available_cpus()), own["ray"])
+
+
+NAMED = 5
+"""Large meshes that are named."""
+
+
+def _tell_large(batch: Batch) -> None:
+    """Say in one line, before anything is done, which meshes are large."""
+    from rlacd.plain_json import printable
+    from rlacd.terminal import say
+
+    large = batch.large()
+    if large:
+        named = [f"{printable(asset.name)} ({size / 1e6:.0f} MB)" for asset, size in large[:NAMED]]
+        more = [f"{len(large) - NAMED} more"] if len(large) > NAMED else []
+        count = "1 mesh is" if len(large) == 1 else f"{len(large)} meshes are"
+        say(f"{count} large and may take minutes and gigabytes each: {', '.join([*named, *more])}")
 
 
 def _tell_plan(batch: Batch) -> None:

@@ -26,6 +26,10 @@ Redo = Literal["none", "failed", "all"]
 REDO: tuple[Redo, ...] = ("none", "failed", "all")
 
 
+LARGE = 5_000_000
+"""Bytes of 100,000 triangles in a binary STL file: larger meshes may take longer than the others by far."""
+
+
 class Watcher(Protocol):
     """Is told how the work goes on."""
 
@@ -99,6 +103,17 @@ class Batch:
     fallback: bool = True
     glob: str = EVERYTHING
     redo: Redo = "none"
+
+    def large(self) -> list[tuple[Asset, int]]:
+        """List the meshes to do whose files hold more than `LARGE` bytes, with their sizes, the largest first.
+
+        Raises
+        ------
+        RlacdError
+            As for `run`.
+        """
+        sizes = [(asset, asset.path.stat().st_size) for asset in self._find() if asset.path.exists()]
+        return sorted((entry for entry in sizes if entry[1] > LARGE), key=lambda entry: (-entry[1], entry[0].name))
 
     def plan(self) -> list[tuple[Asset, bool]]:
         """List all meshes, and whether the result of each is there; writes nothing.
