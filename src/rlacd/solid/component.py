@@ -39,6 +39,9 @@ MARGIN = 1e-3
 FEW_FACES = 400
 """A boolean with so few faces takes no longer than cutting them off first."""
 
+MANY_FACES = 2000
+"""Solids with more faces are halved before a box is cut out of them."""
+
 
 @dataclass(frozen=True)
 class Plane:
@@ -285,22 +288,51 @@ class Component(Part):
 
         All of the solid where it is small, or where it is not cut cleanly.
         """
-        vertices, faces = self.vertices, self.faces
+        surface = self._cell(box)
         room = np.stack([box[0] - self.box[0], self.box[1] - box[1]])  # beyond each side of the box
         for side, axis in sorted(np.argwhere(room > MARGIN).tolist(), key=lambda at: -room[at[0], at[1]]):
-            if len(faces) <= FEW_FACES:
+            if len(surface[1]) <= FEW_FACES:
                 break
-            x, y, z = np.eye(3)[axis].tolist()
-            offset = float(box[side, axis] + (MARGIN if side else -MARGIN))
-            inner = _native.cut_by_plane(vertices, faces, x, y, z, offset)[1 - side]
-            (vertices, faces), folded = _capped(*inner)
-            if folded > NEGLIGIBLE_FOLD:
+            kept = _halves(surface, axis, float(box[side, axis] + (MARGIN if side else -MARGIN)))[1 - side]
+            if kept is None:
                 return self.manifold
-        if faces is self.faces:
+            surface = kept
+        if surface[1] is self.faces:
             return self.manifold
-        clipped = Manifold(Mesh64(vertices, faces.astype(np.uint64)))
-        volume = _native.mesh_volume(vertices, faces) if len(faces) else 0.0
+        clipped = Manifold(Mesh64(surface[0], surface[1].astype(np.uint64)))
+        volume = _native.mesh_volume(*surface) if len(surface[1]) else 0.0
         return clipped if abs(clipped.volume() - volume) <= NEGLIGIBLE_VOLUME + LOST * volume else self.manifold
+
+    def _cell(self, box: FloatArray) -> tuple[FloatArray, IntArray]:
+        """Get the smallest cell of the solid that a box lies in: it is halved across its longest side, time and again.
+
+        Cells are kept: otherwise every look into a box would go through all faces.
+        """
+        cell, place = self.box, ""
+        surface = self.vertices, self.faces
+        while len(surface[1]) > MANY_FACES:
+            axis = int(np.argmax(cell[1] - cell[0]))
+            middle = float(cell[:, axis].mean())
+            if box[1, axis] + MARGIN <= middle:
+                side = 0
+            elif box[0, axis] - MARGIN >= middle:
+                side = 1
+            else:
+                break
+            if place not in self._cells:
+                self._cells[place] = _halves(surface, axis, middle)
+            half = self._cells[place][side]
+            if half is None:
+                break
+            surface = half
+            cell = cell.copy()
+            cell[1 - side, axis] = middle
+            place += str(side)
+        return surface
+
+    @cached_property
+    def _cells(self) -> dict[str, tuple[tuple[FloatArray, IntArray] | None, ...]]:
+        return {}
 
     def pieces(self) -> list[Component]:
         """Connected pieces, cavities kept inside the piece that encloses them; ``[self]`` when there is but one."""
@@ -318,6 +350,15 @@ def _surface_of(manifold: Manifold) -> tuple[FloatArray, IntArray]:
     mesh = manifold.to_mesh64()
     vertices = np.ascontiguousarray(mesh.vert_properties[:, :3], dtype=np.float64)
     return vertices, np.ascontiguousarray(mesh.tri_verts, dtype=np.int32)
+
+
+def _halves(
+    surface: tuple[FloatArray, IntArray], axis: int, offset: float
+) -> tuple[tuple[FloatArray, IntArray] | None, ...]:
+    """Cut a closed surface across an axis of space: what lies below and above, None where it is not cut cleanly."""
+    x, y, z = np.eye(3)[axis].tolist()
+    sides = (_capped(*side) for side in _native.cut_by_plane(*surface, x, y, z, offset))
+    return tuple(side if folded <= NEGLIGIBLE_FOLD else None for side, folded in sides)
 
 
 def _capped(
