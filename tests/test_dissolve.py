@@ -82,7 +82,7 @@ def test_without_time_pieces_are_not_halved() -> None:
     left, middle, right = bent_bar()
     solid = together([left, middle, right])
     for seed in range(5):
-        assert dissolve(middle, [left, right], CRITERION, np.random.default_rng(seed), solid, seconds=-1.0) is None
+        assert dissolve(middle, [left, right], CRITERION, np.random.default_rng(seed), solid, Clock(-1.0)) is None
 
 
 @settings(max_examples=30, deadline=None)

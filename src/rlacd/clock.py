@@ -84,6 +84,17 @@ class Clock:
         """Seconds since the start."""
         return time.perf_counter() - self._start
 
+    @contextmanager
+    def allowance(self, units: float) -> Iterator[None]:
+        """Leave no more than so many units of work to what is done inside; running out of them is not the end."""
+        account = self.work
+        self.work = Work(min(units, account.left))
+        try:
+            yield
+        finally:
+            account.pay(self.work.done)
+            self.work = account
+
     def step(self, done: int, total: int | None, parts: int) -> bool:
         """Report a step of the current stage; True when the work may go on."""
         self._done, self._total, self._parts = done, total, parts

@@ -14,6 +14,9 @@ from rlacd.finish import drop_slivers, merge_parts
 from rlacd.solid.component import Component, Part
 from rlacd.workers import Workers
 
+MOST_MERGING = 20e6
+"""Units of work (see `rlacd.work`) after which merging stops: ten to twenty seconds of one core."""
+
 
 @dataclass(frozen=True)
 class Pass:
@@ -49,6 +52,8 @@ def cut_and_merge(
 ) -> Pass:
     """Cut a solid until every part meets the criterion, drop slivers, merge, and drop slivers again.
 
+    Merging stops after `MOST_MERGING` units of work; the parts then meet the criterion all the same.
+
     Parameters
     ----------
     tree : CutTree
@@ -82,7 +87,7 @@ def cut_and_merge(
         unmet: list[Part] = [part for part in left if id(part) in kept]
     if not merge or (strict and unmet):
         return Pass(pieces, unmet, pieces, criterion)
-    with clock.stage("merge"):
+    with clock.stage("merge"), clock.allowance(MOST_MERGING):
         parts = merge_parts(pieces, criterion, workers, clock, solid=tree.root)
         try:
             if clock.stopped_by is None:

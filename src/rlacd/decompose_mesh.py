@@ -101,13 +101,14 @@ def decompose(
     quality : str, optional
         ``fast``: one pass of cuts; on navigable space, parts that can be divided among others go then, unless the
         policy stands for a published method (``navacd``, ``greedy-SCORE``). ``balanced``, the default where parts are
-        merged: the best of several passes, then a short search for fewer parts. ``best``: the same, and a long one.
+        merged: also a search for fewer parts, whose work is bounded by that of the pass. ``best``: the same, and a
+        long one.
         Each level is never worse than the one before it: fewer hulls, or as many with less volume.
     budget : float, optional
         Seconds the search may take instead, whatever is found until then; what that is depends on the machine. ``best``
         has 5, and more where ``balanced`` takes longer.
     search_steps : int, optional
-        Steps the search may take instead (about 10 to 20 a second on one core); 16 with ``balanced``. The result
+        Steps the search may take instead (about 10 to 20 a second on one core). The result
         depends on nothing else.
     preset : str, optional
         The engine the hulls are for: ``mujoco``, ``physx``, ``physx-gpu``, ``unity``, ``unreal``, ``newton`` or

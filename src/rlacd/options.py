@@ -147,7 +147,8 @@ class Options:
     )
     quality: QualityName | None = option(
         None,
-        "How long to search for fewer hulls: fast hardly, balanced about a second, best until --budget ends.",
+        "How long to search for fewer hulls: fast not at all, balanced about twice as long as fast takes, best until "
+        "--budget ends.",
         one_of(QUALITIES),
         panel=METHOD,
         usual="balanced; fast with --no-merge",
@@ -166,7 +167,6 @@ class Options:
         "How many steps the search may take; unlike --budget, this gives the same bytes however busy the machine is.",
         integer(0),
         panel=METHOD,
-        usual="16 with --quality balanced",
     )
     preset: PresetName | None = option(
         None,

@@ -15,28 +15,37 @@ class Work:
     Parameters
     ----------
     most : float
-        Units there are.
+        Units there are; what is less than a unit does not count.
 
     Attributes
     ----------
-    done : float
+    done : int
         Units spent.
     is_spent : bool
         Whether something was wanted that there was not enough left for.
     """
 
     def __init__(self, most: float = math.inf) -> None:
-        self.most = most
-        self.done = 0.0
+        self.most = most if math.isinf(most) else math.floor(most)
+        self.done = 0
         self.is_spent = False
 
     @property
     def left(self) -> float:
         """Units left."""
-        return max(self.most - self.done, 0.0)
+        return self.most - self.done
+
+    def share(self, among: int) -> float:
+        """Get an equal share of what is left."""
+        return self.left if math.isinf(self.left) else self.left // among
+
+    def close(self) -> None:
+        """Spend nothing more."""
+        self.is_spent = True
 
     def pay(self, units: float) -> bool:
-        """Spend units if there are as many left; otherwise False, and the account is closed."""
+        """Spend units, rounded up, if there are as many left; otherwise False, and the account is closed."""
+        units = math.ceil(units)
         if self.is_spent or units > self.left:
             self.is_spent = True
             return False
@@ -66,7 +75,7 @@ def joining(vertices: int) -> float:
 
 def screening(vertices: int) -> float:
     """Hold the joint hull of two parts against the solid; most are refused at once."""
-    return 120 + 0.3 * vertices
+    return 80 + 0.3 * vertices
 
 
 def holding(vertices: int) -> float:

@@ -6,11 +6,11 @@ joint hull is tight (`rlacd.finish.merge.unite`). What nobody takes is halved an
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
+from rlacd import work
 from rlacd.clock import Clock
 from rlacd.criteria.criterion import Criterion
 from rlacd.finish.merge import unite
@@ -19,6 +19,7 @@ from rlacd.search.shift import exchange_of
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part, Plane
 from rlacd.solid.hull import Hull
+from rlacd.work import Work
 
 TAKERS = 6
 """A piece is offered to so many parts, those first whose hulls grow the least."""
@@ -36,7 +37,7 @@ def dissolve(
     criterion: Criterion,
     random: np.random.Generator,
     solid: Component,
-    seconds: float = math.inf,
+    clock: Clock | None = None,
 ) -> Exchange | None:
     """Give all of a part to the parts around.
 
@@ -50,26 +51,26 @@ def dissolve(
         Draws where pieces are halved.
     solid : Component
         What all are parts of.
-    seconds : float
-        Give up after this time; infinite to be independent of it.
+    clock : Clock, optional
+        Give up when its time or its work is over.
 
     Returns
     -------
     Exchange or None
         With one part less; None where a piece is left over.
     """
-    if not _may_be_taken(part, around, criterion, solid):
+    clock = clock or Clock()
+    if not _may_be_taken(part, around, criterion, solid, clock.work):
         return None
-    clock = Clock(seconds if math.isfinite(seconds) else None)
     now = list(around)
 
     def take(piece: Component, halvings: int) -> bool:
-        for i, hull in _by_growth(now, piece, criterion.reach):
-            union = unite(now[i], piece, criterion, solid, hull)
+        for i, hull in _by_growth(now, piece, criterion.reach, clock.work):
+            union = unite(now[i], piece, criterion, solid, hull, clock.work)
             if union is not None:
                 now[i] = union
                 return True
-        if halvings == 0 or not clock.step(0, None, len(now)):
+        if halvings == 0 or not clock.step(0, None, len(now)) or not clock.work.pay(work.cutting(piece.size)):
             return False
         halves = _halves(piece, random)
         return bool(halves) and all(take(half, halvings - 1) for half in halves)
@@ -79,14 +80,15 @@ def dissolve(
     return exchange_of(part, around, now, criterion)
 
 
-def _may_be_taken(part: Part, around: Sequence[Part], criterion: Criterion, solid: Component) -> bool:
+def _may_be_taken(part: Part, around: Sequence[Part], criterion: Criterion, solid: Component, account: Work) -> bool:
     """Whether each of the part's outermost corners alone could belong to one of the others: a quick no."""
     corners = part.hull.vertices
     directions = np.concatenate([np.eye(3), -np.eye(3)])
     outermost = sorted(set(np.argmax(corners @ directions.T, axis=0).tolist()))
     return all(
         any(
-            not criterion.forbids(solid.filling, _with_point(around[i].hull, corners[k]))
+            account.pay(work.joining(len(around[i].hull.vertices)) + work.holding(len(around[i].hull.vertices)) / 2)
+            and not criterion.forbids(solid.filling, _with_point(around[i].hull, corners[k]))
             for i in np.argsort([_gap(other.box, corners[k]) for other in around], kind="stable").tolist()
         )
         for k in outermost
@@ -97,9 +99,12 @@ def _with_point(hull: Hull, point: FloatArray) -> Hull:
     return Hull.of(np.vstack([hull.vertices, point])) or hull
 
 
-def _by_growth(parts: Sequence[Part], piece: Part, reach: float) -> list[tuple[int, Hull]]:
+def _by_growth(parts: Sequence[Part], piece: Part, reach: float, account: Work) -> list[tuple[int, Hull]]:
     """The parts within reach whose hulls would grow the least, and those hulls."""
     near = [i for i, part in enumerate(parts) if _gap(part.box, piece.box) <= reach]
+    corners = len(piece.hull.vertices)
+    if not account.pay(sum(work.joining(len(parts[i].hull.vertices) + corners) for i in near)):
+        return []
     joint = [Hull.around(parts[i].hull, piece.hull) for i in near]
     growth = [hull.volume - parts[i].hull.volume for i, hull in zip(near, joint, strict=True)]
     return [(near[k], joint[k]) for k in np.argsort(growth, kind="stable")[:TAKERS]]

@@ -15,11 +15,12 @@ from rlacd.cut_and_merge import cut_and_merge
 from rlacd.finish import drop_slivers
 from rlacd.planes.views import Views
 from rlacd.policies.greedy import SCORES
-from rlacd.search.neighbourhood import OPENING, Neighbourhood, Outcome, cost
+from rlacd.search.neighbourhood import Neighbourhood, Outcome, cost
 from rlacd.search.pace import Pace
 from rlacd.search.rankings import Ranking, by_score
 from rlacd.search.tighten import tighten
 from rlacd.solid.component import Component, Part
+from rlacd.work import Work
 from rlacd.workers import Workers
 
 PORTFOLIO = ("excess-norm", "hull-sum", "max-excess")
@@ -33,8 +34,23 @@ SHARE = 2 / 5
 HOPELESS = 5
 """A pass that makes so many times more pieces than there are parts will not have fewer of them after merging."""
 
+TIMES_FIRST_PASS = 3.6
+"""The work a search may do, in that of the first pass."""
+
+MOST_WORK = 10e6
+"""And no more than this, about ten seconds of one core."""
+
+ANOTHER_PASS = 1.5
+"""A pass is given up when it is this many times the work of the first."""
+
+FEW = 20
+"""Among more parts than this, work gains more around the first pass than by cutting the whole solid anew."""
+
 ROUNDS = 3
 """The search goes around so many times from every pass of the portfolio, with other chances, if there is time."""
+
+FURTHER = 1000
+"""Added to the seed when the search goes on after its opening."""
 
 PLANES_PER_AXIS = 12
 """Neighbourhoods are small: half the planes are as good in them, and twice as fast."""
@@ -53,19 +69,20 @@ class Level:
         Steps of the neighbourhood search at most.
     seconds : float or None
         Wall time of the search at most.
-    whole_opening : bool
-        What the search begins with is done in full, even if the seconds do not suffice for it.
+    bounded : bool
+        The search begins with an opening whose work is bounded by that of the first pass, even if the seconds do not
+        suffice for it.
     """
 
     steps: int | None
     seconds: float | None
-    whole_opening: bool = False
+    bounded: bool = False
 
 
 LEVELS = {
     "fast": Level(0, None),
-    "balanced": Level(OPENING, None),
-    "best": Level(None, 5.0, whole_opening=True),
+    "balanced": Level(None, None, bounded=True),
+    "best": Level(None, 5.0, bounded=True),
 }
 """What the levels mean when neither steps nor seconds are given. Each goes through the states of the one before it, so
 that it is never worse."""
@@ -95,6 +112,10 @@ class Account:
         Trials that were taken over.
     exhausted : bool
         There was nothing left to try, or it had been in vain for long.
+    work : int
+        Units of work done (see `rlacd.work`).
+    allowed : int or None
+        The bound on it, where the level has one.
     """
 
     level: str
@@ -105,6 +126,8 @@ class Account:
     steps: int
     accepted: int
     exhausted: bool
+    work: int
+    allowed: int | None
 
     def as_plain(self) -> dict[str, Any]:
         """Everything as plain values."""
@@ -164,7 +187,10 @@ def search(
     # What the finish would drop must not count, or a level could end with more hulls than the one below it.
     best = parts = drop_slivers(parts, workers)
     at_a_limit = most_parts is not None and not all(workers.map(criterion.is_met, best))
-    pace = Pace(clock, bounds.seconds, len(parts), bounds.whole_opening and not at_a_limit)
+    first_pass = clock.work.done
+    bounded = bounds.bounded and not (at_a_limit and bounds.seconds is not None)
+    allowed = min(TIMES_FIRST_PASS * first_pass, MOST_WORK) if bounded else math.inf
+    pace = Pace(clock, bounds.seconds, len(parts), patient=bounded, work=Work(allowed))
     if most_parts is not None and at_a_limit:
         if len(best) <= most_parts:
             outcome = tighten(
@@ -175,9 +201,17 @@ def search(
         from_portfolio = len(parts)
     else:
         others = rankings[1:] if first == "greedy" else rankings  # the first score is that policy's own
-        starts = _portfolio(root, best, criterion, others, views, workers, pace, _seconds_of_a_pass(clock))
+        opening = others if not bounded else others[:1] if len(best) <= FEW else []
+        a_pass = _seconds_of_a_pass(clock)
+        starts = _portfolio(root, best, criterion, opening, views, workers, pace, a_pass, ANOTHER_PASS * first_pass)
         from_portfolio = len(starts[0])
         outcome = _from_all(root, starts, criterion, rankings, near_views, workers, pace, steps, seed)
+        if bounded and bounds.seconds is not None:
+            pace.hurry()
+            starts = _portfolio(root, outcome.parts, criterion, others[len(opening) :], views, workers, pace, a_pass)
+            outcome = outcome.then(
+                _from_all(root, starts, criterion, rankings, near_views, workers, pace, steps, seed + FURTHER)
+            )
     account = Account(
         level=name,
         seconds=time.perf_counter() - start,
@@ -187,6 +221,8 @@ def search(
         steps=outcome.steps,
         accepted=outcome.accepted,
         exhausted=outcome.exhausted,
+        work=pace.work.done,
+        allowed=None if math.isinf(allowed) else math.floor(allowed),
     )
     return outcome.parts, account
 
@@ -216,17 +252,22 @@ def _portfolio(
     workers: Workers,
     pace: Pace,
     seconds: float,
+    work: float = math.inf,
 ) -> list[list[Part]]:
-    """The given parts, made in so many seconds, and those of the whole solid cut by other rankings; the best first."""
+    """The given parts, made in so many seconds, and those of the whole solid cut by other rankings; the best first.
+
+    A pass that needs more than the given work is given up.
+    """
     divisions = Divisions()
     found = [parts]
     for ranking in rankings:
         if pace.is_over or len(parts) == 1 or seconds > SHARE * pace.left:
             break
         tree = CutTree(root, ranking(views), workers, divisions)
-        other = cut_and_merge(tree, criterion, workers, pace, most=HOPELESS * len(parts), strict=True)
-        if other.unmet or pace.is_over:
-            continue
+        with pace.allowance(work):
+            other = cut_and_merge(tree, criterion, workers, pace, most=HOPELESS * len(parts), strict=True)
+            if other.unmet or pace.is_over:
+                continue
         if all(cost(other.parts) != cost(known) for known in found):
             found.append(other.parts)
             pace.parts = min(pace.parts, len(other.parts))

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rlacd._native import Stopped
+from rlacd.clock import Clock
 from rlacd.criteria.criterion import Criterion
 from rlacd.planes.views import Views
 from rlacd.search.dissolve import dissolve
@@ -38,11 +39,14 @@ DRY = 4
 OPENING = 16
 """So many steps are made before parts are tried to be done without: what is cut anew later undoes some of that."""
 
+SMALL = 0.5
+"""The smaller half of the parts is tried before that: per unit of work, nothing saves more parts."""
+
 OPENING_SHARE = 4
 """They take no more than this fraction of the time: a quarter."""
 
-ROUNDS = 2
-"""So often each part is tried to be done without at first, each time by other cuts."""
+TOO_LITTLE = 0.02
+"""Less than this share of the work allowed is not worth another batch."""
 
 STEPS_PER_PART = 2
 """After so many steps a part each of them is tried again."""
@@ -70,6 +74,11 @@ class Outcome:
     steps: int
     accepted: int
     exhausted: bool
+
+    def then(self, other: Outcome) -> Outcome:
+        """Get what this search and another that went on from it have done."""
+        best = min(self.parts, other.parts, key=cost)
+        return Outcome(best, self.steps + other.steps, self.accepted + other.accepted, other.exhausted)
 
 
 class Neighbourhood:
@@ -124,11 +133,10 @@ class Neighbourhood:
         exhausted = len(self._here.parts) == 1
         try:
             if most > 0:
+                self.dissolve_all(pace, enough, SMALL)
                 with pace.share(OPENING_SHARE):
                     self._walk(pace, min(most, OPENING), enough)
-                for _ in range(ROUNDS):
-                    self.dissolve_all(pace, enough)
-            pace.hurry()
+                self.dissolve_all(pace, enough)
             exhausted = len(self._here.parts) == 1
             while not exhausted and self._steps < most and len(self._here.parts) > enough and not pace.is_over:
                 exhausted = self._walk(pace, min(most, self._steps + STEPS_PER_PART * len(self._here.parts)), enough)
@@ -143,7 +151,7 @@ class Neighbourhood:
         while self._dry < DRY and self._vain < PATIENCE * len(here.parts) and len(here.parts) > 1:
             if not pace.step(self._steps, None, len(here.parts)) or self._steps >= most or len(here.parts) <= enough:
                 return False
-            batch = list(self._ways.draw(here, self._random, self._near))
+            batch = self._affordable(list(self._ways.draw(here, self._random, self._near)), pace)
             self._dry = 0 if batch else self._dry + 1
             batch = batch[: int(min(BATCH, most - self._steps))]  # drawn in full: more steps begin with the same
             self._make(batch, pace)
@@ -151,36 +159,55 @@ class Neighbourhood:
             pace.steps += len(batch)
         return True
 
-    def dissolve_all(self, pace: Pace, enough: int = 1) -> None:
-        """Try to do without each part, the smallest first, as long as there are more than `enough`."""
+    def dissolve_all(self, pace: Pace, enough: int = 1, share: float = 1.0) -> None:
+        """Try to do without each part, or a share of them, the smallest first, while there are more than `enough`."""
         here = self._here
         waiting = sorted(here.parts, key=lambda i: (here.parts[i].hull.volume, i))
+        waiting = waiting[: math.ceil(share * len(waiting))]
         while waiting and len(here.parts) > enough and pace.step(self._steps, None, len(here.parts)):
             batch, waiting = waiting[:BATCH], waiting[BATCH:]
             trials = [giving_away(Move.DISSOLVE, here, i, self._random, self._near) for i in batch if i in here.parts]
-            self._make([trial for trial in trials if self._ways.is_new(trial)], pace)
+            self._make(self._affordable([trial for trial in trials if self._ways.is_new(trial)], pace), pace)
+
+    def _affordable(self, trials: list[Trial], pace: Pace) -> list[Trial]:
+        """As many of the trials as there is work left for, by what others of their kind took."""
+        if math.isinf(pace.work.left):
+            return trials
+        dearest = 0.0
+        for count, trial in enumerate(trials, start=1):
+            dearest = max(dearest, self._ways.price(trial))
+            if count > 1 and count * dearest > pace.work.left:  # each is given an equal share
+                return trials[: count - 1]
+        return trials
 
     def _make(self, trials: Sequence[Trial], pace: Pace) -> None:
         """Make trials side by side, and take over what is better."""
-        found = self._workers.map(lambda trial: self._try(trial, pace), trials)
-        for trial, exchange in zip(trials, found, strict=True):
+        if not trials:
+            return
+        clocks = [pace.trial(pace.work.share(len(trials))) for _ in trials]
+        found = self._workers.map(lambda pair: self._try(*pair), zip(trials, clocks, strict=True))
+        for trial, clock, exchange in zip(trials, clocks, found, strict=True):
+            pace.work.pay(clock.work.done)
             taken = exchange is not None and self._here.apply(exchange)
             gain = exchange.gain if exchange is not None and taken else 0
-            self._ways.count(trial, gain)
+            self._ways.count(trial, gain, clock.work.done)
             self._accepted += taken
             self._vain = 0 if gain > 0 else self._vain + 1
             self._best = min(self._best, self.parts, key=cost)
         pace.parts = min(pace.parts, len(self._here.parts))
+        pace.work.pay(self._here.collect())
+        if all(clock.work.is_spent for clock in clocks) or pace.work.left < TOO_LITTLE * pace.work.most < math.inf:
+            pace.work.close()
 
-    def _try(self, trial: Trial, pace: Pace) -> Exchange | None:
+    def _try(self, trial: Trial, clock: Clock) -> Exchange | None:
         parts = self._here.parts
         cluster = [parts[i] for i in trial.cluster]
         if trial.policy is not None:
             around = [parts[i] for i in self._here.around(trial.cluster)]
-            return recut(cluster, around, self._policies[trial.policy], self._criterion, pace.left, self._root)
+            return recut(cluster, around, self._policies[trial.policy], self._criterion, clock, self._root)
         give = dissolve if trial.move is Move.DISSOLVE else shift
         around = [parts[i] for i in trial.around]
-        return give(cluster[0], around, self._criterion, np.random.default_rng(trial.seed), self._root, pace.left)
+        return give(cluster[0], around, self._criterion, np.random.default_rng(trial.seed), self._root, clock)
 
 
 def cost(parts: Sequence[Part]) -> tuple[int, float]:

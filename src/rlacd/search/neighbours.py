@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from rlacd import work
 from rlacd.criteria.criterion import Criterion
 from rlacd.finish.merge import neighbours
 from rlacd.search.recut import Exchange
@@ -42,6 +43,7 @@ class Neighbours:
         self._workers = workers
         self._gaps: dict[int, dict[int, float]] = {}
         self._next = 0
+        self._work = 0.0
         self.replace((), parts)
 
     def replace(self, gone: Iterable[int], new: Sequence[Part]) -> None:
@@ -58,10 +60,20 @@ class Neighbours:
         self._gaps.update((i, {}) for i in ids)
         filled = {i: self._criterion.filled(part) for i, part in self.parts.items()}
         near = neighbours(self.parts, ids, TOUCHING, self._workers)
+        self._work += sum(
+            work.joining(len(self.parts[i].hull.vertices) + len(self.parts[j].hull.vertices))
+            + work.gluing(self.parts[i].size + self.parts[j].size)
+            for i, j, _, _ in near
+        )
         touching = self._workers.map(lambda pair: touch(self.parts[pair[0]], self.parts[pair[1]]), near)
         for (i, j, _, hull_volume), does in zip(near, touching, strict=True):
             if does:
                 self._gaps[i][j] = self._gaps[j][i] = max(hull_volume - filled[i] - filled[j], 0.0) ** (1 / 3)
+
+    def collect(self) -> float:
+        """Get the work done since this was last asked for."""
+        done, self._work = self._work, 0.0
+        return done
 
     def apply(self, exchange: Exchange) -> bool:
         """Make an exchange; False when parts of it are gone already."""

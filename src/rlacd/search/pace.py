@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from rlacd.clock import Clock
+from rlacd.work import Work
 
 
 class Pace(Clock):
@@ -23,10 +24,14 @@ class Pace(Clock):
         Told to the other clock as the number of parts so far.
     patient : bool
         Time does not matter until `hurry` is called.
+    work : Work, optional
+        What may be done; without bound by default.
     """
 
-    def __init__(self, clock: Clock, seconds: float | None, parts: int, patient: bool = False) -> None:
-        super().__init__()
+    def __init__(
+        self, clock: Clock, seconds: float | None, parts: int, patient: bool = False, work: Work | None = None
+    ) -> None:
+        super().__init__(work=work)
         self._outer = clock
         self._end = math.inf if seconds is None else time.perf_counter() + seconds
         self.parts = parts
@@ -36,7 +41,7 @@ class Pace(Clock):
     @property
     def is_over(self) -> bool:
         """Whether the work has to stop, for this clock or for the other."""
-        return self._outer.stopped_by is not None or self.left <= 0
+        return self._outer.stopped_by is not None or self.left <= 0 or self.work.is_spent
 
     @property
     def left(self) -> float:
@@ -44,8 +49,14 @@ class Pace(Clock):
         return math.inf if self._patient else self._end - time.perf_counter()
 
     def hurry(self) -> None:
-        """Let time matter from now on."""
+        """Let time matter from now on, and work no longer."""
         self._patient = False
+        done, self.work = self.work.done, Work()
+        self.work.pay(done)
+
+    def trial(self, units: float) -> Clock:
+        """Get a clock for one of several trials made side by side: the seconds left, and an account of its own."""
+        return Clock(self.left if math.isfinite(self.left) else None, work=Work(units))
 
     def step(self, done: int, total: int | None, parts: int) -> bool:
         """Report to the other clock; True when the work may go on."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from rlacd import work
 from rlacd.clock import Clock
 from rlacd.criteria.criterion import Criterion
 from rlacd.cut import CutTree
@@ -49,7 +49,7 @@ def recut(
     around: Sequence[Part],
     policy: Policy,
     criterion: Criterion,
-    seconds: float,
+    clock: Clock,
     whole: Component | None = None,
 ) -> Exchange | None:
     """Cut some parts anew, and merge the pieces with each other and with the parts around.
@@ -64,8 +64,8 @@ def recut(
         Chooses the planes.
     criterion : Criterion
         Every new part meets it.
-    seconds : float
-        Give up after this time; infinite to be independent of it.
+    clock : Clock
+        Give up when its time or its work is over.
     whole : Component, optional
         What all are parts of: pieces may then be merged across what lies between them.
 
@@ -74,8 +74,11 @@ def recut(
     Exchange or None
         None when that gives neither fewer parts nor as many with smaller hulls.
     """
-    alone, clock = Workers(1), Clock(seconds if math.isfinite(seconds) else None)
-    solid = reunite([member for part in parts for member in part.members])
+    alone = Workers(1)
+    members = [member for part in parts for member in part.members]
+    if not clock.work.pay(work.reuniting(sum(member.size for member in members), len(members))):
+        return None
+    solid = reunite(members)
     if solid is None:
         return None
     pieces, left = CutTree(solid, policy, alone).cut_until(criterion, clock, len(parts) + SLACK)
@@ -84,7 +87,7 @@ def recut(
     if _volumes(pieces) == _volumes(parts):  # cut as before: what could be merged with these was merged
         return None
     merged = merge_parts(pieces, criterion, alone, clock, beside=around, solid=whole)
-    if clock.stopped_by is not None:
+    if clock.stopped_by is not None or clock.work.is_spent:
         return None
     exchange = Exchange.between([*parts, *around], merged)
     tighter = hull_volume(exchange.into) < (1 - TIGHTER) * hull_volume(exchange.out)

@@ -7,12 +7,12 @@ of less even sizes are progress too: in the end the small ones vanish, as bins d
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from functools import reduce
 
 import numpy as np
 
+from rlacd import work
 from rlacd.clock import Clock
 from rlacd.criteria.criterion import Criterion
 from rlacd.finish.merge import unite
@@ -21,6 +21,7 @@ from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part, Plane
 from rlacd.solid.hull import Hull
 from rlacd.solid.reunite import reunite
+from rlacd.work import Work
 
 TRIES = 16
 """Pairs of a taker and a direction, drawn one after the other: as many take about as long as cutting a cluster anew."""
@@ -50,7 +51,7 @@ def shift(
     criterion: Criterion,
     random: np.random.Generator,
     solid: Component,
-    seconds: float = math.inf,
+    clock: Clock | None = None,
 ) -> Exchange | None:
     """Let a part give pieces of itself to the parts around.
 
@@ -65,15 +66,15 @@ def shift(
         Draws takers and directions.
     solid : Component
         What all are parts of.
-    seconds : float
-        Be content with what is given after this time; infinite to be independent of it.
+    clock : Clock, optional
+        Be content with what is given when its time or its work is over.
 
     Returns
     -------
     Exchange or None
         With as many parts, of less even sizes, or one less; None where nobody takes anything.
     """
-    clock = Clock(seconds if math.isfinite(seconds) else None)
+    clock = clock or Clock()
     now = list(around)
     takers = [i for i, other in enumerate(around) if other.hull.volume > SMALLER * part.hull.volume]
     rest = part
@@ -81,11 +82,11 @@ def shift(
         if not clock.step(tried, TRIES, len(now) + 1):
             break
         i = takers[random.integers(len(takers))]
-        bite = _largest_bite(rest, now[i], _direction(rest, now[i], random), criterion, solid)
+        bite = _largest_bite(rest, now[i], _direction(rest, now[i], random), criterion, solid, clock.work)
         if bite is None:
             continue
         now[i], left = bite
-        if left is None or _take_whole(left, now, criterion, solid):
+        if left is None or _take_whole(left, now, criterion, solid, clock.work):
             return exchange_of(part, around, now, criterion)
         rest = left
     return None if rest is part else exchange_of(part, around, [*now, rest], criterion)
@@ -108,7 +109,7 @@ def _direction(part: Part, taker: Part, random: np.random.Generator) -> FloatArr
 
 
 def _largest_bite(
-    part: Part, taker: Part, direction: FloatArray, criterion: Criterion, solid: Component
+    part: Part, taker: Part, direction: FloatArray, criterion: Criterion, solid: Component, account: Work
 ) -> tuple[Part, Part | None] | None:
     """Cut off as much as the taker can have: the taker with it, and the rest; None where that is hardly anything."""
     corners = np.concatenate([member.hull.vertices for member in part.members])
@@ -118,8 +119,8 @@ def _largest_bite(
     best = None
     for _ in range(1 + HALVINGS):
         bite = None
-        if not _is_too_much(corners[heights <= offset], taker, criterion, solid):
-            bite = _bite(part, taker, direction, offset, criterion, solid)
+        if not _is_too_much(corners[heights <= offset], taker, criterion, solid, account):
+            bite = _bite(part, taker, direction, offset, criterion, solid, account)
         if bite is not None:
             lower, best = offset, bite
         elif best is None:
@@ -133,38 +134,54 @@ def _largest_bite(
 
 
 def _bite(
-    part: Part, taker: Part, direction: FloatArray, offset: float, criterion: Criterion, solid: Component
+    part: Part,
+    taker: Part,
+    direction: FloatArray,
+    offset: float,
+    criterion: Criterion,
+    solid: Component,
+    account: Work,
 ) -> tuple[Part, Part | None, float] | None:
     """The taker with what lies below a plane, the rest, and the volume given; None where one of them must not be."""
+    if not account.pay(sum(work.cutting(member.size) for member in part.members)):
+        return None
     below, above = _divided(part.members, direction, offset)
     if not below:
         return taker, part, 0.0
-    grown = unite(taker, _glued(below), criterion, solid)
-    left = _whole(above, criterion, solid) if grown is not None and above else None
+    grown = unite(taker, _glued(below), criterion, solid, account=account)
+    left = _whole(above, criterion, solid, account) if grown is not None and above else None
     if grown is None or (above and left is None):
         return None
     return grown, left, sum(piece.volume for piece in below)
 
 
-def _is_too_much(corners: FloatArray, taker: Part, criterion: Criterion, solid: Component) -> bool:
+def _is_too_much(corners: FloatArray, taker: Part, criterion: Criterion, solid: Component, account: Work) -> bool:
     """Whether the taker cannot even have some corners [N, 3] of what would be cut off: known without cutting."""
+    count = len(corners) + len(taker.hull.vertices)
+    if not account.pay(work.joining(count) + work.holding(count) / 2):
+        return True
     hull = Hull.of(np.concatenate([taker.hull.vertices, corners]))
     return hull is not None and criterion.forbids(solid.filling, hull)
 
 
-def _whole(pieces: Sequence[Component], criterion: Criterion, solid: Component) -> Part | None:
+def _whole(pieces: Sequence[Component], criterion: Criterion, solid: Component, account: Work) -> Part | None:
     """The pieces as one part; None where that does not meet the criterion."""
     if len(pieces) > 1:
-        return unite(_glued(pieces[:-1]), pieces[-1], criterion, solid)
+        return unite(_glued(pieces[:-1]), pieces[-1], criterion, solid, account=account)
+    if not account.pay(work.judging(pieces[0].size, len(pieces[0].hull.faces))):
+        return None
     return pieces[0] if criterion.is_met(pieces[0]) else None
 
 
-def _take_whole(rest: Part, takers: list[Part], criterion: Criterion, solid: Component) -> bool:
+def _take_whole(rest: Part, takers: list[Part], criterion: Criterion, solid: Component, account: Work) -> bool:
     """Give all that is left to one of the takers; False where none can have it."""
+    corners = len(rest.hull.vertices)
+    if not account.pay(sum(work.joining(len(taker.hull.vertices) + corners) for taker in takers)):
+        return False
     joint = [Hull.around(taker.hull, rest.hull) for taker in takers]
     added = [hull.volume - taker.hull.volume for hull, taker in zip(joint, takers, strict=True)]
     for i in np.argsort(added, kind="stable")[:WHOLE].tolist():
-        union = unite(takers[i], rest, criterion, solid, joint[i])
+        union = unite(takers[i], rest, criterion, solid, joint[i], account)
         if union is not None:
             takers[i] = union
             return True

@@ -65,7 +65,7 @@ def tighten(
             break
         factor = math.sqrt(least * reached)
         finer = criterion.scaled(factor)
-        with pace.share(left):
+        with pace.share(left), pace.allowance(pace.work.left / left):
             fine = cut_and_merge(tree, finer, workers, pace, strict=True)
             if fine.unmet or pace.is_over:
                 least = factor

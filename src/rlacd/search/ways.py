@@ -19,6 +19,9 @@ BATCH = 8
 REPEATS = 4
 """So often a part may be given to the same others, each time by other cuts."""
 
+PRIOR = 2
+"""The work of a kind of trial is supposed as if so many had been made."""
+
 DRAWS = 10
 """A way of trying is left for this batch when so many draws in a row gave nothing new."""
 
@@ -31,8 +34,8 @@ class Move(Enum):
     DISSOLVE = "a part is divided among those around"
 
 
-AS_LONG_AS = {Move.SHIFT: 3.0, Move.DISSOLVE: 1.5}
-"""Giving a part away takes about as long as it takes to cut a cluster of so many anew."""
+AS_MUCH_AS = {Move.SHIFT: 3.0, Move.DISSOLVE: 0.6}
+"""Giving a part away is about as much work as it is to cut a cluster of so many anew."""
 
 
 @dataclass(frozen=True)
@@ -48,10 +51,11 @@ class Trial:
 
 @dataclass
 class _Tally:
-    """How often something was tried, and how many parts that gained."""
+    """How often something was tried, how many parts that gained, and how much work it was."""
 
     tried: int = 0
     gained: int = 0
+    work: float = 0.0
 
     @property
     def rate(self) -> float:
@@ -75,6 +79,7 @@ class Ways:
         self._policies = [_Tally() for _ in range(policies)]
         self._cut: list[set[Cluster]] = [set() for _ in range(policies)]
         self._given: dict[tuple[Move, int, Cluster], int] = {}
+        self._units = self._spent = 0.0
 
     def draw(self, here: Neighbours, random: np.random.Generator, reach: float) -> Iterator[Trial]:
         """Draw up to `BATCH` trials of disjoint clusters, none that was made before."""
@@ -101,25 +106,45 @@ class Ways:
         self._given[key] = self._given.get(key, 0) + 1
         return self._given[key] <= REPEATS
 
-    def count(self, trial: Trial, gain: int) -> None:
-        """Remember what a try gave."""
+    def price(self, trial: Trial) -> float:
+        """Get the work that a trial is likely to be, by those made so far; 0 at first."""
+        return self._work(trial.move, len(trial.cluster)) * self._unit
+
+    def count(self, trial: Trial, gain: int, work: float) -> None:
+        """Remember what a try gave, and how much work it was."""
+        self._units += _size(trial.move, len(trial.cluster))
+        self._spent += work
         tallies = [self._kinds[trial.move, len(trial.cluster)]]
         if trial.policy is not None:
             tallies.append(self._policies[trial.policy])
         for tally in tallies:
             tally.tried += 1
             tally.gained += gain
+            tally.work += work
 
     def _worth(self, move: Move, size: int, policy: int | None) -> float:
-        """Parts gained by the time it takes, which is about in proportion to the size of a cluster."""
-        rate = self._kinds[move, size].rate
-        if policy is None:
-            return len(self._policies) * rate / AS_LONG_AS[move]
-        return rate * self._policies[policy].rate / self._usual / size
+        """Parts gained by the work it is."""
+        rate = self._kinds[move, size].rate / self._work(move, size)
+        return len(self._policies) * rate if policy is None else rate * self._policies[policy].rate / self._usual
+
+    def _work(self, move: Move, size: int) -> float:
+        """The work of a trial, that of cutting one part anew being 1: at first about the size of the cluster."""
+        tally = self._kinds[move, size]
+        known = tally.work / self._unit if self._unit > 0 else 0.0
+        return (PRIOR * _size(move, size) + known) / (PRIOR + tally.tried)
+
+    @property
+    def _unit(self) -> float:
+        """Units of work in what was supposed to be 1."""
+        return self._spent / self._units if self._units else 0.0
 
     @property
     def _usual(self) -> float:
         return sum(tally.rate for tally in self._policies) / len(self._policies)
+
+
+def _size(move: Move, size: int) -> float:
+    return AS_MUCH_AS.get(move, float(size))
 
 
 def _cluster(here: Neighbours, random: np.random.Generator, size: int, policy: int) -> Trial | None:

@@ -1,0 +1,115 @@
+"""Work: accounts are kept, and what a bound on work cuts short is the same for any number of threads."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
+from manifold3d import Manifold, OpType
+
+import rlacd
+from rlacd import cut_and_merge
+from rlacd.clock import Clock
+from rlacd.criteria import Concavity
+from rlacd.finish import merge_parts
+from rlacd.search.pace import Pace
+from rlacd.solid.component import Component
+from rlacd.work import Work
+from rlacd.workers import Workers
+from tests.shapes import box
+
+PRICES = st.lists(st.floats(0, 50), max_size=40)
+
+
+@given(st.floats(0, 200), PRICES)
+def test_no_more_is_spent_than_there_is(most: float, prices: list[float]) -> None:
+    work = Work(most)
+    paid = [price for price in prices if work.pay(price)]
+    assert sum(paid) <= work.done <= most
+    assert work.is_spent == (len(paid) < len(prices))
+    assert paid == prices[: len(paid)]  # once something was refused, so is all that follows
+
+
+@given(st.floats(0, 200), st.floats(0, 200), PRICES)
+def test_an_allowance_is_part_of_the_account(most: float, units: float, prices: list[float]) -> None:
+    pace = Pace(Clock(), None, 1, work=Work(most))
+    with pace.allowance(units):
+        for price in prices:
+            pace.work.pay(price)
+        spent = pace.work.done
+        assert spent <= units
+    assert pace.work.done == spent <= most
+    assert not pace.work.is_spent
+
+
+def grate() -> Manifold:
+    holes = [box((i, j, -1), (i + 0.7, j + 0.7, 1)) for i in range(6) for j in range(6)]
+    return box((-0.3, -0.3, 0), (6, 6, 0.2)) - Manifold.batch_boolean(holes, OpType.Add)
+
+
+def sponge() -> Manifold:
+    holes: list[Manifold] = []
+    for width in (3, 1):
+        for i, j in itertools.product(range(width, 9, 3 * width), repeat=2):
+            ends = (i, j), (i + width, j + width)
+            for axis in range(3):
+                low, high = (
+                    np.insert(np.array(end, float), axis, out) for end, out in zip(ends, (-1, 10), strict=True)
+                )
+                holes.append(box(tuple(low), tuple(high)))
+    return box((0, 0, 0), (9, 9, 9)) - Manifold.batch_boolean(holes, OpType.Add)
+
+
+def boxes() -> trimesh.Trimesh:
+    random = np.random.default_rng(0)
+    places, sizes = random.uniform(-1, 1, (150, 3)), random.uniform(0.02, 0.1, (150, 3))
+    move = trimesh.transformations.translation_matrix
+    return trimesh.util.concatenate(
+        [trimesh.creation.box(size, move(place)) for size, place in zip(sizes, places, strict=True)]
+    )
+
+
+@pytest.mark.parametrize("shape", [grate, sponge, boxes])
+def test_the_default_stays_within_its_account(shape: Callable[[], Manifold | trimesh.Trimesh]) -> None:
+    solid = shape()
+    if isinstance(solid, Manifold):
+        mesh = solid.to_mesh64()
+        solid = trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts, process=False)
+    one, three = (rlacd.decompose(solid, threads=threads) for threads in (1, 3))
+    fast = rlacd.decompose(solid, quality="fast")
+    search = one.report["search"]
+    assert 0 < search["work"] <= search["allowed"]
+    assert search["work"] == three.report["search"]["work"]
+    assert len(one) <= len(fast)
+    assert len(one) == len(three)
+    for a, b in zip(one, three, strict=True):
+        assert (a.vertices == b.vertices).all()
+        assert (a.faces == b.faces).all()
+
+
+@pytest.mark.parametrize("most", [0, 2e3, 2e4])
+def test_merging_cut_short_is_the_same_for_any_number_of_threads(most: float) -> None:
+    parts = [Component(Manifold.cube().translate((x, y, 0))) for x in range(4) for y in range(4)]
+    counts = []
+    for threads in (1, 3):
+        with Workers(threads) as workers:
+            merged = merge_parts(parts, Concavity(0.05), workers, Clock(work=Work(most)))
+        assert sum(part.volume for part in merged) == pytest.approx(16)
+        counts.append([part.volume for part in merged])
+    assert counts[0] == counts[1]
+    assert 1 <= len(counts[0]) <= 16
+
+
+def test_a_pass_whose_merging_is_cut_short_still_meets_the_threshold(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = sponge().to_mesh64()
+    solid = mesh.vert_properties[:, :3], mesh.tri_verts
+    whole = rlacd.decompose(solid, quality="fast")
+    monkeypatch.setattr(cut_and_merge, "MOST_MERGING", 1e5)
+    short = rlacd.decompose(solid, quality="fast")
+    assert len(short) > len(whole)
+    assert short.report["concavity"]["max"] <= 0.05
