@@ -290,7 +290,7 @@ def test_ctrl_c_twice_quits_at_once(trouble: dict[str, str], tmp_path: Path) -> 
     _, said = process.communicate(timeout=60)
     assert process.returncode == 130, said
     assert "Traceback" not in said
-    assert batch(assets, "-o", out, "--glob", "a.obj", "--dry-run").stderr.startswith("1 meshes: 1 done")
+    assert batch(assets, "-o", out, "--glob", "a.obj", "--dry-run").stderr.startswith("1 mesh: 1 done")
 
 
 @pytest.mark.slow
