@@ -6,6 +6,7 @@
 
 #include "arrays.hpp"
 #include "hull.hpp"
+#include "mesh_measures.hpp"
 #include "parallel.hpp"
 
 namespace rlacd {

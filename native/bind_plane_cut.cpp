@@ -1,5 +1,6 @@
 // Python bindings of cutting by a plane, and of what hangs together.
 #include "arrays.hpp"
+#include "bodies.hpp"
 #include "plane_cut.hpp"
 #include "point_bodies.hpp"
 

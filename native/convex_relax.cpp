@@ -5,6 +5,7 @@
 
 #include "hull.hpp"
 #include "linear_program.hpp"
+#include "mesh_measures.hpp"
 #include "stop.hpp"
 
 namespace rlacd {

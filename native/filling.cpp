@@ -4,6 +4,7 @@
 #include <queue>
 
 #include "hull.hpp"
+#include "mesh_measures.hpp"
 #include "stop.hpp"
 
 namespace rlacd {

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <numeric>
 
+#include "invariant.hpp"
 #include "predicates.hpp"
 #include "stop.hpp"
 
@@ -188,6 +189,7 @@ void HullBuilder::add(const std::vector<Vec3>& points) {
   for (const std::int32_t id : alive)
     if (facets_[id].outside >= 0) pending.push_back(id);
   expand(pending);
+  RLACD_ASSERT(is_closed());
 }
 
 // Invariant between insertions: every point that lies outside the hull is in the list of one facet that sees it, and
@@ -209,6 +211,21 @@ void HullBuilder::expand(std::vector<std::int32_t>& pending) {
     }
     insert(farthest, id, pending);
   }
+}
+
+bool HullBuilder::is_closed() const {
+  for (std::size_t id = 0; id < facets_.size(); ++id) {
+    const Facet& f = facets_[id];
+    for (int e = 0; e < 3 && f.alive; ++e) {
+      const Facet& g = facets_[f.neighbour[e]];
+      bool meets = false;
+      for (int k = 0; k < 3; ++k)
+        meets = meets || (g.corner[k] == f.corner[(e + 1) % 3] && g.corner[(k + 1) % 3] == f.corner[e] &&
+                          g.neighbour[k] == static_cast<std::int32_t>(id));
+      if (!meets || !g.alive) return false;
+    }
+  }
+  return true;
 }
 
 // Replaces the facets that the point sees by a cone of triangles over their horizon.
@@ -255,6 +272,8 @@ void HullBuilder::insert(std::int32_t point, std::int32_t facet, std::vector<std
       if (beyond.corner[k] == e.to && beyond.corner[(k + 1) % 3] == e.from) beyond.neighbour[k] = id;
     facets_[id].neighbour[0] = e.beyond;
     edge = first_edge_[e.to];
+    RLACD_ASSERT(horizon_[edge].from == e.to);
+    RLACD_ASSERT((edge == 0) == (i + 1 == length));  // back at the start after all edges, and not before
   }
   for (std::size_t i = 0; i < length; ++i) {  // edge 1 is (to, point), edge 2 is (point, from)
     facets_[created_[i]].neighbour[1] = created_[(i + 1) % length];
@@ -387,47 +406,6 @@ Mesh hull_mesh(const std::vector<Vec3>& points) {
   for (const std::int32_t i : hull.indices) mesh.vertices.push_back(points[i]);
   mesh.faces = hull.faces;
   return mesh;
-}
-
-double mesh_volume(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
-  if (faces.empty()) return 0;
-  const Vec3 apex = vertices[faces[0][0]];
-  double sum = 0;
-  for (const Triangle& f : faces)
-    sum += dot(vertices[f[0]] - apex, cross(vertices[f[1]] - apex, vertices[f[2]] - apex));
-  return sum / 6;
-}
-
-double mesh_area(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
-  double sum = 0;
-  for (const Triangle& f : faces) sum += norm(cross(vertices[f[1]] - vertices[f[0]], vertices[f[2]] - vertices[f[0]]));
-  return sum / 2;
-}
-
-std::array<Vec3, 3> mesh_moments(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
-  std::vector<double> areas;
-  areas.reserve(faces.size());
-  double total = 0;
-  Vec3 centroid;
-  for (const Triangle& f : faces) {
-    const Vec3 a = vertices[f[0]], b = vertices[f[1]], c = vertices[f[2]];
-    areas.push_back(norm(cross(b - a, c - a)));
-    total += areas.back();
-    centroid = centroid + areas.back() / 3 * (a + b + c);
-  }
-  std::array<Vec3, 3> moments{};
-  if (!(total > 0)) return moments;
-  centroid = 1 / total * centroid;
-  const auto add = [&moments](double weight, Vec3 p) {
-    for (int i = 0; i < 3; ++i) moments[i] = moments[i] + weight * p[i] * p;
-  };
-  for (std::size_t i = 0; i < faces.size(); ++i) {
-    const Vec3 a = vertices[faces[i][0]] - centroid, b = vertices[faces[i][1]] - centroid,
-               c = vertices[faces[i][2]] - centroid;
-    const double weight = areas[i] / total;
-    for (const Vec3 p : {a, b, c, a + b + c}) add(weight, p);
-  }
-  return moments;
 }
 
 }  // namespace rlacd

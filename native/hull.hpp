@@ -59,6 +59,7 @@ class HullBuilder {
   bool sees(const Facet& f, Vec3 p) const;
   bool sees_closely(const Facet& f, Vec3 p) const;
   bool initialise();
+  bool is_closed() const;  // every edge of a facet is its neighbour's, the other way round
   std::int32_t new_facet(std::int32_t a, std::int32_t b, std::int32_t c);
   template <class Sees>
   void assign(std::int32_t point, const std::vector<std::int32_t>& facets, const Sees& sees);
@@ -93,11 +94,5 @@ Hull convex_hull(const std::vector<Vec3>& points);
 
 // The same as a mesh; empty where the points lie in a plane.
 Mesh hull_mesh(const std::vector<Vec3>& points);
-
-double mesh_volume(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces);
-double mesh_area(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces);
-
-// Second moments of the surface around its centroid, by rows, but for a positive factor.
-std::array<Vec3, 3> mesh_moments(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces);
 
 }  // namespace rlacd

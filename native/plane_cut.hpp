@@ -1,4 +1,4 @@
-// A closed surface cut by a plane, and what it falls into.
+// A closed surface cut by a plane.
 //
 // Input:  a closed oriented triangle mesh and a plane n.x = d.
 // Output: the surface of each side but for the cap in the plane, and the rims of that cap: closed loops, counter-
@@ -27,9 +27,5 @@ std::vector<std::array<double, 2>> on_plane(const std::vector<Vec3>& points, Vec
 
 // What lies below and above.
 std::array<OpenSide, 2> cut_by_plane(const Mesh& mesh, Vec3 normal, double offset);
-
-// The pieces that hang together by edges, in the order of their first faces. Where more than two faces meet at an edge,
-// those hang together that have the solid between them.
-std::vector<Mesh> bodies(const Mesh& mesh);
 
 }  // namespace rlacd

@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "hull.hpp"
+#include "invariant.hpp"
+#include "mesh_measures.hpp"
 
 namespace rlacd {
 
@@ -95,64 +96,75 @@ double mean_below(double s0, double s1, double s2, double d) {
   return (s0 + s1 + s2) / 3 - d - t * (s2 - d) / 3;
 }
 
-// A vertex v that is in the hull of its neighbours has no direction w with w . e < 0 for all edges e from v. Where
-// there are such directions, they are a cone, whose rays are normals of two edges each: the sum of these rays is one of
-// them. Where all edges lie in a plane, the cone has no rays, but holds the directions away from the two outermost.
-std::vector<char> stick_out(const Mesh& mesh) {
+// The directions from each vertex to its neighbours, once a face: those of vertex v are edges[first[v]..first[v + 1]).
+struct VertexEdges {
+  std::vector<std::size_t> first;
+  std::vector<Vec3> edges;
+};
+
+VertexEdges edges_by_vertex(const Mesh& mesh) {
   const std::size_t count = mesh.vertices.size();
-  std::vector<std::size_t> first(count + 1, 0);  // each vertex' edges, by where they start
+  VertexEdges out;
+  out.first.assign(count + 1, 0);
   for (const Triangle& f : mesh.faces)
-    for (const std::int32_t corner : f) ++first[corner + 1];
-  for (std::size_t v = 0; v < count; ++v) first[v + 1] += first[v];
-  std::vector<Vec3> edges(first.back());
-  std::vector<std::size_t> next(first.begin(), first.end() - 1);
+    for (const std::int32_t corner : f) ++out.first[corner + 1];
+  for (std::size_t v = 0; v < count; ++v) out.first[v + 1] += out.first[v];
+  out.edges.resize(out.first.back());
+  std::vector<std::size_t> next(out.first.begin(), out.first.end() - 1);
   for (const Triangle& f : mesh.faces)
-    for (int e = 0; e < 3; ++e) edges[next[f[e]]++] = normalized(mesh.vertices[f[(e + 1) % 3]] - mesh.vertices[f[e]]);
-  std::vector<char> sticks_out(count, 0);
-  for (std::size_t v = 0; v < count; ++v) {
-    const Vec3 *begin = edges.data() + first[v], *end = edges.data() + first[v + 1];
-    const auto all_below = [begin, end](Vec3 w, double height) {
-      return std::all_of(begin, end, [w, height](Vec3 e) { return dot(w, e) <= height; });
-    };
-    if (std::any_of(begin, end, [](Vec3 e) { return norm2(e) < 0.5; })) {
-      sticks_out[v] = 1;  // it is where a neighbour is, and one of the two may
-      continue;
-    }
-    Vec3 w;
-    for (const Vec3* e = begin; e != end; ++e) w = w - *e;
-    if (!all_below(w, -kFlat)) {
-      if (static_cast<std::size_t>(end - begin) > kManyEdges) {
-        sticks_out[v] = 1;  // nobody knows
-        continue;
+    for (int e = 0; e < 3; ++e)
+      out.edges[next[f[e]]++] = normalized(mesh.vertices[f[(e + 1) % 3]] - mesh.vertices[f[e]]);
+  return out;
+}
+
+bool all_below(const Vec3* begin, const Vec3* end, Vec3 w, double height) {
+  return std::all_of(begin, end, [w, height](Vec3 e) { return dot(w, e) <= height; });
+}
+
+// Whether there is a direction w with w . e < 0 for all edges e. Such directions are a cone, whose rays are normals of
+// two edges each: the sum of these rays is one of them. Where all edges lie in a plane, the cone has no rays, but holds
+// the directions away from the two outermost.
+bool has_direction_away(const Vec3* begin, const Vec3* end) {
+  Vec3 sum;
+  for (const Vec3* e = begin; e != end; ++e)
+    for (const Vec3* g = begin; g != e; ++g) {
+      const Vec3 ray = cross(*e, *g);
+      const bool below = all_below(begin, end, ray, kFlat), above = all_below(begin, end, -ray, kFlat);
+      if (below && above) {
+        if (all_below(begin, end, -(*e + *g), -kFlat)) return true;
+      } else if (below) {
+        sum = sum + ray;
+      } else if (above) {
+        sum = sum - ray;
       }
-      w = {};
-      for (const Vec3* e = begin; e != end && !sticks_out[v]; ++e)
-        for (const Vec3* g = begin; g != e; ++g) {
-          const Vec3 ray = cross(*e, *g);
-          bool below = true, above = true;  // whether all edges are
-          for (const Vec3* h = begin; h != end && (below || above); ++h) {
-            const double height = dot(ray, *h);
-            below = below && height <= kFlat;
-            above = above && height >= -kFlat;
-          }
-          if (below && above) {
-            sticks_out[v] = all_below(-(*e + *g), -kFlat);
-            if (sticks_out[v]) break;
-          } else if (below)
-            w = w + ray;
-          else if (above)
-            w = w - ray;
-        }
     }
-    if (!sticks_out[v]) sticks_out[v] = begin != end && all_below(w, -kFlat);
-  }
-  return sticks_out;
+  return all_below(begin, end, sum, -kFlat);
+}
+
+// Whether a vertex with these edges may be a corner of the hull of itself and its neighbours.
+bool sticks_out(const Vec3* begin, const Vec3* end) {
+  if (begin == end) return false;
+  // Where a neighbour is in the same place, one of the two may.
+  if (std::any_of(begin, end, [](Vec3 e) { return norm2(e) < 0.5; })) return true;
+  Vec3 away;
+  for (const Vec3* e = begin; e != end; ++e) away = away - *e;
+  if (all_below(begin, end, away, -kFlat)) return true;
+  // With many edges, trying pairs takes longer than keeping the vertex.
+  return static_cast<std::size_t>(end - begin) > kManyEdges || has_direction_away(begin, end);
+}
+
+std::vector<char> vertices_that_stick_out(const Mesh& mesh) {
+  const VertexEdges of = edges_by_vertex(mesh);
+  std::vector<char> result(mesh.vertices.size(), 0);
+  for (std::size_t v = 0; v < result.size(); ++v)
+    result[v] = sticks_out(of.edges.data() + of.first[v], of.edges.data() + of.first[v + 1]);
+  return result;
 }
 
 }  // namespace
 
 SolidMesh::SolidMesh(const Mesh& solid)
-    : mesh(solid), is_corner(solid.vertices.size(), 0), sticks_out(stick_out(solid)) {
+    : mesh(solid), is_corner(solid.vertices.size(), 0), sticks_out(vertices_that_stick_out(solid)) {
   area.reserve(mesh.faces.size());
   for (const Triangle& f : mesh.faces) {
     const Vec3 a = mesh.vertices[f[0]], b = mesh.vertices[f[1]], c = mesh.vertices[f[2]];
@@ -164,6 +176,7 @@ SolidMesh::SolidMesh(const Mesh& solid)
 
 Sections::Sections(const SolidMesh& solid, Vec3 normal, std::vector<double> offsets)
     : solid_(solid), mesh_(solid.mesh), normal_(normal), axis_(axis_of(normal)), offsets_(std::move(offsets)) {
+  RLACD_ASSERT(std::is_sorted(offsets_.begin(), offsets_.end()));
   project();
   fill_slabs();
   cut_edges();
@@ -195,6 +208,7 @@ std::int32_t Sections::first_above(double height) const {
   auto j = share > 0 ? share < 1 ? static_cast<std::int32_t>(share * (planes - 1)) + 1 : planes : 0;
   while (j < planes && offsets_[j] <= height) ++j;
   while (j > 0 && offsets_[j - 1] > height) --j;
+  RLACD_ASSERT(j == planes || offsets_[j] > height);
   return j;
 }
 

@@ -7,6 +7,7 @@
 #include "convex_collapse.hpp"
 #include "convex_planes.hpp"
 #include "convex_relax.hpp"
+#include "mesh_measures.hpp"
 
 namespace rlacd {
 namespace {
