@@ -28,17 +28,28 @@ STARTING = 0.7
 
 PATIENCE = 1800.0
 
+NO_THREAD = 127
+"""What the C library ends a process with when there is no memory for the data of a thread."""
+
 MAIN = "from rlacd.cli import main; main()"
 
 SMALL = """
-import resource, sys, rlacd, rlacd.decompose_command, rlacd.formats, rlacd.cli
-assert rlacd.decompose  # which loads it
+import resource, sys
+with open("/dev/null", "w") as sys.stdout:
+    sys.argv, argv = ["rlacd", "decompose", "--help"], sys.argv
+    try:
+        import numpy, rlacd.cli, rlacd.formats
+        rlacd.decompose(([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), threads=1)
+        numpy.ones((64, 64)) @ numpy.ones((64, 64))
+        rlacd.cli.main()
+    except SystemExit:
+        sys.argv, sys.stdout = argv, sys.__stdout__
 held = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
 limit = held + int(sys.argv.pop(1))
 resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
 rlacd.cli.main()
 """
-"""Python code that runs the command with so much more memory than it has when all is loaded."""
+"""Python code that runs the command with so much more memory than it has when all libraries are loaded and warm."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +120,7 @@ def draw_fault(random: np.random.Generator, cpu: float, size: int) -> Fault:
         Fault("Ctrl-C", (0, 4, 130), {"FAULT_CPU": f"{moment},{stop}"}),
         Fault("Ctrl-C twice", (0, 4, 130), {"FAULT_CPU": f"{moment},{stop},{stop}"}),
         Fault("Ctrl-C while writing", (0, 4, 130), {"FAULT_CHANGE": f"{change},{stop}"}),
-        Fault("small memory", (0, 2), memory=int(2 ** random.uniform(20, 29))),
+        Fault("small memory", (0, 2, NO_THREAD), memory=int(2 ** random.uniform(26, 31))),
         Fault(
             "clock jumps",
             (0,),
@@ -129,7 +140,7 @@ def command(words: list[str], fault: Fault | None = None) -> Run:
         environment |= {"LD_PRELOAD": str(library()), **fault.environment} if fault.environment else {}
         if fault.memory:
             arguments = ["-c", SMALL, str(fault.memory)]
-            environment["OPENBLAS_NUM_THREADS"] = "1"  # each of its threads reserves memory of its own
+            environment |= {"OPENBLAS_NUM_THREADS": "1", "MALLOC_ARENA_MAX": "1"}  # threads reserve memory of their own
     process = subprocess.Popen(
         [sys.executable, *arguments, *words], env=environment, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE
     )
