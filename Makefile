@@ -20,7 +20,7 @@ SEED    ?= 0
 MESHES  ?= ../shared/meshes
 SECONDS_TO_FUZZ = $(shell expr 60 \* $(MINUTES))
 
-.PHONY: install demo test test-fast lint soak soak-totals fuzz-files fuzz-shapes sanitize sanitize-address sanitize-thread format clean
+.PHONY: install demo test test-fast test-all nightly lint soak soak-totals fuzz-files fuzz-shapes sanitize sanitize-address sanitize-thread format clean
 
 install: $(VENV)/installed
 
@@ -47,13 +47,19 @@ lint: $(VENV)/test-extras
 	$(BIN)/clang-format --dry-run --Werror native/*.cpp native/*.hpp
 	$(BIN)/mypy
 
+# In tiers: two minutes while you work, ten on every push, all of it at night.
+test-fast: $(VENV)/test-extras
+	$(PYTEST) -m 'not slow and not nightly'
+
 test: lint
+	$(PYTEST) -m 'not nightly'
+
+test-all: lint
 	$(PYTEST)
 
-test-fast: $(VENV)/test-extras
-	$(PYTEST) -m 'not slow'
+nightly: test-all sanitize soak
 
-# Nightly: the native tests and a cross-section of $$RLACD_MESHES, decomposed in every way, watched by sanitizers.
+# The native tests and a cross-section of $$RLACD_MESHES, decomposed in every way, watched by sanitizers.
 sanitize: sanitize-address sanitize-thread
 
 sanitize-address sanitize-thread: sanitize-%: build/sanitize-%/installed

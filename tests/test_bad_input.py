@@ -127,7 +127,7 @@ def test_however_the_faces_are_written_the_solid_is_the_same(faces: Any) -> None
     assert sum(hull.volume for hull in result) == pytest.approx(sum(hull.volume for hull in expected), rel=1e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("surface", [klein_bottle, moebius_strip, folded_sphere])
 def test_surfaces_without_an_inside_are_covered(surface: Any) -> None:
     vertices, faces = surface()
@@ -326,6 +326,7 @@ def assert_hulls_or_one_sentence(result: Result, output: Path) -> None:
     assert not output.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", FORMATS)
 def test_a_file_cut_off_anywhere(kind: str, tmp_path: Path) -> None:
     path = write(tmp_path, kind)
@@ -337,7 +338,7 @@ def test_a_file_cut_off_anywhere(kind: str, tmp_path: Path) -> None:
         output.unlink(missing_ok=True)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("kind", FORMATS)
 def test_a_file_with_bytes_changed(kind: str, tmp_path: Path) -> None:
     path = write(tmp_path, kind)
@@ -397,6 +398,7 @@ NAMES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES, ids=ascii)
 def test_any_file_name_works(name: str, tmp_path: Path) -> None:
     try:
@@ -488,6 +490,7 @@ def test_an_input_that_is_no_file_has_code_2(name: str, tmp_path: Path) -> None:
     assert not (tmp_path / "out.glb").exists()
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_full_leaves_the_old_file(tmp_path: Path) -> None:
     """In a process that may write no file larger than 100 bytes: what the system says then ends in one sentence."""
     resource = pytest.importorskip("resource")
@@ -508,6 +511,7 @@ def test_a_disk_that_is_full_leaves_the_old_file(tmp_path: Path) -> None:
     assert sorted(p.name for p in tmp_path.iterdir()) == ["box.stl", "out.glb"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [

@@ -87,7 +87,7 @@ def test_every_mesh_gets_hulls_and_a_row_and_is_not_done_again(assets: Path, tmp
     assert not (out / "a.obj.glb").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_batch_writes_what_decompose_writes(assets: Path, tmp_path: Path) -> None:
     words = ["--preset", "mujoco", "--threshold", "0.1", "--density", "7"]
     assert batch(assets, "-o", tmp_path / "out", "--glob", "b/*", *words).exit_code == 0
@@ -98,7 +98,7 @@ def test_a_batch_writes_what_decompose_writes(assets: Path, tmp_path: Path) -> N
     assert tree(tmp_path / "out" / "b") == tree(alone)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_folder_a_mesh(assets: Path, tmp_path: Path) -> None:
     run = batch(assets, "-o", tmp_path / "out", "--glob", "a.stl", "--folders", "--format", "stl")
     assert run.exit_code == 0, run.output
@@ -223,7 +223,7 @@ def wait_for_rows(out: Path, count: int, process: subprocess.Popen[str]) -> int:
     pytest.fail(f"ended before it had {count} rows: {process.stderr.read() if process.stderr else ''}")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_killed_again_and_again_it_ends_as_if_undisturbed(trouble: dict[str, str], tmp_path: Path) -> None:
     assets = tmp_path / "assets"
     for number in range(5):
@@ -276,7 +276,7 @@ def test_ctrl_c_finishes_what_is_running_and_the_next_run_goes_on(trouble: dict[
     assert all((out / name).stat().st_mtime_ns == then for name, then in before.items()), "none is made twice"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_ctrl_c_twice_quits_at_once(trouble: dict[str, str], tmp_path: Path) -> None:
     assets, out = tmp_path / "assets", tmp_path / "out"
     write_ell(assets / "a.obj")
@@ -293,7 +293,7 @@ def test_ctrl_c_twice_quits_at_once(trouble: dict[str, str], tmp_path: Path) -> 
     assert batch(assets, "-o", out, "--glob", "a.obj", "--dry-run").stderr.startswith("1 mesh: 1 done")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_results_can_go_to_any_address(assets: Path) -> None:
     fsspec = pytest.importorskip("fsspec", reason="the extra fleet is not installed")
     memory = fsspec.filesystem("memory")
@@ -305,7 +305,7 @@ def test_results_can_go_to_any_address(assets: Path) -> None:
     assert (again.exit_code, "3 were done before" in again.stderr) == (0, True)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_real_meshes_give_the_same_bytes_with_one_job_and_two(corpus: Path, tmp_path: Path) -> None:
     assets = tmp_path / "assets"
     assets.mkdir()

@@ -22,8 +22,6 @@ from ray.cluster_utils import Cluster  # noqa: E402
 
 from rlacd.pool.on_ray import RayPool  # noqa: E402
 
-pytestmark = pytest.mark.slow
-
 
 class Counter:
     """Counts rows; at a number of them it does something."""
@@ -42,6 +40,7 @@ class Counter:
             self._then()
 
 
+@pytest.mark.nightly
 def test_a_cluster_that_is_not_there_is_told() -> None:
     assert not ray.is_initialized(), "comes before the cluster of the other tests"
     with pytest.raises(OptionError, match="jobs belongs"):
@@ -73,6 +72,7 @@ def _dies(node: Any) -> bool:
     return False
 
 
+@pytest.mark.nightly
 def test_a_node_dies_half_way_and_the_results_are_those_of_one_machine(cluster: Cluster, tmp_path: Path) -> None:
     assets = tmp_path / "assets"
     for number in range(8):
@@ -101,6 +101,7 @@ def test_a_node_dies_half_way_and_the_results_are_those_of_one_machine(cluster: 
     assert again.rows == []
 
 
+@pytest.mark.nightly
 def test_a_network_of_ones_own_and_a_shared_address_reach_the_nodes(cluster: Cluster, tmp_path: Path) -> None:
     from importlib.resources import files
 

@@ -109,6 +109,7 @@ class TestMethods:
         with pytest.raises(MissingExtraError, match=r"rlacd\[bench\]"):
             make_method("coacd")
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("name", ["coacd", "vhacdx", "vhacdx:hulls", "greedy", "learned", "navacd:space", "planes"])
     def test_all_find_the_parts_of_a_cross(self, name: str) -> None:
         pytest.importorskip(name.partition(":")[0] if name[0] in "cv" else "rlacd")
@@ -121,7 +122,7 @@ class TestMethods:
         assert all(f.shape[1] == 3 and f.max() < len(v) for v, f in hulls)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_coacd_on_its_own_example(corpus: Path, tmp_path: Path) -> None:
     """Version 1.0.14 has been seen to make 47 and 48 parts of SnowFlake at 0.05."""
     pytest.importorskip("coacd")
@@ -207,6 +208,7 @@ class TestStore:
         assert load_hulls(tmp_path / "h.npz") == ([], {})
 
 
+@pytest.mark.slow
 class TestRunner:
     def test_a_row_a_mesh_and_nothing_twice(self, meshes: Path, tmp_path: Path) -> None:
         bench = bench_of(meshes, tmp_path / "run")
@@ -244,7 +246,7 @@ class TestRunner:
         rows = bench_of(meshes, tmp_path / "run").run("greedy", 0.05)
         assert [row["error"] for row in rows] == ["died of SIGSEGV last words"] * 2
 
-    @pytest.mark.slow
+    @pytest.mark.nightly
     @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
     def test_stopping_a_run_ends_its_processes_and_records_nothing(self, tmp_path: Path) -> None:
         """Whether it is interrupted or killed: no process goes on, and what was running is done again next time."""
@@ -283,6 +285,7 @@ class TestRunner:
         assert find_meshes(meshes, tmp_path / "list.txt") == ["box.ply"]
 
 
+@pytest.mark.slow
 def test_what_another_version_made_is_made_again(meshes: Path, tmp_path: Path) -> None:
     bench = bench_of(meshes, tmp_path / "run")
     (first, _) = rows = bench.run("greedy", 0.05)

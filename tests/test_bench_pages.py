@@ -125,7 +125,7 @@ def test_a_sheet_has_a_panel_for_the_input_and_each_method(meshes: Path) -> None
 
 
 class TestCommands:
-    @pytest.mark.slow
+    @pytest.mark.nightly
     def test_compare(self, meshes: Path, tmp_path: Path) -> None:
         out = tmp_path / "run"
         bench("compare", meshes, "--out", out, "--methods", "greedy,navacd", "--pictures", 0)
@@ -141,7 +141,7 @@ class TestCommands:
         bench("compare", meshes, "--out", out, "--methods", "greedy,navacd", "--pictures", 0)
         assert (out / "results.jsonl").read_text() == before
 
-    @pytest.mark.slow
+    @pytest.mark.nightly
     def test_equal_accuracy(self, meshes: Path, tmp_path: Path) -> None:
         out = tmp_path / "run"
         bench("paper-table-1", meshes, "-o", out, "--first", 1, "--methods", "navacd", "--at", 0.3)
@@ -150,7 +150,7 @@ class TestCommands:
         assert (out / "curves.svg").exists()
         assert "44.2" in text, "the paper's numbers stand beside ours"
 
-    @pytest.mark.slow
+    @pytest.mark.nightly
     def test_vhacd_gets_as_many_hulls(self, meshes: Path, tmp_path: Path) -> None:
         pytest.importorskip("vhacdx")
         out = tmp_path / "run"
@@ -161,7 +161,7 @@ class TestCommands:
         assert len(theirs) == 2
         assert all(row["setting"] == ours[mesh] and row["parts"] <= ours[mesh] for mesh, row in theirs.items())
 
-    @pytest.mark.slow
+    @pytest.mark.nightly
     def test_tables_2_and_3(self, meshes: Path, tmp_path: Path) -> None:
         out = tmp_path / "run"
         bench("paper-table-2", meshes, "-o", out, "--first", 1, "--ranking", "excess")
@@ -260,7 +260,7 @@ class TestArms:
         with pytest.raises(OptionError, match="at least 4"):
             train_arms("paper-curves", tmp_path, tmp_path, "quick", 2)
 
-    @pytest.mark.slow
+    @pytest.mark.nightly
     def test_arms_are_trained_once(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         pytest.importorskip("torch")
         folder = tmp_path / "meshes"

@@ -123,6 +123,7 @@ def test_a_report_on_stdout_is_json_and_nothing_else(mesh: Path, stand_in: Stand
     assert report["hausdorff"]["under"] is None, "NaN is not JSON"
 
 
+@pytest.mark.slow
 def test_report_and_picture_are_written(mesh: Path, stand_in: StandIn) -> None:
     pytest.importorskip("mitsuba", reason="the extra view is not installed")
     report, picture = mesh.with_name("r.json"), mesh.with_name("p.png")
@@ -298,6 +299,7 @@ def test_a_real_missing_file(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [".", "/", "", "..", "chair.glb/"])
 def test_a_real_odd_name(name: str, tmp_path: Path) -> None:
     run = shell("decompose", name, cwd=tmp_path)
@@ -319,6 +321,7 @@ def test_a_real_timeout_still_writes_hulls(mesh: Path) -> None:
     assert mesh.with_name("ell_hulls.glb").exists()
 
 
+@pytest.mark.slow
 def test_info_tells_bodies_and_repair(mesh: Path) -> None:
     text = shell("info", mesh)
     assert text.returncode == 0, text.stderr

@@ -356,7 +356,7 @@ def test_offset_bricks_come_apart(policy: str) -> None:
     assert [hull.volume for hull in result] == pytest.approx([2, 2])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("file", ["test/vhacd/al.ply", "test/vhacd/hornbug.ply", "test/coacd_examples/SnowFlake.ply"])
 def test_real_meshes(corpus: Path, file: str) -> None:
     component = Component(repair(load_mesh(corpus / file)).manifold)

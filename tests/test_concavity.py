@@ -152,6 +152,7 @@ def solids(draw: st.DrawFn) -> Closed:
     return from_manifold(pieces[-1].refine(draw(st.integers(1, 3))))
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(solids())
 def test_made_solids_against_dense_sampling(part: Closed) -> None:
@@ -179,7 +180,7 @@ def cut_meshes(corpus: Path, count: int, seed: int) -> Iterator[Closed]:
             todo = [part for half in piece.split_by_plane(normal, offset) for part in half.decompose()]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_real_parts_against_dense_sampling(corpus: Path) -> None:
     parts = list(cut_meshes(corpus, 60, seed=0))
     assert len(parts) > 100

@@ -127,6 +127,7 @@ def test_every_kind_of_input_gives_the_same(source: str, tmp_path) -> None:
     assert result.report["name"] == ("table" if source == "path" else "mesh")
 
 
+@pytest.mark.slow
 def test_same_bytes_for_any_number_of_threads_and_any_run() -> None:
     runs = [rlacd.decompose(SHAPES["cup"](), threads=threads) for threads in (1, 1, 4)]
     for other in runs[1:]:
@@ -137,6 +138,7 @@ def test_same_bytes_for_any_number_of_threads_and_any_run() -> None:
         assert other.report["concavity"] == runs[0].report["concavity"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 40])
 def test_max_hulls(count: int) -> None:
     free = rlacd.decompose(cup())
@@ -150,11 +152,13 @@ def test_max_hulls(count: int) -> None:
         assert len(result) == len(free)
 
 
+@pytest.mark.slow
 def test_more_hulls_fit_better() -> None:
     errors = [rlacd.decompose(cup(), max_hulls=n).report["concavity"]["max"] for n in (2, 4, 8)]
     assert errors == sorted(errors, reverse=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limit", [{"max_vertices": 24}, {"max_vertices": 32}, {"max_faces": 60}])
 def test_limits_hold_together_with_the_promises(limit: dict[str, int]) -> None:
     result = rlacd.decompose(SHAPES["torus"](), **limit)
@@ -163,6 +167,7 @@ def test_limits_hold_together_with_the_promises(limit: dict[str, int]) -> None:
     assert max(len(hull.faces) for hull in result) <= limit.get("max_faces", 10**9)
 
 
+@pytest.mark.slow
 def test_limits_too_low_for_the_threshold_keep_the_count_and_warn() -> None:
     free, result = (rlacd.decompose(SHAPES["torus"](), max_vertices=limit) for limit in (None, 8))
     assert len(result) == len(free)
@@ -183,6 +188,7 @@ def test_without_merging_there_are_no_fewer_parts() -> None:
     assert len(rlacd.decompose(cup(), merge=False)) >= len(rlacd.decompose(cup()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("policy", POLICIES)
 def test_every_policy_keeps_the_promises(policy: str) -> None:
     assert_keeps_promises(rlacd.decompose(cup(), policy=policy), 0.05)
@@ -271,7 +277,7 @@ def _manifold(vertices: np.ndarray, faces: np.ndarray) -> Manifold:
     return Manifold(Mesh64(np.ascontiguousarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.uint64)))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_real_meshes(corpus) -> None:
     for name in (corpus / "quick.txt").read_text().split():
         result = rlacd.decompose(corpus / name)

@@ -68,6 +68,7 @@ def watch_nothing() -> object:
     return Nothing()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("file_format", "ending"), FORMATS)
 def test_a_batch_of_real_meshes_writes_what_decompose_writes(
     file_format: str, ending: str, corpus: Path, tmp_path: Path
@@ -95,7 +96,7 @@ def test_the_same_bytes_in_every_process_and_for_any_number_of_threads(name: str
     assert len(digits) == 1
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", MESHES[2:4])
 def test_limits_do_not_change_that(name: str, corpus: Path, tmp_path: Path) -> None:
     words = ("--max-hulls", 6, "--max-vertices", 24, "--threshold", 0.1)
@@ -122,7 +123,7 @@ def compare(meshes: Path, tmp_path: Path, file_format: str, ending: str, *words:
     assert tree(batches[0], TIMES, "manifest.jsonl", ".rlacd/lock") == expected
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(("file_format", "ending"), FORMATS)
 def test_the_same_files_one_by_one_and_in_a_batch(file_format: str, ending: str, corpus: Path, tmp_path: Path) -> None:
     if file_format == "usd":
@@ -130,7 +131,7 @@ def test_the_same_files_one_by_one_and_in_a_batch(file_format: str, ending: str,
     compare(copied(corpus, SMALL, tmp_path / "assets"), tmp_path, file_format, ending)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_same_files_for_a_cross_section_of_real_meshes(corpus: Path, tmp_path: Path) -> None:
     names = (corpus / "quick.txt").read_text().split()
     assert len(names) == 25

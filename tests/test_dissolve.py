@@ -105,6 +105,7 @@ def test_nothing_is_lost(sizes: list[tuple[float, float, float]], seed: int) -> 
         assert [p.volume for p in once.into] == [p.volume for p in again.into]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("space", [None, NavigableSpace(0.1, 0.04)], ids=["concavity", "space"])
 @pytest.mark.parametrize("name", ["train/kenney_cc0/furniture_pack__washer.ply", "test/vhacd/beshon.ply"])
 def test_parts_of_a_real_shape(name: str, space: NavigableSpace | None, corpus: Path) -> None:

@@ -150,7 +150,7 @@ CAREFUL = settings(
 )
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @CAREFUL
 @given(soups(), st.sampled_from([0.05, 0.05, 0.2]))
 def test_promises_hold_for_any_soup(mesh: tuple[Floats, Any], threshold: float) -> None:
@@ -159,7 +159,7 @@ def test_promises_hold_for_any_soup(mesh: tuple[Floats, Any], threshold: float) 
         same(one, rlacd.decompose(mesh, threshold=threshold, threads=2))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @CAREFUL
 @given(soups(), st.integers(-40, 40))
 def test_scaling_by_a_power_of_two_scales_the_hulls(mesh: tuple[Floats, Any], exponent: int) -> None:
@@ -170,7 +170,7 @@ def test_scaling_by_a_power_of_two_scales_the_hulls(mesh: tuple[Floats, Any], ex
         same(one, rlacd.decompose((vertices * factor, faces), threshold=0.2), factor)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @CAREFUL
 @given(soups(), st.integers(1, 3), st.sampled_from([None, 4, 8, 32]))
 def test_limits_are_kept(mesh: tuple[Floats, Any], max_hulls: int, max_vertices: int | None) -> None:

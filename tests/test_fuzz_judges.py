@@ -191,14 +191,14 @@ def test_kernels_agree_with_brute_force_on_any_soup(seed: int) -> None:
     try_seed(seed)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", range(3, 10))
 def test_whole_decompositions_pass_the_judges(seed: int, tmp_path: Path) -> None:
     row = run_seed(seed, Here(), tmp_path)
     assert row.status in ("done", "refused"), row.said
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_worker_that_hangs_is_a_hang(tmp_path: Path) -> None:
     worker = Watched(Limits(seconds=600))
     try:

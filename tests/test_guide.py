@@ -133,7 +133,7 @@ def test_the_network_keeps_the_symmetries_of_space() -> None:
     assert q_edges.shape == (1, 12)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_onnx_and_torch_agree_and_the_weights_survive(tmp_path: Path) -> None:
     network = random_network()
     path = tmp_path / "guide.onnx"
@@ -214,7 +214,7 @@ def options(meshes: Path, work: Path) -> TrainOptions:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_training_goes_on_where_it_stopped_and_ends_with_the_same_weights(meshes: Path, tmp_path: Path) -> None:
     whole = train(options(meshes, tmp_path / "a"), say=lambda _: None)
     assert whole == tmp_path / "a" / "round1" / "guide.onnx"

@@ -29,6 +29,7 @@ def hottest(heat: list[HeatMesh]) -> float:
     return max(float(part.distance.max()) for part in heat)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("threshold", [0.05, 0.3, 2.0])
 @pytest.mark.parametrize("place", [(0.0, 1.0), (1e5, 1e-2), (-3.0, 1e4)])
 def test_the_hottest_spot_is_as_far_as_the_report_says(threshold: float, place: tuple[float, float]) -> None:
@@ -88,7 +89,7 @@ def test_a_cloud_of_points_has_no_surface_to_measure_to() -> None:
     assert heat_map(result) == []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["raw/chair_ivar_0668.obj", "raw/modular_sci_fi_guns_pack__Pistol_2.glb"])
 def test_real_meshes_agree_with_their_report(corpus: Path, name: str) -> None:
     result = rlacd.decompose(corpus / name)

@@ -50,6 +50,7 @@ def check_refused(error: type[RlacdError], says: str, function: Callable[..., An
 # --- meshes -----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", hostile.REFUSED)
 def test_a_hostile_mesh_is_refused_with_its_reason(name: str, tmp_path: Path) -> None:
     build, says = hostile.REFUSED[name]
@@ -199,7 +200,7 @@ def batch(*words: str) -> tuple[int, str]:
     return result.exit_code, result.output
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_batch_passes_by_what_is_no_file(tmp_path: Path) -> None:
     """A pipe, a device, and a glTF file whose buffer is a pipe: each is a row, and the box is done."""
     assets, out = tmp_path / "assets", tmp_path / "out"
@@ -226,6 +227,7 @@ def test_an_asset_that_never_ends_is_refused(kind: str, tmp_path: Path) -> None:
     check_refused(MeshFileError, KINDS[kind], Asset("mesh.stl", path, "mesh").files)
 
 
+@pytest.mark.slow
 def test_files_beside_an_asset_are_read_once_around(tmp_path: Path) -> None:
     """A hundred thousand spellings of one name do not make a hundred thousand copies."""
     (tmp_path / "much.bin").write_bytes(bytes(2**20))
@@ -355,7 +357,7 @@ def array_header(shape: tuple[int, ...]) -> bytes:
     return b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("trap", ["bomb", "shape", "objects", "depth", "header"])
 def test_a_hostile_checkpoint_is_refused(trap: str, tmp_path: Path) -> None:
     place = checkpoint(tmp_path)

@@ -98,7 +98,7 @@ def test_a_safetensors_file_of_the_same_weights_gives_the_same(
     assert I2PMAEEncoder.from_checkpoint(tmp_path / "weights.safetensors").digest() == official.digest()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_onnxruntime_gives_the_features_of_the_official_code(
     official: I2PMAEEncoder, features: tuple[torch.Tensor, np.ndarray]
 ) -> None:

@@ -80,7 +80,7 @@ def test_the_same_policy_reaches_the_same_components_as_decompose(name: str) -> 
     check_same_as_decompose(Component(small_solids()[name]))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_same_policy_reaches_the_same_components_of_real_meshes(corpus: Path) -> None:
     for solid in real_solids(corpus, 6):
         check_same_as_decompose(solid)

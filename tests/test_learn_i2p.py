@@ -83,7 +83,7 @@ def learned(folder: Path) -> bytes:
     return (folder / "checkpoint" / "weights.safetensors").read_bytes()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_run_ends_with_one_file_that_decompose_runs(meshes: Path, weights: Path, tmp_path: Path) -> None:
     path = run(meshes, tmp_path / "run", weights, export=True)
     lines = [json.loads(line) for line in (tmp_path / "run" / "curves.jsonl").read_text().splitlines()]
@@ -102,7 +102,7 @@ def test_a_run_ends_with_one_file_that_decompose_runs(meshes: Path, weights: Pat
     assert [h.vertices.tobytes() for h in one.hulls] == [h.vertices.tobytes() for h in two.hulls]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_exported_file_computes_what_torch_does(weights: Path, tmp_path: Path) -> None:
     encoder = make_encoder("i2p-mae", weights)
     torch.manual_seed(0)
@@ -177,7 +177,7 @@ def test_other_weights_do_not_go_on_with_a_run(meshes: Path, weights: Path, tmp_
         run(meshes, tmp_path / "run", other, resume=True, validation=0)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_worker_processes_change_nothing(meshes: Path, weights: Path, tmp_path: Path) -> None:
     run(meshes, tmp_path / "alone", weights)
     with LocalPool(2) as pool:

@@ -92,7 +92,7 @@ def error(process: object, exact: np.ndarray, q: np.ndarray) -> float:
     return float(np.abs(q - exact)[process.possible].max())  # type: ignore[attr-defined]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("static_discount", [None, 0.4])
 def test_with_loops_q_learning_converges_where_discounts_add_up_to_less_than_one(
     real_roots: list[Node], static_discount: float | None
@@ -105,7 +105,7 @@ def test_with_loops_q_learning_converges_where_discounts_add_up_to_less_than_one
     assert error(process, exact, history[-1]) < 0.2 * error(process, exact, history[1])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_with_loops_q_learning_diverges_where_discounts_add_up_to_more_than_one(real_roots: list[Node]) -> None:
     process = process_of(real_roots, alike=True, static_discount=0.9)
     assert process.solve() is None

@@ -148,6 +148,7 @@ def test_the_main_job_does_not_load_torch() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_weights_and_another_does_not(meshes: Path, tmp_path: Path) -> None:
     for name, seed in (("a", 0), ("b", 0), ("c", 1)):
         run(meshes, tmp_path / name, seed=seed, validation=0)
@@ -156,6 +157,7 @@ def test_the_same_seed_gives_the_same_weights_and_another_does_not(meshes: Path,
     assert weights(tmp_path / "a") != weights(tmp_path / "c")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("priority", [0.0, 0.6])
 def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, tmp_path: Path, priority: float) -> None:
     run(meshes, tmp_path / "whole", priority=priority)
@@ -164,7 +166,7 @@ def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, tmp_path:
     assert_same_run(tmp_path / "whole", tmp_path / "halves")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_killed_run_resumes_exactly(meshes: Path, tmp_path: Path) -> None:
     whole, killed = tmp_path / "whole", tmp_path / "killed"
     run(meshes, whole, iterations=400)
@@ -182,7 +184,7 @@ def test_a_killed_run_resumes_exactly(meshes: Path, tmp_path: Path) -> None:
     assert_same_run(whole, killed)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("jobs", [1, 3])
 def test_where_episodes_are_played_changes_nothing(meshes: Path, tmp_path: Path, jobs: int) -> None:
     changes = {"environments": 4}
@@ -192,7 +194,7 @@ def test_where_episodes_are_played_changes_nothing(meshes: Path, tmp_path: Path,
     assert_same_run(tmp_path / "alone", tmp_path / "spread")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_worker_that_is_killed_changes_nothing(meshes: Path, tmp_path: Path) -> None:
     run(meshes, tmp_path / "alone")
     killed: list[psutil.Process] = []
@@ -223,6 +225,7 @@ class Doomed(HerePool):
         return died
 
 
+@pytest.mark.slow
 def test_an_episode_nobody_can_play_is_said_and_left_out(meshes: Path, tmp_path: Path) -> None:
     said: list[str] = []
     for name in ("a", "b"):
@@ -245,7 +248,7 @@ def test_solids_without_anything_to_cut_are_one_clear_error(meshes: Path, tmp_pa
         run(meshes, tmp_path / "run", validation=0)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_exported_policy_computes_what_torch_does(meshes: Path, tmp_path: Path) -> None:
     pytest.importorskip("torch", reason="needs the extra train")
     import torch
@@ -332,7 +335,7 @@ def test_a_checkpoint_half_written_leaves_the_one_before(meshes: Path, tmp_path:
     assert weights(tmp_path / "whole") == weights(cut_short)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_training_on_one_solid_learns_to_finish_it(tmp_path: Path) -> None:
     """A cross falls into three parts, if its arms are cut off where they begin; values count the cuts to come."""
     meshes = write_meshes(tmp_path / "meshes")

@@ -107,7 +107,7 @@ def test_the_shipped_policy_cuts_an_l_and_a_t_in_two(shift: float) -> None:
     assert found.report["concavity"]["max"] <= 0.05
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_result_does_not_depend_on_the_number_of_threads(corpus: Path) -> None:
     path = corpus / "test/vhacd/ob_chair_gothic.ply"
     one, two = (rlacd.decompose(path, policy="learned", threads=n) for n in (1, 2))

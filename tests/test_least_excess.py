@@ -53,7 +53,7 @@ def test_it_is_so_where_the_mesh_is_degenerate(solid: tuple[FloatArray, IntArray
     assert least_excess(component, candidates, EXPONENTS["excess_norm"]) == cheapest(swept, excess_norm(swept))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("score", EXPONENTS)
 def test_it_is_so_all_the_way_down_real_meshes(corpus: Path, score: str) -> None:
     names = ("kenney_cc0", "quaternius_cc0", "kaykit_cc0")

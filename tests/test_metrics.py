@@ -140,6 +140,7 @@ def test_invalid_hulls_are_counted() -> None:
 boxes = st.tuples(*[st.floats(-1.2, 1.0)] * 3, *[st.floats(0.1, 1.0)] * 3)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.lists(boxes, min_size=1, max_size=4))
 def test_distances_agree_with_a_boolean_union_and_samples(some: list[tuple[float, ...]]) -> None:

@@ -121,7 +121,7 @@ def test_bodies_stand_up_whatever_axis_points_up(tmp_path: Path, wooden: Decompo
     assert_stands(fall_in_drake(lying.save(tmp_path / "table.sdf", up=up)), lying)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_real_objects_come_to_rest_everywhere(tmp_path: Path, corpus: Path) -> None:
     chair = rlacd.decompose(corpus / "raw" / "chair_ivar_0668.obj", threads=1)
     mujoco, bullet = (
@@ -238,7 +238,7 @@ def test_names_that_xml_or_disks_cannot_hold_are_made_plain(tmp_path: Path, wood
     }
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_body_of_500_hulls_is_simulated(tmp_path: Path) -> None:
     spots = np.stack(np.meshgrid(np.arange(5), np.arange(10), np.arange(10)), axis=-1).reshape(-1, 3) * 0.05
     cubes = [hull_of(trimesh.creation.box((0.04, 0.04, 0.04)).vertices + spot) for spot in spots]

@@ -31,7 +31,7 @@ def test_the_mug_is_one_closed_body_with_one_handle(example: ModuleType) -> None
     assert mug.euler_number == 0, "a cup with a handle is a torus to a topologist"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_mug_hangs_by_its_handle_and_its_one_hull_falls(tmp_path: Path, example: ModuleType) -> None:
     hulls, one = example.main(tmp_path, threads=1)
     assert hulls.held
@@ -41,7 +41,7 @@ def test_the_mug_hangs_by_its_handle_and_its_one_hull_falls(tmp_path: Path, exam
     assert one.height < 0.06
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_dropped_mug_comes_to_rest_on_the_ground(tmp_path: Path, example: ModuleType) -> None:
     example.main(tmp_path, threads=1)
     rest = example.drop(tmp_path / "mug.xml")

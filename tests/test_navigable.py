@@ -97,6 +97,7 @@ SHAPES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHAPES)
 def test_balls_are_where_the_definition_says(name: str) -> None:
     solid = solid_of(SHAPES[name])
@@ -122,6 +123,7 @@ def check_balls(nav: Navigable, solid: Solid) -> None:
     assert on.max() < 1e-7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHAPES)
 @pytest.mark.parametrize(("radius", "tolerance"), [(0.05, 0.02), (0.025, 0.05), (0.05, 0.005)])
 def test_the_boundary_is_covered(name: str, radius: float, tolerance: float) -> None:
@@ -190,6 +192,7 @@ def test_a_tube_is_open_exactly_when_the_ball_fits(turn: int, share: float, is_o
     assert (np.linalg.norm(centres, axis=1) < 0.15).any() == is_open
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turn", range(4))
 @pytest.mark.parametrize("wall", [0.01, 0.06, 0.3])
 @pytest.mark.parametrize("share", [0.96, 0.98, 1.02, 1.04])
@@ -200,6 +203,7 @@ def test_a_door_lets_in_what_is_narrower(turn: int, wall: float, share: float) -
     assert inside_house(nav, home, turn).any() == (share > 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turn", range(2))
 @pytest.mark.parametrize("share", [0.97, 0.985, 1.015, 1.03])
 @pytest.mark.parametrize("wall", [0.02, 0.4])
@@ -461,7 +465,7 @@ def test_balls_give_way_to_finished_parts(seed: int) -> None:
     assert nav.settled([]) is nav
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_on_real_meshes(corpus: Path) -> None:
     for name in (corpus / "quick.txt").read_text().split()[::4]:
         solid = repair(load_mesh(corpus / name))

@@ -96,6 +96,7 @@ def test_seeds_open_a_sealed_room() -> None:
     assert len(rlacd.decompose(house(door=0), criterion=space)) > 6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ball", [0.9, 1.1])
 def test_the_hole_of_a_torus_is_free_exactly_when_the_ball_fits(ball: float) -> None:
     torus = trimesh.creation.torus(0.75, 0.25, major_sections=96, minor_sections=64)  # a hole of radius 0.5
@@ -106,6 +107,7 @@ def test_the_hole_of_a_torus_is_free_exactly_when_the_ball_fits(ball: float) -> 
     assert in_the_hole == (ball < 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ball", [0.98, 1.02])
 def test_a_pipe_stays_open_exactly_when_the_ball_fits(ball: float) -> None:
     outside, inside = Manifold.cylinder(2, 0.4, 0.4, 48, True), Manifold.cylinder(3, 0.3, 0.3, 48, True)
@@ -183,6 +185,7 @@ def test_one_pass_does_without_parts_that_others_can_hold_together() -> None:
     assert "search" not in merged.report["seconds"]
 
 
+@pytest.mark.slow
 def test_balanced_is_not_worse_than_one_pass_where_balls_decide() -> None:
     space = rlacd.NavigableSpace(0.05, 0.01)
     for mesh in (bumpy_ball(), house(door=0.5)):
@@ -261,6 +264,7 @@ def test_a_ball_larger_than_the_object_gives_one_hull() -> None:
     assert any("larger" in warning for warning in result.report["warnings"])
 
 
+@pytest.mark.slow
 def test_an_open_mesh_says_what_was_measured_to() -> None:
     bowl = mesh_of(Manifold.sphere(1, 32).trim_by_plane((0, 0, -1), 0))
     bowl.update_faces(bowl.triangles_center[:, 2] < -1e-9)
@@ -284,7 +288,7 @@ def test_bad_spaces_are_refused(make: Callable[[], Any]) -> None:
         make()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_no_hull_overlaps_a_final_ball_on_real_meshes(corpus: Path) -> None:
     for name in (corpus / "quick.txt").read_text().split()[::4]:
         result = rlacd.decompose(corpus / name, criterion=rlacd.NavigableSpace(0.05, 0.01), policy="navacd")

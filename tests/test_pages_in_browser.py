@@ -16,7 +16,6 @@ import rlacd
 from rlacd.show.viewer import Viewer, open_viewer
 from tests.browser import Watched, change, open_browser, open_driver, open_page, pixels
 
-pytestmark = pytest.mark.slow
 pytest.importorskip("PIL", reason="the extra view is not installed")
 
 
@@ -72,6 +71,7 @@ def rows(page: Any) -> int:
     return int(page.locator("#parts tbody tr").count())
 
 
+@pytest.mark.slow
 def test_the_hulls_are_seen_and_listed(seen: Watched, viewer: Viewer) -> None:
     page = seen.page
     assert viewer.session.result is not None
@@ -86,6 +86,7 @@ def test_the_hulls_are_seen_and_listed(seen: Watched, viewer: Viewer) -> None:
     assert len(colors) > 50
 
 
+@pytest.mark.nightly
 def test_the_explode_slider_pulls_the_hulls_apart(seen: Watched) -> None:
     page = seen.page
     together = pixels(page)
@@ -97,6 +98,7 @@ def test_the_explode_slider_pulls_the_hulls_apart(seen: Watched) -> None:
     assert change(together, pixels(page)) > 0.02
 
 
+@pytest.mark.nightly
 def test_another_threshold_decomposes_anew(seen: Watched, viewer: Viewer) -> None:
     page = seen.page
     before = pixels(page)
@@ -115,6 +117,7 @@ def test_another_threshold_decomposes_anew(seen: Watched, viewer: Viewer) -> Non
     assert viewer.session.result[1].report["options"]["threshold"] == 0.01
 
 
+@pytest.mark.nightly
 def test_a_bad_threshold_is_told_and_nothing_is_lost(seen: Watched) -> None:
     page = seen.page
     page.fill("#threshold-number", "-3")
@@ -127,6 +130,7 @@ def test_a_bad_threshold_is_told_and_nothing_is_lost(seen: Watched) -> None:
     assert "400" in seen.complaints.pop()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["glb", "obj.zip", "mjcf", "report.html"])
 def test_files_are_downloaded(seen: Watched, name: str, tmp_path: Path) -> None:
     with seen.page.expect_download() as found:
@@ -144,6 +148,7 @@ def test_files_are_downloaded(seen: Watched, name: str, tmp_path: Path) -> None:
         assert "<title>table: convex hulls</title>" in path.read_text(encoding="utf-8")
 
 
+@pytest.mark.nightly
 def test_another_mesh_is_dropped_and_shown(seen: Watched, viewer: Viewer, tmp_path: Path) -> None:
     page = seen.page
     ball = trimesh.creation.icosphere(1).export(file_type="glb")
@@ -171,6 +176,7 @@ def test_another_mesh_is_dropped_and_shown(seen: Watched, viewer: Viewer, tmp_pa
     assert "400" in seen.complaints.pop()
 
 
+@pytest.mark.nightly
 def test_a_preset_limits_the_hulls_and_points_out_its_format(seen: Watched, viewer: Viewer) -> None:
     page = seen.page
     page.select_option("#preset", "mujoco")
@@ -181,6 +187,7 @@ def test_a_preset_limits_the_hulls_and_points_out_its_format(seen: Watched, view
     assert "64 vertices" in page.locator("#preset-note").inner_text()
 
 
+@pytest.mark.nightly
 def test_the_command_is_copied(viewer: Viewer, mesh: Path, browser: Any) -> None:
     with open_page(browser, permissions=["clipboard-read", "clipboard-write"]) as watched:
         page = watched.page
@@ -192,6 +199,7 @@ def test_the_command_is_copied(viewer: Viewer, mesh: Path, browser: Any) -> None
         assert copied == f"rlacd decompose {mesh} --quality fast -o table_hulls.glb"
 
 
+@pytest.mark.nightly
 def test_terms_are_explained_where_they_stand(seen: Watched) -> None:
     page = seen.page
     for name in (
@@ -211,6 +219,7 @@ def test_terms_are_explained_where_they_stand(seen: Watched) -> None:
         assert page.locator("#hint").inner_text().endswith(".")
 
 
+@pytest.mark.nightly
 def test_nothing_covers_the_model_on_a_phone(viewer: Viewer, browser: Any) -> None:
     with open_page(browser) as watched:
         page = watched.page
@@ -222,6 +231,7 @@ def test_nothing_covers_the_model_on_a_phone(viewer: Viewer, browser: Any) -> No
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
 
 
+@pytest.mark.nightly
 def test_hulls_that_share_a_face_do_not_flicker(browser: Any, tmp_path: Path) -> None:
     beams = [trimesh.creation.box(size) for size in ((2, 0.5, 0.2), (0.5, 2, 0.2))]
     trimesh.boolean.union(beams, engine="manifold").export(tmp_path / "cross.ply")
@@ -241,6 +251,7 @@ def test_hulls_that_share_a_face_do_not_flicker(browser: Any, tmp_path: Path) ->
             assert (abs(shared - shared[0]).max(axis=1) < 12).all()
 
 
+@pytest.mark.nightly
 def test_an_open_sheet_is_explained_in_the_header(browser: Any, tmp_path: Path) -> None:
     sheet = trimesh.Trimesh([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2), (0, 2, 3)])
     sheet.export(tmp_path / "sheet.ply")
@@ -251,6 +262,7 @@ def test_an_open_sheet_is_explained_in_the_header(browser: Any, tmp_path: Path) 
         assert page.locator("#notes").inner_text() == "1 open body became a thin shell"
 
 
+@pytest.mark.nightly
 def test_rows_and_hulls_point_at_each_other(seen: Watched) -> None:
     page = seen.page
     plain = pixels(page)
@@ -272,6 +284,7 @@ def test_rows_and_hulls_point_at_each_other(seen: Watched) -> None:
     assert page.locator("tr[aria-selected='true']").count() == 0
 
 
+@pytest.mark.nightly
 def test_the_list_is_walked_and_sorted_by_keyboard(seen: Watched) -> None:
     page = seen.page
     page.locator("#parts tbody tr").first.focus()
@@ -285,6 +298,7 @@ def test_the_list_is_walked_and_sorted_by_keyboard(seen: Watched) -> None:
     assert page.locator("th[aria-sort='descending']").inner_text().startswith("Volume")
 
 
+@pytest.mark.nightly
 def test_the_heat_map_is_drawn_with_its_scale(seen: Watched) -> None:
     page = seen.page
     page.fill("#threshold-number", "1.9")
@@ -304,6 +318,7 @@ def test_the_heat_map_is_drawn_with_its_scale(seen: Watched) -> None:
     assert change(plain, pixels(page)) < 0.002
 
 
+@pytest.mark.nightly
 def test_balls_come_with_navigable_space(seen: Watched) -> None:
     page = seen.page
     assert page.locator("#balls").is_hidden()
@@ -318,6 +333,7 @@ def test_balls_come_with_navigable_space(seen: Watched) -> None:
     assert change(plain, pixels(page)) > 0.005
 
 
+@pytest.mark.nightly
 def test_another_axis_can_point_up(seen: Watched) -> None:
     page = seen.page
     assert page.locator("#up input:checked").get_attribute("value") == "z"
@@ -331,6 +347,7 @@ def test_another_axis_can_point_up(seen: Watched) -> None:
     assert change(looks[0], pixels(page)) < 0.001
 
 
+@pytest.mark.nightly
 def test_glass_and_ghosts_are_seen(seen: Watched) -> None:
     page = seen.page
     looks = [pixels(page)]
@@ -344,6 +361,7 @@ def test_glass_and_ghosts_are_seen(seen: Watched) -> None:
     assert min(change(a, b) for a, b in itertools.pairwise(looks)) > 0.01
 
 
+@pytest.mark.nightly
 def test_the_keyboard_turns_fits_and_helps(seen: Watched) -> None:
     page = seen.page
     before = pixels(page)
@@ -359,6 +377,7 @@ def test_the_keyboard_turns_fits_and_helps(seen: Watched) -> None:
     assert page.locator("#help").is_hidden()
 
 
+@pytest.mark.nightly
 def test_work_can_be_stopped(browser: Any, tmp_path: Path) -> None:
     rough = trimesh.creation.icosphere(3)
     rough.vertices *= [[1 + 0.2 * (i % 3)] for i in range(len(rough.vertices))]
@@ -379,6 +398,7 @@ def test_work_can_be_stopped(browser: Any, tmp_path: Path) -> None:
         assert watched.complaints == []
 
 
+@pytest.mark.nightly
 def test_a_server_that_stops_is_told(browser: Any, mesh: Path) -> None:
     with open_page(browser) as watched:
         with open_viewer(mesh, port=0) as viewer:
@@ -388,6 +408,7 @@ def test_a_server_that_stops_is_told(browser: Any, mesh: Path) -> None:
         assert "rlacd view" in watched.page.locator("#trouble").inner_text()
 
 
+@pytest.mark.nightly
 def test_a_browser_without_3d_graphics_still_lists_and_says_so(report: Path, driver: Any) -> None:
     with open_browser(driver, "--disable-3d-apis") as poor, open_page(poor) as watched:
         watched.page.goto(report.as_uri())
@@ -402,6 +423,7 @@ def report(mesh: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return rlacd.decompose(mesh, threshold=1.0).save_report(tmp_path_factory.mktemp("report") / "a report.html")
 
 
+@pytest.mark.nightly
 def test_the_report_opens_from_disk_without_a_network(browser: Any, report: Path) -> None:
     with open_page(browser, offline=True) as watched:
         page = watched.page

@@ -19,8 +19,6 @@ from ray.cluster_utils import Cluster  # noqa: E402
 
 from rlacd.pool.on_ray import RayPool  # noqa: E402
 
-pytestmark = pytest.mark.slow
-
 __all__ = ["meshes"]  # a fixture
 
 
@@ -36,6 +34,7 @@ def cluster() -> Iterator[Cluster]:
         cluster.shutdown()
 
 
+@pytest.mark.slow
 def test_requests_over_ray_are_as_those_here(cluster: Cluster) -> None:
     shared = {"network": Shared({"weights": b"1234"})}
     with RayPool("auto") as pool:
@@ -53,6 +52,7 @@ def test_requests_over_ray_are_as_those_here(cluster: Cluster) -> None:
     assert ray.is_initialized(), "a cluster that somebody else started goes on"
 
 
+@pytest.mark.nightly
 def test_a_node_dies_in_the_middle_of_training_and_the_weights_are_the_same(
     cluster: Cluster, meshes: Path, tmp_path: Path
 ) -> None:

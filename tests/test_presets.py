@@ -31,7 +31,7 @@ def test_round_bodies_are_brought_inside_the_limits(name: str) -> None:
     assert result.report["concavity"]["max"] <= 0.05, "the threshold holds for limited hulls too"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_real_objects_are_what_a_gpu_takes(corpus: Path) -> None:
     """The rule of PhysX for each hull: 64 vertices and polygons, 32 corners a polygon, 32 polygons a corner."""
     names = (corpus / "quick.txt").read_text().split()

@@ -200,7 +200,7 @@ def blind(kept: Path) -> float:
     return float(loss.detach())
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_loss_falls(meshes: Path, tmp_path: Path) -> None:
     changes = {"points": 256, "steps": 400, "batch": 8, "rotate": False, "stretch": 1.0}
     out = run(meshes, tmp_path / "w.safetensors", log_every=40, checkpoint_seconds=1e6, **changes)

@@ -26,9 +26,22 @@ def promises() -> dict[str, str]:
 
 
 @cache
-def names_in(path: str) -> set[str]:
+def tests_of(path: str) -> dict[str, bool]:
+    """The tests of a file, and whether each is run on every push."""
     module = ast.parse((ROOT / path).read_text(encoding="utf-8"))
-    return {node.name for node in ast.walk(module) if isinstance(node, ast.FunctionDef) and node.name[:5] == "test_"}
+    found: dict[str, bool] = {}
+
+    def look(body: list[ast.stmt], pushed: bool) -> None:
+        for node in body:
+            if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                on_push = pushed and not any("mark.nightly" in ast.unparse(mark) for mark in node.decorator_list)
+                if isinstance(node, ast.ClassDef):
+                    look(node.body, on_push)
+                elif node.name.startswith("test_"):
+                    found[node.name] = on_push
+
+    look(module.body, "pytestmark = pytest.mark.nightly" not in map(ast.unparse, module.body))
+    return found
 
 
 @pytest.mark.parametrize("name", promises())
@@ -36,8 +49,9 @@ def test_a_promise_names_tests_that_exist(name: str) -> None:
     named = TEST.findall(promises()[name])
     assert named, "no test holds it"
     assert promises()[name].count("::") == len(named), "a test is not written as `tests/test_x.py::test_y`"
-    missing = [f"{path}::{test}" for path, test in named if not (ROOT / path).is_file() or test not in names_in(path)]
+    missing = [f"{path}::{test}" for path, test in named if not (ROOT / path).is_file() or test not in tests_of(path)]
     assert missing == []
+    assert any(tests_of(path)[test] for path, test in named), "no test holds it on every push"
 
 
 @pytest.fixture
@@ -48,6 +62,7 @@ def mesh(tmp_path: Path) -> Path:
     return tmp_path / "bars.stl"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("policy", ["greedy", "learned"])
 def test_no_network_no_display_no_gpu(policy: str, mesh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A connection to any address would end the process, whatever library asks for it."""
@@ -60,6 +75,7 @@ def test_no_network_no_display_no_gpu(policy: str, mesh: Path, monkeypatch: pyte
     assert {"out.glb", "out.html"} <= set(tree(mesh.parent))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jump", ["0,-100000000", "20,100000000"])
 def test_a_clock_that_jumps_changes_no_bytes(jump: str, mesh: Path) -> None:
     words = ["decompose", str(mesh), "--quality", "best", "--search-steps", "5", "--timeout", "300", "-o"]
@@ -69,6 +85,7 @@ def test_a_clock_that_jumps_changes_no_bytes(jump: str, mesh: Path) -> None:
     assert mesh.with_name("jumpy.glb").read_bytes() == mesh.with_name("calm.glb").read_bytes()
 
 
+@pytest.mark.slow
 def test_the_faults_are_real(mesh: Path) -> None:
     """What the tests above rely on: each fault is seen by the command."""
     words = ["decompose", str(mesh), "--quiet", "-o", str(mesh.with_name("out.obj"))]

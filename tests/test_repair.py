@@ -382,6 +382,7 @@ def with_leaves(count):
     return leaves, np.arange(3 * count).reshape(-1, 3)
 
 
+@pytest.mark.slow
 def test_hundreds_of_leaves_are_one_crowd():
     solid = solid_of(with_leaves(600))
     assert set(steps(solid)) == {"wrapped"}
@@ -396,6 +397,7 @@ def test_a_sheet_attached_to_a_solid_stays():
     assert solid.frame.to_input(vertices)[:, 2].max() == pytest.approx(1.1, abs=1e-2)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10**6), st.integers(1, 12))
 @settings(max_examples=25, deadline=None)
 def test_random_soup_gives_a_closed_solid_near_it(seed, count):
@@ -406,6 +408,7 @@ def test_random_soup_gives_a_closed_solid_near_it(seed, count):
     assert np.isfinite([body.deviation for body in solid.bodies]).all()
 
 
+@pytest.mark.slow
 def test_same_input_same_bytes():
     mesh, _ = with_hole(0.4)
     leaves = with_leaves(400)
@@ -416,7 +419,7 @@ def test_same_input_same_bytes():
         assert first.bodies == second.bodies
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_quick_corpus(corpus):
     """Every real mesh gives a closed solid whose surface is near the input's, and all of the input is on or in it."""
     allowed = {"test/vhacd/bunny.ply": HOLE}
@@ -427,7 +430,7 @@ def test_the_quick_corpus(corpus):
         assert worst <= allowed.get(name, 0.05), name
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_skins_that_lead_away_are_tried_as_sheets(corpus) -> None:
     """Crossing faces of one body: the first skin of this cabinet led 0.15 away from it."""
     solid = repair(load_mesh(corpus / "train/kenney_cc0/furniture_pack__cabinetBedDrawer.ply"))

@@ -116,7 +116,7 @@ def test_simulators_read_the_rewritten_urdf(ear: Path) -> None:
 
 
 @pytest.mark.parametrize("robot", ["kuka_iiwa/model.urdf", "franka_panda/panda.urdf"])
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_real_robots_are_rewritten_and_simulated(tmp_path: Path, robot: str) -> None:
     """The arms that come with pybullet; Panda's calls its folder of meshes a package."""
     bullet = pytest.importorskip("pybullet", reason="the extra sim is not installed")

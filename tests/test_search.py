@@ -91,7 +91,7 @@ def test_what_slanted_planes_cut_is_reunited(cuts: list[tuple[tuple[float, float
     )
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_most_neighbours_can_be_reunited_without_a_wall_between_them(real: Component) -> None:
     with Workers(1) as workers:
         parts = first_pass(real, workers)
@@ -111,7 +111,7 @@ def test_most_neighbours_can_be_reunited_without_a_wall_between_them(real: Compo
     assert reunited == pytest.approx(glued, rel=1e-2)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_search_only_improves_and_keeps_the_solid(real: Component) -> None:
     with Workers(1) as workers:
         parts = first_pass(real, workers)
@@ -123,7 +123,7 @@ def test_a_search_only_improves_and_keeps_the_solid(real: Component) -> None:
     assert sum(own.volume for part in found for own in part.members) == pytest.approx(real.volume, rel=1e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_more_steps_are_never_worse(real: Component) -> None:
     costs = []
     with Workers(1) as workers:
@@ -216,7 +216,7 @@ def test_a_cluster_that_was_cut_badly_becomes_fewer_parts() -> None:
     assert recut(pieces, [], by_score("hull-sum")(Views(12, 0)), CRITERION, Clock(-1.0)) is None
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("options", [{"quality": "balanced"}, {"quality": "best", "search_steps": 30, "seed": 5}])
 @pytest.mark.parametrize("name", SHAPES[:2])
 def test_the_same_hulls_for_any_number_of_threads(name: str, options: dict[str, Any], corpus: Path) -> None:
@@ -227,7 +227,7 @@ def test_the_same_hulls_for_any_number_of_threads(name: str, options: dict[str, 
         assert (a.faces == b.faces).all()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", SHAPES)
 def test_levels_are_ordered(name: str, corpus: Path) -> None:
     fast, balanced, best = (
@@ -244,7 +244,7 @@ def test_levels_are_ordered(name: str, corpus: Path) -> None:
     assert balanced.report["search"]["work"] <= balanced.report["search"]["allowed"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("count", [3, 8])
 def test_with_a_limit_on_hulls_the_error_falls(count: int, corpus: Path) -> None:
     mesh = corpus / SHAPES[0]
@@ -254,7 +254,7 @@ def test_with_a_limit_on_hulls_the_error_falls(count: int, corpus: Path) -> None
     assert balanced.report["concavity"]["max"] <= 1.02 * fast.report["concavity"]["max"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_other_criteria_are_searched_too(corpus: Path) -> None:
     space = rlacd.NavigableSpace(0.025, 0.02)
     fast, best = (
@@ -268,7 +268,7 @@ def test_other_criteria_are_searched_too(corpus: Path) -> None:
     assert limited.report["concavity"]["max"] <= 0.05
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_command_line_searches(corpus: Path, tmp_path: Path) -> None:
     words = ["--quality", "best", "--search-steps", "5", "--report", "-", "-q"]
     done = CliRunner().invoke(app, ["decompose", str(corpus / SHAPES[1]), "-o", str(tmp_path / "h.glb"), *words])
@@ -287,7 +287,7 @@ def test_the_command_line_refuses_bad_options(words: str, tmp_path: Path) -> Non
     assert list(tmp_path.iterdir()) == [mesh]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_cancelling_a_search_keeps_what_it_has_reached(corpus: Path) -> None:
     told: list[rlacd.Progress] = []
 
@@ -304,7 +304,7 @@ def test_cancelling_a_search_keeps_what_it_has_reached(corpus: Path) -> None:
     assert counts == sorted(counts, reverse=True)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_time_does_not_make_the_best_level_worse_than_balanced(corpus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(LEVELS, "best", replace(LEVELS["best"], seconds=0.01))
     balanced, best = (rlacd.decompose(corpus / SHAPES[0], quality=quality) for quality in ("balanced", "best"))

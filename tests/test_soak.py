@@ -45,6 +45,7 @@ def test_shares_of_trials_add_up() -> None:
     assert sum(KINDS.values()) == pytest.approx(1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["file", "shape"])
 def test_a_number_is_always_the_same_trial(kind: str, laboratory: Laboratory) -> None:
     number = first_of(laboratory, kind)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
@@ -34,6 +35,7 @@ starts = st.sampled_from(["", '<?xml version="1.0" encoding="utf-8"?>\n', "<!-- 
 documents = st.tuples(starts, elements()).map("".join)
 
 
+@pytest.mark.slow
 @given(documents)
 def test_every_element_is_where_it_is_said_to_be(text: str) -> None:
     """Its bytes alone parse, with lxml, to the same tag, attributes and number of children."""
@@ -63,6 +65,7 @@ def test_setting_attributes_changes_nothing_else(text: str, data: st.DataObject)
     assert document.data[element.head : element.end] in after.data
 
 
+@pytest.mark.slow
 @given(documents)
 def test_replacing_nothing_is_nothing(text: str) -> None:
     document = parse(NOWHERE, text.encode())

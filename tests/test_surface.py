@@ -26,6 +26,7 @@ def soups(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray]:
     return vertices, faces
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=300)
 @given(soups(), hnp.arrays(np.float64, (8, 3), elements=st.floats(-2, 2)))
 def test_distance_is_that_of_brute_force(soup: tuple[np.ndarray, np.ndarray], points: np.ndarray) -> None:
@@ -46,7 +47,7 @@ def test_needles_are_as_near_as_their_edges(width: float) -> None:
     np.testing.assert_allclose(surface.distance(points), np.linalg.norm(points - on_segment, axis=1), atol=width + 1e-8)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_distance_to_real_meshes(corpus: Path) -> None:
     rng = np.random.default_rng(0)
     for name in (corpus / "quick.txt").read_text().split():

@@ -170,7 +170,7 @@ def rough(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for one process")
 @pytest.mark.parametrize("seconds", [0.0, 2.0, 6.0])
 def test_the_command_leaves_at_once_and_in_silence_while_at_work(rough: Path, seconds: float) -> None:
@@ -205,7 +205,7 @@ ENDINGS = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_nothing_is_said_of_leaks_when_python_ends(rough: Path, ending: str) -> None:
     mesh = rough if "view" in ending else rough.with_name("cube.stl")

@@ -30,6 +30,7 @@ def threads_started(threads: int) -> tuple[int, int]:
     return int(started), int(allowed)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not ON_LINUX or available_cpus() < 2, reason="needs Linux and two processors")
 def test_one_thread_is_one_thread_for_booleans_too() -> None:
     """manifold3d has a pool of its own as soon as a surface has ten thousand triangles."""
