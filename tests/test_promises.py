@@ -26,7 +26,7 @@ def promises() -> dict[str, str]:
 
 
 @cache
-def tests_of(path: str) -> dict[str, bool]:
+def runs_on_push(path: str) -> dict[str, bool]:
     """The tests of a file, and whether each is run on every push."""
     module = ast.parse((ROOT / path).read_text(encoding="utf-8"))
     found: dict[str, bool] = {}
@@ -49,9 +49,11 @@ def test_a_promise_names_tests_that_exist(name: str) -> None:
     named = TEST.findall(promises()[name])
     assert named, "no test holds it"
     assert promises()[name].count("::") == len(named), "a test is not written as `tests/test_x.py::test_y`"
-    missing = [f"{path}::{test}" for path, test in named if not (ROOT / path).is_file() or test not in tests_of(path)]
+    missing = [
+        f"{path}::{test}" for path, test in named if not (ROOT / path).is_file() or test not in runs_on_push(path)
+    ]
     assert missing == []
-    assert any(tests_of(path)[test] for path, test in named), "no test holds it on every push"
+    assert any(runs_on_push(path)[test] for path, test in named), "no test holds it on every push"
 
 
 @pytest.fixture
