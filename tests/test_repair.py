@@ -8,10 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from fuzz.flaws import FAMILIES
 from rlacd.errors import EmptyMeshError
 from rlacd.solid.load import load_mesh
 from rlacd.solid.repair import GAP, HALF_THICKNESS, repair
 from rlacd.solid.repair_caps import HOLE
+from rlacd.solid.repair_distance import SurfaceQuery
 from rlacd.solid.repair_union import to_arrays, to_manifold
 
 BOX = trimesh.creation.box(extents=(2, 2, 2))
@@ -497,3 +499,108 @@ def test_a_closed_mesh_with_folds_is_kept(corpus):
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     assert steps(solid) == ["closed"]
     assert solid.manifold.volume() == pytest.approx(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6, abs=1e-6)
+
+
+def revolved(*profile, sections=24):
+    mesh = trimesh.creation.revolve(np.array(profile), sections=sections)
+    return trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+
+
+BOTTLE = ((0, 0), (0.35, 0), (0.35, 1.4), (0.12, 1.7), (0.12, 2))
+WINE_BOTTLE = ((0, 0), (0.3, 0), (0.3, 1.3), (0.06, 1.6), (0.06, 2))
+CUP = ((0, 0), (0.4, 0), (0.5, 1))
+
+
+@pytest.mark.parametrize(("profile", "sections"), [(BOTTLE, 24), (BOTTLE, 8), (WINE_BOTTLE, 24), (CUP, 24), (CUP, 8)])
+def test_a_bottle_and_a_cup_stay_hollow_unless_they_shall_be_solid(profile, sections):
+    mesh = revolved(*profile, sections=sections)
+    hollow = solid_of(mesh)
+    assert steps(hollow) == ["slab"]
+    assert "--open solid fills it" in hollow.warnings[0]
+    full = solid_of(mesh, open_bodies="solid")
+    assert steps(full) == ["capped"]
+    assert volume(full) == pytest.approx(trimesh.convex.convex_hull(mesh).volume, rel=0.35)
+    thin = solid_of(mesh, open_bodies="thin")
+    assert thin.manifold.volume() == hollow.manifold.volume()
+    assert not thin.warnings
+
+
+def test_a_neck_that_no_ball_passes_is_no_opening():
+    mesh = revolved((0, 0), (0.3, 0), (0.3, 1.3), (0.02, 1.6), (0.02, 2))
+    assert steps(solid_of(mesh)) == ["capped"]
+    assert steps(solid_of(mesh, open_bodies="thin")) == ["slab"]
+
+
+def test_a_box_whose_lid_misses_by_a_hair_is_solid():
+    top = np.flatnonzero(BOX.face_normals[:, 2] > 0.9)
+    lid = moved(BOX.submesh([top], append=True), 0, 0, 0.004)
+    solid = solid_of(join(without(BOX, *top), lid))
+    assert volume(solid) == pytest.approx(8, rel=0.01)
+
+
+def test_cloth_is_never_filled():
+    x, y = np.meshgrid(np.linspace(-1, 1, 12), np.linspace(-1, 1, 12))
+    i = np.arange(11 * 12).reshape(11, 12)[:, :-1].ravel()
+    cloth = trimesh.Trimesh(
+        np.stack([x, y, 0.05 * np.sin(3 * x) * np.cos(2 * y)], axis=-1).reshape(-1, 3),
+        np.concatenate([np.stack([i, i + 1, i + 13], 1), np.stack([i, i + 13, i + 12], 1)]),
+        process=False,
+    )
+    solid = solid_of(cloth)
+    assert steps(solid) == ["slab"]
+    assert not solid.warnings
+
+
+@pytest.mark.parametrize("missing", [1, 5, 10])
+def test_a_knob_with_doubled_faces_a_few_missing_and_a_fin_is_a_ball(missing):
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    faces = np.delete(ball.faces, np.random.default_rng(1).permutation(len(ball.faces))[:missing], axis=0)
+    a, b = faces[0][:2]
+    tip = ball.vertices[[a, b]].mean(axis=0) * 1.2
+    vertices = np.concatenate([ball.vertices, [tip, tip + 0.05]])
+    n = len(ball.vertices)
+    fin = [[a, b, n], [b, n + 1, n]]
+    solid = solid_of(trimesh.Trimesh(vertices, np.concatenate([faces, faces[:, ::-1], fin]), process=False))
+    assert volume(solid) == pytest.approx(ball.volume, rel=0.01)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.1, 0.2])
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("name", ["ball", "torus"])
+def test_a_damaged_solid_stays_the_solid_it_was(name, family, share):
+    """Where whole patches are gone, it may not; then a warning says where."""
+    mesh = {
+        "ball": trimesh.creation.icosphere(subdivisions=2),
+        "torus": trimesh.creation.torus(1, 0.35, major_sections=20, minor_sections=10),
+    }[name]
+    damaged = FAMILIES[family](np.array(mesh.vertices), np.array(mesh.faces), share, np.random.default_rng(5))
+    solid = solid_of(trimesh.Trimesh(*damaged, process=False))
+    repaired = SurfaceQuery(*to_arrays(solid.manifold))
+    points = solid.frame.to_frame(mesh.vertices)
+    missed = np.where(repaired.inside(points), 0, repaired.distance(points)).max()
+    kept = volume(solid) == pytest.approx(mesh.volume, rel=0.03) and missed <= 0.03
+    assert kept or (family in ("missing patches", "mixture") and " at (" in " ".join(solid.warnings))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_faces_missing_from_flat_sides_come_back_exactly(seed):
+    """A cap bends as little as it can, so what is missing of a box is a box again."""
+    mesh = BOX.subdivide().subdivide()
+    rest = without(mesh, *np.random.default_rng(seed).permutation(len(mesh.faces))[: len(mesh.faces) // 20])
+    solid = solid_of(rest)
+    assert volume(solid) == pytest.approx(8, rel=1e-9)
+
+
+def test_a_loop_around_an_island_keeps_the_island():
+    """A face that touches the rim of its hole in one vertex is in the cap, whichever way it is wound."""
+    flat = trimesh.creation.box(extents=(4, 4, 1)).subdivide().subdivide().subdivide()
+    top = np.flatnonzero(flat.triangles_center[:, 2] > 0.499)
+    patch = top[np.abs(flat.triangles_center[top][:, :2]).max(axis=1) < 1]
+    on_rim = np.isin(flat.faces, np.delete(flat.faces, patch, axis=0))
+    touching = next(face for face in patch if on_rim[face].sum() == 1)
+    for turn in (1, -1):
+        faces = flat.faces.copy()
+        faces[touching] = faces[touching][::turn]
+        mesh = trimesh.Trimesh(flat.vertices, np.delete(faces, np.setdiff1d(patch, touching), axis=0), process=False)
+        solid = solid_of(mesh, open_bodies="solid")
+        assert volume(solid) == pytest.approx(16, rel=1e-9)

@@ -19,7 +19,7 @@ from rlacd.cut_and_merge import cut_and_merge
 from rlacd.decomposition import Decomposition
 from rlacd.fields import check_callback
 from rlacd.finish import drop_slivers, in_input, limit_part, limit_roughly, merge_to_count, with_limits
-from rlacd.options import CONCAVITY, DEFAULT_RESOLUTION, DEFAULT_THRESHOLD, OPTION_NAMES, Options, QualityName
+from rlacd.options import CONCAVITY, DEFAULT_RESOLUTION, DEFAULT_THRESHOLD, OPTION_NAMES, OpenName, Options, QualityName
 from rlacd.planes.views import Views
 from rlacd.policies import AS_PUBLISHED, make_policy
 from rlacd.presets import PresetName
@@ -53,6 +53,7 @@ def decompose(
     merge: bool = True,
     policy: str = "greedy",
     resolution: int = DEFAULT_RESOLUTION,
+    open: OpenName = "auto",
     seed: int = 0,
     threads: int | None = None,
     timeout: float | None = None,
@@ -91,6 +92,10 @@ def decompose(
         `rlacd.policies.make_policy`).
     resolution : int
         Cells along the longest side of the grid on which repair looks for enclosed rooms.
+    open : "auto", "solid" or "thin"
+        What becomes of bodies with openings, such as cups and damaged scans. ``auto``: solid if nothing can get inside,
+        or if the openings look like missing faces; else a shell as thin as its faces. ``solid``: whatever is hollow is
+        filled. ``thin``: nothing is.
     seed : int
         For whatever is random; the same input, options and seed give the same bytes.
     threads : int, optional
@@ -193,6 +198,7 @@ def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Cl
             solid = repair(
                 source,
                 resolution=options.resolution,
+                open_bodies=options.open,
                 threads=workers.threads,
                 keep_cavities=isinstance(options.criterion, NavigableSpace) and options.criterion.sees_cavities,
             )

@@ -34,6 +34,11 @@ RESOLUTIONS = (20, 400)
 """The grid that repair looks for rooms on has this number cubed of cells: with fewer than 20 along a side, a wrap drawn
 onto the surface folds over itself; more than 400 would take over 4 GB."""
 
+OpenName = Literal["auto", "solid", "thin"]
+
+OPEN: tuple[OpenName, ...] = get_args(OpenName)
+"""What becomes of bodies with openings; see `rlacd.solid.repair.repair`."""
+
 QualityName = Literal["fast", "balanced", "best"]
 
 QUALITIES: tuple[QualityName, ...] = get_args(QualityName)
@@ -129,6 +134,14 @@ class Options:
         "Grid cells along the longest side when bodies that are not closed are repaired.",
         integer(*RESOLUTIONS),
         panel=METHOD,
+    )
+    open: OpenName = option(
+        "auto",
+        "Bodies with openings: auto fills those that nothing can get into, or that have lost some faces; solid fills "
+        "all that are hollow, thin none.",
+        one_of(OPEN),
+        panel=METHOD,
+        metavar="|".join(OPEN),
     )
     seed: int = option(0, "The same seed, input and options give the same bytes.", integer(0, MAX_SEED), panel=RUN)
     threads: int | None = option(

@@ -72,7 +72,14 @@ _CROWD, _CROSSINGS = 300, 1000
 _FLAT = 1e-6
 
 
-def repair(mesh: InputMesh, *, resolution: int = 100, threads: int | None = None, keep_cavities: bool = False) -> Solid:
+def repair(
+    mesh: InputMesh,
+    *,
+    resolution: int = 100,
+    open_bodies: str = "auto",
+    threads: int | None = None,
+    keep_cavities: bool = False,
+) -> Solid:
     """Make a mesh into one closed, oriented solid.
 
     Parameters
@@ -81,6 +88,10 @@ def repair(mesh: InputMesh, *, resolution: int = 100, threads: int | None = None
         What was loaded.
     resolution
         Cells along the longest side of the grid on which enclosed rooms are looked for.
+    open_bodies
+        ``auto``: a body with openings is solid if nothing can get inside, or if the openings look like damage; else a
+        shell as thin as its faces. ``solid``: every body is filled that has an inside once its openings are closed.
+        ``thin``: what is open stays a shell.
     threads
         How many threads measure distances; all there are by default. The result does not depend on it.
     keep_cavities
@@ -121,11 +132,11 @@ def repair(mesh: InputMesh, *, resolution: int = 100, threads: int | None = None
         return Solid(solid, surface, frame, (body,), tuple(warnings))
 
     query = SurfaceQuery(vertices, faces, threads)
-    work = _Repair(query, frame, resolution, keep_cavities)
+    work = _Repair(query, frame, resolution, keep_cavities, open_bodies)
     doubted = work.doubted()
     if len(doubted):
         # Faces of one body that cross each other can be joined wrongly into a skin: try them as sheets.
-        other = _Repair(query, frame, resolution, keep_cavities, doubted)
+        other = _Repair(query, frame, resolution, keep_cavities, open_bodies, doubted)
         if other.deviation.max() < work.deviation.max():
             work = other
     return Solid(work.solid, surface, frame, work.report(), tuple(warnings + work.warnings))
@@ -143,12 +154,15 @@ class _Repair:
         frame: Frame,
         resolution: int,
         keep_cavities: bool,
+        open_bodies: str,
         as_sheets: IntArray | None = None,
     ) -> None:
         self.input = surface
         self.frame = frame
         self.resolution = resolution
         self.keep_cavities = keep_cavities
+        self.open_bodies = open_bodies
+        self.mouths: dict[int, FloatArray] = {}  # of hollow bodies, where their widest opening is
         self.as_sheets = np.empty(0, dtype=np.int64) if as_sheets is None else as_sheets
         self.warnings: list[str] = []
 
@@ -174,12 +188,29 @@ class _Repair:
             self.solid = unite_around_cavities([part for part, _ in parts], [bool(inward[body]) for _, body in parts])
         else:
             self.solid = unite([part for part, _ in parts])
-            self._wrap_rooms(soup, parts)
+            if open_bodies != "thin":
+                self._wrap_rooms(soup, parts)
         if self.solid.is_empty():
             self.warnings.append("the surface could not be closed: the hull of its points stands in for the solid")
             self.step[:] = STEPS.index("hull")
             self.solid = hull_of_points(surface.vertices, HALF_THICKNESS)
+        self._tell_of_shells()
         self._measure()
+
+    def _tell_of_shells(self) -> None:
+        shells = [body for body in self.mouths if self.step[body] == STEPS.index("slab")]
+        if not shells:
+            return
+        place = self._place(self.mouths[shells[0]])
+        if len(shells) == 1:
+            sentence = f"1 open body became a thin shell; --open solid fills it (its widest opening is at {place})."
+        else:
+            sentence = f"{len(shells)} open bodies became thin shells; --open solid fills them (one opens at {place})."
+        self.warnings.append(sentence)
+
+    def _place(self, point: FloatArray) -> str:
+        """A point of the frame, in the input's unit."""
+        return "(" + ", ".join(f"{x:.4g}" for x in self.frame.to_input(point)) + ")"
 
     def report(self) -> tuple[BodyRepair, ...]:
         """One record a body."""
@@ -246,18 +277,20 @@ class _Repair:
     def _cap(self, soup: Soup) -> Soup:
         """Cap the bodies all of whose holes can honestly be capped."""
         free = int((soup.edges.valence == 1).sum())
-        if free == 0 or free > MOST_FREE_EDGES:
+        if free == 0 or free > MOST_FREE_EDGES or self.open_bodies == "thin":
             return soup
-        closed = close_holes(soup, self.bodies, self.input, self._covers, GAP, HALF_THICKNESS / 2)
+        fill = self.open_bodies == "solid"
+        closed = close_holes(soup, self.bodies, self.input, self._covers, GAP, HALF_THICKNESS / 2, fill)
         if closed is None:
             return soup
+        self.mouths = dict(zip(closed.hollow.tolist(), closed.mouths, strict=True))
         self._note(closed.bodies, "capped")
         self.by_room |= closed.by_room
         if len(closed.far):
-            place = ", ".join(f"{x:.4g}" for x in self.frame.to_input(closed.where[closed.far.argmax()]))
+            place = self._place(closed.where[closed.far.argmax()])
             self.warnings.append(
                 f"Holes were closed although the caps lead up to {closed.far.max():.3f} (longest side = 2) away from "
-                f"the surface: the widest is at ({place})."
+                f"the surface: the widest is at {place}."
             )
         return closed.soup
 

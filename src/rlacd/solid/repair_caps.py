@@ -21,7 +21,15 @@ from rlacd.solid.repair_distance import SurfaceQuery, spread_points
 from rlacd.solid.repair_holes import LONGEST_EXACT_LOOP, cap
 from rlacd.solid.repair_rims import Rims, rims_of
 from rlacd.solid.repair_soup import Soup
-from rlacd.solid.topology import BoolArray, IntArray, components, face_areas, first_of_doubled, nondegenerate
+from rlacd.solid.topology import (
+    BoolArray,
+    IntArray,
+    components,
+    face_areas,
+    first_of_doubled,
+    nondegenerate,
+    signed_tetrahedra,
+)
 
 HOLE, HOLE_SHARE = 0.1, 0.02
 """A body nearly closed, its holes no more than this share of its area, is closed with caps up to this far away: a scan
@@ -29,7 +37,7 @@ with a few holes is meant as a solid, a cup is not. The caps are reported."""
 
 # A wound has at most so many edges, and a share of the area of its body; where it is one missing face, a larger one.
 _WOUND_EDGES, _WOUND, _MISSING_FACE = 12, 0.1, 0.2
-# Where there are not many wounds, a ring of more edges than this is a mouth: its corners lie this well on a circle.
+# A single ring of more edges than this is a mouth, not a wound: its corners lie this well on a circle.
 _RING, _ROUND = 6, 0.1
 # Along this share of its rim at least, the cap turns by less than this from the faces beside it (cosine of 45 degrees).
 _SMOOTH_SHARE, _SMOOTH = 0.3, 0.7
@@ -37,6 +45,8 @@ _SMOOTH_SHARE, _SMOOTH = 0.3, 0.7
 _DAMAGED, _DAMAGED_SHARE, _DAMAGED_EDGES, _DAMAGED_WOUND = 4, 0.3, 60, 0.25
 # Wounds take no more than this share of the area that is left: a cage is no damaged ball.
 _WOUNDS = 0.7
+# An open body that caps would give this much volume for its area is hollow; with less it is a sheet, a leaf or a cloth.
+_ROOMY = 0.02
 # A solid may have a few faces sticking out of it, up to this share of its area, beside flaps.
 FLAPS = 0.05
 
@@ -57,6 +67,10 @@ class Closed:
         Distances of caps from the surface, of each body where something can come there.
     where
         The places of `far`, ``[N, 3]``.
+    hollow
+        Bodies that stay open although caps would give them an inside.
+    mouths
+        The middle of the widest opening of each of them, ``[N, 3]``.
     """
 
     soup: Soup
@@ -64,6 +78,8 @@ class Closed:
     by_room: BoolArray
     far: FloatArray
     where: FloatArray
+    hollow: IntArray
+    mouths: FloatArray
 
 
 def close_holes(
@@ -73,6 +89,7 @@ def close_holes(
     covers: Callable[[FloatArray], BoolArray],
     gap: float,
     thickness: float,
+    fill: bool = False,
 ) -> Closed | None:
     """Cap the bodies all of whose holes may be closed.
 
@@ -90,11 +107,13 @@ def close_holes(
         How far a cap may lead from the surface anyway.
     thickness
         A body that has less volume for its area is none.
+    fill
+        Close every body that closing gives an inside, whatever can come in.
 
     Returns
     -------
     Closed or None
-        None if nothing was closed.
+        None if there is no hole.
     """
     rims = rims_of(soup)
     if not rims.loops:
@@ -114,19 +133,25 @@ def close_holes(
     distance = surface.distance(points)
     far = distance > gap
     unreachable = far.copy()
-    if far.any():
+    if far.any() and not fill:
         far[far] = covers(points[far])
         unreachable &= ~far
     place = owner[on]  # the loop of a point
     nearly_closed = np.bincount(loop_body[owner], cap_area, bodies) <= HOLE_SHARE * body_area
+    by_loop = np.bincount(owner, cap_area, len(rims.loops))
     depth = np.zeros(len(rims.loops))
     np.maximum.at(depth, place, distance)
-    wound = _wounds(soup, rims, caps, owner, body_area[loop_body], depth)
+    smooth = _smooth_share(soup, rims, caps, owner) >= _SMOOTH_SHARE
+    ring = np.array([len(loop) > _RING and _is_round(soup.vertices[loop]) for loop in rims.loops])
+    wound = _wounds(rims, smooth, ring, by_loop / body_area[loop_body], depth)
     wound &= (cap_area * wound[owner]).sum() <= _WOUNDS * soup.area.sum()
-    excused = wound[place] | (nearly_closed[loop_body[place]] & (distance <= HOLE))
+    hole = nearly_closed[loop_body] & (smooth | ~ring)
+    excused = wound[place] | (hole[place] & (distance <= HOLE))
     chosen = np.zeros(bodies, dtype=bool)
     chosen[loop_body] = True
-    chosen[loop_body[place[far & ~excused]]] = False
+    if not fill:
+        chosen[loop_body[place[far & ~excused]]] = False
+    refused = np.setdiff1d(loop_body, np.flatnonzero(chosen))
 
     def capped() -> tuple[Soup, BoolArray]:
         some, whole = chosen[loop_body[owner]], chosen[body]
@@ -143,12 +168,20 @@ def close_holes(
     volume = np.bincount(trial.body_of_side(), np.maximum(trial.sides.volume, 0), bodies)
     chosen &= volume > thickness * np.bincount(trial.body, trial.area, bodies)
     chosen &= trial.sheet_share(bodies, flap) <= FLAPS
-    if not chosen.any():
-        return None
     by_room = np.zeros(bodies, dtype=bool)
     by_room[loop_body[place[unreachable & ~excused]]] = True
     wide = far & chosen[loop_body[place]]
-    return Closed(capped()[0], np.flatnonzero(chosen[joined]), by_room & chosen, distance[wide], points[wide])
+    # What every cap together would enclose, by the windings found.
+    sign = np.where(rims.inverted, -1, 1) * ~rims.flap
+    enclosed = np.bincount(body, sign * signed_tetrahedra(soup.vertices, soup.faces), bodies)
+    enclosed += np.bincount(loop_body[owner], signed_tetrahedra(soup.vertices, caps), bodies)
+    hollow = refused[np.abs(enclosed[refused]) > _ROOMY * body_area[refused]]
+    widest = [np.flatnonzero(loop_body == one)[by_loop[loop_body == one].argmax()] for one in hollow.tolist()]
+    mouths = np.array([soup.vertices[rims.loops[loop]].mean(axis=0) for loop in widest]).reshape(-1, 3)
+    result = capped()[0] if chosen.any() else soup
+    return Closed(
+        result, np.flatnonzero(chosen[joined]), by_room & chosen, distance[wide], points[wide], hollow, mouths
+    )
 
 
 def _caps(soup: Soup, rims: Rims) -> tuple[IntArray, IntArray]:
@@ -182,41 +215,40 @@ def _caps(soup: Soup, rims: Rims) -> tuple[IntArray, IntArray]:
     return faces[real], owner[real]
 
 
-def _wounds(
-    soup: Soup, rims: Rims, caps: IntArray, owner: IntArray, body_area: FloatArray, depth: FloatArray
-) -> BoolArray:
-    """Return ``[L]`` whether each loop runs around missing faces; see the module.
-
-    `body_area` is of each loop's body, `depth` how far its cap leads away from the surface.
-    """
-    loops = rims.loops
-    number = np.array([len(loop) for loop in loops])
-    area = np.bincount(owner, face_areas(soup.vertices, caps), len(loops))
-    # The normal of a cap at an edge of its rim, looked up by the edge.
+def _smooth_share(soup: Soup, rims: Rims, caps: IntArray, owner: IntArray) -> FloatArray:
+    """Return ``[L]`` along which share of each loop its cap goes on where the faces beside it end."""
     a, b, c = (soup.vertices[caps[:, i]] for i in range(3))
-    cross = np.cross(b - a, c - a)
-    cross /= np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), np.finfo(float).tiny)
+    normal = np.cross(b - a, c - a)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+    # The cap's face at each edge of the rim, found by loop and edge.
     count = len(soup.vertices)
     key = ((caps * count + np.roll(caps, -1, axis=1)) + owner[:, None] * count**2).ravel()
-    tail = np.concatenate(loops)
-    head = np.concatenate([np.roll(loop, -1) for loop in loops])
-    loop_of = np.repeat(np.arange(len(loops)), number)
+    tail = np.concatenate(rims.loops)
+    head = np.concatenate([np.roll(loop, -1) for loop in rims.loops])
+    loop_of = np.repeat(np.arange(len(rims.loops)), [len(loop) for loop in rims.loops])
     order = np.argsort(key, kind="stable")
     wanted = head * count + tail + loop_of * count**2
     at = np.minimum(np.searchsorted(key[order], wanted), len(key) - 1)
-    found = key[order][at] == wanted
-    smooth = np.einsum("ij,ij->i", rims.normals[np.concatenate(rims.beside)], cross[order[at] // 3]) > _SMOOTH
+    cosine = np.einsum("ij,ij->i", rims.normals[np.concatenate(rims.beside)], normal[order[at] // 3])
+    smooth = (cosine > _SMOOTH) & (key[order][at] == wanted)
     length = np.linalg.norm(soup.vertices[head] - soup.vertices[tail], axis=1)
-    share = np.bincount(loop_of, length * (smooth & found), len(loops)) / np.bincount(loop_of, length, len(loops))
-    smooth_enough, part = share >= _SMOOTH_SHARE, area / body_area
+    share: FloatArray = np.bincount(loop_of, length * smooth) / np.bincount(loop_of, length)
+    return share
+
+
+def _wounds(rims: Rims, smooth: BoolArray, ring: BoolArray, part: FloatArray, depth: FloatArray) -> BoolArray:
+    """Return ``[L]`` whether each loop runs around missing faces; see the module.
+
+    `part` is the area of its cap as a share of its body's, `depth` how far the cap leads away from the surface.
+    """
+    number = np.array([len(loop) for loop in rims.loops])
     wound: BoolArray = ((number == 3) & (part <= _MISSING_FACE)) | (
-        (number <= _WOUND_EDGES) & smooth_enough & (part <= _WOUND)
+        (number <= _WOUND_EDGES) & smooth & (part <= _WOUND)
     )
     if wound.sum() >= max(_DAMAGED, _DAMAGED_SHARE * len(wound)):
-        small = (part <= HOLE_SHARE) | (depth <= HOLE) | (smooth_enough & (part <= _DAMAGED_WOUND))
+        small = (part <= HOLE_SHARE) | (depth <= HOLE) | (smooth & (part <= _DAMAGED_WOUND))
         return wound | ((number <= _DAMAGED_EDGES) & small)
-    mouth: BoolArray = np.array([len(loop) > _RING and _is_round(soup.vertices[loop]) for loop in loops])
-    return wound & ~mouth
+    return wound & ~ring if wound.sum() == 1 else wound
 
 
 def _is_round(points: FloatArray) -> bool:
