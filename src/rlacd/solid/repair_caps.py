@@ -160,7 +160,8 @@ def close_holes(
         owners = np.concatenate([np.where(whole, body, soup.body), loop_body[owner][some]])
         no_cap = np.zeros(int(some.sum()), dtype=bool)
         kept = first_of_doubled(faces, len(soup.vertices))
-        trusted = np.concatenate([whole & ~rims.flap, ~no_cap])
+        # Where more than two faces met before, which continue each other is a guess: no caps made them meet.
+        trusted = np.concatenate([whole & ~rims.flap & ~soup.at_valence(soup.edges.valence > 2), ~no_cap])
         return Soup(soup.vertices, faces, owners, trusted).only(kept), np.concatenate([rims.flap, no_cap])[kept]
 
     # A cap is worth having only where it gives the body an inside: a strip whose cap lies on itself stays a sheet.
