@@ -6,7 +6,7 @@ RLACD_INSTALL := $(BIN)/pip install --quiet --constraint constraints-dev.txt --n
                  --config-settings=cmake.define.RLACD_WERROR=ON
 # A file's tests stay in one process, one process a processor.
 PYTEST := $(BIN)/pytest --numprocesses auto --dist loadfile
-NATIVE_SOURCES := $(wildcard native/*.cpp native/*.hpp) CMakeLists.txt pyproject.toml constraints-dev.txt
+NATIVE_SOURCES := $(wildcard native/*/*.cpp native/*/*.hpp) CMakeLists.txt pyproject.toml constraints-dev.txt
 
 # The sanitized builds live in environments of their own.
 SANITIZE_address := address,undefined,float-divide-by-zero,float-cast-overflow
@@ -44,7 +44,7 @@ demo: install
 lint: $(VENV)/test-extras
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/clang-format --dry-run --Werror native/*.cpp native/*.hpp
+	$(BIN)/clang-format --dry-run --Werror native/*/*.cpp native/*/*.hpp
 	$(BIN)/mypy
 
 # In tiers: two minutes while you work, ten on every push, all of it at night.
@@ -93,7 +93,7 @@ fuzz-files: $(VENV)/test-extras
 format: $(VENV)/test-extras
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
-	$(BIN)/clang-format -i native/*.cpp native/*.hpp
+	$(BIN)/clang-format -i native/*/*.cpp native/*/*.hpp
 
 clean:
 	rm -rf $(VENV) build demo

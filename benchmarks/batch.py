@@ -23,7 +23,7 @@ import numpy as np
 import psutil
 import typer
 
-from rlacd.fleet import find_assets
+from rlacd.batch import find_assets
 
 MB = 2**20
 
@@ -68,7 +68,15 @@ def main(
         print("|---|---|---|---|---|---|---|---|")
         for number in jobs or [1, 2]:
             out = Path(keep or folder, f"jobs{number}")
-            command = [sys.executable, "-c", "from rlacd.cli import main; main()", "batch", str(links), "-o", str(out)]
+            command = [
+                sys.executable,
+                "-c",
+                "from rlacd.cli.main import main; main()",
+                "batch",
+                str(links),
+                "-o",
+                str(out),
+            ]
             command += ["--jobs", str(number), *(option or [])]
             wall, cpu, own, together = measured(command)
             _, idle, _, _ = measured(command)  # nothing is left to do: starting, reading and hashing

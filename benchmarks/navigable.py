@@ -66,10 +66,10 @@ def run_ours(path: Path, method: str, setting: str, threads: int) -> dict[str, A
 def run_coacd(path: Path, threads: int) -> dict[str, Any]:
     import coacd
 
+    from rlacd.io.read.load import load_mesh
+    from rlacd.repair.repair import repair
     from rlacd.solid.distance import hull_union
     from rlacd.solid.hull import Hull
-    from rlacd.solid.load import load_mesh
-    from rlacd.solid.repair import repair
 
     coacd.set_log_level("error")
     source = load_mesh(path)

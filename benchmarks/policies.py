@@ -22,7 +22,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import rlacd
-from rlacd.solid.load import load_mesh
+from rlacd.io.read.load import load_mesh
 
 POLICIES = ("greedy-excess-norm", "greedy", "greedy-hull-sum", "navacd")
 

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from rlacd.errors import MeshError
-from rlacd.solid.load import load_mesh
-from rlacd.solid.repair import repair
+from rlacd.io.read.load import load_mesh
+from rlacd.repair.repair import repair
 
 FORMATS = {".ply", ".stl", ".obj", ".off", ".glb", ".gltf", ".dae", ".3mf"}
 

@@ -24,7 +24,7 @@ import psutil
 import trimesh
 import typer
 
-from rlacd.fleet import Batch, Order, find_assets
+from rlacd.batch import Batch, JobSpec, find_assets
 from rlacd.pool import Pool, Request, Shared, answers, open_pool
 
 app = typer.Typer(add_completion=False)
@@ -163,7 +163,7 @@ def boxes(count: int = 300, jobs: int = 2, ray: Ray = None) -> None:
                 trimesh.creation.box((1, 2, 3 + number / count)).export(path)
         for part in ("warm", "boxes"):
             used, out = Used(), Path(folder, f"out-{part}")
-            Batch(Path(folder, part), str(out), Order.of({"quality": "fast"})).run(pool, _Nothing())
+            Batch(Path(folder, part), str(out), JobSpec.of({"quality": "fast"})).run(pool, _Nothing())
             told = used.told()
         rows = [json.loads(line) for line in (out / "timings.jsonl").read_text().splitlines()]
         mesh = sum(row["cpu"] for row in rows)

@@ -20,7 +20,7 @@ import numpy as np
 from tests.models import fall_in_bullet, fall_in_drake, fall_in_mujoco
 
 import rlacd
-from rlacd.solid.load import load_mesh
+from rlacd.io.read.load import load_mesh
 
 SECONDS = 0.3
 

@@ -101,7 +101,7 @@ def interrupt(shape: str, seconds: float) -> str:
 
             path = Path(folder) / "mesh.ply"
             trimesh.Trimesh(*mesh_of(shape), process=False).export(path)
-        command = [sys.executable, "-c", "from rlacd.cli import main; main()", "decompose", str(path)]
+        command = [sys.executable, "-c", "from rlacd.cli.main import main; main()", "decompose", str(path)]
         command += ["-o", str(Path(folder) / "hulls.glb"), "--report", "-"]
         told = Path(folder) / "report.json"
         with told.open("w") as out:

@@ -7,8 +7,8 @@ from pathlib import Path
 from sample import sample
 
 import rlacd
+from rlacd.cli.terminal import summary
 from rlacd.plain_json import to_json
-from rlacd.terminal import summary
 
 
 def main() -> None:

@@ -7,7 +7,7 @@ r"""Damage real files of every format and see that each gives hulls or one typed
 
 MESHES is the folder of real meshes: what lies in its ``raw/`` and small meshes of its index, written in every format,
 are the seeds. Every input is made from the seed and its own number alone, and decomposed within a small budget by the
-watched processes of a batch (`rlacd.fleet`). What happened to those that did not end well is written to the output.
+watched processes of a batch (`rlacd.batch`). What happened to those that did not end well is written to the output.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ from fuzz.files import read_hulls
 from fuzz.geometry import why_not_convex
 from fuzz.mutations import Seed, mutated, repacked
 from fuzz.worker import Watched
-from rlacd.fleet import Order
-from rlacd.pool import Limits, WorkerDiedError
+from rlacd.batch import JobSpec
+from rlacd.pool import ProcessLimits, WorkerDiedError
 from rlacd.weights import __name__ as weights_package
 
 CPU_SECONDS, SECONDS, MEMORY = 60.0, 1800.0, 2 * 2**30
@@ -74,7 +74,7 @@ def seeds_of(meshes: Path) -> dict[str, list[Seed]]:
     for name in small[:: max(1, len(small) // SMALL_MESHES)][:SMALL_MESHES]:
         for kind, seed in written(trimesh.load_mesh(meshes / name, process=False)):
             found.setdefault(kind, []).append(seed)
-    weights = Path(sys.modules[weights_package].__file__ or "").with_name("guide.onnx")
+    weights = Path(sys.modules[weights_package].__file__ or "").with_name("ranker.onnx")
     found["onnx"] = [Seed(weights.read_bytes())]
     return found
 
@@ -116,7 +116,7 @@ class Fuzzer:
     seeds: dict[str, list[Seed]]
     seed: int
     folder: Path
-    worker: Watched = field(default_factory=lambda: Watched(Limits(SECONDS, MEMORY), CPU_SECONDS))
+    worker: Watched = field(default_factory=lambda: Watched(ProcessLimits(SECONDS, MEMORY), CPU_SECONDS))
 
     def input(self, number: int) -> tuple[str, Path]:
         """Write the input of a number; its format, and its file."""
@@ -138,7 +138,7 @@ class Fuzzer:
             BOX.export(mesh)
             options["policy"] = str(path)
         try:
-            said, files = self.worker.run(Order(options, ending=".obj"), mesh, "mesh", "mesh")
+            said, files = self.worker.run(JobSpec(options, ending=".obj"), mesh, "mesh", "mesh")
         except WorkerDiedError as error:
             end = {"it needed": "memory", "it took m": "hang"}.get(error.reason[:9], "crash")
             return {"end": end, "said": f"{error.reason} {error.last_words[-300:]}", "cpu": CPU_SECONDS}

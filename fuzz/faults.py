@@ -31,23 +31,23 @@ PATIENCE = 1800.0
 NO_THREAD = 127
 """What the C library ends a process with when there is no memory for the data of a thread."""
 
-MAIN = "from rlacd.cli import main; main()"
+MAIN = "from rlacd.cli.main import main; main()"
 
 SMALL = """
 import resource, sys
 with open("/dev/null", "w") as sys.stdout:
     sys.argv, argv = ["rlacd", "decompose", "--help"], sys.argv
     try:
-        import numpy, rlacd.cli, rlacd.formats
+        import numpy, rlacd.cli.main, rlacd.io.write
         rlacd.decompose(([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), threads=1)
         numpy.ones((64, 64)) @ numpy.ones((64, 64))
-        rlacd.cli.main()
+        rlacd.cli.main.main()
     except SystemExit:
         sys.argv, sys.stdout = argv, sys.__stdout__
 held = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
 limit = held + int(sys.argv.pop(1))
 resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-rlacd.cli.main()
+rlacd.cli.main.main()
 """
 """Python code that runs the command with so much more memory than it has when all libraries are loaded and warm."""
 

@@ -30,8 +30,8 @@ from fuzz.files import read_hulls, write_mesh
 from fuzz.judges import Case, finite_faces, judge
 from fuzz.recipes import Shape, make_shape
 from fuzz.worker import Here, Watched
-from rlacd.fleet import Order
-from rlacd.pool import Limits, WorkerDiedError
+from rlacd.batch import JobSpec
+from rlacd.pool import ProcessLimits, WorkerDiedError
 
 AGAIN = 4
 """One of so many seeds is decomposed twice."""
@@ -89,7 +89,7 @@ def judged(
     folder: Path,
 ) -> Row:
     """Decompose a shape, if need be twice, on another number of threads, and fill in its row."""
-    order = Order.of(options, file_format=ending)
+    order = JobSpec.of(options, file_format=ending)
     row = replace(row, steps=list(shape.steps), options=order.as_plain()["options"], faces=len(shape.faces))
     mesh = write_mesh(folder / f"{row.seed}.ply", shape.vertices, shape.faces)
     start = time.perf_counter()
@@ -101,7 +101,7 @@ def judged(
             return row
         row.parts = said["report"]["parts"]
         if twice and said["report"]["complete"]:
-            other = Order.of({**options, "threads": options["threads"] % 3 + 1}, file_format=ending)
+            other = JobSpec.of({**options, "threads": options["threads"] % 3 + 1}, file_format=ending)
             again, same = worker.run(other, mesh, mesh.name, "out")
             row.cpu += again["cpu"]
             row.twice = files == same
@@ -188,7 +188,7 @@ def main() -> None:
         print(totals([json.loads(line) for line in args.totals.read_text().splitlines()]))
         return
     rows: list[dict[str, Any]] = []
-    worker = Here() if args.here else Watched(Limits(seconds=args.limit, memory=int(args.memory * 2**30)))
+    worker = Here() if args.here else Watched(ProcessLimits(seconds=args.limit, memory=int(args.memory * 2**30)))
     until = time.monotonic() + args.seconds
     with tempfile.TemporaryDirectory() as folder, args.log.open("a") as log:
         for seed in range(args.first, args.first + args.count):

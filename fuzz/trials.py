@@ -29,8 +29,8 @@ from fuzz.recipes import FAULTS, Shape, make_shape, pick, placed
 from fuzz.shapes import FORMATS, Row, judged
 from fuzz.worker import Watched
 from rlacd import NavigableSpace
-from rlacd.fleet import Order
-from rlacd.pool import Limits
+from rlacd.batch import JobSpec
+from rlacd.pool import ProcessLimits
 
 KINDS = {"file": 0.86, "shape": 0.115, "mesh": 0.012, "fault": 0.011, "batch": 0.002}
 """How many of the trials are of each kind."""
@@ -104,8 +104,8 @@ class Laboratory:
         self._meshes = meshes
         self._small = [] if meshes is None else _small_meshes(meshes)
         seeds = _simple_seeds() if meshes is None else seeds_of(meshes)
-        self._files = Fuzzer(seeds, seed, self.folder, Watched(Limits(SECONDS, MEMORY), CPU_SECONDS))
-        self._shapes = Watched(Limits(4 * SECONDS, 3 * 2**30), SHAPE_SECONDS)
+        self._files = Fuzzer(seeds, seed, self.folder, Watched(ProcessLimits(SECONDS, MEMORY), CPU_SECONDS))
+        self._shapes = Watched(ProcessLimits(4 * SECONDS, 3 * 2**30), SHAPE_SECONDS)
 
     def close(self) -> None:
         """End all processes."""
@@ -180,7 +180,7 @@ class Laboratory:
         space = options.get("criterion")
         if isinstance(space, NavigableSpace) and space.radius is not None and space.radius < 0.05:
             del options["criterion"]  # tens of thousands of parts
-        order = Order.of(options, file_format=None if ending == "folder" else ending, folders=ending == "folder")
+        order = JobSpec.of(options, file_format=None if ending == "folder" else ending, folders=ending == "folder")
         trial = replace(trial, story=[*shape.steps, ending], options=options)
         with TemporaryDirectory(dir=self.folder) as place:
             mesh = write_mesh(Path(place) / "mesh.ply", shape.vertices, shape.faces)

@@ -11,13 +11,13 @@ from typing import Any
 
 import psutil
 
-from rlacd.fleet import Order
-from rlacd.fleet.server import SERVER, MeshServer
-from rlacd.pool import Limits, Request, WorkerDiedError
+from rlacd.batch import JobSpec
+from rlacd.batch.server import SERVER, MeshServer
+from rlacd.pool import ProcessLimits, Request, WorkerDiedError
 from rlacd.pool.worker import Worker
 
 Said = tuple[dict[str, Any], dict[str, bytes]]
-"""What `rlacd.fleet.server.MeshServer` answers."""
+"""What `rlacd.batch.server.MeshServer` answers."""
 
 
 class Watched:
@@ -30,7 +30,7 @@ class Watched:
         Time of a processor that a mesh may take, however busy the machine is.
     """
 
-    def __init__(self, limits: Limits, cpu_seconds: float = math.inf) -> None:
+    def __init__(self, limits: ProcessLimits, cpu_seconds: float = math.inf) -> None:
         self.limits = limits
         self.cpu_seconds = cpu_seconds
         self._worker = Worker()
@@ -40,7 +40,7 @@ class Watched:
         """Of the process; 0 where there is none."""
         return int(self._worker.name.partition("@")[0].replace("-", "0"))
 
-    def run(self, order: Order, mesh: Path, name: str, stem: str) -> Said:
+    def run(self, order: JobSpec, mesh: Path, name: str, stem: str) -> Said:
         """Have a mesh decomposed.
 
         Raises
@@ -98,7 +98,7 @@ class _Watch:
 class Here:
     """Does the same in this process, so that a sanitizer's words can be read; a crash ends everything."""
 
-    def run(self, order: Order, mesh: Path, name: str, stem: str) -> Said:
+    def run(self, order: JobSpec, mesh: Path, name: str, stem: str) -> Said:
         """Decompose a mesh."""
         print(f"seed {mesh.stem}", file=sys.stderr, flush=True)
         with TemporaryDirectory() as staging:
@@ -108,6 +108,6 @@ class Here:
         """Nothing is open."""
 
 
-def _values(order: Order, mesh: Path, name: str, stem: str) -> dict[str, Any]:
+def _values(order: JobSpec, mesh: Path, name: str, stem: str) -> dict[str, Any]:
     values = {"order": order.as_plain(), "path": str(mesh), "name": name, "stem": stem}
     return {**values, "hull_only": False, "out": None, "parent": ""}

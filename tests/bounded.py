@@ -17,7 +17,13 @@ import pytest
 
 resource = pytest.importorskip("resource")
 
-PRELOADED = ["tests.bounded", "rlacd.solid.load", "rlacd.robots", "rlacd.policies.learned", "trimesh.exchange.load"]
+PRELOADED = [
+    "tests.bounded",
+    "rlacd.io.read.load",
+    "rlacd.io.robots",
+    "rlacd.policies.learned",
+    "trimesh.exchange.load",
+]
 
 _server = multiprocessing.get_context("forkserver")
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rlacd.command_parameters import usual_value
+from rlacd.cli.parameters import usual_value
 from rlacd.fields import About
 from rlacd.options import Options
 from rlacd.output_options import OutputOptions

@@ -16,7 +16,7 @@ from trimesh import creation
 from typer.testing import CliRunner, Result
 
 import rlacd
-from rlacd.cli import app
+from rlacd.cli.main import app
 from rlacd.errors import EmptyMeshError, MeshDataError, OptionError, OutputError, RlacdError
 from tests.hulls import assert_convex_hull
 from tests.shapes_bad import arrays, ell, folded_sphere, klein_bottle, moebius_strip
@@ -497,7 +497,15 @@ def test_a_disk_that_is_full_leaves_the_old_file(tmp_path: Path) -> None:
     path, output = tmp_path / "box.stl", tmp_path / "out.glb"
     creation.box().export(path)
     output.write_bytes(b"old")
-    command = [sys.executable, "-c", "from rlacd.cli import main; main()", "decompose", str(path), "-o", str(output)]
+    command = [
+        sys.executable,
+        "-c",
+        "from rlacd.cli.main import main; main()",
+        "decompose",
+        str(path),
+        "-o",
+        str(output),
+    ]
     done = subprocess.run(
         command,
         capture_output=True,
@@ -524,7 +532,7 @@ def test_a_disk_that_is_full_leaves_the_old_file(tmp_path: Path) -> None:
 )
 def test_a_bad_option_of_the_command_line_has_code_2(words: list[str], tmp_path: Path) -> None:
     creation.box().export(tmp_path / "box.stl")
-    command = [sys.executable, "-c", "from rlacd.cli import main; main()", "decompose", str(tmp_path / "box.stl")]
+    command = [sys.executable, "-c", "from rlacd.cli.main import main; main()", "decompose", str(tmp_path / "box.stl")]
     done = subprocess.run([*command, *words], capture_output=True, text=True, timeout=120)
     assert done.returncode == 2
     assert done.stderr.startswith("rlacd: ")

@@ -16,7 +16,7 @@ import pytest
 import trimesh
 from typer.testing import CliRunner, Result
 
-from rlacd.cli import app
+from rlacd.cli.main import app
 from tests.trouble import make_trouble, tree, write_ell
 
 TIMES = "timings.jsonl"
@@ -119,7 +119,7 @@ def test_large_meshes_are_named_before_anything_is_done(
 ) -> None:
     small = batch(assets, "-o", tmp_path / "out", "--dry-run")
     assert "large" not in small.stderr
-    monkeypatch.setattr("rlacd.fleet.batch.LARGE", (assets / "a.stl").stat().st_size - 1)
+    monkeypatch.setattr("rlacd.batch.batch.LARGE", (assets / "a.stl").stat().st_size - 1)
     run = batch(assets, "-o", tmp_path / "out", "--dry-run")
     (line,) = [line for line in run.stderr.splitlines() if "large" in line]
     assert "a.stl" in line
@@ -204,7 +204,7 @@ def test_no_mesh_stops_the_others(trouble: dict[str, str], tmp_path: Path) -> No
 
 
 def start(assets: Path, out: Path, environment: dict[str, str], *words: object) -> subprocess.Popen[str]:
-    command = [sys.executable, "-c", "from rlacd.cli import main; main()", "batch", str(assets), "-o", str(out)]
+    command = [sys.executable, "-c", "from rlacd.cli.main import main; main()", "batch", str(assets), "-o", str(out)]
     return subprocess.Popen(
         [*command, "--jobs", "2", *(str(word) for word in words)],
         env={**os.environ, **environment},

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
+from rlacd.batch import Asset, Batch, JobSpec
 from rlacd.errors import OptionError
-from rlacd.fleet import Asset, Batch, Order
-from rlacd.pool import Limits, LocalPool
+from rlacd.pool import LocalPool, ProcessLimits
 from tests.test_batch import TIMES, rows
 from tests.trouble import make_trouble, tree, write_ell
 
@@ -81,7 +81,7 @@ def test_a_node_dies_half_way_and_the_results_are_those_of_one_machine(cluster: 
     (assets / "bad.obj").write_text("no mesh")
     doomed = cluster.add_node(num_cpus=1)
     cluster.wait_for_nodes()
-    order, limits = Order.of({}, file_format="urdf"), Limits(seconds=120)
+    order, limits = JobSpec.of({}, file_format="urdf"), ProcessLimits(seconds=120)
 
     killing = threading.Thread(target=lambda: cluster.remove_node(doomed, allow_graceful=False))
     counter = Counter(at=3, then=killing.start)
@@ -107,13 +107,13 @@ def test_a_network_of_ones_own_and_a_shared_address_reach_the_nodes(cluster: Clu
 
     write_ell(tmp_path / "assets" / "a.obj")
     policy = tmp_path / "own.onnx"
-    policy.write_bytes(files("rlacd.weights").joinpath("guide.onnx").read_bytes())
-    order = Order.of({"policy": str(policy), "threshold": 0.1})
+    policy.write_bytes(files("rlacd.weights").joinpath("ranker.onnx").read_bytes())
+    order = JobSpec.of({"policy": str(policy), "threshold": 0.1})
     # "local:" is fsspec's own word for files; unlike a plain folder it is taken for an address that all nodes reach.
     out = f"local://{tmp_path}/shared"
     summary = Batch(tmp_path / "assets", out, order).run(RayPool("auto"), Counter())
     assert summary.status == {"done": 1}
-    here = Batch(tmp_path / "assets", str(tmp_path / "here"), Order.of({"policy": "learned", "threshold": 0.1}))
+    here = Batch(tmp_path / "assets", str(tmp_path / "here"), JobSpec.of({"policy": "learned", "threshold": 0.1}))
     with LocalPool(1) as pool:
         assert here.run(pool, Counter()).status == {"done": 1}
     assert (tmp_path / "shared" / "a.glb").read_bytes() == (tmp_path / "here" / "a.glb").read_bytes()

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from rlacd.bench import Bench, Limits, Store, Task, find_meshes, make_method, tables, tuning
+from rlacd.bench import Bench, BenchLimits, BenchStore, BenchTask, find_meshes, make_method, tables, tuning
 from rlacd.bench.deployed import Deployment, decompose_as_deployed
 from rlacd.bench.store import load_hulls, save_hulls
 from rlacd.bench.tables import (
@@ -47,8 +47,8 @@ def meshes(tmp_path: Path) -> Path:
     return folder
 
 
-def bench_of(meshes: Path, folder: Path, limits: Limits | None = None) -> Bench:
-    return Bench(meshes, find_meshes(meshes), Store(folder), limits, say=lambda _: None)
+def bench_of(meshes: Path, folder: Path, limits: BenchLimits | None = None) -> Bench:
+    return Bench(meshes, find_meshes(meshes), BenchStore(folder), limits, say=lambda _: None)
 
 
 def wait_for_child(parent: int) -> int:
@@ -126,7 +126,7 @@ class TestMethods:
 def test_coacd_on_its_own_example(corpus: Path, tmp_path: Path) -> None:
     """Version 1.0.14 has been seen to make 47 and 48 parts of SnowFlake at 0.05."""
     pytest.importorskip("coacd")
-    bench = Bench(corpus, ["test/coacd_examples/SnowFlake.ply"], Store(tmp_path), say=lambda _: None)
+    bench = Bench(corpus, ["test/coacd_examples/SnowFlake.ply"], BenchStore(tmp_path), say=lambda _: None)
     (row,) = bench.run("coacd", 0.05)
     assert 45 <= row["parts"] <= 50
     assert row["hausdorff"] < 0.06
@@ -166,30 +166,30 @@ class TestStore:
     ROW: ClassVar = {"mesh": "a.ply", "method": "greedy", "setting": 0.05, "parts": 3}
 
     def test_rows_come_back(self, tmp_path: Path) -> None:
-        store = Store(tmp_path / "deep" / "run")
+        store = BenchStore(tmp_path / "deep" / "run")
         store.add(self.ROW)
         store.close()
-        again = Store(tmp_path / "deep" / "run")
-        assert again.get(Task("a.ply", "greedy", 0.05)) == self.ROW
-        assert again.get(Task("a.ply", "greedy", 0.1)) is None
+        again = BenchStore(tmp_path / "deep" / "run")
+        assert again.get(BenchTask("a.ply", "greedy", 0.05)) == self.ROW
+        assert again.get(BenchTask("a.ply", "greedy", 0.1)) is None
 
     def test_a_line_cut_short_by_a_kill_is_done_again(self, tmp_path: Path) -> None:
         (tmp_path / "results.jsonl").write_text(json.dumps(self.ROW) + '\n{"mesh": "b.pl')
-        store = Store(tmp_path)
+        store = BenchStore(tmp_path)
         assert len(store) == 1
         store.add({**self.ROW, "mesh": "b.ply"})
         store.close()
-        assert [row["mesh"] for row in Store(tmp_path).rows()] == ["a.ply", "b.ply"]
+        assert [row["mesh"] for row in BenchStore(tmp_path).rows()] == ["a.ply", "b.ply"]
 
     def test_a_damaged_line_is_named(self, tmp_path: Path) -> None:
         (tmp_path / "results.jsonl").write_text(json.dumps(self.ROW) + '\n{"mesh": 3}\n')
         with pytest.raises(OutputError, match=r"line 2 .* delete"):
-            Store(tmp_path)
+            BenchStore(tmp_path)
 
     def test_two_runs_do_not_write_to_one_folder(self, tmp_path: Path) -> None:
-        store = Store(tmp_path)
+        store = BenchStore(tmp_path)
         with pytest.raises(OutputError, match="another run"):
-            Store(tmp_path)
+            BenchStore(tmp_path)
         store.close()
 
     def test_hulls_come_back(self, tmp_path: Path) -> None:
@@ -230,12 +230,12 @@ class TestRunner:
         assert bench_of(meshes, tmp_path / "run").run("greedy", 0.05) == first  # the seconds too
 
     def test_a_hang_is_recorded_and_the_run_goes_on(self, meshes: Path, tmp_path: Path) -> None:
-        rows = bench_of(meshes, tmp_path / "run", Limits(seconds=0.05)).run("greedy", 0.05)
+        rows = bench_of(meshes, tmp_path / "run", BenchLimits(seconds=0.05)).run("greedy", 0.05)
         assert [row["error"] for row in rows] == ["more than 0.05 s"] * 2
 
     @pytest.mark.skipif(sys.platform != "linux", reason="address space is limited on Linux only")
     def test_too_much_memory_is_recorded(self, meshes: Path, tmp_path: Path) -> None:
-        rows = bench_of(meshes, tmp_path / "run", Limits(memory=2**28)).run("greedy", 0.05)
+        rows = bench_of(meshes, tmp_path / "run", BenchLimits(memory=2**28)).run("greedy", 0.05)
         assert all("error" in row for row in rows)
 
     def test_a_crash_is_recorded(self, meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -291,11 +291,11 @@ def test_what_another_version_made_is_made_again(meshes: Path, tmp_path: Path) -
     (first, _) = rows = bench.run("greedy", 0.05)
     bench.store.add({**first, "version": "0.0.0", "parts": 99})
     assert tuning.known_curve(bench, "greedy") == []
-    written = bench.store.hulls_of(Task(first["mesh"], "greedy", 0.05)).stat().st_mtime_ns
+    written = bench.store.hulls_of(BenchTask(first["mesh"], "greedy", 0.05)).stat().st_mtime_ns
     again = bench.run("greedy", 0.05)
     assert [row["parts"] for row in again] == [row["parts"] for row in rows]
     assert again[1] == rows[1], "only that one"
-    assert bench.store.hulls_of(Task(first["mesh"], "greedy", 0.05)).stat().st_mtime_ns > written
+    assert bench.store.hulls_of(BenchTask(first["mesh"], "greedy", 0.05)).stat().st_mtime_ns > written
 
 
 class TestLayouts:
@@ -351,14 +351,14 @@ class TestTuning:
     def tuned(
         self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, law: Any, target: float, method: str = "greedy"
     ) -> tuple[tuning.Point, int]:
-        bench = Bench(tmp_path, ["one", "two"], Store(tmp_path / "run"), say=lambda _: None)
+        bench = Bench(tmp_path, ["one", "two"], BenchStore(tmp_path / "run"), say=lambda _: None)
         calls = []
 
         def run(self: Bench, name: str, setting: float) -> list[dict[str, Any]]:
             calls.append(setting)
             for mesh, factor in (("one", 0.5), ("two", 1.5)):
                 self.store.add({"mesh": mesh, "method": name, "setting": setting, "hausdorff": factor * law(setting)})
-            return [self.store.get(Task(mesh, name, setting)) for mesh in self.names]  # type: ignore[misc]
+            return [self.store.get(BenchTask(mesh, name, setting)) for mesh in self.names]  # type: ignore[misc]
 
         monkeypatch.setattr(Bench, "run", run)
         point = tune(bench, method, target)

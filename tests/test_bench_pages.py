@@ -20,7 +20,7 @@ from rlacd.bench.charts import Curve, curves_chart, pareto_chart, pareto_front
 from rlacd.bench.page import Code, Figure, Heading, Page, Text
 from rlacd.bench.sheets import draw_sheet
 from rlacd.bench.tables import Table
-from rlacd.cli import app
+from rlacd.cli.main import app
 from rlacd.errors import OptionError
 from tests.shapes import box, from_manifold
 

@@ -14,11 +14,11 @@ import rlacd
 from rlacd import _native
 from rlacd.clock import Clock
 from rlacd.criteria import Concavity
-from rlacd.criteria.criterion import Chance
+from rlacd.criteria.criterion import Feasibility
 from rlacd.criteria.navigable import Navigable, NavigableSpace
-from rlacd.finish import merge_parts, merge_to_count
+from rlacd.merge import merge_parts, merge_to_count
 from rlacd.solid.balls import Balls
-from rlacd.solid.component import Component, Part, Plane, Share
+from rlacd.solid.component import ClippedPart, Component, Part, Plane
 from rlacd.solid.hull import Hull
 from rlacd.solid.reunite import reunite
 from rlacd.workers import Workers
@@ -58,7 +58,7 @@ def test_a_beam_is_one_part_although_another_crosses_it(workers: Workers) -> Non
     merged = merge_parts(parts, TIGHT, workers, Clock(), solid=root)
     assert sorted(part.hull.volume for part in merged) == pytest.approx([2 * 0.09, 2 * 0.09])
     assert all(part.volume == pytest.approx(2 * 0.09) for part in merged)  # the crossing belongs to both
-    (beam,) = (part for part in merged if isinstance(part, Share))
+    (beam,) = (part for part in merged if isinstance(part, ClippedPart))
     assert set(beam.members) == {parts[0], parts[2]}
     assert TIGHT.error(beam) < 1e-3
 
@@ -106,7 +106,7 @@ def test_what_is_united_with_a_share_is_a_share(workers: Workers) -> None:
     root, parts = arms_and_beam(CROSS)
     merged = merge_parts(parts, TIGHT, workers, Clock(), solid=root)
     (whole,) = merge_to_count(merged, 1, TIGHT, workers, Clock()) or []
-    assert isinstance(whole, Share)
+    assert isinstance(whole, ClippedPart)
     assert whole.volume == pytest.approx(CROSS.volume())
     united = reunite(strangers(whole.members))
     assert united is not None
@@ -116,7 +116,7 @@ def test_what_is_united_with_a_share_is_a_share(workers: Workers) -> None:
 def test_balls_do_not_ask_what_is_inside_a_hull() -> None:
     component = Component(CROSS)
     space = Navigable(NavigableSpace(0.1, 0.05), 0.1, 0.05, Balls(np.zeros((0, 3)), np.zeros(0)))
-    assert space.chance(component.filling, component.hull) is Chance.NEVER
+    assert space.feasibility(component.filling, component.hull) is Feasibility.NEVER
     assert not space.forbids(component.filling, component.hull)
 
 
@@ -148,14 +148,14 @@ def test_a_quick_no_is_never_wrong(seed: int, threshold: float) -> None:
     hull = Hull.of(random.permutation(solid.vertices)[: int(random.integers(4, 12))])
     assume(hull is not None and hull.volume >= 1e-4)
     fits = share_fits(solid, hull, threshold)
-    chance = Concavity(threshold).chance(solid.filling, hull)
+    feasibility = Concavity(threshold).feasibility(solid.filling, hull)
     assume(fits is not None)
-    assert not (fits and chance is not Chance.SOME)
+    assert not (fits and feasibility is not Feasibility.MAYBE)
     larger = Hull.of(np.concatenate([hull.vertices, random.uniform(-1, 1, (3, 3))]))
     assert larger is not None
-    assert Concavity(threshold).forbids(solid.filling, hull) == (chance is Chance.NEVER)
-    if chance is Chance.NEVER:
-        assert Concavity(threshold * (1 - 1e-9)).chance(solid.filling, larger) is Chance.NEVER
+    assert Concavity(threshold).forbids(solid.filling, hull) == (feasibility is Feasibility.NEVER)
+    if feasibility is Feasibility.NEVER:
+        assert Concavity(threshold * (1 - 1e-9)).feasibility(solid.filling, larger) is Feasibility.NEVER
 
 
 @settings(deadline=None, max_examples=40)
@@ -165,13 +165,13 @@ def test_a_quick_no_about_a_pair_is_never_wrong(seed: int, threshold: float) -> 
     solid, blocks = heap_of_blocks(np.random.default_rng(seed))
     hulls = [hull for b in blocks if (hull := Hull.of(b.to_mesh64().vert_properties[:, :3].astype(float))) is not None]
     pairs = np.array([(i, j) for j in range(len(hulls)) for i in range(j)], dtype=np.int32)
-    _, chances = Concavity(threshold).chances(solid.filling, hulls, pairs, 1)
-    for (i, j), chance in zip(pairs, chances, strict=True):
+    _, feasibilities = Concavity(threshold).feasibilities(solid.filling, hulls, pairs, 1)
+    for (i, j), feasibility in zip(pairs, feasibilities, strict=True):
         joint = Hull.around(hulls[i], hulls[j])
-        alone = Concavity(threshold).chance(solid.filling, joint)
-        assert (chance == Chance.SOME) <= (alone is Chance.SOME)
-        assert (chance == Chance.NEVER) <= (alone is Chance.NEVER)
-        assert not (share_fits(solid, joint, threshold) and chance != Chance.SOME)
+        alone = Concavity(threshold).feasibility(solid.filling, joint)
+        assert (feasibility == Feasibility.MAYBE) <= (alone is Feasibility.MAYBE)
+        assert (feasibility == Feasibility.NEVER) <= (alone is Feasibility.NEVER)
+        assert not (share_fits(solid, joint, threshold) and feasibility != Feasibility.MAYBE)
 
 
 def test_all_pairs_in_one_go_are_the_pairs_one_by_one(workers: Workers) -> None:
@@ -181,15 +181,17 @@ def test_all_pairs_in_one_go_are_the_pairs_one_by_one(workers: Workers) -> None:
     seen = set()
     for criterion in (Concavity(0.02), Concavity(0.2), Concavity(0.6)):
         for threads in (1, 3):
-            volumes, chances = criterion.chances(root.filling, hulls, pairs, threads)
-            for (i, j), volume, chance in zip(pairs, volumes, chances, strict=True):
+            volumes, feasibilities = criterion.feasibilities(root.filling, hulls, pairs, threads)
+            for (i, j), volume, feasibility in zip(pairs, volumes, feasibilities, strict=True):
                 joint = Hull.around(hulls[i], hulls[j])
-                assert chance == Chance.NEVER or volume == joint.volume
-                assert (chance == Chance.SOME) == (criterion.chance(root.filling, joint) is Chance.SOME)
-                seen.add(int(chance))
+                assert feasibility == Feasibility.NEVER or volume == joint.volume
+                assert (feasibility == Feasibility.MAYBE) == (
+                    criterion.feasibility(root.filling, joint) is Feasibility.MAYBE
+                )
+                seen.add(int(feasibility))
     assert len(seen) > 1
     with pytest.raises(ValueError, match="out of range"):
-        TIGHT.chances(root.filling, hulls, np.array([(0, len(hulls))], dtype=np.int32), 1)
+        TIGHT.feasibilities(root.filling, hulls, np.array([(0, len(hulls))], dtype=np.int32), 1)
 
 
 def test_time_may_run_out_before_pairs_are_looked_at(workers: Workers) -> None:
@@ -206,15 +208,15 @@ def test_a_face_deep_in_a_hull_is_seen_without_its_corners() -> None:
     solid = Component(block(1, 1, 1, (0, -0.5, 0)) - groove)
     assert solid.volume == pytest.approx(1 - 0.5 * 0.08 * 0.3)
     for threshold in (0.05, 0.1, 0.29):
-        assert Concavity(threshold).chance(solid.filling, solid.hull) is Chance.NEVER
-    assert Concavity(0.31).chance(solid.filling, solid.hull) is Chance.SOME
+        assert Concavity(threshold).feasibility(solid.filling, solid.hull) is Feasibility.NEVER
+    assert Concavity(0.31).feasibility(solid.filling, solid.hull) is Feasibility.MAYBE
 
 
 def test_a_window_in_a_wall_is_seen_between_the_points_first_looked_at() -> None:
     wall = block(4, 4, 0.3) - block(0.3, 0.3, 1, (0.83, -1.41, 0))
     solid = Component(wall)
-    assert Concavity(0.1).chance(solid.filling, solid.hull) is not Chance.SOME
-    assert Concavity(0.2).chance(solid.filling, solid.hull) is Chance.SOME
+    assert Concavity(0.1).feasibility(solid.filling, solid.hull) is not Feasibility.MAYBE
+    assert Concavity(0.2).feasibility(solid.filling, solid.hull) is Feasibility.MAYBE
 
 
 def test_a_solid_that_overlaps_itself_can_be_reunited() -> None:

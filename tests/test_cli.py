@@ -15,7 +15,7 @@ import pytest
 import trimesh
 from typer.testing import CliRunner, Result
 
-from rlacd.cli import app
+from rlacd.cli.main import app
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError, OptionError, OutputError
 from rlacd.progress import Progress, ProgressCallback
@@ -276,7 +276,7 @@ def test_help_names_every_exit_code_and_version_is_told() -> None:
 
 
 def shell(*words: object, **options: Any) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-c", "from rlacd.cli import main; main()", *(str(word) for word in words)]
+    command = [sys.executable, "-c", "from rlacd.cli.main import main; main()", *(str(word) for word in words)]
     return subprocess.run(command, capture_output=True, text=True, timeout=120, **options)
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from rlacd.formats.palette import hull_colors
-from rlacd.show.coloring import HUES, color_hulls, neighbours
+from rlacd.io.write.palette import hull_colors
+from rlacd.view.coloring import HUES, color_hulls, neighbours
 
 
 def boxes(places: np.ndarray, size: float = 1.0) -> list[trimesh.Trimesh]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from manifold3d import Manifold
 
-from rlacd.finish.slivers import drop_slivers, inradius, is_film, is_sliver
+from rlacd.merge.slivers import drop_slivers, inradius, is_film, is_sliver
 from rlacd.planes.candidates import OFFSETS_PER_AXIS, axis_and_principal
 from rlacd.policies import SCORES, Greedy
 from rlacd.solid.component import Component, Plane

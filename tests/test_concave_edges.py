@@ -15,13 +15,13 @@ from scipy.spatial.transform import Rotation
 
 import rlacd
 from rlacd import _native
+from rlacd.io.read.load import load_mesh
 from rlacd.planes.candidates import Candidates
 from rlacd.planes.concave_edges import concave_edge_planes, concave_edges, reflex_edges
 from rlacd.policies import Greedy, NavACD, Policy
 from rlacd.policies.navacd import mid_planes
+from rlacd.repair.repair import repair
 from rlacd.solid.component import Component, Plane
-from rlacd.solid.load import load_mesh
-from rlacd.solid.repair import repair
 from tests import reference_concave_edges as reference
 from tests.reference_concave_edges import FLAT, HAIR, REFLEX
 from tests.shapes import Floats, box, to_manifold

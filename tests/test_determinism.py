@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from rlacd import decompose
-from rlacd.fleet import Batch, Order
-from rlacd.pool import HerePool
+from rlacd.batch import Batch, JobSpec
+from rlacd.pool import InProcessPool
 from tests.test_batch import TIMES
 from tests.trouble import tree
 
@@ -31,7 +31,7 @@ FORMATS = [("glb", "glb"), ("mjcf", "xml"), ("usd", "usd")]
 
 RUN = """
 import sys
-from rlacd.cli import main
+from rlacd.cli.main import main
 for words in " ".join(sys.argv[1:]).split(" ; "):
     sys.argv = ["rlacd", *words.split(" ")]
     try:
@@ -76,8 +76,8 @@ def test_a_batch_of_real_meshes_writes_what_decompose_writes(
     if file_format == "usd":
         pytest.importorskip("pxr", reason="the extra usd is not installed")
     assets, alone = copied(corpus, SMALL, tmp_path / "assets"), tmp_path / "alone"
-    order = Order.of({"quality": "fast", "threads": 1}, file_format=file_format)
-    with HerePool() as pool:
+    order = JobSpec.of({"quality": "fast", "threads": 1}, file_format=file_format)
+    with InProcessPool() as pool:
         Batch(assets, str(tmp_path / "out"), order).run(pool, watch_nothing())  # type: ignore[arg-type]
     alone.mkdir()
     for mesh in assets.iterdir():

@@ -15,14 +15,14 @@ from rlacd.clock import Clock
 from rlacd.criteria import Concavity, NavigableSpace
 from rlacd.criteria.criterion import Criterion
 from rlacd.cut import CutTree
-from rlacd.finish import merge_parts
-from rlacd.planes.views import Views
+from rlacd.io.read.load import load_mesh
+from rlacd.merge import merge_parts
+from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import make_policy
-from rlacd.search.dissolve import dissolve
+from rlacd.repair.repair import repair
 from rlacd.search.recut import Exchange
+from rlacd.search.redistribute import redistribute
 from rlacd.solid.component import Component, Part
-from rlacd.solid.load import load_mesh
-from rlacd.solid.repair import repair
 from rlacd.workers import Workers
 from tests.shapes import bent_bar, box, own_volume, together
 
@@ -52,7 +52,7 @@ def check(exchange: Exchange, part: Part, around: Sequence[Part], criterion: Cri
 def test_a_part_is_divided_between_its_neighbours() -> None:
     left, middle, right = bent_bar()
     solid = together([left, middle, right])
-    found = [dissolve(middle, [left, right], CRITERION, np.random.default_rng(seed), solid) for seed in range(5)]
+    found = [redistribute(middle, [left, right], CRITERION, np.random.default_rng(seed), solid) for seed in range(5)]
     assert any(found)
     for exchange in found:
         if exchange is not None:
@@ -63,8 +63,8 @@ def test_a_part_is_divided_between_its_neighbours() -> None:
 def test_a_part_that_sticks_out_stays() -> None:
     slab, pin = Component(box((0, 0, 0), (1, 1, 0.2))), Component(box((0.4, 0.4, 0.2), (0.6, 0.6, 0.9)))
     solid = together([slab, pin])
-    assert dissolve(pin, [slab], CRITERION, np.random.default_rng(0), solid) is None
-    assert dissolve(pin, [], CRITERION, np.random.default_rng(0), solid) is None
+    assert redistribute(pin, [slab], CRITERION, np.random.default_rng(0), solid) is None
+    assert redistribute(pin, [], CRITERION, np.random.default_rng(0), solid) is None
 
 
 def test_all_or_nothing() -> None:
@@ -74,15 +74,15 @@ def test_all_or_nothing() -> None:
     parts: list[Part] = [slab, tower]
     bent = Part.glued(long, tower)
     solid = together([slab, long, tower])
-    assert dissolve(bent, [slab], CRITERION, np.random.default_rng(0), solid) is None
-    assert dissolve(long, parts, CRITERION, np.random.default_rng(0), solid) is not None
+    assert redistribute(bent, [slab], CRITERION, np.random.default_rng(0), solid) is None
+    assert redistribute(long, parts, CRITERION, np.random.default_rng(0), solid) is not None
 
 
 def test_without_time_pieces_are_not_halved() -> None:
     left, middle, right = bent_bar()
     solid = together([left, middle, right])
     for seed in range(5):
-        assert dissolve(middle, [left, right], CRITERION, np.random.default_rng(seed), solid, Clock(-1.0)) is None
+        assert redistribute(middle, [left, right], CRITERION, np.random.default_rng(seed), solid, Clock(-1.0)) is None
 
 
 @settings(max_examples=30, deadline=None)
@@ -98,7 +98,7 @@ def test_nothing_is_lost(sizes: list[tuple[float, float, float]], seed: int) -> 
         floor += z
     solid = together(stack)
     part, *around = sorted(stack, key=lambda part: part.hull.volume)
-    once, again = (dissolve(part, around, CRITERION, np.random.default_rng(seed), solid) for _ in range(2))
+    once, again = (redistribute(part, around, CRITERION, np.random.default_rng(seed), solid) for _ in range(2))
     assert (once is None) == (again is None)
     if once is not None and again is not None:
         check(once, part, around, CRITERION)
@@ -113,13 +113,13 @@ def test_parts_of_a_real_shape(name: str, space: NavigableSpace | None, corpus: 
     root = Component(solid.manifold)
     goal: Criterion = CRITERION if space is None else space.prepare(solid, 1)
     with Workers(1) as workers:
-        done, left = CutTree(root, make_policy("greedy", Views(), None), workers).cut_until(goal, Clock())
+        done, left = CutTree(root, make_policy("greedy", SweepCache(), None), workers).cut_until(goal, Clock())
         goal = goal.settled([*done, *left])
         parts = merge_parts([*done, *left], goal, workers, Clock(), solid=root)
     gone = 0
     for part in sorted(parts, key=lambda part: part.hull.volume)[:20]:
         around = [other for other in parts if other is not part]
-        exchange = dissolve(part, around, goal, np.random.default_rng(0), root)
+        exchange = redistribute(part, around, goal, np.random.default_rng(0), root)
         if exchange is not None:
             check(exchange, part, around, goal)
             gone += 1

@@ -12,7 +12,7 @@ import pytest
 import typer
 
 import rlacd
-from rlacd.cli import app
+from rlacd.cli.main import app
 from rlacd.options import Options
 from tests.readme_table import options_table
 

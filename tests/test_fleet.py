@@ -15,14 +15,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rlacd import NavigableSpace
-from rlacd.cli import app
+from rlacd.batch import JobSpec, find_assets
+from rlacd.batch.assets import _places, content_hash
+from rlacd.batch.ledger import Ledger
+from rlacd.batch.store import FolderStore, ResultStore, open_store
+from rlacd.cli.main import app
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError, OptionError, OutputError, WeightsError
-from rlacd.fleet import Order, find_assets
-from rlacd.fleet.assets import _places, content_hash
-from rlacd.fleet.ledger import Ledger
-from rlacd.fleet.store import FolderStore, Store, open_store
-from rlacd.formats import save_hulls
+from rlacd.io.write import save_hulls
 from rlacd.options import Options
 from tests.trouble import write_ell
 
@@ -131,13 +131,13 @@ def test_all_that_decides_the_bytes_is_in_the_key_and_nothing_else(tmp_path: Pat
     from importlib.resources import files
 
     for policy in policies:
-        policy.write_bytes(files("rlacd.weights").joinpath("guide.onnx").read_bytes())
+        policy.write_bytes(files("rlacd.weights").joinpath("ranker.onnx").read_bytes())
 
     written = ("file_format", "density", "up", "folders", "one_mesh")
 
     def key(content: str = "c", name: str = "a/chair.obj", **options: object) -> str:
         kept = {what: options.pop(what) for what in written if what in options}
-        return Order.of(options, **kept).key(content, name)  # type: ignore[arg-type]
+        return JobSpec.of(options, **kept).key(content, name)  # type: ignore[arg-type]
 
     same = [key(), key(threads=2), key(threshold=0.05), key(name="b/chair.obj"), key(file_format="glb"), key(up="z")]
     assert len(set(same)) == 1
@@ -175,8 +175,8 @@ def test_a_batch_takes_every_option_of_a_decomposition() -> None:
 
 def test_an_order_survives_the_way_to_another_process() -> None:
     space = NavigableSpace(0.1, 0.2, seeds=[(1, 2, 3)], closed_planes=[((0, 0, 1), 0)])
-    order = Order.of({"criterion": space, "max_vertices": 32}, file_format="urdf", density=2.0, up="y")
-    again = Order(**json.loads(json.dumps(order.as_plain())))
+    order = JobSpec.of({"criterion": space, "max_vertices": 32}, file_format="urdf", density=2.0, up="y")
+    again = JobSpec(**json.loads(json.dumps(order.as_plain())))
     assert again.arguments()["criterion"] == space
     assert again.key("c", "a.obj") == order.key("c", "a.obj")
 
@@ -198,14 +198,14 @@ def test_mistakes_are_found_before_there_is_a_mesh(
     options: dict[str, object], kept: dict[str, object], error: type[Exception]
 ) -> None:
     with pytest.raises(error):
-        Order.of(options, **kept)  # type: ignore[arg-type]
+        JobSpec.of(options, **kept)  # type: ignore[arg-type]
 
 
 # --- places for results -----------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(params=["folder", "memory"])
-def store(request: pytest.FixtureRequest, tmp_path: Path) -> Store:
+def store(request: pytest.FixtureRequest, tmp_path: Path) -> ResultStore:
     if request.param == "folder":
         return open_store(str(tmp_path / "out"))
     fsspec = pytest.importorskip("fsspec", reason="the extra fleet is not installed")
@@ -213,7 +213,7 @@ def store(request: pytest.FixtureRequest, tmp_path: Path) -> Store:
     return open_store("memory://bucket/out")
 
 
-def test_files_go_in_and_come_out(store: Store) -> None:
+def test_files_go_in_and_come_out(store: ResultStore) -> None:
     assert store.read("a/b.bin") is None
     assert store.size("a/b.bin") is None
     store.write("a/b.bin", b"one")
@@ -224,7 +224,7 @@ def test_files_go_in_and_come_out(store: Store) -> None:
     assert store.read("a/b.bin") is None
 
 
-def test_rows_outlive_a_run_that_never_ended(store: Store) -> None:
+def test_rows_outlive_a_run_that_never_ended(store: ResultStore) -> None:
     first = Ledger(store, "m.jsonl")
     first.add({"mesh": "b", "n": 1})
     first.add({"mesh": "a", "n": 1})
@@ -241,7 +241,7 @@ def test_rows_outlive_a_run_that_never_ended(store: Store) -> None:
     assert store.read("m.jsonl") == before
 
 
-def test_a_row_removes_the_files_only_its_forerunner_had(store: Store) -> None:
+def test_a_row_removes_the_files_only_its_forerunner_had(store: ResultStore) -> None:
     for name in ("a.obj", "a_000.obj", "a_001.obj"):
         store.write(name, b"x")
     ledger = Ledger(store, "m.jsonl")
@@ -250,7 +250,7 @@ def test_a_row_removes_the_files_only_its_forerunner_had(store: Store) -> None:
     assert [store.size(name) for name in ("a.obj", "a_000.obj", "a_001.obj")] == [1, 1, None]
 
 
-def test_a_mesh_that_is_gone_cannot_claim_the_result_of_another(store: Store) -> None:
+def test_a_mesh_that_is_gone_cannot_claim_the_result_of_another(store: ResultStore) -> None:
     store.write("a.glb", b"x")
     ledger = Ledger(store, "m.jsonl")
     ledger.add({"mesh": "a.stl", "outputs": {"a.glb": 1}})

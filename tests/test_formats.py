@@ -16,8 +16,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rlacd.errors import OptionError, OutputError
-from rlacd.formats import FORMATS, hull_target, save_hulls
-from rlacd.formats.palette import hull_colors
+from rlacd.io.write import FORMATS, hull_target, save_hulls
+from rlacd.io.write.palette import hull_colors
 from tests.hulls import assert_convex_hull, hull_of, moved, random_hull
 
 THREE = [moved(random_hull(seed), 0.3, (seed, 0.1, -0.7)) for seed in range(3)]

@@ -13,8 +13,8 @@ from trimesh import creation
 from fuzz import mutations
 from fuzz.damaged import written
 from rlacd.errors import RlacdError
-from rlacd.robots import rewrite_robot
-from rlacd.solid.load import load_mesh
+from rlacd.io.read.load import load_mesh
+from rlacd.io.robots import rewrite_robot
 from tests.bounded import bounded
 
 INPUTS = 60

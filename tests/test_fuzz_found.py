@@ -9,10 +9,10 @@ import trimesh
 import rlacd
 from fuzz.recipes import make_shape
 from rlacd import _native
+from rlacd.io.read.load import load_mesh
+from rlacd.repair.repair import repair
 from rlacd.solid.component import Component, Plane
 from rlacd.solid.hull import Hull
-from rlacd.solid.load import load_mesh
-from rlacd.solid.repair import repair
 from rlacd.solid.reunite import reunite
 from tests.shapes import strangers
 

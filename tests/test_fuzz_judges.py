@@ -21,7 +21,7 @@ from fuzz.recipes import Shape, make_shape
 from fuzz.shapes import run_seed
 from fuzz.worker import Here, Watched
 from rlacd.options import Options
-from rlacd.pool import Limits
+from rlacd.pool import ProcessLimits
 from tests.shapes import Closed, box, from_manifold, point_to_triangles
 
 ELL = from_manifold(box((0, 0, 0), (4, 1, 1)) + box((0, 0, 0), (1, 1, 4)))
@@ -200,10 +200,10 @@ def test_whole_decompositions_pass_the_judges(seed: int, tmp_path: Path) -> None
 
 @pytest.mark.nightly
 def test_a_worker_that_hangs_is_a_hang(tmp_path: Path) -> None:
-    worker = Watched(Limits(seconds=600))
+    worker = Watched(ProcessLimits(seconds=600))
     try:
         assert run_seed(5, worker, tmp_path).status == "done"
-        worker.limits = Limits(seconds=1e-3)
+        worker.limits = ProcessLimits(seconds=1e-3)
         assert run_seed(5, worker, tmp_path).status == "hang"
     finally:
         worker.close()

@@ -16,19 +16,19 @@ from rlacd.clock import Clock  # noqa: E402
 from rlacd.criteria import Concavity  # noqa: E402
 from rlacd.cut import CutTree  # noqa: E402
 from rlacd.errors import OptionError  # noqa: E402
-from rlacd.finish import merge_parts  # noqa: E402
-from rlacd.learn.guide import rollout  # noqa: E402
-from rlacd.learn.guide.__main__ import main  # noqa: E402
-from rlacd.learn.guide.export import export, load_network  # noqa: E402
-from rlacd.learn.guide.fit import Dataset, fit, loss  # noqa: E402
-from rlacd.learn.guide.label import label, shortlist  # noqa: E402
-from rlacd.learn.guide.network import Ensemble, GuideNetwork  # noqa: E402
-from rlacd.learn.guide.rollout import Rollouts, State  # noqa: E402
-from rlacd.learn.guide.train import TrainOptions, train  # noqa: E402
+from rlacd.learn.ranker import rollout  # noqa: E402
+from rlacd.learn.ranker.__main__ import main  # noqa: E402
+from rlacd.learn.ranker.export import export, load_network  # noqa: E402
+from rlacd.learn.ranker.fit import Dataset, fit, loss  # noqa: E402
+from rlacd.learn.ranker.label import label, shortlist  # noqa: E402
+from rlacd.learn.ranker.network import Ensemble, RankerNetwork  # noqa: E402
+from rlacd.learn.ranker.rollout import Rollouts, RolloutState  # noqa: E402
+from rlacd.learn.ranker.train import TrainOptions, train  # noqa: E402
+from rlacd.merge import merge_parts  # noqa: E402
 from rlacd.planes.sweep import Sweep, sweep  # noqa: E402
 from rlacd.policies.features import MIRRORED, candidates_of  # noqa: E402
 from rlacd.policies.greedy import excess_norm  # noqa: E402
-from rlacd.policies.learned import Guide  # noqa: E402
+from rlacd.policies.learned import PlaneRanker  # noqa: E402
 from rlacd.pool import LocalPool  # noqa: E402
 from rlacd.solid.component import Component  # noqa: E402
 from rlacd.workers import Workers  # noqa: E402
@@ -58,7 +58,7 @@ class Follow:
         self.first: int | None = first
 
     def choose(self, component: Component, threads: int = 1) -> object:
-        state = State(component, None)
+        state = RolloutState(component, None)
         plane, self.first = (state.choose(greedy_cost) if self.first is None else self.first), None
         return state.candidates.plane(plane) if plane >= 0 else None
 
@@ -87,14 +87,14 @@ def test_rollouts_cut_as_the_loop_does() -> None:
     parts = rollouts.complete(rollouts.settle(start), 100)
     assert parts is not None
     with Workers(1) as workers:
-        first = State(start, None).choose(greedy_cost)
+        first = RolloutState(start, None).choose(greedy_cost)
         done, left = CutTree(start, Follow(first), workers).cut_until(Concavity(0.05), Clock())  # type: ignore[arg-type]
     np.testing.assert_allclose(sorted(p.volume for p in parts), sorted(p.volume for p in [*done, *left]), rtol=1e-12)
     assert sum(p.volume for p in parts) == pytest.approx(start.volume)
 
 
 def test_coarse_choices_are_planes_of_the_full_sweep() -> None:
-    state = State(Component(chair()), None)
+    state = RolloutState(Component(chair()), None)
     plane = state.choose_coarsely(greedy_cost)
     assert state.valid[plane]
     assert plane >= 150 or plane % 25 % 2 == 1
@@ -109,7 +109,7 @@ def test_the_shortlist_holds_no_neighbours() -> None:
 
 def random_network(members: int = 2) -> Ensemble:
     torch.manual_seed(1)
-    return Ensemble([GuideNetwork(8) for _ in range(members)]).eval()
+    return Ensemble([RankerNetwork(8) for _ in range(members)]).eval()
 
 
 def test_the_network_keeps_the_symmetries_of_space() -> None:
@@ -136,18 +136,18 @@ def test_the_network_keeps_the_symmetries_of_space() -> None:
 @pytest.mark.nightly
 def test_onnx_and_torch_agree_and_the_weights_survive(tmp_path: Path) -> None:
     network = random_network()
-    path = tmp_path / "guide.onnx"
+    path = tmp_path / "ranker.onnx"
     export(network, path, {"scales": [0.02, 0.1], "blend": 0.5, "edge_bonus": 0.1})
-    guide, component = Guide(path), Component(chair())
-    assert guide.about.blend == 0.5
+    ranker, component = PlaneRanker(path), Component(chair())
+    assert ranker.about.blend == 0.5
     with torch.no_grad():
         q, q_edges, _ = network(*(torch.from_numpy(x)[None] for x in seen(chair())))
         again = load_network(path.with_suffix(".safetensors"))(*(torch.from_numpy(x)[None] for x in seen(chair())))
     swept = sweep(component, candidates_of(component, 25))
-    theirs = guide.log_parts(component, swept, 0.05)
+    theirs = ranker.log_parts(component, swept, 0.05)
     np.testing.assert_allclose(theirs, torch.cat([q, q_edges], 1)[0, : len(theirs)].numpy(), atol=1e-5)
     torch.testing.assert_close(again[0], q)
-    coarse = guide.log_parts(component, sweep(component, candidates_of(component, 12)), 0.05)
+    coarse = ranker.log_parts(component, sweep(component, candidates_of(component, 12)), 0.05)
     assert np.isfinite(coarse).all()
 
 
@@ -165,7 +165,7 @@ def dataset(states: int = 24) -> Dataset:
 
 def test_fitting_learns_which_plane_is_best() -> None:
     data = dataset()
-    before, after = GuideNetwork(8), fit(data, seed=0, epochs=100, batch=24, width=8)
+    before, after = RankerNetwork(8), fit(data, seed=0, epochs=100, batch=24, width=8)
     with torch.no_grad():
         assert loss(after, data, 0.3) < 0.6 * loss(before, data, 0.3)
 
@@ -173,7 +173,7 @@ def test_fitting_learns_which_plane_is_best() -> None:
 def test_unknown_labels_and_labels_given_up_pull_one_way_only() -> None:
     data = dataset()
     torch.manual_seed(0)
-    network = GuideNetwork(8)
+    network = RankerNetwork(8)
     with torch.no_grad():
         whole = loss(network, data, 0.0)
         data.index[:, 3], data.parts[:, 3], data.known[:, 3] = 0, 7.0, False
@@ -217,7 +217,7 @@ def options(meshes: Path, work: Path) -> TrainOptions:
 @pytest.mark.nightly
 def test_training_goes_on_where_it_stopped_and_ends_with_the_same_weights(meshes: Path, tmp_path: Path) -> None:
     whole = train(options(meshes, tmp_path / "a"), say=lambda _: None)
-    assert whole == tmp_path / "a" / "round1" / "guide.onnx"
+    assert whole == tmp_path / "a" / "round1" / "ranker.onnx"
     stopped = tmp_path / "b"
     shutil.copytree(tmp_path / "a", stopped)
     for gone in (stopped / "round1").iterdir():  # as if stopped in the middle of the second round's labels

@@ -10,7 +10,7 @@ import trimesh
 
 import rlacd
 from rlacd.decomposition import Decomposition
-from rlacd.show.heat import FINEST, INNER, HeatMesh, frame_of, heat_map
+from rlacd.view.heat import FINEST, INNER, HeatMesh, frame_of, heat_map
 from tests.hulls import hull_of
 
 MEASURED_WITHIN = 2e-3  # width of the interval that the report's distance comes from

@@ -18,16 +18,16 @@ import pytest
 from trimesh import creation
 from typer.testing import CliRunner
 
-from rlacd.cli import app
+from rlacd.batch.assets import Asset
+from rlacd.batch.ledger import Ledger
+from rlacd.batch.store import FolderStore
+from rlacd.cli.main import app
 from rlacd.errors import MeshFileError, OutputError, RlacdError, TrainingError, WeightsError
-from rlacd.fleet.assets import Asset
-from rlacd.fleet.ledger import Ledger
-from rlacd.fleet.store import FolderStore
-from rlacd.policies.learned import Guide
+from rlacd.io.read.load import load_mesh
+from rlacd.io.read.open_file import LARGEST
+from rlacd.io.robots import rewrite_robot
+from rlacd.policies.learned import PlaneRanker
 from rlacd.policies.q_network import OnnxQ
-from rlacd.read_file import LARGEST
-from rlacd.robots import rewrite_robot
-from rlacd.solid.load import load_mesh
 from tests import hostile
 from tests.bounded import bounded
 
@@ -106,7 +106,7 @@ def test_a_robot_that_never_ends_is_refused(kind: str, ending: str, tmp_path: Pa
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("network", [Guide, OnnxQ])
+@pytest.mark.parametrize("network", [PlaneRanker, OnnxQ])
 def test_weights_that_never_end_are_refused(kind: str, network: Any, tmp_path: Path) -> None:
     check_refused(WeightsError, KINDS[kind], network, special(tmp_path, kind, ".onnx"))
 
@@ -309,7 +309,7 @@ def test_weights_in_another_file_are_not_looked_for(
     for place in (inside / "beside.bin", tmp_path / "secret.bin"):
         place.write_bytes(bytes(16))
     monkeypatch.chdir(inside)
-    check_refused(WeightsError, "damaged", Guide, network(inside, ABOUT, location))
+    check_refused(WeightsError, "damaged", PlaneRanker, network(inside, ABOUT, location))
 
 
 @pytest.mark.parametrize(
@@ -328,8 +328,8 @@ def test_weights_that_ask_for_too_much_are_refused(change: dict[str, Any], tmp_p
     from rlacd.policies.features import VERSION
 
     sound = {**ABOUT, "features": VERSION}
-    Guide(network(tmp_path, sound))
-    check_refused(WeightsError, "metadata", Guide, network(tmp_path, {**sound, **change}))
+    PlaneRanker(network(tmp_path, sound))
+    check_refused(WeightsError, "metadata", PlaneRanker, network(tmp_path, {**sound, **change}))
 
 
 def checkpoint(folder: Path) -> Path:

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 from typer.testing import CliRunner
 
-from rlacd.cli import app
+from rlacd.cli.main import app
 from rlacd.errors import OptionError, WeightsError
 
 pytest.importorskip("torch", reason="needs the extra train")

@@ -37,7 +37,7 @@ def test_errors_can_be_caught_without_loading_a_library() -> None:
     "arguments", [[], ["--help"], ["decompose", "--help"], ["batch", "--help"], ["bench", "--help"]]
 )
 def test_help_does_not_wait_for_the_geometry(arguments: list[str]) -> None:
-    run = f"from rlacd.cli import app\ntry:\n    app({arguments!r})\nexcept SystemExit:\n    pass"
+    run = f"from rlacd.cli.main import app\ntry:\n    app({arguments!r})\nexcept SystemExit:\n    pass"
     assert not modules_after(run) & {"numpy", "scipy", "trimesh", "onnxruntime", "torch"}
 
 
@@ -74,11 +74,11 @@ WITHOUT_ONNXRUNTIME = "import sys\nsys.modules['onnxruntime'] = None\n"
 
 @pytest.mark.parametrize("policy", ["learned", "own.onnx"])
 def test_a_learned_policy_without_its_extra_is_one_sentence_before_any_work(policy: str, tmp_path: Path) -> None:
-    (tmp_path / "own.onnx").write_bytes(files("rlacd.weights").joinpath("guide.onnx").read_bytes())
+    (tmp_path / "own.onnx").write_bytes(files("rlacd.weights").joinpath("ranker.onnx").read_bytes())
     (tmp_path / "broken.stl").touch()
     command = ["decompose", "broken.stl", "--policy", policy]
     done = subprocess.run(
-        [sys.executable, "-c", f"{WITHOUT_ONNXRUNTIME}from rlacd.cli import app\napp({command!r})"],
+        [sys.executable, "-c", f"{WITHOUT_ONNXRUNTIME}from rlacd.cli.main import app\napp({command!r})"],
         capture_output=True,
         text=True,
         cwd=tmp_path,

@@ -20,15 +20,15 @@ from rlacd.clock import Clock
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.errors import TrainingError
+from rlacd.io.read.load import load_mesh
 from rlacd.learn.encoders import Encoder, describe, make_encoder
 from rlacd.learn.meshes import Solids, list_meshes
-from rlacd.learn.paper.mdp import Cutting, terminal_reward
+from rlacd.learn.paper.mdp import CutProcess, terminal_reward
 from rlacd.planes.candidates import axis_and_principal
 from rlacd.planes.sweep import sweep
 from rlacd.policies.observe import observe, valid_planes
+from rlacd.repair.repair import repair
 from rlacd.solid.component import Component
-from rlacd.solid.load import load_mesh
-from rlacd.solid.repair import repair
 from rlacd.workers import Workers
 from tests.learning import GreedyOverMask, greedy_plane, small_solids, write_meshes
 
@@ -50,7 +50,7 @@ def volumes(components: list[Component]) -> list[tuple[float, float]]:
     return sorted((c.volume, c.hull.volume) for c in components)
 
 
-def cut_greedily(cutting: Cutting) -> list[float]:
+def cut_greedily(cutting: CutProcess) -> list[float]:
     """Cut to the end; the rewards r_1 on the way."""
     saved = []
     while not cutting.over:
@@ -66,7 +66,7 @@ def cut_greedily(cutting: Cutting) -> list[float]:
 def check_same_as_decompose(solid: Component) -> None:
     with Workers(1) as workers:
         done, left = CutTree(solid, GreedyOverMask(), workers).cut_until(CRITERION, Clock())
-    cutting = Cutting(solid, CRITERION)
+    cutting = CutProcess(solid, CRITERION)
     start = sum(c.hull.volume for c in cutting.frontier + cutting.finished + cutting.stuck)
     saved = cut_greedily(cutting)
     assert volumes(cutting.finished) == volumes(done)
@@ -88,7 +88,7 @@ def test_the_same_policy_reaches_the_same_components_of_real_meshes(corpus: Path
 
 def test_reward_of_an_angle_by_hand() -> None:
     solid = Component(small_solids()["angle"])  # two boxes, 2 x 1 x 0.3 and 0.3 x 1 x 1.2 on top of it
-    cutting = Cutting(solid, CRITERION)
+    cutting = CutProcess(solid, CRITERION)
     plane = rlacd.solid.component.Plane((0.0, 0.0, 1.0), 0.3)
     cut = cutting.cut(0, plane)
     hull = (2 * 1.5 - (2 - 0.3) * (1.5 - 0.3) / 2) * 1.0
@@ -106,7 +106,7 @@ def test_terminal_reward_falls_with_the_number_of_parts() -> None:
 
 
 def test_discounts_are_shares_of_the_hull_and_never_exceed_one() -> None:
-    cutting = Cutting(Component(small_solids()["table"]), CRITERION)
+    cutting = CutProcess(Component(small_solids()["table"]), CRITERION)
     while not cutting.over:
         component = cutting.frontier[0]
         cut = cutting.cut(0, cutting.candidates(component).plane(12))

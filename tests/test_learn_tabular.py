@@ -12,10 +12,10 @@ pytest.importorskip("torch", reason="needs the extra train")
 
 from rlacd.criteria import Concavity
 from rlacd.errors import RlacdError
+from rlacd.io.read.load import load_mesh
 from rlacd.learn.paper.tabular import Node, all_nodes, grow, middle_planes, process_of, q_learning
+from rlacd.repair.repair import repair
 from rlacd.solid.component import Component
-from rlacd.solid.load import load_mesh
-from rlacd.solid.repair import repair
 from tests.learning import small_solids
 
 CRITERION = Concavity(0.02)

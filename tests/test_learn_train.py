@@ -21,10 +21,10 @@ import psutil
 import pytest
 from typer.testing import CliRunner
 
-from rlacd.cli import app
+from rlacd.cli.main import app
 from rlacd.errors import MissingExtraError, OptionError, TrainingError
 from rlacd.learn.paper.options import PRESETS, TrainOptions
-from rlacd.pool import Answer, HerePool, LocalPool, Pool, Request, WorkerDiedError
+from rlacd.pool import Answer, InProcessPool, LocalPool, Pool, Request, WorkerDiedError
 from tests.learning import write_meshes
 from tests.pools import pool_processes
 
@@ -144,7 +144,7 @@ def test_without_the_extra_the_command_says_what_to_install(tmp_path: Path, monk
 
 
 def test_the_main_job_does_not_load_torch() -> None:
-    code = "import sys, rlacd, rlacd.cli; sys.exit('torch' in sys.modules or 'gymnasium' in sys.modules)"
+    code = "import sys, rlacd, rlacd.cli.main; sys.exit('torch' in sys.modules or 'gymnasium' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
@@ -171,7 +171,15 @@ def test_a_killed_run_resumes_exactly(meshes: Path, tmp_path: Path) -> None:
     whole, killed = tmp_path / "whole", tmp_path / "killed"
     run(meshes, whole, iterations=400)
     given = [f"--{k.replace('_', '-')}={v}" for k, v in {**TINY, "iterations": 400, "jobs": 2}.items()]
-    command = [sys.executable, "-c", "from rlacd.cli import main; main()", "train", str(meshes), "--run", str(killed)]
+    command = [
+        sys.executable,
+        "-c",
+        "from rlacd.cli.main import main; main()",
+        "train",
+        str(meshes),
+        "--run",
+        str(killed),
+    ]
     command += ["--preset", "paper", "--encoder", "profile"]  # the defaults of TrainOptions
     process = subprocess.Popen([*command, *given], stdout=subprocess.DEVNULL)
     deadline = time.monotonic() + 120
@@ -210,7 +218,7 @@ def test_a_worker_that_is_killed_changes_nothing(meshes: Path, tmp_path: Path) -
     assert_same_run(tmp_path / "alone", tmp_path / "disturbed")
 
 
-class Doomed(HerePool):
+class Doomed(InProcessPool):
     """Of some episodes the process dies every time."""
 
     def __init__(self, episodes: Container[int]) -> None:

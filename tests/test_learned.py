@@ -14,10 +14,10 @@ import pytest
 import rlacd
 from rlacd.errors import WeightsError
 from rlacd.planes.sweep import sweep
-from rlacd.planes.views import Views
+from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import make_policy
 from rlacd.policies.features import MIRRORED, candidates_of, features, measures, tables
-from rlacd.policies.learned import Guide, Learned
+from rlacd.policies.learned import Learned, PlaneRanker
 from rlacd.solid.component import Component
 
 PER_AXIS = 25
@@ -72,26 +72,26 @@ def test_turning_the_solid_permutes_the_features_of_the_coordinate_axes() -> Non
 
 
 def test_the_shipped_policy_ranks_every_plane_it_looks_at() -> None:
-    guide, component = Guide(), Component(chair())
+    ranker, component = PlaneRanker(), Component(chair())
     swept = sweep(component, candidates_of(component, PER_AXIS))
-    q = guide.log_parts(component, swept, 0.05)
+    q = ranker.log_parts(component, swept, 0.05)
     assert q.shape == (len(swept.candidates),)
     assert np.isfinite(q).all()
     assert 0 < np.exp(q[swept.valid()]).min() < 30
 
 
 def test_scales_never_met_in_training_are_taken_to_be_the_nearest() -> None:
-    guide, component = Guide(), Component(chair())
+    ranker, component = PlaneRanker(), Component(chair())
     swept = sweep(component, candidates_of(component, PER_AXIS))
-    least = guide.about.scales[0]
-    below, at = (guide.log_parts(component, swept, scale) for scale in (least / 10, least))
+    least = ranker.about.scales[0]
+    below, at = (ranker.log_parts(component, swept, scale) for scale in (least / 10, least))
     np.testing.assert_array_equal(below, at)
 
 
 def test_shared_sweeps_change_nothing_and_coarser_ones_can_be_ranked() -> None:
     component = Component(chair())
-    assert Learned(views=Views()).choose(component) == Learned().choose(component)
-    coarse = Views(12, 4).of(component)
+    assert Learned(sweeps=SweepCache()).choose(component) == Learned().choose(component)
+    coarse = SweepCache(12, 4).of(component)
     cost = Learned().rank(component, coarse)
     assert cost.shape == (len(coarse.candidates),)
     assert np.isfinite(cost).all()
@@ -118,7 +118,7 @@ def test_the_result_does_not_depend_on_the_number_of_threads(corpus: Path) -> No
 
 def test_a_copy_of_the_weights_elsewhere_is_the_same_policy(tmp_path: Path) -> None:
     path = tmp_path / "mine.onnx"
-    path.write_bytes(files("rlacd.weights").joinpath("guide.onnx").read_bytes())
+    path.write_bytes(files("rlacd.weights").joinpath("ranker.onnx").read_bytes())
     component = Component(chair())
     assert make_policy(str(path), scale=0.05).choose(component) == make_policy("learned", scale=0.05).choose(component)
 
@@ -157,7 +157,7 @@ def bad_weights(tmp_path: Path, kind: str) -> Path:
     elif kind == "garbage":
         path.write_bytes(bytes(range(256)) * 16)
     elif kind == "truncated":
-        whole = files("rlacd.weights").joinpath("guide.onnx").read_bytes()
+        whole = files("rlacd.weights").joinpath("ranker.onnx").read_bytes()
         path.write_bytes(whole[: len(whole) // 2])
     elif kind == "foreign":
         onnx_file(path)

@@ -12,16 +12,16 @@ from hypothesis import strategies as st
 from manifold3d import Manifold
 
 from rlacd import _native
+from rlacd.io.read.load import load_mesh
 from rlacd.planes.candidates import Candidates, axis_and_principal
 from rlacd.planes.least_excess import least_excess
 from rlacd.planes.sweep import SLIVER, Sweep, sweep
-from rlacd.planes.views import Views
+from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import SCORES, Greedy
 from rlacd.policies.greedy import cheapest, excess_norm, hull_sum, max_excess
+from rlacd.repair.repair import repair
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Plane
-from rlacd.solid.load import load_mesh
-from rlacd.solid.repair import repair
 from tests.test_sweep import SOLIDS, crowded_pyramid, finned_tetrahedron, gear
 
 EXPONENTS = {"hull_sum": 1.0, "max_excess": math.inf, "excess_norm": SCORES["excess-norm"]}
@@ -38,9 +38,9 @@ def excess_cost(swept: Sweep, exponent: float) -> FloatArray:
 @pytest.mark.parametrize("name", SOLIDS)
 def test_it_is_the_plane_that_a_sweep_of_all_finds(name: str, score: str) -> None:
     component = Component(SOLIDS[name]())
-    views = Views()
-    swept = views.of(component)
-    found = least_excess(component, views.candidates(component), EXPONENTS[score])
+    sweeps = SweepCache()
+    swept = sweeps.of(component)
+    found = least_excess(component, sweeps.candidates(component), EXPONENTS[score])
     assert found is not None
     assert found == cheapest(swept, COSTS[score](swept))
 
@@ -65,7 +65,7 @@ def test_it_is_so_all_the_way_down_real_meshes(corpus: Path, score: str) -> None
         for _ in range(3):
             sides: list[Component] = []
             for component in frontier:
-                swept = Views().of(component)
+                swept = SweepCache().of(component)
                 plane = greedy.choose(component)
                 assert plane == cheapest(swept, COSTS[score](swept))
                 if plane is not None and component.hull.volume > 1.01 * component.volume:
@@ -142,7 +142,7 @@ def test_no_planes_no_choice() -> None:
 
 def test_the_same_plane_for_any_number_of_threads() -> None:
     component = Component(gear().rotate((3, 5, 7)))
-    candidates = Views().candidates(component)
+    candidates = SweepCache().candidates(component)
     planes = {least_excess(component, candidates, 1.3, threads) for threads in (1, 2, 5, 16)}
     assert len(planes) == 1
 

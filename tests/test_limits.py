@@ -15,7 +15,7 @@ from hypothesis.extra import numpy as hnp
 
 from rlacd import _native
 from rlacd.errors import OptionError
-from rlacd.finish.limits import limit_hull
+from rlacd.merge.limits import limit_hull
 from rlacd.solid.hull import Hull
 
 

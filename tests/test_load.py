@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from rlacd.errors import EmptyMeshError, MeshDataError, MeshError, MeshFileError
-from rlacd.solid.load import load_mesh
+from rlacd.io.read.load import load_mesh
 
 FORMATS = ["obj", "stl", "ply", "off", "glb", "gltf", "dae", "3mf"]
 

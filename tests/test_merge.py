@@ -9,7 +9,7 @@ from manifold3d import Manifold
 from rlacd.clock import Clock
 from rlacd.criteria import Concavity
 from rlacd.criteria.navigable import Navigable, NavigableSpace
-from rlacd.finish import merge_parts, merge_to_count
+from rlacd.merge import merge_parts, merge_to_count
 from rlacd.solid.balls import Balls
 from rlacd.solid.component import Component, Part, Plane
 from rlacd.workers import Workers

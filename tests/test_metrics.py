@@ -15,8 +15,8 @@ import rlacd
 from rlacd.bench import Metrics, measure
 from rlacd.bench.metrics import COVERED, SAMPLES, TOLERANCE, is_valid
 from rlacd.errors import OptionError
-from rlacd.solid.load import load_mesh
-from rlacd.solid.repair import repair
+from rlacd.io.read.load import load_mesh
+from rlacd.repair.repair import repair
 from tests.shapes import Closed, box, dense, from_manifold, point_to_triangles, to_manifold
 
 # The input of most tests: its longest side is 2 and it is centred, so that lengths are the frame's.

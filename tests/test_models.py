@@ -16,7 +16,7 @@ from lxml import etree
 import rlacd
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MissingExtraError, OptionError, OutputError
-from rlacd.formats import MODELS, save
+from rlacd.io.write import MODELS, save
 from tests.hulls import assert_convex_hull, hull_of, moved, random_hull
 from tests.models import TABLE_VOLUME, Rest, decomposed_table, fall_in_bullet, fall_in_drake, fall_in_mujoco
 
@@ -383,7 +383,7 @@ def test_saving_again_replaces_model_and_meshes_and_nothing_else(tmp_path: Path,
 def test_a_failing_disk_leaves_the_older_model_with_its_meshes(
     tmp_path: Path, wooden: Decomposition, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import rlacd.formats as formats
+    import rlacd.io.write as formats
 
     wooden.save(tmp_path / "table.xml")
     before = (tmp_path / "table.xml").read_bytes()

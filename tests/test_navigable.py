@@ -14,11 +14,11 @@ from scipy.spatial import ConvexHull, cKDTree
 from rlacd import _native
 from rlacd.criteria.navigable import LEAST_RADIUS, Balls, Navigable, NavigableSpace
 from rlacd.errors import OptionError
+from rlacd.io.read.load import load_mesh
+from rlacd.repair.repair import repair
 from rlacd.solid.component import Component, Part, Plane
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
-from rlacd.solid.load import load_mesh
-from rlacd.solid.repair import repair
 from rlacd.solid.solid import Solid
 from tests.shapes import Floats, box, from_manifold, point_to_triangles
 

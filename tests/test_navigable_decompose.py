@@ -15,7 +15,7 @@ from manifold3d import Manifold, OpType
 from typer.testing import CliRunner, Result
 
 import rlacd
-from rlacd.cli import app
+from rlacd.cli.main import app
 from tests.hulls import assert_convex_hull
 from tests.shapes import box, point_to_triangles
 

@@ -16,8 +16,8 @@ from trimesh import creation
 from typer.testing import CliRunner
 
 import rlacd
-from rlacd.cli import app
-from rlacd.command_options import decompose_options
+from rlacd.cli.main import app
+from rlacd.cli.options import decompose_options
 from rlacd.compat import coacd, vhacd
 from rlacd.errors import MeshFileError, OptionError, RlacdError, WeightsError
 from rlacd.fields import check_callback

@@ -7,7 +7,7 @@ import colorsys
 import numpy as np
 import pytest
 
-from rlacd.formats.palette import hull_colors, linear_from_oklab, linear_from_srgb, oklab_from_linear, srgb_from_linear
+from rlacd.io.write.palette import hull_colors, linear_from_oklab, linear_from_srgb, oklab_from_linear, srgb_from_linear
 
 # What is seen, in linear RGB: Machado, Oliveira & Fernandes 2009, severity 1.
 SIGHT = {

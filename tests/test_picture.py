@@ -15,8 +15,8 @@ import trimesh
 
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MissingExtraError, OptionError, OutputError
-from rlacd.show import check_picture, draw_picture
-from rlacd.show.picture import caption
+from rlacd.view import check_picture, draw_picture
+from rlacd.view.picture import caption
 from tests.hulls import hull_of, moved
 
 Image = pytest.importorskip("PIL.Image", reason="the extra view is not installed")

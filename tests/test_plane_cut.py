@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from manifold3d import CrossSection, Manifold, OpType
 
 from rlacd import _native
+from rlacd.io.read.load import load_mesh
+from rlacd.repair.repair import repair
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Plane
-from rlacd.solid.load import load_mesh
-from rlacd.solid.repair import repair
 
 LAST_BITS = 1e-12
 

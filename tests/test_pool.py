@@ -15,16 +15,16 @@ import pytest
 
 from rlacd.errors import OptionError
 from rlacd.pool import (
-    HerePool,
-    Limits,
+    InProcessPool,
     LocalPool,
     Pool,
+    ProcessLimits,
     Request,
     Shared,
     WorkerDiedError,
     answers,
     open_pool,
-    submit_twice,
+    submit_with_retry,
     worker,
 )
 from tests.pool_server import SERVER
@@ -40,7 +40,7 @@ def server_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(params=["here", "local"])
 def pool(request: pytest.FixtureRequest) -> Iterator[Pool]:
-    with HerePool() if request.param == "here" else LocalPool(2) as pool:
+    with InProcessPool() if request.param == "here" else LocalPool(2) as pool:
         yield pool
 
 
@@ -53,7 +53,7 @@ def one() -> Iterator[LocalPool]:
 def ask(what: str = "echo", **more: Any) -> Request:
     seconds = more.pop("seconds", 600)
     kept = {name: more.pop(name) for name in ("blobs", "shared", "fresh") if name in more}
-    return Request(SERVER, {"what": what, **more}, **kept, limits=Limits(seconds=seconds))
+    return Request(SERVER, {"what": what, **more}, **kept, limits=ProcessLimits(seconds=seconds))
 
 
 def pid(pool: Pool, request: Request | None = None) -> int:
@@ -92,7 +92,7 @@ def test_what_is_shared_reaches_a_process_once_and_again_when_it_changes(one: Lo
 
 
 def test_a_death_is_told_and_is_nobody_elses(pool: Pool) -> None:
-    if isinstance(pool, HerePool):
+    if isinstance(pool, InProcessPool):
         pytest.skip("nobody watches this process")
     well = [pool.submit(ask(number=n)) for n in range(3)]
     died = pool.submit(ask("die"))
@@ -122,16 +122,16 @@ def test_a_process_stays_unless_a_new_one_is_wanted(one: LocalPool) -> None:
 
 def test_a_second_chance_is_one(one: LocalPool, tmp_path: Path) -> None:
     before = pid(one)
-    assert submit_twice(one, ask("die once", mark=str(tmp_path / "mark"))).result().values["pid"] != before
+    assert submit_with_retry(one, ask("die once", mark=str(tmp_path / "mark"))).result().values["pid"] != before
     with pytest.raises(WorkerDiedError, match="SIGKILL"):
-        submit_twice(one, ask("die")).result()
+        submit_with_retry(one, ask("die")).result()
     with pytest.raises(OptionError, match="too much"):
-        submit_twice(one, ask("refuse")).result()
+        submit_with_retry(one, ask("refuse")).result()
 
 
 def test_a_process_that_is_killed_from_outside_costs_nothing_but_time(one: LocalPool) -> None:
     os.kill(pid(one), signal.SIGKILL)
-    assert submit_twice(one, ask(number=7)).result().values["echo"]["number"] == 7
+    assert submit_with_retry(one, ask(number=7)).result().values["echo"]["number"] == 7
 
 
 def test_many_requests_are_taken_as_there_is_room(pool: Pool) -> None:
@@ -172,6 +172,6 @@ def test_a_server_that_is_not_there_is_told(one: LocalPool) -> None:
 def test_pools_by_what_a_command_is_given() -> None:
     with open_pool(None) as one, open_pool(0) as here, open_pool(3) as three:
         assert (one.room, three.room) == (1, 3)
-        assert isinstance(here, HerePool)
+        assert isinstance(here, InProcessPool)
     with pytest.raises(OptionError, match="jobs is -1"):
         open_pool(-1)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rlacd.cli import app
+from rlacd.cli.main import app
 from rlacd.errors import OptionError, TrainingError
 from rlacd.learn.pretrain.options import PretrainOptions
 from tests.learning import write_meshes

@@ -10,11 +10,11 @@ from scipy.spatial.transform import Rotation
 
 from fuzz.flaws import FAMILIES
 from rlacd.errors import EmptyMeshError
-from rlacd.solid.load import load_mesh
-from rlacd.solid.repair import GAP, HALF_THICKNESS, repair
-from rlacd.solid.repair_caps import HOLE
-from rlacd.solid.repair_distance import SurfaceQuery
-from rlacd.solid.repair_union import to_arrays, to_manifold
+from rlacd.io.read.load import load_mesh
+from rlacd.repair.caps import HOLE
+from rlacd.repair.distance import SurfaceQuery
+from rlacd.repair.repair import GAP, HALF_THICKNESS, repair
+from rlacd.repair.union import to_arrays, to_manifold
 
 BOX = trimesh.creation.box(extents=(2, 2, 2))
 

@@ -17,13 +17,13 @@ import trimesh
 from typer.testing import CliRunner
 
 import rlacd
-from rlacd.cli import app
+from rlacd.cli.main import app
 from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError, OutputError
-from rlacd.show import check_report_page, save_report_page
-from rlacd.show.html_report import report_page
-from rlacd.show.page import MODULES
-from rlacd.show.scene import scene
+from rlacd.view import check_report_page, save_report_page
+from rlacd.view.html_report import report_page
+from rlacd.view.page import MODULES
+from rlacd.view.scene import scene
 from tests.hulls import hull_of
 
 

@@ -13,7 +13,7 @@ from lxml import etree
 from typer.testing import CliRunner
 
 import rlacd
-from rlacd.cli import app
+from rlacd.cli.main import app
 from rlacd.errors import MeshFileError, OptionError, OutputError
 from tests.models import table
 

@@ -19,22 +19,22 @@ from typer.testing import CliRunner
 
 import rlacd
 from rlacd import _native
-from rlacd.cli import app
+from rlacd.cli.main import app
 from rlacd.clock import Clock
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
-from rlacd.finish import merge_parts
-from rlacd.planes.views import Views
+from rlacd.io.read.load import load_mesh
+from rlacd.merge import merge_parts
+from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import make_policy
+from rlacd.repair.repair import repair
+from rlacd.search.budget import SearchBudget
 from rlacd.search.levels import LEVELS, Level, cost, level, search
 from rlacd.search.neighbourhood import Neighbourhood
-from rlacd.search.neighbours import Neighbours
-from rlacd.search.pace import Pace
+from rlacd.search.part_graph import PartGraph
 from rlacd.search.rankings import by_score
 from rlacd.search.recut import Exchange, recut
 from rlacd.solid.component import Component, Part, Plane
-from rlacd.solid.load import load_mesh
-from rlacd.solid.repair import repair
 from rlacd.solid.reunite import reunite, touch
 from rlacd.workers import Workers
 from tests.shapes import box, strangers
@@ -115,7 +115,7 @@ def test_most_neighbours_can_be_reunited_without_a_wall_between_them(real: Compo
 def test_a_search_only_improves_and_keeps_the_solid(real: Component) -> None:
     with Workers(1) as workers:
         parts = first_pass(real, workers)
-        found, account = search(real, parts, CRITERION, "best", Level(40, None), Views(), workers, Clock(), seed=0)
+        found, account = search(real, parts, CRITERION, "best", Level(40, None), SweepCache(), workers, Clock(), seed=0)
     assert cost(found) <= cost(parts)
     assert account.parts == len(found) <= account.portfolio <= account.first_pass == len(parts)
     assert account.steps == 40 or account.exhausted
@@ -129,7 +129,9 @@ def test_more_steps_are_never_worse(real: Component) -> None:
     with Workers(1) as workers:
         parts = first_pass(real, workers)
         for steps in (0, 8, 24):
-            found, _ = search(real, parts, CRITERION, "best", Level(steps, None), Views(), workers, Clock(), seed=3)
+            found, _ = search(
+                real, parts, CRITERION, "best", Level(steps, None), SweepCache(), workers, Clock(), seed=3
+            )
             costs.append(cost(found))
     assert costs[0] >= costs[1] >= costs[2]
 
@@ -138,9 +140,9 @@ def test_the_state_of_a_search_is_always_feasible() -> None:
     root = Component(frame())
     with Workers(1) as workers:
         parts = first_pass(root, workers)
-        state = Neighbourhood(root, parts, CRITERION, [by_score("hull-sum")], Views(12, 0), workers, 0)
+        state = Neighbourhood(root, parts, CRITERION, [by_score("hull-sum")], SweepCache(12, 0), workers, 0)
         for _ in range(4):
-            state.run(Pace(Clock(), None, len(parts)), 3)
+            state.run(SearchBudget(Clock(), None, len(parts)), 3)
             assert all(CRITERION.is_met(part) for part in state.parts)
             assert sum(own.volume for part in state.parts for own in part.members) == pytest.approx(
                 root.volume, rel=1e-6
@@ -154,7 +156,7 @@ def cubes(*places: tuple[float, float, float]) -> list[Part]:
 def test_neighbours_share_a_face() -> None:
     parts = cubes(*((float(x), float(y), 0.0) for x in range(3) for y in range(2)))
     with Workers(1) as workers:
-        here = Neighbours(parts, CRITERION, workers)
+        here = PartGraph(parts, CRITERION, workers)
         assert here.around((0,)) == (1, 2)  # not 3, which has an edge in common
         assert here.around((0, 1)) == (2, 3)
         for seed in range(20):
@@ -208,12 +210,12 @@ def test_a_cluster_that_was_cut_badly_becomes_fewer_parts() -> None:
     pieces: list[Component] = [bar]
     for offset in (-1.0, 0.2, 1.1):
         pieces = [side for piece in pieces for side in piece.cut(Plane((1, 0, 0), offset)) if side is not None]
-    exchange = recut(pieces, [], by_score("hull-sum")(Views(12, 0)), CRITERION, Clock())
+    exchange = recut(pieces, [], by_score("hull-sum")(SweepCache(12, 0)), CRITERION, Clock())
     assert exchange is not None
     assert exchange.gain == 3
     assert exchange.into[0].volume == pytest.approx(3)
     # With no time left, nothing is found.
-    assert recut(pieces, [], by_score("hull-sum")(Views(12, 0)), CRITERION, Clock(-1.0)) is None
+    assert recut(pieces, [], by_score("hull-sum")(SweepCache(12, 0)), CRITERION, Clock(-1.0)) is None
 
 
 @pytest.mark.nightly

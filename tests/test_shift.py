@@ -10,13 +10,13 @@ from manifold3d import Manifold
 
 from rlacd.clock import Clock
 from rlacd.criteria import Concavity
-from rlacd.finish import merge_parts
-from rlacd.planes.views import Views
+from rlacd.merge import merge_parts
+from rlacd.planes.sweep_cache import SweepCache
+from rlacd.search.budget import SearchBudget
 from rlacd.search.neighbourhood import Neighbourhood, cost
-from rlacd.search.neighbours import Neighbours
-from rlacd.search.pace import Pace
+from rlacd.search.part_graph import PartGraph
 from rlacd.search.rankings import by_score
-from rlacd.search.shift import shift
+from rlacd.search.transfer import transfer
 from rlacd.solid.component import Component, Part
 from rlacd.workers import Workers
 from tests.shapes import bent_bar, box, own_volume, together
@@ -32,7 +32,7 @@ def test_what_nobody_can_take_whole_is_divided() -> None:
     solid = together(parts)
     gains = []
     for seed in range(20):
-        exchange = shift(middle, [left, right], CRITERION, np.random.default_rng(seed), solid)
+        exchange = transfer(middle, [left, right], CRITERION, np.random.default_rng(seed), solid)
         if exchange is None:
             continue
         gains.append(exchange.gain)
@@ -46,7 +46,7 @@ def test_what_nobody_can_take_whole_is_divided() -> None:
 def test_a_part_that_fits_into_another_is_taken_at_once() -> None:
     slab, crumb = Component(box((0, 0, 0), (1, 1, 0.2))), Component(box((0.4, 0.4, 0.2), (0.6, 0.6, 0.22)))
     solid = together([slab, crumb])
-    exchange = shift(crumb, [slab], CRITERION, np.random.default_rng(0), solid)
+    exchange = transfer(crumb, [slab], CRITERION, np.random.default_rng(0), solid)
     assert exchange is not None
     assert (len(exchange.out), len(exchange.into)) == (2, 1)
     assert exchange.into[0].volume == pytest.approx(0.2 + 0.04 * 0.02)
@@ -55,8 +55,8 @@ def test_a_part_that_fits_into_another_is_taken_at_once() -> None:
 def test_small_parts_take_nothing_from_large_ones() -> None:
     slab, crumb = Component(box((0, 0, 0), (1, 1, 0.2))), Component(box((0.4, 0.4, 0.2), (0.6, 0.6, 0.22)))
     solid = together([slab, crumb])
-    assert shift(slab, [crumb], CRITERION, np.random.default_rng(0), solid) is None
-    assert shift(slab, [], CRITERION, np.random.default_rng(0), solid) is None
+    assert transfer(slab, [crumb], CRITERION, np.random.default_rng(0), solid) is None
+    assert transfer(slab, [], CRITERION, np.random.default_rng(0), solid) is None
 
 
 @settings(max_examples=40, deadline=None)
@@ -72,8 +72,8 @@ def test_nothing_is_lost(sizes: list[tuple[float, float, float]], seed: int) -> 
         floor += z
     solid = together(stack)
     giver, *around = sorted(stack, key=lambda part: part.hull.volume)
-    exchange = shift(giver, around, CRITERION, np.random.default_rng(seed), solid)
-    again = shift(giver, around, CRITERION, np.random.default_rng(seed), solid)
+    exchange = transfer(giver, around, CRITERION, np.random.default_rng(seed), solid)
+    again = transfer(giver, around, CRITERION, np.random.default_rng(seed), solid)
     assert (exchange is None) == (again is None)
     if exchange is None or again is None:
         return
@@ -88,8 +88,8 @@ def test_nothing_is_lost(sizes: list[tuple[float, float, float]], seed: int) -> 
 def test_the_search_divides_the_bent_bar() -> None:
     parts = bent_bar()
     with Workers(1) as workers:
-        state = Neighbourhood(together(parts), parts, CRITERION, [by_score("hull-sum")], Views(12, 0), workers, 0)
-        outcome = state.run(Pace(Clock(), None, 3), 60)
+        state = Neighbourhood(together(parts), parts, CRITERION, [by_score("hull-sum")], SweepCache(12, 0), workers, 0)
+        outcome = state.run(SearchBudget(Clock(), None, 3), 60)
     assert len(outcome.parts) == 2
     assert all(CRITERION.is_met(part) for part in outcome.parts)
 
@@ -101,10 +101,10 @@ def test_a_search_gives_back_the_best_it_has_seen() -> None:
     solid = together(bars)
     with Workers(1) as workers:
         for seed in range(3):
-            state = Neighbourhood(solid, bars, CRITERION, [by_score("hull-sum")], Views(12, 0), workers, seed)
+            state = Neighbourhood(solid, bars, CRITERION, [by_score("hull-sum")], SweepCache(12, 0), workers, seed)
             reached = cost(bars)
             for _ in range(3):
-                outcome = state.run(Pace(Clock(), None, len(bars)), 8)
+                outcome = state.run(SearchBudget(Clock(), None, len(bars)), 8)
                 assert cost(outcome.parts) <= reached
                 reached = cost(outcome.parts)
 
@@ -113,7 +113,7 @@ def test_small_parts_are_drawn_more_often_and_only_those_near_take() -> None:
     places = [(0.0, 1.0), (1.05, 0.1), (1.2, 0.5), (5.0, 1.0)]
     parts: list[Part] = [Component(box((x, 0, 0), (x + width, 1, 1))) for x, width in places]
     with Workers(1) as workers:
-        here = Neighbours(parts, CRITERION, workers)
+        here = PartGraph(parts, CRITERION, workers)
     assert here.near(1, 0.1) == (0, 2)
     assert here.near(0, 0.04) == ()
     assert here.near(3, 10) == (0, 1, 2)
@@ -129,8 +129,8 @@ def test_a_search_in_vain_ends() -> None:
     solid = Component(cube.manifold + ball.manifold)
     parts: list[Part] = [cube, Component(solid.manifold - cube.manifold)]
     with Workers(1) as workers:
-        state = Neighbourhood(solid, parts, CRITERION, [by_score("hull-sum")], Views(12, 0), workers, 0)
-        outcome = state.run(Pace(Clock(), None, 2), 1000)
+        state = Neighbourhood(solid, parts, CRITERION, [by_score("hull-sum")], SweepCache(12, 0), workers, 0)
+        outcome = state.run(SearchBudget(Clock(), None, 2), 1000)
     assert outcome.exhausted
     assert outcome.steps < 1000
     assert len(outcome.parts) == 2

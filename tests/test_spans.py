@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
 
-from rlacd.robots.spans import Element, parse, replaced
+from rlacd.io.robots.spans import Element, parse, replaced
 
 NOWHERE = Path("test.xml")
 words = st.text(st.sampled_from("aé机-.9_"), max_size=5).map(lambda w: "t" + w)

@@ -17,10 +17,10 @@ import trimesh
 import rlacd
 from rlacd import _native
 from rlacd.clock import Clock
+from rlacd.io.read.load import load_mesh
 from rlacd.solid.cover import MOST_HULLS, cover
 from rlacd.solid.distance import hull_distances
 from rlacd.solid.hull import Hull
-from rlacd.solid.load import load_mesh
 from rlacd.workers import Workers
 from tests.hulls import assert_convex_hull
 from tests.shapes_large import LARGE, Mesh, boxes, bristles, noisy_ball, screws, sheet, spiked_ball, sponge, terrain
@@ -277,7 +277,7 @@ def test_a_stop_ends_with_its_decomposition() -> None:
 @pytest.mark.parametrize("name", ["terrain", "boxes"])
 def test_ctrl_c_is_heeded_in_the_middle_of_a_stage(name: str, tmp_path: Path) -> None:
     trimesh.Trimesh(*LARGE[name](), process=False).export(tmp_path / "mesh.ply")
-    code = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN); from rlacd.cli import main; main()"
+    code = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN); from rlacd.cli.main import main; main()"
     run = subprocess.Popen(
         [sys.executable, "-c", code, "decompose", str(tmp_path / "mesh.ply"), "-o", str(tmp_path / "hulls.glb")],
         stderr=subprocess.PIPE,

@@ -18,9 +18,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from rlacd.show import connections
-from rlacd.show.connections import LONGEST_HEAD, MOST_CONNECTIONS, MOST_STREAMS
-from rlacd.show.viewer import Viewer, open_viewer
+from rlacd.view import connections
+from rlacd.view.connections import LONGEST_HEAD, MOST_CONNECTIONS, MOST_STREAMS
+from rlacd.view.viewer import Viewer, open_viewer
 
 PATIENCE = 60.0
 
@@ -112,7 +112,7 @@ def wait_until(true: Callable[[], bool]) -> None:
 )
 def test_a_request_that_trickles_in_is_ended(viewer: Viewer, trickle: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(connections, "REQUEST_SECONDS", 0.5)
-    monkeypatch.setattr("rlacd.show.server.REQUEST_SECONDS", 0.5)
+    monkeypatch.setattr("rlacd.view.server.REQUEST_SECONDS", 0.5)
     trickle = trickle.replace(b"Content-Length", b"Content-Type: application/json\r\nContent-Length")
     with connected(viewer) as slow:
         slow.sendall(trickle)
@@ -174,7 +174,7 @@ def rough(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for one process")
 @pytest.mark.parametrize("seconds", [0.0, 2.0, 6.0])
 def test_the_command_leaves_at_once_and_in_silence_while_at_work(rough: Path, seconds: float) -> None:
-    command = [sys.executable, "-c", "from rlacd.cli import main; main()", "view", str(rough), "--no-browser"]
+    command = [sys.executable, "-c", "from rlacd.cli.main import main; main()", "view", str(rough), "--no-browser"]
     with subprocess.Popen([*command, "--quality", "best"], stderr=subprocess.PIPE, text=True) as process:
         try:
             assert process.stderr is not None
@@ -198,9 +198,9 @@ ENDINGS = {
     "done": "rlacd.decompose(mesh, quality='fast')",
     "kept": "import sys; sys.kept = rlacd.decompose(mesh, quality='fast', criterion=rlacd.NavigableSpace())",
     "raised": "rlacd.decompose(mesh, progress=lambda seen: 1 / 0)",
-    "viewed": "from rlacd.show.viewer import open_viewer\nwith open_viewer(mesh, port=0): pass",
+    "viewed": "from rlacd.view.viewer import open_viewer\nwith open_viewer(mesh, port=0): pass",
     "viewed for a while": (
-        "import time\nfrom rlacd.show.viewer import open_viewer\nwith open_viewer(mesh, port=0): time.sleep(2)"
+        "import time\nfrom rlacd.view.viewer import open_viewer\nwith open_viewer(mesh, port=0): time.sleep(2)"
     ),
 }
 

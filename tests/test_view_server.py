@@ -25,13 +25,13 @@ import pytest
 import trimesh
 from typer.testing import CliRunner
 
-from rlacd.cli import app
+from rlacd.cli.main import app
 from rlacd.criteria import NavigableSpace
 from rlacd.errors import MeshFileError, OptionError
 from rlacd.options import Options
-from rlacd.show.downloads import offered
-from rlacd.show.viewer import Viewer, open_viewer, read_wishes
-from rlacd.show.wishes import Wishes
+from rlacd.view.downloads import offered
+from rlacd.view.viewer import Viewer, open_viewer, read_controls
+from rlacd.view.wishes import ViewerControls
 
 PATIENCE = 60.0
 NAME = "an elbow 'n ümläut"
@@ -483,7 +483,7 @@ def test_the_command_says_what_is_wrong_in_one_sentence(mesh: Path, words: list[
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for one process")
 def test_the_command_tells_its_address_and_ends_with_ctrl_c(mesh: Path) -> None:
-    command = [sys.executable, "-c", "from rlacd.cli import main; main()", "view", str(mesh), "--no-browser"]
+    command = [sys.executable, "-c", "from rlacd.cli.main import main; main()", "view", str(mesh), "--no-browser"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         try:
             assert process.stderr is not None
@@ -501,8 +501,8 @@ def test_the_command_tells_its_address_and_ends_with_ctrl_c(mesh: Path) -> None:
 
 
 def test_the_controls_hold_the_defaults_of_the_command_line() -> None:
-    wishes, usual, space = Wishes(), Options(), NavigableSpace()
+    wishes, usual, space = ViewerControls(), Options(), NavigableSpace()
     for name in ("criterion", "threshold", "quality", "max_hulls", "max_vertices"):
         assert getattr(wishes, name) == getattr(usual, name)
     assert (wishes.radius, wishes.tolerance) == (space.radius, space.tolerance)
-    assert read_wishes({}) == wishes
+    assert read_controls({}) == wishes

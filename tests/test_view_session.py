@@ -12,7 +12,7 @@ import trimesh
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError
 from rlacd.progress import Progress, ProgressCallback
-from rlacd.show.session import Session, State
+from rlacd.view.session import Session, SessionState
 from tests.hulls import hull_of
 
 PATIENCE = 20.0  # seconds until a test gives up
@@ -58,7 +58,7 @@ def session(work: Work) -> Iterator[Session]:
         work.go_on(100)
 
 
-def until(session: Session, state: str, run: int | None = None) -> State:
+def until(session: Session, state: str, run: int | None = None) -> SessionState:
     for seen in session.changes(patience=PATIENCE):
         assert seen is not None, f"nothing changed while waiting for {state}"
         if seen.state == state and (run is None or seen.run == run):
@@ -72,7 +72,7 @@ def options_of(session: Session) -> dict[str, Any]:
 
 
 def test_it_begins_idle_with_nothing(session: Session) -> None:
-    assert session.state == State()
+    assert session.state == SessionState()
     assert session.result is None
 
 
@@ -146,7 +146,7 @@ def test_an_error_is_said_and_what_there_was_stays(session: Session, work: Work,
 def test_quiet_is_told_and_closing_lets_everyone_go(work: Work) -> None:
     session = Session(work)
     changes = session.changes(patience=0.01)
-    assert next(changes) == State()
+    assert next(changes) == SessionState()
     assert next(changes) is None
     session.close()
     assert [state.state for state in changes if state is not None] == ["closed"]

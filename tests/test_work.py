@@ -16,8 +16,8 @@ import rlacd
 from rlacd import cut_and_merge
 from rlacd.clock import Clock
 from rlacd.criteria import Concavity
-from rlacd.finish import merge_parts
-from rlacd.search.pace import Pace
+from rlacd.merge import merge_parts
+from rlacd.search.budget import SearchBudget
 from rlacd.solid.component import Component
 from rlacd.work import Work
 from rlacd.workers import Workers
@@ -37,7 +37,7 @@ def test_no_more_is_spent_than_there_is(most: float, prices: list[float]) -> Non
 
 @given(st.floats(0, 200), st.floats(0, 200), PRICES)
 def test_an_allowance_is_part_of_the_account(most: float, units: float, prices: list[float]) -> None:
-    pace = Pace(Clock(), None, 1, work=Work(most))
+    pace = SearchBudget(Clock(), None, 1, work=Work(most))
     with pace.allowance(units):
         for price in prices:
             pace.work.pay(price)

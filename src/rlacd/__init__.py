@@ -19,9 +19,9 @@ if TYPE_CHECKING:
         OutputError,
         RlacdError,
     )
+    from rlacd.io.robots import Rewritten, rewrite_robot
     from rlacd.presets import PRESETS, Preset
     from rlacd.progress import Progress
-    from rlacd.robots import Rewritten, rewrite_robot
 
 __all__ = [
     "PRESETS",

@@ -78,8 +78,8 @@ def directed_hausdorff(
 
 class Filling:
     def __init__(self, vertices: FloatArray, faces: IntArray) -> None: ...
-    def chance(self, hull_vertices: FloatArray, hull_faces: IntArray, threshold: float) -> int: ...  # 0, 1 or 2
-    def joint_chances(
+    def feasibility(self, hull_vertices: FloatArray, hull_faces: IntArray, threshold: float) -> int: ...  # 0, 1 or 2
+    def joint_feasibilities(
         self, groups: Sequence[FloatArray], pairs: IntArray, threshold: float, threads: int = 0
     ) -> tuple[FloatArray, IntArray]: ...
     def comes_deeper(self, hull_vertices: FloatArray, hull_faces: IntArray, threshold: float) -> bool: ...

@@ -20,7 +20,7 @@ MISSED = 1e-3
 """No point of a shaving is farther than this from the solid that stands for it."""
 
 
-class Divisions:
+class CutCache:
     """What components fall into, each way of dividing one made once: several trees of cuts share their first levels."""
 
     def __init__(self) -> None:
@@ -72,11 +72,11 @@ class CutTree:
         Shared with other trees.
     """
 
-    def __init__(self, root: Component, policy: Policy, workers: Workers, divisions: Divisions | None = None) -> None:
+    def __init__(self, root: Component, policy: Policy, workers: Workers, cache: CutCache | None = None) -> None:
         self.root = root
         self._policy = policy
         self._workers = workers
-        self._divisions = divisions or Divisions()
+        self._cache = cache or CutCache()
         self._children: dict[Component, list[Component]] = {}
 
     def cut_until(
@@ -127,13 +127,13 @@ class CutTree:
 
     def _divide(self, components: Sequence[Component]) -> None:
         """Split components into their connected pieces, and cut those that are in one piece already."""
-        pieces = [self._divisions.pieces(component) for component in components]
+        pieces = [self._cache.pieces(component) for component in components]
         whole = [c for c, own in zip(components, pieces, strict=True) if own == [c]]
         threads = self._workers.share(len(whole))
         planes = self._workers.map(lambda c: self._policy.choose(c, threads), whole)
         self._children.update((c, own) for c, own in zip(components, pieces, strict=True) if own != [c])
         for component, plane in zip(whole, planes, strict=True):
-            self._children[component] = [] if plane is None else self._divisions.sides(component, plane)
+            self._children[component] = [] if plane is None else self._cache.sides(component, plane)
 
 
 def is_shaving(piece: Component, across: Component) -> bool:

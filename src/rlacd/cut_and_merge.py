@@ -10,7 +10,7 @@ from rlacd._native import Stopped
 from rlacd.clock import Clock
 from rlacd.criteria import Criterion
 from rlacd.cut import CutTree
-from rlacd.finish import drop_slivers, merge_parts
+from rlacd.merge import drop_slivers, merge_parts
 from rlacd.solid.component import Component, Part
 from rlacd.workers import Workers
 

@@ -18,20 +18,20 @@ from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.decomposition import Decomposition
 from rlacd.fields import check_callback
-from rlacd.finish import drop_slivers, in_input, limit_part, limit_roughly, merge_to_count, with_limits
+from rlacd.io.read.load import InputMesh, load_mesh
+from rlacd.merge import drop_slivers, in_input, limit_part, limit_roughly, merge_to_count, with_limits
 from rlacd.options import CONCAVITY, DEFAULT_RESOLUTION, DEFAULT_THRESHOLD, OPTION_NAMES, OpenName, Options, QualityName
-from rlacd.planes.views import Views
+from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import AS_PUBLISHED, make_policy
 from rlacd.presets import PresetName
 from rlacd.progress import ProgressCallback
 from rlacd.renamed import with_former
+from rlacd.repair.repair import repair
 from rlacd.report import make_report
-from rlacd.search import do_without, level, search
-from rlacd.search.levels import Account
+from rlacd.search import eliminate_parts, level, search
+from rlacd.search.levels import SearchSummary
 from rlacd.solid.component import Component, Part
 from rlacd.solid.cover import cover
-from rlacd.solid.load import InputMesh, load_mesh
-from rlacd.solid.repair import repair
 from rlacd.solid.solid import Solid
 from rlacd.workers import Workers
 
@@ -182,7 +182,7 @@ class _Reached(NamedTuple):
     options: Options
     goal: Criterion
     parts: list[Part]
-    found: Account | None = None
+    found: SearchSummary | None = None
 
 
 def _cleaned(reached: _Reached, max_vertices: int | None, max_faces: int | None, workers: Workers) -> list[Part]:
@@ -212,7 +212,7 @@ def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Cl
         return _Reached(solid, options, _unprepared(options, solid), parts)
     if options.max_hulls is None:  # otherwise the threshold may be exceeded anyway
         goal = with_limits(goal, options.max_vertices, options.max_faces)
-    views = Views()
+    views = SweepCache()
     tree = CutTree(root, make_policy(options.policy, views, _scale(goal)), workers)
     parts, goal = _parts(tree, goal, options, workers, clock)
     may_be_divided = options.merge and goal.obstacles is not None and options.policy not in AS_PUBLISHED
@@ -220,7 +220,7 @@ def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Cl
     try:
         if may_be_divided and clock.stopped_by is None:
             with clock.stage("search"):
-                parts = do_without(root, parts, goal, workers, clock, options.seed)
+                parts = eliminate_parts(root, parts, goal, workers, clock, options.seed)
         assert options.quality is not None
         if options.quality != "fast" and clock.stopped_by is None:
             bounds = level(options.quality, options.budget, options.search_steps)

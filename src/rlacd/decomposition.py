@@ -128,7 +128,7 @@ class Decomposition:
         MissingExtraError
             USD was asked for and the extra ``usd`` is not installed.
         """
-        from rlacd.formats import save
+        from rlacd.io.write import save
 
         return save(self, path, file_format=file_format, density=density, up=up, one_mesh=one_mesh)
 
@@ -150,7 +150,7 @@ class Decomposition:
         OutputError
             The criterion was not `NavigableSpace`, the ending is unknown, or the place cannot be written to.
         """
-        from rlacd.formats import save_balls
+        from rlacd.io.write import save_balls
 
         if self.balls is None:
             raise OutputError("there are no balls to write; decompose with a NavigableSpace.")
@@ -182,7 +182,7 @@ class Decomposition:
         OptionError
             `width` or `up` is none of those above.
         """
-        from rlacd.show import draw_picture
+        from rlacd.view import draw_picture
 
         return draw_picture(self, path, width=width, up=up)
 
@@ -208,14 +208,14 @@ class Decomposition:
         OptionError
             `up` is none of those above.
         """
-        from rlacd.show import save_report_page
+        from rlacd.view import save_report_page
 
         return save_report_page(self, path, up=up)
 
     def scene(self) -> trimesh.Scene:
         """Get the hulls as a scene of trimesh: a node and geometry each, ``hull_000`` and so on, in its colour."""
-        from rlacd.formats.encode import hull_name
-        from rlacd.formats.palette import hull_colors
+        from rlacd.io.write.encode import hull_name
+        from rlacd.io.write.palette import hull_colors
 
         scene = trimesh.Scene()
         for index, (hull, color) in enumerate(zip(self.hulls, hull_colors(len(self)), strict=True)):
@@ -254,7 +254,7 @@ class Decomposition:
         """Show the 3-D view in a notebook."""
         from html import escape
 
-        from rlacd.show.html_report import report_page
+        from rlacd.view.html_report import report_page
 
         page = escape(report_page(self, picture=False))
         return f'<iframe srcdoc="{page}" style="width:100%;height:600px;border:0"></iframe>'

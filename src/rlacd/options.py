@@ -37,7 +37,7 @@ onto the surface folds over itself; more than 400 would take over 4 GB."""
 OpenName = Literal["auto", "solid", "thin"]
 
 OPEN: tuple[OpenName, ...] = get_args(OpenName)
-"""What becomes of bodies with openings; see `rlacd.solid.repair.repair`."""
+"""What becomes of bodies with openings; see `rlacd.repair.repair.repair`."""
 
 QualityName = Literal["fast", "balanced", "best"]
 

@@ -1,4 +1,4 @@
-"""What the command line writes, and how: each option stated once. `rlacd.formats` checks by them too."""
+"""What the command line writes, and how: each option stated once. `rlacd.io.write` checks by them too."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ class Preset:
 
     def shortcomings(self, hulls: Sequence[Hull]) -> list[str]:
         """Check hulls against the limits: a sentence for each that is broken, none when all is well."""
-        from rlacd.finish.slivers import is_sliver  # not for --help, which only wants the names
+        from rlacd.merge.slivers import is_sliver  # not for --help, which only wants the names
 
         said = []
         for what, limit, counts in (

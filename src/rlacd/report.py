@@ -41,7 +41,7 @@ def make_report(
     """
     is_cover = solid.manifold.is_empty()  # hulls of what was not repaired: nothing is known of the parts in them
     errors = None if is_cover else clock.if_in_time(lambda: workers.map(criterion.error, parts), lambda: None)
-    account = criterion.account(errors)
+    summary = criterion.summary(errors)
     over = under = None
     has_surface = len(solid.surface[1]) > 0  # a cloud of points has none
     if has_surface:
@@ -59,7 +59,7 @@ def make_report(
         "parts": len(hulls),
         "faces": sum(len(hull.faces) for hull in hulls),
         "vertices": sum(len(hull.vertices) for hull in hulls),
-        **account.entries,
+        **summary.entries,
         "hausdorff": {"over": over, "under": under},
         "scale": solid.frame.scale,
         "mass": _mass(mass),
@@ -73,13 +73,13 @@ def make_report(
                 if has_surface and over is None
                 else []
             ),
-            *account.warnings,
+            *summary.warnings,
             *_shortcomings(
                 [part.hull for part in parts],
                 over,
                 under,
                 options,
-                criterion.overhang if not account.warnings else math.inf,
+                criterion.overhang if not summary.warnings else math.inf,
             ),
             *(
                 _out_of_the_box([part.hull for part in parts], solid)

@@ -67,7 +67,7 @@ def replace(thing: bpy.types.Object, result: Decomposition) -> list[bpy.types.Ob
 def _add(
     thing: bpy.types.Object, collection: bpy.types.Collection, index: int, hull: trimesh.Trimesh
 ) -> bpy.types.Object:
-    from rlacd.formats.palette import hull_colors, linear_from_srgb
+    from rlacd.io.write.palette import hull_colors, linear_from_srgb
 
     name = f"{thing.name}_hull_{index:03d}"
     to_object = np.linalg.inv(np.array(thing.matrix_world, dtype=np.float64))

@@ -2,7 +2,17 @@
 
 from rlacd.bench.methods import Method, make_method
 from rlacd.bench.metrics import Metrics, measure
-from rlacd.bench.runner import Bench, Limits, find_meshes
-from rlacd.bench.store import Store, Task
+from rlacd.bench.runner import Bench, BenchLimits, find_meshes
+from rlacd.bench.store import BenchStore, BenchTask
 
-__all__ = ["Bench", "Limits", "Method", "Metrics", "Store", "Task", "find_meshes", "make_method", "measure"]
+__all__ = [
+    "Bench",
+    "BenchLimits",
+    "BenchStore",
+    "BenchTask",
+    "Method",
+    "Metrics",
+    "find_meshes",
+    "make_method",
+    "measure",
+]

@@ -18,8 +18,8 @@ import numpy as np
 from rlacd.bench.methods import make_method
 from rlacd.bench.metrics import measure
 from rlacd.bench.store import Row, load_hulls, save_hulls
-from rlacd.solid.load import load_mesh
-from rlacd.solid.repair import repair
+from rlacd.io.read.load import load_mesh
+from rlacd.repair.repair import repair
 
 _CUBE = np.array([(x, y, z) for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
 _CUBE_FACES = np.array(

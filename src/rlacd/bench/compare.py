@@ -14,11 +14,11 @@ from rlacd.bench.methods import make_method
 from rlacd.bench.page import Figure, Heading, Page, Text
 from rlacd.bench.runner import Bench
 from rlacd.bench.sheets import draw_sheet
-from rlacd.bench.store import Row, Task, load_hulls
+from rlacd.bench.store import BenchTask, Row, load_hulls
 from rlacd.bench.tables import Table, as_csv, common_meshes, comparison, details, failures, short_names
 from rlacd.bench.tuning import Point, known_curve
 from rlacd.errors import MissingExtraError
-from rlacd.formats import write_file
+from rlacd.io.write import write_file
 
 DEFAULT_METHODS = (
     "coacd",
@@ -161,7 +161,7 @@ def sheets(bench: Bench, entries: Sequence[Entry], meshes: Sequence[str], up: st
         managed = []
         for entry in entries:
             row = next((row for row in entry.rows if row["mesh"] == mesh and "error" not in row), None)
-            path = bench.store.hulls_of(Task(mesh, entry.method, entry.setting))
+            path = bench.store.hulls_of(BenchTask(mesh, entry.method, entry.setting))
             if row is not None and path.exists():
                 managed.append((entry.label, load_hulls(path)[0], row))
         axis = "y" if Path(mesh).suffix.lower() in (".glb", ".gltf") else up

@@ -16,18 +16,18 @@ from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.errors import OptionError
-from rlacd.finish import limit_part
+from rlacd.io.read.load import load_mesh
+from rlacd.merge import limit_part
 from rlacd.planes.candidates import OFFSETS_PER_AXIS, Candidates
 from rlacd.planes.concave_edges import concave_edge_planes
 from rlacd.planes.sweep import SLIVER, sweep
 from rlacd.policies.features import candidates_of
 from rlacd.policies.greedy import cheapest, excess_norm, hull_sum
 from rlacd.policies.learned import Learned
+from rlacd.repair.repair import repair
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Plane
 from rlacd.solid.hull import Hull
-from rlacd.solid.load import load_mesh
-from rlacd.solid.repair import repair
 from rlacd.workers import Workers
 
 RANKINGS = ("learned", "excess")

@@ -11,10 +11,10 @@ from rlacd.bench.page import Figure, Page, Text
 from rlacd.bench.tables import Table
 from rlacd.criteria import Concavity
 from rlacd.errors import MeshError, RlacdError
+from rlacd.io.read.load import load_mesh
 from rlacd.learn.paper.tabular import Node, grow, middle_planes, process_of, q_learning
+from rlacd.repair.repair import repair
 from rlacd.solid.component import Component
-from rlacd.solid.load import load_mesh
-from rlacd.solid.repair import repair
 
 DISCOUNTS = {
     "share of the hull (eq. 9)": None,

@@ -8,7 +8,7 @@ from dataclasses import replace
 from rlacd.bench.compare import Entry, about, curve_chart, mesh_by_mesh, trade_off
 from rlacd.bench.page import Heading, Page, Text
 from rlacd.bench.runner import Bench
-from rlacd.bench.store import Row, Task
+from rlacd.bench.store import BenchTask, Row
 from rlacd.bench.tables import Table, common_meshes, comparison, details, failures
 from rlacd.bench.tuning import CLOSE, Point, tune
 from rlacd.errors import OptionError
@@ -87,7 +87,7 @@ def vhacd_at_equal_parts(bench: Bench, reference: str, setting: float) -> Page:
     """V-HACD, asked for as many hulls as the reference made of each mesh (4.4.2)."""
     ours = bench.run(reference, setting)
     counts = {row["mesh"]: row["parts"] for row in ours if "error" not in row}
-    theirs = bench.run_tasks([Task(mesh, "vhacdx:hulls", float(n)) for mesh, n in counts.items()])
+    theirs = bench.run_tasks([BenchTask(mesh, "vhacdx:hulls", float(n)) for mesh, n in counts.items()])
     entries = [Entry(reference, setting, ours), Entry("vhacdx:hulls", setting, theirs)]
     page = Page("V-HACD at equal part count", [about(bench)])
     groups = [(entries[0].label, ours), ("V-HACD 4, at most as many hulls", theirs)]

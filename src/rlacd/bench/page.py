@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from rlacd.bench.tables import Table
-from rlacd.formats import write_file
+from rlacd.io.write import write_file
 
 
 @dataclass(frozen=True)

@@ -13,14 +13,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rlacd.bench.methods import make_method
-from rlacd.bench.store import Row, Store, Task
+from rlacd.bench.store import BenchStore, BenchTask, Row
 from rlacd.pool.process import kill_group, why_it_ended
 
 Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Limits:
+class BenchLimits:
     """What a task may take.
 
     Attributes
@@ -57,21 +57,21 @@ class Bench:
     """
 
     def __init__(
-        self, meshes: Path, names: Sequence[str], store: Store, limits: Limits | None = None, say: Say = print
+        self, meshes: Path, names: Sequence[str], store: BenchStore, limits: BenchLimits | None = None, say: Say = print
     ) -> None:
         self.meshes = meshes
         self.names = list(names)
         self.store = store
-        self.limits = limits or Limits()
+        self.limits = limits or BenchLimits()
         self._say = say
         self._running: set[subprocess.Popen[bytes]] = set()
         self._stopping = False
 
     def run(self, method: str, setting: float) -> list[Row]:
         """All meshes by one method; in the order of the names."""
-        return self.run_tasks([Task(name, method, setting) for name in self.names])
+        return self.run_tasks([BenchTask(name, method, setting) for name in self.names])
 
-    def run_tasks(self, tasks: Iterable[Task]) -> list[Row]:
+    def run_tasks(self, tasks: Iterable[BenchTask]) -> list[Row]:
         """Do what is not done yet, and return the rows of all tasks in their order."""
         tasks = list(tasks)
         waiting = [task for task in dict.fromkeys(tasks) if self.known(task) is None]
@@ -90,12 +90,12 @@ class Bench:
             pool.shutdown(cancel_futures=True)
         return [found for task in tasks if (found := self.store.get(task)) is not None]
 
-    def known(self, task: Task) -> Row | None:
+    def known(self, task: BenchTask) -> Row | None:
         """The row of a task that is finished, unless another version of its tool made it."""
         row = self.store.get(task)
         return None if row is None or is_outdated(row) else row
 
-    def _finish(self, task: Task) -> Row:
+    def _finish(self, task: BenchTask) -> Row:
         row: Row = {"mesh": task.mesh, "method": task.method, "setting": task.setting}
         hulls = self.store.hulls_of(task)
         if self.store.get(task) is not None:
@@ -111,7 +111,7 @@ class Bench:
             self.store.add(row)
         return row
 
-    def _child(self, task: Task, hulls: Path, answer: Path) -> str | None:
+    def _child(self, task: BenchTask, hulls: Path, answer: Path) -> str | None:
         """Run one process, which makes the hulls unless they are there; None, or what went wrong with it."""
         order = {
             "mesh": str(self.meshes / task.mesh),

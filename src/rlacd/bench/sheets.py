@@ -12,10 +12,10 @@ import numpy as np
 
 from rlacd.bench.methods import RawHull
 from rlacd.bench.store import Row
-from rlacd.formats.palette import hull_colors, linear_from_srgb
-from rlacd.show.picture import FADED, INK, INPUT_COLOR, PAPER, TO_Z_UP
-from rlacd.show.render import Body, render, require_extra
-from rlacd.solid.load import load_mesh
+from rlacd.io.read.load import load_mesh
+from rlacd.io.write.palette import hull_colors, linear_from_srgb
+from rlacd.view.picture import FADED, INK, INPUT_COLOR, PAPER, TO_Z_UP
+from rlacd.view.render import Body, render, require_extra
 
 PANEL = (340, 300)
 """Pixels of one picture."""

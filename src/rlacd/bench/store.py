@@ -22,7 +22,7 @@ Row: TypeAlias = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Task:
+class BenchTask:
     """One mesh, one method and its number.
 
     Attributes
@@ -51,7 +51,7 @@ class Task:
         return f"{Path(self.mesh).stem[:40]}-{digest}.npz"
 
 
-class Store:
+class BenchStore:
     """A folder of results: ``results.jsonl`` and ``hulls/``.
 
     Parameters
@@ -84,7 +84,7 @@ class Store:
     def __len__(self) -> int:
         return len(self._rows)
 
-    def get(self, task: Task) -> Row | None:
+    def get(self, task: BenchTask) -> Row | None:
         """The row of a task, if it is finished."""
         return self._rows.get(task.key)
 
@@ -105,7 +105,7 @@ class Store:
         """Let others write to the folder."""
         self._held.close()
 
-    def hulls_of(self, task: Task) -> Path:
+    def hulls_of(self, task: BenchTask) -> Path:
         """Where the hulls of a task are, or will be."""
         return self.folder / "hulls" / task.file_name
 

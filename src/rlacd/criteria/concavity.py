@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rlacd import _native
-from rlacd.criteria.criterion import Account, Chance, Part
+from rlacd.criteria.criterion import CriterionSummary, Feasibility, Part
 from rlacd.errors import OptionError
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.hull import Hull
@@ -100,15 +100,15 @@ class Concavity:
         """``0.3 R_v``, which the concavity is never less than."""
         return VOLUME_WEIGHT * volume_radius(volume, hull_volume)
 
-    def chance(self, filling: _native.Filling, hull: Hull) -> Chance:
+    def feasibility(self, filling: _native.Filling, hull: Hull) -> Feasibility:
         """Look at the solid's corners and at points of the hull."""
-        return Chance(filling.chance(hull.vertices, hull.faces, self.threshold))
+        return Feasibility(filling.feasibility(hull.vertices, hull.faces, self.threshold))
 
-    def chances(
+    def feasibilities(
         self, filling: _native.Filling, hulls: Sequence[Hull], pairs: IntArray, threads: int
     ) -> tuple[FloatArray, IntArray]:
         """Look at the solid's corners and at points of the joint hulls."""
-        return filling.joint_chances([hull.vertices for hull in hulls], pairs, self.threshold, threads)
+        return filling.joint_feasibilities([hull.vertices for hull in hulls], pairs, self.threshold, threads)
 
     def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
         """Whether the solid's surface comes deeper inside the hull than the threshold."""
@@ -135,18 +135,18 @@ class Concavity:
     def obstacles(self) -> None:
         """None: concavity is not about space."""
 
-    def account(self, errors: Sequence[float] | None) -> Account:
+    def summary(self, errors: Sequence[float] | None) -> CriterionSummary:
         """The concavity of each part, and how many exceed the threshold."""
         if errors is None:
             sentence = "There was no time to measure the concavity of the parts."
-            return Account({"concavity": {"per_part": None, "max": None}}, (sentence,))
+            return CriterionSummary({"concavity": {"per_part": None, "max": None}}, (sentence,))
         exceeding = [error for error in errors if error > self.threshold]
         warning = (
             f"{len(exceeding)} of {len(errors)} parts exceed the concavity {self.threshold:.4g}; "
             f"the worst has {max(exceeding, default=0):.4g}."
         )
         entries = {"concavity": {"per_part": list(errors), "max": max(errors)}}
-        return Account(entries, (warning,) if exceeding else ())
+        return CriterionSummary(entries, (warning,) if exceeding else ())
 
     def error(self, part: Part) -> float:
         """Upper end of the measured concavity; no more than the threshold where the part certainly meets it."""

@@ -13,11 +13,11 @@ from rlacd.solid.balls import Balls
 from rlacd.solid.hull import Hull
 
 
-class Chance(IntEnum):
-    """Whether what a solid fills of a hull may meet a criterion (see native/filling.hpp)."""
+class Feasibility(IntEnum):
+    """Whether what a solid fills of a hull may meet a criterion (see native/distance/filling.hpp)."""
 
-    SOME = 0
-    NONE = 1
+    MAYBE = 0
+    NO = 1
     NEVER = 2
     """Nor does what it fills of any hull that holds this one."""
 
@@ -54,7 +54,7 @@ class Part(Protocol):
 
 
 @dataclass(frozen=True)
-class Account:
+class CriterionSummary:
     """What a report says of a criterion.
 
     Attributes
@@ -83,16 +83,17 @@ class Criterion(Protocol):
     def excludes(self, volume: float, hull_volume: float) -> bool:
         """Tell from the volumes alone that a part cannot meet the criterion (cheap, necessary)."""
 
-    def chance(self, filling: _native.Filling, hull: Hull) -> Chance:
+    def feasibility(self, filling: _native.Filling, hull: Hull) -> Feasibility:
         """Tell cheaply whether what a solid fills of a hull may meet the criterion."""
 
-    def chances(
+    def feasibilities(
         self, filling: _native.Filling, hulls: Sequence[Hull], pairs: IntArray, threads: int
     ) -> tuple[FloatArray, IntArray]:
-        """Volumes [P] of the joint hulls of pairs [P, 2] of hulls, but for `NEVER`, and the `chance` [P] of each."""
+        """Volumes [P] of the joint hulls of pairs [P, 2] of hulls, but for `NEVER`, and the `feasibility` [P] of
+        each."""
 
     def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
-        """Whether what a solid fills of a hull, and of any that holds it, does not meet it: cheaper than `chance`.
+        """Whether what a solid fills of a hull, and of any that holds it, does not meet it: cheaper than `feasibility`.
 
         It need not be known; False then.
         """
@@ -126,5 +127,5 @@ class Criterion(Protocol):
     def obstacles(self) -> Balls | None:
         """Balls that no hull may touch, where the criterion is made of them."""
 
-    def account(self, errors: Sequence[float] | None) -> Account:
+    def summary(self, errors: Sequence[float] | None) -> CriterionSummary:
         """Tell how well finished parts meet the criterion, given the error of each; None where they are not known."""

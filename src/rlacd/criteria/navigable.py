@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rlacd import _native
-from rlacd.criteria.criterion import Account, Chance, Part
+from rlacd.criteria.criterion import CriterionSummary, Feasibility, Part
 from rlacd.errors import OptionError
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.balls import Balls
@@ -226,15 +226,15 @@ class Navigable:
         """Nothing: volumes say nothing about balls."""
         return False
 
-    def chance(self, filling: _native.Filling, hull: Hull) -> Chance:
+    def feasibility(self, filling: _native.Filling, hull: Hull) -> Feasibility:
         """None: what is inside a hull does not count, and hulls of pairs have been tried."""
-        return Chance.NEVER
+        return Feasibility.NEVER
 
-    def chances(
+    def feasibilities(
         self, filling: _native.Filling, hulls: Sequence[Hull], pairs: IntArray, threads: int
     ) -> tuple[FloatArray, IntArray]:
         """None, and no volumes: they are not asked for."""
-        return np.zeros(len(pairs)), np.full(len(pairs), int(Chance.NEVER), dtype=np.int32)
+        return np.zeros(len(pairs)), np.full(len(pairs), int(Feasibility.NEVER), dtype=np.int32)
 
     def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
         """Not known: balls are asked of parts, not of hulls."""
@@ -254,7 +254,7 @@ class Navigable:
         """The balls."""
         return self.balls
 
-    def account(self, errors: Sequence[float] | None) -> Account:
+    def summary(self, errors: Sequence[float] | None) -> CriterionSummary:
         """How many balls there are, what became of them, and how deep the parts' hulls reach into them."""
         exceeding = [error for error in errors or () if error > 0]
         sentences = list(self.warnings)
@@ -278,7 +278,7 @@ class Navigable:
             **asdict(self.conflicts),
             "intrusion": {"per_part": errors and list(errors), "max": errors and max(errors)},
         }
-        return Account({"navigable": entries}, tuple(sentences))
+        return CriterionSummary({"navigable": entries}, tuple(sentences))
 
     def filled(self, part: Part) -> float:
         """Volume of the hulls of the pieces: filling what a piece's own hull fills already costs nothing."""

@@ -23,7 +23,7 @@ from safetensors.torch import load_file, save_file
 from torch import Tensor
 
 from rlacd.errors import OutputError, TrainingError
-from rlacd.read_file import read_file
+from rlacd.io.read.open_file import read_file
 
 FORMAT = 2
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rlacd.criteria import Concavity
 from rlacd.learn.meshes import Solids, list_meshes
 from rlacd.learn.paper.episodes import Episodes
-from rlacd.learn.paper.mdp import Cutting, Reward
+from rlacd.learn.paper.mdp import CutProcess, Reward
 from rlacd.planes.candidates import OFFSETS_PER_AXIS
 from rlacd.policies.observe import Observation, observe
 from rlacd.solid.arrays import BoolArray
@@ -90,7 +90,7 @@ class CutEnv(gymnasium.Env[_Observed, NDArray[np.int64]]):
         self._episodes = Episodes(Solids(folder), names, Concavity(threshold), rotate, max_cuts, max_parts)
         self._threshold, self._points = threshold, points
         self._weights = (volume_reward, finish_reward)
-        self._cutting: Cutting
+        self._cutting: CutProcess
         self._seen: dict[Component, Observation] = {}
         self._cuts = 0
         self._name = ""
@@ -106,7 +106,7 @@ class CutEnv(gymnasium.Env[_Observed, NDArray[np.int64]]):
         )
 
     @property
-    def cutting(self) -> Cutting:
+    def cutting(self) -> CutProcess:
         """The solid being cut."""
         return self._cutting
 

@@ -20,13 +20,13 @@ from manifold3d import Manifold, Mesh64
 from numpy.typing import NDArray
 
 from rlacd.errors import MeshFileError, RlacdError, TrainingError
+from rlacd.io.read.companions import lay_out, mesh_files
+from rlacd.io.read.load import load_mesh
 from rlacd.learn.files import packed, save_bytes, unpacked
+from rlacd.repair.repair import repair
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component
-from rlacd.solid.files import lay_out, mesh_files
 from rlacd.solid.frame import Frame
-from rlacd.solid.load import load_mesh
-from rlacd.solid.repair import repair
 
 ENDINGS = frozenset({".ply", ".obj", ".stl", ".off", ".glb", ".gltf", ".dae", ".3mf"})
 

@@ -3,7 +3,7 @@
 A component with a reflex edge is not convex, and it stays so until a plane through that edge (or nearly) separates its
 two faces. Each edge offers the plane that halves the reflex angle and the planes of its two faces; of the many edges of
 a mesh, few are asked: deep ones, sharp ones, long creases first, and spread out (Andrews, "Navigation-Driven
-Approximate Convex Decomposition", SIGGRAPH 2024). The work is done in native/concave_edges.hpp.
+Approximate Convex Decomposition", SIGGRAPH 2024). The work is done in native/cut/concave_edges.hpp.
 """
 
 from __future__ import annotations

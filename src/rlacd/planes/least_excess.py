@@ -20,8 +20,8 @@ def least_excess(component: Component, candidates: Candidates, exponent: float, 
     """Get the valid plane of least cost; None when every plane misses the solid or shaves off a film.
 
     The cost is the `exponent`-norm of the two sides' |CH(m_i)| - |m_i|. It is measured for those planes only that
-    bounds do not rule out (see native/least_excess.hpp). Of planes that cost the same but for rounding, as they do in
-    symmetric shapes, the first is taken, so that the cuts do not depend on the input's unit and place.
+    bounds do not rule out (see native/cut/least_excess.hpp). Of planes that cost the same but for rounding, as they do
+    in symmetric shapes, the first is taken, so that the cuts do not depend on the input's unit and place.
 
     Parameters
     ----------

@@ -59,6 +59,6 @@ class Sweep:
 
 
 def sweep(component: Component, candidates: Candidates, threads: int = 1) -> Sweep:
-    """Score all candidates of a component: exact volumes of both sides' solids and hulls (see native/sweep.hpp)."""
+    """Score all candidates of a component: exact volumes of both sides' solids and hulls (see native/cut/sweep.hpp)."""
     scores = _native.sweep(component.vertices, component.faces, candidates.directions, candidates.offsets, threads)
     return Sweep(candidates, *np.ascontiguousarray(scores.T))

@@ -1,6 +1,6 @@
 """Which plane to cut next."""
 
-from rlacd.planes.views import Views
+from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies.greedy import SCORES, Greedy
 from rlacd.policies.navacd import CONCAVE_EDGES, NavACD
 from rlacd.policies.policy import Policy
@@ -8,7 +8,7 @@ from rlacd.policies.qpolicy import QPolicy
 from rlacd.policy_names import AS_PUBLISHED, EDGES, POLICIES, WEIGHTS_ENDING, is_policy
 
 
-def make_policy(name: str, views: Views | None = None, scale: float | None = None) -> Policy:
+def make_policy(name: str, sweeps: SweepCache | None = None, scale: float | None = None) -> Policy:
     """Build the policy called `name`.
 
     ``greedy`` looks at 150 planes and those of four concave edges, and takes the one with the least p-norm of excess
@@ -36,7 +36,7 @@ def make_policy(name: str, views: Views | None = None, scale: float | None = Non
         A learned policy is asked for without the extra ``learned``.
     """
     if name == "greedy":
-        return Greedy(views=views)
+        return Greedy(sweeps=sweeps)
     if name == "navacd":
         return NavACD()
     if name.endswith(WEIGHTS_ENDING):
@@ -48,7 +48,7 @@ def make_policy(name: str, views: Views | None = None, scale: float | None = Non
     if name == "learned" or name.endswith(WEIGHTS_ENDING):
         from rlacd.policies.learned import Learned  # onnxruntime takes a while to import
 
-        return Learned(None if name == "learned" else name, scale, views=views)
+        return Learned(None if name == "learned" else name, scale, sweeps=sweeps)
     family, _, score = name.partition("-")
     if family == "greedy" and score.removesuffix(EDGES) in SCORES:
         return Greedy(score.removesuffix(EDGES), concave_edges=CONCAVE_EDGES if score.endswith(EDGES) else 0)

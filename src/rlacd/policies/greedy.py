@@ -10,7 +10,7 @@ import numpy as np
 
 from rlacd.planes.least_excess import SLIVERS, TIE, least_excess
 from rlacd.planes.sweep import Sweep
-from rlacd.planes.views import Views
+from rlacd.planes.sweep_cache import SweepCache
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
 
@@ -66,10 +66,10 @@ class Greedy:
         Where the planes come from; decides about them then.
     """
 
-    def __init__(self, score: str = "excess-norm", concave_edges: int = 4, views: Views | None = None) -> None:
+    def __init__(self, score: str = "excess-norm", concave_edges: int = 4, sweeps: SweepCache | None = None) -> None:
         self._exponent = SCORES[score]
-        self._views = views or Views(concave_edges=concave_edges)
+        self._sweep_cache = sweeps or SweepCache(concave_edges=concave_edges)
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None when every candidate misses it or shaves off a film."""
-        return least_excess(component, self._views.candidates(component), self._exponent, threads)
+        return least_excess(component, self._sweep_cache.candidates(component), self._exponent, threads)

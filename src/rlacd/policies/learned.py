@@ -1,6 +1,6 @@
 """The learned policy: a small network ranks the planes of the sweep by the parts it expects to be left in the end.
 
-The network (see `rlacd.learn.guide`) is run by onnxruntime, on one thread: several components at a time share the
+The network (see `rlacd.learn.ranker`) is run by onnxruntime, on one thread: several components at a time share the
 processors already.
 """
 
@@ -16,16 +16,16 @@ from typing import Any
 import numpy as np
 
 from rlacd.errors import WeightsError
+from rlacd.io.read.open_file import read_file
 from rlacd.planes.sweep import Sweep
-from rlacd.planes.views import Views
+from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies.features import CONCAVE_EDGES, DIRECTIONS, VERSION, features, measures, planes_per_axis, tables
 from rlacd.policies.greedy import cheapest, excess_norm
 from rlacd.policies.network_file import open_network
-from rlacd.read_file import read_file
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
 
-SHIPPED = "guide.onnx"
+SHIPPED = "ranker.onnx"
 """The weights in `rlacd.weights`."""
 
 INPUTS = ["planes", "edges", "component"]
@@ -67,13 +67,13 @@ class About:
     edge_bonus: float
 
 
-class Guide:
+class PlaneRanker:
     """The network, ready to be asked.
 
     Parameters
     ----------
     weights : path, optional
-        An ONNX file exported by ``python -m rlacd.learn.guide``; the shipped one by default.
+        An ONNX file exported by ``python -m rlacd.learn.ranker``; the shipped one by default.
 
     Raises
     ------
@@ -103,18 +103,18 @@ class Guide:
         return q
 
 
-def guided_cost(
-    guide: Guide, component: Component, swept: Sweep, scale: float, blend: float | None = None
+def ranked_cost(
+    ranker: PlaneRanker, component: Component, swept: Sweep, scale: float, blend: float | None = None
 ) -> FloatArray:
     """Cost of every plane of a sweep: parts expected * greedy score ** blend, a little less for concave edges' planes.
 
     The greedy score counts what the network cannot know: it has been told of few planes of a component what they end
     in, and the best of 150 guesses is one that is wrong.
     """
-    blend = guide.about.blend if blend is None else blend
+    blend = ranker.about.blend if blend is None else blend
     greedy = (excess_norm(swept) / component.hull.volume**1.3 + NOTHING) ** (1 / 1.3)
-    log_parts = guide.log_parts(component, swept, scale)
-    log_parts[DIRECTIONS * planes_per_axis(swept) :] -= guide.about.edge_bonus
+    log_parts = ranker.log_parts(component, swept, scale)
+    log_parts[DIRECTIONS * planes_per_axis(swept) :] -= ranker.about.edge_bonus
     parts = np.exp(np.round(log_parts, DECIMALS))
     cost: FloatArray = parts * greedy**blend
     return cost
@@ -145,29 +145,29 @@ class Learned:
         weights: str | os.PathLike[str] | None = None,
         scale: float | None = None,
         blend: float | None = None,
-        views: Views | None = None,
+        sweeps: SweepCache | None = None,
     ) -> None:
-        self._guide = load_guide(weights)
-        self._views = views or Views(self._guide.about.per_axis, CONCAVE_EDGES)
+        self._guide = load_ranker(weights)
+        self._sweep_cache = sweeps or SweepCache(self._guide.about.per_axis, CONCAVE_EDGES)
         self._scale = USUAL_SCALE if scale is None else scale
         self._blend = blend
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None when every candidate misses it or shaves off a film."""
-        swept = self._views.of(component, threads)
+        swept = self._sweep_cache.of(component, threads)
         return cheapest(swept, self.rank(component, swept))
 
     def rank(self, component: Component, swept: Sweep) -> FloatArray:
         """Cost of every plane of a component's sweep over axes and concave edges, whatever its planes per axis."""
-        return guided_cost(self._guide, component, swept, self._scale, self._blend)
+        return ranked_cost(self._guide, component, swept, self._scale, self._blend)
 
 
 @lru_cache(maxsize=4)
-def _cached(weights: str | None) -> Guide:
-    return Guide(weights)
+def _cached(weights: str | None) -> PlaneRanker:
+    return PlaneRanker(weights)
 
 
-def load_guide(weights: str | os.PathLike[str] | None = None) -> Guide:
+def load_ranker(weights: str | os.PathLike[str] | None = None) -> PlaneRanker:
     """Get the guide of a file; the last few are kept.
 
     Raises

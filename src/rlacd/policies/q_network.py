@@ -9,9 +9,9 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from rlacd.errors import WeightsError
+from rlacd.io.read.open_file import read_file
 from rlacd.policies.network_file import open_network
 from rlacd.policies.observe import Float32Array, Observation
-from rlacd.read_file import read_file
 
 if TYPE_CHECKING:
     import onnxruntime

@@ -1,23 +1,23 @@
 """Watched processes that do one request after another: here, on this machine, or on the machines of a Ray cluster."""
 
-from rlacd.pool.again import answers, submit_twice
-from rlacd.pool.here import HerePool
+from rlacd.pool.in_process import InProcessPool
 from rlacd.pool.local import LocalPool
 from rlacd.pool.open import open_pool
-from rlacd.pool.request import Answer, Blobs, Limits, MachineLostError, Pool, Request, Shared, WorkerDiedError
+from rlacd.pool.request import Answer, Blobs, MachineLostError, Pool, ProcessLimits, Request, Shared, WorkerDiedError
+from rlacd.pool.retry import answers, submit_with_retry
 
 __all__ = [
     "Answer",
     "Blobs",
-    "HerePool",
-    "Limits",
+    "InProcessPool",
     "LocalPool",
     "MachineLostError",
     "Pool",
+    "ProcessLimits",
     "Request",
     "Shared",
     "WorkerDiedError",
     "answers",
     "open_pool",
-    "submit_twice",
+    "submit_with_retry",
 ]

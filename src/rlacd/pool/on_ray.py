@@ -18,7 +18,7 @@ from typing import Any
 
 from rlacd import __version__
 from rlacd.errors import MissingExtraError, OptionError
-from rlacd.pool.request import Answer, Limits, MachineLostError, Request, Shared
+from rlacd.pool.request import Answer, MachineLostError, ProcessLimits, Request, Shared
 from rlacd.pool.worker import Worker
 
 LOCAL = "local"
@@ -182,7 +182,7 @@ def _do(
             f"a machine of the cluster has rlacd {__version__}, not {version}: install the same everywhere."
         )
     _fetched = {name: _fetch(name, *given) for name, given in shared.items()}
-    answer = _worker.ask(Request(**plain, shared=_fetched, limits=Limits(*limits)))
+    answer = _worker.ask(Request(**plain, shared=_fetched, limits=ProcessLimits(*limits)))
     return answer.values, answer.blobs, answer.worker
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rlacd.pool.here import HerePool
+from rlacd.pool.in_process import InProcessPool
 from rlacd.pool.local import LocalPool
 from rlacd.pool.request import Pool
 
@@ -29,4 +29,4 @@ def open_pool(jobs: int | None, ray: str | None = None) -> Pool:
         from rlacd.pool.on_ray import RayPool
 
         return RayPool(ray, jobs)
-    return HerePool() if jobs == 0 else LocalPool(1 if jobs is None else jobs)
+    return InProcessPool() if jobs == 0 else LocalPool(1 if jobs is None else jobs)

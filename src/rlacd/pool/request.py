@@ -19,7 +19,7 @@ Blobs: TypeAlias = Mapping[str, bytes]
 
 
 @dataclass(frozen=True)
-class Limits:
+class ProcessLimits:
     """What one request may take.
 
     Attributes
@@ -83,7 +83,7 @@ class Request:
     values: Values
     blobs: Blobs = field(default_factory=dict)
     shared: Mapping[str, Shared] = field(default_factory=dict)
-    limits: Limits = field(default_factory=Limits)
+    limits: ProcessLimits = field(default_factory=ProcessLimits)
     threads: int = 1
     fresh: bool = False
 

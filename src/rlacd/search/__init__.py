@@ -1,5 +1,5 @@
 """Search for fewer parts than one pass of cuts finds."""
 
-from rlacd.search.levels import LEVELS, do_without, level, search
+from rlacd.search.levels import LEVELS, eliminate_parts, level, search
 
-__all__ = ["LEVELS", "do_without", "level", "search"]
+__all__ = ["LEVELS", "eliminate_parts", "level", "search"]

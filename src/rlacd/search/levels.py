@@ -10,13 +10,13 @@ from typing import Any
 
 from rlacd.clock import Clock
 from rlacd.criteria.criterion import Criterion
-from rlacd.cut import CutTree, Divisions
+from rlacd.cut import CutCache, CutTree
 from rlacd.cut_and_merge import cut_and_merge
-from rlacd.finish import drop_slivers
-from rlacd.planes.views import Views
+from rlacd.merge import drop_slivers
+from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies.greedy import SCORES
-from rlacd.search.neighbourhood import Neighbourhood, Outcome, cost
-from rlacd.search.pace import Pace
+from rlacd.search.budget import SearchBudget
+from rlacd.search.neighbourhood import Neighbourhood, SearchOutcome, cost
 from rlacd.search.rankings import Ranking, by_score
 from rlacd.search.tighten import tighten
 from rlacd.solid.component import Component, Part
@@ -96,7 +96,7 @@ def level(quality: str, seconds: float | None, steps: int | None) -> Level:
 
 
 @dataclass
-class Account:
+class SearchSummary:
     """What a search reports.
 
     Attributes
@@ -140,14 +140,14 @@ def search(
     criterion: Criterion,
     name: str,
     bounds: Level,
-    views: Views,
+    sweeps: SweepCache,
     workers: Workers,
     clock: Clock,
     seed: int,
     most_parts: int | None = None,
     rankings: Sequence[Ranking] | None = None,
     first: str = "",
-) -> tuple[list[Part], Account]:
+) -> tuple[list[Part], SearchSummary]:
     """Look for fewer parts, or as many with less volume in their hulls.
 
     Parameters
@@ -183,36 +183,36 @@ def search(
     start = time.perf_counter()
     steps = math.inf if bounds.steps is None else bounds.steps
     rankings = rankings or [by_score(score) for score in PORTFOLIO]
-    near_views = Views(PLANES_PER_AXIS, CONCAVE_EDGES)
+    near_sweeps = SweepCache(PLANES_PER_AXIS, CONCAVE_EDGES)
     # What the finish would drop must not count, or a level could end with more hulls than the one below it.
     best = parts = drop_slivers(parts, workers)
     at_a_limit = most_parts is not None and not all(workers.map(criterion.is_met, best))
     first_pass = clock.work.done
     bounded = bounds.bounded and not (at_a_limit and bounds.seconds is not None)
     allowed = min(TIMES_FIRST_PASS * first_pass, MOST_WORK) if bounded else math.inf
-    pace = Pace(clock, bounds.seconds, len(parts), patient=bounded, work=Work(allowed))
+    budget = SearchBudget(clock, bounds.seconds, len(parts), patient=bounded, work=Work(allowed))
     if most_parts is not None and at_a_limit:
         if len(best) <= most_parts:
             outcome = tighten(
-                root, best, criterion, most_parts, rankings, views, near_views, workers, pace, steps, seed
+                root, best, criterion, most_parts, rankings, sweeps, near_sweeps, workers, budget, steps, seed
             )
         else:  # parts that cannot be united
-            outcome = Outcome(best, 0, 0, True)
+            outcome = SearchOutcome(best, 0, 0, True)
         from_portfolio = len(parts)
     else:
         others = rankings[1:] if first == "greedy" else rankings  # the first score is that policy's own
         opening = others if not bounded else others[:1] if len(best) <= FEW else []
         a_pass = _seconds_of_a_pass(clock)
-        starts = _portfolio(root, best, criterion, opening, views, workers, pace, a_pass, ANOTHER_PASS * first_pass)
+        starts = _portfolio(root, best, criterion, opening, sweeps, workers, budget, a_pass, ANOTHER_PASS * first_pass)
         from_portfolio = len(starts[0])
-        outcome = _from_all(root, starts, criterion, rankings, near_views, workers, pace, steps, seed)
+        outcome = _from_all(root, starts, criterion, rankings, near_sweeps, workers, budget, steps, seed)
         if bounded and bounds.seconds is not None:
-            pace.hurry()
-            starts = _portfolio(root, outcome.parts, criterion, others[len(opening) :], views, workers, pace, a_pass)
+            budget.hurry()
+            starts = _portfolio(root, outcome.parts, criterion, others[len(opening) :], sweeps, workers, budget, a_pass)
             outcome = outcome.then(
-                _from_all(root, starts, criterion, rankings, near_views, workers, pace, steps, seed + FURTHER)
+                _from_all(root, starts, criterion, rankings, near_sweeps, workers, budget, steps, seed + FURTHER)
             )
-    account = Account(
+    summary = SearchSummary(
         level=name,
         seconds=time.perf_counter() - start,
         first_pass=len(parts),
@@ -221,21 +221,21 @@ def search(
         steps=outcome.steps,
         accepted=outcome.accepted,
         exhausted=outcome.exhausted,
-        work=pace.work.done,
+        work=budget.work.done,
         allowed=None if math.isinf(allowed) else math.floor(allowed),
     )
-    return outcome.parts, account
+    return outcome.parts, summary
 
 
-def do_without(
+def eliminate_parts(
     root: Component, parts: Sequence[Part], criterion: Criterion, workers: Workers, clock: Clock, seed: int
 ) -> list[Part]:
     """Try once to do without each part of a solid, by dividing it among those around; the same parts where that fails.
 
     All the search there is in one pass, and only where it is quick: where hulls are held against balls.
     """
-    state = Neighbourhood(root, parts, criterion, (), Views(), workers, seed)
-    state.dissolve_all(Pace(clock, None, len(parts)))
+    state = Neighbourhood(root, parts, criterion, (), SweepCache(), workers, seed)
+    state.redistribute_all(SearchBudget(clock, None, len(parts)))
     return state.parts
 
 
@@ -248,9 +248,9 @@ def _portfolio(
     parts: list[Part],
     criterion: Criterion,
     rankings: Sequence[Ranking],
-    views: Views,
+    sweeps: SweepCache,
     workers: Workers,
-    pace: Pace,
+    budget: SearchBudget,
     seconds: float,
     work: float = math.inf,
 ) -> list[list[Part]]:
@@ -258,19 +258,19 @@ def _portfolio(
 
     A pass that needs more than the given work is given up.
     """
-    divisions = Divisions()
+    cache = CutCache()
     found = [parts]
     for ranking in rankings:
-        if pace.is_over or len(parts) == 1 or seconds > SHARE * pace.left:
+        if budget.is_over or len(parts) == 1 or seconds > SHARE * budget.left:
             break
-        tree = CutTree(root, ranking(views), workers, divisions)
-        with pace.allowance(work):
-            other = cut_and_merge(tree, criterion, workers, pace, most=HOPELESS * len(parts), strict=True)
-            if other.unmet or pace.is_over:
+        tree = CutTree(root, ranking(sweeps), workers, cache)
+        with budget.allowance(work):
+            other = cut_and_merge(tree, criterion, workers, budget, most=HOPELESS * len(parts), strict=True)
+            if other.unmet or budget.is_over:
                 continue
         if all(cost(other.parts) != cost(known) for known in found):
             found.append(other.parts)
-            pace.parts = min(pace.parts, len(other.parts))
+            budget.parts = min(budget.parts, len(other.parts))
     return sorted(found, key=cost)
 
 
@@ -279,23 +279,23 @@ def _from_all(
     starts: Sequence[list[Part]],
     criterion: Criterion,
     rankings: Sequence[Ranking],
-    views: Views,
+    sweeps: SweepCache,
     workers: Workers,
-    pace: Pace,
+    budget: SearchBudget,
     steps: float,
     seed: int,
-) -> Outcome:
+) -> SearchOutcome:
     """Search around the best start; when nothing is left to try there, around the next, and all over again."""
     best = starts[0]
     total = accepted = 0
     exhausted = False
     for number in range(ROUNDS * len(starts)):
-        state = Neighbourhood(root, starts[number % len(starts)], criterion, rankings, views, workers, seed + number)
-        outcome = state.run(pace, steps - total)
+        state = Neighbourhood(root, starts[number % len(starts)], criterion, rankings, sweeps, workers, seed + number)
+        outcome = state.run(budget, steps - total)
         total += outcome.steps
         accepted += outcome.accepted
         exhausted = outcome.exhausted
         best = min(best, outcome.parts, key=cost)
         if not exhausted:
             break
-    return Outcome(best, total, accepted, exhausted)
+    return SearchOutcome(best, total, accepted, exhausted)

@@ -22,14 +22,14 @@ import numpy as np
 from rlacd._native import Stopped
 from rlacd.clock import Clock
 from rlacd.criteria.criterion import Criterion
-from rlacd.planes.views import Views
-from rlacd.search.dissolve import dissolve
-from rlacd.search.neighbours import Neighbours
-from rlacd.search.pace import Pace
+from rlacd.planes.sweep_cache import SweepCache
+from rlacd.search.budget import SearchBudget
+from rlacd.search.operators import BATCH, Operator, OperatorSampler, Trial, giving_away
+from rlacd.search.part_graph import PartGraph
 from rlacd.search.rankings import Ranking
 from rlacd.search.recut import Exchange, recut
-from rlacd.search.shift import shift
-from rlacd.search.ways import BATCH, Move, Trial, Ways, giving_away
+from rlacd.search.redistribute import redistribute
+from rlacd.search.transfer import transfer
 from rlacd.solid.component import Component, Part
 from rlacd.workers import Workers
 
@@ -56,7 +56,7 @@ PATIENCE = 24
 
 
 @dataclass(frozen=True)
-class Outcome:
+class SearchOutcome:
     """What a search has done.
 
     Attributes
@@ -75,10 +75,10 @@ class Outcome:
     accepted: int
     exhausted: bool
 
-    def then(self, other: Outcome) -> Outcome:
+    def then(self, other: SearchOutcome) -> SearchOutcome:
         """Get what this search and another that went on from it have done."""
         best = min(self.parts, other.parts, key=cost)
-        return Outcome(best, self.steps + other.steps, self.accepted + other.accepted, other.exhausted)
+        return SearchOutcome(best, self.steps + other.steps, self.accepted + other.accepted, other.exhausted)
 
 
 class Neighbourhood:
@@ -105,17 +105,17 @@ class Neighbourhood:
         parts: Sequence[Part],
         criterion: Criterion,
         rankings: Sequence[Ranking],
-        views: Views,
+        sweeps: SweepCache,
         workers: Workers,
         seed: int,
     ) -> None:
         self._root = root
         self._criterion = criterion
-        self._policies = [ranking(views) for ranking in rankings]
+        self._policies = [ranking(sweeps) for ranking in rankings]
         self._workers = workers
         self._random = np.random.default_rng(seed)
-        self._here = Neighbours(parts, criterion, workers)
-        self._ways = Ways(len(rankings))
+        self._graph = PartGraph(parts, criterion, workers)
+        self._operators = OperatorSampler(len(rankings))
         self._best = list(parts)
         self._steps = self._accepted = self._dry = self._vain = 0
         self._near = min(criterion.reach, 2 * criterion.overhang)
@@ -123,89 +123,97 @@ class Neighbourhood:
     @property
     def parts(self) -> list[Part]:
         """The parts so far."""
-        return list(self._here.parts.values())
+        return list(self._graph.parts.values())
 
-    def run(self, pace: Pace, most: float = math.inf, enough: int = 1) -> Outcome:
+    def run(self, budget: SearchBudget, most: float = math.inf, enough: int = 1) -> SearchOutcome:
         """Search until there is no hope left, the clock says no, `most` steps are made or `enough` parts are left.
 
         An opening comes first: a few steps, then every part is tried to be done without. Such rounds are no steps.
         """
-        exhausted = len(self._here.parts) == 1
+        exhausted = len(self._graph.parts) == 1
         try:
             if most > 0:
-                self.dissolve_all(pace, enough, SMALL)
-                with pace.share(OPENING_SHARE):
-                    self._walk(pace, min(most, OPENING), enough)
-                self.dissolve_all(pace, enough)
-            exhausted = len(self._here.parts) == 1
-            while not exhausted and self._steps < most and len(self._here.parts) > enough and not pace.is_over:
-                exhausted = self._walk(pace, min(most, self._steps + STEPS_PER_PART * len(self._here.parts)), enough)
-                self.dissolve_all(pace, enough)
+                self.redistribute_all(budget, enough, SMALL)
+                with budget.share(OPENING_SHARE):
+                    self._walk(budget, min(most, OPENING), enough)
+                self.redistribute_all(budget, enough)
+            exhausted = len(self._graph.parts) == 1
+            while not exhausted and self._steps < most and len(self._graph.parts) > enough and not budget.is_over:
+                exhausted = self._walk(budget, min(most, self._steps + STEPS_PER_PART * len(self._graph.parts)), enough)
+                self.redistribute_all(budget, enough)
         except Stopped:  # between two exchanges: the best so far stays
-            pace.note_stop()
-        return Outcome(self._best, self._steps, self._accepted, exhausted)
+            budget.note_stop()
+        return SearchOutcome(self._best, self._steps, self._accepted, exhausted)
 
-    def _walk(self, pace: Pace, most: float, enough: int) -> bool:
+    def _walk(self, budget: SearchBudget, most: float, enough: int) -> bool:
         """Try at random until `most` steps are made in all; whether there is no hope left."""
-        here = self._here
-        while self._dry < DRY and self._vain < PATIENCE * len(here.parts) and len(here.parts) > 1:
-            if not pace.step(self._steps, None, len(here.parts)) or self._steps >= most or len(here.parts) <= enough:
+        graph = self._graph
+        while self._dry < DRY and self._vain < PATIENCE * len(graph.parts) and len(graph.parts) > 1:
+            if (
+                not budget.step(self._steps, None, len(graph.parts))
+                or self._steps >= most
+                or len(graph.parts) <= enough
+            ):
                 return False
-            batch = self._affordable(list(self._ways.draw(here, self._random, self._near)), pace)
+            batch = self._affordable(list(self._operators.draw(graph, self._random, self._near)), budget)
             self._dry = 0 if batch else self._dry + 1
             batch = batch[: int(min(BATCH, most - self._steps))]  # drawn in full: more steps begin with the same
-            self._make(batch, pace)
+            self._make(batch, budget)
             self._steps += len(batch)
-            pace.steps += len(batch)
+            budget.steps += len(batch)
         return True
 
-    def dissolve_all(self, pace: Pace, enough: int = 1, share: float = 1.0) -> None:
+    def redistribute_all(self, budget: SearchBudget, enough: int = 1, share: float = 1.0) -> None:
         """Try to do without each part, or a share of them, the smallest first, while there are more than `enough`."""
-        here = self._here
-        waiting = sorted(here.parts, key=lambda i: (here.parts[i].hull.volume, i))
+        graph = self._graph
+        waiting = sorted(graph.parts, key=lambda i: (graph.parts[i].hull.volume, i))
         waiting = waiting[: math.ceil(share * len(waiting))]
-        while waiting and len(here.parts) > enough and pace.step(self._steps, None, len(here.parts)):
+        while waiting and len(graph.parts) > enough and budget.step(self._steps, None, len(graph.parts)):
             batch, waiting = waiting[:BATCH], waiting[BATCH:]
-            trials = [giving_away(Move.DISSOLVE, here, i, self._random, self._near) for i in batch if i in here.parts]
-            self._make(self._affordable([trial for trial in trials if self._ways.is_new(trial)], pace), pace)
+            trials = [
+                giving_away(Operator.REDISTRIBUTE, graph, i, self._random, self._near)
+                for i in batch
+                if i in graph.parts
+            ]
+            self._make(self._affordable([trial for trial in trials if self._operators.is_new(trial)], budget), budget)
 
-    def _affordable(self, trials: list[Trial], pace: Pace) -> list[Trial]:
+    def _affordable(self, trials: list[Trial], budget: SearchBudget) -> list[Trial]:
         """As many of the trials as there is work left for, by what others of their kind took."""
-        if math.isinf(pace.work.left):
+        if math.isinf(budget.work.left):
             return trials
         dearest = 0.0
         for count, trial in enumerate(trials, start=1):
-            dearest = max(dearest, self._ways.price(trial))
-            if count > 1 and count * dearest > pace.work.left:  # each is given an equal share
+            dearest = max(dearest, self._operators.price(trial))
+            if count > 1 and count * dearest > budget.work.left:  # each is given an equal share
                 return trials[: count - 1]
         return trials
 
-    def _make(self, trials: Sequence[Trial], pace: Pace) -> None:
+    def _make(self, trials: Sequence[Trial], budget: SearchBudget) -> None:
         """Make trials side by side, and take over what is better."""
         if not trials:
             return
-        clocks = [pace.trial(pace.work.share(len(trials))) for _ in trials]
+        clocks = [budget.trial(budget.work.share(len(trials))) for _ in trials]
         found = self._workers.map(lambda pair: self._try(*pair), zip(trials, clocks, strict=True))
         for trial, clock, exchange in zip(trials, clocks, found, strict=True):
-            pace.work.pay(clock.work.done)
-            taken = exchange is not None and self._here.apply(exchange)
+            budget.work.pay(clock.work.done)
+            taken = exchange is not None and self._graph.apply(exchange)
             gain = exchange.gain if exchange is not None and taken else 0
-            self._ways.count(trial, gain, clock.work.done)
+            self._operators.count(trial, gain, clock.work.done)
             self._accepted += taken
             self._vain = 0 if gain > 0 else self._vain + 1
             self._best = min(self._best, self.parts, key=cost)
-        pace.parts = min(pace.parts, len(self._here.parts))
-        pace.work.pay(self._here.collect())
-        if all(clock.work.is_spent for clock in clocks) or pace.work.left < TOO_LITTLE * pace.work.most < math.inf:
-            pace.work.close()
+        budget.parts = min(budget.parts, len(self._graph.parts))
+        budget.work.pay(self._graph.collect())
+        if all(clock.work.is_spent for clock in clocks) or budget.work.left < TOO_LITTLE * budget.work.most < math.inf:
+            budget.work.close()
 
     def _try(self, trial: Trial, clock: Clock) -> Exchange | None:
-        parts = self._here.parts
+        parts = self._graph.parts
         cluster = [parts[i] for i in trial.cluster]
         if trial.policy is not None:
-            around = [parts[i] for i in self._here.around(trial.cluster)]
+            around = [parts[i] for i in self._graph.around(trial.cluster)]
             return recut(cluster, around, self._policies[trial.policy], self._criterion, clock, self._root)
-        give = dissolve if trial.move is Move.DISSOLVE else shift
+        give = redistribute if trial.move is Operator.REDISTRIBUTE else transfer
         around = [parts[i] for i in trial.around]
         return give(cluster[0], around, self._criterion, np.random.default_rng(trial.seed), self._root, clock)
 

@@ -9,7 +9,7 @@ from rlacd import work
 from rlacd.clock import Clock
 from rlacd.criteria.criterion import Criterion
 from rlacd.cut import CutTree
-from rlacd.finish.merge import merge_parts
+from rlacd.merge.merge import merge_parts
 from rlacd.policies import Policy
 from rlacd.solid.component import LOST, Component, Part
 from rlacd.solid.reunite import reunite

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from rlacd.criteria.criterion import Criterion
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
-from rlacd.planes.views import Views
-from rlacd.search.neighbourhood import Neighbourhood, Outcome
-from rlacd.search.pace import Pace
+from rlacd.planes.sweep_cache import SweepCache
+from rlacd.search.budget import SearchBudget
+from rlacd.search.neighbourhood import Neighbourhood, SearchOutcome
 from rlacd.search.rankings import Ranking
 from rlacd.solid.component import Component, Part
 from rlacd.workers import Workers
@@ -28,13 +28,13 @@ def tighten(
     criterion: Criterion,
     most_parts: int,
     rankings: Sequence[Ranking],
-    views: Views,
-    near_views: Views,
+    sweeps: SweepCache,
+    near_sweeps: SweepCache,
     workers: Workers,
-    pace: Pace,
+    budget: SearchBudget,
     steps: float,
     seed: int,
-) -> Outcome:
+) -> SearchOutcome:
     """Look for no more parts than allowed that meet a finer criterion than the given parts do.
 
     The factor by which the threshold is exceeded is bisected: at each, the solid is cut and merged anew, and a
@@ -56,31 +56,31 @@ def tighten(
     Outcome
         Its parts exceed the threshold by no larger factor than those given.
     """
-    tree = CutTree(root, rankings[0](views), workers)
+    tree = CutTree(root, rankings[0](sweeps), workers)
     best = list(parts)
     total = accepted = 0
     least, reached = 1.0, _factor(best, criterion, workers)
     for left in range(ROUNDS, 0, -1):
-        if pace.is_over or reached <= least * CLOSE:
+        if budget.is_over or reached <= least * CLOSE:
             break
         factor = math.sqrt(least * reached)
         finer = criterion.scaled(factor)
-        with pace.share(left), pace.allowance(pace.work.left / left):
-            fine = cut_and_merge(tree, finer, workers, pace, strict=True)
-            if fine.unmet or pace.is_over:
+        with budget.share(left), budget.allowance(budget.work.left / left):
+            fine = cut_and_merge(tree, finer, workers, budget, strict=True)
+            if fine.unmet or budget.is_over:
                 least = factor
                 continue
-            found = Neighbourhood(root, fine.parts, finer, rankings, near_views, workers, seed).run(
-                pace, math.floor((steps - total) / left) if math.isfinite(steps) else steps, most_parts
+            found = Neighbourhood(root, fine.parts, finer, rankings, near_sweeps, workers, seed).run(
+                budget, math.floor((steps - total) / left) if math.isfinite(steps) else steps, most_parts
             )
         total += found.steps
         accepted += found.accepted
         if len(found.parts) <= most_parts:
             best, reached = found.parts, factor
-            pace.parts = len(best)
+            budget.parts = len(best)
         else:
             least = factor
-    return Outcome(best, total, accepted, False)
+    return SearchOutcome(best, total, accepted, False)
 
 
 def _factor(parts: Sequence[Part], criterion: Criterion, workers: Workers) -> float:

@@ -126,13 +126,13 @@ class Part:
     def glued(first: Part, second: Part, hull: Hull | None = None) -> Part:
         """Unite two parts with disjoint interiors; the regions where they touch are no surface of the union.
 
-        Where one of them is a `Share`, which has what others have too, so is the union. Their joint hull may be given
-        where it is known.
+        Where one of them is a `ClippedPart`, which has what others have too, so is the union. Their joint hull may be
+        given where it is known.
         """
         hull = hull or Hull.around(first.hull, second.hull)
         for part in (first, second):
-            if isinstance(part, Share):
-                return Share(part.solid, first, second, hull)
+            if isinstance(part, ClippedPart):
+                return ClippedPart(part.solid, first, second, hull)
         return _Union(first, second, hull)
 
     def _resolved(self) -> tuple[FloatArray, IntArray]:
@@ -181,7 +181,7 @@ class _Union(Part):
         return found
 
 
-class Share(Part):
+class ClippedPart(Part):
     """What a solid fills of the joint hull of two of its parts, whomever it belongs to.
 
     Parts on both sides of a third are one this way, as a beam that crosses another is: hulls may overlap, and what

@@ -14,10 +14,10 @@ from manifold3d import Manifold, Mesh64, OpType
 from rlacd import _native
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.boolean_time import require_time_for
-from rlacd.solid.component import LOST, Component, Part, Share
+from rlacd.solid.component import LOST, ClippedPart, Component, Part
 
 TOUCHING = 1e-8
-"""Distance at which faces count as touching (see native/glue.hpp)."""
+"""Distance at which faces count as touching (see native/distance/glue.hpp)."""
 
 OVERLAP = 2e-9
 """How far touching faces are moved: above rounding (1e-16), below `TOUCHING`."""
@@ -94,7 +94,7 @@ def touch(first: Part, second: Part) -> bool:
 
 
 def _disjoint_pieces(part: Part) -> Sequence[Part]:
-    return part.members if isinstance(part, Share) else (part,)
+    return part.members if isinstance(part, ClippedPart) else (part,)
 
 
 def _holds(whole: Component, components: Sequence[Component]) -> bool:

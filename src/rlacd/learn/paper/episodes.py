@@ -10,7 +10,7 @@ import numpy as np
 from rlacd.criteria import Criterion
 from rlacd.errors import TrainingError
 from rlacd.learn.meshes import TURNS, Solids
-from rlacd.learn.paper.mdp import Cutting
+from rlacd.learn.paper.mdp import CutProcess
 from rlacd.solid.component import Component
 
 TRIES = 1000
@@ -33,9 +33,9 @@ def draw_start(names: Sequence[str], rotate: bool, rng: np.random.Generator) -> 
     return Start(name, axis, TURNS[int(rng.integers(len(TURNS)))] if rotate else 0.0)
 
 
-def begin(solid: Component, criterion: Criterion, max_parts: int) -> Cutting | None:
+def begin(solid: Component, criterion: Criterion, max_parts: int) -> CutProcess | None:
     """Begin an episode; None when there is nothing to cut, or too much."""
-    cutting = Cutting(solid, criterion)
+    cutting = CutProcess(solid, criterion)
     return None if cutting.over or cutting.count > max_parts else cutting
 
 
@@ -69,7 +69,7 @@ class Episodes:
     max_cuts: int
     max_parts: int
 
-    def draw(self, rng: np.random.Generator) -> tuple[Start, Cutting]:
+    def draw(self, rng: np.random.Generator) -> tuple[Start, CutProcess]:
         """Draw the next solid that needs a cut.
 
         Raises
@@ -83,11 +83,11 @@ class Episodes:
                 return start, cutting
         raise nothing_to_cut(TRIES, len(self.names))
 
-    def begin(self, start: Start) -> Cutting | None:
+    def begin(self, start: Start) -> CutProcess | None:
         """Begin an episode; None when the solid cannot be had, or there is nothing to cut or too much."""
         solid = self.solids.get(start.name, start.axis, start.degrees)
         return None if solid is None else begin(solid, self.criterion, self.max_parts)
 
-    def is_capped(self, cutting: Cutting, cuts: int) -> bool:
+    def is_capped(self, cutting: CutProcess, cuts: int) -> bool:
         """Tell whether an episode has to be broken off after so many cuts."""
         return cuts >= self.max_cuts or cutting.count >= self.max_parts

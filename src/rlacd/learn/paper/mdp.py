@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from rlacd.criteria import Criterion
-from rlacd.cut import Divisions
+from rlacd.cut import CutCache
 from rlacd.planes.candidates import Candidates
 from rlacd.policies.observe import candidates_of, valid_planes
 from rlacd.solid.component import Component, Plane
@@ -66,7 +66,7 @@ class Cut:
 
 
 @dataclass
-class Settled:
+class CutResult:
     """Components sorted by what can be done with them."""
 
     unfinished: list[Component] = field(default_factory=list)
@@ -84,7 +84,7 @@ def terminal_reward(parts: int) -> float:
     return 1 / (1 + math.log(max(parts - 1, 1)))
 
 
-class Cutting:
+class CutProcess:
     """One solid on its way to parts.
 
     The state is the *frontier*, connected components that do not meet the criterion, and the parts done so far. Every
@@ -102,7 +102,7 @@ class Cutting:
         self._criterion = criterion
         self._volume = solid.hull.volume
         self._candidates: dict[Component, Candidates] = {}
-        self._divisions = Divisions()
+        self._cache = CutCache()
         settled = self._settle(solid)
         self.frontier: list[Component] = settled.unfinished
         self.finished: list[Component] = settled.finished
@@ -153,26 +153,26 @@ class Cutting:
         discounts = [child.hull.volume / whole for child in settled.unfinished]
         return Cut(reward, settled.unfinished, discounts, settled.finished, settled.stuck, made)
 
-    def _fall_apart(self, component: Component, plane: Plane) -> tuple[Settled, bool]:
-        sides = self._divisions.sides(component, plane)
+    def _fall_apart(self, component: Component, plane: Plane) -> tuple[CutResult, bool]:
+        sides = self._cache.sides(component, plane)
         if not sides:
-            return Settled(stuck=[component]), False
+            return CutResult(stuck=[component]), False
         return _together([self._settle(side) for side in sides]), True
 
-    def _settle(self, component: Component) -> Settled:
+    def _settle(self, component: Component) -> CutResult:
         """Judge a component, split it if it has to be cut, and judge its pieces."""
         if self._criterion.is_met(component):
-            return Settled(finished=[component])
-        pieces = self._divisions.pieces(component)
+            return CutResult(finished=[component])
+        pieces = self._cache.pieces(component)
         if pieces != [component]:
             return _together([self._settle(piece) for piece in pieces])
         if valid_planes(component, self.candidates(component)).any():
-            return Settled(unfinished=[component])
-        return Settled(stuck=[component])
+            return CutResult(unfinished=[component])
+        return CutResult(stuck=[component])
 
 
-def _together(all_settled: Sequence[Settled]) -> Settled:
-    return Settled(
+def _together(all_settled: Sequence[CutResult]) -> CutResult:
+    return CutResult(
         [c for settled in all_settled for c in settled.unfinished],
         [c for settled in all_settled for c in settled.finished],
         [c for settled in all_settled for c in settled.stuck],

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rlacd.learn.encoders import Encoder, describe
 from rlacd.learn.paper.loss import boltzmann
-from rlacd.learn.paper.mdp import Cutting, Reward
+from rlacd.learn.paper.mdp import CutProcess, Reward
 from rlacd.learn.paper.options import TrainOptions
 from rlacd.learn.paper.qnetwork import QNetwork
 from rlacd.learn.paper.record import ENDED, Record
@@ -49,7 +49,7 @@ class Player:
         Of this episode alone.
     """
 
-    cutting: Cutting
+    cutting: CutProcess
     options: TrainOptions
     encoder: Encoder
     network: QNetwork | None

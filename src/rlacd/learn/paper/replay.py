@@ -23,7 +23,7 @@ LEAST_PRIORITY = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Batch:
+class TransitionBatch:
     """B transitions and the C components they left unfinished.
 
     Attributes
@@ -141,7 +141,7 @@ class Replay:
         self._next = (i + 1) % self.capacity
         self._count = min(self._count + 1, self.capacity)
 
-    def sample(self, count: int, rng: np.random.Generator) -> Batch:
+    def sample(self, count: int, rng: np.random.Generator) -> TransitionBatch:
         """Draw `count` transitions, with replacement."""
         if self._count == 0:
             raise RlacdError("there is nothing to learn from yet; let `warmup` be at least 1.")
@@ -155,7 +155,7 @@ class Replay:
             weights = (rarity / rarity.max()).astype(np.float32)
         children = [self._children[i] for i in index]
         rows = np.concatenate(children)
-        return Batch(
+        return TransitionBatch(
             index,
             self._features[self._states[index]].astype(np.float32),
             self._planes[index],

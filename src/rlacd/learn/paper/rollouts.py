@@ -25,7 +25,7 @@ from rlacd.learn.paper.episodes import TRIES, Start, draw_start, nothing_to_cut
 from rlacd.learn.paper.options import TrainOptions
 from rlacd.learn.paper.record import Record
 from rlacd.learn.paper.rollout_server import SERVER
-from rlacd.pool import Answer, Limits, Pool, Request, Shared, WorkerDiedError, submit_twice
+from rlacd.pool import Answer, Pool, ProcessLimits, Request, Shared, WorkerDiedError, submit_with_retry
 
 LOST = 10
 """So many episodes in a row that no process could play, and it is not the meshes' fault."""
@@ -73,7 +73,7 @@ class Rollouts:
         solids: Solids,
         names: Sequence[str],
         options: TrainOptions,
-        limits: Limits,
+        limits: ProcessLimits,
         say: Callable[[str], None],
     ) -> None:
         self._pool, self._solids, self._names, self._options = pool, solids, names, options
@@ -141,7 +141,7 @@ class Rollouts:
         }
         shared = {"setting": self._setting} | ({} if acting.network is None else {"network": acting.network})
         request = Request(SERVER, values, self._solids.files(start.name), shared, self._limits)
-        return _Episode(number, start, submit_twice(self._pool, request))
+        return _Episode(number, start, submit_with_retry(self._pool, request))
 
     def _record(self, episode: _Episode | Record) -> Record:
         if isinstance(episode, Record):

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd.criteria import Criterion
-from rlacd.learn.paper.mdp import Cutting
+from rlacd.learn.paper.mdp import CutProcess
 from rlacd.planes.candidates import OFFSETS_PER_AXIS
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component
@@ -32,7 +32,7 @@ UNKNOWN = -1
 
 
 @dataclass(frozen=True)
-class Outcome:
+class TabularOutcome:
     """What a plane makes of a node.
 
     Attributes
@@ -67,7 +67,7 @@ class Node:
 
     hull_volume: float
     looks: tuple[int, ...]
-    outcomes: list[Outcome] = field(default_factory=list)
+    outcomes: list[TabularOutcome] = field(default_factory=list)
 
 
 def middle_planes(axes: Sequence[int] = (0, 1, 2)) -> list[int]:
@@ -83,20 +83,20 @@ def grow(solid: Component, criterion: Criterion, planes: Sequence[int], depth: i
     list of Node
         The unfinished components of the solid.
     """
-    return [_grow(component, criterion, planes, depth, bins) for component in Cutting(solid, criterion).frontier]
+    return [_grow(component, criterion, planes, depth, bins) for component in CutProcess(solid, criterion).frontier]
 
 
 def _grow(component: Component, criterion: Criterion, planes: Sequence[int], depth: int, bins: int) -> Node:
     node = Node(component.hull.volume, _looks(component, bins))
     for action, plane in enumerate(planes if depth > 0 else ()):
-        cutting = Cutting(component, criterion)
+        cutting = CutProcess(component, criterion)
         if not cutting.frontier:
             break
         cut = cutting.cut(0, cutting.candidates(component).plane(plane))
         if cut.made:
             children = [_grow(child, criterion, planes, depth - 1, bins) for child in cut.unfinished]
             node.outcomes.append(
-                Outcome(action, cut.reward.saved, cut.reward.sides_finished, children, list(cut.discounts))
+                TabularOutcome(action, cut.reward.saved, cut.reward.sides_finished, children, list(cut.discounts))
             )
     return node
 

@@ -40,7 +40,7 @@ from rlacd.learn.paper.torch_policy import torch_policy
 from rlacd.learn.parts import Score, count_parts
 from rlacd.policies import Greedy
 from rlacd.policies.observe import SCALE_INPUTS
-from rlacd.pool import HerePool, Limits, Pool, Shared
+from rlacd.pool import InProcessPool, Pool, ProcessLimits, Shared
 
 Say = Callable[[str], None]
 
@@ -56,7 +56,7 @@ def train(
     resume: bool = False,
     say: Say = print,
     pool: Pool | None = None,
-    limits: Limits | None = None,
+    limits: ProcessLimits | None = None,
 ) -> Path:
     """Train a Q network on a folder of meshes.
 
@@ -101,8 +101,8 @@ def train(
         f"{listed.unreadable} cannot be read, {listed.too_large} are too large"
     )
     with ExitStack() as stack:
-        where, solids = pool or stack.enter_context(HerePool()), Solids(meshes, run / "solids")
-        rollouts = Rollouts(where, solids, listed.training, options, limits or Limits(), say)
+        where, solids = pool or stack.enter_context(InProcessPool()), Solids(meshes, run / "solids")
+        rollouts = Rollouts(where, solids, listed.training, options, limits or ProcessLimits(), say)
         training = Training(run, options, listed, encoder, solids, rollouts, say)
         stack.callback(training.close)
         if checkpoint is None:

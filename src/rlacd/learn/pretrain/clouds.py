@@ -11,9 +11,9 @@ import numpy as np
 
 from rlacd import _native
 from rlacd.errors import RlacdError, TrainingError
+from rlacd.io.read.load import load_mesh
 from rlacd.learn.meshes import TURNS
 from rlacd.policies.observe import Float32Array
-from rlacd.solid.load import load_mesh
 
 KEPT = 8192
 """Points of a mesh that are kept."""

@@ -1,0 +1,77 @@
+// Between numpy arrays and the kernels' own types.
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include <cstring>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "base/geometry.hpp"
+
+namespace rlacd {
+
+namespace nb = nanobind;
+
+using PointsIn = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using FacesIn = nb::ndarray<const std::int32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using VectorIn = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+static_assert(sizeof(Vec3) == 3 * sizeof(double), "points are copied as raw rows");
+static_assert(sizeof(Triangle) == 3 * sizeof(std::int32_t), "faces are copied as raw rows");
+
+inline std::vector<Vec3> to_points(const PointsIn& array) {
+  std::vector<Vec3> points(array.shape(0));
+  if (!points.empty()) std::memcpy(static_cast<void*>(points.data()), array.data(), points.size() * sizeof(Vec3));
+  return points;
+}
+
+// Copies a mesh in and checks its indices, so that no kernel can read out of bounds.
+inline Mesh to_mesh(const PointsIn& vertices, const FacesIn& faces) {
+  Mesh mesh;
+  mesh.vertices = to_points(vertices);
+  mesh.faces.resize(faces.shape(0));
+  if (!mesh.faces.empty())
+    std::memcpy(static_cast<void*>(mesh.faces.data()), faces.data(), mesh.faces.size() * sizeof(Triangle));
+  const auto count = static_cast<std::int64_t>(mesh.vertices.size());
+  for (const Triangle& face : mesh.faces)
+    for (const std::int32_t corner : face)
+      if (corner < 0 || corner >= count) throw std::invalid_argument("face index out of range");
+  return mesh;
+}
+
+// Beyond this, squares of distances overflow: no triangle would be the nearest.
+constexpr double kFarthest = 1e150;
+
+inline void require_finite(const std::vector<Vec3>& points) {
+  for (const Vec3 p : points)
+    for (const double x : {p.x, p.y, p.z}) {
+      if (!std::isfinite(x)) throw std::invalid_argument("a point is not finite");
+      if (std::fabs(x) > kFarthest)
+        throw std::invalid_argument("a point lies beyond 1e150, where distances have no value");
+    }
+}
+
+// As to_mesh, for kernels that compare distances: a NaN would compare false with everything and go unnoticed.
+inline Mesh to_finite_mesh(const PointsIn& vertices, const FacesIn& faces) {
+  Mesh mesh = to_mesh(vertices, faces);
+  require_finite(mesh.vertices);
+  return mesh;
+}
+
+// Hands a vector of rows to numpy without a copy; the array owns it from then on.
+template <class Scalar, class Row>
+nb::ndarray<nb::numpy, Scalar> to_array(std::vector<Row>&& rows) {
+  constexpr std::size_t columns = sizeof(Row) / sizeof(Scalar);
+  static_assert(sizeof(Row) % sizeof(Scalar) == 0, "a row is a whole number of scalars");
+  auto* owned = new std::vector<Row>(std::move(rows));
+  nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<Row>*>(p); });
+  if constexpr (columns == 1)
+    return nb::ndarray<nb::numpy, Scalar>(reinterpret_cast<Scalar*>(owned->data()), {owned->size()}, owner);
+  else
+    return nb::ndarray<nb::numpy, Scalar>(reinterpret_cast<Scalar*>(owned->data()), {owned->size(), columns}, owner);
+}
+
+}  // namespace rlacd

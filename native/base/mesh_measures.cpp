@@ -1,0 +1,47 @@
+// Volume, area and moments of triangle meshes: see mesh_measures.hpp for input and output.
+#include "base/mesh_measures.hpp"
+
+namespace rlacd {
+
+double mesh_volume(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
+  if (faces.empty()) return 0;
+  const Vec3 apex = vertices[faces[0][0]];
+  double sum = 0;
+  for (const Triangle& f : faces)
+    sum += dot(vertices[f[0]] - apex, cross(vertices[f[1]] - apex, vertices[f[2]] - apex));
+  return sum / 6;
+}
+
+double mesh_area(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
+  double sum = 0;
+  for (const Triangle& f : faces) sum += norm(cross(vertices[f[1]] - vertices[f[0]], vertices[f[2]] - vertices[f[0]]));
+  return sum / 2;
+}
+
+std::array<Vec3, 3> mesh_moments(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
+  std::vector<double> areas;
+  areas.reserve(faces.size());
+  double total = 0;
+  Vec3 centroid;
+  for (const Triangle& f : faces) {
+    const Vec3 a = vertices[f[0]], b = vertices[f[1]], c = vertices[f[2]];
+    areas.push_back(norm(cross(b - a, c - a)));
+    total += areas.back();
+    centroid = centroid + areas.back() / 3 * (a + b + c);
+  }
+  std::array<Vec3, 3> moments{};
+  if (!(total > 0)) return moments;
+  centroid = 1 / total * centroid;
+  const auto add = [&moments](double weight, Vec3 p) {
+    for (int i = 0; i < 3; ++i) moments[i] = moments[i] + weight * p[i] * p;
+  };
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    const Vec3 a = vertices[faces[i][0]] - centroid, b = vertices[faces[i][1]] - centroid,
+               c = vertices[faces[i][2]] - centroid;
+    const double weight = areas[i] / total;
+    for (const Vec3 p : {a, b, c, a + b + c}) add(weight, p);
+  }
+  return moments;
+}
+
+}  // namespace rlacd

@@ -1,0 +1,106 @@
+// Python bindings of the concavity of a part.
+#include <nanobind/stl/vector.h>
+
+#include "base/arrays.hpp"
+#include "base/parallel.hpp"
+#include "distance/concavity.hpp"
+#include "distance/filling.hpp"
+
+namespace rlacd {
+
+void bind_concavity(nb::module_& m) {
+  m.def(
+      "meets_concavity",
+      [](const PointsIn& part_vertices, const FacesIn& part_faces, const PointsIn& hull_vertices,
+         const FacesIn& hull_faces, double part_volume, double hull_volume, double threshold) {
+        const Mesh part = to_finite_mesh(part_vertices, part_faces), hull = to_finite_mesh(hull_vertices, hull_faces);
+        nb::gil_scoped_release release;
+        return meets_concavity(part, hull, part_volume, hull_volume, threshold);
+      },
+      nb::arg("part_vertices"), nb::arg("part_faces"), nb::arg("hull_vertices"), nb::arg("hull_faces"),
+      nb::arg("part_volume"), nb::arg("hull_volume"), nb::arg("threshold"),
+      "Whether the concavity of a closed part with this hull is certainly <= threshold.\n\n"
+      "False when it is larger, or so close (0.1 %) that branch and bound gave up. The hull must hold the part.");
+  m.def(
+      "concavity",
+      [](const PointsIn& part_vertices, const FacesIn& part_faces, const PointsIn& hull_vertices,
+         const FacesIn& hull_faces, double part_volume, double hull_volume, double tolerance, double floor) {
+        const Mesh part = to_finite_mesh(part_vertices, part_faces), hull = to_finite_mesh(hull_vertices, hull_faces);
+        if (!(tolerance > 0)) throw std::invalid_argument("the tolerance must be positive");
+        Concavity c;
+        {
+          nb::gil_scoped_release release;
+          c = concavity(part, hull, part_volume, hull_volume, tolerance, floor);
+        }
+        const auto pair = [](const Interval& i) { return nb::make_tuple(i.lower, i.upper); };
+        return nb::make_tuple(pair(c.value()), pair(c.part_to_hull), pair(c.hull_to_part), c.volume_radius);
+      },
+      nb::arg("part_vertices"), nb::arg("part_faces"), nb::arg("hull_vertices"), nb::arg("hull_faces"),
+      nb::arg("part_volume"), nb::arg("hull_volume"), nb::arg("tolerance"), nb::arg("floor") = 0.0,
+      "Concavity of a closed part with this hull: (value, part_to_hull, hull_to_part, volume_radius).\n\n"
+      "The first three are certified intervals (lower, upper). The value's is at most `tolerance` wide; that of a\n"
+      "one-sided distance may be wider below the value, where the others decide it. Values up to `floor` need not be "
+      "told\n"
+      "apart: the interval may then be as wide as (0, floor), which is much faster for nearly convex parts.");
+  nb::class_<Filling>(m, "Filling", "A closed solid that hulls of its parts are held against.")
+      .def(
+          "__init__",
+          [](Filling* self, const PointsIn& vertices, const FacesIn& faces) {
+            const Mesh solid = to_finite_mesh(vertices, faces);
+            if (solid.faces.empty()) throw std::invalid_argument("the solid has no faces");
+            nb::gil_scoped_release release;
+            new (self) Filling(solid);
+          },
+          nb::arg("vertices"), nb::arg("faces"))
+      .def(
+          "feasibility",
+          [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces, double threshold) {
+            const Mesh hull = to_finite_mesh(hull_vertices, hull_faces);
+            nb::gil_scoped_release release;
+            return static_cast<int>(self.chance(hull, threshold));
+          },
+          nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("threshold"),
+          "Whether the surfaces of a hull and of the solid's share of it may be as near as the threshold.\n\n"
+          "0: they may; 1: they are not; 2: nor are those of any hull that holds this one.")
+      .def(
+          "joint_feasibilities",
+          [](const Filling& self, const std::vector<PointsIn>& groups,
+             const nb::ndarray<const std::int32_t, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>& pairs,
+             double threshold, int threads) {
+            std::vector<HullCorners> corners;
+            for (const PointsIn& group : groups) corners.emplace_back(to_points(group));
+            const std::vector<std::int32_t> pair(pairs.data(), pairs.data() + pairs.size());
+            for (const std::int32_t g : pair)
+              if (g < 0 || g >= static_cast<std::int64_t>(groups.size()))
+                throw std::invalid_argument("pair out of range");
+            std::vector<double> volumes(pairs.shape(0));
+            std::vector<std::int32_t> chances(pairs.shape(0));
+            {
+              nb::gil_scoped_release release;
+              parallel_for(volumes.size(), resolve_threads(threads), [&](std::size_t i) {
+                const Filling::Joint joint =
+                    self.joint_chance(corners[pair[2 * i]], corners[pair[2 * i + 1]], threshold);
+                volumes[i] = joint.volume;
+                chances[i] = static_cast<std::int32_t>(joint.chance);
+              });
+            }
+            return nb::make_tuple(to_array<double>(std::move(volumes)), to_array<std::int32_t>(std::move(chances)));
+          },
+          nb::arg("groups"), nb::arg("pairs"), nb::arg("threshold"), nb::arg("threads") = 0,
+          "Volumes [P] of the joint hulls of pairs [P, 2] of hulls, given by their corners, a list of arrays [N, 3], "
+          "and\n"
+          "the `chance` [P] of each, where the hulls themselves are close enough to their shares of the solid. There "
+          "is no\n"
+          "volume (0) where the chance is 2.")
+      .def(
+          "comes_deeper",
+          [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces, double threshold) {
+            const Mesh hull = to_finite_mesh(hull_vertices, hull_faces);
+            nb::gil_scoped_release release;
+            return self.comes_deeper(hull, threshold);
+          },
+          nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("threshold"),
+          "Whether the solid's surface comes deeper than the threshold inside a hull: `chance` is 2.");
+}
+
+}  // namespace rlacd

@@ -1,0 +1,125 @@
+// Python bindings of the surface queries: closest points, winding numbers, samples, one-sided Hausdorff distance.
+#include "base/arrays.hpp"
+#include "base/parallel.hpp"
+#include "distance/hausdorff.hpp"
+#include "distance/sample.hpp"
+#include "distance/surface.hpp"
+
+namespace rlacd {
+namespace {
+
+constexpr std::size_t kChunk = 256;
+
+// task(i) for every point, without the GIL, in chunks large enough to be worth a thread.
+template <class Task>
+void for_each_point(std::size_t count, int threads, const Task& task) {
+  const std::size_t chunks = (count + kChunk - 1) / kChunk;
+  parallel_for(chunks, threads, [&](std::size_t chunk) {
+    for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) task(i);
+  });
+}
+
+void require_positive_tolerance(double tolerance) {
+  if (!(tolerance > 0)) throw std::invalid_argument("the tolerance must be positive");
+}
+
+}  // namespace
+
+void bind_distance(nb::module_& m) {
+  nb::class_<Surface>(m, "Surface",
+                      "A triangle surface and a tree of boxes over it. Any quality: open, self-intersecting, slivers.")
+      .def(
+          "__init__",
+          [](Surface* self, const PointsIn& vertices, const FacesIn& faces) {
+            const Mesh mesh = to_finite_mesh(vertices, faces);
+            if (mesh.faces.empty()) throw std::invalid_argument("the surface has no faces");
+            nb::gil_scoped_release release;
+            new (self) Surface(mesh);
+          },
+          nb::arg("vertices"), nb::arg("faces"))
+      .def(
+          "distance",
+          [](const Surface& self, const PointsIn& array, int threads) {
+            const std::vector<Vec3> points = to_points(array);
+            require_finite(points);
+            std::vector<double> distances(points.size());
+            {
+              nb::gil_scoped_release release;
+              for_each_point(points.size(), threads,
+                             [&](std::size_t i) { distances[i] = std::sqrt(self.bvh().closest(points[i]).distance2); });
+            }
+            return to_array<double>(std::move(distances));
+          },
+          nb::arg("points"), nb::arg("threads") = 0, "Unsigned distances [N] of points [N, 3] to the surface.")
+      .def(
+          "closest",
+          [](const Surface& self, const PointsIn& array, int threads) {
+            const std::vector<Vec3> points = to_points(array);
+            require_finite(points);
+            std::vector<Vec3> closest(points.size());
+            std::vector<std::int32_t> faces(points.size());
+            {
+              nb::gil_scoped_release release;
+              for_each_point(points.size(), threads, [&](std::size_t i) {
+                const Bvh::Hit hit = self.bvh().closest(points[i]);
+                closest[i] = hit.point;
+                faces[i] = self.bvh().face(hit.slot);
+              });
+            }
+            return nb::make_tuple(to_array<double>(std::move(closest)), to_array<std::int32_t>(std::move(faces)));
+          },
+          nb::arg("points"), nb::arg("threads") = 0,
+          "Closest points of the surface [N, 3] to points [N, 3], and the faces [N] they lie on.")
+      .def(
+          "winding",
+          [](const Surface& self, const PointsIn& array, double accuracy, int threads) {
+            const std::vector<Vec3> points = to_points(array);
+            require_finite(points);
+            if (!(accuracy >= 1)) throw std::invalid_argument("the accuracy must be at least 1");
+            std::vector<double> windings(points.size());
+            {
+              nb::gil_scoped_release release;
+              const Winding& winding = self.winding();
+              for_each_point(points.size(), threads,
+                             [&](std::size_t i) { windings[i] = winding.at(points[i], accuracy); });
+            }
+            return to_array<double>(std::move(windings));
+          },
+          nb::arg("points"), nb::arg("accuracy") = 2.0, nb::arg("threads") = 0,
+          "Generalised winding numbers [N] of points [N, 3].\n\n"
+          "Groups of triangles farther than `accuracy` times their radius are expanded to second order: with the\n"
+          "default 2 errors up to 0.03 were seen close to real surfaces, with 4 up to 0.01; infinity is exact.");
+
+  m.def(
+      "sample_surface",
+      [](const PointsIn& vertices, const FacesIn& faces, std::size_t count, std::uint64_t seed) {
+        const Mesh mesh = to_finite_mesh(vertices, faces);
+        SurfaceSamples samples;
+        {
+          nb::gil_scoped_release release;
+          samples = sample_surface(mesh, count, seed);
+        }
+        return nb::make_tuple(to_array<double>(std::move(samples.points)),
+                              to_array<std::int32_t>(std::move(samples.faces)));
+      },
+      nb::arg("vertices"), nb::arg("faces"), nb::arg("count"), nb::arg("seed"),
+      "Points [count, 3] spread evenly by area over a surface, and their faces [count]; the same bits for a seed.");
+
+  m.def(
+      "directed_hausdorff",
+      [](const PointsIn& vertices, const FacesIn& faces, const Surface& surface, double tolerance, int threads) {
+        const Mesh mesh = to_finite_mesh(vertices, faces);
+        require_positive_tolerance(tolerance);
+        Interval found;
+        {
+          nb::gil_scoped_release release;
+          found = directed_hausdorff(mesh, surface.bvh(), tolerance, threads);
+        }
+        return nb::make_tuple(found.lower, found.upper);
+      },
+      nb::arg("vertices"), nb::arg("faces"), nb::arg("surface"), nb::arg("tolerance"), nb::arg("threads") = 0,
+      "(lower, upper) around the greatest distance from a point of the mesh's faces to the surface;\n"
+      "upper - lower <= tolerance.");
+}
+
+}  // namespace rlacd

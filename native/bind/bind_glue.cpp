@@ -1,0 +1,39 @@
+// Python bindings of gluing.
+#include "base/arrays.hpp"
+#include "distance/glue.hpp"
+
+namespace rlacd {
+
+void bind_glue(nb::module_& m) {
+  m.def(
+      "glue",
+      [](const PointsIn& va, const FacesIn& fa, const PointsIn& vb, const FacesIn& fb) {
+        const Mesh a = to_mesh(va, fa), b = to_mesh(vb, fb);
+        Mesh out;
+        {
+          nb::gil_scoped_release release;
+          out = glue(a, b);
+        }
+        return nb::make_tuple(to_array<double>(std::move(out.vertices)), to_array<std::int32_t>(std::move(out.faces)));
+      },
+      nb::arg("vertices_a"), nb::arg("faces_a"), nb::arg("vertices_b"), nb::arg("faces_b"),
+      "Surface (vertices [V, 3], faces [F, 3]) of the union of two closed solids with disjoint interiors: both "
+      "surfaces\n"
+      "without the regions where they touch face to face (within 1e-8). Not a closed mesh: for measuring only.");
+  m.def(
+      "outward_where_touching",
+      [](const PointsIn& va, const FacesIn& fa, const PointsIn& vb, const FacesIn& fb) {
+        const Mesh a = to_mesh(va, fa), b = to_mesh(vb, fb);
+        std::vector<Vec3> outward;
+        {
+          nb::gil_scoped_release release;
+          outward = outward_where_touching(a, b);
+        }
+        return to_array<double>(std::move(outward));
+      },
+      nb::arg("vertices_a"), nb::arg("faces_a"), nb::arg("vertices_b"), nb::arg("faces_b"),
+      "For every vertex of the first solid, the direction [V, 3] out of all its faces that touch the second: 1 along\n"
+      "the normal of each such plane, 0 where there is none.");
+}
+
+}  // namespace rlacd

@@ -1,0 +1,89 @@
+// Python bindings of the convex hull and of mesh volume and area.
+#include <nanobind/stl/vector.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "base/arrays.hpp"
+#include "base/mesh_measures.hpp"
+#include "base/parallel.hpp"
+#include "hull/hull.hpp"
+
+namespace rlacd {
+
+namespace {
+
+constexpr std::size_t kPairsAThread = 8;  // starting a thread takes as long as some joint hulls of small parts
+
+}  // namespace
+
+void bind_hull(nb::module_& m) {
+  m.def(
+      "convex_hull",
+      [](const PointsIn& array) {
+        const std::vector<Vec3> points = to_points(array);
+        for (const Vec3& p : points)  // no predicate decides about infinity
+          if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
+            throw std::invalid_argument("points must be finite");
+        Hull hull;
+        {
+          nb::gil_scoped_release release;
+          hull = convex_hull(points);
+        }
+        return nb::make_tuple(to_array<std::int32_t>(std::move(hull.indices)),
+                              to_array<std::int32_t>(std::move(hull.faces)), hull.rank);
+      },
+      nb::arg("points"),
+      "Convex hull of points [N, 3]: (indices [H] into points, faces [F, 3] into those H points, rank).\n\n"
+      "Every index is an extreme point, the facets are exactly convex (no rounding in the decisions) and outward\n"
+      "oriented. rank < 3 (all points coplanar): no indices, no faces.");
+  m.def(
+      "joint_hull_volumes",
+      [](const std::vector<PointsIn>& groups,
+         const nb::ndarray<const std::int32_t, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>& pairs, int threads) {
+        const std::vector<std::int32_t> pair(pairs.data(), pairs.data() + pairs.size());
+        for (const std::int32_t g : pair)
+          if (g < 0 || g >= static_cast<std::int64_t>(groups.size())) throw std::invalid_argument("pair out of range");
+        std::vector<double> volumes(pairs.shape(0));
+        {
+          nb::gil_scoped_release release;
+          const auto worth_threads = static_cast<int>(1 + volumes.size() / kPairsAThread);
+          parallel_for(volumes.size(), std::min(resolve_threads(threads), worth_threads), [&](std::size_t i) {
+            HullBuilder hull;
+            std::vector<Vec3> both = to_points(groups[pair[2 * i]]);
+            const std::vector<Vec3> other = to_points(groups[pair[2 * i + 1]]);
+            both.insert(both.end(), other.begin(), other.end());
+            hull.add(both);
+            volumes[i] = hull.volume();
+          });
+        }
+        return to_array<double>(std::move(volumes));
+      },
+      nb::arg("groups"), nb::arg("pairs"), nb::arg("threads") = 0,
+      "Volumes [P] of the joint hulls of pairs [P, 2] of point groups, a list of arrays [N, 3].");
+  m.def(
+      "mesh_volume",
+      [](const PointsIn& v, const FacesIn& f) {
+        const Mesh mesh = to_mesh(v, f);
+        return mesh_volume(mesh.vertices, mesh.faces);
+      },
+      nb::arg("vertices"), nb::arg("faces"), "Signed volume of a closed triangle mesh.");
+  m.def(
+      "mesh_moments",
+      [](const PointsIn& vertices, const FacesIn& faces) {
+        const Mesh mesh = to_mesh(vertices, faces);
+        const std::array<Vec3, 3> rows = mesh_moments(mesh.vertices, mesh.faces);
+        return to_array<double>(std::vector<Vec3>(rows.begin(), rows.end()));
+      },
+      nb::arg("vertices"), nb::arg("faces"),
+      "Second moments [3, 3] of a surface around its centroid, exact over its triangles but for a positive factor.");
+  m.def(
+      "mesh_area",
+      [](const PointsIn& v, const FacesIn& f) {
+        const Mesh mesh = to_mesh(v, f);
+        return mesh_area(mesh.vertices, mesh.faces);
+      },
+      nb::arg("vertices"), nb::arg("faces"), "Area of a triangle mesh.");
+}
+
+}  // namespace rlacd

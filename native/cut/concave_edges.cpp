@@ -1,0 +1,252 @@
+// Concave edges: see concave_edges.hpp for input, output and algorithm.
+#include "cut/concave_edges.hpp"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+
+#include "base/stop.hpp"
+
+namespace rlacd {
+
+namespace {
+
+constexpr double kStraightOn = 0.8660254037844387;  // cosine of 30 degrees: edges that turn by less continue each other
+constexpr std::size_t kMostAtVertex = 4;  // more reflex edges at a vertex are not a crease but a rough surface
+constexpr std::size_t kContenders = 256;  // so many edges are weighed exactly; scans have thousands
+constexpr std::size_t kFacets = 64;       // so many facets of the hull, the largest, bound the depth of all edges
+constexpr double kFlat = 1e-6;            // single precision cannot tell corners so close to a face's plane from it
+constexpr double kHair = 1e-9;            // above rounding (1e-15), below the clean-up of hulls (1e-6)
+constexpr double kSameDirection = 3e-7;   // so close to a coordinate axis a normal is that axis
+constexpr double kSamePlane = 1e-4;       // between coordinates of planes
+constexpr double kTie = 1e-9;  // the first one of scores this close is taken, not the one that rounding prefers
+
+Vec3 divided(Vec3 a, double s) { return {a.x / s, a.y / s, a.z / s}; }
+
+Vec3 middle(const Mesh& mesh, const ReflexEdge& edge) {
+  return 0.5 * (mesh.vertices[edge.end[0]] + mesh.vertices[edge.end[1]]);
+}
+
+Box box_of(const Mesh& mesh) {
+  Box box;
+  for (const Vec3 p : mesh.vertices) box.extend(p);
+  return box;
+}
+
+// Planes of a hull's facets, the largest triangles first.
+class Facets {
+ public:
+  explicit Facets(const Mesh& hull) {
+    std::vector<Vec3> scaled;
+    std::vector<double> size;
+    for (const Triangle& f : hull.faces) {
+      const Vec3 a = hull.vertices[f[0]];
+      scaled.push_back(cross(hull.vertices[f[1]] - a, hull.vertices[f[2]] - a));
+      size.push_back(norm(scaled.back()));
+    }
+    std::vector<std::size_t> order(hull.faces.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(), [&size](std::size_t i, std::size_t j) { return size[i] > size[j]; });
+    for (const std::size_t i : order) {
+      if (!(size[i] > 0)) break;
+      normals_.push_back(divided(scaled[i], size[i]));
+      offsets_.push_back(dot(normals_.back(), hull.vertices[hull.faces[i][0]]));
+    }
+  }
+
+  std::size_t size() const { return normals_.size(); }
+
+  // Distance of a point inside from the nearest of the first `count` planes: with all, from the hull's surface.
+  double depth(Vec3 p, std::size_t count) const {
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < std::min(count, size()); ++i)
+      least = std::min(least, offsets_[i] - dot(normals_[i], p));
+    return std::max(least, 0.0);
+  }
+
+ private:
+  std::vector<Vec3> normals_;
+  std::vector<double> offsets_;
+};
+
+std::int32_t root_of(std::vector<std::int32_t>& parent, std::int32_t i) {
+  while (parent[i] != i) i = parent[i] = parent[parent[i]];
+  return i;
+}
+
+// Length of the whole crease that each edge is a piece of, but no more than `most`.
+std::vector<double> crease_lengths(const Mesh& mesh, const std::vector<ReflexEdge>& edges, double most) {
+  struct End {
+    std::int32_t vertex, edge;
+    Vec3 outgoing;
+  };
+  std::vector<double> length;
+  std::vector<End> ends;
+  for (const ReflexEdge& edge : edges) length.push_back(norm(mesh.vertices[edge.end[1]] - mesh.vertices[edge.end[0]]));
+  for (const int side : {0, 1})
+    for (std::size_t i = 0; i < edges.size(); ++i) {
+      const Vec3 along = mesh.vertices[edges[i].end[1 - side]] - mesh.vertices[edges[i].end[side]];
+      ends.push_back({edges[i].end[side], static_cast<std::int32_t>(i), divided(along, length[i])});
+    }
+  std::stable_sort(ends.begin(), ends.end(), [](const End& a, const End& b) { return a.vertex < b.vertex; });
+
+  std::vector<std::int32_t> parent(edges.size());
+  std::iota(parent.begin(), parent.end(), 0);
+  for (std::size_t i = 0; i < ends.size(); ++i)
+    for (std::size_t j = i + 1; j < std::min(i + kMostAtVertex, ends.size()) && ends[j].vertex == ends[i].vertex; ++j)
+      if (dot(ends[i].outgoing, ends[j].outgoing) < -kStraightOn)
+        parent[root_of(parent, ends[j].edge)] = root_of(parent, ends[i].edge);
+  std::vector<double> total(edges.size(), 0), result;
+  for (std::size_t i = 0; i < edges.size(); ++i) total[root_of(parent, static_cast<std::int32_t>(i))] += length[i];
+  for (std::size_t i = 0; i < edges.size(); ++i)
+    result.push_back(std::min(total[root_of(parent, static_cast<std::int32_t>(i))], most));
+  return result;
+}
+
+Vec3 snapped(Vec3 n) {
+  const double largest = max_abs(n);
+  Vec3 nearest;
+  for (int axis = 0; axis < 3; ++axis)
+    if (std::fabs(n[axis]) == largest) nearest[axis] = n[axis] > 0 ? 1 : -1;
+  return (norm(n - nearest) < kSameDirection ? nearest : n) + Vec3{};  // no -0.0
+}
+
+// The three planes of an edge, which contain it: the one that halves the reflex angle, and those of its two faces,
+// their normals pointing outwards.
+using EdgePlanes = std::array<CandidatePlane, 3>;
+
+EdgePlanes planes_of(const Mesh& mesh, const ReflexEdge& edge) {
+  const Vec3 across = edge.normal[0] - edge.normal[1];  // at least 0.17 long
+  const Vec3 centre = middle(mesh, edge);
+  EdgePlanes planes;
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 normal = snapped(k == 0 ? divided(across, norm(across)) : edge.normal[k - 1]);
+    planes[k] = {normal, dot(normal, centre)};
+  }
+  return planes;
+}
+
+// Tells planes apart, whichever way their normals point, by four coordinates: the unit normal, and the height over the
+// centre of a box in radii of it.
+class PlaneSpace {
+ public:
+  explicit PlaneSpace(const Box& box)
+      : centre_(0.5 * (box.lower + box.upper)), radius_(norm(box.upper - box.lower) / 2) {}
+
+  // From differences: a sum of squares less a product would leave 1e-8 of planes that are the same, and that noise
+  // would choose between edges that are alike.
+  double difference(const CandidatePlane& p, const CandidatePlane& q) const {
+    const double hp = height(p), hq = height(q);
+    const double same_way = norm2(p.normal - q.normal) + (hp - hq) * (hp - hq);
+    const double other_way = norm2(p.normal + q.normal) + (hp + hq) * (hp + hq);
+    return std::sqrt(std::min(same_way, other_way));
+  }
+
+ private:
+  double height(const CandidatePlane& p) const { return (p.offset - dot(p.normal, centre_)) / radius_; }
+
+  Vec3 centre_;
+  double radius_;
+};
+
+struct Contender {
+  ReflexEdge edge;
+  double weight;
+  Vec3 centre;
+  EdgePlanes planes;
+  double distance = 1;                     // to the nearest chosen edge, once there is one
+  std::array<double, 3> novelty{1, 1, 1};  // difference of each plane from the nearest of those chosen
+
+  double score() const {
+    if (!(*std::max_element(novelty.begin(), novelty.end()) > kSamePlane)) return 0;
+    return weight * distance * ((novelty[0] + novelty[1] + novelty[2]) / 3);
+  }
+};
+
+std::vector<ReflexEdge> spread_out(std::vector<Contender>& contenders, const PlaneSpace& space, std::size_t count) {
+  std::vector<ReflexEdge> chosen;
+  std::vector<double> score(contenders.size());
+  while (chosen.size() < count) {
+    poll_stop();
+    std::transform(contenders.begin(), contenders.end(), score.begin(), [](const Contender& c) { return c.score(); });
+    const double enough = (1 - kTie) * *std::max_element(score.begin(), score.end());
+    const auto place = std::find_if(score.begin(), score.end(), [enough](double s) { return s >= enough; });
+    if (!(*place > 0)) break;
+    const Contender best = contenders[static_cast<std::size_t>(place - score.begin())];
+    for (Contender& c : contenders) {
+      const double away = norm(c.centre - best.centre);
+      c.distance = chosen.empty() ? away : std::min(c.distance, away);
+      for (int k = 0; k < 3; ++k)
+        for (const CandidatePlane& taken : best.planes)
+          c.novelty[k] = std::min(c.novelty[k], space.difference(c.planes[k], taken));
+    }
+    chosen.push_back(best.edge);
+  }
+  return chosen;
+}
+
+// The offset of a plane that has a face, and what is flat with it, below.
+double above_face(const Mesh& mesh, const Triangle& face, Vec3 outward) {
+  double top = -std::numeric_limits<double>::infinity();
+  for (const std::int32_t corner : face) top = std::max(top, dot(mesh.vertices[corner], outward));
+  double flat = top;
+  for (const Vec3 p : mesh.vertices)
+    if (const double height = dot(p, outward); height <= top + kFlat) flat = std::max(flat, height);
+  return max_abs(outward) == 1 ? flat : flat + kHair;
+}
+
+// Of the two ways to write a plane, the one whose normal has its largest coordinate positive.
+CandidatePlane turned(const CandidatePlane& plane) {
+  int largest = 0;
+  for (const int axis : {1, 2})
+    if (std::fabs(plane.normal[axis]) > std::fabs(plane.normal[largest])) largest = axis;
+  if (plane.normal[largest] > 0) return plane;
+  return {Vec3{} - plane.normal, -plane.offset};
+}
+
+}  // namespace
+
+std::vector<ReflexEdge> choose_concave_edges(const Mesh& mesh, const Mesh& hull, std::size_t count) {
+  const std::vector<ReflexEdge> edges = reflex_edges(mesh);
+  if (edges.empty() || count == 0) return {};
+  const Box box = box_of(hull);
+  const Facets facets(hull);
+  const std::vector<double> length = crease_lengths(mesh, edges, max_abs(box.upper - box.lower));
+  std::vector<double> worth, bound;
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    worth.push_back(edges[i].angle * length[i]);
+    bound.push_back(worth[i] * facets.depth(middle(mesh, edges[i]), kFacets));
+  }
+  std::vector<std::size_t> kept(edges.size());
+  std::iota(kept.begin(), kept.end(), std::size_t{0});
+  if (kept.size() > kContenders) {
+    std::stable_sort(kept.begin(), kept.end(), [&bound](std::size_t i, std::size_t j) { return bound[i] > bound[j]; });
+    kept.resize(kContenders);
+  }
+  std::vector<Contender> contenders;
+  for (const std::size_t i : kept) {
+    const Vec3 centre = middle(mesh, edges[i]);
+    const double weight = facets.size() <= kFacets ? bound[i] : worth[i] * facets.depth(centre, facets.size());
+    contenders.push_back({edges[i], weight, centre, planes_of(mesh, edges[i])});
+  }
+  return spread_out(contenders, PlaneSpace(box), count);
+}
+
+std::vector<CandidatePlane> planes_of_edges(const Mesh& mesh, const Mesh& hull, const std::vector<ReflexEdge>& edges) {
+  const PlaneSpace space(box_of(hull));
+  std::vector<CandidatePlane> planes;
+  for (const ReflexEdge& edge : edges) {
+    EdgePlanes own = planes_of(mesh, edge);
+    for (const int side : {0, 1})
+      own[side + 1].offset = above_face(mesh, mesh.faces[edge.face[side]], own[side + 1].normal);
+    for (const CandidatePlane& plane : own) {
+      const CandidatePlane candidate = turned(plane);
+      if (std::all_of(planes.begin(), planes.end(),
+                      [&](const CandidatePlane& other) { return space.difference(candidate, other) > kSamePlane; }))
+        planes.push_back(candidate);
+    }
+  }
+  return planes;
+}
+
+}  // namespace rlacd

@@ -1,0 +1,286 @@
+// Cutting by a plane: see plane_cut.hpp for input, output and algorithm.
+#include "cut/plane_cut.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include "base/stop.hpp"
+
+namespace rlacd {
+
+namespace {
+
+constexpr double kOnPlane = 1e-13;  // of the mesh's farthest coordinate: the rounding of a height stays below
+constexpr double kFlat = 1e-12;     // of the same: corners so close to a line or a plane lie in it
+constexpr double kPi = 3.14159265358979323846;
+
+using Edge = std::array<std::int32_t, 2>;
+
+int dominant_axis(Vec3 n) {
+  const Vec3 a = {std::fabs(n.x), std::fabs(n.y), std::fabs(n.z)};
+  return a.x >= a.y && a.x >= a.z ? 0 : a.y >= a.z ? 1 : 2;
+}
+
+class Cutter {
+ public:
+  Cutter(const Mesh& mesh, Vec3 normal, double offset)
+      : mesh_(mesh), normal_(normal), offset_(offset), axis_(dominant_axis(normal)), points_(mesh.vertices) {
+    for (const Vec3 p : points_) farthest_ = std::max(farthest_, max_abs(p));
+    heights_.reserve(points_.size());
+    sides_.reserve(points_.size());
+    for (const Vec3 p : points_) {
+      const double height = dot(normal, p) - offset;
+      heights_.push_back(height);
+      sides_.push_back(std::fabs(height) <= kOnPlane * farthest_ ? 0 : height < 0 ? -1 : 1);
+    }
+  }
+
+  OpenSide side(int which) {
+    std::vector<Triangle> faces;
+    std::vector<Edge> in_plane;
+    for (const Triangle& f : mesh_.faces) {
+      poll_stop();
+      const int s[3] = {which * sides_[f[0]], which * sides_[f[1]], which * sides_[f[2]]};
+      if (std::max({s[0], s[1], s[2]}) <= 0 && (std::min({s[0], s[1], s[2]}) < 0 || !bounds(f, which))) continue;
+      std::int32_t polygon[4];
+      int count = 0;
+      for (int e = 0; e < 3; ++e) {
+        const std::int32_t a = f[e], b = f[(e + 1) % 3];
+        if (s[e] >= 0) polygon[count++] = a;
+        if (s[e] * s[(e + 1) % 3] < 0) polygon[count++] = crossing(a, b);
+      }
+      for (int k = 0; k < count; ++k)
+        if (const std::int32_t a = polygon[k], b = polygon[(k + 1) % count]; is_on_plane(a) && is_on_plane(b))
+          in_plane.push_back({a, b});
+      if (count == 3) {
+        faces.push_back({polygon[0], polygon[1], polygon[2]});
+      } else {  // a quadrilateral: across its shorter diagonal
+        const int k =
+            norm2(points_[polygon[2]] - points_[polygon[0]]) <= norm2(points_[polygon[3]] - points_[polygon[1]]) ? 0
+                                                                                                                 : 1;
+        faces.push_back({polygon[k], polygon[k + 1], polygon[k + 2]});
+        faces.push_back({polygon[k], polygon[k + 2], polygon[(k + 3) % 4]});
+      }
+    }
+    std::vector<std::vector<std::int32_t>> loops = rims(boundary(std::move(in_plane)), -which);
+    straighten(faces, loops);
+    return compacted(faces, loops);
+  }
+
+ private:
+  bool is_on_plane(std::int32_t point) const {
+    return static_cast<std::size_t>(point) >= sides_.size() || sides_[point] == 0;
+  }
+
+  // Whether a triangle in the plane bounds the side from outside.
+  bool bounds(const Triangle& f, int which) const {
+    const Vec3 a = points_[f[0]];
+    const double up = dot(normal_, cross(points_[f[1]] - a, points_[f[2]] - a));
+    return which < 0 ? up > 0 : up <= 0;
+  }
+
+  // The point where an edge crosses the plane: on it to the last bit where that is possible.
+  std::int32_t crossing(std::int32_t a, std::int32_t b) {
+    if (a > b) std::swap(a, b);
+    const auto key = static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint32_t>(b);
+    const auto [known, is_new] = crossings_.try_emplace(key, static_cast<std::int32_t>(points_.size()));
+    if (is_new) {
+      const double t = heights_[a] / (heights_[a] - heights_[b]);
+      Vec3 p = points_[a] + t * (points_[b] - points_[a]);
+      if (std::fabs(normal_[axis_]) == 1) p[axis_] = offset_ * normal_[axis_];
+      points_.push_back(p);
+    }
+    return known->second;
+  }
+
+  // The edges less those that run the other way too.
+  static std::vector<Edge> boundary(std::vector<Edge> edges) {
+    const auto undirected = [](const Edge& e) { return std::minmax(e[0], e[1]); };
+    std::sort(edges.begin(), edges.end(), [&](const Edge& e, const Edge& g) {
+      const auto [e0, e1] = undirected(e);
+      const auto [g0, g1] = undirected(g);
+      return e0 != g0 ? e0 < g0 : e1 != g1 ? e1 < g1 : e[0] < g[0];
+    });
+    std::vector<Edge> left;
+    for (std::size_t i = 0; i < edges.size();) {
+      const auto [low, high] = undirected(edges[i]);
+      int ascending = 0;
+      for (;
+           i < edges.size() && std::min(edges[i][0], edges[i][1]) == low && std::max(edges[i][0], edges[i][1]) == high;
+           ++i)
+        ascending += edges[i][0] == low ? 1 : -1;
+      for (; ascending > 0; --ascending) left.push_back({low, high});
+      for (; ascending < 0; ++ascending) left.push_back({high, low});
+    }
+    return left;
+  }
+
+  // Loops against the boundary's edges; outside is where the normal times `up` points.
+  std::vector<std::vector<std::int32_t>> rims(const std::vector<Edge>& boundary, int up) const {
+    std::vector<Edge> edges;  // by their first point
+    edges.reserve(boundary.size());
+    for (const Edge& e : boundary) edges.push_back({e[1], e[0]});
+    std::sort(edges.begin(), edges.end());
+    std::vector<char> is_used(edges.size(), 0);
+    std::vector<std::vector<std::int32_t>> loops;
+    for (std::size_t first = 0; first < edges.size(); ++first) {
+      if (is_used[first]) continue;
+      std::vector<std::int32_t> loop;
+      for (std::size_t edge = first;;) {
+        is_used[edge] = 1;
+        loop.push_back(edges[edge][0]);
+        if (edges[edge][1] == edges[first][0]) break;
+        edge = next(edges, is_used, edges[edge], up);
+      }
+      if (loop.size() > 2) loops.push_back(std::move(loop));
+    }
+    return loops;
+  }
+
+  // Of the edges on from the end of one, the first to its left side on the way back.
+  std::size_t next(const std::vector<Edge>& edges, const std::vector<char>& is_used, const Edge& edge, int up) const {
+    const auto begin = std::lower_bound(edges.begin(), edges.end(), Edge{edge[1], -1});
+    std::size_t best = 0;
+    double least = std::numeric_limits<double>::infinity();
+    for (auto e = begin; e != edges.end() && (*e)[0] == edge[1]; ++e) {
+      const auto i = static_cast<std::size_t>(e - edges.begin());
+      if (is_used[i]) continue;
+      if (const double angle = angle_inside(edge, *e, up); angle < least) least = angle, best = i;
+    }
+    return best;
+  }
+
+  // Between an edge and the one before it, on the side of the loop's inside; in (0, 2 pi].
+  double angle_inside(const Edge& before, const Edge& edge, int up) const {
+    const auto at = on_plane({points_[before[0]], points_[edge[0]], points_[edge[1]]}, up > 0 ? normal_ : -normal_);
+    const double bx = at[0][0] - at[1][0], by = at[0][1] - at[1][1], ex = at[2][0] - at[1][0], ey = at[2][1] - at[1][1];
+    const double angle = std::atan2(ex * by - ey * bx, ex * bx + ey * by);
+    return angle > 0 ? angle : angle + 2 * kPi;
+  }
+
+  // Takes corners of the rims away that flat parts of the surface have between two others on a line: there its
+  // triangles met. They would pile up, cut after cut.
+  void straighten(std::vector<Triangle>& faces, std::vector<std::vector<std::int32_t>>& loops) const {
+    std::vector<std::int32_t> times(points_.size(), 0);  // that a point is on a rim
+    for (const std::vector<std::int32_t>& loop : loops)
+      for (const std::int32_t v : loop) ++times[v];
+    std::unordered_map<std::int32_t, std::vector<std::size_t>> around;  // faces at points on a rim
+    for (std::size_t f = 0; f < faces.size(); ++f)
+      for (const std::int32_t corner : faces[f])
+        if (times[corner] > 0) around[corner].push_back(f);
+    std::vector<char> is_gone(faces.size(), 0);
+    for (std::vector<std::int32_t>& loop : loops) {
+      std::vector<std::int32_t> kept;
+      for (std::size_t i = 0; i < loop.size(); ++i) {
+        const std::int32_t v = loop[i], before = kept.empty() ? loop.back() : kept.back();
+        const std::int32_t after = i + 1 < loop.size() ? loop[i + 1] : kept.front();
+        const std::size_t left = kept.size() + loop.size() - i;
+        if (left > 3 && times[v] == 1 && is_between(before, v, after) &&
+            (moves_to(v, before, faces, around, is_gone) || moves_to(v, after, faces, around, is_gone)))
+          continue;
+        kept.push_back(v);
+      }
+      loop = std::move(kept);
+    }
+    std::size_t kept = 0;
+    for (std::size_t f = 0; f < faces.size(); ++f)
+      if (!is_gone[f]) faces[kept++] = faces[f];
+    faces.resize(kept);
+  }
+
+  bool is_between(std::int32_t before, std::int32_t v, std::int32_t after) const {
+    const Vec3 a = points_[v] - points_[before], b = points_[after] - points_[v], c = points_[after] - points_[before];
+    return dot(a, b) > 0 && norm(cross(a, b)) <= kFlat * farthest_ * norm(c);
+  }
+
+  // Moves a point to another along the rim, if the faces around it lie in a plane and none turns over.
+  bool moves_to(std::int32_t v, std::int32_t to, std::vector<Triangle>& faces,
+                std::unordered_map<std::int32_t, std::vector<std::size_t>>& around, std::vector<char>& is_gone) const {
+    const auto doubled_area = [&](const Triangle& f) {
+      return cross(points_[f[1]] - points_[f[0]], points_[f[2]] - points_[f[0]]);
+    };
+    std::vector<std::size_t>& own = around[v];
+    Vec3 normal;
+    for (const std::size_t f : own)
+      if (!is_gone[f])
+        if (const Vec3 n = doubled_area(faces[f]); norm2(n) > norm2(normal)) normal = n;
+    normal = normalized(normal);
+    int shared = 0;
+    for (const std::size_t f : own) {
+      if (is_gone[f]) continue;
+      for (const std::int32_t corner : faces[f])
+        if (std::fabs(dot(normal, points_[corner] - points_[v])) > kFlat * farthest_) return false;
+      Triangle moved = faces[f];
+      bool has_both = false;
+      for (std::int32_t& corner : moved) {
+        has_both = has_both || corner == to;
+        if (corner == v) corner = to;
+      }
+      if (has_both)
+        ++shared;
+      else if (!(dot(normal, doubled_area(moved)) > 0))
+        return false;
+    }
+    if (shared != 1) return false;
+    for (const std::size_t f : own) {
+      if (is_gone[f]) continue;
+      if (std::find(faces[f].begin(), faces[f].end(), to) != faces[f].end()) {
+        is_gone[f] = 1;
+        continue;
+      }
+      std::replace(faces[f].begin(), faces[f].end(), v, to);
+      around[to].push_back(f);
+    }
+    return true;
+  }
+
+  OpenSide compacted(const std::vector<Triangle>& faces, const std::vector<std::vector<std::int32_t>>& rims) const {
+    OpenSide out;
+    std::vector<std::int32_t> number(points_.size(), -1);
+    const auto numbered = [&](std::int32_t point) {
+      if (number[point] < 0) {
+        number[point] = static_cast<std::int32_t>(out.mesh.vertices.size());
+        out.mesh.vertices.push_back(points_[point]);
+      }
+      return number[point];
+    };
+    out.mesh.faces.reserve(faces.size());
+    for (const Triangle& f : faces) out.mesh.faces.push_back({numbered(f[0]), numbered(f[1]), numbered(f[2])});
+    for (const std::vector<std::int32_t>& rim : rims) {
+      out.rims.emplace_back();
+      for (const std::int32_t point : rim) out.rims.back().push_back(numbered(point));
+    }
+    return out;
+  }
+
+  const Mesh& mesh_;
+  const Vec3 normal_;
+  const double offset_;
+  const int axis_;
+  double farthest_ = 0;       // coordinate
+  std::vector<Vec3> points_;  // the vertices and, after them, crossings
+  std::vector<double> heights_;
+  std::vector<signed char> sides_;  // of the vertices: -1 below, 0 on the plane, 1 above
+  std::unordered_map<std::uint64_t, std::int32_t> crossings_;
+};
+
+}  // namespace
+
+std::vector<std::array<double, 2>> on_plane(const std::vector<Vec3>& points, Vec3 normal) {
+  const int axis = dominant_axis(normal);
+  int u = (axis + 1) % 3, v = (axis + 2) % 3;
+  if (normal[axis] < 0) std::swap(u, v);
+  std::vector<std::array<double, 2>> flat;
+  flat.reserve(points.size());
+  for (const Vec3 p : points) flat.push_back({p[u], p[v]});
+  return flat;
+}
+
+std::array<OpenSide, 2> cut_by_plane(const Mesh& mesh, Vec3 normal, double offset) {
+  Cutter cutter(mesh, normal, offset);
+  OpenSide below = cutter.side(-1);
+  return {std::move(below), cutter.side(1)};
+}
+
+}  // namespace rlacd

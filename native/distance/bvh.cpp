@@ -1,0 +1,176 @@
+#include "distance/bvh.hpp"
+
+#include <numeric>
+
+#include "base/stop.hpp"
+
+namespace rlacd {
+namespace {
+
+constexpr int kLeafSize = 4;
+constexpr int kBins = 8;
+// Deeper nodes are halved by count, so no tree is deeper than this plus log2 of the number of triangles: what is left
+// of 31 bits keeps every walk inside a stack of fixed size.
+constexpr int kDeepestHeuristicSplit = 48;
+constexpr int kStack = 96;
+
+double half_area(const Box& box) {
+  const Vec3 e = box.upper - box.lower;
+  return e.x * e.y + e.y * e.z + e.z * e.x;
+}
+
+double distance2_to_box(const Box& box, Vec3 p) {
+  const double x = std::max(std::max(box.lower.x - p.x, p.x - box.upper.x), 0.0);
+  const double y = std::max(std::max(box.lower.y - p.y, p.y - box.upper.y), 0.0);
+  const double z = std::max(std::max(box.lower.z - p.z, p.z - box.upper.z), 0.0);
+  return x * x + y * y + z * z;
+}
+
+struct Item {
+  Box box;
+  Vec3 centre;
+  std::int32_t face;
+};
+
+using Items = std::vector<Item>::iterator;
+
+Items halve(Items first, Items last, int axis) {
+  const Items middle = first + (last - first) / 2;
+  std::nth_element(first, middle, last, [axis](const Item& a, const Item& b) {
+    return a.centre[axis] != b.centre[axis] ? a.centre[axis] < b.centre[axis] : a.face < b.face;
+  });
+  return middle;
+}
+
+Items split(Items first, Items last, int depth) {
+  Box centres;
+  for (Items item = first; item != last; ++item) centres.extend(item->centre);
+  const Vec3 extent = centres.upper - centres.lower;
+  const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
+  // Beside numbers smaller than these or beyond the largest, the scale would overflow or vanish.
+  const bool is_told_apart = extent[axis] > 0x1p-1000 && extent[axis] <= std::numeric_limits<double>::max();
+  if (depth >= kDeepestHeuristicSplit || !is_told_apart) return halve(first, last, axis);
+
+  const double scale = kBins / extent[axis], origin = centres.lower[axis];
+  const auto bin_of = [=](const Item& item) {
+    return std::min(kBins - 1, static_cast<int>((item.centre[axis] - origin) * scale));
+  };
+  Box boxes[kBins];
+  int counts[kBins] = {};
+  for (Items item = first; item != last; ++item) {
+    const int bin = bin_of(*item);
+    boxes[bin].extend(item->box);
+    ++counts[bin];
+  }
+  double cost_above[kBins] = {};  // of bins [i, kBins)
+  Box above, below;
+  for (int i = kBins - 1, count = 0; i > 0; --i) {
+    if (counts[i] > 0) above.extend(boxes[i]);
+    count += counts[i];
+    cost_above[i] = count > 0 ? count * half_area(above) : 0;
+  }
+  double least = std::numeric_limits<double>::infinity();
+  int cut = 0;
+  for (int i = 1, count = 0; i < kBins; ++i) {
+    if (counts[i - 1] > 0) below.extend(boxes[i - 1]);
+    count += counts[i - 1];
+    if (count == 0 || count == last - first) continue;
+    const double cost = count * half_area(below) + cost_above[i];
+    if (cost < least) least = cost, cut = i;
+  }
+  if (cut == 0) return halve(first, last, axis);
+  return std::partition(first, last, [=](const Item& item) { return bin_of(item) < cut; });
+}
+
+Box bounds(Items first, Items last) {
+  Box box;
+  for (Items item = first; item != last; ++item) box.extend(item->box);
+  return box;
+}
+
+}  // namespace
+
+Bvh::Bvh(const Mesh& mesh) {
+  std::vector<Item> items(mesh.faces.size());
+  for (std::size_t f = 0; f < items.size(); ++f) {
+    for (const std::int32_t corner : mesh.faces[f]) items[f].box.extend(mesh.vertices[corner]);
+    items[f].centre = 0.5 * (items[f].box.lower + items[f].box.upper);
+    items[f].face = static_cast<std::int32_t>(f);
+  }
+
+  struct Range {
+    Items first, last;
+    std::int32_t node;
+    int depth;
+  };
+  nodes_.reserve(items.size() / 2 + 1);
+  nodes_.emplace_back();
+  std::vector<Range> open = {{items.begin(), items.end(), 0, 0}};
+  while (!open.empty()) {
+    poll_stop();
+    const Range range = open.back();
+    open.pop_back();
+    // A mesh of one triangle has no two halves: its second child stays an empty leaf.
+    const Items middle = range.last - range.first > 1 ? split(range.first, range.last, range.depth) : range.last;
+    const Items ends[3] = {range.first, middle, range.last};
+    for (int side = 0; side < 2; ++side) {
+      const auto count = static_cast<std::int32_t>(ends[side + 1] - ends[side]);
+      Node& node = nodes_[range.node];
+      node.box[side] = bounds(ends[side], ends[side + 1]);
+      if (count <= kLeafSize) {
+        node.child[side] = ~static_cast<std::int32_t>(ends[side] - items.begin());
+        node.leaf_size[side] = count;
+      } else {
+        node.child[side] = static_cast<std::int32_t>(nodes_.size());
+        open.push_back({ends[side], ends[side + 1], node.child[side], range.depth + 1});
+        nodes_.emplace_back();
+      }
+    }
+  }
+
+  triangles_.reserve(items.size());
+  faces_.reserve(items.size());
+  for (const Item& item : items) {
+    const Triangle& face = mesh.faces[item.face];
+    triangles_.emplace_back(mesh.vertices[face[0]], mesh.vertices[face[1]], mesh.vertices[face[2]]);
+    faces_.push_back(item.face);
+  }
+}
+
+Bvh::Hit Bvh::closest(Vec3 p, std::int32_t hint, double enough, double within) const {
+  Hit best;
+  best.distance2 = within * within;
+  const double enough2 = enough * enough;
+  const auto look_at = [&](std::int32_t slot) {
+    const Vec3 q = closest_on_triangle(triangles_[slot], p);
+    const double d2 = norm2(q - p);
+    if (d2 < best.distance2) best = {q, d2, slot};
+  };
+  if (hint >= 0) look_at(hint);
+
+  struct Visit {
+    std::int32_t child, leaf_size;
+    double distance2;
+  };
+  Visit stack[kStack];
+  int top = 0;
+  stack[top++] = {0, 0, 0.0};
+  while (top > 0 && best.distance2 > enough2) {
+    const Visit visit = stack[--top];
+    if (visit.distance2 >= best.distance2) continue;
+    if (visit.child < 0) {
+      for (std::int32_t i = 0; i < visit.leaf_size; ++i) look_at(~visit.child + i);
+      continue;
+    }
+    const Node& node = nodes_[visit.child];
+    Visit next[2];
+    for (int side = 0; side < 2; ++side)
+      next[side] = {node.child[side], node.leaf_size[side], distance2_to_box(node.box[side], p)};
+    const int nearer = next[1].distance2 < next[0].distance2 ? 1 : 0;
+    if (next[1 - nearer].distance2 < best.distance2) stack[top++] = next[1 - nearer];
+    if (next[nearer].distance2 < best.distance2) stack[top++] = next[nearer];
+  }
+  return best;
+}
+
+}  // namespace rlacd

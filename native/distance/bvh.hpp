@@ -1,0 +1,55 @@
+// A tree of boxes over triangles that answers "which point of the surface is closest?".
+//
+// In:  a triangle mesh, of any quality: open, self-intersecting, with triangles of no area.
+// Out: closest points, exact up to rounding.
+// How: top-down build, each node split where the surface-area heuristic is least over eight bins along the longest axis
+//      of its centroids (halved when that fails or the tree gets deep); a node holds the boxes of both its children,
+//      and a query walks the nearer child first and prunes by the best distance so far.
+#pragma once
+
+#include <limits>
+#include <vector>
+
+#include "base/geometry.hpp"
+#include "distance/triangle.hpp"
+
+namespace rlacd {
+
+class Bvh {
+ public:
+  explicit Bvh(const Mesh& mesh);
+
+  // Triangles are kept in the order of the leaves; a *slot* is a place in that order.
+  struct Hit {
+    Vec3 point;
+    double distance2 = std::numeric_limits<double>::infinity();
+    std::int32_t slot = -1;
+  };
+
+  // The closest point to p. A hint (the slot of a triangle thought to be near) only makes it faster. The search ends at
+  // the first triangle within `enough`: the distance then is at most `enough`, not the least. Where no triangle is
+  // nearer than `within`, the slot is -1.
+  Hit closest(Vec3 p, std::int32_t hint = -1, double enough = 0,
+              double within = std::numeric_limits<double>::infinity()) const;
+
+  double distance(std::int32_t slot, Vec3 p) const { return distance_to_triangle(triangles_[slot], p); }
+  std::int32_t face(std::int32_t slot) const { return faces_[slot]; }
+  std::size_t size() const { return triangles_.size(); }
+
+  // A child is a node (child >= 0) or a leaf that holds the slots [~child, ~child + leaf_size).
+  struct Node {
+    Box box[2];
+    std::int32_t child[2] = {-1, -1};
+    std::int32_t leaf_size[2] = {0, 0};
+  };
+  // Nodes come before their children.
+  const std::vector<Node>& nodes() const { return nodes_; }
+  const TriangleFrame& triangle(std::int32_t slot) const { return triangles_[slot]; }
+
+ private:
+  std::vector<Node> nodes_;
+  std::vector<TriangleFrame> triangles_;
+  std::vector<std::int32_t> faces_;
+};
+
+}  // namespace rlacd

@@ -1,0 +1,230 @@
+#include "distance/filling.hpp"
+
+#include <algorithm>
+#include <queue>
+
+#include "base/mesh_measures.hpp"
+#include "base/stop.hpp"
+#include "hull/hull.hpp"
+
+namespace rlacd {
+namespace {
+
+constexpr std::size_t kSome = 40;  // corners: more than this take longer than to look at some first
+
+constexpr double kInside = 0.5, kAccuracy = 2;
+
+// Cells are looked at: so many besides the facets, down to this share of the threshold.
+constexpr int kMostCells = 400;
+constexpr double kSmall = 0.2;
+
+bool meet(const Box& a, const Box& b) {
+  return a.lower.x <= b.upper.x && b.lower.x <= a.upper.x && a.lower.y <= b.upper.y && b.lower.y <= a.upper.y &&
+         a.lower.z <= b.upper.z && b.lower.z <= a.upper.z;
+}
+
+// What lies deeper than t under all planes. Most things do not, and mostly for the same plane as those before them.
+class Depths {
+ public:
+  Depths(const ConvexPlanes& planes, double t) : planes_(planes), t_(t) {}
+
+  bool holds(Vec3 p) {
+    if (planes_.depth(last_, p) <= t_) return false;
+    const std::int32_t plane = planes_.first_within(p, t_);
+    if (plane >= 0) last_ = plane;
+    return plane < 0;
+  }
+
+  // Whether it is certain that no point of a box is in there.
+  bool misses(const Box& box) {
+    const Vec3 middle = 0.5 * (box.lower + box.upper), half = 0.5 * (box.upper - box.lower);
+    const auto is_off = [&](std::int32_t plane) {
+      const Vec3 n = planes_.normal(plane);
+      const double reach = std::fabs(n.x) * half.x + std::fabs(n.y) * half.y + std::fabs(n.z) * half.z;
+      return planes_.depth(plane, middle) + reach <= t_;
+    };
+    if (is_off(last_)) return true;
+    const std::int32_t plane = planes_.nearest(middle).plane;
+    if (!is_off(plane)) return false;
+    last_ = plane;
+    return true;
+  }
+
+  // Whether some point of a triangle is.
+  bool meets(Vec3 a, Vec3 b, Vec3 c) {
+    if (std::max({planes_.depth(last_, a), planes_.depth(last_, b), planes_.depth(last_, c)}) <= t_) return false;
+    constexpr int kMost = 24;  // a plane adds one corner at most, and most planes none
+    Vec3 polygon[kMost] = {a, b, c}, clipped[kMost];
+    int count = 3;
+    for (std::size_t i = 0; i < planes_.size(); ++i) {
+      const auto plane = static_cast<std::int32_t>(i);
+      double depth[kMost];
+      bool cuts = false;
+      for (int k = 0; k < count; ++k) {
+        depth[k] = planes_.depth(plane, polygon[k]) - t_;
+        cuts |= depth[k] <= 0;
+      }
+      if (!cuts) continue;
+      int kept = 0;
+      for (int k = 0; k < count; ++k) {
+        const int next = k + 1 < count ? k + 1 : 0;
+        if (kept + 2 > kMost) return false;  // not known
+        if (depth[k] > 0) clipped[kept++] = polygon[k];
+        if ((depth[k] > 0) != (depth[next] > 0)) {
+          const double share = depth[k] / (depth[k] - depth[next]);
+          clipped[kept++] = polygon[k] + share * (polygon[next] - polygon[k]);
+        }
+      }
+      if (kept == 0) {
+        last_ = plane;
+        return false;
+      }
+      std::copy(clipped, clipped + kept, polygon);
+      count = kept;
+    }
+    Vec3 middle{0, 0, 0};
+    for (int k = 0; k < count; ++k) middle = middle + (1.0 / count) * polygon[k];
+    return planes_.nearest(middle).depth > t_;
+  }
+
+ private:
+  const ConvexPlanes& planes_;
+  const double t_;
+  std::int32_t last_ = 0;  // the plane that the last thing is not deep under
+};
+
+Mesh joint_hull(const std::vector<Vec3>& first, const std::vector<Vec3>& second) {
+  std::vector<Vec3> both = first;
+  both.insert(both.end(), second.begin(), second.end());
+  return hull_mesh(both);
+}
+
+struct Cell {
+  Vec3 corner[3];
+  Vec3 middle;
+  double radius;
+  std::int32_t hint;                                      // the slot of a face of the solid that is near
+  double most = std::numeric_limits<double>::infinity();  // how far a point of it outside the solid can be from it
+
+  Cell(Vec3 a, Vec3 b, Vec3 c, std::int32_t near) : corner{a, b, c}, middle((1.0 / 3) * (a + b + c)), hint(near) {
+    radius = std::sqrt(std::max({norm2(a - middle), norm2(b - middle), norm2(c - middle)}));
+  }
+  bool operator<(const Cell& other) const { return most < other.most; }
+};
+
+}  // namespace
+
+Chance Filling::chance(const Mesh& hull, double threshold) const {
+  if (comes_deeper(hull, threshold)) return Chance::kNever;
+  return is_missed(hull, hull.faces, threshold, kMostCells) ? Chance::kNone : Chance::kSome;
+}
+
+HullCorners::HullCorners(std::vector<Vec3> corners) : all(std::move(corners)) {
+  if (all.size() <= kSome) {
+    some = all;
+    return;
+  }
+  std::vector<std::size_t> chosen;
+  for (int x = -1; x <= 1; ++x)
+    for (int y = -1; y <= 1; ++y)
+      for (int z = -1; z <= 1; ++z) {
+        const Vec3 towards = {static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)};
+        const auto farthest = std::max_element(all.begin(), all.end(),
+                                               [towards](Vec3 p, Vec3 q) { return dot(towards, p) < dot(towards, q); });
+        chosen.push_back(static_cast<std::size_t>(farthest - all.begin()));
+      }
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  for (const std::size_t i : chosen) some.push_back(all[i]);
+}
+
+Filling::Joint Filling::joint_chance(const HullCorners& first, const HullCorners& second, double threshold) const {
+  const bool are_all = first.some.size() == first.all.size() && second.some.size() == second.all.size();
+  Mesh hull = joint_hull(first.some, second.some);
+  if (!hull.faces.empty() && comes_deeper(hull, threshold)) return {0, Chance::kNever};
+  if (!are_all) hull = joint_hull(first.all, second.all);
+  std::vector<char> is_new(hull.faces.size(), 1);
+  for (const std::vector<Vec3>* own : {&first.all, &second.all}) {
+    std::vector<char> is_own(hull.vertices.size());
+    std::transform(hull.vertices.begin(), hull.vertices.end(), is_own.begin(),
+                   [own](Vec3 p) { return std::find(own->begin(), own->end(), p) != own->end(); });
+    for (std::size_t f = 0; f < hull.faces.size(); ++f) {
+      const auto [a, b, c] = hull.faces[f];
+      if (is_own[a] && is_own[b] && is_own[c]) is_new[f] = 0;
+    }
+  }
+  std::vector<Triangle> facets;
+  for (std::size_t f = 0; f < hull.faces.size(); ++f)
+    if (is_new[f]) facets.push_back(hull.faces[f]);
+  const double volume = mesh_volume(hull.vertices, hull.faces);
+  if (!are_all && is_missed(hull, facets, threshold, 0)) return {volume, Chance::kNone};
+  if (!are_all && comes_deeper(hull, threshold)) return {volume, Chance::kNever};
+  return {volume, is_missed(hull, facets, threshold, kMostCells) ? Chance::kNone : Chance::kSome};
+}
+
+bool Filling::comes_deeper(const Mesh& hull, double threshold) const {
+  const ConvexPlanes planes(hull);
+  Depths depths(planes, threshold);
+  Box inner;
+  for (const Vec3 p : hull.vertices) inner.extend(p);
+  inner.lower = inner.lower + Vec3{threshold, threshold, threshold};
+  inner.upper = inner.upper - Vec3{threshold, threshold, threshold};
+  const std::vector<Bvh::Node>& nodes = surface_.bvh().nodes();
+  std::vector<std::int32_t> open = {0};
+  while (!open.empty()) {
+    poll_stop();
+    const Bvh::Node& node = nodes[open.back()];
+    open.pop_back();
+    for (int side = 0; side < 2; ++side) {
+      if (!meet(node.box[side], inner) || depths.misses(node.box[side])) continue;
+      if (node.child[side] >= 0) {
+        open.push_back(node.child[side]);
+        continue;
+      }
+      for (std::int32_t i = 0; i < node.leaf_size[side]; ++i) {
+        const Triangle& face = solid_.faces[surface_.bvh().face(~node.child[side] + i)];
+        const Vec3 p = solid_.vertices[face[0]], q = solid_.vertices[face[1]], r = solid_.vertices[face[2]];
+        for (const Vec3 corner : {p, q, r})
+          if (inner.holds(corner) && depths.holds(corner)) return true;
+        if (depths.meets(p, q, r)) return true;
+      }
+    }
+  }
+  return false;
+}
+
+bool Filling::is_missed(const Mesh& hull, const std::vector<Triangle>& facets, double threshold, int most) const {
+  std::priority_queue<Cell> open;
+  // Whether the middle of a cell is missed; the cell stays open where another point of it may be.
+  const auto look_at = [&](Cell cell) {
+    poll_stop();
+    if (cell.radius < kSmall * threshold) return false;
+    const double enough = std::max(0.0, threshold - cell.radius), within = threshold + cell.radius;
+    const Bvh::Hit hit = surface_.bvh().closest(cell.middle, cell.hint, enough, within);
+    const double distance = std::sqrt(hit.distance2);  // `within` where there is nothing nearer
+    const bool is_far = distance > threshold;
+    if (is_far && surface_.winding().at(cell.middle, kAccuracy) < kInside) return true;
+    // On the way from a middle inside to a point outside, the surface comes after its distance at the soonest.
+    cell.most = is_far ? cell.radius - distance : cell.radius + distance;
+    cell.hint = hit.slot;
+    if (cell.most > threshold) open.push(cell);
+    return false;
+  };
+  for (const auto& [a, b, c] : facets)
+    if (look_at(Cell(hull.vertices[a], hull.vertices[b], hull.vertices[c], -1))) return true;
+  for (int looked = 0; looked < most && !open.empty(); looked += 2) {
+    const Cell cell = open.top();
+    open.pop();
+    // Across the longest side: the cells stay as round as they are.
+    int from = 0;
+    for (int k = 1; k < 3; ++k)
+      if (norm2(cell.corner[(k + 1) % 3] - cell.corner[k]) > norm2(cell.corner[(from + 1) % 3] - cell.corner[from]))
+        from = k;
+    const Vec3 p = cell.corner[from], q = cell.corner[(from + 1) % 3], tip = cell.corner[(from + 2) % 3];
+    const Vec3 between = 0.5 * (p + q);
+    if (look_at(Cell(p, between, tip, cell.hint)) || look_at(Cell(between, q, tip, cell.hint))) return true;
+  }
+  return false;
+}
+
+}  // namespace rlacd

@@ -1,0 +1,230 @@
+// Gluing two solids that touch: see glue.hpp for input, output and algorithm.
+#include "distance/glue.hpp"
+
+#include <algorithm>
+
+#include "base/stop.hpp"
+
+namespace rlacd {
+
+namespace {
+
+constexpr double kSameNormal = 1e-6;  // 1 - cosine between normals of faces in one plane
+
+struct Point2 {
+  double u, v;
+};
+using Polygon = std::vector<Point2>;
+
+double doubled_area(const Polygon& p) {
+  double sum = 0;
+  for (std::size_t i = 1; i + 1 < p.size(); ++i)
+    sum += (p[i].u - p[0].u) * (p[i + 1].v - p[0].v) - (p[i].v - p[0].v) * (p[i + 1].u - p[0].u);
+  return sum;
+}
+
+// Thinner than kCoincident: what rounding leaves between two outlines that were meant to be the same.
+bool is_film(const Polygon& p) {
+  double longest2 = 0;
+  for (std::size_t i = 0; i < p.size(); ++i)
+    for (std::size_t j = i + 1; j < p.size(); ++j)
+      longest2 = std::max(longest2, (p[i].u - p[j].u) * (p[i].u - p[j].u) + (p[i].v - p[j].v) * (p[i].v - p[j].v));
+  return doubled_area(p) <= kCoincident * std::sqrt(longest2);
+}
+
+// Splits a convex polygon by the line through a and b: what lies left of it (inside) and right of it (outside).
+void split(const Polygon& p, Point2 a, Point2 b, Polygon& inside, Polygon& outside) {
+  inside.clear();
+  outside.clear();
+  const auto side = [a, b](Point2 q) { return (b.u - a.u) * (q.v - a.v) - (b.v - a.v) * (q.u - a.u); };
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    const Point2 q = p[i], r = p[(i + 1) % p.size()];
+    const double sq = side(q), sr = side(r);
+    if (sq >= 0) inside.push_back(q);
+    if (sq <= 0) outside.push_back(q);
+    if ((sq > 0 && sr < 0) || (sq < 0 && sr > 0)) {
+      const double t = sq / (sq - sr);
+      const Point2 x{q.u + t * (r.u - q.u), q.v + t * (r.v - q.v)};
+      inside.push_back(x);
+      outside.push_back(x);
+    }
+  }
+}
+
+// Removes a triangle (counter-clockwise) from convex polygons.
+void subtract(std::vector<Polygon>& polygons, const std::array<Point2, 3>& triangle) {
+  std::vector<Polygon> left;
+  Polygon inside, outside;
+  for (Polygon& p : polygons) {
+    Polygon rest = p;
+    std::vector<Polygon> pieces;
+    for (int e = 0; e < 3 && !rest.empty(); ++e) {
+      split(rest, triangle[e], triangle[(e + 1) % 3], inside, outside);
+      if (outside.size() >= 3 && !is_film(outside)) pieces.push_back(outside);
+      rest = inside.size() >= 3 && !is_film(inside) ? inside : Polygon();
+    }
+    if (rest.empty())
+      left.push_back(std::move(p));  // the triangle only touches it: keep it whole
+    else
+      left.insert(left.end(), pieces.begin(), pieces.end());
+  }
+  polygons = std::move(left);
+}
+
+// A triangle with its plane and the two coordinates that the plane is seen in.
+struct Facet {
+  Vec3 corner[3], normal;
+  double offset = 0, height = 0;  // height: twice the area over the longest edge
+  Box box;
+  int u = 0, v = 1;
+
+  Facet(const Mesh& mesh, const Triangle& face) {
+    double longest2 = 0;
+    for (int i = 0; i < 3; ++i) {
+      corner[i] = mesh.vertices[face[i]];
+      box.extend(corner[i]);
+    }
+    for (int i = 0; i < 3; ++i) longest2 = std::max(longest2, norm2(corner[i] - corner[(i + 1) % 3]));
+    const Vec3 n = cross(corner[1] - corner[0], corner[2] - corner[0]);
+    height = longest2 > 0 ? norm(n) / std::sqrt(longest2) : 0;
+    normal = normalized(n);
+    offset = dot(normal, corner[0]);
+    const int drop = std::fabs(n.x) >= std::fabs(n.y) && std::fabs(n.x) >= std::fabs(n.z) ? 0
+                     : std::fabs(n.y) >= std::fabs(n.z)                                   ? 1
+                                                                                          : 2;
+    u = (drop + 1) % 3;
+    v = (drop + 2) % 3;
+    if (n[drop] < 0) std::swap(u, v);  // so that the triangle is counter-clockwise in (u, v)
+  }
+
+  Point2 project(Vec3 p) const { return {p[u], p[v]}; }
+  Vec3 lift(Point2 p) const {
+    const int drop = 3 - u - v;
+    Vec3 x;
+    x[u] = p.u;
+    x[v] = p.v;
+    x[drop] = (offset - normal[u] * p.u - normal[v] * p.v) / normal[drop];
+    return x;
+  }
+
+  bool touches(const Facet& other) const {
+    if (dot(normal, other.normal) >= 0) return false;
+    for (const Vec3 p : other.corner)
+      if (std::fabs(dot(normal, p) - offset) > kCoincident) return false;
+    return true;
+  }
+};
+
+bool overlap(const Box& a, const Box& b) {
+  for (int axis = 0; axis < 3; ++axis)
+    if (a.lower[axis] > b.upper[axis] + kCoincident || b.lower[axis] > a.upper[axis] + kCoincident) return false;
+  return true;
+}
+
+std::vector<Facet> facets_within(const Mesh& mesh, const Box& box) {
+  std::vector<Facet> result;
+  for (const Triangle& face : mesh.faces) {
+    const Facet facet(mesh, face);
+    if (facet.height > kCoincident && overlap(facet.box, box)) result.push_back(facet);
+  }
+  return result;
+}
+
+Box box_of(const Mesh& mesh) {
+  Box box;
+  for (const Triangle& face : mesh.faces)
+    for (const std::int32_t corner : face) box.extend(mesh.vertices[corner]);
+  return box;
+}
+
+// Appends to `out` what is left of mesh `a` where it does not touch `b`.
+void append_untouched(Mesh& out, const Mesh& a, const Mesh& b, const Box& common) {
+  const std::vector<Facet> others = facets_within(b, common);
+  const auto base = static_cast<std::int32_t>(out.vertices.size());
+  out.vertices.insert(out.vertices.end(), a.vertices.begin(), a.vertices.end());
+  std::vector<Polygon> polygons;
+  for (const Triangle& face : a.faces) {
+    poll_stop();
+    const Facet facet(a, face);
+    if (facet.height <= kCoincident) continue;  // its edges are those of its neighbours
+    bool whole = true;
+    if (overlap(facet.box, common)) {
+      for (const Facet& other : others) {
+        if (!overlap(facet.box, other.box) || !facet.touches(other)) continue;
+        if (whole)
+          polygons.assign(
+              1, {facet.project(facet.corner[0]), facet.project(facet.corner[1]), facet.project(facet.corner[2])});
+        whole = false;
+        // Seen from this side the other triangle is clockwise.
+        subtract(polygons,
+                 {facet.project(other.corner[0]), facet.project(other.corner[2]), facet.project(other.corner[1])});
+        if (polygons.empty()) break;
+      }
+    }
+    if (whole) {
+      out.faces.push_back({face[0] + base, face[1] + base, face[2] + base});
+      continue;
+    }
+    for (const Polygon& p : polygons) {
+      const auto first = static_cast<std::int32_t>(out.vertices.size());
+      for (const Point2 q : p) out.vertices.push_back(facet.lift(q));
+      for (std::int32_t i = 1; i + 1 < static_cast<std::int32_t>(p.size()); ++i)
+        out.faces.push_back({first, first + i, first + i + 1});
+    }
+  }
+}
+
+}  // namespace
+
+Mesh glue(const Mesh& a, const Mesh& b) {
+  const Box box_a = box_of(a), box_b = box_of(b);
+  Box common;
+  for (int axis = 0; axis < 3; ++axis) {
+    common.lower[axis] = std::max(box_a.lower[axis], box_b.lower[axis]);
+    common.upper[axis] = std::min(box_a.upper[axis], box_b.upper[axis]);
+  }
+  Mesh out;
+  append_untouched(out, a, b, common);
+  append_untouched(out, b, a, common);
+  return out;
+}
+
+namespace {
+
+// Whether a triangle of one solid and an opposite one of the other have more in common than an edge.
+bool share_area(const Facet& facet, const Facet& other) {
+  if (!overlap(facet.box, other.box) || !facet.touches(other)) return false;
+  Polygon common = {facet.project(facet.corner[0]), facet.project(facet.corner[1]), facet.project(facet.corner[2])};
+  const Point2 outline[3] = {facet.project(other.corner[0]), facet.project(other.corner[2]),
+                             facet.project(other.corner[1])};
+  Polygon inside, outside;
+  for (int e = 0; e < 3; ++e) {
+    split(common, outline[e], outline[(e + 1) % 3], inside, outside);
+    if (inside.size() < 3 || is_film(inside)) return false;
+    common = inside;
+  }
+  return true;
+}
+
+}  // namespace
+
+std::vector<Vec3> outward_where_touching(const Mesh& a, const Mesh& b) {
+  const Box box_a = box_of(a), box_b = box_of(b);
+  const std::vector<Facet> others = facets_within(b, box_a);
+  std::vector<Vec3> outward(a.vertices.size());
+  for (const Triangle& face : a.faces) {
+    poll_stop();
+    const Facet facet(a, face);
+    if (facet.height <= kCoincident || !overlap(facet.box, box_b)) continue;
+    if (std::none_of(others.begin(), others.end(), [&](const Facet& other) { return share_area(facet, other); }))
+      continue;
+    for (const std::int32_t corner : face) {
+      Vec3& sum = outward[static_cast<std::size_t>(corner)];
+      const double lacking = 1 - dot(sum, facet.normal);
+      if (lacking > kSameNormal) sum = sum + lacking * facet.normal;  // faces of one plane count once
+    }
+  }
+  return outward;
+}
+
+}  // namespace rlacd

@@ -1,0 +1,30 @@
+// A triangle surface with what its queries need, built once.
+#pragma once
+
+#include <memory>
+#include <mutex>
+
+#include "distance/bvh.hpp"
+#include "distance/winding.hpp"
+
+namespace rlacd {
+
+class Surface {
+ public:
+  explicit Surface(const Mesh& mesh) : bvh_(mesh) {}
+  Surface(const Surface&) = delete;  // winding_ refers to bvh_
+  Surface& operator=(const Surface&) = delete;
+
+  const Bvh& bvh() const { return bvh_; }
+  const Winding& winding() const {
+    std::call_once(winding_made_, [this] { winding_ = std::make_unique<Winding>(bvh_); });
+    return *winding_;
+  }
+
+ private:
+  Bvh bvh_;
+  mutable std::once_flag winding_made_;
+  mutable std::unique_ptr<Winding> winding_;
+};
+
+}  // namespace rlacd

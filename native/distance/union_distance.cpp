@@ -1,0 +1,247 @@
+#include "distance/union_distance.hpp"
+
+#include <unordered_map>
+
+#include "base/stop.hpp"
+#include "cut/clip.hpp"
+#include "distance/surface_field.hpp"
+
+namespace rlacd {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// Planes are moved out by this before a triangle of the surface is clipped by them, so that the hulls on both sides of
+// a cut leave no slivers of rounding between them. What is lost is at most this far beyond every facet's plane.
+constexpr double kInsideSlack = 1e-9;
+
+// A facet in more pieces than this is left as it is.
+constexpr std::size_t kMostPieces = 4096;
+
+// Two facets face the same way when the angle between them is below 60 degrees.
+constexpr double kSameWay = 0.5;
+
+bool overlap(const Box& a, const Box& b, double slack) {
+  for (int axis = 0; axis < 3; ++axis)
+    if (a.lower[axis] > b.upper[axis] + slack || b.lower[axis] > a.upper[axis] + slack) return false;
+  return true;
+}
+
+Box box_of(const Corners& corner) {
+  Box box;
+  for (const Vec3 p : corner) box.extend(p);
+  return box;
+}
+
+double distance2_to_box(const Box& box, Vec3 p) {
+  double sum = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double d = std::max({box.lower[axis] - p[axis], p[axis] - box.upper[axis], 0.0});
+    sum += d * d;
+  }
+  return sum;
+}
+
+// Polygons in one mesh, in which equal corners are one vertex: its distance is asked once.
+class Gathering {
+ public:
+  void add(const Polygon& polygon) {
+    corner_.clear();
+    for (const Vec3 p : polygon) corner_.push_back(number_of(p));
+    for (std::size_t i = 2; i < corner_.size(); ++i) mesh_.faces.push_back({corner_[0], corner_[i - 1], corner_[i]});
+  }
+  Mesh take() { return std::move(mesh_); }
+
+ private:
+  using Key = std::array<double, 3>;
+  struct Hash {
+    std::size_t operator()(const Key& p) const {
+      std::size_t all = 0;
+      for (const double x : p) all = (all ^ std::hash<double>()(x)) * 0x9e3779b97f4a7c15u;
+      return all;
+    }
+  };
+
+  std::int32_t number_of(Vec3 p) {
+    const auto next = static_cast<std::int32_t>(mesh_.vertices.size());
+    const auto [place, is_new] = number_.try_emplace(Key{p.x, p.y, p.z}, next);
+    if (is_new) mesh_.vertices.push_back(p);
+    return place->second;
+  }
+
+  Mesh mesh_;
+  std::unordered_map<Key, std::int32_t, Hash> number_;
+  std::vector<std::int32_t> corner_;
+};
+
+// Whether three ascending lists have a number in common.
+bool have_common(const std::vector<std::int32_t>& a, const std::vector<std::int32_t>& b,
+                 const std::vector<std::int32_t>& c) {
+  return std::any_of(a.begin(), a.end(), [&](std::int32_t i) {
+    return std::binary_search(b.begin(), b.end(), i) && std::binary_search(c.begin(), c.end(), i);
+  });
+}
+
+// Whether a triangle lies farther than `gap` beyond a plane.
+bool is_beyond(const ConvexPlanes& planes, std::int32_t plane, const Corners& corner, double gap) {
+  return planes.depth(plane, corner[0]) < -gap && planes.depth(plane, corner[1]) < -gap &&
+         planes.depth(plane, corner[2]) < -gap;
+}
+
+// A plane that a triangle lies farther than `gap` beyond, or -1. The one given is tried first.
+std::int32_t plane_before(const ConvexPlanes& planes, const Corners& corner, double gap, std::int32_t first) {
+  if (first >= 0 && is_beyond(planes, first, corner, gap)) return first;
+  for (std::int32_t i = 0; i < static_cast<std::int32_t>(planes.size()); ++i)
+    if (is_beyond(planes, i, corner, gap)) return i;
+  return -1;
+}
+
+}  // namespace
+
+HullUnion::Member::Member(Mesh hull) : mesh(std::move(hull)), planes(mesh), bvh(mesh) {
+  for (const Triangle& face : mesh.faces)
+    for (const std::int32_t corner : face) box.extend(mesh.vertices[corner]);
+}
+
+double HullUnion::Member::distance(Vec3 p, double enough) const {
+  // The farthest facet plane that p is beyond is no farther than the hull.
+  const double beyond = -planes.nearest(p).depth;
+  if (beyond <= 0) return 0;
+  return beyond >= enough ? beyond : std::sqrt(bvh.closest(p).distance2);
+}
+
+HullUnion::HullUnion(std::vector<Mesh> hulls, int threads) : members_(hulls.size()) {
+  parallel_for(hulls.size(), hulls.size() < 8 ? 1 : threads,
+               [&](std::size_t i) { members_[i] = std::make_unique<Member>(std::move(hulls[i])); });
+}
+
+double HullUnion::distance(Vec3 p) const {
+  double best = kInfinity;
+  for (const auto& member : members_)
+    if (distance2_to_box(member->box, p) < best * best) best = std::min(best, member->distance(p, best));
+  return best;
+}
+
+// Distance to the union; the witnesses are the hulls.
+class HullField {
+ public:
+  explicit HullField(const HullUnion& hulls) : members_(hulls.members_) {}
+
+  Sample at(Vec3 p, std::int32_t hint, double enough) const {
+    Sample best{kInfinity, -1};
+    if (hint >= 0) best = {from(hint, p), hint};
+    for (std::size_t k = 0; k < members_.size() && best.value > enough; ++k) {
+      if (static_cast<std::int32_t>(k) == hint) continue;
+      if (!(distance2_to_box(members_[k]->box, p) < best.value * best.value)) continue;
+      const double distance = members_[k]->distance(p, best.value);
+      if (distance < best.value) best = {distance, static_cast<std::int32_t>(k)};
+    }
+    return best;
+  }
+  double from(std::int32_t hull, Vec3 p) const { return members_[hull]->distance(p, kInfinity); }
+
+ private:
+  const std::vector<std::unique_ptr<HullUnion::Member>>& members_;
+};
+
+HullUnion::Exposed HullUnion::exposed(double gap, int threads) const {
+  struct Facet {
+    std::vector<Polygon> pieces;
+    bool resolved = true;
+  };
+  std::vector<std::vector<Facet>> facets(members_.size());
+  parallel_for(members_.size(), threads, [&](std::size_t own) {
+    const Mesh& mesh = members_[own]->mesh;
+    std::vector<std::int32_t> between(members_.size(), -1);  // the plane that the last facet lay beyond
+    Clipper clipper;
+    for (const Triangle& face : mesh.faces) {
+      poll_stop();
+      const Corners corner = corners_of(mesh, face);
+      const Vec3 normal = normalized(cross(corner[1] - corner[0], corner[2] - corner[0]));
+      const Box box = box_of(corner);
+      Facet& facet = facets[own].emplace_back();
+      facet.pieces = {{corner.begin(), corner.end()}};
+      for (std::size_t m = 0; m < members_.size() && !facet.pieces.empty(); ++m) {
+        if (m == own || !overlap(box, members_[m]->box, gap)) continue;
+        // Where another hull's facet faces the other way (or across), the hull is grown by the gap: a touching facet is
+        // covered. Where it faces the same way, the hull is shrunk by less than that: of two facets in one plane
+        // neither covers the other, and of two hulls on both sides of a plane across this facet one always covers it.
+        const ConvexPlanes& planes = members_[m]->planes;
+        if (const std::int32_t plane = plane_before(planes, corner, gap, between[m]); plane >= 0) {
+          between[m] = plane;
+          continue;
+        }
+        HalfSpaces halves(planes);
+        for (std::size_t i = 0; i < halves.offset.size(); ++i) {
+          const double same_way = planes.x()[i] * normal.x + planes.y()[i] * normal.y + planes.z()[i] * normal.z;
+          halves.offset[i] += same_way >= kSameWay ? -0.25 * gap : gap;
+        }
+        clipper.subtract(facet.pieces, halves);
+        if (facet.pieces.size() > kMostPieces) {
+          facet.resolved = false;
+          break;
+        }
+      }
+    }
+  });
+
+  Gathering resolved, unresolved;
+  for (const std::vector<Facet>& own : facets)
+    for (const Facet& facet : own)
+      for (const Polygon& piece : facet.pieces) (facet.resolved ? resolved : unresolved).add(piece);
+  return {resolved.take(), unresolved.take()};
+}
+
+Interval HullUnion::over(const Bvh& surface, double tolerance, double gap, int threads) const {
+  const Exposed found = exposed(gap, threads);
+  Interval over = maximize_in_waves(SurfaceField(surface), found.exposed, tolerance, threads);
+  if (!found.unresolved.faces.empty()) {
+    const Interval most = maximize_in_waves(SurfaceField(surface), found.unresolved, tolerance, threads);
+    over.upper = std::max(over.upper, most.upper);
+  }
+  return over;
+}
+
+Interval HullUnion::under(const Mesh& surface, double tolerance, int threads) const {
+  if (members_.empty()) return {kInfinity, kInfinity};
+  std::vector<HalfSpaces> grown;
+  for (const auto& member : members_) {
+    for (double& offset : grown.emplace_back(member->planes).offset) offset += kInsideSlack;
+  }
+
+  constexpr std::size_t kChunk = 64;
+  const auto for_each = [threads](std::size_t count, const auto& task) {
+    parallel_for((count + kChunk - 1) / kChunk, threads, [&](std::size_t chunk) {
+      Clipper clipper;
+      for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) task(i, clipper);
+    });
+  };
+  std::vector<std::vector<std::int32_t>> holders(surface.vertices.size());  // the hulls that a corner is in
+  for_each(holders.size(), [&](std::size_t v, Clipper&) {
+    const Vec3 p = surface.vertices[v];
+    for (std::size_t m = 0; m < members_.size(); ++m)
+      if (overlap({p, p}, members_[m]->box, kInsideSlack) && members_[m]->planes.nearest(p).depth >= -kInsideSlack)
+        holders[v].push_back(static_cast<std::int32_t>(m));
+  });
+  std::vector<std::vector<Polygon>> outside(surface.faces.size());
+  for_each(outside.size(), [&](std::size_t f, Clipper& clipper) {
+    poll_stop();
+    const auto [a, b, c] = surface.faces[f];
+    if (have_common(holders[a], holders[b], holders[c])) return;
+    const Corners corner = corners_of(surface, surface.faces[f]);
+    const Box box = box_of(corner);
+    outside[f] = {{corner.begin(), corner.end()}};
+    for (std::size_t m = 0; m < members_.size(); ++m) {
+      if (!overlap(box, members_[m]->box, kInsideSlack)) continue;
+      if (outside[f].size() > kMostPieces) break;  // uncut pieces are in no way wrong here, only more work
+      clipper.subtract(outside[f], grown[m]);
+    }
+  });
+
+  Gathering left;
+  for (const std::vector<Polygon>& polygons : outside)
+    for (const Polygon& polygon : polygons) left.add(polygon);
+  return maximize_in_waves(HullField(*this), left.take(), tolerance, threads);
+}
+
+}  // namespace rlacd

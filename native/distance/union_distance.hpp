@@ -1,0 +1,61 @@
+// Distances between a union of convex hulls and a surface, certified.
+//
+// In:  convex hulls (closed, convex, outward oriented), which may touch and overlap; a triangle surface.
+// Out: over:  the greatest distance from the surface *of the union* to the given surface: what the hulls add;
+//      under: the greatest distance from the given surface to the union as a solid, 0 inside any hull: what they miss;
+//      each as an interval of the width asked for.
+// How: the triangles are clipped exactly against the hulls, so that what counts is a set of small convex polygons, and
+//      branch_and_bound.hpp finds the maximum over those. Over: a facet of a hull loses what lies inside other hulls
+//      and what touches another hull's facet from the opposite side; of two facets that coincide facing the same way,
+//      both stay. Under: a triangle of the surface loses what lies inside any hull; on the rest, distance to the union
+//      is the least of the distances to the hulls, which are convex. Triangles are independent and waves deterministic:
+//      the same bits for any number of threads.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "base/geometry.hpp"
+#include "distance/branch_and_bound.hpp"
+#include "distance/bvh.hpp"
+#include "hull/convex_planes.hpp"
+
+namespace rlacd {
+
+class HullUnion {
+ public:
+  HullUnion(std::vector<Mesh> hulls, int threads);
+  HullUnion(const HullUnion&) = delete;
+  HullUnion& operator=(const HullUnion&) = delete;
+
+  // The surface of the union as triangles. Cracks between hulls narrower than `gap` count as closed; next to inner
+  // corners of the surface, strips narrower than about `gap` are lost for it. A facet that lies
+  // in so many hulls that its pieces were not cut out to the end is left to `unresolved`: parts of it are hidden.
+  struct Exposed {
+    Mesh exposed, unresolved;
+  };
+  Exposed exposed(double gap, int threads) const;
+
+  Interval over(const Bvh& surface, double tolerance, double gap, int threads) const;
+  Interval under(const Mesh& surface, double tolerance, int threads) const;
+
+  // From p to the solid, 0 inside.
+  double distance(Vec3 p) const;
+
+ private:
+  struct Member {
+    explicit Member(Mesh hull);
+    // 0 inside, else to the surface; may give up with any number >= `enough` once the distance is known to be that.
+    double distance(Vec3 p, double enough) const;
+
+    Mesh mesh;
+    ConvexPlanes planes;
+    Bvh bvh;
+    Box box;
+  };
+  friend class HullField;
+
+  std::vector<std::unique_ptr<Member>> members_;
+};
+
+}  // namespace rlacd

@@ -1,0 +1,17 @@
+#include "hull/convex_body.hpp"
+
+#include <utility>
+
+namespace rlacd {
+
+ConvexBody::ConvexBody(Mesh mesh) : mesh_(std::move(mesh)), planes_(mesh_) {
+  for (const Vec3 vertex : mesh_.vertices) box_.extend(vertex);
+}
+
+double ConvexBody::distance(Vec3 p, double enough) const {
+  const double outside = -planes_.nearest(p).depth;
+  if (outside <= 0 || outside >= enough) return outside;
+  return std::sqrt(bvh().closest(p).distance2);
+}
+
+}  // namespace rlacd

@@ -1,0 +1,95 @@
+// A closed convex triangle mesh that shrinks its number of corners by growing.
+//
+// In:  a convex hull around the origin, about as wide in all directions.
+// Out: convex hulls around it with fewer and fewer corners, the cheapest edge collapse first.
+// Invariants: the living facets form a closed, outward oriented triangle mesh of sphere topology; it is convex up to
+// kFlat; every collapse replaces it by its hull with one new point.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "base/geometry.hpp"
+#include "hull/linear_program.hpp"
+
+namespace rlacd {
+
+class ConvexCollapse {
+ public:
+  // Edges of the hull that need not be tried can be left out: may_collapse(from, to).
+  explicit ConvexCollapse(
+      const Mesh& hull, const std::function<bool(std::int32_t, std::int32_t)>& may_collapse =
+                            [](std::int32_t, std::int32_t) { return true; });
+
+  // Collapses edges while there are more than `most` corners, and further while the new corner is acceptable. False
+  // when no edge can be collapsed any more although there are too many corners.
+  template <class Acceptable>
+  bool reduce(std::size_t most, const Acceptable& acceptable);
+
+  std::vector<Vec3> corners() const;
+
+ private:
+  struct Facet {
+    Triangle corner;
+    std::int32_t neighbour[3];  // across the edge corner[i] -> corner[i + 1]
+    Vec3 normal;
+    double offset, area;
+    bool alive;
+  };
+  struct Collapse {
+    double cost;  // added volume
+    std::int32_t from, to;
+    std::uint32_t from_version, to_version;
+    Vec3 point;
+    bool operator<(const Collapse& other) const {  // the cheapest on top of a max-heap; ties by the corners
+      if (cost != other.cost) return cost > other.cost;
+      return from != other.from ? from > other.from : to > other.to;
+    }
+  };
+  struct HorizonEdge {
+    std::int32_t from, to, beyond;
+  };
+
+  std::int32_t add_facet(std::int32_t a, std::int32_t b, std::int32_t c);
+  bool gather(std::int32_t from, std::int32_t to);
+  bool extend(Vec3 point);
+  bool trace_horizon();
+  std::optional<Collapse> plan(std::int32_t from, std::int32_t to);
+  void schedule(std::int32_t from, std::int32_t to);
+  void apply(const Collapse& collapse);
+
+  std::vector<Vec3> points_;
+  std::vector<Facet> facets_;
+  std::vector<std::int32_t> facet_of_;  // one living facet of each living corner, -1 for the dead
+  std::vector<std::uint32_t> version_;  // of a corner: changes with its facets
+  std::vector<std::int32_t> free_;
+  std::vector<Collapse> heap_;
+  std::size_t alive_ = 0;
+
+  std::vector<std::int32_t> region_;  // facets that the point of the collapse at hand replaces
+  std::vector<std::uint32_t> mark_;   // of a facet: the last gathering it was part of
+  std::uint32_t gathering_ = 0;
+  std::vector<HorizonEdge> horizon_;
+  std::vector<std::int32_t> horizon_at_;  // of a corner: the horizon edge that starts there
+  std::vector<Above> above_;
+};
+
+template <class Acceptable>
+bool ConvexCollapse::reduce(std::size_t most, const Acceptable& acceptable) {
+  while (!heap_.empty() && alive_ > 4) {
+    const Collapse collapse = heap_.front();
+    std::pop_heap(heap_.begin(), heap_.end());
+    heap_.pop_back();
+    if (facet_of_[collapse.from] < 0 || facet_of_[collapse.to] < 0) continue;
+    if (version_[collapse.from] != collapse.from_version || version_[collapse.to] != collapse.to_version) {
+      schedule(collapse.from, collapse.to);
+      continue;
+    }
+    if (alive_ > most || acceptable(collapse.point)) apply(collapse);
+  }
+  return alive_ <= most;
+}
+
+}  // namespace rlacd

@@ -1,0 +1,94 @@
+#include "hull/convex_planes.hpp"
+
+#include <stdexcept>
+
+#include "hull/wide.hpp"
+
+namespace rlacd {
+namespace {
+
+// Normals closer than this are one plane. It is pushed out to touch the hull like every other, so taking it for its
+// twin shifts a depth by no more than this times the hull's diameter, and only upwards.
+constexpr double kSameNormal = 1e-9;
+
+// Pushes planes out until they touch a point.
+RLACD_WIDE void push_out(double* h, const double* x, const double* y, const double* z, std::size_t count, Vec3 p) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const double height = x[i] * p.x + y[i] * p.y + z[i] * p.z;
+    h[i] = h[i] > height ? h[i] : height;
+  }
+}
+
+}  // namespace
+
+ConvexPlanes::ConvexPlanes(const Mesh& hull) {
+  struct Facet {
+    std::array<std::int64_t, 3> key;
+    double area;
+    Vec3 normal;
+    bool operator<(const Facet& other) const { return key != other.key ? key < other.key : area > other.area; }
+  };
+  std::vector<Facet> facets;
+  facets.reserve(hull.faces.size());
+  for (const Triangle& face : hull.faces) {
+    const Vec3 a = hull.vertices[face[0]];
+    const Vec3 product = cross(hull.vertices[face[1]] - a, hull.vertices[face[2]] - a);
+    const double area = norm(product);
+    if (!(area > 0)) continue;
+    const Vec3 n = (1 / area) * product;
+    if (!(std::fabs(norm2(n) - 1) < 1e-12)) continue;  // underflow
+    facets.push_back(
+        {{std::llround(n.x / kSameNormal), std::llround(n.y / kSameNormal), std::llround(n.z / kSameNormal)}, area, n});
+  }
+  if (facets.empty()) throw std::invalid_argument("the hull has no facet with an area");
+  std::sort(facets.begin(), facets.end());
+  facets.erase(std::unique(facets.begin(), facets.end(), [](const Facet& a, const Facet& b) { return a.key == b.key; }),
+               facets.end());
+
+  count_ = facets.size();
+  const std::size_t padded = (count_ + kBlock - 1) / kBlock * kBlock;
+  x_.assign(padded, 0);
+  y_.assign(padded, 0);
+  z_.assign(padded, 0);
+  h_.assign(padded, -std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < count_; ++i) {
+    x_[i] = facets[i].normal.x;
+    y_[i] = facets[i].normal.y;
+    z_[i] = facets[i].normal.z;
+  }
+  std::vector<bool> is_corner(hull.vertices.size(), false);
+  for (const Triangle& face : hull.faces)
+    for (const std::int32_t corner : face) is_corner[corner] = true;
+  for (std::size_t v = 0; v < hull.vertices.size(); ++v)
+    if (is_corner[v]) push_out(h_.data(), x_.data(), y_.data(), z_.data(), padded, hull.vertices[v]);
+  std::fill(h_.begin() + static_cast<std::ptrdiff_t>(count_), h_.end(), std::numeric_limits<double>::infinity());
+}
+
+RLACD_WIDE ConvexPlanes::Nearest ConvexPlanes::nearest(Vec3 p) const {
+  Nearest best;
+  double depths[kBlock];
+  for (std::size_t start = 0; start < h_.size(); start += kBlock) {
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < kBlock; ++i)
+      depths[i] = h_[start + i] - (x_[start + i] * p.x + y_[start + i] * p.y + z_[start + i] * p.z);
+    for (std::size_t i = 0; i < kBlock; ++i) least = depths[i] < least ? depths[i] : least;
+    if (!(least < best.depth)) continue;
+    best.depth = least;
+    best.plane = static_cast<std::int32_t>(start + (std::find(depths, depths + kBlock, least) - depths));
+  }
+  return best;
+}
+
+RLACD_WIDE std::int32_t ConvexPlanes::first_within(Vec3 p, double t) const {
+  for (std::size_t start = 0; start < h_.size(); start += kBlock) {
+    bool is_within = false;
+    for (std::size_t i = start; i < start + kBlock; ++i)
+      is_within |= h_[i] - (x_[i] * p.x + y_[i] * p.y + z_[i] * p.z) <= t;
+    if (!is_within) continue;
+    for (std::size_t i = start; i < start + kBlock; ++i)
+      if (h_[i] - (x_[i] * p.x + y_[i] * p.y + z_[i] * p.z) <= t) return static_cast<std::int32_t>(i);
+  }
+  return -1;
+}
+
+}  // namespace rlacd

@@ -1,0 +1,266 @@
+#include "hull/simplify_hull.hpp"
+
+#include <array>
+#include <stdexcept>
+
+#include "base/mesh_measures.hpp"
+#include "distance/bvh.hpp"
+#include "hull/convex_collapse.hpp"
+#include "hull/convex_planes.hpp"
+#include "hull/convex_relax.hpp"
+
+namespace rlacd {
+namespace {
+
+// With more corners than this, edge collapse was better than a plain cover on every hull tried.
+constexpr std::size_t kFewCorners = 10;
+
+// Collapses leave room between the hulls, and what they cost shows only after it is used up: on the last stretch, from
+// this many times the corners asked for, collapses and relaxation take turns.
+constexpr double kLastStretch = 1.5, kStep = 1.1;
+constexpr int kSweepsOnTheWay = 3, kSweepsAtTheEnd = 30;
+
+// Hulls thinner than this share of their length are given that thickness first: rounding is 1e-4 of a thickness of
+// 1e-12, and where two facets meet at the tip of a needle that much of its length would be left outside.
+constexpr double kThinnest = 1e-9;
+
+// A facet with less area than this share of a square on its longest side has no normal worth the name.
+constexpr double kSliver = 1e-6;
+
+// So many times more than the tolerance is needed, since normals and depths are rounded.
+constexpr double kSafely = 4;
+
+constexpr double kUnknown = std::numeric_limits<double>::infinity();
+
+// The affine map to a frame where the hull is about 2 wide in three perpendicular directions and around the origin. The
+// directions come from extreme points (the longest line, the point farthest from it), not from second moments, whose
+// cancellation would lose a plate's thickness below 1e-8 of its width.
+class Whitening {
+ public:
+  explicit Whitening(const std::vector<Vec3>& points) {
+    const double share = 1.0 / static_cast<double>(points.size());
+    for (const Vec3 p : points) centre_ = centre_ + share * p;
+    const auto farthest = [&](const auto& distance) {
+      return *std::max_element(points.begin(), points.end(), [&](Vec3 p, Vec3 q) { return distance(p) < distance(q); });
+    };
+    const Vec3 a = farthest([&](Vec3 p) { return norm2(p - centre_); });
+    const Vec3 b = farthest([&](Vec3 p) { return norm2(p - a); });
+    axes_[0] = normalized(b - a);
+    const Vec3 c = farthest([&](Vec3 p) { return norm2(cross(axes_[0], p - a)); });
+    axes_[2] = normalized(cross(axes_[0], c - a));
+    axes_[1] = cross(axes_[2], axes_[0]);
+    for (int i = 0; i < 3; ++i) {
+      for (const Vec3 p : points) scale_[i] = std::max(scale_[i], std::fabs(dot(axes_[i], p - centre_)));
+      if (!(norm2(axes_[i]) > 0.5 && scale_[i] > 0) || !std::isfinite(1 / scale_[i]))
+        throw std::invalid_argument("the hull is flat");
+    }
+  }
+  Vec3 to(Vec3 p) const {
+    const Vec3 d = p - centre_;
+    return {dot(axes_[0], d) / scale_[0], dot(axes_[1], d) / scale_[1], dot(axes_[2], d) / scale_[2]};
+  }
+  Vec3 from(Vec3 p) const {
+    return centre_ + scale_[0] * p.x * axes_[0] + scale_[1] * p.y * axes_[1] + scale_[2] * p.z * axes_[2];
+  }
+  // The points, moved to both sides along every axis in which they are not `share` as thick as they are long, so that
+  // they are; none if there is no such axis.
+  std::vector<Vec3> thickened(const std::vector<Vec3>& points, double share) const {
+    const double enough = share * std::max({scale_[0], scale_[1], scale_[2]}), by = 2 * enough;
+    std::vector<Vec3> moved = points;
+    bool thin = false;
+    for (int i = 0; i < 3; ++i) {
+      if (scale_[i] >= enough) continue;
+      thin = true;
+      std::vector<Vec3> both;
+      for (const Vec3 p : moved) both.push_back(p - by * axes_[i]), both.push_back(p + by * axes_[i]);
+      moved = std::move(both);
+    }
+    return thin ? moved : std::vector<Vec3>();
+  }
+
+ private:
+  Vec3 centre_;
+  Vec3 axes_[3];
+  double scale_[3] = {0, 0, 0};
+};
+
+double volume_of(const Mesh& mesh) { return mesh_volume(mesh.vertices, mesh.faces); }
+
+// The corners of the intersection of half-spaces n . x <= h that all hold the origin inside: facets of the hull of n /
+// h.
+std::vector<Vec3> corners_of_intersection(const std::vector<Above>& planes) {
+  std::vector<Vec3> dual;
+  for (const Above& plane : planes) dual.push_back(1 / plane.offset * plane.normal);
+  const Mesh polar = hull_mesh(dual);
+  std::vector<Vec3> corners;
+  for (const Triangle& face : polar.faces) {
+    const Vec3 a = polar.vertices[face[0]];
+    const Vec3 normal = cross(polar.vertices[face[1]] - a, polar.vertices[face[2]] - a);
+    corners.push_back(1 / dot(normal, a) * normal);
+  }
+  return corners;
+}
+
+// The normals of three large facets in different directions, divided by the hull's width along them: in these
+// coordinates any parallelepiped is the unit cube.
+std::array<Vec3, 3> main_directions(const Mesh& hull) {
+  std::array<Vec3, 3> best;
+  for (int i = 0; i < 3; ++i) {
+    double most = 0;
+    for (const Triangle& face : hull.faces) {
+      const Vec3 a = hull.vertices[face[0]];
+      const Vec3 normal = cross(hull.vertices[face[1]] - a, hull.vertices[face[2]] - a);
+      const double size = i == 0   ? norm(normal)
+                          : i == 1 ? norm(cross(best[0], normal))
+                                   : std::fabs(dot(cross(best[0], best[1]), normal));
+      if (size > most) most = size, best[i] = normalized(normal);
+    }
+  }
+  for (Vec3& normal : best) {
+    double low = 0, high = 0;
+    for (const Vec3 p : hull.vertices) low = std::min(low, dot(normal, p)), high = std::max(high, dot(normal, p));
+    normal = 1 / (high - low) * normal;
+  }
+  return best;
+}
+
+// Polytopes of supporting planes in a few directions that have at most `most` corners: tetrahedra, prisms, a box.
+std::vector<Mesh> plain_covers(const Mesh& hull, std::size_t most) {
+  const auto cover = [&](const std::vector<Vec3>& normals) {
+    std::vector<Above> planes;
+    for (const Vec3 direction : normals) {
+      const Vec3 normal = normalized(direction);
+      double offset = 0;
+      for (const Vec3 p : hull.vertices) offset = std::max(offset, dot(normal, p));
+      planes.push_back({normal, offset});
+    }
+    return hull_mesh(corners_of_intersection(planes));
+  };
+  const std::array<Vec3, 3> axes = main_directions(hull);
+  const auto [x, y, z] = axes;
+  std::vector<Mesh> covers = {cover({x + y + z, x - y - z, y - x - z, z - x - y})};
+  for (int octant = 0; octant < 8 && most < 6; ++octant) {
+    const Vec3 u = (octant & 1 ? -1.0 : 1.0) * x, v = (octant & 2 ? -1.0 : 1.0) * y, w = (octant & 4 ? -1.0 : 1.0) * z;
+    covers.push_back(cover({u, v, w, -u - v - w}));
+  }
+  for (int axis = 0; axis < 3 && most >= 6; ++axis) {
+    const Vec3 along = axes[axis], u = axes[(axis + 1) % 3], v = axes[(axis + 2) % 3];
+    covers.push_back(cover({along, -along, u, std::sqrt(0.75) * v - 0.5 * u, -std::sqrt(0.75) * v - 0.5 * u}));
+  }
+  if (most >= 8) covers.push_back(cover({x, -x, y, -y, z, -z}));
+  return covers;
+}
+
+// How much larger than 1 a scaling about the origin must be for `outer` to hold every corner of `inner`.
+double missing_scale(const Mesh& outer, const Mesh& inner) {
+  const auto reach = [](const Mesh& mesh, Vec3 normal) {
+    double farthest = 0;
+    for (const Vec3 p : mesh.vertices) farthest = std::max(farthest, dot(normal, p));
+    return farthest;
+  };
+  double scale = 1;
+  for (const Triangle& face : outer.faces) {
+    const Vec3 a = outer.vertices[face[0]];
+    const Vec3 normal = normalized(cross(outer.vertices[face[1]] - a, outer.vertices[face[2]] - a));
+    const double own = reach(outer, normal);
+    if (own > 0) scale = std::max(scale, reach(inner, normal) / own);
+  }
+  return scale;
+}
+
+// Out of the whitened frame, scaled by the hair that tolerances and rounding may have left it too small.
+Mesh brought_back(Mesh outer, const Mesh& inner, const Whitening& whitening) {
+  const double scale = missing_scale(outer, inner);
+  for (Vec3& p : outer.vertices) p = whitening.from(scale * p);
+  return hull_mesh(outer.vertices);
+}
+
+std::vector<std::size_t> stages(std::size_t corners, std::size_t most) {
+  std::vector<std::size_t> sizes;
+  for (double size = kLastStretch * static_cast<double>(most); size > static_cast<double>(most); size /= kStep)
+    if (static_cast<std::size_t>(size) < (sizes.empty() ? corners : sizes.back()))
+      sizes.push_back(static_cast<std::size_t>(size));
+  if (sizes.empty() || sizes.back() != most) sizes.push_back(most);
+  return sizes;
+}
+
+// For every corner of a convex hull, how many times farther from it than t a point of the hull may be that lies no
+// deeper than t under any facet around the corner; infinity where that is not known.
+//
+// The cone of the edges a -> v from a corner a holds the hull: x - a = sum c_v (v - a) with c_v >= 0. With N the mean
+// of the normals of the facets around a, the mean depth of x is N . (a - x) = sum c_v N . (a - v) <= t, so that |x - a|
+// <= sum c_v |v - a| is at most t times the greatest |v - a| / N . (a - v).
+std::vector<double> reach_of_corners(const Mesh& hull) {
+  std::vector<Vec3> normal(hull.vertices.size());
+  std::vector<double> facets(hull.vertices.size(), 0), reach(hull.vertices.size(), 0);
+  for (const Triangle& f : hull.faces) {
+    const Vec3 a = hull.vertices[f[0]];
+    const Vec3 b = hull.vertices[f[1]] - a, c = hull.vertices[f[2]] - a, product = cross(b, c);
+    const bool is_sliver = norm(product) <= kSliver * std::max({norm2(b), norm2(c), norm2(c - b)});
+    for (const std::int32_t corner : f) {
+      if (is_sliver) reach[corner] = kUnknown;
+      normal[corner] = normal[corner] + normalized(product);
+      ++facets[corner];
+    }
+  }
+  for (const Triangle& f : hull.faces)
+    for (int e = 0; e < 3; ++e) {  // every edge from both of its ends: the mesh is closed
+      const std::int32_t a = f[e];
+      const Vec3 edge = hull.vertices[f[(e + 1) % 3]] - hull.vertices[a];
+      const double depth = -dot(normal[a], edge) / facets[a];
+      reach[a] = std::max(reach[a], depth > 0 ? norm(edge) / depth : kUnknown);
+    }
+  return reach;
+}
+
+}  // namespace
+
+Mesh simplify_hull(const Mesh& hull, std::size_t max_vertices, std::size_t max_faces, double tolerance) {
+  if (max_vertices < 4 || max_faces < 4) throw std::invalid_argument("a hull has at least 4 vertices and 4 faces");
+  // A triangulated convex polytope has twice as many triangles as corners, less four.
+  const std::size_t most = std::min(max_vertices, (max_faces + 4) / 2);
+  const Whitening whitening(hull.vertices);
+  if (const std::vector<Vec3> thick = whitening.thickened(hull.vertices, kThinnest); !thick.empty())
+    return hull.vertices.size() <= most ? hull : simplify_hull(hull_mesh(thick), max_vertices, max_faces, tolerance);
+  std::vector<Vec3> whitened;
+  for (const Vec3 p : hull.vertices) whitened.push_back(whitening.to(p));
+  const Mesh inner = hull_mesh(whitened);
+  if (inner.faces.empty()) throw std::invalid_argument("the hull is flat");
+
+  const Bvh surface(hull);
+  const ConvexPlanes planes(hull);
+  const auto redundant = [&](Vec3 point) {
+    const Vec3 p = whitening.from(point);
+    return planes.nearest(p).depth >= -tolerance && surface.closest(p).distance2 <= tolerance * tolerance;
+  };
+  if (inner.vertices.size() <= most) {
+    // The new corner of a collapse lies above all facets around both ends of its edge. If it is redundant, it is within
+    // the tolerance of a point of the hull that is no deeper than that under them: the ends are near it, and each
+    // other.
+    Mesh corners = inner;
+    for (Vec3& p : corners.vertices) p = whitening.from(p);
+    const std::vector<double> reach = reach_of_corners(corners);
+    ConvexCollapse collapse(inner, [&](std::int32_t a, std::int32_t b) {
+      return norm(corners.vertices[b] - corners.vertices[a]) <= kSafely * tolerance * (reach[a] + reach[b]);
+    });
+    collapse.reduce(most, redundant);
+    const std::vector<Vec3> left = collapse.corners();
+    return left.size() == hull.vertices.size() ? hull : brought_back(hull_mesh(left), inner, whitening);
+  }
+  Mesh best = inner;
+  bool fits = true;
+  for (const std::size_t stage : stages(best.vertices.size(), most)) {
+    ConvexCollapse collapse(best);
+    fits = collapse.reduce(stage, redundant);
+    best = relax_around(hull_mesh(collapse.corners()), inner, stage > most ? kSweepsOnTheWay : kSweepsAtTheEnd);
+    if (!fits) break;
+  }
+  if (!fits || most <= kFewCorners)
+    for (Mesh& cover : plain_covers(inner, most)) {
+      cover = relax_around(std::move(cover), inner, kSweepsAtTheEnd);
+      if (!fits || volume_of(cover) < volume_of(best)) best = std::move(cover), fits = true;
+    }
+  return brought_back(best, inner, whitening);
+}
+
+}  // namespace rlacd

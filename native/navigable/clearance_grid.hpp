@@ -1,0 +1,62 @@
+// The clearance on a grid of cells around a solid, and the cells that the boundary of the navigable space crosses.
+//
+// How: cubes of cells are halved as long as the fields at their centre, which change no faster than one moves, leave
+//      open what holds for all of them. First only near the boundary of the space; that a cell farther off is free is
+//      left unsaid unless a large cube says so, which is nearly always all that the way of a ball depends on.
+#pragma once
+
+#include "navigable/navigable_field.hpp"
+
+namespace rlacd {
+
+struct ClearanceGrid {
+  Vec3 origin;  // lower corner of the first cell
+  double pitch = 0;
+  std::int32_t count[3] = {0, 0, 0};
+
+  // At the centre of each cell. Where the whole cell is free it may be a lower bound that says so; where no point of
+  // the cell is, or the cell is not resolved, -infinity.
+  std::vector<float> clearance;
+
+  // Cells that the boundary of the space may cross, ascending, and the room at their centres.
+  struct Crossed {
+    std::int32_t cell;
+    double inside;  // at most the depth of its centre in the hull
+    NavigableField::Value room;
+  };
+  std::vector<Crossed> boundary;
+
+  struct Cube {
+    std::array<std::int32_t, 3> first;
+    std::int32_t side;
+    std::int32_t slot;  // of a triangle thought to be near
+    double inside;      // at most the depth of its centre in the hull
+  };
+  std::vector<Cube> unresolved;
+
+  std::int32_t size() const { return count[0] * count[1] * count[2]; }
+  std::int32_t at(std::int32_t i, std::int32_t j, std::int32_t k) const { return (k * count[1] + j) * count[0] + i; }
+  std::array<std::int32_t, 3> place(std::int32_t cell) const {
+    return {cell % count[0], cell / count[0] % count[1], cell / count[0] / count[1]};
+  }
+  Vec3 centre(std::int32_t cell) const {
+    const auto [i, j, k] = place(cell);
+    return origin + pitch * Vec3{i + 0.5, j + 0.5, k + 0.5};
+  }
+  bool holds(std::int32_t i, std::int32_t j, std::int32_t k) const {
+    return i >= 0 && j >= 0 && k >= 0 && i < count[0] && j < count[1] && k < count[2];
+  }
+  // Coordinates of the cell that holds x, perhaps off the grid.
+  std::array<std::int32_t, 3> over(Vec3 x) const {
+    const auto floor_of = [this](double a, double b) { return static_cast<std::int32_t>(std::floor((a - b) / pitch)); };
+    return {floor_of(x.x, origin.x), floor_of(x.y, origin.y), floor_of(x.z, origin.z)};
+  }
+};
+
+// Every cell on the grid's border lies farther than the radius from the hull.
+ClearanceGrid clearance_grid(const NavigableField& field, double pitch, int threads);
+
+// Asks for the cells of the cubes that are not resolved.
+void resolve(const NavigableField& field, ClearanceGrid& grid, int threads);
+
+}  // namespace rlacd

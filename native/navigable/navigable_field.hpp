@@ -1,0 +1,63 @@
+// The two fields whose level sets bound what a ball can do around a solid.
+//
+// In:  the surface of a closed solid, its convex hull, closed half-spaces; the ball's radius r and the tolerance t.
+// Out: clearance(x): the radius of the largest ball around x that touches neither the surface nor a closed half-space.
+//                    A ball may stand at x where clearance >= r.
+//      room(x):      at least r + t exactly where, besides, the surface is t farther away than it has to be, and x is
+//                    no farther than r from the hull: the navigable space, but for sides and ways in.
+// Both are minima of distances, so they change no faster than x moves, and each value comes with the direction in which
+// it grows. Which side of the surface x is on neither of them knows: a path along which the clearance stays positive
+// does not change sides.
+#pragma once
+
+#include <vector>
+
+#include "distance/bvh.hpp"
+#include "hull/convex_body.hpp"
+
+namespace rlacd {
+
+// Balls keep out of normal . x < offset; the normal has length 1.
+struct HalfSpace {
+  Vec3 normal;
+  double offset;
+};
+
+class NavigableField {
+ public:
+  NavigableField(const Bvh& surface, const ConvexBody& hull, std::vector<HalfSpace> closed, double radius,
+                 double tolerance)
+      : surface_(surface), hull_(hull), closed_(std::move(closed)), radius_(radius), tolerance_(tolerance) {}
+
+  double radius() const { return radius_; }
+  double tolerance() const { return tolerance_; }
+  double level() const { return radius_ + tolerance_; }  // of the room, on the boundary of the space
+  const Bvh& surface() const { return surface_; }
+  const ConvexBody& hull() const { return hull_; }
+
+  enum class Limit { kSurface, kGround, kHull };
+  struct Value {
+    double value = 0;
+    Vec3 uphill;             // unit, but zero on the surface itself
+    std::int32_t slot = -1;  // of the nearest triangle
+    Limit by = Limit::kSurface;
+  };
+  Value clearance(Vec3 x, std::int32_t hint = -1) const { return by_surface_and_ground(x, hint, 0); }
+  // The room but for the hull's part in it.
+  Value room_near(Vec3 x, std::int32_t hint = -1) const { return by_surface_and_ground(x, hint, tolerance_); }
+
+  // Distance to the nearest closed half-space, negative in it.
+  double above_ground(Vec3 x) const;
+  // What the room is where the hull is `away`: it ends at r from the hull.
+  double room_by_hull(double away) const { return level() + radius_ - away; }
+
+ private:
+  Value by_surface_and_ground(Vec3 x, std::int32_t hint, double margin) const;
+
+  const Bvh& surface_;
+  const ConvexBody& hull_;
+  std::vector<HalfSpace> closed_;
+  double radius_, tolerance_;
+};
+
+}  // namespace rlacd

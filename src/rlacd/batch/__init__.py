@@ -1,0 +1,7 @@
+"""Many meshes: limits, cache, resume; on any pool of processes."""
+
+from rlacd.batch.assets import ENDINGS, Asset, find_assets
+from rlacd.batch.batch import REDO, Batch, Summary, Watcher
+from rlacd.batch.job_spec import JobSpec
+
+__all__ = ["ENDINGS", "REDO", "Asset", "Batch", "JobSpec", "Summary", "Watcher", "find_assets"]

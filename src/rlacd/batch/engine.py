@@ -1,0 +1,94 @@
+"""All meshes through a pool: as many at a time as it has room for, written as they come."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from typing import Any, TypeAlias
+
+from rlacd.batch.context import BatchContext
+from rlacd.batch.pipeline import MeshOutcome, MeshTask, Pipeline, pipeline
+from rlacd.pool import Answer, Pool, Request, WorkerDiedError
+
+LOOK = 1.0
+"""Seconds between two looks at whether there is room for more."""
+
+WRITERS = 4
+"""Results written at a time: each waits for a disk, not for a processor."""
+
+_Going: TypeAlias = tuple[MeshTask, Pipeline]
+
+
+class Engine:
+    """Takes meshes to their outcomes.
+
+    Parameters
+    ----------
+    pool : Pool
+    work : Work
+    """
+
+    def __init__(self, pool: Pool, work: BatchContext) -> None:
+        self._pool, self._work = pool, work
+        self._asked: dict[Future[Answer], _Going] = {}
+        self._writing: dict[Future[MeshOutcome], MeshTask] = {}
+        self._last: deque[tuple[_Going, Request]] = deque()
+        self._writers = ThreadPoolExecutor(WRITERS)
+
+    def run(self, tasks: Iterator[MeshTask]) -> Iterator[tuple[MeshTask, MeshOutcome]]:
+        """Do tasks in any order; what an outcome's ``outputs`` name is in the store by then.
+
+        No more tasks are taken from the iterator than can be worked on soon.
+
+        Raises
+        ------
+        OutputError
+            A result cannot be written.
+        """
+        with self._writers:
+            while True:
+                self._begin(tasks)
+                if not (self._asked or self._writing or self._begin_last()):
+                    return
+                going_on: list[Future[Any]] = [*self._asked, *self._writing]
+                wait(going_on, LOOK, FIRST_COMPLETED)
+                for written in [future for future in self._writing if future.done()]:
+                    yield self._writing.pop(written), written.result()
+                for asked in [future for future in self._asked if future.done()]:
+                    self._go_on(self._asked.pop(asked), _answer(asked))
+
+    def _begin(self, tasks: Iterator[MeshTask]) -> None:
+        room = max(1, self._pool.room // self._work.order.threads)
+        while len(self._asked) < room and len(self._writing) < WRITERS + room:
+            if (task := next(tasks, None)) is None:
+                return
+            self._go_on((task, pipeline(task, self._work, brought=self._pool.many_machines)), None)
+
+    def _begin_last(self) -> bool:
+        """Begin one of the meshes that are to be alone; nothing else is going on."""
+        if not self._last or self._work.stop.is_set():
+            return False
+        going, request = self._last.popleft()
+        self._asked[self._pool.submit(request)] = going
+        return True
+
+    def _go_on(self, going: _Going, answer: Answer | WorkerDiedError | None) -> None:
+        task, steps = going
+        try:
+            wish = next(steps) if answer is None else steps.send(answer)
+        except StopIteration as end:
+            outcome: MeshOutcome = end.value
+            self._writing[self._writers.submit(outcome.put, self._work)] = task
+            return
+        if wish.last and not self._pool.many_machines:
+            self._last.append((going, wish.request))
+        else:
+            self._asked[self._pool.submit(wish.request)] = going
+
+
+def _answer(done: Future[Answer]) -> Answer | WorkerDiedError:
+    try:
+        return done.result()
+    except WorkerDiedError as died:
+        return died

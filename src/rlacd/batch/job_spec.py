@@ -1,0 +1,184 @@
+"""What is done to every mesh of a batch, as plain values that travel to any process; and the key of a result."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, field, replace
+from importlib.resources import files
+from pathlib import Path, PurePosixPath
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from rlacd._version import __version__
+from rlacd.criteria import NavigableSpace
+from rlacd.errors import OptionError, WeightsError
+from rlacd.io.read.open_file import read_file
+from rlacd.io.write import DENSITY, FORMATS, MODELS, check_model_options, hull_target
+from rlacd.options import Options
+from rlacd.policies import make_policy
+from rlacd.pool import Shared
+from rlacd.presets import find_preset
+
+WEIGHTS_ENDING = ".onnx"
+DEFAULT_FORMAT = "glb"
+FOLDER_FORMAT = "obj"
+
+POLICY = "policy"
+"""Name of the network that requests share, if the policy is a file."""
+
+
+@dataclass(frozen=True)
+class JobSpec:
+    """Options of a decomposition and of its file.
+
+    Attributes
+    ----------
+    options
+        What `rlacd.decompose` is given, plain: a `NavigableSpace` is the dict of its fields.
+    ending
+        Of the file that is written, with its dot; empty for a folder with one file a hull.
+    file_format
+        The format, where the ending does not tell it.
+    density
+        Mass per cubic unit, for formats that hold masses.
+    up
+        The axis that points up; None for y in files from glTF, else z.
+    one_mesh
+        Whether a model has all its hulls in one mesh file.
+    weights
+        Hash of the network that a policy's file holds, and of the one that ships.
+    """
+
+    options: dict[str, Any] = field(default_factory=dict)
+    ending: str = f".{DEFAULT_FORMAT}"
+    file_format: str | None = None
+    density: float = DENSITY
+    up: str | None = None
+    one_mesh: bool = False
+    weights: str = ""
+
+    @classmethod
+    def of(
+        cls,
+        options: dict[str, Any],
+        *,
+        file_format: str | None = None,
+        folders: bool = False,
+        density: float | None = None,
+        up: str | None = None,
+        one_mesh: bool = False,
+    ) -> JobSpec:
+        """Check everything that can be checked before there is a mesh.
+
+        Parameters
+        ----------
+        options : dict
+            Keyword arguments of `rlacd.decompose`, without ``progress``. Each mesh gets one thread by default.
+        file_format : str, optional
+            A word that ``--format`` takes, or any ending of a file of hulls; what the preset says, or glb, by default.
+        folders : bool
+            A folder a mesh with one file a hull.
+        density, up, one_mesh
+            As for `rlacd.Decomposition.save`.
+
+        Raises
+        ------
+        OptionError
+            An option is out of range.
+        WeightsError
+            The policy's network cannot be loaded.
+        OutputError, MissingExtraError
+            The format is unknown, or needs an extra.
+        """
+        checked = Options(**{"threads": 1, **options})
+        make_policy(checked.policy)
+        ending, wanted = _file_kind(file_format, folders, checked.preset)
+        check_model_options(DENSITY if density is None else density, up or "z")
+        with TemporaryDirectory() as folder:
+            hull_target(f"{folder}/mesh{ending or '/'}", wanted)
+        if one_mesh and ending != ".urdf":
+            raise OptionError("one mesh for all hulls is for .urdf files; leave it out.")
+        plain = {"threads": 1, **options}
+        if isinstance(checked.criterion, NavigableSpace):
+            plain["criterion"] = asdict(checked.criterion)
+        weight = DENSITY if density is None else density
+        return cls(plain, ending, wanted, weight, up, one_mesh, _weights(checked.policy))
+
+    @property
+    def threads(self) -> int:
+        """Of one mesh."""
+        return int(self.options["threads"])
+
+    def key(self, content: str, name: str) -> str:
+        """Name the result of a mesh with this content by all that decides its bytes.
+
+        Neither the number of threads nor the place of a policy's file decides anything.
+        """
+        options = Options(**self.arguments()).as_plain()
+        del options["threads"]
+        if options["policy"].endswith(WEIGHTS_ENDING):
+            options["policy"] = WEIGHTS_ENDING
+        decides = [
+            __version__,
+            content,
+            PurePosixPath(name).stem,  # models are called so
+            self.weights,
+            options,
+            [self.ending, self.file_format, self.density, self.up_of(name), self.one_mesh],
+        ]
+        return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
+
+    def up_of(self, name: str) -> str:
+        """Tell which axis of a mesh points up."""
+        return self.up or ("y" if PurePosixPath(name).suffix.lower() in (".glb", ".gltf") else "z")
+
+    def arguments(self) -> dict[str, Any]:
+        """Get the keyword arguments of `rlacd.decompose`."""
+        space = self.options.get("criterion")
+        if not isinstance(space, dict):
+            return dict(self.options)
+        return {**self.options, "criterion": NavigableSpace(**space)}
+
+    def with_policy(self, path: Path) -> JobSpec:
+        """Get the same order with the network in another place."""
+        return replace(self, options={**self.options, "policy": str(path)})
+
+    def shared(self) -> dict[str, Shared]:
+        """Get what all processes need that make these decompositions: the network of a policy that is a file."""
+        policy = str(self.options.get("policy", ""))
+        if not policy.endswith(WEIGHTS_ENDING):
+            return {}
+        return {POLICY: Shared({"onnx": Path(policy).read_bytes()}, key=self.weights)}
+
+    def as_plain(self) -> dict[str, Any]:
+        """Everything as plain values; ``JobSpec(**plain)`` makes the order of them again."""
+        return asdict(self)
+
+
+def _file_kind(file_format: str | None, folders: bool, preset: str | None) -> tuple[str, str | None]:
+    """Ending and format of what a mesh gets; no ending for a folder, no format where the ending tells it."""
+    wanted = None if file_format is None else file_format.lower().lstrip(".")
+    endings = [ending for of_model in MODELS.values() for ending in of_model]
+    if wanted is not None and wanted not in (*FORMATS, *MODELS, *endings):
+        raise OptionError(f"unknown format {file_format!r}; use one of {', '.join((*FORMATS, *MODELS))}.")
+    if folders:
+        if wanted not in (None, *FORMATS):
+            raise OptionError(f"{file_format} is no format for a folder a mesh; use one of {', '.join(FORMATS)}.")
+        return "", wanted or FOLDER_FORMAT
+    if wanted is None and preset is not None:
+        engine = find_preset(preset)
+        return engine.ending, engine.file_format
+    if wanted in MODELS:
+        return f".{MODELS[wanted][0]}", wanted
+    return f".{wanted or DEFAULT_FORMAT}", None
+
+
+def _weights(policy: str) -> str:
+    digest = hashlib.sha256(files("rlacd.weights").joinpath("ranker.onnx").read_bytes())
+    if policy.endswith(WEIGHTS_ENDING):
+        try:
+            digest.update(read_file(policy))
+        except OSError as error:
+            raise WeightsError(f"The policy {policy} cannot be read ({error}); give another path.") from error
+    return digest.hexdigest()

@@ -1,0 +1,172 @@
+"""What a process of the pool does for a batch: one mesh from its file to the files of its hulls."""
+
+from __future__ import annotations
+
+import resource
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from rlacd.batch.job_spec import POLICY, JobSpec
+from rlacd.batch.store import open_store, put_files, under
+from rlacd.decompose_mesh import decompose
+from rlacd.decomposition import Decomposition
+from rlacd.errors import MeshError, RlacdError
+from rlacd.io.read.companions import lay_out
+from rlacd.io.read.load import load_mesh
+from rlacd.pool import Blobs, Shared
+
+SERVER = "rlacd.batch.server:MeshServer"
+
+STAND_IN = "The convex hull of the whole mesh stands in for its decomposition."
+
+
+def make(
+    order: JobSpec, mesh: Path, stem: str, staging: Path, hull_only: bool
+) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """Decompose a mesh file and write what was asked for into a new folder.
+
+    Parameters
+    ----------
+    order : Order
+    mesh : Path
+    stem : str
+        What the file or folder is called.
+    staging : Path
+        An existing folder.
+    hull_only : bool
+        Take the convex hull of all points instead, inside the limits asked for.
+
+    Returns
+    -------
+    dict
+        What is said of the result.
+    dict of bytes
+        The files by name relative to the staging folder; a file that names others comes last.
+
+    Raises
+    ------
+    RlacdError
+        The mesh cannot be used, or its hulls cannot be written.
+    """
+    result = _hull(order, mesh) if hull_only else decompose(mesh, **order.arguments())
+    with TemporaryDirectory(dir=staging) as folder:
+        place = f"{folder}/{stem}{order.ending or '/'}"
+        written: dict[str, Any] = {"density": order.density, "up": order.up_of(mesh.name), "one_mesh": order.one_mesh}
+        result.save(place, file_format=order.file_format, **written)
+        paths = sorted(path for path in Path(folder).rglob("*") if path.is_file())
+        paths.sort(key=lambda path: -len(path.relative_to(folder).parts))
+        files = {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
+    return _summary(result.report), files
+
+
+def _hull(order: JobSpec, mesh: Path) -> Decomposition:
+    """One hull around everything: a cloud of points has no shape but that."""
+    source = load_mesh(mesh)
+    used = source.vertices[np.unique(source.faces)] if len(source.faces) else source.vertices
+    limits: dict[str, Any] = {
+        name: order.options.get(name) for name in ("max_vertices", "max_faces", "preset", "threads")
+    }
+    around = decompose((used, np.empty((0, 3), dtype=np.int64)), max_hulls=1, quality="fast", **limits)
+    told = {what: around.report[what] for what in ("parts", "faces", "vertices")}
+    told |= {"name": mesh.stem, "complete": False, "warnings": [STAND_IN]}
+    return Decomposition(around.hulls, told, trimesh.Trimesh(source.vertices, source.faces, process=False))
+
+
+def _summary(report: dict[str, Any]) -> dict[str, Any]:
+    """What is the same whenever and wherever the mesh is decomposed."""
+    same = ("parts", "faces", "vertices", "complete", "hausdorff")
+    kept: dict[str, Any] = {what: report[what] for what in same if what in report}
+    if "concavity" in report:
+        kept["concavity"] = report["concavity"]["max"]
+    if "navigable" in report:
+        kept["intrusion"] = report["navigable"]["intrusion"]["max"]
+    return {**kept, "warnings": report["warnings"]}
+
+
+class MeshServer:
+    """Decomposes meshes.
+
+    Parameters
+    ----------
+    staging : Path
+        A folder for what is on its way.
+    """
+
+    def __init__(self, staging: Path) -> None:
+        self._staging = staging
+
+    def __call__(
+        self, values: dict[str, Any], blobs: Blobs, shared: Mapping[str, Shared]
+    ) -> tuple[dict[str, Any], dict[str, bytes]]:
+        """Decompose a mesh; whatever goes wrong with it is part of the answer.
+
+        Parameters
+        ----------
+        values : dict
+            ``order``, as plain values; the mesh's ``path`` where it can be read here; its ``name``, for messages; the
+            ``stem`` of its result, and ``hull_only``: see `make`; ``out``, an address, with the ``parent`` of the
+            result in it, where the files are to be put from here.
+        blobs : dict of bytes
+            The files of the mesh (`rlacd.io.read.companions.mesh_files`), where it cannot be read here.
+        shared : dict of Shared
+            See `JobSpec.shared`.
+
+        Returns
+        -------
+        dict
+            ``report`` and ``outputs``, the lengths of files that were put from here; or ``error``, and whether the mesh
+            is at fault, ``unusable``. In any case ``seconds``, ``cpu`` and ``peak_mb``, of the process so far.
+        dict of bytes
+            The files that are to be put.
+
+        Raises
+        ------
+        OutputError
+            Files cannot be put.
+        """
+        wall, cpu = time.perf_counter(), time.process_time()
+        files: dict[str, bytes] = {}
+        with TemporaryDirectory(dir=self._staging) as folder:
+            path = lay_out(blobs, Path(folder)) if blobs else Path(values["path"])
+            try:
+                order = self._order(values["order"], shared)
+                report, files = make(order, path, values["stem"], self._staging, values["hull_only"])
+                said: dict[str, Any] = {"report": report}
+            except MeshError as error:
+                said = {"error": self._sentence(error, path, values["name"]), "unusable": True}
+            except RlacdError as error:
+                said = {"error": self._sentence(error, path, values["name"])}
+            except MemoryError:
+                said = {"error": "there is not enough memory for it"}
+            except Exception as error:
+                sentence = self._sentence(error, path, values["name"])
+                said = {"error": f"a bug in rlacd ({type(error).__name__}: {sentence})"}
+        if values["out"] is not None:
+            said["outputs"], files = put_files(open_store(values["out"]), under(values["parent"], files)), {}
+        said["seconds"] = round(time.perf_counter() - wall, 4)
+        said["cpu"] = round(time.process_time() - cpu, 4)
+        said["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // (
+            2**20 if sys.platform == "darwin" else 2**10
+        )
+        return said, files
+
+    def _order(self, plain: dict[str, Any], shared: Mapping[str, Shared]) -> JobSpec:
+        order = JobSpec(**plain)
+        if POLICY not in shared:
+            return order
+        network = self._staging / f"{shared[POLICY].key}.onnx"  # it stays, so that it is read once
+        if not network.exists():
+            network.write_bytes(shared[POLICY].blobs["onnx"])
+        return order.with_policy(network)
+
+    def _sentence(self, error: Exception, path: Path, name: str) -> str:
+        """First line of a message, with the mesh's name where this machine's path to it stood."""
+        line = (str(error).strip().splitlines() or ["no message"])[0]
+        return line.replace(str(path), name).replace(str(self._staging), "")

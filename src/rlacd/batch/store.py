@@ -1,0 +1,329 @@
+"""Where results go: a folder of this machine, or any address that fsspec knows (``s3://``, ``gs://``, ``memory://``)."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import io
+import os
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path, PurePosixPath
+from typing import Any, Protocol
+
+from rlacd.errors import MissingExtraError, OptionError, OutputError
+from rlacd.io.read.open_file import read_file
+from rlacd.io.write.atomic import output_errors, write_file
+
+PRIVATE = ".rlacd"
+"""Folder in the results for what only the next run needs."""
+
+SEGMENT_SECONDS = 10.0
+"""An object store cannot append: so often a new object with the lines since the last one is written."""
+
+
+class Journal(Protocol):
+    """Lines that outlive a kill of the process that writes them."""
+
+    def lines(self) -> Iterator[bytes]:
+        """All whole lines, oldest first."""
+
+    def add(self, line: bytes) -> None:
+        """Keep a line, which ends in a line's end."""
+
+    def remove(self) -> None:
+        """Forget all lines, on the disk too."""
+
+    def close(self) -> None:
+        """Keep what is not kept yet."""
+
+
+class ResultStore(Protocol):
+    """A place for files; names are relative to it, with slashes.
+
+    Attributes
+    ----------
+    shared : bool
+        Whether every machine reaches it under the same address.
+    """
+
+    shared: bool
+
+    def write(self, name: str, data: bytes) -> None:
+        """Put a file there, whole or not at all."""
+
+    def read(self, name: str) -> bytes | None:
+        """Get the content of a file; None if there is none."""
+
+    def size(self, name: str) -> int | None:
+        """Get the length of a file; None if there is none."""
+
+    def remove(self, name: str) -> None:
+        """Remove a file, and the folders that it leaves empty."""
+
+    def journal(self, name: str) -> Journal:
+        """Open a journal."""
+
+    def open(self) -> None:
+        """Get ready for writing, as the only run that does."""
+
+    def close(self) -> None:
+        """Let other runs write."""
+
+
+def open_store(place: str) -> ResultStore:
+    """Find the store of a folder's name or an address.
+
+    Raises
+    ------
+    MissingExtraError
+        It is an address, and fsspec or what it needs for that is not installed.
+    OptionError
+        fsspec does not know such addresses.
+    """
+    if "://" not in place:
+        return FolderStore(Path(place))
+    if place.startswith("file://"):
+        return FolderStore(Path(place.removeprefix("file://")))
+    return AddressStore(place)
+
+
+def under(parent: str, files: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Name files as a store does, by the folder they go to."""
+    return {str(PurePosixPath(parent) / name): data for name, data in files.items()}
+
+
+def put_files(store: ResultStore, files: Mapping[str, bytes]) -> dict[str, int]:
+    """Write files, the one that names others last; returns their lengths."""
+    for name, data in files.items():
+        store.write(name, data)
+    return {name: len(data) for name, data in files.items()}
+
+
+class FolderStore:
+    """A folder of this machine."""
+
+    shared = False
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._lock: io.TextIOWrapper | None = None
+
+    def write(self, name: str, data: bytes) -> None:
+        """See `ResultStore`."""
+        path = self.folder / name
+        with output_errors(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+        write_file(path, data)
+
+    def read(self, name: str) -> bytes | None:
+        """See `ResultStore`."""
+        path = self.folder / name
+        try:
+            return read_file(path, sys.maxsize)
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            raise OutputError(f"cannot read {path} ({error.strerror}); move it away.") from error
+
+    def size(self, name: str) -> int | None:
+        """See `ResultStore`."""
+        try:
+            return (self.folder / name).stat().st_size
+        except OSError:
+            return None
+
+    def remove(self, name: str) -> None:
+        """See `ResultStore`."""
+        path = self.folder / name
+        with output_errors(path):
+            path.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # the first that is not empty ends it
+            for parent in path.parents:
+                if parent == self.folder:
+                    break
+                parent.rmdir()
+
+    def journal(self, name: str) -> Journal:
+        """See `ResultStore`."""
+        return _FileJournal(self.folder / PRIVATE / name)
+
+    def open(self) -> None:
+        """Take the folder for this run, and remove what a killed one left half-written.
+
+        Raises
+        ------
+        OutputError
+            The folder cannot be made or written to, or another run is writing to it.
+        """
+        lock = self.folder / PRIVATE / "lock"
+        with output_errors(self.folder):
+            lock.parent.mkdir(parents=True, exist_ok=True)
+            self._lock = lock.open("a")
+            try:
+                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                raise OutputError(
+                    f"another run is writing to {self.folder}; wait for it or choose another folder."
+                ) from error
+        for at, _, files in os.walk(self.folder):
+            for file in files:
+                if file.startswith(".rlacd-") and file.endswith(".tmp"):
+                    Path(at, file).unlink(missing_ok=True)
+
+    def close(self) -> None:
+        """See `ResultStore`."""
+        if self._lock is not None:
+            self._lock.close()
+
+
+class _FileJournal:
+    """Lines appended to a file, each on the disk before the next."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._file: io.BufferedWriter | None = None
+
+    def lines(self) -> Iterator[bytes]:
+        with output_errors(self._path):
+            content = read_file(self._path, sys.maxsize) if self._path.exists() else b""
+        whole = content.rfind(b"\n") + 1
+        if whole < len(content):
+            os.truncate(self._path, whole)  # what a kill left of its last line
+        yield from content[:whole].splitlines()
+
+    def add(self, line: bytes) -> None:
+        with output_errors(self._path):
+            if self._file is None:
+                self._path.parent.mkdir(parents=True, exist_ok=True)
+                self._file = self._path.open("ab")
+            self._file.write(line)
+            self._file.flush()
+            os.fsync(self._file.fileno())
+
+    def remove(self) -> None:
+        self.close()
+        self._path.unlink(missing_ok=True)
+
+    def close(self) -> None:
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+
+class AddressStore:
+    """Anything fsspec has a driver for; the driver's own ways (environment, files) find the credentials."""
+
+    shared = True
+
+    def __init__(self, address: str) -> None:
+        try:
+            import fsspec
+        except ImportError as error:
+            raise MissingExtraError(
+                "results at an address need an extra: run  pip install 'rlacd[fleet]'  and try again."
+            ) from error
+        try:
+            self._system, self._root = fsspec.core.url_to_fs(address)
+        except ImportError as error:
+            raise MissingExtraError(f"{address} needs another package: {str(error).splitlines()[0]}") from error
+        except ValueError as error:
+            raise OptionError(f"{address} is no address that fsspec knows: {error}.") from error
+        self.shared = not address.startswith("memory://")
+
+    def write(self, name: str, data: bytes) -> None:
+        """See `ResultStore`; whole or not at all where the system writes objects so, as all object stores do."""
+        path = self._path(name)
+        with self._errors(path):
+            self._system.makedirs(path.rpartition("/")[0], exist_ok=True)
+            self._system.pipe_file(path, data)
+
+    def read(self, name: str) -> bytes | None:
+        """See `ResultStore`."""
+        with self._errors(self._path(name)):
+            try:
+                return bytes(self._system.cat_file(self._path(name)))
+            except FileNotFoundError:
+                return None
+
+    def size(self, name: str) -> int | None:
+        """See `ResultStore`."""
+        with self._errors(self._path(name)):
+            try:
+                return int(self._system.size(self._path(name)))
+            except FileNotFoundError:
+                return None
+
+    def remove(self, name: str) -> None:
+        """See `ResultStore`."""
+        with self._errors(self._path(name)), contextlib.suppress(FileNotFoundError):
+            self._system.rm_file(self._path(name))
+
+    def names(self, folder: str) -> list[str]:
+        """List the files of a folder, sorted."""
+        with self._errors(self._path(folder)):
+            self._system.invalidate_cache()
+            try:
+                found: list[Any] = self._system.ls(self._path(folder), detail=False)
+            except FileNotFoundError:
+                return []
+        return sorted(f"{folder}/{str(path).rstrip('/').rpartition('/')[2]}" for path in found)
+
+    def journal(self, name: str) -> Journal:
+        """See `ResultStore`."""
+        return _SegmentJournal(self, f"{PRIVATE}/{name}.parts")
+
+    def open(self) -> None:
+        """Nothing to do: an object store has no locks, so two runs must not write to one address at a time."""
+
+    def close(self) -> None:
+        """Nothing to do."""
+
+    def _path(self, name: str) -> str:
+        return f"{self._root.rstrip('/')}/{name}"
+
+    @contextlib.contextmanager
+    def _errors(self, path: str) -> Iterator[None]:
+        try:
+            yield
+        except (MemoryError, RecursionError):
+            raise
+        except Exception as error:  # drivers raise whatever their clients raise
+            reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
+            raise OutputError(f"cannot reach {path} ({reason}); check the address and your rights there.") from error
+
+
+class _SegmentJournal:
+    """Lines in numbered objects, one every few seconds; the lines of the last few seconds may be lost with a kill."""
+
+    def __init__(self, store: AddressStore, folder: str) -> None:
+        self._store = store
+        self._folder = folder
+        self._waiting: list[bytes] = []
+        self._number = len(store.names(folder))
+        self._written = time.monotonic()
+
+    def lines(self) -> Iterator[bytes]:
+        for name in self._store.names(self._folder):
+            yield from (self._store.read(name) or b"").splitlines()
+
+    def add(self, line: bytes) -> None:
+        self._waiting.append(line)
+        if time.monotonic() - self._written > SEGMENT_SECONDS:
+            self._flush()
+
+    def remove(self) -> None:
+        self._waiting.clear()
+        for name in self._store.names(self._folder):
+            self._store.remove(name)
+
+    def close(self) -> None:
+        self._flush()
+
+    def _flush(self) -> None:
+        if self._waiting:
+            self._store.write(f"{self._folder}/{self._number:08d}.jsonl", b"".join(self._waiting))
+            self._waiting.clear()
+            self._number += 1
+        self._written = time.monotonic()

@@ -1,0 +1,1 @@
+"""The `rlacd` command: a module a subcommand, and what they print."""

@@ -1,0 +1,207 @@
+"""The command `rlacd batch`: a folder of meshes at once, on this machine or on a cluster."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rlacd.cli.exit_codes import ExitCode, exit_codes
+from rlacd.cli.options import decompose_options, how_parameters
+from rlacd.cli.parameters import REQUIRED, Parameters, command, option_parameters
+from rlacd.errors import OptionError
+from rlacd.output_options import OutputOptions
+from rlacd.workers import available_cpus
+
+if TYPE_CHECKING:
+    from rlacd.batch import Batch
+    from rlacd.pool import Pool
+
+HELP = """Decompose all meshes of a folder; what is done already is passed over.
+
+\b
+[bold]Examples[/bold]
+  rlacd batch assets/ -o hulls/
+  rlacd batch assets/ -o hulls/ --glob 'furniture/*.obj' --preset mujoco --jobs 8
+  rlacd batch assets/ -o hulls/ --dry-run
+  rlacd batch assets/ -o s3://bucket/hulls --ray auto
+
+A mesh whose process dies, hangs or needs too much memory is tried once more alone, and is then given its convex hull.
+OUT/manifest.jsonl tells what became of each mesh. Killed at any moment, the same command goes on where it was.
+Ctrl-C once finishes what is running; twice quits at once.
+"""
+
+BATCH_EPILOG = """\b
+[bold]Exit codes[/bold]
+  0    all done
+  1    a bug in rlacd (RLACD_DEBUG=1 shows the traceback)
+  2    bad option, or no meshes
+  3    the results cannot be written
+  4    stopped by Ctrl-C; run again to go on
+  5    all done, but some meshes failed or were given their convex hull
+  130  interrupted at once; no file is left half-written
+"""
+
+BATCH = "Batch"
+"""The panel of this command's own options."""
+
+WRITTEN = ("density", "up", "one_mesh")
+"""Options of decompose that say how hulls are written."""
+
+
+def _option(default: Any, kind: Any, *names: str, **about: Any) -> tuple[Any, Any]:
+    return default, Annotated[kind, typer.Option(*names, rich_help_panel=BATCH, **about)]
+
+
+_OWN: Parameters = {
+    "assets": (
+        REQUIRED,
+        Annotated[Path, typer.Argument(metavar="ASSETS", help="A folder of meshes, of any depth.")],
+    ),
+    "out": _option(
+        REQUIRED,
+        str,
+        "--output",
+        "-o",
+        metavar="OUT",
+        help="A folder, or an address that fsspec knows: s3://bucket/path.",
+    ),
+    "glob": _option("**", str, help="Only these: 'chair_*.obj' in any folder, 'furniture/*' by the whole name."),
+    "jobs": _option(
+        None, int | None, min=1, help="Meshes at a time. [dim]\\[default: all cores][/dim]", show_default=False
+    ),
+    "ray": _option(None, str | None, metavar="ADDRESS", help="Use a Ray cluster: its address, auto, or local."),
+    "limit": _option(
+        600.0, float, metavar="SECONDS", min=0.1, help="What one mesh may take before its process is ended."
+    ),
+    "memory": _option(4.0, float, metavar="GB", min=0.0, help="What the process of a mesh may hold; 0: no limit."),
+    "fallback": _option(True, bool, "--fallback/--no-fallback", help="Give meshes that fail their convex hull."),
+    "folders": _option(False, bool, "--folders", help="A folder a mesh with one file a hull."),
+    "redo": _option("none", str, metavar="WHICH", help="Make results again: none, those that failed (failed), or all."),
+    "folder_format": _option(
+        None,
+        str | None,
+        "--format",
+        metavar="EXT",
+        help="Of each result: glb, obj, ply, stl, mjcf, urdf, sdf, usd, unreal or godot. "
+        "[dim]\\[default: what --preset says, or glb][/dim]",
+        show_default=False,
+    ),
+    "threads": _option(None, int | None, help="Threads of each mesh. [dim]\\[default: 1][/dim]", show_default=False),
+    "timeout": _option(
+        None, float | None, metavar="SECONDS", help="After so long, keep what is reached of a mesh.", show_default=False
+    ),
+    "dry_run": _option(False, bool, "--dry-run", help="Tell which meshes would be done, and write nothing."),
+}
+
+
+def batch_command() -> Callable[..., None]:
+    """Build the command."""
+
+    def batch(**given: Any) -> None:
+        with exit_codes():
+            own = {name: given.pop(name) for name in _OWN}
+            quiet = bool(given.pop("quiet"))
+            work = _batch(own, given)
+            if not quiet:
+                _tell_large(work)
+            if own["dry_run"]:
+                _tell_plan(work)
+            else:
+                _run(work, own, quiet=quiet)
+
+    written = option_parameters(OutputOptions, only=(*WRITTEN, "quiet"))
+    return command(batch, HELP, {**_OWN, **{k: p for k, p in {**written, **how_parameters()}.items() if k not in _OWN}})
+
+
+def _batch(own: dict[str, Any], given: dict[str, Any]) -> Batch:
+    from rlacd.batch import REDO, Batch, JobSpec
+    from rlacd.pool import ProcessLimits
+
+    if own["redo"] not in REDO:
+        raise OptionError(f"--redo is {own['redo']!r}; it has to be one of {', '.join(REDO)}.")
+    if own["out"] == "-":
+        raise OptionError("a batch cannot be written to stdout; give -o a folder.")
+    from rlacd.cli.terminal import say
+
+    written = OutputOptions(**{name: given.pop(name) for name in WRITTEN})
+    options = decompose_options({**given, "threads": own["threads"], "timeout": own["timeout"]}, warn=say)
+    order = JobSpec.of(
+        options,
+        file_format=own["folder_format"],
+        folders=own["folders"],
+        density=written.density,
+        up=written.up,
+        one_mesh=bool(written.one_mesh),
+    )
+    limits = ProcessLimits(own["limit"], int(own["memory"] * 2**30))
+    return Batch(own["assets"], own["out"], order, limits, own["fallback"], own["glob"], own["redo"])
+
+
+def _pool(own: dict[str, Any]) -> Pool:
+    from rlacd.pool import open_pool
+
+    return open_pool(own["jobs"] or (None if own["ray"] else available_cpus()), own["ray"])
+
+
+NAMED = 5
+"""Large meshes that are named."""
+
+
+def _tell_large(batch: Batch) -> None:
+    """Say in one line, before anything is done, which meshes are large."""
+    from rlacd.cli.terminal import say
+    from rlacd.plain_json import printable
+
+    large = batch.large()
+    if large:
+        named = [f"{printable(asset.name)} ({size / 1e6:.0f} MB)" for asset, size in large[:NAMED]]
+        more = [f"{len(large) - NAMED} more"] if len(large) > NAMED else []
+        count = "1 mesh is" if len(large) == 1 else f"{len(large)} meshes are"
+        say(f"{count} large and may take minutes and gigabytes each: {', '.join([*named, *more])}")
+
+
+def _tell_plan(batch: Batch) -> None:
+    from rlacd.cli.terminal import counted, say
+    from rlacd.plain_json import printable
+
+    plan = batch.plan()
+    for asset, finished in plan:
+        if not finished:
+            typer.echo(printable(f"{asset.name} -> {asset.place}{batch.order.ending or '/'}"))
+    done = sum(finished for _, finished in plan)
+    say(f"{counted(len(plan), 'mesh', 'meshes')}: {done} done, {len(plan) - done} to do; nothing was written")
+
+
+def _run(batch: Batch, own: dict[str, Any], *, quiet: bool) -> None:
+    from rlacd.cli.batch_screen import Screen, summary_lines
+    from rlacd.cli.terminal import say
+
+    stop = threading.Event()
+
+    def on_interrupt(number: int, frame: FrameType | None) -> None:
+        stop.set()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        say("stopping; what is running will be finished (Ctrl-C again to quit at once)")
+
+    previous: Any = None
+    with suppress(ValueError):  # not in the main thread: then nobody presses Ctrl-C
+        previous = signal.signal(signal.SIGINT, on_interrupt)
+    try:
+        with _pool(own) as pool, Screen(quiet=quiet) as screen:
+            summary = batch.run(pool, screen, stop)
+    finally:
+        if previous is not None:
+            signal.signal(signal.SIGINT, previous)
+    if not quiet:
+        say("\n".join(summary_lines(summary, batch.out)))
+    if summary.stopped:
+        raise typer.Exit(ExitCode.STOPPED_EARLY)
+    if summary.failures:
+        raise typer.Exit(ExitCode.SOME_FAILED)

@@ -1,0 +1,123 @@
+"""What `rlacd batch` shows: a bar with rate and time left, a line for each mesh that failed, a summary."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
+from rich.progress import Progress as Bars
+
+from rlacd.cli.terminal import counted, say
+from rlacd.plain_json import printable
+
+if TYPE_CHECKING:
+    from rlacd.batch import Asset, Summary
+    from rlacd.batch.ledger import Row
+
+TELL_EVERY = 30.0
+"""Seconds between lines where stderr is no terminal."""
+
+SHOWN = 10
+"""Failures that the summary names."""
+
+
+class Screen:
+    """Watches a batch; says nothing but failures where it is to be quiet.
+
+    Parameters
+    ----------
+    quiet : bool
+    """
+
+    def __init__(self, *, quiet: bool) -> None:
+        console = Console(stderr=True)
+        self._quiet = quiet
+        self._draws = console.is_terminal and not quiet
+        self._bars = Bars(
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[state]}"),
+            TimeElapsedColumn(),
+            console=console,
+            transient=True,
+            disable=not self._draws,
+        )
+        self._bar = self._bars.add_task("meshes", total=None, state="")
+        self._start = self._told = time.monotonic()
+        self._total = self._passed_over = self._made = 0
+        self._status: Counter[str] = Counter()
+
+    def __enter__(self) -> Screen:
+        self._bars.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self._bars.stop()
+
+    def begin(self, meshes: int) -> None:
+        """See `rlacd.batch.Watcher`."""
+        self._total = meshes
+        self._bars.update(self._bar, total=meshes)
+
+    def passed_over(self, asset: Asset) -> None:
+        """See `rlacd.batch.Watcher`."""
+        self._passed_over += 1
+        self._bars.update(self._bar, advance=1)
+
+    def finished(self, row: Row, timing: Row) -> None:
+        """See `rlacd.batch.Watcher`."""
+        self._made += 1
+        self._status[row["status"]] += 1
+        self._bars.update(self._bar, advance=1, state=self._state())
+        if row["status"] != "done":
+            line = printable(failure_line(row))
+            self._bars.console.print(line, markup=False, highlight=False) if self._draws else say(line)
+        elif not self._draws and not self._quiet and time.monotonic() - self._told > TELL_EVERY:
+            self._told = time.monotonic()
+            say(f"{self._made + self._passed_over}/{self._total}  {self._state()}")
+
+    def _state(self) -> str:
+        rate = self._made / max(time.monotonic() - self._start, 1e-9)
+        left = (self._total - self._made - self._passed_over) / rate
+        words = [f"{60 * rate:.0f}/min", f"{duration(left)} left"]
+        words += [f"{self._status[status]} {status}" for status in ("failed", "fallback") if self._status[status]]
+        return ", ".join(words)
+
+
+def failure_line(row: Row) -> str:
+    """Say what became of a mesh that failed."""
+    instead = " (given its convex hull)" if row["status"] == "fallback" else ""
+    return f"  {row['mesh']}: {row['error']}{instead}"
+
+
+def summary_lines(summary: Summary, out: str) -> list[str]:
+    """Tell what a run did, what failed, and what took longest."""
+    made = sum(summary.status.values()) - summary.passed_over
+    meshes = counted(summary.meshes, "mesh", "meshes")
+    words = [f"{summary.status['done']} of {meshes} {'is' if summary.meshes == 1 else 'are'} done"]
+    words += [f"{summary.status[status]} {status}" for status in ("fallback", "failed") if summary.status[status]]
+    rate = f", {60 * made / summary.seconds:.0f} a minute" if made and summary.seconds > 0 else ""
+    lines = [
+        f"{out}: {', '.join(words)}",
+        f"  {made} now in {duration(summary.seconds)}{rate}; {summary.passed_over} were done before",
+    ]
+    lines += [printable(failure_line(row)) for row in summary.failures[:SHOWN]]
+    if len(summary.failures) > SHOWN:
+        lines.append(f"  ... and {len(summary.failures) - SHOWN} more: see manifest.jsonl")
+    if summary.slowest:
+        lines.append(printable("  slowest: " + ", ".join(f"{name} {spent:.1f} s" for name, spent in summary.slowest)))
+    if summary.stopped:
+        lines.append("  stopped early; run the same command again to go on")
+    return lines
+
+
+def duration(seconds: float) -> str:
+    """Say a time in the unit that suits it."""
+    if seconds < 60:
+        return f"{seconds:.0f} s" if seconds >= 10 else f"{seconds:.1f} s"
+    minutes, hours = seconds / 60, seconds / 3600
+    return f"{minutes:.0f} min" if hours < 2 else f"{hours:.1f} h"

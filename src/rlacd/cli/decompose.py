@@ -1,0 +1,202 @@
+"""The command `rlacd decompose`: options, files, and one call."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rlacd.cli.exit_codes import ExitCode, exit_codes
+from rlacd.cli.options import decompose_options, how_parameters
+from rlacd.cli.parameters import REQUIRED, Parameters, chosen, command, option_parameters, taken
+from rlacd.errors import MeshFileError, OptionError
+from rlacd.output_options import Axis, OutputOptions
+
+STDOUT = "-"
+ROBOTS = (".urdf", ".xml")
+IN_METRES = (*ROBOTS, ".glb", ".gltf")
+"""Files whose unit is the metre, as their formats say."""
+
+HELP = """Turn a mesh into convex hulls for collision.
+
+\b
+[bold]Examples[/bold]
+  rlacd decompose chair.glb
+  rlacd decompose chair.glb -o chair_hulls.obj --threshold 0.02
+  rlacd decompose chair.glb -o hulls/ --format stl --max-vertices 64
+  rlacd decompose arm.dae -o arm.glb --picture arm.png --report - | jq .parts
+  rlacd decompose chair.glb -o chair.xml --preset mujoco
+  rlacd decompose robot.urdf -o robot_acd.urdf
+  rlacd decompose house.glb --criterion navigable --radius-abs 0.3 --tolerance-abs 0.05
+
+Ctrl-C once stops gracefully and writes what is reached; twice quits at once.
+"""
+
+MESH = typer.Argument(
+    metavar="IN",
+    help="The mesh: obj, stl, ply, off, glb, gltf, dae, 3mf. It need not be closed or clean. "
+    "Or a robot, .urdf or .xml (MJCF), whose collision meshes are to be replaced.",
+)
+
+
+def decompose_command() -> Callable[..., None]:
+    """Build `rlacd decompose`."""
+
+    def decompose(mesh: Path, **given: Any) -> None:
+        with exit_codes():
+            _decompose(mesh, OutputOptions(**taken(given, OutputOptions)), given)
+
+    mine: Parameters = {"mesh": (REQUIRED, Annotated[Path, MESH])}
+    return command(decompose, HELP, mine | option_parameters(OutputOptions) | how_parameters())
+
+
+def _decompose(mesh: Path, asked: OutputOptions, how: dict[str, Any]) -> None:
+    from rlacd.cli.terminal import say
+
+    _check_input(mesh)
+    wanted = _named(mesh, asked, how.get("preset"))
+    robot = mesh.suffix.lower() in ROBOTS
+    _check_output(mesh, wanted)
+    _check_robot(asked, wanted) if robot else _check_mesh(wanted)
+    if wanted.balls is not None and how.get("criterion") != "navigable":
+        raise OptionError("--balls needs --criterion navigable.")
+    options = decompose_options(how, metres=mesh.suffix.lower() in IN_METRES, warn=say)
+    run = _rewrite if robot else _write
+    if not run(mesh, wanted, options):
+        raise typer.Exit(ExitCode.STOPPED_EARLY)
+
+
+def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any]) -> bool:
+    """Decompose a mesh and write all that is wanted; whether it is complete."""
+    from rlacd.cli.terminal import Watch, say, summary
+    from rlacd.decompose_mesh import decompose
+    from rlacd.io.write import write_file
+    from rlacd.plain_json import to_json
+    from rlacd.view import draw_picture, is_html, save_report_page
+
+    up: Axis = wanted.up or _usual_up(mesh)
+    with Watch(quiet=bool(wanted.quiet)) as watch:
+        result = decompose(mesh, **options, progress=watch)
+    place = str(wanted.output)
+    written = chosen({"file_format": wanted.file_format, "density": wanted.density, "one_mesh": wanted.one_mesh})
+    result.save(place, up=up, **written)
+    if not wanted.quiet:
+        say(summary(result, place))
+    if wanted.report == STDOUT:
+        typer.echo(to_json(result.report), nl=False)
+    elif wanted.report is not None and is_html(wanted.report):
+        save_report_page(result, wanted.report, up=up)
+    elif wanted.report is not None:
+        write_file(Path(wanted.report), to_json(result.report).encode())
+    if wanted.balls is not None:
+        result.save_balls(wanted.balls)
+    if wanted.picture is not None:
+        draw_picture(result, wanted.picture, up=up)
+    return bool(result.report.get("complete", True))
+
+
+def _rewrite(robot: Path, wanted: OutputOptions, options: dict[str, Any]) -> bool:
+    """Replace the collision meshes of a robot; whether all are complete."""
+    from rlacd.cli.terminal import Watch, rewrite_summary, say
+    from rlacd.io.robots import rewrite_robot
+    from rlacd.io.write import write_file
+    from rlacd.plain_json import to_json
+
+    with Watch(quiet=bool(wanted.quiet)) as watch:
+        packages = wanted.package_dirs or ()
+        done = rewrite_robot(robot, str(wanted.output), package_dirs=packages, **options, progress=watch)
+    if not wanted.quiet:
+        say(rewrite_summary(done))
+    measured = to_json({str(mesh.path): mesh.result.report for mesh in done.meshes})
+    if wanted.report == STDOUT:
+        typer.echo(measured, nl=False)
+    elif wanted.report is not None:
+        write_file(Path(wanted.report), measured.encode())
+    return done.complete
+
+
+def _named(mesh: Path, asked: OutputOptions, preset: str | None) -> OutputOptions:
+    """Fill in where to write and in which format, as far as a preset or the input decides that."""
+    from rlacd.io.write import MODELS
+    from rlacd.presets import find_preset
+
+    output, file_format = asked.output, asked.file_format
+    if output == STDOUT:
+        raise OptionError("hulls cannot be written to stdout; give -o a file name, and use - with --report only.")
+    engine = None if preset is None else find_preset(preset)
+    if output is None:
+        ending = ".glb" if engine is None else engine.ending
+        if mesh.suffix.lower() in ROBOTS:
+            ending = mesh.suffix
+        elif file_format in MODELS:
+            ending = f".{MODELS[file_format][0]}"
+        output = str(mesh.parent / f"{mesh.stem or 'mesh'}_hulls{ending}")
+    if engine is not None and engine.file_format is not None and file_format is None:
+        fits = Path(output).suffix.lower().lstrip(".") in MODELS[engine.file_format]
+        file_format = engine.file_format if fits else None
+    return dataclasses.replace(asked, output=output, file_format=file_format)
+
+
+def _check_mesh(wanted: OutputOptions) -> None:
+    """Check before any work that everything can be written."""
+    from rlacd.io.write import check_balls, check_file, hull_target
+    from rlacd.view import check_picture
+
+    hull_target(str(wanted.output), wanted.file_format, one_mesh=bool(wanted.one_mesh))
+    if wanted.package_dirs:
+        raise OptionError("--package-dir belongs to robots: a .urdf or .xml file as input.")
+    if wanted.report not in (None, STDOUT):
+        check_file(Path(wanted.report))
+    if wanted.picture is not None:
+        check_picture(wanted.picture, up=wanted.up)
+    if wanted.balls is not None:
+        check_balls(Path(wanted.balls))
+
+
+def _check_robot(asked: OutputOptions, wanted: OutputOptions) -> None:
+    """Refuse what belongs to a single mesh, and check that the report can be written."""
+    from rlacd.io.write import check_file
+    from rlacd.view import is_html
+
+    if wanted.report is not None and is_html(wanted.report):
+        raise OptionError("--report as a page belongs to a single mesh; for a robot give a .json file.")
+    for name in ("picture", "balls", "file_format", "density", "one_mesh"):
+        if getattr(asked, name) is not None:
+            spelled = "format" if name == "file_format" else name.replace("_", "-")
+            raise OptionError(f"--{spelled} belongs to a single mesh; leave it out for a robot.")
+    if wanted.report not in (None, STDOUT):
+        check_file(Path(wanted.report))
+
+
+def _check_input(mesh: Path) -> None:
+    """Say that the input is missing before anything is said of the output; loading says what else may be wrong."""
+    try:
+        mesh.stat()
+    except FileNotFoundError as error:
+        raise MeshFileError(f"{mesh} does not exist: check the spelling and the folder") from error
+    except (OSError, ValueError):
+        return
+
+
+def _check_output(mesh: Path, wanted: OutputOptions) -> None:
+    """No file may be written twice, and the input never."""
+    seen = {_same(mesh): "the input"}
+    for name, flag in (("output", "-o"), ("report", "--report"), ("picture", "--picture"), ("balls", "--balls")):
+        path = getattr(wanted, name)
+        if path is None or path == STDOUT:
+            continue
+        if _same(path) in seen:
+            raise OptionError(f"{flag} {path} would overwrite {seen[_same(path)]}; choose another name.")
+        seen[_same(path)] = f"what {flag} writes"
+
+
+def _same(path: str | Path) -> str:
+    return os.path.normcase(os.path.realpath(path))  # unlike Path.resolve, at ease with links in a circle
+
+
+def _usual_up(mesh: Path) -> Axis:
+    return "y" if mesh.suffix.lower() in (".glb", ".gltf") else "z"

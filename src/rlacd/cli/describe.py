@@ -1,0 +1,81 @@
+"""What a mesh file holds and how it would be repaired."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+from rlacd.io.read.load import load_mesh
+from rlacd.repair.repair import repair
+
+
+def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Load and repair a mesh file, and tell what was found, as plain values.
+
+    Parameters
+    ----------
+    path : path-like
+        Any file `rlacd.decompose` takes.
+
+    Returns
+    -------
+    dict
+        ``file``, ``name``, ``vertices``, ``faces``, ``bounds`` (two corners, in the file's unit), ``scale`` (frame
+        units per unit of the file), ``repair`` (a dict per body: ``body``, ``step``, ``faces_in``, ``faces_out``,
+        ``deviation`` in frame units), ``solid`` (``faces``, and ``volume`` in the file's unit cubed), ``warnings``.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be read or holds nothing usable.
+    """
+    mesh = load_mesh(path)
+    solid = repair(mesh)
+    used = mesh.vertices[np.unique(mesh.faces)] if len(mesh.faces) else mesh.vertices
+    return {
+        "file": os.fspath(path),
+        "name": mesh.name,
+        "vertices": len(mesh.vertices),
+        "faces": len(mesh.faces),
+        "bounds": [used.min(axis=0).tolist(), used.max(axis=0).tolist()],
+        "scale": float(solid.frame.scale),
+        "repair": [
+            {
+                "body": int(body.body),
+                "step": body.step,
+                "faces_in": int(body.faces_in),
+                "faces_out": int(body.faces_out),
+                "deviation": float(body.deviation),
+            }
+            for body in solid.bodies
+        ],
+        "solid": {
+            "faces": int(solid.manifold.num_tri()),
+            "volume": float(solid.manifold.volume()) / float(solid.frame.scale) ** 3,
+        },
+        "warnings": list(solid.warnings),
+    }
+
+
+def describe_text(facts: dict[str, Any]) -> str:
+    """Say what `describe` found in a few lines for people."""
+    size = np.subtract(facts["bounds"][1], facts["bounds"][0])
+    bodies = facts["repair"]
+    lines = [
+        facts["file"],
+        f"  holds    {facts['faces']} triangles, {facts['vertices']} vertices, "
+        f"{len(bodies)} bod{'y' if len(bodies) == 1 else 'ies'}",
+        f"  size     {size[0]:.6g} x {size[1]:.6g} x {size[2]:.6g}",
+        f"  repaired {facts['solid']['faces']} triangles, volume {facts['solid']['volume']:.6g}",
+    ]
+    worst: dict[str, float] = {}
+    for body in bodies:
+        worst[body["step"]] = max(worst.get(body["step"], 0.0), body["deviation"])
+    for step, count in Counter(body["step"] for body in bodies).most_common():
+        moved = f", surface moved by up to {worst[step] / facts['scale']:.3g}" if worst[step] > 0 else ""
+        lines.append(f"    {count:5d} x {step}{moved}")
+    lines += [f"  warning: {warning}" for warning in facts["warnings"]]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,96 @@
+"""The command line: one command a verb, nothing but wiring."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from rlacd import __version__
+from rlacd.cli.batch import BATCH_EPILOG, batch_command
+from rlacd.cli.bench import app as bench
+from rlacd.cli.decompose import decompose_command
+from rlacd.cli.exit_codes import EPILOG, ExitCode, exit_codes
+from rlacd.cli.train import pretrain_command, train_command
+from rlacd.cli.view import view
+from rlacd.plain_json import printable
+
+
+class Commands(TyperGroup):
+    """Tells those who give a file where a command belongs what to type instead."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Look the command up that the words begin with."""
+        word = args[0]
+        if self.get_command(ctx, word) is None and (Path(word).suffix or os.path.exists(word)):
+            verb = "batch" if os.path.isdir(word) else "decompose"
+            typed = shlex.join(["rlacd", verb, *args])
+            typer.echo(f"rlacd: {printable(word)} is no command; did you mean  {printable(typed)}", err=True)
+            raise typer.Exit(ExitCode.BAD_INPUT)
+        return super().resolve_command(ctx, args)
+
+
+app = typer.Typer(
+    name="rlacd",
+    cls=Commands,
+    help="Approximate convex decomposition: any mesh in, few tight convex hulls out.",
+    epilog=EPILOG,
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def main() -> None:
+    """Run the command line: the entry point of the ``rlacd`` script."""
+    app()
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"rlacd {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Approximate convex decomposition: any mesh in, few tight convex hulls out."""
+
+
+app.command("decompose", epilog=EPILOG)(decompose_command())
+
+
+@app.command(epilog=EPILOG)
+def info(
+    mesh: Annotated[Path, typer.Argument(metavar="FILE", help="The mesh to look at.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
+) -> None:
+    """Tell what a file holds and how it would be repaired, without decomposing it.
+
+    \b
+    [bold]Examples[/bold]
+      rlacd info chair.glb
+      rlacd info chair.glb --json | jq .repair
+    """
+    with exit_codes():
+        from rlacd.cli.describe import describe, describe_text
+        from rlacd.plain_json import printable, to_json
+
+        facts = describe(mesh)
+        typer.echo(to_json(facts) if as_json else printable(describe_text(facts)), nl=False)
+
+
+app.command("view", epilog=EPILOG)(view)
+app.command("batch", epilog=BATCH_EPILOG)(batch_command())
+app.add_typer(bench, name="bench")
+app.command("train", epilog=EPILOG)(train_command())
+app.command("pretrain", epilog=EPILOG)(pretrain_command())

@@ -1,0 +1,139 @@
+"""From what the user gave on the command line to the keyword arguments of `rlacd.decompose`."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Callable
+from typing import Any
+
+from rlacd.cli.parameters import Parameters, chosen, option_parameters
+from rlacd.errors import OptionError
+from rlacd.fields import about
+from rlacd.options import CONCAVITY, Options
+from rlacd.renamed import former_names
+from rlacd.space_options import NAVIGABLE, SpaceOptions
+
+_SPACE = tuple(field.name for field in dataclasses.fields(SpaceOptions))
+
+_LENGTH = re.compile(r"([-+.\deE]+)\s*(%|m|cm|mm)")
+_METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+
+
+def how_parameters() -> Parameters:
+    """Make the parameters that say how to decompose."""
+    return option_parameters(Options) | option_parameters(SpaceOptions)
+
+
+def decompose_options(
+    given: dict[str, Any], *, metres: bool = False, warn: Callable[[str], None] = lambda sentence: None
+) -> dict[str, Any]:
+    """Keep what the user gave, and make the criterion of its own options.
+
+    Parameters
+    ----------
+    given : dict
+        Options that say how to decompose, by name; None where not given.
+    metres : bool
+        Whether the mesh is in metres, so that lengths with a unit can be taken.
+    warn : callable
+        Told that a name is a former one.
+
+    Returns
+    -------
+    dict
+        Keyword arguments of `rlacd.decompose`: defaults are stated once, by its options.
+
+    Raises
+    ------
+    OptionError
+        Options contradict each other, or are not what they should look like.
+    """
+    given = _renamed(chosen(given), warn)
+    given = _lengths(given, metres)
+    space = {name: given.pop(name) for name in _SPACE if name in given}
+    criterion = given.pop("criterion", CONCAVITY)
+    if criterion not in (CONCAVITY, NAVIGABLE):
+        raise OptionError(f"criterion is {criterion!r}; it has to be {CONCAVITY} or {NAVIGABLE}.")
+    if criterion == CONCAVITY:
+        if space:
+            raise OptionError(f"{_typed(next(iter(space)), space)} needs --criterion navigable.")
+        return given
+    if "threshold" in given or "threshold_abs" in given:
+        raise OptionError("--threshold belongs to --criterion concavity; give --radius and --tolerance instead.")
+    from rlacd.criteria import NavigableSpace
+
+    if "seeds" in space:
+        space["seeds"] = [_numbers("--seed-point", text, 3) for text in space["seeds"]]
+    if "closed_planes" in space:
+        space["closed_planes"] = [_plane(text) for text in space["closed_planes"]]
+    return {**given, "criterion": NavigableSpace(**space)}
+
+
+def _typed(name: str, space: dict[str, Any]) -> str:
+    """Spell an option as the user has."""
+    flags = about(SpaceOptions, name).flags or (f"--{name.replace('_', '-')}",)
+    yes, _, no = flags[0].partition("/")
+    return no if space[name] is False else yes
+
+
+def _renamed(given: dict[str, Any], warn: Callable[[str], None]) -> dict[str, Any]:
+    for old, new in (former_names(Options) | former_names(SpaceOptions)).items():
+        if old not in given:
+            continue
+        typed_old, typed_new = (f"--{name.replace('_', '-')}" for name in (old, new))
+        if new in given:
+            raise OptionError(f"{typed_old} is the former name of {typed_new}; give one of the two.")
+        warn(f"{typed_old} is now called {typed_new}; the old name will go.")
+        given[new] = given.pop(old)
+    return given
+
+
+def _lengths(given: dict[str, Any], metres: bool) -> dict[str, Any]:
+    """Read lengths that are words: a number, a share of the longest side (5%), or metres (0.05m)."""
+    taken = dict(given)
+    for name, of_longest in (("threshold", 2.0), ("radius", 1.0), ("tolerance", 1.0)):
+        word = taken.get(name)
+        if not isinstance(word, str):
+            continue
+        found = _LENGTH.fullmatch(word.strip())
+        value = _number(found[1] if found else word)
+        if value is None:
+            raise OptionError(
+                f"--{name} is {word!r}; it has to be a number, a share such as 5%, or a length in metres."
+            )
+        unit = found[2] if found else None
+        if unit in _METRES:
+            if not metres:
+                raise OptionError(
+                    f"--{name} is {word}, but the file does not say its unit; give --{name}-abs in the file's own unit."
+                )
+            if f"{name}_abs" in taken:
+                raise OptionError(f"--{name} and --{name}-abs are both lengths; give one of the two.")
+            del taken[name]
+            taken[f"{name}_abs"] = value * _METRES[unit]
+        else:
+            taken[name] = value / 100 * of_longest if unit == "%" else value
+    return taken
+
+
+def _number(word: str) -> float | None:
+    try:
+        return float(word)
+    except ValueError:
+        return None
+
+
+def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
+    values = [_number(word) for word in text.split(",")]
+    found = tuple(value for value in values if value is not None)
+    if len(found) != count or len(values) != count:
+        raise OptionError(
+            f"{option} is {text!r}; it takes {count} numbers with commas between, such as {'0,0,1,0'[: 2 * count - 1]}."
+        )
+    return found
+
+
+def _plane(text: str) -> tuple[tuple[float, ...], float]:
+    *normal, offset = _numbers("--closed-plane", text, 4)
+    return tuple(normal), offset

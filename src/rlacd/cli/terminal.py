@@ -1,0 +1,136 @@
+"""What the command line shows while it works and when it is done, and how Ctrl-C stops it."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from types import FrameType, TracebackType
+from typing import TYPE_CHECKING, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+from rich.progress import Progress as Bars
+
+from rlacd.decomposition import Decomposition
+from rlacd.progress import Progress
+
+if TYPE_CHECKING:
+    from rlacd.io.robots import Rewritten
+
+
+def say(text: str) -> None:
+    """Print a line to stderr; stdout is kept for what the user asked to be written there."""
+    typer.echo(text, err=True)
+
+
+class Watch:
+    """Shows progress on a terminal and turns Ctrl-C into a graceful stop.
+
+    The first Ctrl-C makes the decomposition stop at its next step and keep what it has; the second one interrupts at
+    once. The bar is drawn only where stderr is a terminal.
+    """
+
+    def __init__(self, *, quiet: bool) -> None:
+        self.interrupted = False
+        console = Console(stderr=True)
+        self._bars = Bars(
+            TextColumn("{task.description:<12}"),
+            BarColumn(),
+            TextColumn("{task.fields[parts]} parts"),
+            TimeElapsedColumn(),
+            console=console,
+            transient=True,
+            disable=quiet or not console.is_terminal,
+        )
+        self._task = self._bars.add_task("starting", total=None, parts=0)
+        self._previous: Any = None
+
+    def __enter__(self) -> Watch:
+        # Python runs signal handlers in the main thread only, and refuses to set them from another one.
+        if threading.current_thread() is threading.main_thread():
+            self._previous = signal.signal(signal.SIGINT, self._on_interrupt)
+        self._bars.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self._bars.stop()
+        if self._previous is not None:
+            signal.signal(signal.SIGINT, self._previous)
+
+    def __call__(self, progress: Progress) -> bool:
+        """Show `progress`; False when the user wants to stop."""
+        self._bars.update(
+            self._task,
+            description=progress.stage,
+            completed=progress.done,
+            total=progress.total,
+            parts=progress.parts,
+        )
+        return not self.interrupted
+
+    def _on_interrupt(self, number: int, frame: FrameType | None) -> None:
+        self.interrupted = True
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        say("stopping; what is reached will be written (Ctrl-C again to quit at once)")
+
+
+def summary(result: Decomposition, written: str) -> str:
+    """Tell in a few lines what came out, how good it is, and what the user should know."""
+    report = result.report
+    triangles = sum(len(hull.faces) for hull in result)
+    lines = [f"{written}: {_count(len(result))}, {triangles} triangles{_time(report)}"]
+    lines += [f"  {fit}" for fit in [_fit(report)] if fit]
+    lines += [f"  warning: {warning}" for warning in report.get("warnings", [])]
+    return "\n".join(lines)
+
+
+def rewrite_summary(done: Rewritten) -> str:
+    """Tell the same of a robot: its meshes, each with its number of hulls."""
+    total = sum(len(mesh.files) for mesh in done.meshes)
+    lines = [f"{done.path}: {counted(len(done.meshes), 'mesh', 'meshes')}, {_count(total)} in {done.folder}"]
+    lines += [f"  {mesh.path.name}: {_count(len(mesh.files))}; {_fit(mesh.result.report)}" for mesh in done.meshes]
+    lines += [f"  warning: {warning}" for warning in done.warnings]
+    return "\n".join(lines)
+
+
+def counted(count: int, one: str, many: str) -> str:
+    """Say how many there are of something."""
+    return f"{count} {one if count == 1 else many}"
+
+
+def _count(hulls: int) -> str:
+    return counted(hulls, "hull", "hulls")
+
+
+def _time(report: dict[str, Any]) -> str:
+    total = report.get("seconds", {}).get("total")
+    reason = {None: "", "timeout": ", stopped by the timeout", "cancel": ", stopped by Ctrl-C"}[
+        report.get("stopped_by")
+    ]
+    return ("" if total is None else f", {total:.2f} s") + reason
+
+
+def _fit(report: dict[str, Any]) -> str:
+    words = []
+    worst = report.get("concavity", {}).get("max")
+    if worst is not None:
+        threshold = report.get("options", {}).get("threshold")
+        verdict = "" if threshold is None else f" (threshold {threshold:g}{', exceeded' * (worst > threshold)})"
+        words.append(f"max concavity {worst:.4f}{verdict}")
+    space = report.get("navigable")
+    if space is not None:
+        intruding = space["intrusion"]["max"]
+        words.append(
+            f"there are {space['balls']} balls"
+            if intruding is None
+            else f"no hull touches any of the {space['balls']} balls"
+            if intruding <= 0
+            else f"hulls reach {intruding:.4f} into the {space['balls']} balls"
+        )
+    reach = report.get("hausdorff", {})
+    if reach.get("over") is not None:
+        words.append(f"hulls reach {reach['over']:.4f} from the input")
+    if reach.get("under") is not None:
+        words.append(f"input lies {reach['under']:.4f} from the hulls")
+    return "; ".join(words)

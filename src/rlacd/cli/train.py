@@ -1,0 +1,132 @@
+"""The commands `rlacd train` and `rlacd pretrain`: their options, and their help, are the fields of a dataclass."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rlacd.cli.exit_codes import exit_codes
+from rlacd.cli.parameters import REQUIRED, Parameters, chosen, command, option_parameters
+from rlacd.errors import MissingExtraError, OptionError
+from rlacd.learn.paper.options import PRESETS, TrainOptions
+from rlacd.learn.pretrain.options import PretrainOptions
+
+EXTRA = ("torch", "gymnasium", "tensorboard", "safetensors", "onnx", "onnxscript", "onnxruntime")
+
+DEFAULT_PRESET = "two-cores"
+
+TRAIN_HELP = """Train a policy that chooses cuts, by the paper's reinforcement learning.
+
+\b
+[bold]Examples[/bold]
+  rlacd train meshes/ --run run/ --preset quick
+  rlacd train meshes/ --run run/ --seed 1
+  rlacd train meshes/ --run run/ --seed 1 --resume --jobs 8
+  rlacd train meshes/ --run run/ --environments 256 --ray auto
+  rlacd train meshes/ --run run/ --preset paper --encoder-weights i2p_mae.pth
+  tensorboard --logdir run/tensorboard
+
+The run's folder gets the curves, a checkpoint to --resume from, and in the end policy.onnx, which decompose takes as
+--policy. A preset sets all options; those given beside it change it.
+"""
+
+PRETRAIN_HELP = """Make weights for --encoder i2p-mae out of a folder of meshes, without any labels.
+
+Most of a point cloud is hidden, and the encoder learns to say what was there (the 3-D half of I2P-MAE).
+
+\b
+[bold]Examples[/bold]
+  rlacd pretrain meshes/ --out weights.safetensors
+  rlacd pretrain meshes/ --out weights.safetensors --resume
+  rlacd pretrain meshes/ --out small.safetensors --size small --points 1024 --batch 32 --steps 1000
+  rlacd train meshes/ --run run/ --encoder i2p-mae --encoder-weights weights.safetensors
+
+Beside the weights a folder, weights.run, gets the curves and a checkpoint to --resume from.
+"""
+
+MESHES = (REQUIRED, Annotated[Path, typer.Argument(help="A folder of meshes, of any depth.")])
+WHERE: Parameters = {
+    "jobs": (
+        None,
+        Annotated[
+            int | None,
+            typer.Option(
+                min=0, help="Processes that cut; 0: the one that learns. [dim]\\[default: 1][/dim]", show_default=False
+            ),
+        ],
+    ),
+    "ray": (
+        None,
+        Annotated[
+            str | None, typer.Option(metavar="ADDRESS", help="Cut on a Ray cluster: its address, auto, or local.")
+        ],
+    ),
+    "limit": (
+        600.0,
+        Annotated[float, typer.Option(metavar="SECONDS", min=0.1, help="What one episode may take.")],
+    ),
+    "memory": (
+        4.0,
+        Annotated[float, typer.Option(metavar="GB", min=0.0, help="What a process that cuts may hold; 0: no limit.")],
+    ),
+}
+"""Where episodes are played, which decides nothing but how long that takes."""
+
+RESUME = (False, Annotated[bool, typer.Option("--resume", help="Go on from the run's last checkpoint.")])
+
+
+def train_command() -> Callable[..., None]:
+    """Build `rlacd train`."""
+
+    def train(**given: Any) -> None:
+        with exit_codes():
+            meshes, run, preset, resume = (given.pop(name) for name in ("meshes", "run", "preset", "resume"))
+            from rlacd.pool import ProcessLimits, open_pool
+
+            jobs, ray, limit, memory = (given.pop(name) for name in WHERE)
+            options = TrainOptions.preset(preset, **chosen(given))
+            if run.exists() and not run.is_dir():
+                raise OptionError(f"--run {run} is a file; give a folder.")
+            learn, limits = _learn("rlacd.learn.paper.train", "train"), ProcessLimits(limit, int(memory * 2**30))
+            with open_pool(jobs, ray) as pool:
+                learn(meshes, run, options, resume=resume, say=typer.echo, pool=pool, limits=limits)
+
+    own: Parameters = {
+        "meshes": MESHES,
+        "run": (REQUIRED, Annotated[Path, typer.Option("--run", "-o", help="A folder for this run.")]),
+        "preset": (DEFAULT_PRESET, Annotated[str, typer.Option(help=f"One of {', '.join(PRESETS)}.")]),
+        "resume": RESUME,
+        **WHERE,
+    }
+    return command(train, TRAIN_HELP, own | option_parameters(TrainOptions, note="without a preset: "))
+
+
+def pretrain_command() -> Callable[..., None]:
+    """Build `rlacd pretrain`."""
+
+    def pretrain(**given: Any) -> None:
+        with exit_codes():
+            meshes, out, resume = (given.pop(name) for name in ("meshes", "out", "resume"))
+            options = PretrainOptions(**chosen(given))
+            _learn("rlacd.learn.pretrain.run", "pretrain")(meshes, out, options, resume=resume, say=typer.echo)
+            typer.echo(f"{out}: give it to  rlacd train --encoder i2p-mae --encoder-weights")
+
+    out = typer.Option("--out", "-o", metavar="FILE.safetensors", help="Where the weights go.")
+    own: Parameters = {"meshes": MESHES, "out": (REQUIRED, Annotated[Path, out]), "resume": RESUME}
+    return command(pretrain, PRETRAIN_HELP, own | option_parameters(PretrainOptions))
+
+
+def _learn(module: str, name: str) -> Callable[..., Path]:
+    try:
+        run: Callable[..., Path] = getattr(importlib.import_module(module), name)
+    except ModuleNotFoundError as error:
+        if (error.name or "").split(".")[0] in EXTRA:
+            raise MissingExtraError(
+                "training needs an extra: run  pip install 'rlacd[train]'  and try again."
+            ) from error
+        raise
+    return run

@@ -1,0 +1,1 @@
+"""Files: meshes read, hulls and models written, robots rewritten."""

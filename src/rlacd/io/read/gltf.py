@@ -1,0 +1,184 @@
+"""What a glTF file promises, weighed against what it holds.
+
+Its JSON may use one array for any number of meshes, take any part of a buffer any number of times, and promise arrays
+that no bytes stand for. A parser makes room for all of it, one after another; and it copies names and whatever else
+hangs on a mesh for each of its primitives. So it is given the triangles and their places, and nothing else.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from rlacd.errors import MeshFileError
+from rlacd.io.read.limits import MOST_PLACES, most_in_memory
+
+Json: TypeAlias = dict[str, Any]
+
+MAGIC, JSON_CHUNK = b"glTF", b"JSON"
+
+ITEM_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
+"""By component type; see "Accessor Data Types" in the specification."""
+
+ITEMS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+
+UNREAD = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
+"""Extensions that hide the triangles: without what decodes them, files hold zeros in their place."""
+
+KEPT = {
+    "buffers": ("byteLength", "uri"),
+    "bufferViews": ("buffer", "byteOffset", "byteLength", "byteStride"),
+    "accessors": ("bufferView", "byteOffset", "componentType", "count", "type"),
+    "nodes": ("children", "mesh", "matrix", "translation", "rotation", "scale"),
+    "scenes": ("nodes",),
+}
+"""What the triangles and their places follow from, beside the meshes."""
+
+UNREADABLE = "cannot be read as glTF: it is damaged or cut off"
+
+
+def plain_gltf(path: Path, content: bytes, beside: Callable[[str], bytes]) -> bytes:
+    """Make a glTF file with the same triangles and nothing else, unless it promises what it does not hold.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file, to speak of it.
+    content : bytes
+        What it holds, JSON or binary (GLB).
+    beside : callable
+        Gets the content of a file that a buffer names.
+
+    Raises
+    ------
+    MeshFileError
+        It does, or asks for more than anybody could use.
+    FileNotFoundError
+        Raised by `beside`.
+    """
+    header, rest = _header(path, content)
+    try:
+        plain = _plain(path, header)
+        _check(path, plain, _bytes_given(path, plain, len(content), beside))
+    except (TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:
+        reason = f"{type(error).__name__}: {error!s:.100}"
+        raise MeshFileError(f"{path} {UNREADABLE} ({reason}); export it again") from error
+    text = json.dumps(plain).encode()
+    if rest is None:
+        return text
+    text += b" " * (-len(text) % 4)
+    head = struct.pack("<4sIII4s", MAGIC, 2, 20 + len(text) + len(rest), len(text), JSON_CHUNK)
+    return b"".join((head, text, rest))
+
+
+def _header(path: Path, content: bytes) -> tuple[Json, bytes | None]:
+    """Take a file apart into its JSON and, if it is binary, what follows that."""
+    text, rest = content, None
+    if content.startswith(MAGIC):
+        if len(content) < 20 or content[16:20] != JSON_CHUNK:
+            raise MeshFileError(f"{path} {UNREADABLE}; export it again")
+        length, chunk = struct.unpack_from("<II", content, 8)
+        if max(length, 20 + chunk) > len(content):
+            raise MeshFileError(f"{path} is cut off: its header promises {length} bytes; export it again")
+        if content[4:8] != b"\2\0\0\0":
+            raise MeshFileError(f"{path} is of another version than glTF 2: convert it to glb, obj, stl or ply")
+        text, rest = content[20 : 20 + chunk], content[20 + chunk :]
+    try:
+        header = json.loads(text.decode())
+    except RecursionError as error:
+        raise MeshFileError(f"{path} nests its JSON too deep: no exporter writes such files") from error
+    except ValueError as error:
+        raise MeshFileError(f"{path} {UNREADABLE} ({error}); export it again") from error
+    if not isinstance(header, dict):
+        raise MeshFileError(f"{path} {UNREADABLE}; export it again")
+    return header, rest
+
+
+def _plain(path: Path, header: Json) -> Json:
+    hidden = [name for name in UNREAD if name in header.get("extensionsRequired", [])]
+    if hidden:
+        raise MeshFileError(f"{path} hides its triangles by {hidden[0]}: export it again without compression")
+    plain: Json = {key: header[key] for key in ("scene",) if key in header}
+    plain["asset"] = {"version": header.get("asset", {}).get("version", "2.0")}
+    for key, fields in KEPT.items():
+        if key in header:
+            plain[key] = [_only(item, fields) for item in header[key]]
+    plain["meshes"] = [
+        {"primitives": [_plain_primitive(primitive) for primitive in mesh["primitives"]]}
+        for mesh in header.get("meshes", [])
+    ]
+    return plain
+
+
+def _plain_primitive(primitive: Json) -> Json:
+    return {**_only(primitive, ("indices", "mode")), "attributes": _only(primitive["attributes"], ("POSITION",))}
+
+
+def _only(item: Json, fields: tuple[str, ...]) -> Json:
+    return {field: item[field] for field in fields if field in item}
+
+
+def _bytes_given(path: Path, header: Json, own: int, beside: Callable[[str], bytes]) -> int:
+    """Count the bytes of the file and of those its buffers name."""
+    buffers = header.get("buffers", [])
+    if len(buffers) > MOST_PLACES:
+        raise MeshFileError(f"{path} has {len(buffers)} buffers, more than {MOST_PLACES}: export it again, with one")
+    named = {buffer["uri"] for buffer in buffers if "base64," not in buffer.get("uri", "base64,")}
+    return own + sum(len(beside(name)) for name in sorted(named))
+
+
+def _check(path: Path, header: Json, given: int) -> None:
+    primitives = [primitive for mesh in header["meshes"] for primitive in mesh["primitives"]]
+    nodes = header.get("nodes", [])
+    edges = sum(len(node.get("children", [])) for node in nodes)
+    edges += sum(len(scene.get("nodes", [])) for scene in header.get("scenes", []))
+    counts = {"nodes": len(nodes), "references to nodes": edges, "primitives": len(primitives)}
+    for what, count in counts.items():
+        if count > MOST_PLACES:
+            raise MeshFileError(f"{path} has {count} {what}, more than {MOST_PLACES}: join its meshes first")
+    views = header.get("bufferViews", [])
+    accessors = [_Accessor(path, accessor, views) for accessor in header.get("accessors", [])]
+    asked = sum(_natural(path, view.get("byteLength", 0), "byteLength") for view in views)
+    asked += sum(accessor.bytes for accessor in accessors)
+    asked += sum(accessors[index].as_loaded for primitive in primitives for index in _used(primitive))
+    if asked > most_in_memory(given):
+        raise MeshFileError(
+            f"{path} asks for {asked} bytes, though it holds {given}: export it again, with one buffer view per array"
+        )
+
+
+class _Accessor:
+    """How much an array takes: ``bytes`` in the file, and ``as_loaded`` in a mesh, where all numbers take eight."""
+
+    def __init__(self, path: Path, accessor: Json, views: list[Json]) -> None:
+        count = _natural(path, accessor["count"], "count")
+        row = ITEM_BYTES[accessor["componentType"]] * ITEMS[accessor["type"]]
+        self.bytes = count * row
+        self.as_loaded = 8 * count * ITEMS[accessor["type"]]
+        if "bufferView" not in accessor:
+            return  # zeros, or what an extension puts there
+        view = views[_natural(path, accessor["bufferView"], "bufferView")]
+        start = _natural(path, accessor.get("byteOffset", 0), "byteOffset")
+        _natural(path, view.get("byteOffset", 0), "byteOffset")
+        stride = _natural(path, view.get("byteStride", row), "byteStride")
+        length = start + (count - 1) * stride + row if count else 0
+        if stride < row or length > view["byteLength"]:
+            raise MeshFileError(f"{path} promises {count} rows where there is no room for them; export it again")
+
+
+def _used(primitive: Json) -> Iterator[int]:
+    """Give the accessors of a primitive."""
+    yield from primitive["attributes"].values()
+    if "indices" in primitive:
+        yield primitive["indices"]
+
+
+def _natural(path: Path, number: Any, what: str) -> int:
+    if not isinstance(number, int) or number < 0:
+        raise MeshFileError(
+            f"{path} has {number!r:.40} as a {what}, which cannot be negative or broken; export it again"
+        )
+    return number

@@ -1,0 +1,80 @@
+"""What headers promise of the lines that follow, and text that parsers would take too long for.
+
+A check raises MeshFileError. What `plain_…` returns holds the same triangles as it was given, in a form that every
+parser reads in time that grows with its length.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from rlacd.errors import MeshFileError
+from rlacd.io.read.limits import MOST_TRIANGLES
+
+MOST_FIELDS = 2000
+"""Lines of a PLY file's header: for each list among its properties, all before it are looked at again."""
+
+PLY_ELEMENT = re.compile(rb"^element\s+(\S+)\s+(\S+)", re.MULTILINE)
+PLY_END = re.compile(rb"^end_header[ \t]*\r?\n", re.MULTILINE)
+EMPTY_LINES = re.compile(rb"[ \t]*[\r\n]\s*")
+BODY_END = re.compile(rb"endsolid", re.IGNORECASE)
+
+
+def check_text(path: Path, content: bytes) -> None:
+    """Refuse text in which every character takes two bytes, and text of more lines than any mesh has."""
+    if b"\0" in content.rstrip(b"\0"):
+        raise MeshFileError(f"{path} is no plain text: save it as UTF-8, or export it again if it is damaged")
+    lines = content.count(b"\n")
+    if lines > MOST_TRIANGLES:
+        raise MeshFileError(f"{path} has {lines} lines, more than {MOST_TRIANGLES}: simplify it first")
+
+
+def plain_obj(path: Path, content: bytes) -> bytes:
+    """Take out which material a face has: each makes a mesh of its own, with a table as long as all vertices."""
+    check_text(path, content)
+    return content.replace(b"usemtl ", b"# ")
+
+
+def plain_stl(path: Path, content: bytes) -> bytes:
+    """Compare a binary file's length with its count, as a short one would be read as text; join the bodies of text."""
+    if b"\0" in content[:512]:
+        count = int.from_bytes(content[80:84], "little")
+        if len(content) < 84 + 50 * count:
+            raise MeshFileError(f"{path} is cut off: its header promises {count} triangles; export it again")
+        return content
+    if len(content) == 84 + 50 * int.from_bytes(content[80:84], "little"):
+        return content
+    check_text(path, content)
+    last = content.lower().rfind(b"endsolid")
+    return BODY_END.sub(b"", content[:last]) + content[last:] if last >= 0 else content
+
+
+def plain_ply(path: Path, content: bytes) -> bytes:
+    """Compare a text file's lines with the counts in its header, without the empty ones.
+
+    The parser does so itself for binary files, but for elements of less than none.
+    """
+    end = PLY_END.search(content)
+    if end is None:
+        raise MeshFileError(f"{path} cannot be read as ply: its header has no end; export it again")
+    header = content[: end.end()]
+    fields = header.count(b"\n")
+    if fields > MOST_FIELDS:
+        raise MeshFileError(f"{path} has a header of {fields} lines, more than {MOST_FIELDS}: export it again")
+    counts = [count_in(path, word) for _, word in PLY_ELEMENT.findall(header)]
+    if b"ascii" not in header.lower().split(b"\n", 2)[1]:
+        return content
+    check_text(path, content)
+    body = EMPTY_LINES.sub(b"\n", content[end.end() :].strip())
+    if body.count(b"\n") + bool(body) < sum(counts):
+        raise MeshFileError(f"{path} is cut off: its header promises {sum(counts)} lines; export it again")
+    return header + body + b"\n"
+
+
+def count_in(path: Path, word: bytes) -> int:
+    """Read a count in a header; raises MeshFileError where it is none."""
+    if not re.fullmatch(rb"\+?\d{1,18}", word):
+        said = word[:20].decode(errors="replace")
+        raise MeshFileError(f"{path} has {said!r} in its header where a count belongs: it is damaged; export it again")
+    return int(word)

@@ -1,0 +1,136 @@
+"""Which file a robot description means: relative paths, ``package://`` and ``file://``, and none outside its package.
+
+A description is a file that others made. What it may name is limited to its own package (the nearest folder above it
+with a ``package.xml``, else the folder above its own, since ``../meshes`` is where most keep them), the packages it
+refers to, and the folders the user allows. Links are followed: workspaces of ROS are made of them.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+from rlacd.errors import MeshFileError, OptionError
+from rlacd.io.read.open_file import read_file
+from rlacd.io.robots.spans import LARGEST_DESCRIPTION, parse
+
+PACKAGE_SCHEMES = ("package", "model")
+
+
+class References:
+    """Finds the files that one robot description names.
+
+    Parameters
+    ----------
+    robot : Path
+        The description.
+    package_dirs : sequence of str
+        ``NAME=PATH`` says where a package is; ``PATH`` alone is a folder that may be read and may hold packages.
+
+    Raises
+    ------
+    OptionError
+        A folder does not exist.
+    """
+
+    def __init__(self, robot: Path, package_dirs: Sequence[str] = ()) -> None:
+        self._robot = Path(os.path.abspath(robot))
+        self._named: dict[str, Path] = {}
+        self._allowed: list[Path] = []
+        for given in package_dirs:
+            name, equals, folder = str(given).rpartition("=")
+            place = Path(os.path.abspath(folder))
+            if not place.is_dir():
+                raise OptionError(f"the package folder {folder} does not exist; give NAME=FOLDER or FOLDER.")
+            self._allowed.append(place)
+            if equals:
+                self._named[name] = place
+        self.root = next(
+            (folder for folder in self._robot.parents if (folder / "package.xml").is_file()), self._robot.parent.parent
+        )
+        self._allowed.append(self.root)
+
+    def find(self, reference: str, folder: Path) -> Path:
+        """Get the file that `reference` means in a description that reads relative paths from `folder`.
+
+        Raises
+        ------
+        MeshFileError
+            There is no such file or package, or it lies outside what the description may name.
+        """
+        package = self.package_of(reference)
+        parts = urlsplit(reference) if "://" in reference else None
+        if package is not None and parts is not None:
+            base, rest = package, unquote(parts.path).lstrip("/")
+        elif parts is not None and parts.scheme == "file":
+            base, rest = folder, unquote(parts.netloc + parts.path)
+        elif parts is not None:
+            raise MeshFileError(f"{self._robot} names {reference}, which is not on this disk: fetch it first.")
+        else:
+            base, rest = folder, reference.replace("\\", "/")
+        if "\0" in rest:
+            raise MeshFileError(f"{self._robot} names {reference!r}, which is no file name.")
+        place = Path(os.path.abspath(base / rest))
+        if not any(place.is_relative_to(allowed) for allowed in ([package] if package else self._allowed)):
+            raise MeshFileError(
+                f"{self._robot} names {reference}, outside of {package or self.root}: "
+                "give --package-dir with a folder that holds it if you trust the file."
+            )
+        if not place.is_file():
+            raise MeshFileError(f"{self._robot} names {reference}, but {place} does not exist.")
+        return place
+
+    def package_of(self, reference: str) -> Path | None:
+        """Get the folder of the package that ``package://NAME/...`` names; None for any other reference.
+
+        Raises
+        ------
+        MeshFileError
+            It is not found.
+        """
+        if "://" not in reference or urlsplit(reference).scheme not in PACKAGE_SCHEMES:
+            return None
+        name = reference.split("://", 1)[1].split("/", 1)[0]
+        if name in self._named:
+            return self._named[name]
+        if name.strip(". ") and not set(name) & {"\\", "\0"}:
+            for folder in self._candidates(name):
+                if folder.is_dir():
+                    return folder
+        raise MeshFileError(
+            f"{self._robot} names the package {name}, which is not found: give --package-dir {name}=FOLDER."
+        )
+
+    def _candidates(self, name: str) -> Iterator[Path]:
+        """Where a package may be, likeliest first: above the file, beside those folders, in ROS' search paths."""
+        for folder in self._robot.parents:
+            if folder.name == name or _package_name(folder) == name:
+                yield folder
+            elif (folder / name / "package.xml").is_file() or folder.is_relative_to(self.root):
+                yield folder / name  # some take any folder beside the file for a package
+        yield from (folder / name for folder in self._allowed[:-1])
+        for path in _paths("AMENT_PREFIX_PATH"):
+            yield path / "share" / name
+        for path in _paths("ROS_PACKAGE_PATH"):
+            yield path if path.name == name else path / name
+
+
+def _package_name(folder: Path) -> str | None:
+    place = folder / "package.xml"
+    if not place.is_file():
+        return None
+    try:
+        document = parse(place, read_file(place, LARGEST_DESCRIPTION))
+    except (MeshFileError, OSError):
+        return None
+    found = next(document.root.named("name"), None)
+    if found is None:
+        return None
+    inner = document.data[found.head : found.end].split(b"<")[0]
+    return inner.decode(document.encoding, "replace").strip()
+
+
+def _paths(variable: str) -> list[Path]:
+    return [Path(part) for part in os.environ.get(variable, "").split(os.pathsep) if part]

@@ -1,0 +1,232 @@
+"""Rewriting a robot: plan from the file, decompose each mesh once, write hulls and file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from rlacd.decompose_mesh import decompose
+from rlacd.decomposition import Decomposition
+from rlacd.errors import MeshError, MeshFileError, OptionError, OutputError
+from rlacd.fields import checked, path_like, read, shown
+from rlacd.io.read.load import load_mesh
+from rlacd.io.read.open_file import read_file
+from rlacd.io.robots.collada import collada_unit
+from rlacd.io.robots.mjcf import mesh_folder, plan_mjcf
+from rlacd.io.robots.plan import HullFile, MeshUse, Plan
+from rlacd.io.robots.references import References
+from rlacd.io.robots.spans import LARGEST_DESCRIPTION, Document, parse, replaced
+from rlacd.io.robots.urdf import plan_urdf
+from rlacd.io.write import check_file, check_name, file_stem, write_file
+from rlacd.io.write.encode import encode_plain_obj
+from rlacd.io.write.folder import check_names, write_folder
+from rlacd.output_options import OutputOptions
+from rlacd.solid.hull import Hull
+
+ENDINGS = {".urdf": "urdf", ".xml": "mjcf"}
+ROOTS = {"urdf": "robot", "mjcf": "mujoco"}
+
+
+@dataclass(frozen=True)
+class RewrittenMesh:
+    """One collision mesh: its file, the names of its hulls' files, and its decomposition at the scale of its use."""
+
+    path: Path
+    files: list[str]
+    result: Decomposition
+
+
+@dataclass(frozen=True)
+class Rewritten:
+    """What rewriting a robot has done.
+
+    Attributes
+    ----------
+    path
+        The new description.
+    folder
+        Where its hulls are, as OBJ files.
+    meshes
+        The collision meshes that were replaced, each once.
+    warnings
+        What the user should know: one sentence each.
+    """
+
+    path: Path
+    folder: Path
+    meshes: list[RewrittenMesh]
+    warnings: list[str]
+
+    @property
+    def complete(self) -> bool:
+        """False when a decomposition was stopped early."""
+        return all(mesh.result.report.get("complete", True) for mesh in self.meshes)
+
+
+def is_robot(path: str | os.PathLike[str]) -> bool:
+    """Tell by its ending whether a file describes a robot."""
+    return Path(path).suffix.lower() in ENDINGS
+
+
+def rewrite_robot(
+    robot: str | os.PathLike[str],
+    output: str | os.PathLike[str],
+    *,
+    package_dirs: Sequence[str] = (),
+    **options: Any,
+) -> Rewritten:
+    """Replace every collision mesh of a URDF or MJCF file by its hulls, and keep all other bytes.
+
+    Parameters
+    ----------
+    robot : path-like
+        ``*.urdf``, or ``*.xml`` for MJCF. Its meshes are looked for relative to it, in packages
+        (``package://NAME/...``), and nowhere outside its own package.
+    output : path-like
+        The new file, of the same kind. Hulls go to a folder beside it, ``robot_acd_urdf`` for ``robot_acd.urdf``.
+    package_dirs : sequence of str
+        ``NAME=FOLDER`` says where a package is; ``FOLDER`` alone may be read and searched for packages.
+    **options
+        Those of `rlacd.decompose`, for each mesh. Lengths such as `threshold_abs` are in the robot's unit, behind the
+        scale of a mesh; a `timeout` is for each mesh.
+
+    Returns
+    -------
+    Rewritten
+
+    Raises
+    ------
+    MeshError
+        The file or one of its meshes cannot be read, is not allowed to be read, or there is none to replace.
+    OptionError
+        An option is out of range, or `output` is not of the same kind as `robot`.
+    OutputError
+        The place cannot be written to.
+    """
+    source, place = Path(read(path_like(), "robot", robot)), Path(read(path_like(), "output", output))
+    packages = checked(OutputOptions, "package_dirs", package_dirs, called="package_dirs") or ()
+    check_rewrite(source, place)
+    kind = ENDINGS[source.suffix.lower()]
+    document = parse(source, _read(source))
+    if document.root.tag != ROOTS[kind]:
+        raise MeshFileError(
+            f"{source} is no {kind.upper()}: it starts with <{document.root.tag}>, not <{ROOTS[kind]}>."
+        )
+    references = References(source, packages)
+    folder = place.with_name(f"{place.stem}_{kind}")
+    plan, warnings = _plan(document, kind, references, place, folder)
+    if not plan.uses:
+        raise MeshFileError(f"{source} has no collision mesh to decompose: there is nothing to do.")
+    stem = file_stem(place.stem)
+    names = _stems([use.path for use in plan.uses])
+    meshes: dict[MeshUse, RewrittenMesh] = {}
+    shares: dict[MeshUse, list[HullFile]] = {}
+    files: dict[str, bytes] = {}
+    for use, name in zip(plan.uses, names, strict=True):
+        unit, said = collada_unit(use.path)
+        warnings += said
+        result = _decomposed(use, unit, options)
+        written = {
+            f"{stem}_{name}_{i:03d}.obj": encode_plain_obj(_unscaled(h, use)) for i, h in enumerate(result.hulls)
+        }
+        files.update(written)
+        volumes = np.array([hull.volume for hull in result.hulls])
+        shares[use] = [HullFile(*pair) for pair in zip(written, (volumes / volumes.sum()).tolist(), strict=True)]
+        meshes[use] = RewrittenMesh(use.path, list(written), result)
+        warnings += [f"{use.path.name}: {warning}" for warning in result.report.get("warnings", [])]
+    data = replaced(document.data, plan.edit(shares))
+    check_names(folder, stem, list(files))
+    write_folder(folder, stem, files, then=lambda: write_file(place, data))
+    return Rewritten(place, folder, list(meshes.values()), warnings)
+
+
+def check_rewrite(source: Path, place: Path) -> None:
+    """Check, before any work, that `source` can be rewritten as `place`; raises as `rewrite_robot`."""
+    if not is_robot(source):
+        raise MeshFileError(f"{source} is no robot: its name has to end in {' or '.join(ENDINGS)}.")
+    if place.suffix.lower() != source.suffix.lower():
+        raise OptionError(f"{source} can only be rewritten as another {source.suffix}, not as {shown(str(place))}.")
+    if os.path.realpath(source) == os.path.realpath(place):
+        raise OptionError(f"{place} would overwrite the input; choose another name.")
+    check_name(place)
+    check_file(place)
+    folder = place.with_name(f"{place.stem}_{ENDINGS[source.suffix.lower()]}")
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(f"cannot write into {folder}: it is a file, not a folder; choose another name.")
+
+
+def _plan(document: Document, kind: str, references: References, place: Path, folder: Path) -> tuple[Plan, list[str]]:
+    if kind == "urdf":
+        plan = plan_urdf(document, references, lambda old, hull: _reference(old, hull, references, folder))
+    else:
+        source = Path(os.path.abspath(document.path)).parent
+        within = os.path.relpath(mesh_folder(document), source)  # the same from the new file
+        target = os.path.relpath(folder.absolute(), Path(os.path.abspath(place.absolute().parent / within)))
+        plan = plan_mjcf(document, references, lambda old, hull: (Path(target) / hull).as_posix())
+    warnings = list(plan.warnings)
+    if plan.relative and os.path.realpath(place.absolute().parent) != os.path.realpath(document.path.absolute().parent):
+        warnings.append(
+            f"{len(plan.relative)} other files, such as {plan.relative[0]}, are named relative to "
+            f"{document.path.absolute().parent}: they are not found from {place.absolute().parent}."
+        )
+    return plan, warnings
+
+
+def _reference(old: str, hull: str, references: References, folder: Path) -> str:
+    """Name a hull the way the mesh was named: by its package if it lies in that package, else relative to the file."""
+    package = references.package_of(old)
+    target = Path(os.path.abspath(folder)) / hull
+    if package is not None and target.is_relative_to(package):
+        scheme, rest = old.split("://", 1)
+        return f"{scheme}://{rest.split('/', 1)[0]}/{target.relative_to(package).as_posix()}"
+    return f"{folder.name}/{hull}"
+
+
+def _decomposed(use: MeshUse, unit: float, options: Mapping[str, Any]) -> Decomposition:
+    try:
+        mesh = load_mesh(use.path)
+        faces = mesh.faces if np.prod(np.sign(use.scale)) > 0 else mesh.faces[:, ::-1]
+        return decompose((mesh.vertices * unit * use.scale, faces), **options)
+    except MeshError as error:
+        if str(use.path) in str(error):
+            raise
+        raise type(error)(f"{use.path}: {error}") from error
+
+
+def _unscaled(hull: trimesh.Trimesh, use: MeshUse) -> trimesh.Trimesh:
+    """Take the description's scale out of a hull: it will be applied again when that is read."""
+    with np.errstate(over="ignore"):
+        points = np.ascontiguousarray(hull.vertices / use.scale)
+    if not np.isfinite(points).all():
+        raise MeshFileError(f"{use.path} has the scale {use.scale}, which cannot be divided out again: mend the scale.")
+    exact = Hull.of(points)
+    if exact is not None:
+        return trimesh.Trimesh(exact.vertices, exact.faces, process=False)
+    faces = hull.faces if np.prod(np.sign(use.scale)) > 0 else hull.faces[:, ::-1]
+    return trimesh.Trimesh(points, faces, process=False)
+
+
+def _stems(paths: Sequence[Path]) -> list[str]:
+    """Name each mesh after its file; where two would be the same, on any file system, a number follows."""
+    stems: list[str] = []
+    for path in paths:
+        plain = stem = file_stem(path.stem)
+        number = 1
+        while stem.lower() in {other.lower() for other in stems}:
+            number += 1
+            stem = f"{plain}_{number}"
+        stems.append(stem)
+    return stems
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return read_file(path, LARGEST_DESCRIPTION)
+    except OSError as error:
+        raise MeshFileError(f"{path} cannot be opened ({error.strerror}): check its name and permissions.") from error

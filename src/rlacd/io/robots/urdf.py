@@ -1,0 +1,99 @@
+"""URDF: each ``<collision>`` with a mesh becomes one such element a hull, otherwise like it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rlacd.errors import MeshFileError
+from rlacd.io.robots.plan import Edits, HullFiles, MeshUse, Plan, Scale
+from rlacd.io.robots.references import References
+from rlacd.io.robots.spans import Document, Element
+
+
+def plan_urdf(document: Document, references: References, named: Callable[[str, str], str]) -> Plan:
+    """Find the collision meshes of a URDF.
+
+    Parameters
+    ----------
+    document : Document
+        The file.
+    references : References
+        Finds the files it names.
+    named : callable
+        Gets the reference to the mesh and a hull's file name, and gives the reference to the hull.
+
+    Raises
+    ------
+    MeshFileError
+        A mesh cannot be found or its scale is unusable, or the file still holds macros.
+    """
+    folder = document.path.absolute().parent
+    if any(element.tag.startswith("xacro:") for element in document.root.walk()):
+        raise MeshFileError(f"{document.path} holds xacro macros: expand it with the tool xacro first.")
+    found: list[tuple[Element, Element, MeshUse]] = []
+    for link in document.root.named("link"):
+        for collision in link.named("collision"):
+            for geometry in collision.named("geometry"):
+                for mesh in geometry.named("mesh"):
+                    reference = mesh.attributes.get("filename", "")
+                    where = f"link {link.attributes.get('name', '?')} of {document.path}"
+                    if not reference:
+                        raise MeshFileError(f"a collision mesh of {where} has no filename: give it one.")
+                    use = MeshUse(references.find(reference, folder), read_scale(mesh.attributes.get("scale"), where))
+                    found.append((collision, mesh, use))
+    replaced_meshes = {mesh for _, mesh, _ in found}
+    relative = [
+        mesh.attributes["filename"]
+        for mesh in document.root.walk()
+        if mesh.tag in ("mesh", "texture")
+        and mesh not in replaced_meshes
+        and _is_relative(mesh.attributes.get("filename"))
+    ]
+
+    def edit(hulls: HullFiles) -> Edits:
+        edits: Edits = []
+        for collision, mesh, use in found:
+            pieces = []
+            for index, hull in enumerate(hulls[use]):
+                reference = named(mesh.attributes["filename"], hull.name)
+                pieces.append(_collision(document, collision, mesh, reference, index))
+            edits.append((collision.start, collision.end, document.indent(collision).join(pieces)))
+        return edits
+
+    return Plan(list(dict.fromkeys(use for _, _, use in found)), edit, relative)
+
+
+def read_scale(text: str | None, where: str) -> Scale:
+    """Read three factors, or one for all axes.
+
+    Raises
+    ------
+    MeshFileError
+        They are no numbers, or one of them is zero.
+    """
+    try:
+        values = [float(word) for word in (text or "1 1 1").split()]
+    except ValueError:
+        values = []
+    values = values * 3 if len(values) == 1 else values
+    if len(values) != 3 or not all(0 < abs(value) < float("inf") for value in values):
+        raise MeshFileError(f"the scale {text!r} in {where} is not three numbers other than zero.")
+    return (values[0], values[1], values[2])
+
+
+def _collision(document: Document, collision: Element, mesh: Element, reference: str, index: int) -> bytes:
+    """Get the bytes of the collision with another mesh in it and, if it has a name, the hull's number behind that."""
+    whole = document.text(collision)
+    inner = document.with_attributes(mesh, {"filename": reference})
+    at, end = mesh.start - collision.start, mesh.end - collision.start
+    whole = whole[:at] + inner + whole[end:]
+    if "name" not in collision.attributes:
+        return whole
+    head = collision.head - collision.start  # the start tag comes before the mesh, so it has not moved
+    tag = Element(collision.tag, collision.attributes, None, 0, head, head)
+    name = f"{collision.attributes['name']}_{index:03d}"
+    return Document(document.path, whole, tag, document.encoding).with_attributes(tag, {"name": name}) + whole[head:]
+
+
+def _is_relative(reference: str | None) -> bool:
+    return bool(reference) and "://" not in str(reference) and not str(reference).startswith("/")

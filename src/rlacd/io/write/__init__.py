@@ -1,0 +1,139 @@
+"""Hulls as files: GLB, OBJ, PLY, STL, a folder with one file a hull, or a model for a simulator or an engine."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import trimesh
+
+from rlacd.errors import OutputError
+from rlacd.io.write.atomic import write_file
+from rlacd.io.write.balls import check_balls, save_balls
+from rlacd.io.write.encode import ENCODERS
+from rlacd.io.write.engines import encode_godot, encode_unreal
+from rlacd.io.write.folder import check_names, write_folder
+from rlacd.io.write.mjcf import encode_mjcf
+from rlacd.io.write.model import Model, check_model_options, mesh_files, model_of
+from rlacd.io.write.sdf import encode_sdf
+from rlacd.io.write.target import FORMATS, MODELS, WITH_MESHES, Target, check_file, check_name, hull_target, mesh_folder
+from rlacd.io.write.urdf import encode_urdf
+from rlacd.io.write.usd import encode_usd
+from rlacd.output_options import DENSITY
+
+if TYPE_CHECKING:
+    from rlacd.decomposition import Decomposition
+
+__all__ = [
+    "DENSITY",
+    "FORMATS",
+    "MODELS",
+    "Target",
+    "check_balls",
+    "check_file",
+    "check_model_options",
+    "check_name",
+    "file_stem",
+    "hull_target",
+    "save",
+    "save_balls",
+    "save_hulls",
+    "write_file",
+]
+
+
+_WITH_MESHES = {"mjcf": encode_mjcf, "urdf": encode_urdf, "sdf": encode_sdf}
+_ONE_FILE = {"usd": encode_usd, "unreal": encode_unreal, "godot": encode_godot}
+
+
+def save(
+    result: Decomposition,
+    path: str | os.PathLike[str],
+    *,
+    file_format: str | None = None,
+    density: float = DENSITY,
+    up: str = "z",
+    one_mesh: bool = False,
+) -> Path:
+    """Write a decomposition; see `rlacd.Decomposition.save`.
+
+    Raises
+    ------
+    OutputError, OptionError
+        As for `hull_target` and `model_of`, and for a disk that fails while writing.
+    MissingExtraError
+        The format needs an extra that is not installed.
+    """
+    check_model_options(density, up)
+    target = hull_target(path, file_format, one_mesh=one_mesh)
+    if target.file_format not in MODELS:
+        return save_hulls(result.hulls, path, stem=result.name, file_format=file_format)
+    model = model_of(result, density=density, up=up)
+    if target.file_format in WITH_MESHES:
+        _save_with_meshes(model, target, one_mesh)
+    else:
+        encode = _ONE_FILE[target.file_format]
+        write_file(target.path, encode(model, target.path.suffix.lower().lstrip(".")))
+    return target.path
+
+
+def _save_with_meshes(model: Model, target: Target, one_mesh: bool) -> None:
+    folder = mesh_folder(target.path, target.file_format)
+    stem = file_stem(model.name)
+    hulls, visual = mesh_files(model, stem, one_mesh=one_mesh)
+    files = {file.name: file.data for file in (*([] if visual is None else [visual]), *hulls)}
+    check_names(folder, stem, list(files))
+    described = _WITH_MESHES[target.file_format](model, hulls, visual, folder.name)
+    write_folder(folder, stem, files, then=lambda: write_file(target.path, described))
+
+
+def save_hulls(
+    hulls: Sequence[trimesh.Trimesh],
+    path: str | os.PathLike[str],
+    *,
+    stem: str = "mesh",
+    file_format: str | None = None,
+) -> Path:
+    """Write convex hulls to a file or a folder; see `rlacd.Decomposition.save`.
+
+    Parameters
+    ----------
+    hulls : sequence of trimesh.Trimesh
+        Convex and closed; at least one.
+    path : path-like
+        A file ``*.glb``, ``*.obj``, ``*.ply``, ``*.stl``, or a folder.
+    stem : str
+        Files in a folder are called ``<stem>_000.obj``, ``<stem>_001.obj``, ...
+    file_format : str, optional
+        The format inside a folder.
+
+    Returns
+    -------
+    pathlib.Path
+        Where it was written.
+
+    Raises
+    ------
+    OutputError, OptionError
+        As for `hull_target`, and for a disk that fails while writing.
+    """
+    if not hulls:
+        raise OutputError("there are no hulls to write; decompose a mesh first.")
+    target = hull_target(path, file_format)
+    encode = ENCODERS[target.file_format]
+    if target.is_folder:
+        stem = file_stem(stem)
+        files = {f"{stem}_{i:03d}.{target.file_format}": encode([hull]) for i, hull in enumerate(hulls)}
+        write_folder(target.path, stem, files)
+    else:
+        write_file(target.path, encode(hulls))
+    return target.path
+
+
+def file_stem(name: str) -> str:
+    """Make a file's name of any name: a file may not be called anything, and its name is counted in bytes."""
+    plain = re.sub(r'[\x00-\x1f/\\:*?"<>|]', "_", name).strip(". ")
+    return plain.encode(errors="replace")[:150].decode(errors="ignore").strip(". ") or "mesh"

@@ -1,0 +1,163 @@
+"""Hulls as the bytes of a file: GLB, OBJ, PLY, STL.
+
+Every encoder takes the hulls in the order of their names (``hull_000``, ``hull_001``, ...) and keeps each one a closed
+convex hull *in the file*: the text formats and PLY carry float64 exactly, and for GLB and binary STL the hull is taken
+again after rounding to float32.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TypeAlias
+
+import numpy as np
+import trimesh
+
+from rlacd.errors import OutputError
+from rlacd.io.write.palette import hull_colors, linear_from_srgb
+from rlacd.io.write.single_precision import placed_hull, placed_mesh, rounded_hull
+
+GENERATOR = "rlacd"
+
+FloatArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+Color: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
+
+VISUAL_COLOR: Color = np.array([180, 182, 186], dtype=np.uint8)
+"""The input beside its hulls: grey, since its own colours are not carried over."""
+
+
+def hull_name(index: int) -> str:
+    """``hull_000``, ``hull_001``, ..."""
+    return f"hull_{index:03d}"
+
+
+def encode_glb(
+    hulls: Sequence[trimesh.Trimesh],
+    names: Sequence[str] | None = None,
+    visual: tuple[str, trimesh.Trimesh] | None = None,
+) -> bytes:
+    """Binary glTF 2.0 with a node, a mesh and a material a hull, called `names`, after one for the `visual`.
+
+    Positions in glTF are float32. A hull whose shape that would ruin, because it lies far from the origin, is stored
+    about its own centre and its node carries the translation; all others are stored in place, for readers that ignore
+    transforms.
+
+    Raises
+    ------
+    OutputError
+        A hull is too thin for its size for float32 even about its own centre.
+    """
+    scene = trimesh.Scene()
+
+    def add(name: str, mesh: trimesh.Trimesh, shift: FloatArray, color: Color) -> None:
+        material = trimesh.visual.material.PBRMaterial(
+            name=name, baseColorFactor=_gltf_color(color), metallicFactor=0.0, roughnessFactor=0.8
+        )
+        mesh.visual = trimesh.visual.TextureVisuals(material=material)
+        placement = trimesh.transformations.translation_matrix(shift)
+        scene.add_geometry(mesh, node_name=name, geom_name=name, transform=placement)
+
+    if visual is not None:
+        add(visual[0], *placed_mesh(visual[1]), VISUAL_COLOR)
+    names = names or [hull_name(index) for index in range(len(hulls))]
+    for name, hull, color in zip(names, hulls, hull_colors(len(hulls)), strict=True):
+        placed = placed_hull(hull)
+        if placed is None:
+            raise OutputError(
+                f"cannot write {name} as GLB: it is too thin for single precision; "
+                "write .obj, .ply or .stl, which keep double precision."
+            )
+        add(name, *placed, color)
+    return bytes(scene.export(file_type="glb"))
+
+
+def encode_obj(
+    hulls: Sequence[trimesh.Trimesh],
+    names: Sequence[str] | None = None,
+    visual: tuple[str, trimesh.Trimesh] | None = None,
+) -> bytes:
+    """Wavefront OBJ with an object a hull, its colour on every vertex, and every digit of the coordinates.
+
+    trimesh's writer prints a fixed number of decimals, which erases small meshes; the shortest text that reads back
+    to the same float64 does not. Hulls are called `names` and follow the `visual`, if there is one.
+    """
+    names = names or [hull_name(index) for index in range(len(hulls))]
+    objects = list(zip(names, hulls, hull_colors(len(hulls)), strict=True))
+    if visual is not None:
+        objects.insert(0, (*visual, VISUAL_COLOR))
+    lines = [f"# {GENERATOR}: {len(hulls)} convex hulls"]
+    first = 1
+    for name, mesh, color in objects:
+        tint = " ".join(f"{channel / 255.0:.3f}" for channel in color)
+        lines.append(f"o {name}")
+        lines += [f"v {x!r} {y!r} {z!r} {tint}" for x, y, z in mesh.vertices.tolist()]
+        lines += [f"f {a} {b} {c}" for a, b, c in (mesh.faces + first).tolist()]
+        first += len(mesh.vertices)
+    return ("\n".join(lines) + "\n").encode()
+
+
+def encode_plain_obj(mesh: trimesh.Trimesh) -> bytes:
+    """One mesh as Wavefront OBJ that every reader takes: no object, no colours, every digit."""
+    lines = [f"# {GENERATOR}"]
+    lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist()]
+    lines += [f"f {a} {b} {c}" for a, b, c in (mesh.faces + 1).tolist()]
+    return ("\n".join(lines) + "\n").encode("ascii")
+
+
+def encode_ply(hulls: Sequence[trimesh.Trimesh]) -> bytes:
+    """Binary PLY in float64, coloured by vertex; the face property ``hull`` tells which hull a triangle belongs to.
+
+    trimesh's writer has float32 only.
+    """
+    vertex = np.dtype([("xyz", "<f8", 3), ("rgb", "u1", 3)])
+    face = np.dtype([("corners", "u1"), ("abc", "<i4", 3), ("hull", "<i4")])
+    vertices = np.empty(sum(len(hull.vertices) for hull in hulls), dtype=vertex)
+    faces = np.empty(sum(len(hull.faces) for hull in hulls), dtype=face)
+    faces["corners"] = 3
+    v = f = 0
+    for index, (hull, color) in enumerate(zip(hulls, hull_colors(len(hulls)), strict=True)):
+        here = slice(v, v + len(hull.vertices)), slice(f, f + len(hull.faces))
+        vertices["xyz"][here[0]], vertices["rgb"][here[0]] = hull.vertices, color
+        faces["abc"][here[1]], faces["hull"][here[1]] = hull.faces + v, index
+        v, f = here[0].stop, here[1].stop
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"comment {GENERATOR}: {len(hulls)} convex hulls",
+        f"element vertex {len(vertices)}",
+        *(f"property double {axis}" for axis in "xyz"),
+        *(f"property uchar {channel}" for channel in ("red", "green", "blue")),
+        f"element face {len(faces)}",
+        "property list uchar int vertex_indices",
+        "property int hull",
+        "end_header",
+    ]
+    return ("\n".join(header) + "\n").encode("ascii") + vertices.tobytes() + faces.tobytes()
+
+
+def encode_stl(hulls: Sequence[trimesh.Trimesh]) -> bytes:
+    """STL: binary for one hull, which every reader takes; text with a ``solid`` a hull for several.
+
+    Binary STL knows neither several solids nor float64, so the text form also serves a single hull that float32
+    cannot hold.
+    """
+    if len(hulls) == 1 and (rounded := rounded_hull(hulls[0])) is not None:
+        return bytes(rounded.export(file_type="stl"))
+    solids = []
+    for index, hull in enumerate(hulls):
+        named = trimesh.Trimesh(hull.vertices, hull.faces, process=False, metadata={"name": hull_name(index)})
+        solids.append(named.export(file_type="stl_ascii"))
+    return "".join(solids).encode("ascii")
+
+
+ENCODERS: dict[str, Callable[[Sequence[trimesh.Trimesh]], bytes]] = {
+    "glb": encode_glb,
+    "obj": encode_obj,
+    "ply": encode_ply,
+    "stl": encode_stl,
+}
+
+
+def _gltf_color(srgb: Color) -> list[float]:
+    # glTF wants base colours in linear light.
+    return [*linear_from_srgb(srgb).tolist(), 1.0]

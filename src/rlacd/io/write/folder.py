@@ -1,0 +1,85 @@
+"""A folder with one file a hull, which can be written again and never holds hulls of two runs."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from rlacd.errors import OutputError
+from rlacd.io.write.atomic import output_errors, sync_folder, write_file
+
+
+def write_folder(
+    folder: Path, stem: str, files: Mapping[str, bytes], *, then: Callable[[], None] = lambda: None
+) -> None:
+    """Put `files` into `folder`, all of them or none, beside a list of them, ``<stem>_hulls.json``.
+
+    A new folder appears under its name only when it is complete. In a folder that exists, files are replaced one by
+    one once all of them are safely on disk; then those that an earlier run listed and this one did not write are
+    removed, since a reader that takes every ``*.obj`` would mix two results. Nothing else in the folder is touched.
+    Between the two, `then` is called: what it writes finds all the files it names, old and new.
+
+    Raises
+    ------
+    OutputError
+        The folder cannot be written to.
+    """
+    listing = f"{stem}_hulls.json"
+    contents = json.dumps({"generator": "rlacd", "files": list(files)}, indent=1).encode()
+    with output_errors(folder):
+        exists = folder.is_dir()
+        # Inside an existing folder, not beside it: it may be the root of a disk, and renames cannot leave a disk.
+        parent = folder if exists else folder.resolve().parent
+        parent.mkdir(parents=True, exist_ok=True)
+        staging = Path(tempfile.mkdtemp(prefix=".rlacd-", suffix=".tmp", dir=parent))
+        try:
+            for name, data in {**files, listing: contents}.items():
+                write_file(staging / name, data)
+            if exists:
+                stale = listed_hulls(folder / listing, stem) - set(files)
+                for name in (*files, listing):
+                    os.replace(staging / name, folder / name)
+                then()
+                for name in sorted(stale):
+                    (folder / name).unlink(missing_ok=True)
+            else:
+                _open_to_umask(staging)
+                os.rename(staging, folder)
+                then()
+        finally:
+            shutil.rmtree(staging, ignore_errors=True)
+        sync_folder(parent)
+
+
+def check_names(folder: Path, stem: str, names: Sequence[str]) -> None:
+    """Raise OutputError if a file that no run of rlacd has listed would be replaced in a folder of its own naming."""
+    with output_errors(folder):
+        ours = listed_hulls(folder / f"{stem}_hulls.json", stem)
+        taken = [name for name in names if name not in ours and (folder / name).exists()]
+    if taken:
+        raise OutputError(
+            f"cannot write {folder / taken[0]}: a file of that name is there that rlacd did not write; "
+            "move it away or choose another name."
+        )
+
+
+def listed_hulls(listing: Path, stem: str) -> set[str]:
+    """Hull files an earlier run wrote; only names of the form it writes, whatever the list says by now."""
+    try:
+        names = json.loads(listing.read_bytes())["files"]
+        ours = re.compile(re.escape(stem) + r"(_[^/\\]+)?_(\d{3,}|visual|collision)\.(glb|obj|ply|stl)")
+        return {name for name in names if ours.fullmatch(name)}
+    except (OSError, ValueError, KeyError, TypeError):
+        return set()  # No list, or one that somebody else made: then nothing here is known to be ours.
+
+
+def _open_to_umask(folder: Path) -> None:
+    # mkdtemp makes the folder private to the user; give it the mode any new folder of theirs would have.
+    umask = os.umask(0)
+    os.umask(umask)
+    folder.chmod(0o777 & ~umask)

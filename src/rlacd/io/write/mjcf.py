@@ -1,0 +1,58 @@
+"""MJCF: a free body for MuJoCo, with its hulls in class ``collision`` and the mesh to look at in class ``visual``."""
+
+from __future__ import annotations
+
+import numpy as np
+from lxml import etree
+
+from rlacd.io.write.model import TO_Z_UP, MeshFile, Model, numbers
+from rlacd.io.write.palette import hull_colors
+
+LEAST_INERTIA = 1e-14
+"""MuJoCo refuses moving bodies with less than 1e-15 of mass or inertia; those are rounded up."""
+
+
+def encode_mjcf(model: Model, hulls: list[MeshFile], visual: MeshFile | None, folder: str) -> bytes:
+    """Describe the body; mesh files are in `folder`, named from where the model is.
+
+    Groups follow the habit of the MuJoCo Menagerie: 2 is seen, 3 collides and is hidden until asked for.
+    """
+    root = etree.Element("mujoco", model=model.name)
+    compiler = etree.SubElement(root, "compiler", angle="radian")
+    if min(model.mass.volume_abs, *np.linalg.eigvalsh(model.mass.inertia_abs)) < LEAST_INERTIA:
+        compiler.set("boundmass", repr(LEAST_INERTIA))
+        compiler.set("boundinertia", repr(LEAST_INERTIA))
+    default = etree.SubElement(root, "default")
+    looks = etree.SubElement(default, "default", {"class": "visual"})
+    etree.SubElement(looks, "geom", type="mesh", contype="0", conaffinity="0", group="2")
+    collides = etree.SubElement(default, "default", {"class": "collision"})
+    etree.SubElement(collides, "geom", type="mesh", contype="1", conaffinity="1", group="3")
+
+    asset = etree.SubElement(root, "asset")
+    world = etree.SubElement(root, "worldbody")
+    body = etree.SubElement(world, "body", name=model.name)
+    if model.up != "z":
+        body.set("quat", numbers(TO_Z_UP[model.up]))
+    etree.SubElement(body, "freejoint", name=model.name)
+    mass, inertia = model.mass, model.mass.inertia_abs
+    etree.SubElement(
+        body,
+        "inertial",
+        pos=numbers(mass.centre_abs),
+        mass=numbers([mass.volume_abs]),
+        fullinertia=numbers([*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]]),
+    )
+
+    def add(kind: str, name: str, file: MeshFile, **extra: str) -> None:
+        # The body's mass is said above, so the volume of a mesh does not matter; "shell" takes open and flat ones too.
+        etree.SubElement(asset, "mesh", name=name, file=f"{folder}/{file.name}", inertia="shell")
+        geom = etree.SubElement(body, "geom", {"name": name, "class": kind, "mesh": name, **extra})
+        if file.shift.any():
+            geom.set("pos", numbers(file.shift))
+
+    if visual is not None:
+        add("visual", f"{model.name}_visual", visual)
+    for index, (hull, color) in enumerate(zip(hulls, hull_colors(len(hulls)), strict=True)):
+        add("collision", f"{model.name}_{index:03d}", hull, rgba=numbers([*np.round(color / 255, 3), 1.0]))
+    etree.indent(root)
+    return bytes(etree.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"

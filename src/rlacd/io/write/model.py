@@ -1,0 +1,166 @@
+"""What a simulator or an engine is told of a body: hulls to collide with, a mesh to look at, mass, which way is up."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import trimesh
+
+from rlacd.errors import OutputError
+from rlacd.fields import about, read
+from rlacd.io.write.encode import encode_obj, encode_plain_obj, hull_name
+from rlacd.io.write.single_precision import placed_hull, placed_mesh
+from rlacd.output_options import DENSITY, OutputOptions
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.frame import Frame
+from rlacd.solid.mass import Mass, mass_of_triangles
+
+if TYPE_CHECKING:
+    from rlacd.decomposition import Decomposition
+
+TO_Z_UP = {
+    "x": (math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0),
+    "y": (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0),
+    "z": (1.0, 0.0, 0.0, 0.0),
+}
+"""Quaternions (w, x, y, z) that stand a body up whose own axis points up, in a world where z does."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A body to write; all lengths in the input's own unit and frame.
+
+    Attributes
+    ----------
+    name
+        Printable, without line breaks; as the user's file is called.
+    hulls
+        At least one.
+    visual
+        The input as it was read; None for a cloud of points.
+    mass
+        Of the repaired solid, at the density asked for.
+    up
+        The axis of the input that points up.
+    """
+
+    name: str
+    hulls: Sequence[trimesh.Trimesh]
+    visual: trimesh.Trimesh | None
+    mass: Mass
+    up: str
+
+
+@dataclass(frozen=True)
+class MeshFile:
+    """A mesh beside the model: what it is called, what is in it, and where it goes in the body's frame.
+
+    Attributes
+    ----------
+    name
+        File name.
+    data
+        Its bytes.
+    shift
+        ``[3]``; zero unless the body lies too far from its origin for float32.
+    """
+
+    name: str
+    data: bytes
+    shift: FloatArray
+
+
+def model_of(result: Decomposition, *, density: float = DENSITY, up: str = "z") -> Model:
+    """Gather what is to be written of a decomposition.
+
+    Raises
+    ------
+    OutputError
+        There are no hulls, or the body weighs nothing at this density.
+    OptionError
+        `density` is not positive, or `up` is no axis.
+    """
+    density, up = check_model_options(density, up)
+    if not result.hulls:
+        raise OutputError("there are no hulls to write; decompose a mesh first.")
+    mass = _mass(result).scaled(density)
+    if not (0 < mass.volume_abs < math.inf and np.isfinite(mass.inertia_abs).all()):
+        raise OutputError(f"the mass of {result.name} at density {density:g} is {mass.volume_abs:g}; scale the mesh.")
+    visual = result.source if len(result.source.faces) else None
+    name = printable_name(result.name).replace("::", "_")  # which parts names in SDF
+    if name == "world" or re.fullmatch("__.*__", name):
+        name = f"body_{name.strip('_')}"  # simulators keep those names for themselves
+    return Model(name, result.hulls, visual, mass, up)
+
+
+def check_model_options(density: float, up: str) -> tuple[float, str]:
+    """Get both as plain values; raises OptionError unless `density` is a positive number and `up` is x, y or z."""
+    return (
+        read(about(OutputOptions, "density").kind, "density", density),
+        read(about(OutputOptions, "up").kind, "up", up),
+    )
+
+
+def printable_name(name: str) -> str:
+    """Keep of a name what every text format can hold: no control characters, no broken Unicode."""
+    plain = "".join("_" if ord(mark) < 32 or ord(mark) == 127 else mark for mark in name)
+    return plain.encode(errors="replace").decode().translate({0xFFFE: "_", 0xFFFF: "_"}).strip() or "mesh"
+
+
+def node_name(name: str) -> str:
+    """Make the name one word, for formats where a blank ends it."""
+    return re.sub(r"\s+", "_", printable_name(name))
+
+
+def mesh_files(model: Model, stem: str, *, one_mesh: bool = False) -> tuple[list[MeshFile], MeshFile | None]:
+    """Encode the hulls and the mesh to look at as OBJ files of their own, ``<stem>_000.obj`` and ``<stem>_visual.obj``.
+
+    With `one_mesh`, the hulls are the objects of a single file, ``<stem>_collision.obj``.
+
+    Raises
+    ------
+    OutputError
+        A hull is too thin for the single precision that simulators compute in.
+    """
+    hulls = []
+    for index, hull in enumerate(model.hulls):
+        placed = placed_hull(hull)
+        if placed is None:
+            raise OutputError(
+                f"cannot write {hull_name(index)} for a simulator: it is too thin for single precision; "
+                "scale the mesh, or write .obj, .ply or .stl."
+            )
+        rounded, shift = placed
+        exact = rounded if shift.any() else hull  # readers that keep double precision get it where they can
+        hulls.append(MeshFile(f"{stem}_{index:03d}.obj", encode_plain_obj(exact), shift))
+    if one_mesh:
+        hulls = [_one_file(model, f"{stem}_collision.obj", any(hull.shift.any() for hull in hulls))]
+    if model.visual is None:
+        return hulls, None
+    visual, shift = placed_mesh(model.visual)
+    return hulls, MeshFile(f"{stem}_visual.obj", encode_plain_obj(visual), shift)
+
+
+def numbers(values: Sequence[float] | FloatArray) -> str:
+    """Write numbers with every digit, a blank between."""
+    return " ".join(repr(float(value) + 0.0) for value in values)  # + 0.0: no negative zero
+
+
+def _one_file(model: Model, name: str, far: bool) -> MeshFile:
+    bounds = np.array([hull.bounds for hull in model.hulls])
+    shift = (bounds[:, 0].min(axis=0) + bounds[:, 1].max(axis=0)) / 2 if far else np.zeros(3)
+    moved = [trimesh.Trimesh(hull.vertices - shift, hull.faces, process=False) for hull in model.hulls]
+    return MeshFile(name, encode_obj(moved), shift)
+
+
+def _mass(result: Decomposition) -> Mass:
+    said = result.report.get("mass")
+    if said is None:  # a result from elsewhere: its hulls stand for the solid
+        hulls = trimesh.util.concatenate(result.hulls)
+        return mass_of_triangles(hulls.triangles, Frame(np.zeros(3), 1.0))
+    return Mass(float(said["volume_abs"]), np.array(said["centre_abs"]), np.array(said["inertia_abs"]))

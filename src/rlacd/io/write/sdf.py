@@ -1,0 +1,47 @@
+"""SDFormat: a model for Gazebo and Drake, with a ``<collision>`` a hull."""
+
+from __future__ import annotations
+
+from lxml import etree
+
+from rlacd.io.write.model import TO_Z_UP, MeshFile, Model, numbers
+
+DRAKE = "http://drake.mit.edu"
+
+
+def encode_sdf(model: Model, hulls: list[MeshFile], visual: MeshFile | None, folder: str) -> bytes:
+    """Describe the body; mesh files are in `folder`, named from where the model is."""
+    root = etree.Element("sdf", version="1.9", nsmap={"drake": DRAKE})
+    described = etree.SubElement(root, "model", name=model.name)
+    if model.up != "z":
+        w, x, y, z = TO_Z_UP[model.up]
+        pose = etree.SubElement(described, "pose", rotation_format="quat_xyzw")
+        pose.text = f"0 0 0 {numbers([x, y, z, w])}"
+    link = etree.SubElement(described, "link", name=model.name)
+    inertial = etree.SubElement(link, "inertial")
+    _text(inertial, "pose", f"{numbers(model.mass.centre_abs)} 0 0 0")
+    _text(inertial, "mass", numbers([model.mass.volume_abs]))
+    inertia = etree.SubElement(inertial, "inertia")
+    axes = {"x": 0, "y": 1, "z": 2}
+    for a, b in ("xx", "xy", "xz", "yy", "yz", "zz"):
+        _text(inertia, f"i{a}{b}", numbers([model.mass.inertia_abs[axes[a], axes[b]]]))
+
+    def add(kind: str, file: MeshFile, name: str) -> etree._Element:
+        shape = etree.SubElement(link, kind, name=name)
+        if file.shift.any():
+            _text(shape, "pose", f"{numbers(file.shift)} 0 0 0")
+        mesh = etree.SubElement(etree.SubElement(shape, "geometry"), "mesh")
+        _text(mesh, "uri", f"{folder}/{file.name}")
+        return mesh
+
+    if visual is not None:
+        add("visual", visual, f"{model.name}_visual")
+    for index, hull in enumerate(hulls):
+        # Without this word Drake takes the mesh for a surface and gives it far poorer contacts.
+        etree.SubElement(add("collision", hull, f"{model.name}_{index:03d}"), f"{{{DRAKE}}}declare_convex")
+    etree.indent(root)
+    return bytes(etree.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"
+
+
+def _text(parent: etree._Element, tag: str, text: str) -> None:
+    etree.SubElement(parent, tag).text = text

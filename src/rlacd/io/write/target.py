@@ -1,0 +1,178 @@
+"""Where the hulls go and in which format: decided, and checked, before any work begins."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from rlacd.errors import OptionError, OutputError
+from rlacd.fields import checked, flag, path_like, read
+from rlacd.io.write.atomic import output_errors
+from rlacd.io.write.usd import require_usd
+from rlacd.output_options import OutputOptions
+
+FORMATS = ("glb", "obj", "ply", "stl")
+"""Hulls and nothing else; also what the files of a folder may be."""
+
+MODELS: dict[str, tuple[str, ...]] = {
+    "mjcf": ("xml",),
+    "urdf": ("urdf",),
+    "sdf": ("sdf",),
+    "usd": ("usd", "usda", "usdc"),
+    "unreal": ("glb", "obj"),
+    "godot": ("glb",),
+}
+"""Hulls with the mesh they stand for, in a simulator's or an engine's own words, and the endings of each."""
+
+_MODEL_OF = {ending: name for name, endings in MODELS.items() for ending in endings if ending not in FORMATS}
+
+_UNWRITABLE = re.compile("[\x00-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
+
+WITH_MESHES = ("mjcf", "urdf", "sdf")
+"""Models that name mesh files beside them."""
+
+FOLDER_FORMAT = "obj"
+SEPARATORS = tuple(mark for mark in (os.sep, os.altsep) if mark)
+
+
+@dataclass(frozen=True)
+class Target:
+    """A checked place for hulls: one file, or a folder that gets one file a hull.
+
+    Attributes
+    ----------
+    path
+        The file or folder.
+    file_format
+        One of `FORMATS` or of `MODELS`.
+    is_folder
+        Whether `path` is a folder.
+    """
+
+    path: Path
+    file_format: str
+    is_folder: bool
+
+
+def hull_target(path: str | os.PathLike[str], file_format: str | None = None, *, one_mesh: bool = False) -> Target:
+    """Read `path` the way `Decomposition.save` does and check that it can be written to.
+
+    Parameters
+    ----------
+    path : path-like
+        An existing folder, text ending in ``/``, or a name without ending given with a `file_format` is a folder;
+        anything else is one file, its format told by its ending.
+    file_format : str, optional
+        The format of the files in a folder.
+    one_mesh : bool
+        Whether a model is to have all its hulls in one mesh file; URDF alone can.
+
+    Raises
+    ------
+    OutputError
+        Unknown ending, no permission, or a folder where a file is meant or the reverse.
+    OptionError
+        `file_format` is unknown, or given for a single file with another ending; or `one_mesh` for anything but URDF.
+    """
+    file_format = checked(OutputOptions, "file_format", file_format)
+    one_mesh = read(flag(), "one_mesh", one_mesh)
+    target = _target(read(path_like(), "path", path), file_format)
+    if one_mesh and target.file_format != "urdf":
+        raise OptionError(f"one mesh for all hulls is for .urdf files, not for {target.path}: leave it out.")
+    return target
+
+
+def _target(text: str, file_format: str | None) -> Target:
+    if not text:
+        raise OutputError("the output has no name; give a file such as hulls.glb, or a folder such as hulls/.")
+    place = Path(text)
+    ending = place.suffix.lower().lstrip(".")
+    wanted = None if file_format is None else file_format.lower().lstrip(".")
+    if wanted in _MODEL_OF:
+        wanted = _MODEL_OF[wanted]
+    if wanted in MODELS:
+        return _model_target(text, wanted)
+    if wanted is not None and wanted not in FORMATS:
+        raise OptionError(f"unknown format {file_format!r}; use one of {', '.join((*FORMATS, *MODELS))}.")
+    if wanted is None and ending in _MODEL_OF and not text.endswith(SEPARATORS):
+        return _model_target(text, _MODEL_OF[ending])
+
+    with output_errors(place):
+        is_folder = text.endswith(SEPARATORS) or (place.is_dir() and ending not in FORMATS) or (wanted and not ending)
+        if is_folder:
+            _check_folder(place)
+            return Target(place, wanted or FOLDER_FORMAT, is_folder=True)
+
+    if ending not in FORMATS:
+        known = ", ".join(f".{name}" for name in (*FORMATS, *_MODEL_OF))
+        said = f"the ending .{ending} of {place}" if ending else f"{place} without an ending"
+        raise OutputError(f"cannot write {said}; use one of {known}, or end the name with / for a folder.")
+    if wanted not in (None, ending):
+        raise OptionError(f"the format {wanted} contradicts the name {place}; give one of the two, or a folder.")
+    check_file(place)
+    return Target(place, ending, is_folder=False)
+
+
+def mesh_folder(path: Path, file_format: str) -> Path:
+    """Where a model that is not one file keeps its meshes: ``chair.urdf`` in ``chair_urdf``.
+
+    The format is part of the name, so that two models of one thing do not take each other's meshes.
+    """
+    return path.with_name(f"{path.stem}_{file_format}")
+
+
+def check_name(path: Path) -> None:
+    """Raise OutputError if a file's name cannot be written down in XML, as that of its folder of meshes will be."""
+    if _UNWRITABLE.search(path.name):
+        raise OutputError(f"cannot write {str(path)!r}: XML cannot hold some marks of its name; choose another name.")
+
+
+def _model_target(text: str, file_format: str) -> Target:
+    place = Path(text)
+    endings = [f".{ending}" for ending in MODELS[file_format]]
+    if text.endswith(SEPARATORS) or place.suffix.lower() not in endings:
+        raise OptionError(
+            f"the format {file_format} needs a file whose name ends in {' or '.join(endings)}, not {text}."
+        )
+    check_file(place)
+    if file_format == "usd":
+        require_usd()
+    if file_format in WITH_MESHES:
+        check_name(place)
+        _check_folder(mesh_folder(place, file_format))
+    return Target(place, file_format, is_folder=False)
+
+
+def check_file(path: Path) -> None:
+    """Raise `OutputError` if `path` cannot become a file, without touching the disk."""
+    with output_errors(path):
+        if path.is_dir():
+            raise OutputError(f"cannot write {path}: it is a folder; end the name with / to fill it.")
+        if path.exists() and not path.is_file():
+            raise OutputError(f"cannot write {path}: it is not an ordinary file; choose another name.")
+        _check_parent(path)
+
+
+def _check_folder(folder: Path) -> None:
+    if folder.is_dir():
+        if not os.access(folder, os.W_OK | os.X_OK):
+            raise OutputError(
+                f"cannot write into {folder}: you may not; choose another place or change its permissions."
+            )
+    elif folder.exists():
+        raise OutputError(f"cannot write into {folder}: it is a file, not a folder; choose another name.")
+    else:
+        _check_parent(folder)
+
+
+def _check_parent(path: Path) -> None:
+    # resolve() follows a link to where the bytes will really go. Folders that are missing are made with the file.
+    parent = path.resolve().parent
+    while not parent.exists() and parent != parent.parent:
+        parent = parent.parent
+    if not parent.is_dir():
+        raise OutputError(f"cannot write {path}: {parent} is a file, not a folder; choose another name.")
+    if not os.access(parent, os.W_OK | os.X_OK):
+        raise OutputError(f"cannot write {path}: you may not write to {parent}; choose another place.")

@@ -1,0 +1,41 @@
+"""URDF: a link with its mass, the mesh to look at, and a ``<collision>`` a hull."""
+
+from __future__ import annotations
+
+from lxml import etree
+
+from rlacd.io.write.model import MeshFile, Model, numbers
+
+
+def encode_urdf(model: Model, hulls: list[MeshFile], visual: MeshFile | None, folder: str) -> bytes:
+    """Describe the body; mesh files are in `folder`, named from where the model is."""
+    robot = etree.Element("robot", name=model.name)
+    # MuJoCo reads URDF too, but by default looks for every mesh beside it and drops what is only seen.
+    extension = etree.SubElement(robot, "mujoco")
+    etree.SubElement(extension, "compiler", strippath="false", discardvisual="false")
+    link = etree.SubElement(robot, "link", name=model.name)
+    inertial = etree.SubElement(link, "inertial")
+    etree.SubElement(inertial, "origin", xyz=numbers(model.mass.centre_abs), rpy="0 0 0")
+    etree.SubElement(inertial, "mass", value=numbers([model.mass.volume_abs]))
+    axes = {"x": 0, "y": 1, "z": 2}
+    etree.SubElement(
+        inertial,
+        "inertia",
+        {
+            f"i{a}{b}": numbers([model.mass.inertia_abs[axes[a], axes[b]]])
+            for a, b in ("xx", "xy", "xz", "yy", "yz", "zz")
+        },
+    )
+
+    def add(kind: str, file: MeshFile, name: str) -> None:
+        shape = etree.SubElement(link, kind, name=name)
+        etree.SubElement(shape, "origin", xyz=numbers(file.shift), rpy="0 0 0")
+        geometry = etree.SubElement(shape, "geometry")
+        etree.SubElement(geometry, "mesh", filename=f"{folder}/{file.name}")
+
+    if visual is not None:
+        add("visual", visual, f"{model.name}_visual")
+    for index, hull in enumerate(hulls):
+        add("collision", hull, f"{model.name}_{index:03d}")
+    etree.indent(robot)
+    return bytes(etree.tostring(robot, encoding="utf-8", xml_declaration=True)) + b"\n"

@@ -1,0 +1,126 @@
+"""USD: a rigid body whose hulls are guides with UsdPhysics' collision schemas; needs the extra ``usd``."""
+
+from __future__ import annotations
+
+import importlib
+import re
+import unicodedata
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from rlacd.errors import MissingExtraError, OutputError
+from rlacd.io.write.encode import hull_name
+from rlacd.io.write.model import Model
+from rlacd.io.write.palette import hull_colors, linear_from_srgb
+from rlacd.io.write.single_precision import placed_hull, placed_mesh
+
+
+def require_usd() -> None:
+    """Raise MissingExtraError, saying how to get it, unless USD can be imported."""
+    try:
+        for module in ("pxr", "pxr.UsdPhysics"):
+            importlib.import_module(module)
+    except ImportError as error:
+        raise MissingExtraError("USD needs an extra: run  pip install 'rlacd[usd]'  and try again.") from error
+
+
+def encode_usd(model: Model, ending: str) -> bytes:
+    """Write a stage: ``/<name>`` is the rigid body, ``visual`` under it is seen, ``collision/hull_000``, ... collide.
+
+    Parameters
+    ----------
+    model : Model
+        USD says which way is up, y or z; a body whose x points up is turned.
+    ending : {"usda", "usd", "usdc"}
+        Text for ``usda``, else binary.
+
+    Raises
+    ------
+    MissingExtraError
+        The extra ``usd`` is not installed.
+    OutputError
+        A hull is too thin for single precision.
+    """
+    require_usd()
+    from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdPhysics
+
+    layer = Sdf.Layer.CreateAnonymous(f".{'usda' if ending == 'usda' else 'usdc'}")
+    stage = Usd.Stage.Open(layer)
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y if model.up == "y" else UsdGeom.Tokens.z)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdPhysics.SetStageKilogramsPerUnit(stage, 1.0)
+
+    body = UsdGeom.Xform.Define(stage, f"/{identifier(model.name)}")
+    stage.SetDefaultPrim(body.GetPrim())
+    Usd.ModelAPI(body).SetKind(Kind.Tokens.component)
+    body.GetPrim().SetDisplayName(model.name)
+    if model.up == "x":
+        body.AddOrientOp().Set(Gf.Quatf(0.5**0.5, Gf.Vec3f(0, -(0.5**0.5), 0)))
+    UsdPhysics.RigidBodyAPI.Apply(body.GetPrim())
+    _set_mass(UsdPhysics.MassAPI.Apply(body.GetPrim()), model)
+
+    if model.visual is not None:
+        visual, shift = placed_mesh(model.visual)
+        _mesh(stage, body.GetPath().AppendChild("visual"), visual, shift)
+    group = UsdGeom.Scope.Define(stage, body.GetPath().AppendChild("collision"))
+    UsdGeom.Imageable(group).CreatePurposeAttr(UsdGeom.Tokens.guide)
+    for index, (hull, color) in enumerate(zip(model.hulls, hull_colors(len(model.hulls)), strict=True)):
+        placed = placed_hull(hull)
+        if placed is None:
+            raise OutputError(
+                f"cannot write {hull_name(index)} as USD: it is too thin for single precision; "
+                "write .obj, .ply or .stl, which keep double precision."
+            )
+        mesh = _mesh(stage, group.GetPath().AppendChild(hull_name(index)), *placed)
+        mesh.CreatePurposeAttr(UsdGeom.Tokens.guide)
+        mesh.CreateDisplayColorAttr([Gf.Vec3f(*linear_from_srgb(color).tolist())])
+        UsdPhysics.CollisionAPI.Apply(mesh.GetPrim())
+        UsdPhysics.MeshCollisionAPI.Apply(mesh.GetPrim()).CreateApproximationAttr(UsdPhysics.Tokens.convexHull)
+    return _bytes(layer, ending)
+
+
+def identifier(name: str) -> str:
+    """Make a prim's name of any name: letters of any script, digits and ``_``, no digit first."""
+    plain = re.sub(r"\W", "_", unicodedata.normalize("NFC", name))
+    return plain if re.match(r"[^\W\d]", plain) else f"_{plain}"
+
+
+def _mesh(stage: Any, path: Any, mesh: trimesh.Trimesh, shift: np.ndarray[Any, Any]) -> Any:
+    from pxr import Gf, UsdGeom, Vt
+
+    prim = UsdGeom.Mesh.Define(stage, path)
+    points = np.ascontiguousarray(mesh.vertices, dtype=np.float32)
+    prim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
+    prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(mesh.faces), 3, dtype=np.int32)))
+    prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(mesh.faces, dtype=np.int32).ravel()))
+    prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    prim.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(axis=0), points.max(axis=0)])))
+    if shift.any():
+        prim.AddTranslateOp().Set(Gf.Vec3d(*shift.tolist()))
+    return prim
+
+
+def _set_mass(api: Any, model: Model) -> None:
+    from pxr import Gf
+
+    moments, axes = np.linalg.eigh(model.mass.inertia_abs)
+    axes[:, 2] *= np.sign(np.linalg.det(axes))  # a rotation, not a mirror
+    turn = Gf.Matrix3d(*axes.T.ravel().tolist()).ExtractRotation().GetQuat()  # Gf multiplies rows from the left
+    api.CreateMassAttr(model.mass.volume_abs)
+    api.CreateCenterOfMassAttr(Gf.Vec3f(*model.mass.centre_abs.tolist()))
+    api.CreateDiagonalInertiaAttr(Gf.Vec3f(*moments.tolist()))
+    api.CreatePrincipalAxesAttr(Gf.Quatf(turn))
+
+
+def _bytes(layer: Any, ending: str) -> bytes:
+    import tempfile
+    from pathlib import Path
+
+    if ending == "usda":
+        return str(layer.ExportToString()).encode()
+    with tempfile.TemporaryDirectory(prefix="rlacd-") as folder:  # the binary form is only ever written to a file
+        path = Path(folder) / f"stage.{ending}"
+        layer.Export(str(path))
+        return path.read_bytes()

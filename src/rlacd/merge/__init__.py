@@ -1,0 +1,8 @@
+"""After the cuts: merging parts, limits on vertices and faces, slivers."""
+
+from rlacd.merge.in_input import in_input
+from rlacd.merge.limited import limit_part, limit_roughly, with_limits
+from rlacd.merge.merge import merge_parts, merge_to_count
+from rlacd.merge.slivers import drop_slivers
+
+__all__ = ["drop_slivers", "in_input", "limit_part", "limit_roughly", "merge_parts", "merge_to_count", "with_limits"]

@@ -1,0 +1,139 @@
+"""Hulls with few vertices and faces: the limit as part of the criterion, and its last application."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rlacd import _native
+from rlacd.criteria import Criterion
+from rlacd.criteria.criterion import CriterionSummary, Feasibility
+from rlacd.criteria.criterion import Part as PartLike
+from rlacd.merge.in_input import plain_hull
+from rlacd.merge.limits import limit_hull
+from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.balls import Balls
+from rlacd.solid.component import Part
+from rlacd.solid.hull import Hull
+
+FEWEST_VERTICES, FEWEST_FACES = 24, 44
+"""Lower limits are applied at the end only, with a warning where a hull then exceeds the threshold: round parts would
+have to be cut very small to meet them (a ball into 75 pieces for 16 vertices at threshold 0.05, into 12 for 32)."""
+
+
+@dataclass(frozen=True)
+class LimitedCriterion:
+    """A criterion that has to hold for the limited hull too.
+
+    Attributes
+    ----------
+    criterion : Criterion
+    max_vertices, max_faces : int or None
+        Limits on the hull's vertices and triangles.
+    """
+
+    criterion: Criterion
+    max_vertices: int | None
+    max_faces: int | None
+
+    @property
+    def reach(self) -> float:
+        """The underlying criterion's."""
+        return self.criterion.reach
+
+    @property
+    def is_hereditary(self) -> bool:
+        """No: limited hulls need not lie in each other where the exact ones do."""
+        return False
+
+    def excludes(self, volume: float, hull_volume: float) -> bool:
+        """Limiting a hull only adds volume, so the underlying bound holds."""
+        return self.criterion.excludes(volume, hull_volume)
+
+    def feasibility(self, filling: _native.Filling, hull: Hull) -> Feasibility:
+        """The underlying criterion's: limited hulls are larger."""
+        return self.criterion.feasibility(filling, hull)
+
+    def feasibilities(
+        self, filling: _native.Filling, hulls: Sequence[Hull], pairs: IntArray, threads: int
+    ) -> tuple[FloatArray, IntArray]:
+        """The underlying criterion's: limited hulls are larger."""
+        return self.criterion.feasibilities(filling, hulls, pairs, threads)
+
+    def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
+        """The underlying criterion's: limited hulls are larger."""
+        return self.criterion.forbids(filling, hull)
+
+    def least_error(self, volume: float, hull_volume: float) -> float:
+        """Limiting a hull only adds volume, so the underlying bound holds."""
+        return self.criterion.least_error(volume, hull_volume)
+
+    def is_met(self, part: PartLike) -> bool:
+        """Decide for the exact hull first, then for the limited one."""
+        return self.criterion.is_met(part) and (self._fits(part) or self.criterion.is_met(self._limited(part)))
+
+    def error(self, part: PartLike) -> float:
+        """Measure the part against its limited hull."""
+        return self.criterion.error(self._limited(part))
+
+    def filled(self, part: PartLike) -> float:
+        """The underlying criterion's."""
+        return self.criterion.filled(part)
+
+    def settled(self, parts: Sequence[PartLike]) -> LimitedCriterion:
+        """Settle the underlying criterion with the limited hulls."""
+        return LimitedCriterion(
+            self.criterion.settled([self._limited(part) for part in parts]), self.max_vertices, self.max_faces
+        )
+
+    @property
+    def overhang(self) -> float:
+        """The underlying criterion's."""
+        return self.criterion.overhang
+
+    @property
+    def obstacles(self) -> Balls | None:
+        """The underlying criterion's."""
+        return self.criterion.obstacles
+
+    def summary(self, errors: Sequence[float] | None) -> CriterionSummary:
+        """The underlying criterion's."""
+        return self.criterion.summary(errors)
+
+    def scaled(self, factor: float) -> LimitedCriterion:
+        """Get the same limits with a larger threshold."""
+        return LimitedCriterion(self.criterion.scaled(factor), self.max_vertices, self.max_faces)
+
+    def _fits(self, part: PartLike) -> bool:
+        return (self.max_vertices is None or len(part.hull.vertices) <= self.max_vertices) and (
+            self.max_faces is None or len(part.hull.faces) <= self.max_faces
+        )
+
+    def _limited(self, part: PartLike) -> PartLike:
+        if self._fits(part):
+            return part
+        hull = limit_hull(part.hull, self.max_vertices, self.max_faces)
+        return part.with_hull(hull)
+
+
+def with_limits(criterion: Criterion, max_vertices: int | None, max_faces: int | None) -> Criterion:
+    """Add limits to a criterion where there are any that cutting can meet."""
+    if max_vertices is None and max_faces is None:
+        return criterion
+    if (max_vertices or FEWEST_VERTICES) < FEWEST_VERTICES or (max_faces or FEWEST_FACES) < FEWEST_FACES:
+        return criterion
+    return LimitedCriterion(criterion, max_vertices, max_faces)
+
+
+def limit_roughly(part: Part, max_vertices: int | None, max_faces: int | None) -> Part:
+    """Get the part with a hull inside the limits at no cost: where its own is not, a box or a tetrahedron around it."""
+    vertices, faces = len(part.hull.vertices), len(part.hull.faces)
+    if vertices <= (max_vertices or vertices) and faces <= (max_faces or faces):
+        return part
+    return part.with_hull(plain_hull(part.hull.vertices, max_vertices, max_faces))
+
+
+def limit_part(part: Part, max_vertices: int | None, max_faces: int | None) -> Part:
+    """Get the part with a hull inside the limits, and without corners it hardly needs; the same part if it has that."""
+    hull = limit_hull(part.hull, max_vertices, max_faces)
+    return part if hull is part.hull else part.with_hull(hull)

@@ -1,0 +1,398 @@
+"""Merging: pairs of parts whose joint hull still meets the criterion become one part, cheapest pair first."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from rlacd import _native, work
+from rlacd._native import Stopped
+from rlacd.clock import Clock
+from rlacd.criteria.criterion import Criterion, Feasibility
+from rlacd.merge.boxes import Boxes
+from rlacd.solid.arrays import IntArray
+from rlacd.solid.component import LOST, ClippedPart, Component, Part
+from rlacd.solid.hull import Hull
+from rlacd.work import Work
+from rlacd.workers import Workers
+
+FEW = 100
+"""Among so many parts every pair may be united across what lies between; among more, those that a third is near to."""
+
+
+AT_ONCE = 512
+"""The clock is asked before so many pairs are held against the solid, or parts against all others."""
+
+
+class _Pair(NamedTuple):
+    cost: float  # volume of the joint hull - what the criterion counts as filled by each
+    first: int
+    second: int
+
+
+def merge_parts(
+    parts: Sequence[Part],
+    criterion: Criterion,
+    workers: Workers,
+    clock: Clock,
+    beside: Sequence[Part] = (),
+    solid: Component | None = None,
+) -> list[Part]:
+    """Unite pairs of parts, the cheapest first, as long as the union meets the criterion.
+
+    The test looks at the glued union: its own surface against its own hull, both ways. When no pair is left that meets
+    it so, parts are united across what lies between them, where the solid is given: there the test looks at all that
+    the solid fills of the joint hull (`ClippedPart`). Pairs are tested a batch at a time on all workers, and taken in
+    the order of their cost whatever the number of workers.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+        Solids with disjoint interiors.
+    beside : sequence of Part
+        More of them, of which no two are to be united with each other: that has been tried before.
+    solid : Component, optional
+        What all of them are parts of.
+
+    Returns
+    -------
+    list of Part
+        Parts that could not be united further, in the order of their first piece, those beside last.
+    """
+    pairs = _Adjoining(criterion, workers, clock)
+    alive = _unite_pairs([*parts, *beside], len(parts), pairs, workers, clock)
+    if solid is None:
+        return alive
+    waiting = {id(part) for part in beside}
+    new = [part for part in alive if id(part) not in waiting]
+    old = [part for part in alive if id(part) in waiting]
+    return _unite_pairs([*new, *old], len(new), _Bridged(criterion, workers, clock, solid), workers, clock)
+
+
+class _Pairing(Protocol):
+    """Which pairs of parts may become one, and how that is found out."""
+
+    def pairs(
+        self, alive: Mapping[int, Part], boxes: Boxes, new: Sequence[int]
+    ) -> tuple[list[_Pair], list[tuple[int, int]]]:
+        """Pairs of a new part with any other in the boxes that may be united, and their costs; and those never to be.
+
+        Fewer where the clock has no work left for more.
+        """
+
+    def price(self, first: Part, second: Part) -> float:
+        """The work of uniting two parts."""
+
+    def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
+        """Their union if it meets the criterion; otherwise None, and whether no larger union will either."""
+
+
+def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, workers: Workers, clock: Clock) -> list[Part]:
+    """Unite pairs, of which one at least is among the first `new` parts or made of them."""
+    alive: dict[int, Part] = dict(enumerate(parts))
+    origin = {i: i for i in alive}
+    refused: dict[int, set[int]] = {i: set() for i in alive}  # whom a part, or a piece of it, can never be united with
+
+    def refuse(first: int, second: int) -> None:
+        refused[first].add(second)
+        refused[second].add(first)
+
+    try:
+        boxes = Boxes(alive)
+        queue, never = pairing.pairs(alive, boxes, range(new))
+        heapq.heapify(queue)
+        for first, second in never:
+            refuse(first, second)
+        verdicts: dict[_Pair, tuple[Part | None, bool]] = {}  # on pairs that are back in the queue
+        count = newest = len(alive)
+        while queue and clock.step(count - len(alive), None, len(alive)):
+            batch = _cheapest(queue, alive, 2 * workers.threads)
+            fresh = [pair for pair in batch if pair not in verdicts]
+            verdicts.update(
+                zip(fresh, workers.map(lambda p: pairing.unite(alive[p.first], alive[p.second]), fresh), strict=True)
+            )
+            for taken, pair in enumerate(batch, start=1):
+                union, for_good = verdicts.pop(pair)
+                # Paid for in the order of the pairs: how many are tested side by side must not matter.
+                if not clock.work.pay(pairing.price(alive[pair.first], alive[pair.second])):
+                    break
+                if union is None:
+                    if for_good:
+                        refuse(pair.first, pair.second)
+                    continue
+                origin[newest] = min(origin[pair.first], origin[pair.second])
+                del alive[pair.first], alive[pair.second]
+                alive[newest] = union
+                boxes.add(newest, union, [pair.first, pair.second])
+                refused[newest] = refused.pop(pair.first) | refused.pop(pair.second)
+                for i in refused[newest] & alive.keys():
+                    refused[i].add(newest)
+                found, never = pairing.pairs(alive, boxes.without([*refused[newest]]), [newest])
+                for first, second in never:
+                    refuse(first, second)
+                for other in [*batch[taken:], *found]:
+                    heapq.heappush(queue, other)
+                newest += 1
+                break
+    except Stopped:  # between two unions
+        clock.note_stop()
+    return [alive[i] for i in sorted(alive, key=origin.__getitem__)]
+
+
+def _cheapest(queue: list[_Pair], alive: dict[int, Part], most: int) -> list[_Pair]:
+    """Take the cheapest pairs of parts that are still there off the queue."""
+    batch: list[_Pair] = []
+    while queue and len(batch) < most:
+        pair = heapq.heappop(queue)
+        if pair.first in alive and pair.second in alive:
+            batch.append(pair)
+    return batch
+
+
+@dataclass(frozen=True)
+class _Adjoining:
+    """Pairs within the criterion's reach, judged by themselves."""
+
+    criterion: Criterion
+    workers: Workers
+    clock: Clock
+
+    def pairs(
+        self, alive: Mapping[int, Part], boxes: Boxes, new: Sequence[int]
+    ) -> tuple[list[_Pair], list[tuple[int, int]]]:
+        """Those that the volume bound allows."""
+        filled = self.criterion.filled
+        pairs = boxes.pairs(new, self.criterion.reach)
+        if not self.clock.work.pay(_sum_over(alive, pairs, work.joining)):
+            return [], []
+        found = [
+            _Pair(hull_volume - (filled(alive[first]) + filled(alive[second])), first, second)
+            for first, second, volume, hull_volume in joint_volumes(alive, pairs, self.workers)
+            if not self.criterion.excludes(volume, hull_volume)
+        ]
+        return found, []
+
+    def price(self, first: Part, second: Part) -> float:
+        """Gluing and judging."""
+        return price_of_gluing(first, second)
+
+    def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
+        """Glue them."""
+        union = Part.glued(first, second)
+        return (union, False) if self.criterion.is_met(union) else (None, self.criterion.is_hereditary)
+
+
+@dataclass(frozen=True)
+class _Bridged:
+    """All pairs (of many parts, those near each other or a third), judged by the solid's share of the joint hull."""
+
+    criterion: Criterion
+    workers: Workers
+    clock: Clock
+    solid: Component
+
+    def pairs(
+        self, alive: Mapping[int, Part], boxes: Boxes, new: Sequence[int]
+    ) -> tuple[list[_Pair], list[tuple[int, int]]]:
+        """Those with a chance: how much the solid fills is not known yet."""
+        filled = self.criterion.filled
+        reach = np.inf if len(boxes.ids) <= FEW else self.criterion.reach
+        pairs = boxes.pairs(new, reach, across=True)
+        found: list[_Pair] = []
+        never: list[tuple[int, int]] = []
+        for some in np.split(pairs, range(AT_ONCE, len(pairs), AT_ONCE)):
+            if not self.clock.goes_on() or not self.clock.work.pay(_sum_over(alive, some, work.screening)):
+                break
+            used, places = _places(some)
+            hulls = [alive[i].hull for i in used]
+            volumes, feasibilities = self.criterion.feasibilities(
+                self.solid.filling, hulls, places, self.workers.threads
+            )
+            for (first, second), volume, feasibility in zip(
+                some.tolist(), volumes.tolist(), feasibilities.tolist(), strict=True
+            ):
+                if feasibility == Feasibility.MAYBE:
+                    found.append(_Pair(volume - (filled(alive[first]) + filled(alive[second])), first, second))
+                elif feasibility == Feasibility.NEVER:
+                    never.append((first, second))
+        return found, never
+
+    def price(self, first: Part, second: Part) -> float:
+        """A boolean and judging."""
+        return price_of_share(first, second, self.solid)
+
+    def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
+        """Take the solid's share of the joint hull."""
+        return _clipped(first, second, Hull.around(first.hull, second.hull), self.criterion, self.solid), False
+
+
+def unite(
+    first: Part,
+    second: Part,
+    criterion: Criterion,
+    solid: Component,
+    hull: Hull | None = None,
+    account: Work | None = None,
+) -> Part | None:
+    """Unite two parts of a solid, as they are or across what lies between them; None where neither is allowed.
+
+    Their joint hull may be given where it is known. None, too, where the account has no work left for it.
+    """
+    hull = hull or Hull.around(first.hull, second.hull)
+    account = account or Work()
+    if not account.pay(work.holding(len(hull.vertices))):
+        return None
+    feasibility = criterion.feasibility(solid.filling, hull)
+    if feasibility is Feasibility.NO:
+        return None
+    if is_alone(first) and is_alone(second):  # otherwise they may overlap each other
+        if not account.pay(price_of_gluing(first, second)):
+            return None
+        union = Part.glued(first, second, hull)
+        if not criterion.excludes(union.volume, hull.volume) and criterion.is_met(union):
+            return union
+    if feasibility is not Feasibility.MAYBE or not account.pay(price_of_share(first, second, solid)):
+        return None
+    return _clipped(first, second, hull, criterion, solid)
+
+
+def price_of_gluing(first: Part, second: Part) -> float:
+    """The work of gluing two parts and judging the union."""
+    faces, hull_faces = first.size + second.size, len(first.hull.faces) + len(second.hull.faces)
+    return work.gluing(faces) + work.judging(faces, hull_faces)
+
+
+def price_of_share(first: Part, second: Part, solid: Component) -> float:
+    """The work of taking what the solid fills of the joint hull of two parts, and judging it."""
+    faces, hull_faces = first.size + second.size, len(first.hull.faces) + len(second.hull.faces)
+    return work.filling(solid.size, faces, hull_faces) + work.judging(faces, hull_faces)
+
+
+def is_alone(part: Part) -> bool:
+    """Tell whether a part is made of its members only, and of nothing that other parts have too."""
+    return part.volume <= (1 + LOST) * sum(member.volume for member in part.members)
+
+
+def _clipped(first: Part, second: Part, hull: Hull, criterion: Criterion, solid: Component) -> ClippedPart | None:
+    share = ClippedPart(solid, first, second, hull)
+    fits = share.is_whole and not criterion.excludes(share.volume, hull.volume)
+    return share if fits and criterion.is_met(share) else None
+
+
+def neighbours(
+    alive: Mapping[int, Part], new: Sequence[int], reach: float, workers: Workers
+) -> list[tuple[int, int, float, float]]:
+    """Pairs of a new part with any other whose boxes lie within reach: (first, second, volume, joint hull's volume)."""
+    return joint_volumes(alive, Boxes(alive).pairs(new, reach), workers)
+
+
+def joint_volumes(alive: Mapping[int, Part], pairs: IntArray, workers: Workers) -> list[tuple[int, int, float, float]]:
+    """Volumes of pairs of parts [P, 2]: (first, second, volume of both, joint hull's volume)."""
+    used, places = _places(pairs)
+    corners = [alive[i].hull.vertices for i in used]
+    hulls = _native.joint_hull_volumes(corners, places, workers.threads)
+    return [
+        (i, j, alive[i].volume + alive[j].volume, hull)
+        for (i, j), hull in zip(pairs.tolist(), hulls.tolist(), strict=True)
+    ]
+
+
+def _places(pairs: IntArray) -> tuple[list[int], IntArray]:
+    """The ids that pairs [P, 2] are made of, and the pairs as places among them."""
+    used, places = np.unique(pairs, return_inverse=True)
+    return used.tolist(), np.ascontiguousarray(places.reshape(-1, 2), dtype=np.int32)
+
+
+def _sum_over(alive: Mapping[int, Part], pairs: IntArray, price: Callable[[int], float]) -> float:
+    """The price of the vertices of each pair of hulls, added up."""
+    corners = {i: len(alive[i].hull.vertices) for i in np.unique(pairs).tolist()}
+    return sum(price(corners[i] + corners[j]) for i, j in pairs.tolist())
+
+
+def merge_to_count(
+    parts: Sequence[Part],
+    count: int,
+    criterion: Criterion,
+    workers: Workers,
+    clock: Clock,
+    worst: float = np.inf,
+) -> list[Part] | None:
+    """Unite parts, the pair with the least error of its union first, until no more than `count` are left.
+
+    Errors are measured only for pairs whose lower bound could make them the best (lazy best-first search), first among
+    neighbours, then among all parts.
+
+    Parameters
+    ----------
+    worst : float
+        Give up (None) as soon as a union is needed whose error is not below this.
+
+    Raises
+    ------
+    ValueError
+        `count` is less than 1.
+    """
+    if count < 1:
+        raise ValueError("at least one part has to be left")
+    alive: dict[int, Part] = dict(enumerate(parts))
+    origin = {i: i for i in alive}
+    newest = len(parts)
+    reach = criterion.reach
+    try:
+        queue = _bounded_pairs(alive, list(alive), reach, criterion, workers)
+        while len(alive) > count and clock.step(len(parts) - len(alive), len(parts) - count, len(alive)):
+            pair = _pop_least(queue, alive, criterion)
+            if pair is None:
+                if reach == np.inf:
+                    break
+                reach = np.inf
+                queue = _bounded_pairs(alive, list(alive), reach, criterion, workers)
+                continue
+            if pair.error >= worst:
+                return None
+            union = Part.glued(alive[pair.first], alive[pair.second])
+            del alive[pair.first], alive[pair.second]
+            origin[newest] = min(origin[pair.first], origin[pair.second])
+            alive[newest] = union
+            queue += _bounded_pairs(alive, [newest], reach, criterion, workers)
+            heapq.heapify(queue)
+            newest += 1
+    except Stopped:  # between two unions
+        clock.note_stop()
+    return [alive[i] for i in sorted(alive, key=origin.__getitem__)]
+
+
+@dataclass(order=True, frozen=True)
+class _BoundedPair:
+    error: float  # of the union: a lower bound, or the measured value
+    first: int
+    second: int
+    measured: bool
+
+
+def _bounded_pairs(
+    alive: dict[int, Part], new: Sequence[int], reach: float, criterion: Criterion, workers: Workers
+) -> list[_BoundedPair]:
+    queue = [
+        _BoundedPair(criterion.least_error(volume, hull_volume), first, second, False)
+        for first, second, volume, hull_volume in neighbours(alive, new, reach, workers)
+    ]
+    heapq.heapify(queue)
+    return queue
+
+
+def _pop_least(queue: list[_BoundedPair], alive: dict[int, Part], criterion: Criterion) -> _BoundedPair | None:
+    """Take the pair whose union has the least error off the queue; None when there is no pair left."""
+    while queue:
+        pair = heapq.heappop(queue)
+        if pair.first not in alive or pair.second not in alive:
+            continue
+        if pair.measured:
+            return pair
+        error = criterion.error(Part.glued(alive[pair.first], alive[pair.second]))
+        heapq.heappush(queue, _BoundedPair(max(error, pair.error), pair.first, pair.second, True))
+    return None

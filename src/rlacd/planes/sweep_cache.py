@@ -1,0 +1,52 @@
+"""Candidate planes and their sweeps that several policies look at, each made once."""
+
+from __future__ import annotations
+
+import threading
+from weakref import WeakKeyDictionary
+
+from rlacd.planes.candidates import OFFSETS_PER_AXIS, Candidates, axis_and_principal
+from rlacd.planes.concave_edges import concave_edge_planes
+from rlacd.planes.sweep import Sweep, sweep
+from rlacd.solid.component import Component
+
+
+class SweepCache:
+    """The same kinds of planes of every component, and sweeps over them, kept as long as the component is.
+
+    Parameters
+    ----------
+    per_axis : int
+        Planes along each of the six axes.
+    concave_edges : int
+        How many concave edges add their planes.
+    """
+
+    def __init__(self, per_axis: int = OFFSETS_PER_AXIS, concave_edges: int = 4) -> None:
+        self._per_axis = per_axis
+        self._concave_edges = concave_edges
+        self._candidates: WeakKeyDictionary[Component, Candidates] = WeakKeyDictionary()
+        self._sweeps: WeakKeyDictionary[Component, Sweep] = WeakKeyDictionary()
+        self._lock = threading.Lock()
+
+    def candidates(self, component: Component) -> Candidates:
+        """Get the planes of a component."""
+        with self._lock:
+            known = self._candidates.get(component)
+        if known is None:
+            known = axis_and_principal(component, self._per_axis)
+            if self._concave_edges > 0:
+                known = Candidates.joined(known, concave_edge_planes(component, self._concave_edges))
+            with self._lock:  # another thread may have been here: with the same result
+                self._candidates[component] = known
+        return known
+
+    def of(self, component: Component, threads: int = 1) -> Sweep:
+        """Get the sweep of a component."""
+        with self._lock:
+            known = self._sweeps.get(component)
+        if known is None:
+            known = sweep(component, self.candidates(component), threads)
+            with self._lock:
+                self._sweeps[component] = known
+        return known

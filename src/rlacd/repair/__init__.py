@@ -1,0 +1,1 @@
+"""From any soup of triangles to one closed, oriented solid."""

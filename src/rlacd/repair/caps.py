@@ -1,0 +1,257 @@
+"""Which holes of a soup are closed: those that somebody lost, not those that somebody made.
+
+Input: a soup, what its surface was, and where a ball can go around it. Output: the soup with caps, and what was capped.
+
+A body is closed when every one of its holes may be; a cap that leaves another hole open would be one more sheet. A
+hole may be closed if its cap stays near the surface, if the ball cannot come to it, if it is small against the body, or
+if it is a wound: few edges, and a cap that goes on where the faces around it end, as missing faces leave it. The mouth
+of a bottle has faces that turn away from its cap all around. Where there are many wounds, other small holes are too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from rlacd._native import poll_stop
+from rlacd.repair.distance import SurfaceQuery, spread_points
+from rlacd.repair.holes import LONGEST_EXACT_LOOP, cap
+from rlacd.repair.rims import Rims, rims_of
+from rlacd.repair.soup import Soup
+from rlacd.repair.topology import (
+    BoolArray,
+    IntArray,
+    components,
+    face_areas,
+    first_of_doubled,
+    nondegenerate,
+    signed_tetrahedra,
+)
+from rlacd.solid.frame import FloatArray
+
+HOLE, HOLE_SHARE = 0.1, 0.02
+"""A body nearly closed, its holes no more than this share of its area, is closed with caps up to this far away: a scan
+with a few holes is meant as a solid, a cup is not. The caps are reported."""
+
+# A wound has at most so many edges, and a share of the area of its body; where it is one missing face, a larger one.
+_WOUND_EDGES, _WOUND, _MISSING_FACE = 12, 0.1, 0.2
+# A single ring of more edges than this is a mouth, not a wound: its corners lie this well on a circle.
+_RING, _ROUND = 6, 0.1
+# Along this share of its rim at least, the cap turns by less than this from the faces beside it (cosine of 45 degrees).
+_SMOOTH_SHARE, _SMOOTH = 0.3, 0.7
+# With so many wounds, and at least this share of all holes, all are that have at most so many edges, and so much area.
+_DAMAGED, _DAMAGED_SHARE, _DAMAGED_EDGES, _DAMAGED_WOUND = 4, 0.3, 60, 0.25
+# Wounds take no more than this share of the area that is left: a cage is no damaged ball.
+_WOUNDS = 0.7
+# An open body that caps would give this much volume for its area is hollow; with less it is a sheet, a leaf or a cloth.
+_ROOMY = 0.02
+# A solid may have a few faces sticking out of it, up to this share of its area, beside flaps.
+FLAPS = 0.05
+
+
+@dataclass(frozen=True)
+class Closed:
+    """What was closed.
+
+    Attributes
+    ----------
+    soup
+        The faces with the caps. Bodies that share a hole have become one, numbered like the first.
+    bodies
+        The bodies that were capped.
+    by_room
+        ``[bodies]``, bodies that were capped only because nothing can come to a cap.
+    far
+        Distances of caps from the surface, of each body where something can come there.
+    where
+        The places of `far`, ``[N, 3]``.
+    hollow
+        Bodies that stay open although caps would give them an inside.
+    mouths
+        The middle of the widest opening of each of them, ``[N, 3]``.
+    """
+
+    soup: Soup
+    bodies: IntArray
+    by_room: BoolArray
+    far: FloatArray
+    where: FloatArray
+    hollow: IntArray
+    mouths: FloatArray
+
+
+def close_holes(
+    soup: Soup,
+    bodies: int,
+    surface: SurfaceQuery,
+    covers: Callable[[FloatArray], BoolArray],
+    gap: float,
+    thickness: float,
+    fill: bool = False,
+) -> Closed | None:
+    """Cap the bodies all of whose holes may be closed.
+
+    Parameters
+    ----------
+    soup
+        The faces.
+    bodies
+        How many bodies they are of.
+    surface
+        What caps shall stay near.
+    covers
+        Whether the ball can come to points.
+    gap
+        How far a cap may lead from the surface anyway.
+    thickness
+        A body that has less volume for its area is none.
+    fill
+        Close every body that closing gives an inside, whatever can come in.
+
+    Returns
+    -------
+    Closed or None
+        None if there is no hole.
+    """
+    rims = rims_of(soup)
+    if not rims.loops:
+        return None
+    caps, owner = _caps(soup, rims)
+    first_body = np.array([soup.body[beside[0]] for beside in rims.beside])
+    lengths = [len(loop) for loop in rims.loops]
+    _, group = components(bodies, np.repeat(first_body, lengths), soup.body[np.concatenate(rims.beside)])
+    _, first = np.unique(group, return_index=True)
+    joined = first[group]  # the first of the bodies that share holes
+    loop_body = joined[first_body]
+    body = joined[soup.body]
+
+    cap_area = face_areas(soup.vertices, caps)
+    body_area = np.bincount(body, soup.area, bodies)
+    points, on = spread_points(soup.vertices, caps, gap / 2)
+    distance = surface.distance(points)
+    far = distance > gap
+    unreachable = far.copy()
+    if far.any() and not fill:
+        far[far] = covers(points[far])
+        unreachable &= ~far
+    place = owner[on]  # the loop of a point
+    nearly_closed = np.bincount(loop_body[owner], cap_area, bodies) <= HOLE_SHARE * body_area
+    by_loop = np.bincount(owner, cap_area, len(rims.loops))
+    depth = np.zeros(len(rims.loops))
+    np.maximum.at(depth, place, distance)
+    smooth = _smooth_share(soup, rims, caps, owner) >= _SMOOTH_SHARE
+    ring = np.array([len(loop) > _RING and _is_round(soup.vertices[loop]) for loop in rims.loops])
+    wound = _wounds(rims, smooth, ring, by_loop / body_area[loop_body], depth)
+    wound &= (cap_area * wound[owner]).sum() <= _WOUNDS * soup.area.sum()
+    hole = nearly_closed[loop_body] & (smooth | ~ring)
+    excused = wound[place] | (hole[place] & (distance <= HOLE))
+    chosen = np.zeros(bodies, dtype=bool)
+    chosen[loop_body] = True
+    if not fill:
+        chosen[loop_body[place[far & ~excused]]] = False
+    refused = np.setdiff1d(loop_body, np.flatnonzero(chosen))
+
+    def capped() -> tuple[Soup, BoolArray]:
+        some, whole = chosen[loop_body[owner]], chosen[body]
+        turned = np.where((whole & rims.inverted)[:, None], soup.faces[:, ::-1], soup.faces)
+        faces = np.concatenate([turned, caps[some]])
+        owners = np.concatenate([np.where(whole, body, soup.body), loop_body[owner][some]])
+        no_cap = np.zeros(int(some.sum()), dtype=bool)
+        kept = first_of_doubled(faces, len(soup.vertices))
+        # Where more than two faces met before, which continue each other is a guess: no caps made them meet.
+        trusted = np.concatenate([whole & ~rims.flap & ~soup.at_valence(soup.edges.valence > 2), ~no_cap])
+        return Soup(soup.vertices, faces, owners, trusted).only(kept), np.concatenate([rims.flap, no_cap])[kept]
+
+    # A cap is worth having only where it gives the body an inside: a strip whose cap lies on itself stays a sheet.
+    trial, flap = capped()
+    volume = np.bincount(trial.body_of_side(), np.maximum(trial.sides.volume, 0), bodies)
+    chosen &= volume > thickness * np.bincount(trial.body, trial.area, bodies)
+    chosen &= trial.sheet_share(bodies, flap) <= FLAPS
+    by_room = np.zeros(bodies, dtype=bool)
+    by_room[loop_body[place[unreachable & ~excused]]] = True
+    wide = far & chosen[loop_body[place]]
+    # What every cap together would enclose, by the windings found.
+    sign = np.where(rims.inverted, -1, 1) * ~rims.flap
+    enclosed = np.bincount(body, sign * signed_tetrahedra(soup.vertices, soup.faces), bodies)
+    enclosed += np.bincount(loop_body[owner], signed_tetrahedra(soup.vertices, caps), bodies)
+    hollow = refused[np.abs(enclosed[refused]) > _ROOMY * body_area[refused]]
+    widest = [np.flatnonzero(loop_body == one)[by_loop[loop_body == one].argmax()] for one in hollow.tolist()]
+    mouths = np.array([soup.vertices[rims.loops[loop]].mean(axis=0) for loop in widest]).reshape(-1, 3)
+    result = capped()[0] if chosen.any() else soup
+    return Closed(
+        result, np.flatnonzero(chosen[joined]), by_room & chosen, distance[wide], points[wide], hollow, mouths
+    )
+
+
+def _caps(soup: Soup, rims: Rims) -> tuple[IntArray, IntArray]:
+    """Triangulate the loops, no two across the same edge if that can be avoided.
+
+    Returns the faces ``[C, 3]``, without those that have a vertex twice, and the loop ``[C]`` of each.
+    """
+    count = len(soup.vertices)
+    edges = soup.edges.vertices @ np.array([count, 1])  # in ascending order
+    across: dict[int, list[int]] = {}
+    caps = []
+    for loop, beside in zip(rims.loops, rims.beside, strict=True):
+        poll_stop()
+        taken = None
+        if 3 < len(loop) <= LONGEST_EXACT_LOOP:
+            low, high = np.minimum(loop[:, None], loop), np.maximum(loop[:, None], loop)
+            at = np.minimum(np.searchsorted(edges, low * count + high), len(edges) - 1)
+            taken = (edges[at] == low * count + high) | (low == high)
+            for i, vertex in enumerate(loop.tolist()):
+                if vertex in across:
+                    taken[i] |= np.isin(loop, across[vertex])
+        caps.append(loop[cap(soup.vertices[loop], rims.normals[beside], taken)])
+        if len(loop) > 3:
+            for a, b, c in caps[-1].tolist():
+                across.setdefault(a, []).extend((b, c))
+                across.setdefault(b, []).extend((c, a))
+                across.setdefault(c, []).extend((a, b))
+    owner = np.repeat(np.arange(len(caps)), [len(some) for some in caps])
+    faces = np.concatenate(caps)
+    real = nondegenerate(faces)
+    return faces[real], owner[real]
+
+
+def _smooth_share(soup: Soup, rims: Rims, caps: IntArray, owner: IntArray) -> FloatArray:
+    """Return ``[L]`` along which share of each loop its cap goes on where the faces beside it end."""
+    a, b, c = (soup.vertices[caps[:, i]] for i in range(3))
+    normal = np.cross(b - a, c - a)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+    # The cap's face at each edge of the rim, found by loop and edge.
+    count = len(soup.vertices)
+    key = ((caps * count + np.roll(caps, -1, axis=1)) + owner[:, None] * count**2).ravel()
+    tail = np.concatenate(rims.loops)
+    head = np.concatenate([np.roll(loop, -1) for loop in rims.loops])
+    loop_of = np.repeat(np.arange(len(rims.loops)), [len(loop) for loop in rims.loops])
+    order = np.argsort(key, kind="stable")
+    wanted = head * count + tail + loop_of * count**2
+    at = np.minimum(np.searchsorted(key[order], wanted), len(key) - 1)
+    cosine = np.einsum("ij,ij->i", rims.normals[np.concatenate(rims.beside)], normal[order[at] // 3])
+    smooth = (cosine > _SMOOTH) & (key[order][at] == wanted)
+    length = np.linalg.norm(soup.vertices[head] - soup.vertices[tail], axis=1)
+    share: FloatArray = np.bincount(loop_of, length * smooth) / np.bincount(loop_of, length)
+    return share
+
+
+def _wounds(rims: Rims, smooth: BoolArray, ring: BoolArray, part: FloatArray, depth: FloatArray) -> BoolArray:
+    """Return ``[L]`` whether each loop runs around missing faces; see the module.
+
+    `part` is the area of its cap as a share of its body's, `depth` how far the cap leads away from the surface.
+    """
+    number = np.array([len(loop) for loop in rims.loops])
+    wound: BoolArray = ((number == 3) & (part <= _MISSING_FACE)) | (
+        (number <= _WOUND_EDGES) & smooth & (part <= _WOUND)
+    )
+    if wound.sum() >= max(_DAMAGED, _DAMAGED_SHARE * len(wound)):
+        small = (part <= HOLE_SHARE) | (depth <= HOLE) | (smooth & (part <= _DAMAGED_WOUND))
+        return wound | ((number <= _DAMAGED_EDGES) & small)
+    return wound & ~ring if wound.sum() == 1 else wound
+
+
+def _is_round(points: FloatArray) -> bool:
+    radii = np.linalg.norm(points - points.mean(axis=0), axis=1)
+    return bool(radii.std() <= _ROUND * radii.mean())

@@ -1,0 +1,238 @@
+"""Cracks are welded and holes get caps: new faces that connect the free edges of a soup.
+
+Input: a soup and its edges. Output: changed faces, or extra ones. Nothing here decides whether a cap is honest; the
+caller measures that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mapbox_earcut
+import numpy as np
+from scipy.spatial import cKDTree
+
+from rlacd._native import poll_stop
+from rlacd.repair.topology import BoolArray, Edges, IntArray, components, first_of_doubled, nondegenerate
+from rlacd.solid.frame import FloatArray
+
+# The best triangulation looks at every three corners; longer loops are cut by ears, or where that fails up to a length.
+_EXACT_LOOP = 60
+LONGEST_EXACT_LOOP = 250
+"""Loops of more edges than this are not triangulated in the best way."""
+
+# What area weighs against bending.
+_AREA = 0.1
+# What an edge that is there already weighs: more than anything else, but it is better than no cap.
+_TAKEN = 1e3
+
+# Edges whose neighbours are looked up before the next look at whether the work has to stop.
+_AT_ONCE = 1000
+
+
+# Tracing loops is the one step of a repair that walks edge by edge; a soup with more free edges is no scan with holes.
+MOST_FREE_EDGES = 500_000
+
+
+def close_cracks(vertices: FloatArray, faces: IntArray, tolerances: Sequence[float]) -> tuple[IntArray, IntArray]:
+    """Merge free edges that nearly coincide, trying ever wider tolerances.
+
+    A try that closes nothing, or leaves no face, is undone.
+
+    Returns the faces ``[G, 3]`` and ``[G]`` the given face each comes from.
+    """
+    origin = np.arange(len(faces))
+    free = len(free_edges(faces, len(vertices)))
+    for tolerance in tolerances:
+        poll_stop()
+        if free == 0 or free > MOST_FREE_EDGES:
+            break
+        split, parent = split_at_free_vertices(vertices, weld_free_vertices(vertices, faces, tolerance), tolerance)
+        keep = nondegenerate(split)
+        keep[keep] = first_of_doubled(split[keep], len(vertices))
+        left = len(free_edges(split[keep], len(vertices)))
+        if left < free and keep.any():
+            faces, origin, free = split[keep], origin[parent[keep]], left
+    return faces, origin
+
+
+def weld_free_vertices(vertices: FloatArray, faces: IntArray, tolerance: float) -> IntArray:
+    """Merge vertices of free edges that lie within `tolerance` of each other; returns faces of the same number.
+
+    A face may come out degenerate. Vertices keep their places: each group is represented by its first vertex.
+    """
+    free = free_edges(faces, len(vertices))
+    ends = np.unique(free)
+    pairs = (
+        cKDTree(vertices[ends]).query_pairs(tolerance, output_type="ndarray") if len(ends) else np.empty((0, 2), int)
+    )
+    if len(pairs) == 0:
+        return faces
+    _, label = components(len(ends), pairs[:, 0], pairs[:, 1])
+    _, first = np.unique(label, return_index=True)
+    target = np.arange(len(vertices))
+    target[ends] = ends[first[label]]
+    return target[faces]
+
+
+def split_at_free_vertices(vertices: FloatArray, faces: IntArray, tolerance: float) -> tuple[IntArray, IntArray]:
+    """Insert free vertices into the free edges they lie on (T-junctions).
+
+    Returns the faces ``[G, 3]``, split ones replaced by several, and ``[G]`` the old face each comes from.
+    """
+    edges = Edges.of(faces, len(vertices))
+    halfedge = np.flatnonzero(edges.valence[edges.of_halfedge] == 1)
+    # One edge per face and round, so that the pieces of a face do not depend on each other.
+    _, first = np.unique(halfedge // 3, return_index=True)
+    halfedge = halfedge[first]
+    free = np.unique(edges.vertices[edges.valence == 1])
+    none = faces, np.arange(len(faces))
+    if len(halfedge) == 0:
+        return none
+    face, corner = halfedge // 3, halfedge % 3
+    a, b, c = faces[face, corner], faces[face, (corner + 1) % 3], faces[face, (corner + 2) % 3]
+    span = vertices[b] - vertices[a]
+    length = np.linalg.norm(span, axis=1)
+    tree = cKDTree(vertices[free])
+    found: list[list[int]] = []
+    for begin in range(0, len(a), _AT_ONCE):
+        poll_stop()
+        some = slice(begin, begin + _AT_ONCE)
+        middle, reach = (vertices[a[some]] + vertices[b[some]]) / 2, length[some] / 2 + tolerance
+        found += list(tree.query_ball_point(middle, reach, return_sorted=True))
+    count = np.array([len(x) for x in found])
+    if count.sum() > 50_000_000 or count.sum() == 0:
+        return none
+    edge = np.repeat(np.arange(len(halfedge)), count)
+    vertex = free[np.concatenate([np.asarray(x, dtype=np.int64) for x in found])]
+    offset = vertices[vertex] - vertices[a[edge]]
+    along = np.einsum("ij,ij->i", offset, span[edge]) / np.maximum(length[edge] ** 2, np.finfo(float).tiny)
+    away = np.linalg.norm(offset - along[:, None] * span[edge], axis=1)
+    margin = tolerance / np.maximum(length[edge], tolerance)
+    on = (away <= tolerance) & (along > margin) & (along < 1 - margin) & (vertex != c[edge])
+    edge, vertex, along = edge[on], vertex[on], along[on]
+    if len(edge) == 0:
+        return none
+    order = np.lexsort((vertex, along, edge))
+    edge, vertex = edge[order], vertex[order]
+    split = np.unique(edge)
+    # The corners along each split edge: a, the inserted vertices, b; every consecutive pair makes a face with c.
+    chain_edge = np.concatenate([split, edge, split])
+    chain_vertex = np.concatenate([a[split], vertex, b[split]])
+    place = np.concatenate([np.zeros(len(split)), np.ones(len(edge)), np.full(len(split), 2)])
+    order = np.lexsort((np.arange(len(place)), place, chain_edge))
+    chain_edge, chain_vertex = chain_edge[order], chain_vertex[order]
+    pair = np.flatnonzero(chain_edge[1:] == chain_edge[:-1])
+    pieces = np.stack([chain_vertex[pair], chain_vertex[pair + 1], c[chain_edge[pair]]], axis=1)
+    whole = np.ones(len(faces), dtype=bool)
+    whole[face[split]] = False
+    new = np.concatenate([faces[whole], pieces])
+    origin = np.concatenate([np.flatnonzero(whole), face[chain_edge[pair]]])
+    good = nondegenerate(new)
+    return new[good], origin[good]
+
+
+def free_edges(faces: IntArray, count: int) -> IntArray:
+    """Return the directed edges ``[B, 2]`` that only one face uses, as that face runs along them."""
+    edges = Edges.of(faces, count)
+    halfedge = np.flatnonzero(edges.valence[edges.of_halfedge] == 1)
+    face, corner = halfedge // 3, halfedge % 3
+    return np.stack([faces[face, corner], faces[face, (corner + 1) % 3]], axis=1)
+
+
+def cap(points: FloatArray, beside: FloatArray, taken: BoolArray | None = None) -> IntArray:
+    """Triangulate a closed loop of points; a loop may visit a place twice.
+
+    Parameters
+    ----------
+    points
+        ``[N, 3]``.
+    beside
+        ``[N, 3]``, the unit normal of the face on the other side of the edge from each point to the next. It runs along
+        that edge in the order of the loop.
+    taken
+        ``[N, N]``, between which points an edge would be one too many, because there is one or because they are one.
+
+    Returns
+    -------
+    IntArray
+        ``[N - 2, 3]`` corners, none of them new, which run against the loop, as the faces beside it would have them.
+    """
+    if len(points) <= 3:
+        return np.array([[0, 2, 1]])
+    if len(points) <= _EXACT_LOOP:
+        return _least_bent(points, beside, taken)[:, ::-1]
+    middle = points.mean(axis=0)
+    _, _, axes = np.linalg.svd(points - middle, full_matrices=False)
+    flat = np.ascontiguousarray((points - middle) @ axes[:2].T)
+    ears = mapbox_earcut.triangulate_float64(flat, np.array([len(points)], dtype=np.uint32)).reshape(-1, 3)
+    if len(ears) != len(points) - 2:  # the loop's shadow crosses itself: no plane is right
+        if len(points) <= LONGEST_EXACT_LOOP:
+            return _least_bent(points, beside, taken)[:, ::-1]
+        return _strips(len(points))[:, ::-1]
+    triangles: IntArray = ears.astype(np.int64)
+    a, b, c = triangles.T
+    along = ((b - a) % len(points) < (c - a) % len(points)).sum() * 2 > len(triangles)
+    return triangles[:, ::-1] if along else triangles
+
+
+def _strips(count: int) -> IntArray:
+    """Zigzag between both ends of the index range until they meet."""
+    low, high, triangles = 0, count - 1, []
+    while high - low > 1:
+        triangles.append((low, low + 1, high))
+        low += 1
+        if high - low > 1:
+            triangles.append((low, high - 1, high))
+            high -= 1
+    return np.array(triangles, dtype=np.int64)
+
+
+def _least_bent(points: FloatArray, beside: FloatArray, taken: BoolArray | None) -> IntArray:
+    """Triangulate a loop so that it bends least, by dynamic programming.
+
+    What is least is the sum over all edges, those of the loop included, of length times angle between the faces: the
+    total absolute mean curvature, which brings the sharp edges of an object back where a small area would cut them off.
+    The area, a little of it, decides where nothing bends. After Liepa, "Filling holes in meshes" (2003).
+    """
+    n = len(points)
+    cost, choice = np.zeros((n, n)), np.zeros((n, n), dtype=np.int64)
+    normal = np.zeros((n, n, 3))  # of the triangle behind the chord from i to k
+    ring = np.arange(n)
+    # Triangles here run with the loop, the faces beside it against them.
+    normal[ring[:-1], ring[1:]] = -beside[:-1]
+    span_of = np.linalg.norm(points[:, None] - points, axis=2)
+    per_area = _AREA / max(float(span_of.max()), np.finfo(float).tiny)
+    for span in range(2, n):
+        poll_stop()
+        first = np.arange(n - span)[:, None]
+        middle, last = first + np.arange(1, span), first + span
+        cross = np.cross(points[middle] - points[first], points[last] - points[first])
+        twice = np.linalg.norm(cross, axis=2)
+        cross /= np.maximum(twice, np.finfo(float).tiny)[..., None]
+        total = cost[first, middle] + cost[middle, last] + per_area * twice
+        total += span_of[first, middle] * _angle(cross, normal[first, middle])
+        total += span_of[middle, last] * _angle(cross, normal[middle, last])
+        if taken is not None and span < n - 1:
+            total += np.where(taken[first, last], _TAKEN, 0.0)
+        if span == n - 1:
+            total += span_of[0, n - 1] * _angle(cross, -beside[n - 1])
+        best = total.argmin(axis=1)[:, None]
+        cost[first, last] = np.take_along_axis(total, best, axis=1)
+        choice[first, last] = np.take_along_axis(middle, best, axis=1)
+        normal[first[:, 0], last[:, 0]] = np.take_along_axis(cross, best[..., None], axis=1)[:, 0]
+    triangles, open_spans = [], [(0, n - 1)]
+    while open_spans:
+        i, k = open_spans.pop()
+        if k - i < 2:
+            continue
+        j = int(choice[i, k])
+        triangles.append((i, j, k))
+        open_spans += [(i, j), (j, k)]
+    return np.array(triangles, dtype=np.int64)
+
+
+def _angle(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Angles between unit vectors in radians; a right angle for one that is zero."""
+    result: FloatArray = np.arccos(np.clip(np.einsum("...i,...i->...", a, b), -1, 1))
+    return result

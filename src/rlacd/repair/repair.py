@@ -1,0 +1,445 @@
+"""From any soup of triangles to one closed, oriented solid, by the least change that works.
+
+Input: an `InputMesh`. Output: a `Solid`, with the step every body needed. In order:
+
+1. equal vertices are merged; degenerate and doubled faces dropped;
+2. free edges that nearly coincide are welded, T-junctions included;
+3. the sides of the faces are joined around the edges (`topology`): a body whose faces all have an inside and an outside
+   is solid and keeps its faces exactly, whatever their windings were; faces it encloses are dropped;
+4. holes are capped where every point of the cap stays near the input's surface, or where nothing can reach it;
+5. what is still open is made of sheets: each is thickened into a slab, face by face, without remeshing;
+6. all solids are united and their cavities filled;
+7. a room that remains and that no ball can enter is closed by a wrap of voxels drawn onto the surface.
+
+The watertight-manifold algorithm of Huang et al. (2018) would serve for 5 too, but it grows every sheet by a voxel and
+turns a dozen exact faces into tens of thousands of approximate ones; steps 3 to 5 keep the faces of the input.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from manifold3d import Manifold
+
+from rlacd._native import poll_stop
+from rlacd.errors import EmptyMeshError
+from rlacd.io.read.load import InputMesh
+from rlacd.repair.caps import FLAPS, close_holes
+from rlacd.repair.distance import SurfaceQuery, spread_points
+from rlacd.repair.holes import MOST_FREE_EDGES, close_cracks
+from rlacd.repair.skin import skin
+from rlacd.repair.soup import NO_AREA, Soup, hidden_faces, on_repeated_edge
+from rlacd.repair.topology import (
+    BoolArray,
+    Edges,
+    IntArray,
+    bodies_of,
+    face_areas,
+    first_of_doubled,
+    merge_equal_vertices,
+    nondegenerate,
+    signed_tetrahedra,
+)
+from rlacd.repair.union import (
+    hull_of_points,
+    slab_of_faces,
+    split_labels,
+    to_arrays,
+    to_manifold,
+    unite,
+    unite_around_cavities,
+)
+from rlacd.repair.voxels import Reach
+from rlacd.solid.frame import FloatArray, Frame
+from rlacd.solid.solid import BodyRepair, Solid
+
+STEPS = ("closed", "reoriented", "outer skin", "welded", "capped", "slab", "wrapped", "hull")
+"""What can be done to a body, from the least change to the most."""
+
+HALF_THICKNESS = 1e-3
+"""Half the thickness of the slab a sheet becomes, in frame units."""
+
+GAP = 0.03
+"""Farthest a cap may lead from the input's surface, and the radius of the ball a gap must stop, in frame units."""
+
+_WELDS = (2e-5, 5e-4)
+_WRAP_ERROR = 4e-3
+# More sheets than this are not united one by one: it would take seconds, and cutting what comes out longer. So it does
+# when fewer of them all cross each other: 40 do so 780 times (a second or two), 80 3,160 times (ten).
+_CROWD, _CROSSINGS = 300, 1000
+# A closed body with less volume per area is flat: nothing could be cut from it.
+_FLAT = 1e-6
+
+
+def repair(
+    mesh: InputMesh,
+    *,
+    resolution: int = 100,
+    open_bodies: str = "auto",
+    threads: int | None = None,
+    keep_cavities: bool = False,
+) -> Solid:
+    """Make a mesh into one closed, oriented solid.
+
+    Parameters
+    ----------
+    mesh
+        What was loaded.
+    resolution
+        Cells along the longest side of the grid on which enclosed rooms are looked for.
+    open_bodies
+        ``auto``: a body with openings is solid if nothing can get inside, or if the openings look like damage; else a
+        shell as thin as its faces. ``solid``: every body is filled that has an inside once its openings are closed.
+        ``thin``: what is open stays a shell.
+    threads
+        How many threads measure distances; all there are by default. The result does not depend on it.
+    keep_cavities
+        Leave sealed rooms open: what a union encloses, and closed bodies wound the other way round than what encloses
+        them. A closed sheet without thickness is a solid all the same.
+
+    Returns
+    -------
+    Solid
+        Never empty.
+
+    Raises
+    ------
+    EmptyMeshError
+        There is no point.
+    Stopped
+        There is no time left: `rlacd.solid.cover` is what needs next to none.
+    """
+    poll_stop()
+    warnings = list(mesh.warnings)
+    points = mesh.vertices[np.unique(mesh.faces)] if len(mesh.faces) else mesh.vertices
+    if len(points) == 0:
+        raise EmptyMeshError("the mesh has no points, so there is nothing to decompose: check the file or its export")
+    frame = Frame.of(points)
+    points = frame.to_frame(points)
+    used, corner = np.unique(mesh.faces, return_inverse=True)
+    vertices, index = merge_equal_vertices(frame.to_frame(mesh.vertices[used]))
+    faces = index[corner.reshape(-1, 3)]
+    poll_stop()
+    faces = faces[nondegenerate(faces)]
+    faces = faces[first_of_doubled(faces, len(vertices))]
+    surface = (vertices, np.ascontiguousarray(faces, dtype=np.int32))
+
+    if len(faces) == 0 or face_areas(vertices, faces).max() < NO_AREA:
+        warnings.append("no face has an area: the hull of the points stands in for the solid")
+        solid = hull_of_points(points, HALF_THICKNESS)
+        body = BodyRepair(0, "hull", len(mesh.faces), solid.num_tri(), 0.0)
+        return Solid(solid, surface, frame, (body,), tuple(warnings))
+
+    query = SurfaceQuery(vertices, faces, threads)
+    work = _Repair(query, frame, resolution, keep_cavities, open_bodies)
+    doubted = work.doubted()
+    if len(doubted):
+        # Faces of one body that cross each other can be joined wrongly into a skin: try them as sheets.
+        other = _Repair(query, frame, resolution, keep_cavities, open_bodies, doubted)
+        if other.deviation.max() < work.deviation.max():
+            work = other
+    return Solid(work.solid, surface, frame, work.report(), tuple(warnings + work.warnings))
+
+
+class _Repair:
+    """The steps on one input; `solid`, `report()` and `warnings` are the result.
+
+    Bodies are numbered after cracks are welded; `step`, `deviation` and `faces_out` are per body.
+    """
+
+    def __init__(
+        self,
+        surface: SurfaceQuery,
+        frame: Frame,
+        resolution: int,
+        keep_cavities: bool,
+        open_bodies: str,
+        as_sheets: IntArray | None = None,
+    ) -> None:
+        self.input = surface
+        self.frame = frame
+        self.resolution = resolution
+        self.keep_cavities = keep_cavities
+        self.open_bodies = open_bodies
+        self.mouths: dict[int, FloatArray] = {}  # of hollow bodies, where their widest opening is
+        self.as_sheets = np.empty(0, dtype=np.int64) if as_sheets is None else as_sheets
+        self.warnings: list[str] = []
+
+        faces, origin = close_cracks(surface.vertices, surface.faces, _WELDS)
+        self.bodies, body = bodies_of(faces, Edges.of(faces, len(surface.vertices)))
+        self.body_of_input = np.zeros(len(surface.faces), dtype=np.int64)
+        self.body_of_input[origin] = body
+        self.step = np.zeros(self.bodies, dtype=np.int64)
+        self.deviation = np.zeros(self.bodies)
+        self.faces_out = np.zeros(self.bodies, dtype=np.int64)
+        self.by_room = np.zeros(self.bodies, dtype=bool)  # capped only because nothing can reach the cap
+        self._note(body[(faces != surface.faces[origin]).any(axis=1)], "welded")
+
+        soup = Soup(surface.vertices, faces, body)
+        poll_stop()
+        if self._is_oriented(soup):
+            parts = self._as_they_are(soup)
+        else:
+            soup = self._cap(self._drop_hidden(soup))
+            parts = self._wrap_crowds(soup, self._build(soup))
+        if keep_cavities:
+            inward = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces), self.bodies) < 0
+            self.solid = unite_around_cavities([part for part, _ in parts], [bool(inward[body]) for _, body in parts])
+        else:
+            self.solid = unite([part for part, _ in parts])
+            if open_bodies != "thin":
+                self._wrap_rooms(soup, parts)
+        if self.solid.is_empty():
+            self.warnings.append("the surface could not be closed: the hull of its points stands in for the solid")
+            self.step[:] = STEPS.index("hull")
+            self.solid = hull_of_points(surface.vertices, HALF_THICKNESS)
+        self._tell_of_shells()
+        self._measure()
+
+    def _tell_of_shells(self) -> None:
+        shells = [body for body in self.mouths if self.step[body] == STEPS.index("slab")]
+        if not shells:
+            return
+        place = self._place(self.mouths[shells[0]])
+        if len(shells) == 1:
+            sentence = f"1 open body became a thin shell; --open solid fills it (its widest opening is at {place})."
+        else:
+            sentence = f"{len(shells)} open bodies became thin shells; --open solid fills them (one opens at {place})."
+        self.warnings.append(sentence)
+
+    def _place(self, point: FloatArray) -> str:
+        """A point of the frame, in the input's unit."""
+        return "(" + ", ".join(f"{x:.4g}" for x in self.frame.to_input(point)) + ")"
+
+    def report(self) -> tuple[BodyRepair, ...]:
+        """One record a body."""
+        faces_in = np.bincount(self.body_of_input, minlength=self.bodies)
+        rows = zip(self.step.tolist(), faces_in.tolist(), self.faces_out.tolist(), self.deviation.tolist(), strict=True)
+        return tuple(BodyRepair(i, STEPS[s], a, b, d) for i, (s, a, b, d) in enumerate(rows))
+
+    def doubted(self) -> IntArray:
+        """Bodies whose skin was chosen among faces that cross, and that leads away from them."""
+        return np.flatnonzero((self.step == STEPS.index("outer skin")) & (self.deviation > GAP))
+
+    def _note(self, bodies: IntArray, step: str) -> None:
+        """Record a step; a body keeps the one that changes it most."""
+        bodies = np.unique(bodies)
+        self.step[bodies] = np.maximum(self.step[bodies], STEPS.index(step))
+
+    @cached_property
+    def reach(self) -> Reach:
+        """Where a ball of radius `GAP` can go around the input."""
+        return Reach.of(self.input.vertices, self.input.faces, radius=GAP, resolution=self.resolution)
+
+    def _is_oriented(self, soup: Soup) -> bool:
+        """Whether every edge joins two faces that run along it in opposite directions, and no body is flat."""
+        if (soup.edges.valence != 2).any():
+            return False
+        forward = (soup.faces < np.roll(soup.faces, -1, axis=1)).ravel()
+        if (np.bincount(soup.edges.of_halfedge, forward) != 1).any():
+            return False
+        volume = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces))
+        return bool((np.abs(volume) > 2 * _FLAT * np.bincount(soup.body, soup.area)).all())
+
+    def _as_they_are(self, soup: Soup) -> list[tuple[Manifold, int]]:
+        """Take closed, oriented bodies over; what `_build` would come to, without looking at every side."""
+        volume = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces))
+        inward = volume < 0
+        faces = np.where(inward[soup.body, None], soup.faces[:, ::-1], soup.faces)
+        self._note(np.flatnonzero(inward), "reoriented")
+        self.faces_out = np.bincount(soup.body)
+        solids = [to_manifold(v, f) for v, f in split_labels(soup.vertices, faces, soup.body)]
+        return list(zip(solids, range(self.bodies), strict=True))
+
+    def _drop_hidden(self, soup: Soup) -> Soup:
+        """Drop faces that lie inside their own body, where that is what keeps the body from having an inside.
+
+        Where parts meet in faces that overlap without matching, the order of faces around an edge is undecided, and one
+        wrong guess joins the inside with the outside. The winding number does not mind.
+        """
+        crowded = np.zeros(self.bodies, dtype=bool)
+        crowded[soup.body[soup.at_valence(soup.edges.valence > 2)]] = True
+        if not crowded.any():
+            return soup
+        share = soup.sheet_share(self.bodies)
+        hidden = np.zeros(len(soup.faces), dtype=bool)
+        for body in np.flatnonzero(crowded & (share > FLAPS)):
+            poll_stop()
+            some = np.flatnonzero(soup.body == body)
+            hidden[some] = hidden_faces(soup.vertices, soup.faces[some])
+        if not hidden.any():
+            return soup
+        better = soup.only(~hidden).sheet_share(self.bodies) < share / 2
+        self._note(soup.body[hidden & better[soup.body]], "outer skin")
+        return soup.only(~hidden | ~better[soup.body])
+
+    def _cap(self, soup: Soup) -> Soup:
+        """Cap the bodies all of whose holes can honestly be capped."""
+        free = int((soup.edges.valence == 1).sum())
+        if free == 0 or free > MOST_FREE_EDGES or self.open_bodies == "thin":
+            return soup
+        fill = self.open_bodies == "solid"
+        closed = close_holes(soup, self.bodies, self.input, self._covers, GAP, HALF_THICKNESS / 2, fill)
+        if closed is None:
+            return soup
+        self.mouths = dict(zip(closed.hollow.tolist(), closed.mouths, strict=True))
+        self._note(closed.bodies, "capped")
+        self.by_room |= closed.by_room
+        if len(closed.far):
+            place = self._place(closed.where[closed.far.argmax()])
+            self.warnings.append(
+                f"Holes were closed although the caps lead up to {closed.far.max():.3f} (longest side = 2) away from "
+                f"the surface: the widest is at {place}."
+            )
+        return closed.soup
+
+    def _covers(self, points: FloatArray) -> BoolArray:
+        """Whether a ball can come to points; where cavities are kept, whatever leads there is open."""
+        return np.ones(len(points), dtype=bool) if self.keep_cavities else self.reach.covers(points)
+
+    def _build(self, soup: Soup) -> list[tuple[Manifold, int]]:
+        """Turn every body into closed solids; returns them, and the body each belongs to."""
+        sides = soup.sides
+        front, back = sides.label[0::2], sides.label[1::2]
+        none = _FLAT * sides.area
+        sheet_area = np.bincount(front, soup.area * sides.sheet, len(none))
+        # A component that is mostly sheet yet has negative volume joins the inside with the outside: its body is not a
+        # solid anywhere, so all of it becomes slabs (whose cavities are filled later).
+        leaky = soup.body_of_side()[(sides.volume < -none) & (4 * sheet_area > sides.area)]
+        solid = sides.volume > none
+        flat = np.abs(sides.volume) <= none
+        leaky = np.union1d(leaky, self.as_sheets)
+        sheet = (sides.sheet & (sides.volume >= -none)[front]) | (flat[front] & flat[back]) | np.isin(soup.body, leaky)
+        wall = (solid[front] | solid[back]) & ~sides.sheet & ~sheet
+
+        self._note(soup.body[solid[back] & wall], "reoriented")
+        self._note(soup.body[~wall & ~sheet], "outer skin")
+        self._note(soup.body[soup.at_valence(soup.edges.valence > 2)], "outer skin")
+        self._note(soup.body[sheet], "slab")
+        poll_stop()
+        mixed = np.bincount(soup.body[sheet], minlength=self.bodies) > 0
+        return self._skins(soup.only(~sheet & (wall | ~mixed[soup.body]))) + self._skins(soup.only(sheet).in_patches())
+
+    def _skins(self, soup: Soup) -> list[tuple[Manifold, int]]:
+        """Build the outer side components of a soup; sheets and flat bodies get thickness."""
+        if len(soup.faces) == 0:
+            return []
+        sides = soup.sides
+        front = sides.label[0::2]
+        none = _FLAT * sides.area
+        has_sheet, is_front = np.zeros((2, len(none)), dtype=bool)
+        has_sheet[front[sides.sheet]] = True
+        is_front[front] = True
+        # The two side components of a flat closed body are each other's mirror: build the fronts.
+        flat = (np.abs(sides.volume) <= none) & ~has_sheet & is_front
+        keep = (sides.volume > none) | (has_sheet & (sides.volume >= -none)) | flat
+        vertices, faces, label = self._skin(soup, keep, flat)
+        # Where parts touch along an edge, their common outer skin runs through the edge twice. Their insides are plain:
+        # build those, turned inside out, and let the union join them.
+        pinched = np.zeros(self.bodies, dtype=bool)
+        pinched[soup.body_of_side()[label[on_repeated_edge(faces, len(vertices))]]] = True
+        # Only where the skin is one piece: volumes of crossing pieces do not add up to those of the insides.
+        pinched &= np.bincount(soup.body_of_side(), sides.volume > 0, self.bodies) == 1
+        pinched[soup.body[sides.sheet]] = False
+        pinched = pinched[soup.body_of_side()]
+        if pinched.any():
+            rooms = pinched & (sides.volume < -none)
+            vertices, faces, label = self._skin(soup, (keep & ~pinched) | rooms, flat)
+            faces[rooms[label]] = faces[rooms[label]][:, ::-1]
+        built, count = np.unique(label, return_counts=True)
+        body = soup.body_of_side()[built]
+        solids = [to_manifold(v, f) for v, f in split_labels(vertices, faces, label)]
+        # Sheets narrower than they shall be thick can cross themselves, and come out inside out.
+        for i in np.flatnonzero(has_sheet[built] | flat[built]):
+            poll_stop()
+            if solids[i].volume() <= 0:
+                some = (sides.label.reshape(-1, 2) == built[i]).any(axis=1)
+                solids[i] = slab_of_faces(soup.vertices, soup.faces[some], HALF_THICKNESS)
+                count[i] = solids[i].num_tri()
+        np.add.at(self.faces_out, body, count)
+        return list(zip(solids, body.tolist(), strict=True))
+
+    @staticmethod
+    def _skin(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, IntArray, IntArray]:
+        """Build side components, sheets and flat ones with thickness."""
+        front = soup.sides.label[0::2]
+        thin = keep[front] & (soup.sides.sheet | flat[front])
+        return skin(soup.vertices, soup.faces, soup.sides, keep, thin, HALF_THICKNESS)
+
+    def _wrap(self, cells: BoolArray, error: float) -> Manifold:
+        """Return a solid of grid cells, drawn onto the input and simplified."""
+        return to_manifold(*self.reach.wrap(cells, self.input, HALF_THICKNESS)).simplify(error)
+
+    def _wrap_crowds(self, soup: Soup, parts: list[tuple[Manifold, int]]) -> list[tuple[Manifold, int]]:
+        """Wrap sheets by the hundred (leaves, feathers) as one body: what no ball of radius `GAP` can tell apart."""
+        is_slab = self.step == STEPS.index("slab")
+        boxes = np.array([part.bounding_box() for part, body in parts if is_slab[body]]).reshape(-1, 2, 3)
+        if is_slab.sum() <= _CROWD and _crossings(boxes) <= _CROSSINGS:
+            return parts
+        slabs = soup.only(is_slab[soup.body])
+        points, _ = spread_points(slabs.vertices, slabs.faces, self.reach.pitch / 2)
+        wrap = self._wrap(self.reach.around_points(points), HALF_THICKNESS / 2)
+        if wrap.volume() <= 0:
+            return parts
+        first = int(slabs.body.min())
+        self._note(slabs.body, "wrapped")
+        self.faces_out[is_slab] = 0
+        self.faces_out[first] = wrap.num_tri()
+        return [*((part, body) for part, body in parts if not is_slab[body]), (wrap, first)]
+
+    def _wrap_rooms(self, soup: Soup, parts: list[tuple[Manifold, int]]) -> None:
+        """Close rooms that sheets enclose but for gaps no ball of radius `GAP` passes."""
+        is_slab = self.step == STEPS.index("slab")
+        slabs = soup.only(is_slab[soup.body])
+        around = soup.only((is_slab | self.by_room)[soup.body])
+        if around.area.sum() < 4 * np.pi * GAP**2 or self.solid.is_empty():
+            return
+        rooms = self.reach.rooms_outside(SurfaceQuery(*to_arrays(self.solid)))
+        if len(rooms) == 0:
+            return
+        rooms = np.intersect1d(rooms, self.reach.rooms_near(spread_points(around.vertices, around.faces, GAP)[0]))
+        if len(rooms) == 0:
+            return
+        wrap = self._wrap(self.reach.around_rooms(rooms), _WRAP_ERROR)
+        # The wrap takes the place of the sheets that are nothing but walls of the rooms; the others stay slabs.
+        points, on = spread_points(slabs.vertices, slabs.faces, GAP)
+        wall = np.bincount(on, ~np.isin(self.reach.rooms_near(points), rooms), len(slabs.faces)) == 0
+        before = self.faces_out.copy()
+        self.faces_out[is_slab] = 0
+        others = [part for part, body in parts if not is_slab[body]]
+        united = unite([*others, *(part for part, _ in self._build(slabs.only(~wall))), wrap])
+        if united.volume() <= self.solid.volume():
+            self.faces_out = before
+            return
+        self.solid = united
+        wrapped = np.concatenate([slabs.body[wall], np.flatnonzero(self.by_room)])
+        self._note(wrapped, "wrapped")
+        self.faces_out[wrapped.min(initial=self.bodies - 1)] += wrap.num_tri()
+
+    def _measure(self) -> None:
+        """Record, for the bodies that were changed, how far the solid and the input lead from each other."""
+        if self.step.max() < STEPS.index("outer skin"):
+            return
+        solid = SurfaceQuery(*to_arrays(self.solid), self.input.threads)
+        poll_stop()
+        points, _ = spread_points(solid.vertices, solid.faces, GAP)
+        closest, face = self.input.closest(points)
+        np.maximum.at(self.deviation, self.body_of_input[face], np.linalg.norm(points - closest, axis=1))
+
+        changed = np.flatnonzero(self.step[self.body_of_input] >= STEPS.index("outer skin"))
+        points, on = spread_points(self.input.vertices, self.input.faces[changed], GAP)
+        distance = solid.distance(points)
+        lost = np.flatnonzero(distance > 2 * HALF_THICKNESS)
+        lost = lost[~solid.inside(points[lost])]
+        np.maximum.at(self.deviation, self.body_of_input[changed[on[lost]]], distance[lost])
+
+
+def _crossings(boxes: FloatArray) -> int:
+    """Count the pairs of boxes [N, 2, 3] that meet."""
+    lower, upper = boxes[:, 0], boxes[:, 1]
+    count = 0
+    for i in range(len(boxes)):
+        poll_stop()
+        count += int(((lower[i] <= upper[i + 1 :]) & (lower[i + 1 :] <= upper[i])).all(axis=1).sum())
+    return count

@@ -1,0 +1,233 @@
+"""Where a surface is open: flaps told from the surface they stick on, and the loops of edges around its holes.
+
+Input: a soup. Output: its flaps, and loops of vertices that run around holes; nothing is decided or changed here.
+
+Faces are mated across edges: two that share an edge, and of more than two those that continue each other best. Faces
+that mates connect are a patch, and all faces of a patch are wound alike, whatever the file says. A small patch that
+hangs on others by edges they mate without it is a flap: its free edges are no hole's. At a vertex where several holes
+meet, a loop turns from a free edge to the next one across the hole, so loops never run around faces that are there.
+An island that touches its hole's rim in a vertex becomes part of that hole's loop, which visits the vertex twice.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rlacd._native import poll_stop
+from rlacd.repair.distance import SurfaceQuery
+from rlacd.repair.soup import Soup, across
+from rlacd.repair.topology import BoolArray, IntArray, components
+from rlacd.solid.frame import FloatArray
+
+# A flap has at most this share of its body's area.
+_FLAP = 0.05
+
+_NEXT = np.array([1, 2, 0])
+
+
+@dataclass(frozen=True)
+class Rims:
+    """The holes of a soup.
+
+    Attributes
+    ----------
+    loops
+        The vertices around each hole, in the order in which the faces beside it run.
+    beside
+        For each loop and each of its edges, which leads to the next vertex, the face that has it.
+    normals
+        ``[F, 3]``, unit normals with which all faces of a patch are wound alike.
+    inverted
+        ``[F]``, whether a face is wound the other way.
+    flap
+        ``[F]``, whether a face belongs to a flap.
+    """
+
+    loops: list[IntArray]
+    beside: list[IntArray]
+    normals: FloatArray
+    inverted: BoolArray
+    flap: BoolArray
+
+
+def rims_of(soup: Soup) -> Rims:
+    """Find the flaps of a soup and the loops around its holes."""
+    mate = _mates(soup)
+    label = _sides(soup, mate)
+    one_sided = label[0::2] == label[1::2]
+    if one_sided.any():
+        # Where faces are missing, two that are left can be mated wrongly: go by the windings of the file there.
+        forward = (soup.faces < soup.faces[:, _NEXT]).ravel()
+        wrong = (mate >= 0) & np.repeat(one_sided, 3) & (forward == forward[mate])
+        mate[wrong] = -1
+        label = _sides(soup, mate)
+    low = np.minimum(label[0::2], label[1::2])
+    _, patch = np.unique(low, return_inverse=True)
+    flap = _flaps(soup, patch)
+    inverted = label[0::2] > low
+    a, b, c = (soup.vertices[soup.faces[:, i]] for i in range(3))
+    weighted = np.cross(b - a, c - a)
+    weighted[inverted] *= -1
+    inverted ^= _against_main(soup, patch, flap, weighted)
+    weighted[flap] = 0
+    normal_of_vertex: FloatArray = np.stack(
+        [np.bincount(soup.faces.ravel(), np.repeat(weighted[:, k], 3), len(soup.vertices)) for k in range(3)], axis=1
+    )
+    rim = np.flatnonzero((mate < 0) & np.repeat(~flap, 3))
+    tail, head = soup.faces.ravel()[rim], soup.faces[:, _NEXT].ravel()[rim]
+    swap = inverted[rim // 3]
+    fan = _fans(soup.faces, mate)
+    tail_fan, head_fan = fan[rim], fan[rim - rim % 3 + _NEXT[rim % 3]]
+    tail, head = np.where(swap, head, tail), np.where(swap, tail, head)
+    tail_fan, head_fan = np.where(swap, head_fan, tail_fan), np.where(swap, tail_fan, head_fan)
+    follower = _followers(soup.vertices, normal_of_vertex, tail, head, tail_fan, head_fan)
+    # What hangs between bodies is open where it is free; a hole is free all around, or nearly.
+    free = soup.edges.valence[soup.edges.of_halfedge[rim]] == 1
+    loops = [loop for loop in _cycles(follower) if len(loop) > 2 and 2 * free[loop].sum() > len(loop)]
+    normals = weighted / np.maximum(np.linalg.norm(weighted, axis=1, keepdims=True), np.finfo(float).tiny)
+    beside = [rim[loop] // 3 for loop in loops]
+    return Rims([tail[loop] for loop in loops], beside, normals, inverted, flap)
+
+
+def _sides(soup: Soup, mate: IntArray) -> IntArray:
+    """Return ``[2F]`` the component that the front and the back of every face belong to, joined across mates."""
+    mated = np.flatnonzero(mate >= 0)
+    forward = (soup.faces < soup.faces[:, _NEXT]).ravel()
+    # Mates wound alike run along their edge in opposite directions; then fronts continue fronts.
+    turned = forward[mated] == forward[mate[mated]]
+    front, other = 2 * (mated // 3), 2 * (mate[mated] // 3)
+    return components(
+        2 * len(soup.faces), np.concatenate([front, front + 1]), np.concatenate([other + turned, other + 1 - turned])
+    )[1]
+
+
+def _fans(faces: IntArray, mate: IntArray) -> IntArray:
+    """Return ``[3F]`` the fan of each corner: the corners around a vertex that mates connect."""
+    here = np.flatnonzero(mate >= 0)
+    there = mate[here]
+    here_next, there_next = (h - h % 3 + _NEXT[h % 3] for h in (here, there))
+    flat = faces.ravel()
+    same = flat[here] == flat[there]  # mates wound differently begin at the same vertex
+    begins, ends = np.where(same, there, there_next), np.where(same, there_next, there)
+    return components(3 * len(faces), np.concatenate([here, here_next]), np.concatenate([begins, ends]))[1]
+
+
+def _mates(soup: Soup) -> IntArray:
+    """Return ``[3F]`` the halfedge that continues each across its edge, -1 for none."""
+    edge = soup.edges
+    mate = np.full(3 * len(soup.faces), -1, dtype=np.int64)
+    order = np.argsort(edge.of_halfedge, kind="stable")
+    valence = edge.valence[edge.of_halfedge[order]]
+    two = order[valence == 2].reshape(-1, 2)
+    mate[two[:, 0]], mate[two[:, 1]] = two[:, 1], two[:, 0]
+    free = soup.at_valence(edge.valence == 1)
+    for number in np.unique(valence[valence > 2]).tolist():
+        around = order[valence == number].reshape(-1, number)
+        away = across(soup.vertices, soup.faces, around.ravel()).reshape(-1, number, 3)
+        folded = np.einsum("eik,ejk->eij", away, away)
+        # What hangs on the others has free edges.
+        hanging = 2 * free[around // 3]
+        folded += hanging[:, :, None] + hanging[:, None, :]
+        folded[:, np.arange(number), np.arange(number)] = np.inf
+        row = np.arange(len(around))
+        for _ in range(number // 2):
+            first, second = np.divmod(folded.reshape(len(around), -1).argmin(axis=1), number)
+            mate[around[row, first]], mate[around[row, second]] = around[row, second], around[row, first]
+            for gone in (first, second):
+                folded[row, gone, :] = np.inf
+                folded[row, :, gone] = np.inf
+    return mate
+
+
+def _flaps(soup: Soup, patch: IntArray) -> BoolArray:
+    """Return ``[F]`` whether a face belongs to a small patch with free edges that hangs on other patches."""
+    count = int(patch.max(initial=-1)) + 1
+    hangs, free = (
+        np.bincount(patch[soup.at_valence(some)], minlength=count) > 0
+        for some in (soup.edges.valence > 2, soup.edges.valence == 1)
+    )
+    small = np.bincount(patch, soup.area, count)[patch] <= _FLAP * np.bincount(soup.body, soup.area)[soup.body]
+    return np.asarray(small & hangs[patch] & free[patch])
+
+
+def _against_main(soup: Soup, patch: IntArray, left_out: BoolArray, weighted: FloatArray) -> BoolArray:
+    """Return ``[F]`` which patches are wound against the largest one that they touch in a vertex; turns `weighted`.
+
+    What lies inside has the greater winding number, so a patch is wound like the rest if its back has.
+    """
+    turned = np.zeros(len(soup.faces), dtype=bool)
+    count = int(patch.max(initial=-1)) + 1
+    corner = np.repeat(np.arange(len(soup.faces)), 3)
+    _, cluster = components(len(soup.faces) + len(soup.vertices), corner, len(soup.faces) + soup.faces.ravel())
+    area = np.bincount(patch, np.where(left_out, 0, soup.area), count)
+    cluster_of = np.zeros(count, dtype=np.int64)
+    cluster_of[patch] = cluster[: len(soup.faces)]
+    largest = np.lexsort((np.arange(count), -area, cluster_of))
+    main = np.zeros(count, dtype=bool)
+    main[largest[np.unique(cluster_of[largest], return_index=True)[1]]] = True
+    island = np.flatnonzero(~main[patch] & ~left_out)
+    if len(island) == 0:
+        return turned
+    # The largest face of each island stands for it.
+    island = island[np.lexsort((-soup.area[island], patch[island]))]
+    island = island[np.unique(patch[island], return_index=True)[1]]
+    there = main[patch] & ~left_out
+    corners = soup.faces[there].copy()
+    a, b, c = (soup.vertices[corners[:, i]] for i in range(3))
+    flipped = np.einsum("ij,ij->i", np.cross(b - a, c - a), weighted[there]) < 0
+    corners[flipped] = corners[flipped, ::-1]
+    query = SurfaceQuery(soup.vertices, corners)
+    middle = soup.vertices[soup.faces[island]].mean(axis=1)
+    step = weighted[island] / np.maximum(np.sqrt(2 * soup.area[island]), np.finfo(float).tiny)[:, None] / 2
+    wrong = query.winding(middle + step) > query.winding(middle - step)
+    turned = np.isin(patch, patch[island[wrong]])
+    weighted[turned] *= -1
+    return turned
+
+
+def _followers(
+    vertices: FloatArray, normals: FloatArray, tail: IntArray, head: IntArray, tail_fan: IntArray, head_fan: IntArray
+) -> IntArray:
+    """Return ``[N]`` the free edge that continues each at its head, -1 for none.
+
+    Seen from outside, what follows a fan counter-clockwise around a vertex is a hole, then the next fan.
+    """
+    follower = np.full(len(tail), -1, dtype=np.int64)
+    ends, begins = np.argsort(head, kind="stable"), np.argsort(tail, kind="stable")
+    vertex = np.unique(head)
+    first_in, last_in = (np.searchsorted(head[ends], vertex, side=side) for side in ("left", "right"))
+    first_out, last_out = (np.searchsorted(tail[begins], vertex, side=side) for side in ("left", "right"))
+    single = (last_in - first_in == 1) & (last_out - first_out == 1)
+    follower[ends[first_in[single]]] = begins[first_out[single]]
+    for i in np.flatnonzero(~single & (last_out > first_out)):
+        poll_stop()
+        arriving, leaving = ends[first_in[i] : last_in[i]], begins[first_out[i] : last_out[i]]
+        here, axis = vertices[vertex[i]], normals[vertex[i]]
+        axis = axis / max(float(np.linalg.norm(axis)), np.finfo(float).tiny)
+        came, goes = vertices[tail[arriving]] - here, vertices[head[leaving]] - here
+        flat = came - np.outer(came @ axis, axis)
+        turn = np.arctan2(np.cross(axis, flat) @ goes.T, flat @ goes.T) % (2 * np.pi)
+        turn[head_fan[arriving][:, None] == tail_fan[leaving]] += 2 * np.pi  # all the way around
+        for _ in range(min(turn.shape)):
+            a, b = np.unravel_index(turn.argmin(), turn.shape)
+            follower[arriving[a]] = leaving[b]
+            turn[a], turn[:, b] = np.inf, np.inf
+    return follower
+
+
+def _cycles(follower: IntArray) -> list[IntArray]:
+    """Return the cycles of a partial permutation."""
+    seen = [False] * len(follower)
+    step = follower.tolist()
+    cycles: list[IntArray] = []
+    for start in range(len(step)):
+        walk, at = [], start
+        while at >= 0 and not seen[at]:
+            seen[at] = True
+            walk.append(at)
+            at = step[at]
+        if walk and at == start:
+            cycles.append(np.array(walk, dtype=np.int64))
+    return cycles

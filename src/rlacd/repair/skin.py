@@ -1,0 +1,153 @@
+"""From side components to closed triangle meshes: solids exactly as they are, sheets as thin slabs.
+
+Input: a soup, its `Sides`, and the components to build. Output: one closed, oriented 2-manifold whose edges all have
+exactly two faces. Every fan of corners that meets at a vertex within one region of space becomes a vertex of its own,
+so surfaces that merely touch in a vertex or an edge come apart. Fans that see a sheet are moved `half_thickness` away
+from it; the free edges of sheets get a rim.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rlacd._native import poll_stop
+from rlacd.repair.topology import BoolArray, IntArray, Sides, components, facing_sides
+from rlacd.solid.frame import FloatArray
+
+# A sharp fold would push its vertex far out to keep the distance to both flanks; stop at this multiple.
+_LONGEST_MITER = 2.0
+
+
+def skin(
+    vertices: FloatArray, faces: IntArray, sides: Sides, keep: BoolArray, thin: BoolArray, half_thickness: float
+) -> tuple[FloatArray, IntArray, IntArray]:
+    """Build the surfaces of chosen side components.
+
+    Parameters
+    ----------
+    vertices, faces
+        The soup, ``[V, 3]`` and ``[F, 3]``.
+    sides
+        Its sides.
+    keep
+        ``[C]``, the side components to build.
+    thin
+        ``[F]``, the faces without an inside; their sides are moved outward.
+    half_thickness
+        By how much, in the unit of the vertices.
+
+    Returns
+    -------
+    tuple
+        New vertices ``[N, 3]``, faces ``[M, 3]`` and the side component ``[M]`` of each new face.
+    """
+    kept = np.flatnonzero(keep[sides.label])  # sides
+    corner_slot = np.full(6 * len(faces), -1, dtype=np.int64)
+    slots = (3 * kept[:, None] + np.arange(3)).ravel()
+    corner_slot[slots] = np.arange(len(slots))
+
+    first, second = sides.wedges.T
+    side_first, side_second = facing_sides(faces, sides.wedges)
+    used = keep[sides.label[side_first]]
+    first, second, side_first, side_second = first[used], second[used], side_first[used], side_second[used]
+    rim = first == second
+
+    def corners_at(halfedge: IntArray, side: IntArray) -> tuple[IntArray, IntArray]:
+        """Slots of the corners of `side` at the smaller and at the larger end of `halfedge`."""
+        here, there = halfedge % 3, (halfedge + 1) % 3
+        there = (halfedge % 3 + 1) % 3
+        face = halfedge // 3
+        forward = faces[face, here] < faces[face, there]
+        low, high = np.where(forward, here, there), np.where(forward, there, here)
+        return corner_slot[3 * side + low], corner_slot[3 * side + high]
+
+    low_first, high_first = corners_at(first, side_first)
+    low_second, high_second = corners_at(second, side_second)
+    inner = ~rim
+    number, fan = components(
+        len(slots),
+        np.concatenate([low_first[inner], high_first[inner]]),
+        np.concatenate([low_second[inner], high_second[inner]]),
+    )
+
+    face_of_side = kept // 2
+    back = kept % 2 == 1
+    corner_vertex = faces[face_of_side].ravel()
+    base = np.empty(number, dtype=np.int64)
+    base[fan] = corner_vertex
+    positions = vertices[base].copy()
+    poll_stop()
+    positions += half_thickness * _fan_offsets(vertices, faces[face_of_side], back, thin[face_of_side], fan, number)
+
+    triangles = fan.reshape(-1, 3).copy()
+    triangles[back] = triangles[back][:, ::-1]
+    label = sides.label[kept]
+    if not rim.any():
+        return positions, triangles, label
+
+    # A rim edge from low to high: its face shows one side to the wedge's beginning and the other to its end.
+    low_a, high_a, low_b, high_b = (fan[s[rim]] for s in (low_first, high_first, low_second, high_second))
+    rim_label = sides.label[side_first[rim]]
+    quads = [np.stack([high_a, low_a, low_b], axis=1), np.stack([high_a, low_b, high_b], axis=1)]
+    caps, cap_label, centers = _rim_caps(
+        np.concatenate([low_b, high_a]), np.concatenate([low_a, high_b]), np.tile(rim_label, 2), number
+    )
+    rim_faces = np.concatenate([*quads, caps])
+    rim_faces_label = np.concatenate([rim_label, rim_label, cap_label])
+    real = (
+        (rim_faces[:, 0] != rim_faces[:, 1])
+        & (rim_faces[:, 1] != rim_faces[:, 2])
+        & (rim_faces[:, 2] != rim_faces[:, 0])
+    )
+    return (
+        np.concatenate([positions, vertices[base[centers]]]),
+        np.concatenate([triangles, rim_faces[real]]),
+        np.concatenate([label, rim_faces_label[real]]),
+    )
+
+
+def _fan_offsets(
+    vertices: FloatArray, corners: IntArray, back: BoolArray, thin: BoolArray, fan: IntArray, number: int
+) -> FloatArray:
+    """Direction ``[number, 3]`` that leaves every face of a fan at speed 1; zero for fans that see no sheet."""
+    a, b, c = (vertices[corners[:, i]] for i in range(3))
+    normal = np.cross(b - a, c - a)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+    normal[back] *= -1
+    weight = np.empty((len(corners), 3))
+    for i, (p, q, r) in enumerate(((a, b, c), (b, c, a), (c, a, b))):
+        along, across = q - p, r - p
+        weight[:, i] = np.arctan2(np.linalg.norm(np.cross(along, across), axis=1), np.einsum("ij,ij->i", along, across))
+    corner_normal = np.repeat(normal, 3, axis=0)
+    total = np.stack([np.bincount(fan, weight.ravel() * corner_normal[:, k], number) for k in range(3)], axis=1)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    mean = np.where(length > 1e-6, total / np.maximum(length, np.finfo(float).tiny), 0.0)
+    # The miter: far enough along the mean normal to be at distance 1 from the steepest face that has a direction.
+    cosine = np.where(weight.ravel() > 0, np.einsum("ij,ij->i", corner_normal, mean[fan]), 1.0)
+    steepest = np.ones(number)
+    np.minimum.at(steepest, fan, cosine)
+    sees_sheet = np.bincount(fan, np.repeat(thin, 3), number) > 0
+    speed = np.where(sees_sheet, 1 / np.maximum(steepest, 1 / _LONGEST_MITER), 0.0)
+    offsets: FloatArray = mean * speed[:, None]
+    return offsets
+
+
+def _rim_caps(tail: IntArray, head: IntArray, label: IntArray, number: int) -> tuple[IntArray, IntArray, IntArray]:
+    """Close the ends of rims where three or more free edges meet in a vertex.
+
+    Each rim quad leaves a link between two fans at both of its ends. Two links between the same two fans match each
+    other; longer cycles bound a small polygon, closed here with a fan of triangles around a new central vertex.
+
+    Returns the triangles, their labels, and for every central vertex (numbered from `number` on) a fan at its place.
+    """
+    linked = tail != head
+    tail, head, label = tail[linked], head[linked], label[linked]
+    _, cycle = components(number, tail, head)
+    cycle = cycle[tail]
+    # Matched pairs need no cap: link (a, b) with (b, a).
+    key, mate = tail * number + head, head * number + tail
+    unmatched = ~np.isin(key, mate)
+    tail, head, label, cycle = tail[unmatched], head[unmatched], label[unmatched], cycle[unmatched]
+    _, first, center = np.unique(cycle, return_index=True, return_inverse=True)
+    caps = np.stack([tail, head, number + center.reshape(-1)], axis=1) if len(tail) else np.empty((0, 3), np.int64)
+    return caps, label, tail[first] if len(tail) else np.empty(0, np.int64)

@@ -1,0 +1,134 @@
+"""The faces of an input on their way through repair, and what is asked of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from rlacd.repair.distance import SurfaceQuery
+from rlacd.repair.topology import (
+    BoolArray,
+    Edges,
+    IntArray,
+    Sides,
+    components,
+    face_areas,
+    sides_of,
+    signed_tetrahedra,
+)
+from rlacd.solid.frame import FloatArray
+
+NO_AREA = 1e-14
+"""Faces below this area, in the frame, have none."""
+
+# Sheets of a body are thickened apart if they are at most this many, of at most this many faces in all.
+_MOST_PATCHES, _MOST_PATCHED = 100, 4000
+# Cosine of the angle between two faces below which a sheet is folded onto itself (20 degrees).
+_FOLD = 0.94
+# How far beside a face the winding number is asked for.
+_BESIDE = 2e-4
+
+
+@dataclass(frozen=True)
+class Soup:
+    """Faces on their way through the steps; `body` numbers the body of each, from the input to the end.
+
+    The windings of `trusted` faces have been looked into and put right.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    body: IntArray
+    trusted: BoolArray | None = None
+
+    @cached_property
+    def edges(self) -> Edges:
+        """Which faces meet in which edge."""
+        return Edges.of(self.faces, len(self.vertices))
+
+    @cached_property
+    def sides(self) -> Sides:
+        """The components that the sides of the faces form."""
+        return sides_of(self.vertices, self.faces, self.edges, self.trusted)
+
+    @cached_property
+    def area(self) -> FloatArray:
+        """Areas of the faces [F]."""
+        return face_areas(self.vertices, self.faces)
+
+    def at_valence(self, marked: BoolArray) -> BoolArray:
+        """Return ``[F]`` whether a face has an edge of marked valence, given ``[E]`` marks."""
+        return np.asarray(marked[self.edges.of_halfedge].reshape(-1, 3).any(axis=1))
+
+    def body_of_side(self) -> IntArray:
+        """Return ``[C]`` the body of each side component."""
+        result = np.zeros(len(self.sides.volume), dtype=np.int64)
+        result[self.sides.label] = np.repeat(self.body, 2)
+        return result
+
+    def sheet_share(self, bodies: int, flap: BoolArray | bool = False) -> FloatArray:
+        """Return ``[bodies]`` the share of the area of each body that has no inside and is no flap."""
+        sheet = np.bincount(self.body, self.area * (self.sides.sheet & ~np.asarray(flap)), bodies)
+        share: FloatArray = sheet / np.maximum(np.bincount(self.body, self.area, bodies), NO_AREA)
+        return share
+
+    def in_patches(self) -> Soup:
+        """The same faces, come apart along folds and along every edge that more than two of them share.
+
+        Sheets that meet in an edge are thickened one by one and united afterwards: where all corners of a sheet lie on
+        others, or face both ways, no vertex would be left to give it thickness.
+        """
+        halfedge = np.argsort(self.edges.of_halfedge, kind="stable")
+        halfedge = halfedge[self.edges.valence[self.edges.of_halfedge[halfedge]] == 2].reshape(-1, 2)
+        away = [across(self.vertices, self.faces, some) for some in halfedge.T]
+        halfedge = halfedge[np.einsum("ij,ij->i", *away) < _FOLD]
+        count, patch = components(len(self.faces), halfedge[:, 0] // 3, halfedge[:, 1] // 3)
+        # Layers of thousands of faces on each other take minutes to unite: there, thin spots are the lesser evil.
+        patches = np.unique(np.stack([self.body, patch], axis=1), axis=0)[:, 0]
+        tangled = (np.bincount(patches)[self.body] > _MOST_PATCHES) | (
+            np.bincount(self.body)[self.body] > _MOST_PATCHED
+        )
+        patch = np.where(tangled, count + self.body, patch)
+        count += int(self.body.max(initial=0)) + 1
+        key = self.faces * count + patch[:, None]
+        distinct, corner = np.unique(key, return_inverse=True)
+        return Soup(self.vertices[distinct // max(count, 1)], corner.reshape(-1, 3), self.body)
+
+    def only(self, keep: BoolArray) -> Soup:
+        """The marked faces."""
+        trusted = None if self.trusted is None else self.trusted[keep]
+        return Soup(self.vertices, self.faces[keep], self.body[keep], trusted)
+
+
+def across(vertices: FloatArray, faces: IntArray, halfedges: IntArray) -> FloatArray:
+    """Return the unit direction ``[N, 3]`` in which each halfedge's face leads away from it."""
+    face, corner = halfedges // 3, halfedges % 3
+    a, b, c = (vertices[faces[face, (corner + i) % 3]] for i in range(3))
+    along = (b - a) / np.maximum(np.linalg.norm(b - a, axis=1, keepdims=True), np.finfo(float).tiny)
+    away = c - a - np.einsum("ij,ij->i", c - a, along)[:, None] * along
+    return np.asarray(away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), np.finfo(float).tiny))
+
+
+def on_repeated_edge(faces: IntArray, count: int) -> BoolArray:
+    """Return ``[F]`` which faces have a directed edge that another face has too."""
+    key = (faces * count + np.roll(faces, -1, axis=1)).ravel()
+    _, inverse, number = np.unique(key, return_inverse=True, return_counts=True)
+    result: BoolArray = (number[inverse.reshape(-1, 3)] > 1).any(axis=1)
+    return result
+
+
+def hidden_faces(vertices: FloatArray, faces: IntArray) -> BoolArray:
+    """Return ``[F]`` which faces of one body it winds around on both sides."""
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    normal = np.cross(b - a, c - a)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+    middle = (a + b + c) / 3
+    query = SurfaceQuery(vertices, faces)
+    beside = np.stack([query.winding(middle + _BESIDE * normal), query.winding(middle - _BESIDE * normal)])
+    if signed_tetrahedra(vertices, faces).sum() < 0:
+        beside = -beside
+    # On a skin the sides have 0 and 1; a wall inside has 0.5 and 1.5. A skin that lies double has 0 and 2.
+    result: BoolArray = (beside.mean(axis=0) > 0.75) & (beside.min(axis=0) > 0.25)
+    return result

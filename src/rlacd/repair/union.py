@@ -1,0 +1,175 @@
+"""From closed meshes to one solid: overlapping ones united, enclosed cavities filled."""
+
+from __future__ import annotations
+
+import manifold3d
+import numpy as np
+from manifold3d import Error, Manifold, Mesh64, OpType
+
+from rlacd import _native
+from rlacd._native import poll_stop
+from rlacd.repair.topology import IntArray, face_areas, signed_tetrahedra
+from rlacd.solid.boolean_time import require_time_for
+from rlacd.solid.frame import FloatArray
+
+# Where manifold3d moves faces by more than `_MOVED` on average, corners are moved by less than `_HAIR` (frame units).
+_MOVED, _HAIR = 1e-5, 1e-9
+_HAIRS = 4  # one in a hundred leaves two faces so nearly in one plane that it does not help
+
+# Uniting takes time per mesh even where nothing overlaps; above this many, meshes are put side by side instead.
+MOST_UNITED = 4000
+
+# So many triangles are united in one go; between two goes the work may be stopped.
+_AT_ONCE = 20_000
+
+
+def to_manifold(vertices: FloatArray, faces: IntArray) -> Manifold:
+    """Return the solid a closed, oriented mesh bounds; the solid is empty if the mesh is not closed.
+
+    Where a face is folded back onto its neighbour, in one plane, manifold3d takes it for degenerate and flips its edges
+    and those around it: surfaces came back up to 0.1 away. Such a solid is built again, each corner moved by a hair, so
+    that no two faces lie in one plane.
+    """
+    manifold = _taken_over(vertices, faces)
+    if manifold.is_empty():
+        return manifold
+    moved = _moved(manifold, vertices, faces)
+    for seed in range(_HAIRS):
+        if moved <= _MOVED:
+            break
+        hair = np.random.default_rng(seed).uniform(-_HAIR / 2, _HAIR / 2, np.shape(vertices))
+        other = _taken_over(vertices + hair, faces)
+        if not other.is_empty() and (less := _moved(other, vertices, faces)) < moved:
+            manifold, moved = other, less
+    return manifold
+
+
+def _taken_over(vertices: FloatArray, faces: IntArray) -> Manifold:
+    require_time_for(len(faces))
+    mesh = Mesh64(np.ascontiguousarray(vertices, dtype=np.float64), np.ascontiguousarray(faces, dtype=np.uint64))
+    manifold = Manifold(mesh)
+    return manifold if manifold.status() == Error.NoError else Manifold()
+
+
+def _moved(manifold: Manifold, vertices: FloatArray, faces: IntArray) -> float:
+    """How far manifold3d moved the faces, on average, as far as the volume tells."""
+    area = float(face_areas(vertices, faces).sum())
+    return abs(manifold.volume() - float(signed_tetrahedra(vertices, faces).sum())) / area if area > 0 else 0.0
+
+
+def to_arrays(manifold: Manifold) -> tuple[FloatArray, IntArray]:
+    """Return vertices float64 ``[V, 3]`` and faces int64 ``[F, 3]`` of a solid."""
+    mesh = manifold.to_mesh64()
+    return np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64)
+
+
+def split_labels(vertices: FloatArray, faces: IntArray, label: IntArray) -> list[tuple[FloatArray, IntArray]]:
+    """Take a mesh apart into the faces of each label, in ascending order of the labels."""
+    order = np.argsort(label, kind="stable")
+    cuts = np.flatnonzero(np.diff(label[order])) + 1
+    parts = []
+    for some in np.split(order, cuts) if len(order) else []:
+        poll_stop()
+        used, index = np.unique(faces[some], return_inverse=True)
+        parts.append((vertices[used], index.reshape(-1, 3).astype(np.int64)))
+    return parts
+
+
+def unite(solids: list[Manifold], *, keep_cavities: bool = False) -> Manifold:
+    """Unite solids and fill the cavities nothing can reach."""
+    solids = [s for s in solids if not s.is_empty()]
+    if not solids:
+        return Manifold()
+    if len(solids) > MOST_UNITED:
+        return Manifold.compose(solids)
+    united = _united(solids)
+    # More cavities than solid are none: shells that came out inside out.
+    return united if keep_cavities and united.volume() > 0 else _without_cavities(united)
+
+
+def unite_around_cavities(solids: list[Manifold], inward: list[bool]) -> Manifold:
+    """Unite solids but for the cavities that some of them bound, and keep what stands in a cavity.
+
+    Parameters
+    ----------
+    solids : list of Manifold
+        Each with positive volume.
+    inward : list of bool
+        Which of them the input winds the other way round. A solid is a cavity if it is wound otherwise than the
+        outermost solid around it.
+    """
+    kept = [i for i, solid in enumerate(solids) if not solid.is_empty()]
+    if len({inward[i] for i in kept}) < 2:
+        return unite(solids, keep_cavities=True)
+    around = {kept[i]: [kept[j] for j in others] for i, others in enumerate(_around([solids[i] for i in kept]))}
+    outermost = {i: max(around[i], key=lambda j: solids[j].volume(), default=i) for i in kept}
+    cavities = {i for i in kept if inward[i] != inward[outermost[i]]}
+    inside: dict[int, list[Manifold]] = {j: [solids[i] for i in sorted(cavities) if j in around[i]] for j in kept}
+    hollow = [solids[j] - unite(inside[j]) if inside[j] else solids[j] for j in kept if j not in cavities]
+    return unite(hollow, keep_cavities=True)
+
+
+def _around(solids: list[Manifold]) -> list[list[int]]:
+    """Which solids each solid lies in, if it crosses none."""
+    boxes = np.reshape([solid.bounding_box() for solid in solids], (-1, 2, 3))
+    around: list[list[int]] = [[] for _ in solids]
+    for j, solid in enumerate(solids):
+        poll_stop()
+        inner = (boxes[:, 0] >= boxes[j, 0]).all(axis=1) & (boxes[:, 1] <= boxes[j, 1]).all(axis=1)
+        inner[j] = False
+        if not inner.any():
+            continue
+        vertices, faces = to_arrays(solid)
+        surface = _native.Surface(np.ascontiguousarray(vertices), np.ascontiguousarray(faces, dtype=np.int32))
+        candidates = np.flatnonzero(inner)
+        points = np.stack([to_arrays(solids[i])[0][0] for i in candidates])
+        for i in candidates[surface.winding(points) > 0.5]:
+            around[i].append(j)
+    return around
+
+
+def _without_cavities(solid: Manifold) -> Manifold:
+    shells = solid.decompose()
+    outer = [s for s in shells if s.volume() > 0]
+    if len(outer) == len(shells) or not outer:
+        return solid
+    # What lay inside a cavity overlaps the filled solid now.
+    return _united(outer)
+
+
+def _united(solids: list[Manifold]) -> Manifold:
+    """Unite solids, neighbours in the list first, and what comes of them."""
+    while len(solids) > 1:
+        united, group, triangles = [], [solids[0]], solids[0].num_tri()
+        for solid in solids[1:]:
+            if len(group) > 1 and triangles + solid.num_tri() > _AT_ONCE:
+                united.append(_united_at_once(group, triangles))
+                group, triangles = [], 0
+            group.append(solid)
+            triangles += solid.num_tri()
+        solids = [*united, _united_at_once(group, triangles)]
+    return solids[0]
+
+
+def _united_at_once(solids: list[Manifold], triangles: int) -> Manifold:
+    if len(solids) == 1:
+        return solids[0]
+    require_time_for(triangles)
+    return Manifold.batch_boolean(solids, OpType.Add)
+
+
+def hull_of_points(points: FloatArray, half_thickness: float) -> Manifold:
+    """Return the hull of points ``[N, 3]``, given thickness along the axes in which they have none."""
+    poll_stop()
+    points = np.unique(points, axis=0)
+    middle = points.mean(axis=0)
+    _, _, axes = np.linalg.svd(np.concatenate([points - middle, np.zeros((3, 3))]), full_matrices=False)
+    extent = np.ptp((points - middle) @ axes.T, axis=0)
+    for axis in axes[extent < half_thickness]:
+        points = np.concatenate([points - half_thickness * axis, points + half_thickness * axis])
+    return manifold3d.Manifold.hull_points(points)
+
+
+def slab_of_faces(vertices: FloatArray, faces: IntArray, half_thickness: float) -> Manifold:
+    """Return the union of triangles that each are given thickness."""
+    return unite([hull_of_points(vertices[face], half_thickness) for face in faces])

@@ -1,0 +1,172 @@
+"""Which space a ball of given radius can reach from outside, on a voxel grid, and a closed wrap of what it cannot.
+
+Input: a surface in the normalised frame. The reachable space is the union of all balls that touch no face and can roll
+in from infinity; the rest (the surface's closing) is what a collision with anything larger than the ball sees. Every
+point of its boundary is within about 1.4 radii of the surface.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from rlacd._native import poll_stop
+from rlacd.repair.distance import SurfaceQuery, spread_points
+from rlacd.repair.topology import BoolArray, IntArray
+from rlacd.solid.frame import FloatArray
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Reachable space on a grid of cubic cells.
+
+    Attributes
+    ----------
+    origin
+        ``[3]``, the centre of cell (0, 0, 0).
+    pitch
+        Edge length of a cell.
+    radius
+        Radius of the ball.
+    reached
+        ``[X, Y, Z]``, cells the ball can cover.
+    depth
+        ``[X, Y, Z]``, distance to the nearest cell of the surface.
+    room
+        ``[X, Y, Z]``, label of every connected set of cells where the ball fits but which it cannot enter; 0 elsewhere.
+    """
+
+    origin: FloatArray
+    pitch: float
+    radius: float
+    reached: BoolArray
+    depth: FloatArray
+    room: IntArray
+
+    @classmethod
+    def of(cls, vertices: FloatArray, faces: IntArray, radius: float, resolution: int) -> Reach:
+        """Roll a ball around a surface; the longest side of the frame is `resolution` cells."""
+        pitch = 2.0 / resolution
+        points, _ = spread_points(vertices, faces, pitch / 2)
+        margin = int(np.ceil(radius / pitch)) + 3
+        origin = points.min(axis=0) - margin * pitch
+        cell = np.rint((points - origin) / pitch).astype(np.int64)
+        occupied = np.zeros(cell.max(axis=0) + 1 + margin, dtype=bool)
+        occupied[tuple(cell.T)] = True
+        poll_stop()
+        depth = ndimage.distance_transform_edt(~occupied) * pitch
+        poll_stop()
+        label, _ = ndimage.label(depth > radius)
+        outside = label == label[0, 0, 0]
+        poll_stop()
+        reached = ndimage.distance_transform_edt(~outside) * pitch <= radius
+        room = np.where(outside, 0, label)
+        return cls(origin, pitch, radius, reached, depth, room)
+
+    def covers(self, points: FloatArray) -> BoolArray:
+        """Return ``[N]`` whether the ball can come to each point; points off the grid it can."""
+        cell = np.rint((points - self.origin) / self.pitch).astype(np.int64)
+        inside = ((cell >= 0) & (cell < self.reached.shape)).all(axis=1)
+        result = np.ones(len(points), dtype=bool)
+        result[inside] = self.reached[tuple(cell[inside].T)]
+        return result
+
+    def rooms_outside(self, solid: SurfaceQuery) -> IntArray:
+        """Return the labels of the rooms whose deepest cell lies outside a solid."""
+        labels = np.unique(self.room)
+        labels = labels[labels > 0]
+        if len(labels) == 0:
+            return labels
+        deepest = ndimage.maximum_position(self.depth, self.room, labels)
+        centers = self.origin + np.array(deepest) * self.pitch
+        return labels[~solid.inside(centers)]
+
+    def rooms_near(self, points: FloatArray) -> IntArray:
+        """Return ``[N]`` the label of a room whose walls each point may belong to, 0 for none."""
+        reach = self.radius + 2 * self.pitch
+        away, index = ndimage.distance_transform_edt(self.room == 0, return_indices=True)
+        cell = np.clip(np.rint((points - self.origin) / self.pitch).astype(np.int64), 0, np.array(self.room.shape) - 1)
+        at = tuple(cell.T)
+        nearest = self.room[tuple(index[(slice(None), *at)])]
+        label: IntArray = np.where(away[at] * self.pitch <= reach, nearest, 0)
+        return label
+
+    def around_rooms(self, rooms: IntArray) -> BoolArray:
+        """Return ``[X, Y, Z]`` the unreachable cells of some rooms and of their walls."""
+        distance = ndimage.distance_transform_edt(~np.isin(self.room, rooms)) * self.pitch
+        cells: BoolArray = (distance <= self.radius + 2 * self.pitch) & ~self.reached
+        return cells
+
+    def around_points(self, points: FloatArray) -> BoolArray:
+        """Return ``[X, Y, Z]`` the unreachable cells at and between some points."""
+        mark = np.zeros(self.reached.shape, dtype=bool)
+        mark[tuple(np.rint((points - self.origin) / self.pitch).astype(np.int64).T)] = True
+        cells: BoolArray = (ndimage.distance_transform_edt(~mark) * self.pitch <= self.radius) & ~self.reached
+        return cells
+
+    def wrap(self, cells: BoolArray, surface: SurfaceQuery, thickness: float) -> tuple[FloatArray, IntArray]:
+        """Return the closed surface of a set of cells, drawn onto a surface where it is near.
+
+        Corners of cells move to `thickness` in front of the closest point of the surface, seen from where they were; so
+        a wrap around a single sheet keeps two sides. Corners farther than two cells away span a gap and are smoothed.
+        """
+        corners, quads = _boundary_squares(cells)
+        points = self.origin + (corners - 0.5) * self.pitch
+        closest, _ = surface.closest(points)
+        away = points - closest
+        distance = np.linalg.norm(away, axis=1)
+        attached = distance <= 2 * self.pitch
+        step = thickness / np.maximum(distance, np.finfo(float).tiny)
+        points[attached] = (closest + np.minimum(step, 1)[:, None] * away)[attached]
+        _smooth(points, quads, ~attached)
+        return points, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def _boundary_squares(solid: BoolArray) -> tuple[FloatArray, IntArray]:
+    """Return corner coordinates ``[N, 3]`` (cell (0, 0, 0) spans 0 to 1), outward squares ``[Q, 4]`` of a cell set."""
+    shape = np.array(solid.shape) + 1
+    squares = []
+    for axis in range(3):
+        u, v = (axis + 1) % 3, (axis + 2) % 3
+        for direction in (1, -1):
+            beyond = np.zeros_like(solid)
+            to: list[slice] = [slice(None)] * 3
+            frm: list[slice] = [slice(None)] * 3
+            to[axis], frm[axis] = (
+                (slice(None, -1), slice(1, None)) if direction == 1 else (slice(1, None), slice(None, -1))
+            )
+            beyond[tuple(to)] = solid[tuple(frm)]
+            cells = np.argwhere(solid & ~beyond)
+            cells[:, axis] += direction == 1
+            ring = [(0, 0), (1, 0), (1, 1), (0, 1)]
+            if direction == -1:
+                ring.reverse()
+            loop = []
+            for du, dv in ring:
+                corner = cells.copy()
+                corner[:, u] += du
+                corner[:, v] += dv
+                loop.append(np.ravel_multi_index(tuple(corner.T), tuple(shape)))
+            squares.append(np.stack(loop, axis=1))
+    flat = np.concatenate(squares)
+    used, index = np.unique(flat, return_inverse=True)
+    corners = np.stack(np.unravel_index(used, tuple(shape)), axis=1).astype(np.float64)
+    return corners, index.reshape(-1, 4)
+
+
+def _smooth(points: FloatArray, quads: IntArray, free: BoolArray, rounds: int = 20) -> None:
+    """Pull the free points to the mean of their neighbours, in place; the others stay."""
+    if not free.any():
+        return
+    a = quads.ravel()
+    b = quads[:, [1, 2, 3, 0]].ravel()
+    tail, head = np.concatenate([a, b]), np.concatenate([b, a])
+    some = free[tail]
+    tail, head = tail[some], head[some]
+    degree = np.maximum(np.bincount(tail, minlength=len(points)), 1)
+    for _ in range(rounds):
+        poll_stop()
+        mean = np.stack([np.bincount(tail, points[head, k], len(points)) for k in range(3)], axis=1)
+        points[free] = (mean / degree[:, None])[free]

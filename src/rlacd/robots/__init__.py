@@ -1,5 +1,0 @@
-"""Robot descriptions that exist: every collision mesh is replaced by its hulls, and the rest kept byte for byte."""
-
-from rlacd.robots.rewrite import Rewritten, RewrittenMesh, is_robot, rewrite_robot
-
-__all__ = ["Rewritten", "RewrittenMesh", "is_robot", "rewrite_robot"]

@@ -1,0 +1,129 @@
+"""The parts of a decomposition, who touches whom, and which of them are worth cutting again together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from rlacd import work
+from rlacd.criteria.criterion import Criterion
+from rlacd.merge.merge import neighbours
+from rlacd.search.recut import Exchange
+from rlacd.solid.component import Part
+from rlacd.solid.reunite import TOUCHING, touch
+from rlacd.workers import Workers
+
+Cluster = tuple[int, ...]
+"""Ids of parts, ascending."""
+
+SPREAD = 0.6
+"""How much chance there is in drawing clusters: without any, all would lie around the same pair."""
+
+
+class PartGraph:
+    """Parts under ids that are never used again, and the pairs of them that touch face to face.
+
+    A pair's *gap* is the radius of a ball as large as the volume that its joint hull would fill at a cost: the smaller
+    it is, the less is missing for the two to be one part.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+        They get the ids 0, 1, ...
+    criterion : Criterion
+        Says what may be filled at no cost.
+    workers : Workers
+        Tests pairs.
+    """
+
+    def __init__(self, parts: Sequence[Part], criterion: Criterion, workers: Workers) -> None:
+        self.parts: dict[int, Part] = {}
+        self._criterion = criterion
+        self._workers = workers
+        self._gaps: dict[int, dict[int, float]] = {}
+        self._next = 0
+        self._work = 0.0
+        self.replace((), parts)
+
+    def replace(self, gone: Iterable[int], new: Sequence[Part]) -> None:
+        """Take parts away and put others in their place, under new ids."""
+        for i in gone:
+            del self.parts[i]
+            for j in self._gaps.pop(i):
+                del self._gaps[j][i]
+        if not new:
+            return
+        ids = list(range(self._next, self._next + len(new)))
+        self._next += len(new)
+        self.parts.update(zip(ids, new, strict=True))
+        self._gaps.update((i, {}) for i in ids)
+        filled = {i: self._criterion.filled(part) for i, part in self.parts.items()}
+        near = neighbours(self.parts, ids, TOUCHING, self._workers)
+        self._work += sum(
+            work.joining(len(self.parts[i].hull.vertices) + len(self.parts[j].hull.vertices))
+            + work.gluing(self.parts[i].size + self.parts[j].size)
+            for i, j, _, _ in near
+        )
+        touching = self._workers.map(lambda pair: touch(self.parts[pair[0]], self.parts[pair[1]]), near)
+        for (i, j, _, hull_volume), does in zip(near, touching, strict=True):
+            if does:
+                self._gaps[i][j] = self._gaps[j][i] = max(hull_volume - filled[i] - filled[j], 0.0) ** (1 / 3)
+
+    def collect(self) -> float:
+        """Get the work done since this was last asked for."""
+        done, self._work = self._work, 0.0
+        return done
+
+    def apply(self, exchange: Exchange) -> bool:
+        """Make an exchange; False when parts of it are gone already."""
+        ids = {id(part): i for i, part in self.parts.items()}
+        if any(id(part) not in ids for part in exchange.out):
+            return False
+        self.replace([ids[id(part)] for part in exchange.out], exchange.into)
+        return True
+
+    def around(self, cluster: Cluster) -> Cluster:
+        """Get the parts that touch the cluster's, in ascending order."""
+        return tuple(sorted({j for i in cluster for j in self._gaps[i]} - set(cluster)))
+
+    def near(self, which: int, reach: float) -> Cluster:
+        """Get the parts whose boxes lie within reach of a part's along every axis, in ascending order."""
+        ids = [i for i in self.parts if i != which]
+        if not ids:
+            return ()
+        boxes = np.array([self.parts[i].box for i in ids])
+        box = self.parts[which].box
+        gaps = np.maximum(box[0] - boxes[:, 1], boxes[:, 0] - box[1]).max(axis=1)
+        return tuple(i for i, gap in zip(ids, gaps.tolist(), strict=True) if gap <= reach)
+
+    def draw_small(self, random: np.random.Generator) -> int:
+        """Draw a part, those with small hulls more often: the chances fall with the rank, as 1/2, 1/3, 1/4, ..."""
+        by_size = sorted(self.parts, key=lambda i: (self.parts[i].hull.volume, i))
+        feasibilities = 1 / np.arange(2, len(by_size) + 2)
+        return by_size[int(random.choice(len(by_size), p=feasibilities / feasibilities.sum()))]
+
+    def draw(self, size: int, random: np.random.Generator) -> Cluster | None:
+        """Draw a cluster of parts that hang together: a pair with a small gap, and what lies close to it.
+
+        Gaps are compared after each was multiplied by a number between 1 - `SPREAD` and 1 + `SPREAD`. None where not so
+        many parts hang together.
+        """
+        pairs = [(gap, i, j) for i, gaps in self._gaps.items() for j, gap in gaps.items() if i < j]
+        if not pairs:
+            return None
+        _, *cluster = pairs[_least([gap for gap, _, _ in pairs], random)]
+        while len(cluster) < size:
+            near: dict[int, float] = {}
+            for i in cluster:
+                for j, gap in self._gaps[i].items():
+                    if j not in cluster:
+                        near[j] = min(gap, near.get(j, np.inf))
+            if not near:
+                return None
+            cluster.append(list(near)[_least(list(near.values()), random)])
+        return tuple(sorted(cluster))
+
+
+def _least(gaps: Sequence[float], random: np.random.Generator) -> int:
+    return int(np.argmin(np.array(gaps) * random.uniform(1 - SPREAD, 1 + SPREAD, len(gaps))))

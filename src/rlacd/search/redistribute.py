@@ -1,0 +1,130 @@
+"""Another step of the search: a part is divided until the parts around have taken all of it, or one piece is left over.
+
+Hulls may overlap, so a taker need not end where the part began: it takes a piece when all that the solid fills of their
+joint hull is tight (`rlacd.merge.merge.unite`). What nobody takes is halved and offered again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rlacd import work
+from rlacd.clock import Clock
+from rlacd.criteria.criterion import Criterion
+from rlacd.merge.merge import unite
+from rlacd.search.recut import Exchange
+from rlacd.search.transfer import exchange_of
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.component import Component, Part, Plane
+from rlacd.solid.hull import Hull
+from rlacd.work import Work
+
+TAKERS = 6
+"""A piece is offered to so many parts, those first whose hulls grow the least."""
+
+HALVINGS = 3
+"""A piece that nobody takes is halved so often at most."""
+
+MIDDLE = 0.1
+"""Halves are taken up to this share of the length off the middle, by chance: another try is another division."""
+
+
+def redistribute(
+    part: Part,
+    around: Sequence[Part],
+    criterion: Criterion,
+    random: np.random.Generator,
+    solid: Component,
+    clock: Clock | None = None,
+) -> Exchange | None:
+    """Give all of a part to the parts around.
+
+    Parameters
+    ----------
+    part : Part
+    around : sequence of Part
+        Parts near it; each that takes a piece still meets the criterion with it.
+    criterion : Criterion
+    random : numpy.random.Generator
+        Draws where pieces are halved.
+    solid : Component
+        What all are parts of.
+    clock : Clock, optional
+        Give up when its time or its work is over.
+
+    Returns
+    -------
+    Exchange or None
+        With one part less; None where a piece is left over.
+    """
+    clock = clock or Clock()
+    if not _may_be_taken(part, around, criterion, solid, clock.work):
+        return None
+    now = list(around)
+
+    def take(piece: Component, halvings: int) -> bool:
+        for i, hull in _by_growth(now, piece, criterion.reach, clock.work):
+            union = unite(now[i], piece, criterion, solid, hull, clock.work)
+            if union is not None:
+                now[i] = union
+                return True
+        if halvings == 0 or not clock.step(0, None, len(now)) or not clock.work.pay(work.cutting(piece.size)):
+            return False
+        halves = _halves(piece, random)
+        return bool(halves) and all(take(half, halvings - 1) for half in halves)
+
+    if not all(take(member, HALVINGS) for member in sorted(part.members, key=lambda member: -member.volume)):
+        return None
+    return exchange_of(part, around, now, criterion)
+
+
+def _may_be_taken(part: Part, around: Sequence[Part], criterion: Criterion, solid: Component, account: Work) -> bool:
+    """Whether each of the part's outermost corners alone could belong to one of the others: a quick no."""
+    corners = part.hull.vertices
+    directions = np.concatenate([np.eye(3), -np.eye(3)])
+    outermost = sorted(set(np.argmax(corners @ directions.T, axis=0).tolist()))
+    return all(
+        any(
+            account.pay(work.joining(len(around[i].hull.vertices)) + work.holding(len(around[i].hull.vertices)) / 2)
+            and not criterion.forbids(solid.filling, _with_point(around[i].hull, corners[k]))
+            for i in np.argsort([_gap(other.box, corners[k]) for other in around], kind="stable").tolist()
+        )
+        for k in outermost
+    )
+
+
+def _with_point(hull: Hull, point: FloatArray) -> Hull:
+    return Hull.of(np.vstack([hull.vertices, point])) or hull
+
+
+def _by_growth(parts: Sequence[Part], piece: Part, reach: float, account: Work) -> list[tuple[int, Hull]]:
+    """The parts within reach whose hulls would grow the least, and those hulls."""
+    near = [i for i, part in enumerate(parts) if _gap(part.box, piece.box) <= reach]
+    corners = len(piece.hull.vertices)
+    if not account.pay(sum(work.joining(len(parts[i].hull.vertices) + corners) for i in near)):
+        return []
+    joint = [Hull.around(parts[i].hull, piece.hull) for i in near]
+    growth = [hull.volume - parts[i].hull.volume for i, hull in zip(near, joint, strict=True)]
+    return [(near[k], joint[k]) for k in np.argsort(growth, kind="stable")[:TAKERS]]
+
+
+def _gap(box: FloatArray, other: FloatArray) -> float:
+    """How far a box [2, 3] is from another, or from a point [3]."""
+    low, high = (other[0], other[1]) if other.ndim == 2 else (other, other)
+    return float(np.linalg.norm(np.maximum(np.maximum(low - box[1], box[0] - high), 0.0)))
+
+
+def _halves(piece: Component, random: np.random.Generator) -> list[Component]:
+    """Cut across the longest of the axes of space, or of the piece's own; the smaller half first."""
+    axes = np.eye(3) if random.random() < 0.5 else piece.principal_axes
+    heights = piece.hull.vertices @ axes.T
+    lower, upper = heights.min(axis=0), heights.max(axis=0)
+    longest = int(np.argmax(upper - lower))
+    share = random.uniform(0.5 - MIDDLE, 0.5 + MIDDLE)
+    x, y, z = (float(c) for c in axes[longest])
+    below, above = piece.cut(Plane((x, y, z), float(lower[longest] + share * (upper - lower)[longest])))
+    if below is None or above is None:
+        return []
+    return sorted([below, above], key=lambda half: half.volume)

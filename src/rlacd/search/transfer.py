@@ -1,0 +1,220 @@
+"""Another step of the search: a part gives pieces of itself to the larger parts around, until it is gone.
+
+Two parts that cannot become one may still share a third between them. A piece is what a plane cuts off the part on the
+other's side, as large as the criterion allows; what is left is then tried whole with everything around. As many parts
+of less even sizes are progress too: in the end the small ones vanish, as bins do that are emptied into fuller ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import reduce
+
+import numpy as np
+
+from rlacd import work
+from rlacd.clock import Clock
+from rlacd.criteria.criterion import Criterion
+from rlacd.merge.merge import unite
+from rlacd.search.recut import Exchange
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.component import Component, Part, Plane
+from rlacd.solid.hull import Hull
+from rlacd.solid.reunite import reunite
+from rlacd.work import Work
+
+TRIES = 16
+"""Pairs of a taker and a direction, drawn one after the other: as many take about as long as cutting a cluster anew."""
+
+SMALLER = 0.5
+"""Parts with hulls smaller than this share of the giver's do not take from it."""
+
+FIRST = 1 / 8
+"""If not even so much of the part's extent can be given in a direction, the direction is left."""
+
+HALVINGS = 3
+"""How often the interval is halved in which the last plane lies that the criterion allows."""
+
+LEAST = 0.03
+"""A piece of a smaller share of the part's volume is not worth a cut."""
+
+WHOLE = 5
+"""So many neighbours, those with the least added volume, are asked to take all that is left."""
+
+PATCHES = 4
+"""Parts of more components are reunited where that leaves them as they are."""
+
+
+def transfer(
+    part: Part,
+    around: Sequence[Part],
+    criterion: Criterion,
+    random: np.random.Generator,
+    solid: Component,
+    clock: Clock | None = None,
+) -> Exchange | None:
+    """Let a part give pieces of itself to the parts around.
+
+    Parameters
+    ----------
+    part : Part
+        The giver.
+    around : sequence of Part
+        Parts near it; each that takes a piece still meets the criterion with it, and so does what is left.
+    criterion : Criterion
+    random : numpy.random.Generator
+        Draws takers and directions.
+    solid : Component
+        What all are parts of.
+    clock : Clock, optional
+        Be content with what is given when its time or its work is over.
+
+    Returns
+    -------
+    Exchange or None
+        With as many parts, of less even sizes, or one less; None where nobody takes anything.
+    """
+    clock = clock or Clock()
+    now = list(around)
+    takers = [i for i, other in enumerate(around) if other.hull.volume > SMALLER * part.hull.volume]
+    rest = part
+    for tried in range(TRIES if takers else 0):
+        if not clock.step(tried, TRIES, len(now) + 1):
+            break
+        i = takers[random.integers(len(takers))]
+        bite = _largest_bite(rest, now[i], _direction(rest, now[i], random), criterion, solid, clock.work)
+        if bite is None:
+            continue
+        now[i], left = bite
+        if left is None or _take_whole(left, now, criterion, solid, clock.work):
+            return exchange_of(part, around, now, criterion)
+        rest = left
+    return None if rest is part else exchange_of(part, around, [*now, rest], criterion)
+
+
+def exchange_of(part: Part, around: Sequence[Part], after: Sequence[Part], criterion: Criterion) -> Exchange:
+    """What turns a part and those around into what they are after giving; parts of many patches are mended."""
+    known = {id(other) for other in around}
+    return Exchange.between([part, *around], [p if id(p) in known else _mended(p, criterion) for p in after])
+
+
+def _direction(part: Part, taker: Part, random: np.random.Generator) -> FloatArray:
+    """Draw an axis of space, a principal axis of the part, or the way between the two; it leads away from the taker."""
+    away = part.hull.vertices.mean(axis=0) - taker.hull.vertices.mean(axis=0)
+    largest = max(part.members, key=lambda member: member.volume)
+    axes = np.vstack([np.eye(3), largest.principal_axes, away])
+    axis: FloatArray = axes[random.integers(len(axes))]
+    axis = axis / max(float(np.linalg.norm(axis)), 1e-12)
+    return -axis if axis @ away < 0 else axis
+
+
+def _largest_bite(
+    part: Part, taker: Part, direction: FloatArray, criterion: Criterion, solid: Component, account: Work
+) -> tuple[Part, Part | None] | None:
+    """Cut off as much as the taker can have: the taker with it, and the rest; None where that is hardly anything."""
+    corners = np.concatenate([member.hull.vertices for member in part.members])
+    heights = corners @ direction
+    lower, upper = float(heights.min()), float(heights.max())
+    offset = lower + FIRST * (upper - lower)
+    best = None
+    for _ in range(1 + HALVINGS):
+        bite = None
+        if not _is_too_much(corners[heights <= offset], taker, criterion, solid, account):
+            bite = _bite(part, taker, direction, offset, criterion, solid, account)
+        if bite is not None:
+            lower, best = offset, bite
+        elif best is None:
+            return None
+        else:
+            upper = offset
+        offset = (lower + upper) / 2
+    if best is None or best[2] <= LEAST * sum(member.volume for member in part.members):
+        return None
+    return best[:2]
+
+
+def _bite(
+    part: Part,
+    taker: Part,
+    direction: FloatArray,
+    offset: float,
+    criterion: Criterion,
+    solid: Component,
+    account: Work,
+) -> tuple[Part, Part | None, float] | None:
+    """The taker with what lies below a plane, the rest, and the volume given; None where one of them must not be."""
+    if not account.pay(sum(work.cutting(member.size) for member in part.members)):
+        return None
+    below, above = _divided(part.members, direction, offset)
+    if not below:
+        return taker, part, 0.0
+    grown = unite(taker, _glued(below), criterion, solid, account=account)
+    left = _whole(above, criterion, solid, account) if grown is not None and above else None
+    if grown is None or (above and left is None):
+        return None
+    return grown, left, sum(piece.volume for piece in below)
+
+
+def _is_too_much(corners: FloatArray, taker: Part, criterion: Criterion, solid: Component, account: Work) -> bool:
+    """Whether the taker cannot even have some corners [N, 3] of what would be cut off: known without cutting."""
+    count = len(corners) + len(taker.hull.vertices)
+    if not account.pay(work.joining(count) + work.holding(count) / 2):
+        return True
+    hull = Hull.of(np.concatenate([taker.hull.vertices, corners]))
+    return hull is not None and criterion.forbids(solid.filling, hull)
+
+
+def _whole(pieces: Sequence[Component], criterion: Criterion, solid: Component, account: Work) -> Part | None:
+    """The pieces as one part; None where that does not meet the criterion."""
+    if len(pieces) > 1:
+        return unite(_glued(pieces[:-1]), pieces[-1], criterion, solid, account=account)
+    if not account.pay(work.judging(pieces[0].size, len(pieces[0].hull.faces))):
+        return None
+    return pieces[0] if criterion.is_met(pieces[0]) else None
+
+
+def _take_whole(rest: Part, takers: list[Part], criterion: Criterion, solid: Component, account: Work) -> bool:
+    """Give all that is left to one of the takers; False where none can have it."""
+    corners = len(rest.hull.vertices)
+    if not account.pay(sum(work.joining(len(taker.hull.vertices) + corners) for taker in takers)):
+        return False
+    joint = [Hull.around(taker.hull, rest.hull) for taker in takers]
+    added = [hull.volume - taker.hull.volume for hull, taker in zip(joint, takers, strict=True)]
+    for i in np.argsort(added, kind="stable")[:WHOLE].tolist():
+        union = unite(takers[i], rest, criterion, solid, joint[i], account)
+        if union is not None:
+            takers[i] = union
+            return True
+    return False
+
+
+def _divided(
+    components: Sequence[Component], direction: FloatArray, offset: float
+) -> tuple[list[Component], list[Component]]:
+    """What of the components lies below and above a plane."""
+    x, y, z = (float(c) for c in direction)
+    below: list[Component] = []
+    above: list[Component] = []
+    for component in components:
+        heights = component.hull.vertices @ direction
+        if heights.max() <= offset:
+            below.append(component)
+        elif heights.min() >= offset:
+            above.append(component)
+        else:
+            for side, found in zip((below, above), component.cut(Plane((x, y, z), offset)), strict=True):
+                if found is not None:
+                    side.append(found)
+    return below, above
+
+
+def _glued(pieces: Sequence[Part]) -> Part:
+    return reduce(Part.glued, pieces)
+
+
+def _mended(part: Part, criterion: Criterion) -> Part:
+    """Get the part as one component if it is made of many and that meets the criterion."""
+    if len(part.members) <= PATCHES:
+        return part
+    whole = reunite(part.members)
+    return whole if whole is not None and criterion.is_met(whole) else part

@@ -1,6 +1,0 @@
-"""Looking at a decomposition: pictures (extra ``view``), reports, and the viewer."""
-
-from rlacd.show.html_report import check_report_page, is_html, save_report_page
-from rlacd.show.picture import check_picture, check_up, draw_picture
-
-__all__ = ["check_picture", "check_report_page", "check_up", "draw_picture", "is_html", "save_report_page"]

@@ -1,0 +1,104 @@
+"""Colours of hulls side by side: hulls that touch never share a hue, as long as there are hues enough."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import trimesh
+
+from rlacd.io.write.palette import TELLABLE, hull_colors
+from rlacd.solid.arrays import FloatArray
+
+HUES = len(TELLABLE) // 3
+"""Colours that everybody tells apart; see `rlacd.io.write.palette`."""
+
+NEAR = 2e-3
+"""Hulls nearer than this share of their common extent count as touching: closer than the eye separates."""
+
+
+@dataclass(frozen=True, eq=False)
+class Coloring:
+    """A colour for each hull.
+
+    Attributes
+    ----------
+    rgb : uint8 [N, 3]
+    rank : int64 [N]
+        The number of the hue; differs between hulls that touch, unless more than `HUES` of them all touch each other.
+    """
+
+    rgb: npt.NDArray[np.uint8]
+    rank: npt.NDArray[np.int64]
+
+
+def color_hulls(hulls: Sequence[trimesh.Trimesh]) -> Coloring:
+    """Choose colours by which hulls touch: neighbours differ in hue, and all differ in shade where hues return.
+
+    Hulls are coloured from the one with the most neighbours left down (smallest-last order, Matula & Beck 1983), each
+    in the hue that its neighbours leave free and that is used least.
+    """
+    beside = neighbours(hulls)
+    rank = np.full(len(hulls), -1, dtype=np.int64)
+    used = np.zeros(HUES, dtype=np.int64)
+    shade = np.zeros(len(hulls), dtype=np.int64)
+    for hull in _smallest_last(beside):
+        taken = np.bincount([rank[other] for other in beside[hull] if rank[other] >= 0], minlength=HUES)
+        rank[hull] = np.lexsort((np.arange(HUES), used, taken))[0]
+        shade[hull] = used[rank[hull]]
+        used[rank[hull]] += 1
+    index = rank + HUES * shade
+    return Coloring(hull_colors(int(index.max(initial=-1)) + 1)[index], rank)
+
+
+def neighbours(hulls: Sequence[trimesh.Trimesh]) -> list[set[int]]:
+    """Tell which convex hulls touch or overlap: those that no plane of a facet of either separates by `NEAR`.
+
+    Two hulls that are apart only along a direction between two edges count as touching.
+    """
+    beside: list[set[int]] = [set() for _ in hulls]
+    if not hulls:
+        return beside
+    corners = [np.asarray(hull.vertices, dtype=np.float64) for hull in hulls]
+    lower = np.array([points.min(axis=0) for points in corners])
+    upper = np.array([points.max(axis=0) for points in corners])
+    near = NEAR * float((upper.max(axis=0) - lower.min(axis=0)).max())
+    planes = [_planes(hull) for hull in hulls]
+    for one in range(len(hulls)):
+        boxes = np.all((lower[one + 1 :] <= upper[one] + near) & (upper[one + 1 :] >= lower[one] - near), axis=1)
+        for other in (one + 1 + np.flatnonzero(boxes)).tolist():
+            if not (_apart(planes[one], corners[other], near) or _apart(planes[other], corners[one], near)):
+                beside[one].add(other)
+                beside[other].add(one)
+    return beside
+
+
+def _planes(hull: trimesh.Trimesh) -> tuple[FloatArray, FloatArray]:
+    """The facets' outward unit normals and offsets; facets too thin to have a normal are left out."""
+    triangles = np.asarray(hull.triangles, dtype=np.float64)
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    lengths = np.linalg.norm(normals, axis=1)
+    sound = lengths > 0.0
+    normals = normals[sound] / lengths[sound, None]
+    return normals, np.einsum("ij,ij->i", normals, triangles[sound, 0])
+
+
+def _apart(planes: tuple[FloatArray, FloatArray], points: FloatArray, near: float) -> bool:
+    normals, offsets = planes
+    return bool(np.any((normals @ points.T).min(axis=1) > offsets + near)) if len(normals) else False
+
+
+def _smallest_last(beside: list[set[int]]) -> list[int]:
+    """Order in which every hull has few neighbours before it: the one with the fewest left is taken off the end."""
+    left = [set(others) for others in beside]
+    waiting = set(range(len(beside)))
+    order = []
+    while waiting:
+        least = min(waiting, key=lambda hull: (len(left[hull]), -hull))
+        waiting.remove(least)
+        order.append(least)
+        for other in left[least]:
+            left[other].discard(least)
+    return order[::-1]

@@ -1,0 +1,157 @@
+"""What the viewer offers to keep: hulls in every format, models for simulators and engines, the balls, the report."""
+
+from __future__ import annotations
+
+import io
+import tempfile
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import cast
+
+from rlacd.decomposition import Decomposition
+from rlacd.errors import MissingExtraError, OptionError
+from rlacd.io.write import FORMATS, MODELS, file_stem
+from rlacd.io.write.target import WITH_MESHES
+from rlacd.io.write.usd import require_usd
+from rlacd.output_options import Axis
+from rlacd.plain_json import to_json
+from rlacd.view.html_report import report_page
+
+FOLDERS = ("obj", "stl")
+"""Formats that are offered as a file a hull too."""
+
+
+@dataclass(frozen=True)
+class Download:
+    """A file's name and bytes."""
+
+    name: str
+    content: bytes
+
+
+@dataclass(frozen=True)
+class Offer:
+    """Something that can be downloaded.
+
+    Attributes
+    ----------
+    name
+        What `download` is asked for.
+    label
+        What people call it.
+    hint
+        What it holds, in a sentence.
+    group
+        What it stands under.
+    missing
+        Why it cannot be had here; None where it can.
+    """
+
+    name: str
+    label: str
+    hint: str
+    group: str
+    missing: str | None = None
+
+
+_MODEL_NAMES = {
+    "mjcf": ("MJCF", "MuJoCo"),
+    "urdf": ("URDF", "ROS, Bullet and most robot simulators"),
+    "sdf": ("SDF", "Gazebo"),
+    "usd": ("USD", "Isaac Sim and PhysX"),
+    "unreal": ("Unreal", "Unreal Engine"),
+    "godot": ("Godot", "Godot"),
+}
+
+
+def offered() -> list[Offer]:
+    """Name what can be downloaded."""
+    return [
+        *(Offer(ending, ending.upper(), f"All hulls in one .{ending} file.", "Hulls") for ending in FORMATS),
+        *(
+            Offer(f"{ending}.zip", f"{ending.upper()} zip", f"One .{ending} file per hull, zipped.", "Hulls")
+            for ending in FOLDERS
+        ),
+        *(
+            Offer(
+                model,
+                _MODEL_NAMES[model][0],
+                f"The mesh with its hulls as collision shapes, for {_MODEL_NAMES[model][1]}"
+                f" (.{MODELS[model][0]}{' and its meshes, zipped' if model in WITH_MESHES else ''}).",
+                "Models",
+                _missing(model),
+            )
+            for model in MODELS
+        ),
+        Offer("report.html", "Report", "This view as one HTML file that opens anywhere, offline.", "More"),
+        Offer("report.json", "Numbers", "Everything that was measured, as JSON.", "More"),
+        Offer("balls.csv", "Balls", "The balls that no hull touches: x, y, z and radius.", "More"),
+    ]
+
+
+def _missing(model: str) -> str | None:
+    if model != "usd":
+        return None
+    try:
+        require_usd()
+    except MissingExtraError as error:
+        return str(error)
+    return None
+
+
+def download(decomposition: Decomposition, wanted: str, *, up: str = "z", unit: str = "") -> Download:
+    """Make one of the files `offered`; what takes several files comes zipped.
+
+    Parameters
+    ----------
+    decomposition : Decomposition
+    wanted : str
+        The name of what is offered.
+    up : {"x", "y", "z"}
+        The axis of the input that points up.
+    unit : str
+        The input's unit of length, for the report; empty where nobody says.
+
+    Raises
+    ------
+    OptionError
+        `wanted` is not offered.
+    OutputError
+        The hulls cannot be written in this format, or there are no balls.
+    MissingExtraError
+        The format needs an extra that is not installed.
+    """
+    names = [offer.name for offer in offered()]
+    if wanted not in names:
+        raise OptionError(f"{wanted!r} cannot be downloaded; choose one of {', '.join(names)}.")
+    stem = file_stem(decomposition.name)
+    if wanted == "report.html":
+        return Download(f"{stem}_hulls.html", report_page(decomposition, up=up, unit=unit).encode())
+    if wanted == "report.json":
+        return Download(f"{stem}_hulls.json", to_json(decomposition.report).encode())
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        if wanted == "balls.csv":
+            decomposition.save_balls(folder / f"{stem}_balls.csv")
+        elif wanted in MODELS:
+            place = folder / f"{stem if wanted in WITH_MESHES else f'{stem}_{wanted}'}.{MODELS[wanted][0]}"
+            decomposition.save(place, file_format=wanted, up=cast(Axis, up))
+        elif wanted.endswith(".zip"):
+            decomposition.save(folder, file_format=wanted.removesuffix(".zip"))
+        else:
+            decomposition.save(folder / f"{stem}_hulls.{wanted}")
+        files = sorted(path for path in folder.rglob("*") if path.is_file())
+        if len(files) == 1 and not wanted.endswith(".zip"):
+            return Download(files[0].name, files[0].read_bytes())
+        return Download(f"{stem}_hulls_{wanted.removesuffix('.zip')}.zip", _zipped(folder, files))
+
+
+def _zipped(folder: Path, files: list[Path]) -> bytes:
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in files:
+            # Without a date: the same hulls give the same bytes.
+            entry = zipfile.ZipInfo(path.relative_to(folder).as_posix())
+            archive.writestr(entry, path.read_bytes(), zipfile.ZIP_DEFLATED)
+    return content.getvalue()

@@ -1,0 +1,100 @@
+"""The report: one HTML file with a 3-D view, the picture, and everything that was measured; opens without a network."""
+
+from __future__ import annotations
+
+import base64
+import os
+from pathlib import Path
+from typing import Any
+
+from rlacd._version import __version__
+from rlacd.decomposition import Decomposition
+from rlacd.errors import MissingExtraError, OutputError
+from rlacd.fields import about, path_like, read
+from rlacd.io.write import check_file, write_file
+from rlacd.output_options import OutputOptions
+from rlacd.view.heat import heat_map
+from rlacd.view.page import still_page
+from rlacd.view.picture import check_up, picture_bytes
+from rlacd.view.scene import heat_scene, scene
+
+HEAT_TRIANGLES = 16_000
+"""Of the error heat map in a file, or a few times as many: half a megabyte or so."""
+
+PICTURE_WIDTH = 1500
+
+
+def is_html(path: str | os.PathLike[str]) -> bool:
+    """Tell from its name whether a report is to be a page."""
+    return Path(path).suffix.lower() in (".html", ".htm")
+
+
+def check_report_page(path: str | os.PathLike[str], up: str | None = None) -> Path:
+    """Check, before any work, that `save_report_page` will be able to write to `path`.
+
+    Raises
+    ------
+    OutputError
+        The name does not end in ``.html``, or the place cannot be written to.
+    OptionError
+        `up` is no axis.
+    """
+    place = Path(read(path_like(), "path", path))
+    if not is_html(place):
+        raise OutputError(f"cannot write the report {place}: it must end in .html; rename it.")
+    check_up(up)
+    check_file(place)
+    return place
+
+
+def save_report_page(
+    decomposition: Decomposition, path: str | os.PathLike[str], *, up: str = "z", picture: bool = True
+) -> Path:
+    """Write a report as one self-contained HTML file.
+
+    It holds a 3-D view to turn and pull apart, the list of parts, an error heat map, what was repaired, the times, the
+    options and the warnings. The same decomposition gives the same bytes.
+
+    Parameters
+    ----------
+    decomposition : Decomposition
+    path : path-like
+        A ``.html`` file.
+    up : {"x", "y", "z"}
+        The axis of the input that points up.
+    picture : bool
+        Draw the picture into it too, which takes some seconds. Where the extra ``view`` is not installed, it is left
+        out and a note says so.
+
+    Returns
+    -------
+    pathlib.Path
+        Where it was written.
+
+    Raises
+    ------
+    OutputError, OptionError
+        As for `check_report_page`.
+    """
+    place = check_report_page(path, read(about(OutputOptions, "up").kind, "up", up))
+    write_file(place, report_page(decomposition, up=up, picture=picture).encode())
+    return place
+
+
+def report_page(decomposition: Decomposition, *, up: str = "z", picture: bool = True, unit: str = "") -> str:
+    """Build the text of the report; see `save_report_page`."""
+    data: dict[str, Any] = {
+        **scene(decomposition, up, unit=unit),
+        "heat": heat_scene(heat_map(decomposition, triangles=HEAT_TRIANGLES)),
+        **(_picture(decomposition, up) if picture else {}),
+    }
+    return still_page(f"{decomposition.name}: convex hulls", {"version": __version__}, data)
+
+
+def _picture(decomposition: Decomposition, up: str) -> dict[str, str]:
+    """The picture as an address, or a note why there is none."""
+    try:
+        png = picture_bytes(decomposition, width=PICTURE_WIDTH, up=up, clear=True)
+    except MissingExtraError as error:
+        return {"note": f"The picture is left out: {error}"}
+    return {"picture": "data:image/png;base64," + base64.b64encode(png).decode("ascii")}

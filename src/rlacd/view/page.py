@@ -1,0 +1,119 @@
+"""The page of the viewer and of the report as one HTML text: styles, scripts and data inside.
+
+three.js is a classic script that defines ``THREE``. The page's own scripts are ES modules behind an import map: the
+viewer's server gives them, a report holds each as a data address, since a page opened from a disk may not import its
+neighbours. The content policy names what may run by its hash and forbids every other source, so neither page can reach
+a network; the viewer may ask its own server.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import hashlib
+import html
+import re
+from dataclasses import dataclass
+from importlib import resources
+from typing import Any
+
+from rlacd.plain_json import to_json
+
+MODULES = ("arrays", "camera", "controls", "facts", "ground", "hints", "keys", "link", "list", "stage", "widgets")
+"""Modules of the page beside ``main``; ``import ... from "page/list"``."""
+
+POLICY = (
+    "default-src 'none'; script-src {modules} {scripts}; style-src {styles}; img-src data: blob:; "
+    "connect-src {connect}; base-uri 'none'; form-action 'none'"
+)
+
+
+@dataclass(frozen=True)
+class Page:
+    """An HTML text and its content policy, which stands in the text as well."""
+
+    text: str
+    policy: str
+
+
+def live_page(title: str, config: dict[str, Any]) -> Page:
+    """Build the viewer's page, which asks its server for the scripts of `module` and everything it shows.
+
+    Parameters
+    ----------
+    title : str
+    config : dict
+        Plain values for the page's controls; see `rlacd.view.server`.
+    """
+    imports = {f"page/{name}": f"./page/{name}.js" for name in MODULES}
+    return _page(title, {"live": True, **config}, None, imports, modules="'self'", connect="'self'")
+
+
+def module(name: str) -> str | None:
+    """Get the text of one of the page's scripts; None where there is no such script."""
+    return _asset(f"{name}.js") if name in MODULES else None
+
+
+def still_page(title: str, config: dict[str, Any], scene: dict[str, Any]) -> str:
+    """Build a report: the same page with its data inside and no server.
+
+    Parameters
+    ----------
+    title : str
+    config : dict
+        Plain values for the page.
+    scene : dict
+        What `rlacd.view.scene.scene` gives, with ``heat`` and ``picture`` where there are any.
+    """
+    imports = {f"page/{name}": _data_address(_asset(f"{name}.js")) for name in MODULES}
+    return _page(title, {"live": False, **config}, scene, imports, modules="data:", connect="'none'").text
+
+
+def _page(
+    title: str,
+    config: dict[str, Any],
+    data: dict[str, Any] | None,
+    imports: dict[str, str],
+    *,
+    modules: str,
+    connect: str,
+) -> Page:
+    # The same data always gives the same bytes: gzip would store the time otherwise.
+    packed = b"" if data is None else gzip.compress(to_json(data, indent=None).encode(), mtime=0)
+    style = _asset("style.css")
+    scripts = {
+        "three": _asset("vendor/three.min.js"),
+        "imports": _inert(to_json({"imports": imports}, indent=None)),
+        "main": _asset("main.js"),
+    }
+    policy = POLICY.format(
+        modules=modules, connect=connect, styles=_hash(style), scripts=" ".join(map(_hash, scripts.values()))
+    )
+    values = {
+        "policy": policy,
+        "title": html.escape(title),
+        "style": style,
+        **scripts,
+        "config": _inert(to_json(config, indent=None)),
+        "data": base64.b64encode(packed).decode("ascii"),
+    }
+    # In one sweep, so that no value is searched for the names of others.
+    return Page(re.sub(r"\{\{(\w+)\}\}", lambda match: values[match[1]], _asset("page.html")), policy)
+
+
+def _hash(text: str) -> str:
+    """What a content policy calls a script or style by."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode('ascii')}'"
+
+
+def _asset(name: str) -> str:
+    return (resources.files("rlacd.view") / "web" / name).read_text(encoding="utf-8")
+
+
+def _data_address(script: str) -> str:
+    return "data:text/javascript;base64," + base64.b64encode(script.encode()).decode("ascii")
+
+
+def _inert(json_text: str) -> str:
+    """JSON that cannot end the script element it stands in."""
+    return json_text.replace("<", "\\u003c")

@@ -1,0 +1,206 @@
+"""One PNG that tells how good a decomposition is: the input, its hulls, and the hulls pulled apart."""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from rlacd.errors import OutputError
+from rlacd.fields import about, checked, integer, path_like, read
+from rlacd.io.write import check_file, write_file
+from rlacd.io.write.palette import linear_from_srgb
+from rlacd.output_options import OutputOptions
+from rlacd.solid.balls import Balls
+from rlacd.view.coloring import color_hulls
+from rlacd.view.render import Body, Spheres, render, require_extra
+
+if TYPE_CHECKING:
+    from rlacd.decomposition import Decomposition
+
+INPUT_COLOR = np.array([0.46, 0.47, 0.50])  # linear reflectance
+BALL_COLOR = np.array([0.10, 0.30, 0.75])
+PULL = 0.55  # how far hulls move apart: a hull's distance from the middle grows by this share
+PAPER, INK, FADED = (255, 255, 255), (28, 30, 34), (120, 124, 132)
+TO_Z_UP = {  # rows: where the drawing's x, y, z axes come from
+    "x": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
+    "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),  # +z, the front of glTF, is seen
+    "z": np.eye(3),
+}
+
+
+def check_picture(path: str | os.PathLike[str], up: str | None = None) -> Path:
+    """Check, before any work, that `draw_picture` will be able to write to `path`.
+
+    Raises
+    ------
+    OutputError
+        The name does not end in ``.png``, or the place cannot be written to.
+    MissingExtraError
+        The extra ``view`` is not installed.
+    OptionError
+        `up` is no axis.
+    """
+    place = Path(read(path_like(), "path", path))
+    check_up(up)
+    if place.suffix.lower() != ".png":
+        raise OutputError(f"cannot write the picture {place}: it must end in .png; rename it.")
+    check_file(place)
+    for module in ("mitsuba", "PIL"):
+        require_extra(module)
+    return place
+
+
+def check_up(up: str | None) -> None:
+    """Raise `OptionError` if `up` is no axis; None leaves the choice to others."""
+    checked(OutputOptions, "up", up)
+
+
+def draw_picture(
+    decomposition: Decomposition,
+    path: str | os.PathLike[str],
+    *,
+    width: int = 1600,
+    samples: int = 16,
+    up: str = "z",
+) -> Path:
+    """Draw the input, its hulls and the hulls pulled apart, side by side, with one line of numbers.
+
+    Parameters
+    ----------
+    decomposition : Decomposition
+        What to draw.
+    path : path-like
+        A ``.png`` file.
+    width : int
+        Pixels, from 300 to 8,000.
+    samples : int
+        Light paths a pixel: more are slower and less grainy.
+    up : {"x", "y", "z"}
+        The axis of the input that points up in the picture.
+
+    Returns
+    -------
+    pathlib.Path
+        Where it was written.
+
+    Raises
+    ------
+    MissingExtraError
+        The extra ``view`` is not installed.
+    OutputError
+        The place cannot be written to.
+    OptionError
+        `width`, `samples` or `up` is out of range.
+    """
+    place = check_picture(path, read(about(OutputOptions, "up").kind, "up", up))
+    write_file(place, picture_bytes(decomposition, width=width, samples=samples, up=up))
+    return place
+
+
+def picture_bytes(
+    decomposition: Decomposition, *, width: int = 1600, samples: int = 16, up: str = "z", clear: bool = False
+) -> bytes:
+    """Draw the picture as the bytes of a PNG file; see `draw_picture`.
+
+    With `clear` it has no paper and no header, so that a page can put it on any ground.
+    """
+    width = read(integer(300, 8000, rule="a number of pixels between 300 and 8000"), "width", width)
+    samples = read(integer(1, 10_000), "samples", samples)
+
+    image = require_extra("PIL.Image")
+    panels: list[tuple[str, list[Body], Spheres | None]] = [
+        ("input", [_body(decomposition.source.triangles, INPUT_COLOR, up)], None),
+        ("hulls", _hull_bodies(decomposition, up, pull=0.0), None),
+        ("pulled apart", _hull_bodies(decomposition, up, pull=PULL), None),
+    ]
+    if decomposition.balls is not None:
+        some = apart(decomposition.balls)
+        spheres = Spheres(some.centres @ TO_Z_UP[up].T, some.radii, BALL_COLOR)
+        panels.insert(2, ("some of the balls they leave free", _hull_bodies(decomposition, up, pull=0.0), spheres))
+    columns = 3 if len(panels) == 3 else 2
+    rows = math.ceil(len(panels) / columns)
+    panel_width = width // columns
+    panel_height = round(panel_width * 0.92 if rows == 1 else panel_width * 0.62)
+    unit = width / 1600
+    header, footer = 0 if clear else round(104 * unit), round(44 * unit)
+    size = width, header + rows * (panel_height + footer)
+    sheet = image.new("RGBA", size, (*PAPER, 0)) if clear else image.new("RGB", size, PAPER)
+    for number, (title, bodies, veil) in enumerate(panels):
+        left = number % columns * panel_width
+        top = header + number // columns * (panel_height + footer)
+        pixels = render(bodies, panel_width, panel_height, samples=samples, clear=clear)
+        if veil is not None:  # the spheres let half of what is behind them through
+            veiled = render(bodies, panel_width, panel_height, samples=samples, spheres=veil, clear=clear)
+            pixels = ((pixels.astype(np.uint16) + veiled + 1) // 2).astype(np.uint8)
+        sheet.paste(image.fromarray(pixels), (left, top))
+        middle = (left + panel_width // 2, top + panel_height + footer // 2)
+        _write(sheet, title, middle, round(20 * unit), FADED, anchor="mm")
+    if not clear:
+        margin = round(32 * unit)
+        _write(sheet, decomposition.name, (margin, round(40 * unit)), round(34 * unit), INK, anchor="lm")
+        _write(sheet, caption(decomposition), (margin, round(79 * unit)), round(21 * unit), FADED, anchor="lm")
+
+    encoded = io.BytesIO()
+    sheet.save(encoded, format="PNG")
+    return encoded.getvalue()
+
+
+def caption(decomposition: Decomposition) -> str:
+    """One line of numbers: hulls, faces, concavity, seconds; only what the report holds."""
+    report = decomposition.report
+    count = len(decomposition)
+    words = [f"{count} hull{'s' * (count != 1)}", f"{sum(len(hull.faces) for hull in decomposition)} triangles"]
+    worst = report.get("concavity", {}).get("max")
+    if worst is not None:
+        threshold = report.get("options", {}).get("threshold")
+        words.append(f"concavity {worst:.3f}" + (f" (threshold {threshold:g})" if threshold is not None else ""))
+    if "navigable" in report:
+        words.append(f"{report['navigable']['balls']} balls left free")
+    total = report.get("seconds", {}).get("total")
+    if total is not None:
+        words.append(f"{total:.2f} s")
+    if not report.get("complete", True):
+        words.append(f"stopped early by {report.get('stopped_by')}")
+    return "   ·   ".join(words)
+
+
+def apart(balls: Balls) -> Balls:
+    """Choose balls that do not overlap, the smallest first: all of them would be one cloud."""
+    order = np.argsort(balls.radii, kind="stable")
+    tree = cKDTree(balls.centres)
+    hidden = np.zeros(len(balls), dtype=bool)
+    shown: list[int] = []
+    for i in order:
+        if not hidden[i]:
+            shown.append(int(i))
+            near = np.array(tree.query_ball_point(balls.centres[i], balls.radii[i] + balls.radii.max()))
+            away = np.linalg.norm(balls.centres[near] - balls.centres[i], axis=1)
+            hidden[near[away < balls.radii[near] + balls.radii[i]]] = True
+    return Balls(balls.centres[shown], balls.radii[shown])
+
+
+def _hull_bodies(decomposition: Decomposition, up: str, *, pull: float) -> list[Body]:
+    corners = np.concatenate([hull.bounds for hull in decomposition])
+    middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
+    colors = linear_from_srgb(color_hulls(decomposition.hulls).rgb)
+    return [
+        _body(hull.triangles + pull * (hull.bounds.mean(axis=0) - middle), color, up)
+        for hull, color in zip(decomposition, colors, strict=True)
+    ]
+
+
+def _body(triangles: npt.ArrayLike, color: npt.NDArray[np.float64], up: str) -> Body:
+    return Body(np.asarray(triangles, dtype=np.float64) @ TO_Z_UP[up].T, color)
+
+
+def _write(sheet: Any, text: str, place: tuple[int, int], size: int, ink: tuple[int, int, int], anchor: str) -> None:
+    from PIL import ImageDraw, ImageFont
+
+    ImageDraw.Draw(sheet).text(place, text, font=ImageFont.load_default(size=size), fill=ink, anchor=anchor)

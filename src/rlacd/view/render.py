@@ -1,0 +1,210 @@
+"""Path-traced pictures of meshes on white paper, on any CPU.
+
+Mitsuba 3 renders without display, GPU or OpenGL library, so it also works in a bare container, where VTK's wheels
+find no OpenGL and end the process.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rlacd.errors import MissingExtraError
+from rlacd.io.write.palette import srgb_from_linear
+
+SKY, KEY = 0.42, 12.0  # radiance: an even sky, and one soft lamp that gives the shadows a direction
+PAPER = 1.0  # what shows where there is nothing
+FIELD_OF_VIEW = 22.0  # degrees, vertical; narrow, so that equal hulls look equal
+ELEVATION, AZIMUTH = np.deg2rad(24.0), np.deg2rad(-58.0)
+
+
+@dataclass(frozen=True)
+class Body:
+    """A mesh to draw: triangles [F, 3, 3], z up, and its linear RGB reflectance [3]."""
+
+    triangles: npt.NDArray[np.float64]
+    color: npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Spheres:
+    """Spheres to draw: centres [B, 3], radii [B], z up, and their linear RGB reflectance [3]."""
+
+    centres: npt.NDArray[np.float64]
+    radii: npt.NDArray[np.float64]
+    color: npt.NDArray[np.float64]
+
+
+def require_extra(module: str) -> Any:
+    """Import a module of the extra ``view``, or say how to get it."""
+    try:
+        with _without_native_stderr():
+            return importlib.import_module(module)
+    except ModuleNotFoundError as error:
+        raise MissingExtraError("pictures need an extra: run  pip install 'rlacd[view]'  and try again.") from error
+    except ImportError as error:
+        # Installed, but a system library is absent: a container without a compiler may lack libatomic, for one.
+        raise MissingExtraError(f"pictures need {module}, which does not load here ({error}); install that.") from error
+
+
+@contextlib.contextmanager
+def _without_native_stderr() -> Iterator[None]:
+    """Keep C++ code from writing to stderr: while it loads, Mitsuba's compiler, not used here, complains about LLVM."""
+    if sys.stderr is not None:
+        sys.stderr.flush()
+    try:
+        kept = os.dup(2)
+    except OSError:  # There is no stderr to keep clean.
+        yield
+        return
+    try:
+        with open(os.devnull, "wb") as nowhere:
+            os.dup2(nowhere.fileno(), 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+
+
+def render(
+    bodies: Sequence[Body],
+    width: int,
+    height: int,
+    *,
+    samples: int,
+    spheres: Spheres | None = None,
+    clear: bool = False,
+) -> npt.NDArray[np.uint8]:
+    """Render `bodies`, framed to fit, as sRGB bytes [height, width, 3 or 4]; the same bytes every time.
+
+    Parameters
+    ----------
+    bodies : sequence of Body
+        Any size and place; the camera frames them.
+    width, height : int
+        Pixels.
+    samples : int
+        Light paths a pixel: more are slower and less grainy.
+    spheres : Spheres, optional
+        Drawn too; the camera does not look for them.
+    clear : bool
+        Leave the paper out: a fourth channel holds what is covered.
+
+    Raises
+    ------
+    MissingExtraError
+        Mitsuba is not installed.
+    """
+    mi = require_extra("mitsuba")
+    points = np.concatenate([body.triangles.reshape(-1, 3) for body in bodies])
+    low, high = points.min(axis=0), points.max(axis=0)
+    view = _view(points - (low + high) / 2.0, width / height)
+    # Everything is drawn about the origin and in one size, since the renderer computes in float32.
+    size = float(np.linalg.norm(high - low)) or 1.0
+    with _scalar_variant(mi):
+        scene: dict[str, Any] = {
+            "type": "scene",
+            "integrator": {"type": "path", "max_depth": 3, "hide_emitters": True},
+            "sensor": _sensor(mi, view / size, width, height),
+            "sky": {"type": "constant", "radiance": {"type": "rgb", "value": SKY}},
+            "key": _lamp(mi),
+        }
+        for index, body in enumerate(bodies):
+            placed = (body.triangles - (low + high) / 2.0) / size
+            scene[f"body_{index}"] = _mesh(mi, placed, body.color)
+        if spheres is not None:
+            for index, (centre, radius) in enumerate(zip(spheres.centres, spheres.radii, strict=True)):
+                placed = (centre - (low + high) / 2.0) / size
+                scene[f"sphere_{index}"] = _sphere(placed, radius / size, spheres)
+        light = np.array(mi.render(mi.load_dict(scene), spp=samples))
+    if clear:
+        covered = np.clip(light[..., 3:], 0.0, 1.0)
+        colors = srgb_from_linear(np.clip(light[..., :3] / np.maximum(covered, 1e-6), 0.0, 1.0))
+        return np.concatenate([colors, np.rint(255.0 * covered).astype(np.uint8)], axis=2)
+    return srgb_from_linear(np.clip(light[..., :3] + PAPER * (1.0 - light[..., 3:]), 0.0, 1.0))
+
+
+def _view(points: npt.NDArray[np.float64], aspect: float) -> npt.NDArray[np.float64]:
+    """Eye position from which all `points` (about the origin) are inside the picture."""
+    toward_eye = np.array([np.cos(ELEVATION) * np.cos(AZIMUTH), np.cos(ELEVATION) * np.sin(AZIMUTH), np.sin(ELEVATION)])
+    right = np.cross([0.0, 0.0, 1.0], toward_eye)
+    right /= np.linalg.norm(right)
+    up = np.cross(toward_eye, right)
+    half = 0.92 * np.tan(np.deg2rad(FIELD_OF_VIEW) / 2.0)  # a margin of 8 %
+    # A point is inside if |up . p| <= half * depth, depth = distance - toward_eye . p; likewise to the right.
+    needed = np.maximum(np.abs(points @ up) / half, np.abs(points @ right) / (half * aspect)) + points @ toward_eye
+    eye: npt.NDArray[np.float64] = toward_eye * needed.max()
+    return eye
+
+
+def _sensor(mi: Any, eye: npt.NDArray[np.float64], width: int, height: int) -> dict[str, Any]:
+    return {
+        "type": "perspective",
+        "fov": FIELD_OF_VIEW,
+        "fov_axis": "y",
+        "near_clip": 1e-3,
+        "far_clip": 1e4,
+        "to_world": mi.ScalarTransform4f().look_at(origin=eye.tolist(), target=[0, 0, 0], up=[0, 0, 1]),
+        "film": {
+            "type": "hdrfilm",
+            "width": width,
+            "height": height,
+            "pixel_format": "rgba",
+            "rfilter": {"type": "gaussian"},
+        },
+        "sampler": {"type": "multijitter"},
+    }
+
+
+def _lamp(mi: Any) -> dict[str, Any]:
+    position = [1.2, -2.2, 3.2]
+    facing = mi.ScalarTransform4f().look_at(origin=position, target=[0, 0, 0], up=[0, 1, 0])
+    return {
+        "type": "rectangle",
+        "to_world": facing @ mi.ScalarTransform4f().scale(1.1),
+        "light": {"type": "area", "radiance": {"type": "rgb", "value": KEY}},
+    }
+
+
+def _mesh(mi: Any, triangles: npt.NDArray[np.float64], color: npt.NDArray[np.float64]) -> Any:
+    # Both sides: the input's triangles may face any way.
+    surface = {"type": "diffuse", "reflectance": {"type": "rgb", "value": color.tolist()}}
+    properties = mi.Properties()
+    properties["bsdf"] = mi.load_dict({"type": "twosided", "surface": surface})
+    properties["face_normals"] = True
+    mesh = mi.Mesh("body", vertex_count=3 * len(triangles), face_count=len(triangles), props=properties)
+    arrays = mi.traverse(mesh)
+    arrays["vertex_positions"] = triangles.astype(np.float32).ravel()
+    arrays["faces"] = np.arange(3 * len(triangles), dtype=np.uint32)
+    arrays.update()
+    return mesh
+
+
+def _sphere(centre: npt.NDArray[np.float64], radius: float, look: Spheres) -> dict[str, Any]:
+    surface = {"type": "diffuse", "reflectance": {"type": "rgb", "value": look.color.tolist()}}
+    return {
+        "type": "sphere",
+        "center": centre.tolist(),
+        "radius": float(radius),
+        "surface": surface,
+    }
+
+
+@contextlib.contextmanager
+def _scalar_variant(mi: Any) -> Iterator[None]:
+    """Mitsuba's plain C++ renderer, which needs no compiler at run time; the caller's own choice comes back after."""
+    before = mi.variant()
+    mi.set_variant("scalar_rgb")
+    try:
+        yield
+    finally:
+        if before is not None:
+            mi.set_variant(before)

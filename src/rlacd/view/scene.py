@@ -1,0 +1,122 @@
+"""What the page draws: a decomposition as plain values, its arrays as base64 text.
+
+Positions are float32 in the normalised frame: small numbers about the origin, whatever the input's unit and place.
+"""
+
+from __future__ import annotations
+
+import base64
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rlacd.decomposition import Decomposition
+from rlacd.solid.frame import Frame
+from rlacd.view.coloring import color_hulls
+from rlacd.view.heat import HeatMesh, frame_of
+from rlacd.view.picture import apart
+
+SHOWN_BALLS = 4000
+"""More balls than this are not drawn."""
+
+
+def scene(decomposition: Decomposition, up: str = "z", *, unit: str = "") -> dict[str, Any]:
+    """Describe a decomposition for the page.
+
+    Parameters
+    ----------
+    decomposition : Decomposition
+    up : {"x", "y", "z"}
+        The axis of the input that points up.
+    unit : str
+        The input's unit of length, such as ``m``; empty where nobody says.
+
+    Returns
+    -------
+    dict
+        ``name``; ``up``; ``unit``; ``scale``, frame units to one of the input's; ``report`` as it is; ``input``,
+        ``{vertices, faces}`` or None for a cloud of points; ``parts``, a list of ``{vertices, faces, color, rank,
+        error, volume}`` with ``rank`` the number of the hue, ``error`` what the criterion measures (or None) and
+        ``volume`` in the normalised frame; ``balls``, ``{centres, radii, shown, of}`` or None, with how many balls are
+        shown of how many.
+    """
+    frame = frame_of(decomposition)
+    source, report = decomposition.source, decomposition.report
+    errors = _errors(report, len(decomposition))
+    colors = color_hulls(decomposition.hulls)
+    balls = None
+    if decomposition.balls is not None and len(decomposition.balls):
+        some = apart(decomposition.balls)
+        balls = {
+            "centres": floats(frame.to_frame(some.centres[:SHOWN_BALLS])),
+            "radii": floats(some.radii[:SHOWN_BALLS] * frame.scale),
+            "shown": min(len(some), SHOWN_BALLS),
+            "of": len(decomposition.balls),
+        }
+    return {
+        "name": decomposition.name,
+        "up": up,
+        "unit": unit,
+        "scale": frame.scale,
+        "report": report,
+        "input": _mesh(frame.to_frame(source.vertices), source.faces) if len(source.faces) else None,
+        "parts": [
+            {
+                **_mesh(frame.to_frame(hull.vertices), hull.faces),
+                "color": "#" + bytes(color.tolist()).hex(),
+                "rank": int(rank),
+                "error": error,
+                "volume": float(hull.volume) * frame.scale**3,
+            }
+            for hull, color, rank, error in zip(decomposition, colors.rgb, colors.rank, errors, strict=True)
+        ],
+        "balls": balls,
+    }
+
+
+def input_scene(name: str, vertices: ArrayLike, faces: ArrayLike, up: str = "z", *, unit: str = "") -> dict[str, Any]:
+    """Describe an input of which there are no hulls yet: as `scene`, without parts or report."""
+    points, corners = np.asarray(vertices, dtype=np.float64), np.asarray(faces)
+    frame = Frame.of(points[np.unique(corners)] if len(corners) else points)
+    return {
+        "name": name,
+        "up": up,
+        "unit": unit,
+        "scale": frame.scale,
+        "report": None,
+        "input": _mesh(frame.to_frame(points), corners) if len(corners) else None,
+        "parts": [],
+        "balls": None,
+    }
+
+
+def heat_scene(heat: list[HeatMesh]) -> dict[str, Any]:
+    """Describe an error heat map for the page.
+
+    Returns
+    -------
+    dict
+        ``parts``, a list of ``{vertices, faces, distance}``, and ``max``, the farthest spot in the normalised frame.
+    """
+    return {
+        "parts": [{**_mesh(part.vertices, part.faces), "distance": floats(part.distance)} for part in heat],
+        "max": max((float(part.distance.max()) for part in heat), default=0.0),
+    }
+
+
+def floats(values: ArrayLike) -> str:
+    """Base64 of little-endian float32."""
+    return base64.b64encode(np.asarray(values).astype("<f4").tobytes()).decode("ascii")
+
+
+def _mesh(vertices: ArrayLike, faces: ArrayLike) -> dict[str, str]:
+    corners = np.asarray(faces).astype("<u4").tobytes()
+    return {"vertices": floats(vertices), "faces": base64.b64encode(corners).decode("ascii")}
+
+
+def _errors(report: dict[str, Any], count: int) -> list[float | None]:
+    """What the criterion measured of each part, whichever it was."""
+    measured = report.get("concavity") or report.get("navigable", {}).get("intrusion") or {}
+    per_part = measured.get("per_part") or []
+    return list(per_part) if len(per_part) == count else [None] * count

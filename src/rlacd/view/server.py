@@ -1,0 +1,408 @@
+"""The viewer's server: the page, the decomposition, its progress, and files to download, for this machine only.
+
+====================================  ===========================================================================
+``GET /``, ``GET /page/NAME.js``      the page and its scripts
+``GET /events``                       the state, with every change (server-sent events)
+``GET /state``                        the state as it is
+``GET /scene``, ``GET /heat``         what is drawn; see `rlacd.view.scene`
+``GET /download?format=NAME``         a file
+``POST /open?name=NAME``              another mesh: the bytes of its file
+``POST /command``                     the options as a command for a terminal
+``POST /decompose``, ``POST /cancel``  JSON in, JSON out
+====================================  ===========================================================================
+
+It listens on the loopback address alone. Pages of other sites are kept out: a request must name this server as its
+host, so that no foreign name can be pointed at it, and must not come from a page of another origin. What is held is
+bounded: connections and their time in `rlacd.view.connections`, one input of at most `LARGEST_MESH` bytes, one
+decomposition with its scene and heat map, and `HEAVY` answers that are worked out at a time.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import json
+import re
+import tempfile
+import threading
+import time
+import urllib.parse
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+from http import HTTPStatus
+from pathlib import Path
+from typing import Any
+
+from rlacd._version import __version__
+from rlacd.decomposition import Decomposition
+from rlacd.errors import OptionError, RlacdError
+from rlacd.io.read.load import FORMATS as READ
+from rlacd.io.write import MODELS
+from rlacd.plain_json import to_json
+from rlacd.presets import PRESETS
+from rlacd.view.command import as_command
+from rlacd.view.connections import ANSWER_SECONDS, FOREVER, FULL, REQUEST_SECONDS, BoundedHandler, BoundedServer
+from rlacd.view.downloads import download, offered
+from rlacd.view.heat import heat_map
+from rlacd.view.page import live_page, module
+from rlacd.view.picture import check_up
+from rlacd.view.scene import heat_scene, input_scene, scene
+from rlacd.view.session import Session, SessionState
+from rlacd.view.wishes import Subject, ViewerControls
+
+ADDRESS = "127.0.0.1"
+USUAL_PORT = 8765
+LONGEST_REQUEST = 10_000  # bytes of JSON
+LARGEST_MESH = 2**28  # bytes of a file that a page sends
+QUICKEST = 0.05  # seconds between two reports of progress
+HEARTBEAT = 3.0  # seconds after which a stream in which nothing happens says so, and finds out whether it is read
+HEAVY = 2  # answers that take memory and time, at once
+
+HARDENING = {
+    "Cache-Control": "no-store",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+"""Headers of every answer."""
+
+
+class ViewServer(BoundedServer):
+    """Serves one session.
+
+    Parameters
+    ----------
+    session : Session
+    subject : Subject
+        What is looked at first.
+    port : int, optional
+        Where to listen; without it the usual port, or any free one.
+    options : Wishes
+        What the page's controls hold at first.
+    accept : callable
+        From the page's options to `ViewerControls`; raises `OptionError`.
+    read : callable
+        From a path to a `Subject`; raises `MeshError`.
+
+    Raises
+    ------
+    OptionError
+        The port is in use, may not be used, or is none.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        subject: Subject,
+        *,
+        port: int | None,
+        options: ViewerControls,
+        accept: Callable[[dict[str, Any]], ViewerControls],
+        read: Callable[[Path], Subject],
+    ) -> None:
+        self.session, self.subject, self.accept, self._read = session, subject, accept, read
+        self.heavy = threading.BoundedSemaphore(HEAVY)
+        self._made: dict[str, tuple[int, bytes]] = {}
+        self._making = threading.Lock()
+        self._opening = threading.Lock()
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        page = live_page(
+            subject.name,
+            {
+                "options": asdict(options),
+                "downloads": [asdict(offer) for offer in offered()],
+                "presets": [{"name": name, **preset_words(name)} for name in PRESETS],
+                "formats": list(READ),
+                "version": __version__,
+            },
+        )
+        self.page, self.policy = page.text.encode(), f"{page.policy}; frame-ancestors 'none'"
+        self._bind(port)
+
+    @property
+    def address(self) -> str:
+        """Where the page is."""
+        return f"http://{ADDRESS}:{self.server_address[1]}/"
+
+    @property
+    def folder(self) -> Path | None:
+        """Where the mesh lies that a page has sent; None before."""
+        return None if self._folder is None else Path(self._folder.name)
+
+    def decompose(self, wishes: ViewerControls, *, other_input: bool = False) -> None:
+        """Decompose the subject next: a draft at once, then what is wished for."""
+        mesh = {"mesh": self.subject.path}
+        draft = wishes.draft()
+        self.session.decompose(
+            {**mesh, **wishes.options()}, None if draft is None else {**mesh, **draft}, other_input=other_input
+        )
+
+    def open_mesh(self, name: str, content: bytes, wishes: ViewerControls) -> None:
+        """Look at another mesh from now on: the content of a file.
+
+        Raises
+        ------
+        MeshError
+            It cannot be read or holds nothing usable; what is looked at stays.
+        """
+        with self._opening:
+            folder = tempfile.TemporaryDirectory(prefix="rlacd-view-", ignore_cleanup_errors=True)
+            try:
+                path = Path(folder.name) / file_name(name)
+                path.write_bytes(content)
+                self.subject = self._read(path)
+            except BaseException:
+                folder.cleanup()
+                raise
+            self.decompose(wishes, other_input=True)
+            if self._folder is not None:
+                self._folder.cleanup()
+            self._folder = folder
+
+    def server_close(self) -> None:
+        """Stop listening, and remove what pages have sent."""
+        super().server_close()
+        if self._folder is not None:
+            self._folder.cleanup()
+
+    def scene(self) -> bytes:
+        """Give the scene as JSON; worked out once for whatever there is to draw."""
+        subject, result = self.subject, self.session.result
+        if result is None:
+            mesh = subject.mesh
+            return to_json(
+                input_scene(subject.name, mesh.vertices, mesh.faces, subject.up, unit=subject.unit), indent=None
+            ).encode()
+        return self._once("scene", result[0], lambda: scene(result[1], subject.up, unit=subject.unit))
+
+    def heat(self, version: int, decomposition: Decomposition) -> bytes:
+        """Give the error heat map as JSON; worked out once for a decomposition."""
+        return self._once("heat", version, lambda: heat_scene(heat_map(decomposition)))
+
+    def _once(self, what: str, version: int, make: Callable[[], dict[str, Any]]) -> bytes:
+        with self._making:
+            made = self._made.get(what)
+            if made is None or made[0] != version:
+                self._made.pop(what, None)
+                made = self._made[what] = version, to_json(make(), indent=None).encode()
+            return made[1]
+
+    def _bind(self, port: int | None) -> None:
+        try:
+            super().__init__((ADDRESS, USUAL_PORT if port is None else port), _Handler)
+        except OverflowError:
+            raise OptionError(f"{port} is no port; choose one from 1024 to 65535.") from None
+        except OSError as error:
+            if port is None:
+                super().__init__((ADDRESS, 0), _Handler)
+            elif error.errno == errno.EADDRINUSE:
+                raise OptionError(
+                    f"port {port} is in use; choose another with --port, or leave it out to get a free one."
+                ) from error
+            else:
+                raise OptionError(f"cannot listen on port {port} ({error.strerror}); choose another.") from error
+
+
+class _Handler(BoundedHandler):
+    server: ViewServer
+
+    def do_GET(self) -> None:
+        place = urllib.parse.urlsplit(self.path)
+        query = urllib.parse.parse_qs(place.query)
+        with self._answered():
+            self._check_sender()
+            if place.path == "/":
+                self._send(self.server.page, "text/html", {"Content-Security-Policy": self.server.policy})
+            elif place.path == "/events":
+                self._send_events()
+            elif place.path == "/state":
+                self._send_json(asdict(self.server.session.state))
+            elif place.path == "/scene":
+                with self.server.heavy:
+                    content = self.server.scene()
+                self._send(content, "application/json")
+            elif place.path == "/heat":
+                with self.server.heavy:
+                    content = self.server.heat(*self._result())
+                self._send(content, "application/json")
+            elif place.path == "/download":
+                self._send_file(query.get("format", [""])[0], query.get("up", [self.server.subject.up])[0])
+            elif (script := module(place.path.removeprefix("/page/").removesuffix(".js"))) is not None:
+                self._send(script.encode(), "text/javascript")
+            else:
+                raise _Refused(HTTPStatus.NOT_FOUND, "there is nothing here.")
+
+    def do_POST(self) -> None:
+        with self._answered():
+            self._check_sender()
+            place = urllib.parse.urlsplit(self.path)
+            answer: dict[str, Any] = {}
+            if place.path == "/open":
+                self._open(urllib.parse.parse_qs(place.query))
+            elif place.path == "/decompose":
+                self.server.decompose(self.server.accept(self._body()))
+            elif place.path == "/command":
+                answer["command"] = self._command(self._body())
+            elif place.path == "/cancel":
+                self._body()
+                self.server.session.stop()
+            else:
+                raise _Refused(HTTPStatus.NOT_FOUND, "there is nothing here.")
+            self._send_json(answer, HTTPStatus.ACCEPTED)
+
+    def _open(self, query: dict[str, list[str]]) -> None:
+        if self.headers.get_content_type() != "application/octet-stream":
+            raise _Refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "a mesh is sent as application/octet-stream.")
+        wishes = self.server.accept(_object(query.get("options", ["{}"])[0]))
+        wishes.options()
+        with self.server.heavy:
+            content = self._read(LARGEST_MESH, ANSWER_SECONDS)
+            self.server.open_mesh(query.get("name", [""])[0], content, wishes)
+
+    def _command(self, given: dict[str, Any]) -> str:
+        wishes = self.server.accept(given)
+        wishes.options()
+        return as_command(self.server.subject.path, asdict(wishes), ViewerControls())
+
+    @contextlib.contextmanager
+    def _answered(self) -> Iterator[None]:
+        """Turn errors into answers that the page shows."""
+        self.server.expect(self.connection, FOREVER)
+        try:
+            yield
+        except (TimeoutError, ConnectionError):
+            self.close_connection = True
+        except _Refused as error:
+            self.close_connection = True  # what else was sent is not read
+            self._send_json({"error": str(error)}, error.status)
+        except RlacdError as error:
+            self._send_json({"error": str(error)}, HTTPStatus.BAD_REQUEST)
+        except Exception as error:
+            said = f"a bug in rlacd ({type(error).__name__}: {error}); please report it."
+            self._send_json({"error": said}, HTTPStatus.INTERNAL_SERVER_ERROR)
+
+    def _check_sender(self) -> None:
+        """Refuse requests for another host, and those of pages of other origins."""
+        hosts = self.headers.get_all("Host") or []
+        if len(hosts) != 1 or urllib.parse.urlsplit(f"//{hosts[0]}").hostname not in (ADDRESS, "localhost"):
+            raise _Refused(HTTPStatus.FORBIDDEN, f"this viewer answers to {ADDRESS} and localhost only.")
+        origin = self.headers.get("Origin")
+        followed = self.command == "GET" and self.headers.get("Sec-Fetch-Mode") == "navigate"  # a link in another page
+        if (origin is not None and origin != f"http://{hosts[0]}") or (
+            self.headers.get("Sec-Fetch-Site") in ("cross-site", "same-site") and not (followed and self.path == "/")
+        ):
+            raise _Refused(HTTPStatus.FORBIDDEN, "this viewer answers to its own page only.")
+
+    def _body(self) -> dict[str, Any]:
+        if self.headers.get_content_type() != "application/json":  # forms of other sites cannot send this
+            raise _Refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "this viewer takes JSON only.")
+        return _object(self._read(LONGEST_REQUEST, REQUEST_SECONDS))
+
+    def _read(self, longest: int, seconds: float) -> bytes:
+        told = self.headers.get("Content-Length", "0")
+        if "Transfer-Encoding" in self.headers or not (told.isascii() and told.isdigit()):
+            raise _Refused(HTTPStatus.LENGTH_REQUIRED, "the request does not say how long it is (Content-Length).")
+        if len(told) > len(str(longest)) or int(told) > longest:
+            raise _Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"the request is longer than {longest:,} bytes.")
+        self.server.expect(self.connection, seconds)
+        content = self.read_body(int(told))
+        self.server.expect(self.connection, FOREVER)
+        if len(content) != int(told):
+            raise ConnectionError("the request ended early")
+        return content
+
+    def _result(self) -> tuple[int, Decomposition]:
+        result = self.server.session.result
+        if result is None:
+            raise OptionError("there are no hulls yet; wait for the first decomposition.")
+        return result
+
+    def _send_events(self) -> None:
+        if not self.server.streams.acquire(blocking=False):
+            raise _Refused(HTTPStatus.SERVICE_UNAVAILABLE, FULL)
+        try:
+            self.close_connection = True
+            self._send_head(HTTPStatus.OK, "text/event-stream", {"Connection": "close"})
+            for state in _calmly(self.server.session.changes(HEARTBEAT)):
+                told = ": still here" if state is None else f"data: {json.dumps(asdict(state))}"
+                self.wfile.write(f"{told}\n\n".encode())
+                self.wfile.flush()
+        finally:
+            self.server.streams.release()
+
+    def _send_file(self, wanted: str, up: str) -> None:
+        check_up(up)
+        with self.server.heavy:
+            file = download(self._result()[1], wanted, up=up, unit=self.server.subject.unit)
+        plain = file.name.encode("ascii", "replace").decode().replace('"', "_").replace("\\", "_")
+        exact = urllib.parse.quote(file.name.encode(errors="replace"))
+        named = f"attachment; filename=\"{plain}\"; filename*=UTF-8''{exact}"
+        self._send(file.content, "application/octet-stream", {"Content-Disposition": named})
+
+    def _send_json(self, value: Any, status: HTTPStatus = HTTPStatus.OK) -> None:
+        self._send(to_json(value, indent=None).encode(), "application/json", status=status)
+
+    def _send(
+        self, content: bytes, kind: str, headers: dict[str, str] | None = None, status: HTTPStatus = HTTPStatus.OK
+    ) -> None:
+        self.server.expect(self.connection, ANSWER_SECONDS)
+        self._send_head(status, kind, {"Content-Length": str(len(content)), **(headers or {})})
+        self.wfile.write(content)
+
+    def _send_head(self, status: HTTPStatus, kind: str, headers: dict[str, str]) -> None:
+        self.send_response(status)
+        text = kind.startswith("text/")
+        self.send_header("Content-Type", f"{kind}; charset=utf-8" if text and kind != "text/event-stream" else kind)
+        if self.close_connection and "Connection" not in headers:
+            self.send_header("Connection", "close")
+        for name, value in {**HARDENING, **headers}.items():
+            self.send_header(name, value)
+        self.end_headers()
+
+
+class _Refused(Exception):
+    """A request that is none of ours."""
+
+    def __init__(self, status: HTTPStatus, said: str) -> None:
+        super().__init__(said)
+        self.status = status
+
+
+def _object(text: str | bytes) -> dict[str, Any]:
+    try:
+        given = json.loads(text)
+    except (ValueError, RecursionError):
+        given = None
+    if not isinstance(given, dict):
+        raise OptionError("the request is no JSON object; send {} at least.")
+    return given
+
+
+def file_name(name: str) -> str:
+    """The name of a file that a page has sent, without folders and what a file system may not take."""
+    last = re.split(r"[/\\]", name)[-1]
+    plain = re.sub(r'[\x00-\x1f\x7f<>:"|?*]', "_", last).strip(". ")[-120:]
+    return plain.encode(errors="replace").decode() or "mesh"
+
+
+def preset_words(name: str) -> dict[str, Any]:
+    """What the page says of a preset: the engine, its limits, and the format that is for it."""
+    preset = PRESETS[name]
+    ending = preset.ending.lstrip(".")
+    model = next((model for model, endings in MODELS.items() if ending in endings), ending)
+    limits = [
+        f"{limit} {what}"
+        for limit, what in ((preset.max_vertices, "vertices"), (preset.max_faces, "triangles"))
+        if limit
+    ]
+    return {"engine": preset.engine, "format": preset.file_format or model, "limits": " and ".join(limits)}
+
+
+def _calmly(changes: Iterator[SessionState | None]) -> Iterator[SessionState | None]:
+    """Slow progress down to what an eye can follow; the last state of every kind always comes."""
+    for state in changes:
+        yield state
+        if state is not None and state.state == "working":
+            time.sleep(QUICKEST)  # changes meanwhile are seen as one

@@ -1,0 +1,222 @@
+"""What the viewer works on: one mesh, decomposed again and again with other options.
+
+One thread does the work. Asking for other options ends the work that is under way and drops what it reached; stopping
+keeps it. Everybody else reads the state and waits for it to change.
+"""
+
+from __future__ import annotations
+
+import atexit
+import threading
+import time
+import weakref
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+from rlacd.decomposition import Decomposition
+from rlacd.errors import RlacdError
+from rlacd.progress import Progress
+
+Run = Callable[..., Decomposition]
+"""Takes ``progress`` and the options, gives a decomposition: `rlacd.decompose` with the mesh bound."""
+
+
+@dataclass(frozen=True)
+class SessionState:
+    """What a session is doing.
+
+    Attributes
+    ----------
+    state : "idle", "working" or "closed"
+    run : int or None
+        Number of the last decomposition that was finished; None before the first.
+    version : int
+        Grows whenever there is something else to draw: another input, a draft, a decomposition.
+    draft : bool
+        Whether the hulls there are come of a quick first pass, which better ones may replace.
+    stage, done, total, parts, seconds
+        Of the work under way; see `rlacd.progress.Progress`.
+    error : str or None
+        Why the work asked for last gave nothing.
+    """
+
+    state: str = "idle"
+    run: int | None = None
+    version: int = 0
+    draft: bool = False
+    stage: str = "load"
+    done: int = 0
+    total: int | None = None
+    parts: int = 0
+    seconds: float = 0.0
+    error: str | None = None
+
+
+_SESSIONS: weakref.WeakSet[Session] = weakref.WeakSet()
+AT_EXIT = 30.0  # seconds that work may take to end when Python does
+
+
+class Session:
+    """Decomposes on a thread of its own.
+
+    Parameters
+    ----------
+    run : callable
+        Called with ``progress`` and the options asked for.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self._changed = threading.Condition()
+        self._state = SessionState()
+        self._count = 0  # changes of the state so far
+        self._wanted: list[dict[str, Any]] | None = None  # options of the draft, if any, and of the result
+        self._stopped = False
+        self._result: Decomposition | None = None
+        self._thread = threading.Thread(target=self._work, name="rlacd-view", daemon=True)
+        self._thread.start()
+        _SESSIONS.add(self)
+
+    def __enter__(self) -> Session:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    @property
+    def state(self) -> SessionState:
+        """What is being done now."""
+        with self._changed:
+            return self._state
+
+    @property
+    def result(self) -> tuple[int, Decomposition] | None:
+        """The hulls there are and their version; None before the first and after another input came."""
+        with self._changed:
+            return None if self._result is None else (self._state.version, self._result)
+
+    @property
+    def ended(self) -> bool:
+        """Whether the session is closed and its work has ended."""
+        return not self._thread.is_alive()
+
+    def decompose(
+        self, options: dict[str, Any], draft: dict[str, Any] | None = None, *, other_input: bool = False
+    ) -> None:
+        """Decompose with these options next, instead of what is under way.
+
+        Parameters
+        ----------
+        options : dict
+        draft : dict, optional
+            Options of a quick pass that comes first, whose hulls are there until better ones are.
+        other_input : bool
+            Drop the hulls there are: they belong to another input.
+        """
+        with self._changed:
+            self._wanted, self._stopped = [dict(draft)] if draft else [], False
+            self._wanted.append(dict(options))
+            now = SessionState("working", run=self._state.run, version=self._state.version, draft=self._state.draft)
+            if other_input:
+                self._result = None
+                now = replace(now, version=now.version + 1, draft=False)
+            self._tell(now)
+
+    def stop(self) -> None:
+        """End the work under way and keep what it reached."""
+        with self._changed:
+            self._stopped = True
+
+    def close(self, patience: float = 1.0) -> bool:
+        """End the work, drop it, and let those who wait go; tells whether the work has ended in so many seconds.
+
+        Work that has not is told to end; its thread is waited for when Python ends, since nothing may hold objects of
+        C++ libraries then.
+        """
+        with self._changed:
+            if self._state.state != "closed":
+                self._tell(replace(self._state, state="closed"))
+        self._thread.join(timeout=patience)
+        return self.ended
+
+    def changes(self, patience: float = 15.0) -> Iterator[SessionState | None]:
+        """Yield the state now and after every change until the session is closed; None after so many quiet seconds."""
+        seen = -1
+        while True:
+            with self._changed:
+                news = self._count != seen or self._changed.wait(timeout=patience)
+                seen, state = self._count, self._state
+            yield state if news else None
+            if state.state == "closed":
+                return
+
+    def _work(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._wanted is not None or self._state.state == "closed")
+                if self._state.state == "closed" or self._wanted is None:
+                    return
+                passes, self._wanted = self._wanted, None
+            self._take(passes)
+
+    def _take(self, passes: list[dict[str, Any]]) -> None:
+        """Make a draft, if one is wanted, and then the result."""
+        for number, options in enumerate(passes, start=1):
+            result, error = self._attempt(options)
+            with self._changed:
+                if self._state.state == "closed" or self._wanted is not None:
+                    return
+                is_last = number == len(passes) or self._stopped or error is not None
+                # Cut short before its search, a pass is worth less than the draft, which is finished.
+                if number > 1 and result is not None and _is_cut_short(result):
+                    result = None
+                state = self._state
+                if result is not None:
+                    self._result = result
+                    state = replace(state, version=state.version + 1, draft=number < len(passes))
+                if is_last:
+                    done = result is not None or (number > 1 and error is None)
+                    state = replace(state, state="idle", run=(state.run or 0) + 1 if done else state.run, error=error)
+                self._tell(state)
+                if is_last:
+                    return
+
+    def _attempt(self, options: dict[str, Any]) -> tuple[Decomposition | None, str | None]:
+        try:
+            return self._run(progress=self._follow, **options), None
+        except RlacdError as error:
+            return None, str(error)
+        except MemoryError:
+            return None, "there is not enough memory for this mesh; simplify it or use a larger machine."
+        except Exception as error:  # the viewer stays up, and says what happened
+            return None, f"a bug in rlacd ({type(error).__name__}: {error}); please report it."
+
+    def _follow(self, progress: Progress) -> bool:
+        with self._changed:
+            if self._wanted is not None or self._stopped or self._state.state == "closed":
+                return False
+            told = {name: getattr(progress, name) for name in ("stage", "done", "total", "parts", "seconds")}
+            self._tell(replace(self._state, **told))
+            return True
+
+    def _tell(self, state: SessionState) -> None:
+        self._state = state
+        self._count += 1
+        self._changed.notify_all()
+
+
+def _is_cut_short(result: Decomposition) -> bool:
+    """Whether the work was stopped before its first pass was done."""
+    return result.report.get("complete") is False and result.report.get("search") is None
+
+
+@atexit.register
+def _end_all() -> None:
+    """End work that goes on when Python ends: its thread would hold what C++ libraries then report as leaked."""
+    until = time.monotonic() + AT_EXIT
+    sessions = list(_SESSIONS)
+    for session in sessions:
+        session.close(0.0)
+    for session in sessions:
+        session.close(max(0.0, until - time.monotonic()))
