@@ -53,8 +53,8 @@ _HOME = {
     "PRESETS": "presets",
     "Preset": "presets",
     "Progress": "progress",
-    "Rewritten": "robots",
-    "rewrite_robot": "robots",
+    "Rewritten": "io.robots",
+    "rewrite_robot": "io.robots",
     **dict.fromkeys((name for name in __all__ if name.endswith("Error")), "errors"),
 }
 

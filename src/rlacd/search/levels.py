@@ -34,7 +34,7 @@ SHARE = 2 / 5
 HOPELESS = 5
 """A pass that makes so many times more pieces than there are parts will not have fewer of them after merging."""
 
-TIMES_FIRST_PASS = 3.6
+TIMES_FIRST_PASS = 7.5
 """The work a search may do, in that of the first pass."""
 
 MOST_WORK = 10e6
