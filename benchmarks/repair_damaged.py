@@ -18,13 +18,13 @@ from typing import Any
 
 import numpy as np
 import trimesh
+from rlacd.solid.repair_distance import SurfaceQuery, spread_points
 
 import rlacd
 from fuzz.flaws import FAMILIES
+from rlacd.io.read.load import load_mesh
+from rlacd.repair.repair import repair
 from rlacd.solid.frame import Frame
-from rlacd.solid.load import load_mesh
-from rlacd.solid.repair import repair
-from rlacd.solid.repair_distance import SurfaceQuery, spread_points
 
 SPACING = 0.02
 THRESHOLD = 0.05
