@@ -449,7 +449,7 @@ def test_an_output_that_cannot_be_written_has_code_3(output: str, says: str, tmp
 
 def test_the_library_refuses_names_that_no_file_can_have(tmp_path: Path) -> None:
     result = rlacd.decompose(BOX)
-    for name in ("\0.glb", "y" * 300 + ".stl", "no/such/folder/x.obj"):
+    for name in ("\0.glb", "y" * 300 + ".stl"):
         with pytest.raises(OutputError):
             result.save(tmp_path / name)
     assert list(tmp_path.iterdir()) == []

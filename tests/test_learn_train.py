@@ -128,7 +128,7 @@ def test_every_option_has_help_and_the_command_line_shows_it() -> None:
     assert shown.exit_code == 0
     for option in dataclasses.fields(TrainOptions):
         assert f"--{option.name.replace('_', '-')}" in shown.output
-        assert option.metadata["help"].split(";")[0][:30] in shown.output
+        assert option.metadata["option"].help.split(";")[0][:30] in shown.output
 
 
 def test_without_the_extra_the_command_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
