@@ -105,7 +105,7 @@ def test_merging_cut_short_is_the_same_for_any_number_of_threads(most: float) ->
     assert 1 <= len(counts[0]) <= 16
 
 
-def test_a_pass_whose_merging_is_cut_short_still_meets_the_threshold(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_pass_whose_merging_is_cut_short_meets_the_threshold_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = sponge().to_mesh64()
     solid = mesh.vert_properties[:, :3], mesh.tri_verts
     whole = rlacd.decompose(solid, quality="fast")
@@ -113,3 +113,5 @@ def test_a_pass_whose_merging_is_cut_short_still_meets_the_threshold(monkeypatch
     short = rlacd.decompose(solid, quality="fast")
     assert len(short) > len(whole)
     assert short.report["concavity"]["max"] <= 0.05
+    for result, expected in ((whole, False), (short, True)):
+        assert any("merging stopped" in warning for warning in result.report["warnings"]) == expected

@@ -46,6 +46,7 @@ class Clock:
         self.seconds: dict[str, float] = {}
         self.stopped_by: StoppedBy | None = None
         self.stopped_in: str | None = None
+        self.cut_short: set[str] = set()  # stages that ran out of their allowance of work
         self.stop = Stop()
         self._timeout = timeout
         self._progress = progress
@@ -92,6 +93,8 @@ class Clock:
         try:
             yield
         finally:
+            if self.work.is_spent:
+                self.cut_short.add(self._stage)
             account.pay(self.work.done)
             self.work = account
 

@@ -68,6 +68,7 @@ def make_report(
             *solid.warnings,
             *_coarse(solid),
             *_early_end(clock),
+            *_cut_short(clock),
             *(
                 ["There was no time to measure how far hulls and input are apart."]
                 if has_surface and over is None
@@ -138,6 +139,15 @@ def _early_end(clock: Clock) -> list[str]:
     if clock.stopped_in == "search":
         return [f"{reason.capitalize()} the search for fewer hulls early; those found so far are valid."]
     return [f"Incomplete: {reason} the work early; the hulls cover the solid but are coarser than asked for."]
+
+
+def _cut_short(clock: Clock) -> list[str]:
+    if "merge" not in clock.cut_short:
+        return []
+    return [
+        "There were so many parts that merging stopped at its bound of work: all hulls are valid, but fewer may do. A "
+        "larger threshold leaves less to merge."
+    ]
 
 
 def _shortcomings(
