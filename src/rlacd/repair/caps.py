@@ -90,6 +90,7 @@ def close_holes(
     gap: float,
     thickness: float,
     fill: bool = False,
+    bend: float = 1.0,
 ) -> Closed | None:
     """Cap the bodies all of whose holes may be closed.
 
@@ -109,6 +110,8 @@ def close_holes(
         A body that has less volume for its area is none.
     fill
         Close every body that closing gives an inside, whatever can come in.
+    bend
+        What bending weighs when caps are made; see `cap`.
 
     Returns
     -------
@@ -118,7 +121,7 @@ def close_holes(
     rims = rims_of(soup)
     if not rims.loops:
         return None
-    caps, owner = _caps(soup, rims)
+    caps, owner = _caps(soup, rims, bend)
     first_body = np.array([soup.body[beside[0]] for beside in rims.beside])
     lengths = [len(loop) for loop in rims.loops]
     _, group = components(bodies, np.repeat(first_body, lengths), soup.body[np.concatenate(rims.beside)])
@@ -185,8 +188,8 @@ def close_holes(
     )
 
 
-def _caps(soup: Soup, rims: Rims) -> tuple[IntArray, IntArray]:
-    """Triangulate the loops, no two across the same edge if that can be avoided.
+def _caps(soup: Soup, rims: Rims, bend: float) -> tuple[IntArray, IntArray]:
+    """Triangulate the loops, where bending counts no two across the same edge if that can be avoided.
 
     Returns the faces ``[C, 3]``, without those that have a vertex twice, and the loop ``[C]`` of each.
     """
@@ -197,14 +200,14 @@ def _caps(soup: Soup, rims: Rims) -> tuple[IntArray, IntArray]:
     for loop, beside in zip(rims.loops, rims.beside, strict=True):
         poll_stop()
         taken = None
-        if 3 < len(loop) <= LONGEST_EXACT_LOOP:
+        if bend and 3 < len(loop) <= LONGEST_EXACT_LOOP:
             low, high = np.minimum(loop[:, None], loop), np.maximum(loop[:, None], loop)
             at = np.minimum(np.searchsorted(edges, low * count + high), len(edges) - 1)
             taken = (edges[at] == low * count + high) | (low == high)
             for i, vertex in enumerate(loop.tolist()):
                 if vertex in across:
                     taken[i] |= np.isin(loop, across[vertex])
-        caps.append(loop[cap(soup.vertices[loop], rims.normals[beside], taken)])
+        caps.append(loop[cap(soup.vertices[loop], rims.normals[beside], taken, bend)])
         if len(loop) > 3:
             for a, b, c in caps[-1].tolist():
                 across.setdefault(a, []).extend((b, c))

@@ -140,7 +140,7 @@ def free_edges(faces: IntArray, count: int) -> IntArray:
     return np.stack([faces[face, corner], faces[face, (corner + 1) % 3]], axis=1)
 
 
-def cap(points: FloatArray, beside: FloatArray, taken: BoolArray | None = None) -> IntArray:
+def cap(points: FloatArray, beside: FloatArray, taken: BoolArray | None = None, bend: float = 1.0) -> IntArray:
     """Triangulate a closed loop of points; a loop may visit a place twice.
 
     Parameters
@@ -152,6 +152,8 @@ def cap(points: FloatArray, beside: FloatArray, taken: BoolArray | None = None) 
         that edge in the order of the loop.
     taken
         ``[N, N]``, between which points an edge would be one too many, because there is one or because they are one.
+    bend
+        What bending weighs; with 0 the area is least.
 
     Returns
     -------
@@ -161,14 +163,14 @@ def cap(points: FloatArray, beside: FloatArray, taken: BoolArray | None = None) 
     if len(points) <= 3:
         return np.array([[0, 2, 1]])
     if len(points) <= _EXACT_LOOP:
-        return _least_bent(points, beside, taken)[:, ::-1]
+        return _least_bent(points, beside, taken, bend)[:, ::-1]
     middle = points.mean(axis=0)
     _, _, axes = np.linalg.svd(points - middle, full_matrices=False)
     flat = np.ascontiguousarray((points - middle) @ axes[:2].T)
     ears = mapbox_earcut.triangulate_float64(flat, np.array([len(points)], dtype=np.uint32)).reshape(-1, 3)
     if len(ears) != len(points) - 2:  # the loop's shadow crosses itself: no plane is right
         if len(points) <= LONGEST_EXACT_LOOP:
-            return _least_bent(points, beside, taken)[:, ::-1]
+            return _least_bent(points, beside, taken, bend)[:, ::-1]
         return _strips(len(points))[:, ::-1]
     triangles: IntArray = ears.astype(np.int64)
     a, b, c = triangles.T
@@ -188,7 +190,7 @@ def _strips(count: int) -> IntArray:
     return np.array(triangles, dtype=np.int64)
 
 
-def _least_bent(points: FloatArray, beside: FloatArray, taken: BoolArray | None) -> IntArray:
+def _least_bent(points: FloatArray, beside: FloatArray, taken: BoolArray | None, bend: float) -> IntArray:
     """Triangulate a loop so that it bends least, by dynamic programming.
 
     What is least is the sum over all edges, those of the loop included, of length times angle between the faces: the
@@ -203,6 +205,7 @@ def _least_bent(points: FloatArray, beside: FloatArray, taken: BoolArray | None)
     normal[ring[:-1], ring[1:]] = -beside[:-1]
     span_of = np.linalg.norm(points[:, None] - points, axis=2)
     per_area = _AREA / max(float(span_of.max()), np.finfo(float).tiny)
+    span_of *= bend
     for span in range(2, n):
         poll_stop()
         first = np.arange(n - span)[:, None]

@@ -65,6 +65,8 @@ GAP = 0.03
 
 _WELDS = (2e-5, 5e-4)
 _WRAP_ERROR = 4e-3
+# What a capped body may lose before its caps are made another way.
+_LOST = 5e-3
 # More sheets than this are not united one by one: it would take seconds, and cutting what comes out longer. So it does
 # when fewer of them all cross each other: 40 do so 780 times (a second or two), 80 3,160 times (ten).
 _CROWD, _CROSSINGS = 300, 1000
@@ -133,10 +135,16 @@ def repair(
 
     query = SurfaceQuery(vertices, faces, threads)
     work = _Repair(query, frame, resolution, keep_cavities, open_bodies)
+    bend = 1.0
+    if work.lost > _LOST:
+        # A cap that bends little can cross the body's own faces, which turns some of it inside out: try small caps.
+        other = _Repair(query, frame, resolution, keep_cavities, open_bodies, bend=0.0)
+        if other.lost < work.lost:
+            work, bend = other, 0.0
     doubted = work.doubted()
     if len(doubted):
         # Faces of one body that cross each other can be joined wrongly into a skin: try them as sheets.
-        other = _Repair(query, frame, resolution, keep_cavities, open_bodies, doubted)
+        other = _Repair(query, frame, resolution, keep_cavities, open_bodies, doubted, bend)
         if other.deviation.max() < work.deviation.max():
             work = other
     return Solid(work.solid, surface, frame, work.report(), tuple(warnings + work.warnings))
@@ -156,6 +164,7 @@ class _Repair:
         keep_cavities: bool,
         open_bodies: str,
         as_sheets: IntArray | None = None,
+        bend: float = 1.0,
     ) -> None:
         self.input = surface
         self.frame = frame
@@ -163,6 +172,8 @@ class _Repair:
         self.keep_cavities = keep_cavities
         self.open_bodies = open_bodies
         self.mouths: dict[int, FloatArray] = {}  # of hollow bodies, where their widest opening is
+        self.bend = bend
+        self.lost = 0.0  # how far what a capped body lost lies from the solid
         self.as_sheets = np.empty(0, dtype=np.int64) if as_sheets is None else as_sheets
         self.warnings: list[str] = []
 
@@ -280,7 +291,7 @@ class _Repair:
         if free == 0 or free > MOST_FREE_EDGES or self.open_bodies == "thin":
             return soup
         fill = self.open_bodies == "solid"
-        closed = close_holes(soup, self.bodies, self.input, self._covers, GAP, HALF_THICKNESS / 2, fill)
+        closed = close_holes(soup, self.bodies, self.input, self._covers, GAP, HALF_THICKNESS / 2, fill, self.bend)
         if closed is None:
             return soup
         self.mouths = dict(zip(closed.hollow.tolist(), closed.mouths, strict=True))
@@ -432,7 +443,9 @@ class _Repair:
         distance = solid.distance(points)
         lost = np.flatnonzero(distance > 2 * HALF_THICKNESS)
         lost = lost[~solid.inside(points[lost])]
-        np.maximum.at(self.deviation, self.body_of_input[changed[on[lost]]], distance[lost])
+        body = self.body_of_input[changed[on[lost]]]
+        np.maximum.at(self.deviation, body, distance[lost])
+        self.lost = float(distance[lost].max(initial=0.0, where=self.step[body] == STEPS.index("capped")))
 
 
 def _crossings(boxes: FloatArray) -> int:
