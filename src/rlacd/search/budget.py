@@ -1,4 +1,4 @@
-"""The time a search may take, within that of the whole decomposition."""
+"""The time and work a search may take, within the limits of the whole decomposition."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from rlacd.work import Work
 
 
 class SearchBudget(Clock):
-    """A clock within another: it runs out sooner, and that is not an early end of the work.
+    """A clock nested in another: when it runs out, the search ends but the decomposition is not cut short.
 
     Parameters
     ----------
     clock : Clock
-        Timeout, progress and cancel are its own.
+        The outer clock; it handles timeout, progress and cancellation.
     seconds : float or None
-        Wall time that is left.
+        Wall time available; unlimited if None.
     parts : int
-        Told to the other clock as the number of parts so far.
+        Number of parts so far, reported to the outer clock.
     patient : bool
-        Time does not matter until `hurry` is called.
+        Ignore the time limit until `hurry` is called.
     work : Work, optional
-        What may be done; without bound by default.
+        The work allowed; unlimited by default.
     """
 
     def __init__(
@@ -40,35 +40,35 @@ class SearchBudget(Clock):
 
     @property
     def is_over(self) -> bool:
-        """Whether the work has to stop, for this clock or for the other."""
+        """Whether the search has to stop: the outer clock was stopped, or the time or the work is used up."""
         return self._outer.stopped_by is not None or self.left <= 0 or self.work.is_spent
 
     @property
     def left(self) -> float:
-        """Seconds left on this clock; infinite where it never runs out."""
+        """Seconds left on this clock; infinite if there is no time limit."""
         return math.inf if self._patient else self._end - time.perf_counter()
 
     def hurry(self) -> None:
-        """Let time matter from now on, and work no longer."""
+        """From now on, limit time instead of work."""
         self._patient = False
         done, self.work = self.work.done, Work()
         self.work.pay(done)
 
     def trial(self, units: float) -> Clock:
-        """Get a clock for one of several trials made side by side: the seconds left, and an account of its own."""
+        """Get a clock for one of several parallel trials: the seconds left, and a separate work account of `units`."""
         return Clock(self.left if math.isfinite(self.left) else None, work=Work(units))
 
     def step(self, done: int, total: int | None, parts: int) -> bool:
-        """Report to the other clock; True when the work may go on."""
+        """Report to the outer clock; True if the search may continue."""
         return self._outer.step(self.steps, None, self.parts) and not self.is_over
 
     def note_stop(self) -> None:
-        """Tell the other clock."""
+        """Forward the stop to the outer clock."""
         self._outer.note_stop()
 
     @contextmanager
     def share(self, among: int) -> Iterator[None]:
-        """Leave only an equal share of the time that is left to what is done inside."""
+        """Limit the time inside the context to 1 / `among` of the time left."""
         end = self._end
         now = time.perf_counter()
         self._end = now + (end - now) / among

@@ -1,4 +1,4 @@
-"""Quality levels: how much is searched after the first pass of cuts, and the bounds of a search."""
+"""Quality levels: how much to search after the first pass, and the limits of a search."""
 
 from __future__ import annotations
 
@@ -24,54 +24,54 @@ from rlacd.work import Work
 from rlacd.workers import Workers
 
 PORTFOLIO = ("excess-norm", "hull-sum", "max-excess")
-"""Scores by which the whole solid is cut anew, the better first."""
+"""Scores for further passes over the whole solid, best first."""
 
 assert set(PORTFOLIO) <= set(SCORES)
 
 SHARE = 2 / 5
-"""The whole solid is cut anew while that takes no more than this share of the seconds that are left."""
+"""Passes over the whole solid are made while one takes at most this share of the seconds left."""
 
 HOPELESS = 5
-"""A pass that makes so many times more pieces than there are parts will not have fewer of them after merging."""
+"""A pass is abandoned when its pieces outnumber the parts by this factor: merging will not make up for that."""
 
 TIMES_FIRST_PASS = 7.5
-"""The work a search may do, in that of the first pass."""
+"""Limit on the work of a search, as a multiple of the work of the first pass."""
 
 MOST_WORK = 10e6
-"""And no more than this, about ten seconds of one core."""
+"""Absolute limit on the work of a search in units: about ten seconds of one core."""
 
 ANOTHER_PASS = 1.5
-"""A pass is given up when it is this many times the work of the first."""
+"""A pass is abandoned when it exceeds this multiple of the work of the first."""
 
 FEW = 20
-"""Among more parts than this, work gains more around the first pass than by cutting the whole solid anew."""
+"""With more parts than this, searching around the first pass gains more per unit of work than another pass."""
 
 ROUNDS = 3
-"""The search goes around so many times from every pass of the portfolio, with other chances, if there is time."""
+"""If time allows, the search starts this many times from every pass of the portfolio, each time with another seed."""
 
 FURTHER = 1000
-"""Added to the seed when the search goes on after its opening."""
+"""Added to the seed when the search continues after its opening."""
 
 PLANES_PER_AXIS = 12
-"""Neighbourhoods are small: half the planes are as good in them, and twice as fast."""
+"""Neighbourhoods are small: half the planes give results as good in half the time."""
 
 CONCAVE_EDGES = 2
-"""None, two and four came out alike: 0.82, 0.81 and 0.81 of the parts after 4 s on nine meshes of one seed."""
+"""Zero, two and four make little difference: 0.82, 0.81 and 0.81 of the parts after 4 s (nine meshes, one seed)."""
 
 
 @dataclass(frozen=True)
 class Level:
-    """How much is searched.
+    """How much to search.
 
     Attributes
     ----------
     steps : int or None
-        Steps of the neighbourhood search at most.
+        Maximum number of steps of the neighbourhood search.
     seconds : float or None
-        Wall time of the search at most.
+        Maximum wall time of the search.
     bounded : bool
-        The search begins with an opening whose work is bounded by that of the first pass, even if the seconds do not
-        suffice for it.
+        The search starts with an opening whose work is limited to a multiple of that of the first pass. The opening is
+        completed even if it takes longer than `seconds`.
     """
 
     steps: int | None
@@ -84,12 +84,12 @@ LEVELS = {
     "balanced": Level(None, None, bounded=True),
     "best": Level(None, 5.0, bounded=True),
 }
-"""What the levels mean when neither steps nor seconds are given. Each goes through the states of the one before it, so
-that it is never worse."""
+"""The levels when neither steps nor seconds are given. Each visits all states of the level below, so it is never
+worse."""
 
 
 def level(quality: str, seconds: float | None, steps: int | None) -> Level:
-    """Get the level called `quality` with other bounds: those given replace its own."""
+    """Get the level called `quality`; for levels that search, given limits replace all of its own."""
     if quality == "fast" or (seconds is None and steps is None):
         return LEVELS[quality]
     return Level(steps, seconds)
@@ -97,25 +97,25 @@ def level(quality: str, seconds: float | None, steps: int | None) -> Level:
 
 @dataclass
 class SearchSummary:
-    """What a search reports.
+    """Summary of a search.
 
     Attributes
     ----------
     level : str
     seconds : float
-        Wall time it took.
+        Wall time of the search.
     first_pass, portfolio, parts : int
-        Parts before it, after the best of the portfolio, and in the end.
+        Number of parts before the search, after the best pass of the portfolio, and at the end.
     steps : int
         Trials of the neighbourhood search.
     accepted : int
-        Trials that were taken over.
+        Trials that were accepted.
     exhausted : bool
-        There was nothing left to try, or it had been in vain for long.
+        Nothing new was left to try, or no trial had saved a part for a long time.
     work : int
         Units of work done (see `rlacd.work`).
     allowed : int or None
-        The bound on it, where the level has one.
+        Limit on the work, if the level has one.
     """
 
     level: str
@@ -130,7 +130,7 @@ class SearchSummary:
     allowed: int | None
 
     def as_plain(self) -> dict[str, Any]:
-        """Everything as plain values."""
+        """All fields as plain values."""
         return asdict(self)
 
 
@@ -148,43 +148,48 @@ def search(
     rankings: Sequence[Ranking] | None = None,
     first: str = "",
 ) -> tuple[list[Part], SearchSummary]:
-    """Look for fewer parts, or as many with less volume in their hulls.
+    """Search for fewer parts, or for equally many with a smaller total hull volume.
 
     Parameters
     ----------
     root : Component
         The solid.
     parts : sequence of Part
-        A decomposition of it.
+        A decomposition of the solid.
     criterion : Criterion
-        What every new part will meet.
+        Every new part meets it.
     name : str
-        Of the level, for the account.
+        Name of the level, for the summary.
     bounds : Level
-        When to stop.
-    views : Views
-        Sweeps of the solid's components, those of the first pass among them.
+        Limits of the search.
+    sweeps : SweepCache
+        Sweeps of the solid's components, including those of the first pass.
+    workers : Workers
+    clock : Clock
+        Its work so far is taken as the work of the first pass.
     seed : int
     most_parts : int, optional
-        Where the parts are so few and do not meet the criterion, look for parts that come closer to it instead.
+        Limit on the number of parts. If there are no more parts than this and some do not meet the criterion, search
+        for parts that come closer to meeting it instead.
     rankings : sequence of Ranking, optional
-        Each cuts the whole solid anew, where that takes little time, and neighbourhoods; the scores of `PORTFOLIO` by
-        default.
+        Used to cut neighbourhoods and, if time allows, for further passes over the whole solid; the scores of
+        `PORTFOLIO` by default.
     first : str
-        The policy of the first pass, which need not be repeated.
+        The policy of the first pass, which is not repeated.
 
     Returns
     -------
     parts : list of Part
-        Never worse than those given. Depends on the seed and the steps, and on time only where the seconds or the
-        clock end the search.
-    account : Account
+        Never worse than the given ones. They depend on the seed and the steps, and on time only if `seconds` or the
+        clock ends the search.
+    summary : SearchSummary
     """
     start = time.perf_counter()
     steps = math.inf if bounds.steps is None else bounds.steps
     rankings = rankings or [by_score(score) for score in PORTFOLIO]
     near_sweeps = SweepCache(PLANES_PER_AXIS, CONCAVE_EDGES)
-    # What the finish would drop must not count, or a level could end with more hulls than the one below it.
+    # Slivers would be dropped at the end anyway; if they counted here, a level could end with more hulls than the one
+    # below it.
     best = parts = drop_slivers(parts, workers)
     at_a_limit = most_parts is not None and not all(workers.map(criterion.is_met, best))
     first_pass = clock.work.done
@@ -196,11 +201,11 @@ def search(
             outcome = tighten(
                 root, best, criterion, most_parts, rankings, sweeps, near_sweeps, workers, budget, steps, seed
             )
-        else:  # parts that cannot be united
+        else:  # merging could not reach the limit
             outcome = SearchOutcome(best, 0, 0, True)
         from_portfolio = len(parts)
     else:
-        others = rankings[1:] if first == "greedy" else rankings  # the first score is that policy's own
+        others = rankings[1:] if first == "greedy" else rankings  # greedy has already used the first score
         opening = others if not bounded else others[:1] if len(best) <= FEW else []
         a_pass = _seconds_of_a_pass(clock)
         starts = _portfolio(root, best, criterion, opening, sweeps, workers, budget, a_pass, ANOTHER_PASS * first_pass)
@@ -230,9 +235,9 @@ def search(
 def eliminate_parts(
     root: Component, parts: Sequence[Part], criterion: Criterion, workers: Workers, clock: Clock, seed: int
 ) -> list[Part]:
-    """Try once to do without each part of a solid, by dividing it among those around; the same parts where that fails.
+    """Try once to eliminate each part by redistributing it to the parts around it; parts that cannot go stay.
 
-    All the search there is in one pass, and only where it is quick: where hulls are held against balls.
+    This is the only search inside a pass, and only used where it is quick: where hulls are tested against balls.
     """
     state = Neighbourhood(root, parts, criterion, (), SweepCache(), workers, seed)
     state.redistribute_all(SearchBudget(clock, None, len(parts)))
@@ -254,9 +259,9 @@ def _portfolio(
     seconds: float,
     work: float = math.inf,
 ) -> list[list[Part]]:
-    """The given parts, made in so many seconds, and those of the whole solid cut by other rankings; the best first.
+    """The given parts and those of further passes, one for each ranking; best first.
 
-    A pass that needs more than the given work is given up.
+    `seconds` is the expected duration of a pass. A pass that needs more than `work` is abandoned.
     """
     cache = CutCache()
     found = [parts]
@@ -285,7 +290,7 @@ def _from_all(
     steps: float,
     seed: int,
 ) -> SearchOutcome:
-    """Search around the best start; when nothing is left to try there, around the next, and all over again."""
+    """Search from the best start, then from the next whenever a search is exhausted, for `ROUNDS` rounds."""
     best = starts[0]
     total = accepted = 0
     exhausted = False

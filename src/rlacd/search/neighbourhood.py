@@ -1,14 +1,19 @@
-"""Large-neighbourhood search: a few neighbouring parts are reunited and cut differently, again and again.
+"""Adaptive large-neighbourhood search over the parts of a decomposition.
 
-A state is the parts so far, all of them meeting the criterion. A trial takes a cluster of neighbours, two of which have
-a joint hull that fits almost, reunites what they are made of into one solid, cuts that anew, and merges the pieces with
-each other and with the parts around. It is accepted when fewer parts are left, or as many with less volume in their
-hulls. Or a part gives pieces of itself to those around, which is taken over even if no part is saved yet, or it is
-divided among them altogether. Small clusters are quick to try, large ones can be cut in quite another way; which of
-them, or giving, and which ranking of planes, is worth its time depends on the shape, so that is learned on the way.
-(P. Shaw, "Using Constraint Programming and Local Search Methods to Solve Vehicle Routing Problems", CP 1998, and S.
-Ropke and D. Pisinger, "An Adaptive Large Neighborhood Search Heuristic for the Pickup and Delivery Problem with Time
-Windows", 2006, are where the ideas come from.)
+A state is a set of parts, all of which meet the criterion. Three operators change it:
+
+- recut: a cluster of neighbours, two of which have a joint hull that almost fits, is reunited into one solid and cut
+  again; the pieces are merged with each other and with the parts around. Accepted if it leaves fewer parts, or equally
+  many with a smaller total hull volume.
+- transfer: a part gives pieces to the parts around it. Accepted even if it saves no part yet.
+- redistribute: a part is divided among the parts around it and disappears.
+
+Small clusters are quick to try; large ones allow very different cuts. Which operator, cluster size and ranking of
+planes pays off depends on the shape, so the search adapts their weights to the gains so far.
+
+Sources: P. Shaw, "Using Constraint Programming and Local Search Methods to Solve Vehicle Routing Problems", CP 1998;
+S. Ropke and D. Pisinger, "An Adaptive Large Neighborhood Search Heuristic for the Pickup and Delivery Problem with Time
+Windows", 2006.
 """
 
 from __future__ import annotations
@@ -34,40 +39,42 @@ from rlacd.solid.component import Component, Part
 from rlacd.workers import Workers
 
 DRY = 4
-"""The search ends when so many batches in a row found nothing new to try."""
+"""The search ends after this many batches in a row with nothing new to try."""
 
 OPENING = 16
-"""So many steps are made before parts are tried to be done without: what is cut anew later undoes some of that."""
+"""Steps before the first attempt to eliminate all parts: later recuts undo some of what elimination gains."""
 
 SMALL = 0.5
-"""The smaller half of the parts is tried before that: per unit of work, nothing saves more parts."""
+"""Share of the parts, the smallest, that the search tries to eliminate first: nothing saves more parts per unit of
+work."""
 
 OPENING_SHARE = 4
-"""They take no more than this fraction of the time: a quarter."""
+"""The steps of the opening take at most one part in this many of the time left."""
 
 TOO_LITTLE = 0.02
-"""Less than this share of the work allowed is not worth another batch."""
+"""The search ends when less than this share of the allowed work is left."""
 
 STEPS_PER_PART = 2
-"""After so many steps a part each of them is tried again."""
+"""Steps per part between two attempts to eliminate all parts."""
 
 PATIENCE = 24
-"""It ends, too, after so many trials a part that saved none: giving pieces away finds something new to try for ever."""
+"""The search also ends after this many trials per part without a gain: transfer always finds something new to try."""
 
 
 @dataclass(frozen=True)
 class SearchOutcome:
-    """What a search has done.
+    """Result of a neighbourhood search.
 
     Attributes
     ----------
     parts : list of Part
+        The best parts found.
     steps : int
         Trials made.
     accepted : int
-        Trials that were taken over.
+        Trials accepted.
     exhausted : bool
-        There was nothing left to try, or it had been in vain for long.
+        Nothing new was left to try, or no trial had saved a part for a long time.
     """
 
     parts: list[Part]
@@ -76,25 +83,26 @@ class SearchOutcome:
     exhausted: bool
 
     def then(self, other: SearchOutcome) -> SearchOutcome:
-        """Get what this search and another that went on from it have done."""
+        """Combine this outcome with that of a search that continued from it."""
         best = min(self.parts, other.parts, key=cost)
         return SearchOutcome(best, self.steps + other.steps, self.accepted + other.accepted, other.exhausted)
 
 
 class Neighbourhood:
-    """Parts that are being improved.
+    """A decomposition that is being improved.
 
     Parameters
     ----------
     root : Component
         The solid.
     parts : sequence of Part
-        Made of components with disjoint interiors; all that meet the criterion stay so.
+        Made of components with disjoint interiors.
     criterion : Criterion
+        Every new part meets it.
     rankings : sequence of Ranking
-        Who ranks planes; those that turn out well are asked more often.
-    views : Views
-        Where sweeps come from.
+        Rankings of planes for recuts; the more successful ones are used more often.
+    sweeps : SweepCache
+        Sweeps for the rankings.
     workers : Workers
     seed : int
     """
@@ -126,9 +134,9 @@ class Neighbourhood:
         return list(self._graph.parts.values())
 
     def run(self, budget: SearchBudget, most: float = math.inf, enough: int = 1) -> SearchOutcome:
-        """Search until there is no hope left, the clock says no, `most` steps are made or `enough` parts are left.
+        """Search until nothing is left to try, the budget is used up, `most` steps are made or `enough` parts are left.
 
-        An opening comes first: a few steps, then every part is tried to be done without. Such rounds are no steps.
+        It opens with a few steps followed by an attempt to eliminate every part. Eliminations do not count as steps.
         """
         exhausted = len(self._graph.parts) == 1
         try:
@@ -141,12 +149,12 @@ class Neighbourhood:
             while not exhausted and self._steps < most and len(self._graph.parts) > enough and not budget.is_over:
                 exhausted = self._walk(budget, min(most, self._steps + STEPS_PER_PART * len(self._graph.parts)), enough)
                 self.redistribute_all(budget, enough)
-        except Stopped:  # between two exchanges: the best so far stays
+        except Stopped:  # raised between two exchanges: the best state so far is kept
             budget.note_stop()
         return SearchOutcome(self._best, self._steps, self._accepted, exhausted)
 
     def _walk(self, budget: SearchBudget, most: float, enough: int) -> bool:
-        """Try at random until `most` steps are made in all; whether there is no hope left."""
+        """Make random trials until `most` steps are made in total; whether the search is exhausted."""
         graph = self._graph
         while self._dry < DRY and self._vain < PATIENCE * len(graph.parts) and len(graph.parts) > 1:
             if (
@@ -157,14 +165,15 @@ class Neighbourhood:
                 return False
             batch = self._affordable(list(self._operators.draw(graph, self._random, self._near)), budget)
             self._dry = 0 if batch else self._dry + 1
-            batch = batch[: int(min(BATCH, most - self._steps))]  # drawn in full: more steps begin with the same
+            # The batch is drawn in full and then shortened, so a search with more steps starts with the same trials.
+            batch = batch[: int(min(BATCH, most - self._steps))]
             self._make(batch, budget)
             self._steps += len(batch)
             budget.steps += len(batch)
         return True
 
     def redistribute_all(self, budget: SearchBudget, enough: int = 1, share: float = 1.0) -> None:
-        """Try to do without each part, or a share of them, the smallest first, while there are more than `enough`."""
+        """Try to eliminate each part, or the smallest share of them, smallest first, until `enough` parts are left."""
         graph = self._graph
         waiting = sorted(graph.parts, key=lambda i: (graph.parts[i].hull.volume, i))
         waiting = waiting[: math.ceil(share * len(waiting))]
@@ -178,18 +187,18 @@ class Neighbourhood:
             self._make(self._affordable([trial for trial in trials if self._operators.is_new(trial)], budget), budget)
 
     def _affordable(self, trials: list[Trial], budget: SearchBudget) -> list[Trial]:
-        """As many of the trials as there is work left for, by what others of their kind took."""
+        """The first trials, as many as the work left pays for, estimated from earlier trials of their kind."""
         if math.isinf(budget.work.left):
             return trials
         dearest = 0.0
         for count, trial in enumerate(trials, start=1):
             dearest = max(dearest, self._operators.price(trial))
-            if count > 1 and count * dearest > budget.work.left:  # each is given an equal share
+            if count > 1 and count * dearest > budget.work.left:  # each trial gets an equal share
                 return trials[: count - 1]
         return trials
 
     def _make(self, trials: Sequence[Trial], budget: SearchBudget) -> None:
-        """Make trials side by side, and take over what is better."""
+        """Make trials of the same state in parallel, then apply the exchanges they found in order."""
         if not trials:
             return
         clocks = [budget.trial(budget.work.share(len(trials))) for _ in trials]
@@ -219,5 +228,5 @@ class Neighbourhood:
 
 
 def cost(parts: Sequence[Part]) -> tuple[int, float]:
-    """How many parts there are, and the volume of their hulls: the less, the better they fit."""
+    """The number of parts, then the total volume of their hulls: what the search minimises."""
     return len(parts), sum(part.hull.volume for part in parts)

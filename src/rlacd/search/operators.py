@@ -1,4 +1,4 @@
-"""What a search tries next: which clusters are cut anew by whom, and which parts are given away."""
+"""The operators of the search, and how the next trials are drawn."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ import numpy as np
 from rlacd.search.part_graph import Cluster, PartGraph
 
 SIZES = (3, 4, 5, 6, 8)
-"""So many parts are cut anew together: two seldom become one, and more take too long."""
+"""Cluster sizes for recuts: two parts rarely become one, and more than eight take too long."""
 
 BATCH = 8
-"""Trials made of one state at a time; the same whatever the number of threads, so that the result is too."""
+"""Trials made from the same state. It does not depend on the number of threads, so neither does the result."""
 
 REPEATS = 4
-"""So often a part may be given to the same others, each time by other cuts."""
+"""How often a part may be given to the same parts, each time with other random cuts."""
 
 PRIOR = 2
-"""The work of a kind of trial is supposed as if so many had been made."""
+"""Weight of the prior estimate of the work of a kind of trial, in trials."""
 
 DRAWS = 10
-"""A way of trying is left for this batch when so many draws in a row gave nothing new."""
+"""Draws of one operator in a batch before it is skipped for lack of anything new."""
 
 
 class Operator(Enum):
-    """What can be done to a state."""
+    """A way to change the parts of a state."""
 
     RECUT = "a cluster is cut anew by a policy"
     TRANSFER = "a part gives pieces to those around"
@@ -35,12 +35,12 @@ class Operator(Enum):
 
 
 AS_MUCH_AS = {Operator.TRANSFER: 3.0, Operator.REDISTRIBUTE: 0.6}
-"""Giving a part away is about as much work as it is to cut a cluster of so many anew."""
+"""Prior estimate of the work of giving a part away: that of recutting a cluster of this many parts."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """What to try: with which parts, the ids of those around, which policy cuts, and the seed of what is drawn."""
+    """One application of an operator: to which parts, the ids of those around, the policy (recut only), and a seed."""
 
     move: Operator
     cluster: Cluster
@@ -51,7 +51,7 @@ class Trial:
 
 @dataclass
 class _Tally:
-    """How often something was tried, how many parts that gained, and how much work it was."""
+    """Number of trials, parts they saved, and work they took."""
 
     tried: int = 0
     gained: int = 0
@@ -59,14 +59,14 @@ class _Tally:
 
     @property
     def rate(self) -> float:
-        """Parts gained a try, from a hopeful start."""
+        """Parts saved per trial, with an optimistic prior of 1 in 10."""
         return (self.gained + 1) / (self.tried + 10)
 
 
 class OperatorSampler:
-    """Ways of trying: so many parts cut anew by this policy, or one that is given away in this manner.
+    """Draws trials: recuts of each cluster size by each policy, transfers and redistributions.
 
-    Those that turned out well are taken more often.
+    The weight of each is its estimated gain per unit of work.
     """
 
     def __init__(self, policies: int) -> None:
@@ -82,7 +82,7 @@ class OperatorSampler:
         self._units = self._spent = 0.0
 
     def draw(self, graph: PartGraph, random: np.random.Generator, reach: float) -> Iterator[Trial]:
-        """Draw up to `BATCH` trials of disjoint clusters, none that was made before."""
+        """Draw up to `BATCH` new trials of disjoint clusters."""
         taken: set[int] = set()
         worth = np.array([self._worth(*way) for way in self._operators])
         for way in random.choice(len(self._operators), BATCH, p=worth / worth.sum()):
@@ -97,7 +97,7 @@ class OperatorSampler:
                     break
 
     def is_new(self, trial: Trial) -> bool:
-        """Whether the trial was not made before, or not too often; it is from now on."""
+        """Whether the trial may be made: a recut once, giving a part away `REPEATS` times. The call counts as made."""
         if trial.policy is not None:
             known = trial.cluster in self._cut[trial.policy]
             self._cut[trial.policy].add(trial.cluster)
@@ -107,11 +107,11 @@ class OperatorSampler:
         return self._given[key] <= REPEATS
 
     def price(self, trial: Trial) -> float:
-        """Get the work that a trial is likely to be, by those made so far; 0 at first."""
+        """Estimate the work of a trial from those made so far; 0 before the first."""
         return self._work(trial.move, len(trial.cluster)) * self._unit
 
     def count(self, trial: Trial, gain: int, work: float) -> None:
-        """Remember what a try gave, and how much work it was."""
+        """Record the gain and the work of a trial."""
         self._units += _size(trial.move, len(trial.cluster))
         self._spent += work
         tallies = [self._kinds[trial.move, len(trial.cluster)]]
@@ -123,19 +123,19 @@ class OperatorSampler:
             tally.work += work
 
     def _worth(self, move: Operator, size: int, policy: int | None) -> float:
-        """Parts gained by the work it is."""
+        """Estimated parts saved per unit of work, up to a common factor."""
         rate = self._kinds[move, size].rate / self._work(move, size)
         return len(self._policies) * rate if policy is None else rate * self._policies[policy].rate / self._usual
 
     def _work(self, move: Operator, size: int) -> float:
-        """The work of a trial, that of cutting one part anew being 1: at first about the size of the cluster."""
+        """Estimated work of a trial, relative to recutting one part; the prior is the size of the cluster."""
         tally = self._kinds[move, size]
         known = tally.work / self._unit if self._unit > 0 else 0.0
         return (PRIOR * _size(move, size) + known) / (PRIOR + tally.tried)
 
     @property
     def _unit(self) -> float:
-        """Units of work in what was supposed to be 1."""
+        """Units of work per unit of the prior estimate."""
         return self._spent / self._units if self._units else 0.0
 
     @property
@@ -159,5 +159,5 @@ def _giver(graph: PartGraph, random: np.random.Generator, move: Operator, reach:
 
 
 def giving_away(move: Operator, graph: PartGraph, giver: int, random: np.random.Generator, reach: float) -> Trial:
-    """Let a part be given to those within reach."""
+    """Make the trial that gives a part to those within reach."""
     return Trial(move, (giver,), None, graph.near(giver, reach), int(random.integers(2**32)))

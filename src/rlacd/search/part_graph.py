@@ -1,4 +1,4 @@
-"""The parts of a decomposition, who touches whom, and which of them are worth cutting again together."""
+"""The parts of a decomposition, which of them touch, and which clusters are worth recutting."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ Cluster = tuple[int, ...]
 """Ids of parts, ascending."""
 
 SPREAD = 0.6
-"""How much chance there is in drawing clusters: without any, all would lie around the same pair."""
+"""Amount of randomness in drawing clusters: without any, all would contain the same pair."""
 
 
 class PartGraph:
-    """Parts under ids that are never used again, and the pairs of them that touch face to face.
+    """Parts under ids that are never reused, and the pairs of parts that touch face to face.
 
-    A pair's *gap* is the radius of a ball as large as the volume that its joint hull would fill at a cost: the smaller
-    it is, the less is missing for the two to be one part.
+    A pair's *gap* is the cube root of the volume its joint hull adds to what may be filled for free: the smaller the
+    gap, the closer the two are to being one part.
 
     Parameters
     ----------
     parts : sequence of Part
         They get the ids 0, 1, ...
     criterion : Criterion
-        Says what may be filled at no cost.
+        Decides what may be filled for free.
     workers : Workers
-        Tests pairs.
+        Tests pairs in parallel.
     """
 
     def __init__(self, parts: Sequence[Part], criterion: Criterion, workers: Workers) -> None:
@@ -47,7 +47,7 @@ class PartGraph:
         self.replace((), parts)
 
     def replace(self, gone: Iterable[int], new: Sequence[Part]) -> None:
-        """Take parts away and put others in their place, under new ids."""
+        """Replace parts by others, which get new ids."""
         for i in gone:
             del self.parts[i]
             for j in self._gaps.pop(i):
@@ -71,12 +71,12 @@ class PartGraph:
                 self._gaps[i][j] = self._gaps[j][i] = max(hull_volume - filled[i] - filled[j], 0.0) ** (1 / 3)
 
     def collect(self) -> float:
-        """Get the work done since this was last asked for."""
+        """Get the work done since the last call."""
         done, self._work = self._work, 0.0
         return done
 
     def apply(self, exchange: Exchange) -> bool:
-        """Make an exchange; False when parts of it are gone already."""
+        """Apply an exchange; False if some of the parts it takes out are already gone."""
         ids = {id(part): i for i, part in self.parts.items()}
         if any(id(part) not in ids for part in exchange.out):
             return False
@@ -84,11 +84,11 @@ class PartGraph:
         return True
 
     def around(self, cluster: Cluster) -> Cluster:
-        """Get the parts that touch the cluster's, in ascending order."""
+        """Get the parts that touch a cluster, in ascending order."""
         return tuple(sorted({j for i in cluster for j in self._gaps[i]} - set(cluster)))
 
     def near(self, which: int, reach: float) -> Cluster:
-        """Get the parts whose boxes lie within reach of a part's along every axis, in ascending order."""
+        """Get the parts whose boxes are within reach of a part's box along every axis, in ascending order."""
         ids = [i for i in self.parts if i != which]
         if not ids:
             return ()
@@ -98,16 +98,16 @@ class PartGraph:
         return tuple(i for i, gap in zip(ids, gaps.tolist(), strict=True) if gap <= reach)
 
     def draw_small(self, random: np.random.Generator) -> int:
-        """Draw a part, those with small hulls more often: the chances fall with the rank, as 1/2, 1/3, 1/4, ..."""
+        """Draw a part, favouring small hulls: the weights by rank are 1/2, 1/3, 1/4, ..."""
         by_size = sorted(self.parts, key=lambda i: (self.parts[i].hull.volume, i))
         feasibilities = 1 / np.arange(2, len(by_size) + 2)
         return by_size[int(random.choice(len(by_size), p=feasibilities / feasibilities.sum()))]
 
     def draw(self, size: int, random: np.random.Generator) -> Cluster | None:
-        """Draw a cluster of parts that hang together: a pair with a small gap, and what lies close to it.
+        """Draw a connected cluster: a pair with a small gap, extended by the neighbours with the smallest gaps.
 
-        Gaps are compared after each was multiplied by a number between 1 - `SPREAD` and 1 + `SPREAD`. None where not so
-        many parts hang together.
+        Each gap is multiplied by a random factor between 1 - `SPREAD` and 1 + `SPREAD` before comparing. None if the
+        connected parts around the pair are too few.
         """
         pairs = [(gap, i, j) for i, gaps in self._gaps.items() for j, gap in gaps.items() if i < j]
         if not pairs:

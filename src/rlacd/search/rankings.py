@@ -1,4 +1,4 @@
-"""Rankings of planes, by which a search cuts."""
+"""Rankings of planes for the search."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import Greedy, Policy
 
 Ranking: TypeAlias = Callable[[SweepCache], Policy]
-"""Makes the policy that takes the plane it likes best of those that the views offer."""
+"""Makes a policy that takes the best-ranked plane of a component's sweep."""
 
 
 def by_score(name: str) -> Ranking:
-    """Get the ranking by one of the greedy policy's scores."""
+    """Get a ranking by one of the greedy policy's scores."""
     return lambda sweeps: Greedy(name, sweeps=sweeps)

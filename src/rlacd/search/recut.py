@@ -1,4 +1,4 @@
-"""One step of the search: a few parts become one solid again, are cut differently, and merged with what is around."""
+"""The recut operator: a few parts are reunited, cut differently, and merged with the parts around."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from rlacd.solid.reunite import reunite
 from rlacd.workers import Workers
 
 SLACK = 5
-"""Merging may make up for so many pieces more than the parts there were; it seldom does for more."""
+"""Pieces allowed beyond the number of parts: merging rarely makes up for more."""
 
 TIGHTER = 1e-4
-"""As many parts are better only if their hulls are smaller by this share; otherwise the search would tread water."""
+"""Equally many parts are better only if their hulls are smaller by this share; otherwise the search would stall."""
 
 
 @dataclass(frozen=True, eq=False)
 class Exchange:
-    """Parts to take out of a decomposition and better ones to put in."""
+    """Parts of a decomposition and the parts that replace them."""
 
     out: tuple[Part, ...]
     into: tuple[Part, ...]
 
     @classmethod
     def between(cls, before: Sequence[Part], after: Sequence[Part]) -> Exchange:
-        """What turns some parts into others; those that are among both stay."""
+        """The exchange that turns some parts into others; parts that are in both stay."""
         known, kept = {id(part) for part in before}, {id(part) for part in after}
         return cls(
             tuple(part for part in before if id(part) not in kept),
@@ -40,7 +40,7 @@ class Exchange:
 
     @property
     def gain(self) -> int:
-        """How many parts fewer there are."""
+        """Number of parts saved."""
         return len(self.out) - len(self.into)
 
 
@@ -52,27 +52,27 @@ def recut(
     clock: Clock,
     whole: Component | None = None,
 ) -> Exchange | None:
-    """Cut some parts anew, and merge the pieces with each other and with the parts around.
+    """Reunite some parts, cut them again, and merge the pieces with each other and with the parts around.
 
     Parameters
     ----------
     parts : sequence of Part
-        Parts that hang together.
+        A connected cluster.
     around : sequence of Part
-        Parts that touch them.
+        Parts that touch the cluster.
     policy : Policy
         Chooses the planes.
     criterion : Criterion
         Every new part meets it.
     clock : Clock
-        Give up when its time or its work is over.
+        Give up when its time or its work is used up.
     whole : Component, optional
-        What all are parts of: pieces may then be merged across what lies between them.
+        The solid; if given, pieces may be merged across other parts between them.
 
     Returns
     -------
     Exchange or None
-        None when that gives neither fewer parts nor as many with smaller hulls.
+        None if the result has neither fewer parts nor equally many with smaller hulls.
     """
     alone = Workers(1)
     members = [member for part in parts for member in part.members]
@@ -84,7 +84,7 @@ def recut(
     pieces, left = CutTree(solid, policy, alone).cut_until(criterion, clock, len(parts) + SLACK)
     if left or sum(piece.volume for piece in pieces) < (1 - LOST) * solid.volume:
         return None
-    if _volumes(pieces) == _volumes(parts):  # cut as before: what could be merged with these was merged
+    if _volumes(pieces) == _volumes(parts):  # cut as before: merging these has already been tried
         return None
     merged = merge_parts(pieces, criterion, alone, clock, beside=around, solid=whole)
     if clock.stopped_by is not None or clock.work.is_spent:
@@ -95,11 +95,11 @@ def recut(
 
 
 def _volumes(parts: Sequence[Part]) -> list[int]:
-    """Shares of the whole, in millionths: two ways to divide a solid that agree in them are the same."""
+    """Sorted shares of the total volume in millionths; two divisions of a solid with equal shares count as the same."""
     whole = sum(part.volume for part in parts)
     return sorted(round(1e6 * part.volume / whole) for part in parts)
 
 
 def hull_volume(parts: Sequence[Part]) -> float:
-    """Add up the volumes of the parts' hulls."""
+    """Total volume of the parts' hulls."""
     return sum(part.hull.volume for part in parts)

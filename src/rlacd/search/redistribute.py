@@ -1,7 +1,8 @@
-"""Another step of the search: a part is divided until the parts around have taken all of it, or one piece is left over.
+"""The redistribute operator: a part is divided until the parts around have taken all of it, or some piece cannot go.
 
-Hulls may overlap, so a taker need not end where the part began: it takes a piece when all that the solid fills of their
-joint hull is tight (`rlacd.merge.merge.unite`). What nobody takes is halved and offered again.
+Hulls may overlap, so a taker need not end where the part began: it takes a piece if the solid clipped to their joint
+hull meets the criterion (`rlacd.merge.merge.unite`). A piece that no part can take is halved, and the halves are
+offered again.
 """
 
 from __future__ import annotations
@@ -22,13 +23,13 @@ from rlacd.solid.hull import Hull
 from rlacd.work import Work
 
 TAKERS = 6
-"""A piece is offered to so many parts, those first whose hulls grow the least."""
+"""Number of parts a piece is offered to, starting with those whose hulls would grow the least."""
 
 HALVINGS = 3
-"""A piece that nobody takes is halved so often at most."""
+"""Maximum depth of halving for a piece that no part can take."""
 
 MIDDLE = 0.1
-"""Halves are taken up to this share of the length off the middle, by chance: another try is another division."""
+"""A piece is halved within this share of its length from the middle, at random, so each trial divides differently."""
 
 
 def redistribute(
@@ -39,25 +40,26 @@ def redistribute(
     solid: Component,
     clock: Clock | None = None,
 ) -> Exchange | None:
-    """Give all of a part to the parts around.
+    """Divide a part among the parts around it.
 
     Parameters
     ----------
     part : Part
+        The part to eliminate.
     around : sequence of Part
-        Parts near it; each that takes a piece still meets the criterion with it.
+        Parts near it; each that takes a piece still meets the criterion.
     criterion : Criterion
     random : numpy.random.Generator
         Draws where pieces are halved.
     solid : Component
-        What all are parts of.
+        The solid that was decomposed.
     clock : Clock, optional
-        Give up when its time or its work is over.
+        Give up when its time or its work is used up.
 
     Returns
     -------
     Exchange or None
-        With one part less; None where a piece is left over.
+        An exchange that saves one part; None if some piece cannot be taken.
     """
     clock = clock or Clock()
     if not _may_be_taken(part, around, criterion, solid, clock.work):
@@ -81,7 +83,7 @@ def redistribute(
 
 
 def _may_be_taken(part: Part, around: Sequence[Part], criterion: Criterion, solid: Component, account: Work) -> bool:
-    """Whether each of the part's outermost corners alone could belong to one of the others: a quick no."""
+    """Whether some other part could take each of the part's extreme vertices by itself: a quick necessary test."""
     corners = part.hull.vertices
     directions = np.concatenate([np.eye(3), -np.eye(3)])
     outermost = sorted(set(np.argmax(corners @ directions.T, axis=0).tolist()))
@@ -100,7 +102,7 @@ def _with_point(hull: Hull, point: FloatArray) -> Hull:
 
 
 def _by_growth(parts: Sequence[Part], piece: Part, reach: float, account: Work) -> list[tuple[int, Hull]]:
-    """The parts within reach whose hulls would grow the least, and those hulls."""
+    """The parts within reach whose hulls would grow the least, with their joint hulls."""
     near = [i for i, part in enumerate(parts) if _gap(part.box, piece.box) <= reach]
     corners = len(piece.hull.vertices)
     if not account.pay(sum(work.joining(len(parts[i].hull.vertices) + corners) for i in near)):
@@ -111,13 +113,13 @@ def _by_growth(parts: Sequence[Part], piece: Part, reach: float, account: Work) 
 
 
 def _gap(box: FloatArray, other: FloatArray) -> float:
-    """How far a box [2, 3] is from another, or from a point [3]."""
+    """Distance of a box [2, 3] from another, or from a point [3]."""
     low, high = (other[0], other[1]) if other.ndim == 2 else (other, other)
     return float(np.linalg.norm(np.maximum(np.maximum(low - box[1], box[0] - high), 0.0)))
 
 
 def _halves(piece: Component, random: np.random.Generator) -> list[Component]:
-    """Cut across the longest of the axes of space, or of the piece's own; the smaller half first."""
+    """Cut across the longest coordinate axis or principal axis, chosen at random; the smaller half first."""
     axes = np.eye(3) if random.random() < 0.5 else piece.principal_axes
     heights = piece.hull.vertices @ axes.T
     lower, upper = heights.min(axis=0), heights.max(axis=0)

@@ -1,4 +1,4 @@
-"""Search with a limit on the number of hulls: as many parts, with less error."""
+"""Search under a limit on the number of hulls: reduce the error without exceeding the limit."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from rlacd.solid.component import Component, Part
 from rlacd.workers import Workers
 
 ROUNDS = 6
-"""So many thresholds, between the one asked for and the one reached, are tried."""
+"""Number of thresholds to try between the requested one and the one reached."""
 
 CLOSE = 1.02
-"""A threshold is told from another when it is larger by this factor."""
+"""Thresholds closer than this factor are treated as equal."""
 
 
 def tighten(
@@ -35,26 +35,26 @@ def tighten(
     steps: float,
     seed: int,
 ) -> SearchOutcome:
-    """Look for no more parts than allowed that meet a finer criterion than the given parts do.
+    """Search for at most `most_parts` parts that meet a finer threshold than the given parts do.
 
-    The factor by which the threshold is exceeded is bisected: at each, the solid is cut and merged anew, and a
-    neighbourhood search tries to get down to the number of parts allowed.
+    The factor by which the threshold is exceeded is bisected. For each factor, the solid is cut and merged again, and a
+    neighbourhood search tries to reduce the number of parts to `most_parts`.
 
     Parameters
     ----------
     parts : sequence of Part
-        No more than `most_parts`.
+        At most `most_parts`.
     criterion : Criterion
-        What was asked for.
-    views, near_views : Views
-        Sweeps of the solid's components, and of those in neighbourhoods.
+        The requested criterion.
+    sweeps, near_sweeps : SweepCache
+        Sweeps of the solid's components, and of components in neighbourhoods.
     steps : float
-        Trials in all; every factor gets an equal share of them, and of the time.
+        Maximum number of trials; every factor gets an equal share of them, and of the time.
 
     Returns
     -------
-    Outcome
-        Its parts exceed the threshold by no larger factor than those given.
+    SearchOutcome
+        Its parts exceed the threshold by no larger a factor than the given ones.
     """
     tree = CutTree(root, rankings[0](sweeps), workers)
     best = list(parts)
@@ -84,7 +84,7 @@ def tighten(
 
 
 def _factor(parts: Sequence[Part], criterion: Criterion, workers: Workers) -> float:
-    """Least factor (to within `CLOSE`) by which a criterion has to be scaled for all parts to meet it."""
+    """Smallest factor (to within `CLOSE`) by which a criterion must be scaled for all parts to meet it."""
 
     def meets(factor: float) -> bool:
         return all(workers.map(criterion.scaled(factor).is_met, parts))

@@ -1,8 +1,8 @@
-"""Another step of the search: a part gives pieces of itself to the larger parts around, until it is gone.
+"""The transfer operator: a part gives pieces to larger parts around it until it is gone.
 
-Two parts that cannot become one may still share a third between them. A piece is what a plane cuts off the part on the
-other's side, as large as the criterion allows; what is left is then tried whole with everything around. As many parts
-of less even sizes are progress too: in the end the small ones vanish, as bins do that are emptied into fuller ones.
+Two parts that cannot be united may still share a third between them. A plane cuts off a piece on the taker's side, as
+large as the criterion allows; then each part around is offered all of the rest. Equally many parts of less even sizes
+are progress too: small parts disappear in the end, as bins do that are emptied into fuller ones.
 """
 
 from __future__ import annotations
@@ -24,25 +24,25 @@ from rlacd.solid.reunite import reunite
 from rlacd.work import Work
 
 TRIES = 16
-"""Pairs of a taker and a direction, drawn one after the other: as many take about as long as cutting a cluster anew."""
+"""Number of (taker, direction) pairs to draw: together they take about as long as a recut."""
 
 SMALLER = 0.5
-"""Parts with hulls smaller than this share of the giver's do not take from it."""
+"""Only parts whose hulls are larger than this share of the giver's can take from it."""
 
 FIRST = 1 / 8
-"""If not even so much of the part's extent can be given in a direction, the direction is left."""
+"""First depth to try in a direction, as a share of the part's extent; if it fails, the direction is abandoned."""
 
 HALVINGS = 3
-"""How often the interval is halved in which the last plane lies that the criterion allows."""
+"""Bisection steps for the deepest plane that the criterion allows."""
 
 LEAST = 0.03
-"""A piece of a smaller share of the part's volume is not worth a cut."""
+"""Pieces up to this share of the part's volume are not worth a cut."""
 
 WHOLE = 5
-"""So many neighbours, those with the least added volume, are asked to take all that is left."""
+"""Number of neighbours, those with the least added volume, that are offered all of the rest."""
 
 PATCHES = 4
-"""Parts of more components are reunited where that leaves them as they are."""
+"""Parts of more components than this are reunited into one if that meets the criterion."""
 
 
 def transfer(
@@ -53,26 +53,26 @@ def transfer(
     solid: Component,
     clock: Clock | None = None,
 ) -> Exchange | None:
-    """Let a part give pieces of itself to the parts around.
+    """Let a part give pieces to the parts around it.
 
     Parameters
     ----------
     part : Part
         The giver.
     around : sequence of Part
-        Parts near it; each that takes a piece still meets the criterion with it, and so does what is left.
+        Parts near it; each that takes a piece still meets the criterion, and so does the rest.
     criterion : Criterion
     random : numpy.random.Generator
         Draws takers and directions.
     solid : Component
-        What all are parts of.
+        The solid that was decomposed.
     clock : Clock, optional
-        Be content with what is given when its time or its work is over.
+        Stop when its time or its work is used up; pieces given so far stay given.
 
     Returns
     -------
     Exchange or None
-        With as many parts, of less even sizes, or one less; None where nobody takes anything.
+        Equally many parts of less even sizes, or one fewer; None if no piece can be given.
     """
     clock = clock or Clock()
     now = list(around)
@@ -93,13 +93,13 @@ def transfer(
 
 
 def exchange_of(part: Part, around: Sequence[Part], after: Sequence[Part], criterion: Criterion) -> Exchange:
-    """What turns a part and those around into what they are after giving; parts of many patches are mended."""
+    """The exchange of parts before and after giving; changed parts of many components are reunited."""
     known = {id(other) for other in around}
     return Exchange.between([part, *around], [p if id(p) in known else _mended(p, criterion) for p in after])
 
 
 def _direction(part: Part, taker: Part, random: np.random.Generator) -> FloatArray:
-    """Draw an axis of space, a principal axis of the part, or the way between the two; it leads away from the taker."""
+    """Draw a coordinate axis, a principal axis, or the line between the two parts, pointing away from the taker."""
     away = part.hull.vertices.mean(axis=0) - taker.hull.vertices.mean(axis=0)
     largest = max(part.members, key=lambda member: member.volume)
     axes = np.vstack([np.eye(3), largest.principal_axes, away])
@@ -111,7 +111,7 @@ def _direction(part: Part, taker: Part, random: np.random.Generator) -> FloatArr
 def _largest_bite(
     part: Part, taker: Part, direction: FloatArray, criterion: Criterion, solid: Component, account: Work
 ) -> tuple[Part, Part | None] | None:
-    """Cut off as much as the taker can have: the taker with it, and the rest; None where that is hardly anything."""
+    """Give the taker as much as it can have: the grown taker and the rest; None if that is at most `LEAST`."""
     corners = np.concatenate([member.hull.vertices for member in part.members])
     heights = corners @ direction
     lower, upper = float(heights.min()), float(heights.max())
@@ -142,7 +142,7 @@ def _bite(
     solid: Component,
     account: Work,
 ) -> tuple[Part, Part | None, float] | None:
-    """The taker with what lies below a plane, the rest, and the volume given; None where one of them must not be."""
+    """The taker with what lies below a plane, the rest, and the volume given; None if one fails the criterion."""
     if not account.pay(sum(work.cutting(member.size) for member in part.members)):
         return None
     below, above = _divided(part.members, direction, offset)
@@ -156,7 +156,7 @@ def _bite(
 
 
 def _is_too_much(corners: FloatArray, taker: Part, criterion: Criterion, solid: Component, account: Work) -> bool:
-    """Whether the taker cannot even have some corners [N, 3] of what would be cut off: known without cutting."""
+    """Whether the taker cannot even have the given corners [N, 3] of the piece: decided without cutting."""
     count = len(corners) + len(taker.hull.vertices)
     if not account.pay(work.joining(count) + work.holding(count) / 2):
         return True
@@ -165,7 +165,7 @@ def _is_too_much(corners: FloatArray, taker: Part, criterion: Criterion, solid: 
 
 
 def _whole(pieces: Sequence[Component], criterion: Criterion, solid: Component, account: Work) -> Part | None:
-    """The pieces as one part; None where that does not meet the criterion."""
+    """The pieces as one part; None if that fails the criterion."""
     if len(pieces) > 1:
         return unite(_glued(pieces[:-1]), pieces[-1], criterion, solid, account=account)
     if not account.pay(work.judging(pieces[0].size, len(pieces[0].hull.faces))):
@@ -174,7 +174,7 @@ def _whole(pieces: Sequence[Component], criterion: Criterion, solid: Component, 
 
 
 def _take_whole(rest: Part, takers: list[Part], criterion: Criterion, solid: Component, account: Work) -> bool:
-    """Give all that is left to one of the takers; False where none can have it."""
+    """Give all of the rest to one of the takers; False if none can have it."""
     corners = len(rest.hull.vertices)
     if not account.pay(sum(work.joining(len(taker.hull.vertices) + corners) for taker in takers)):
         return False
@@ -191,7 +191,7 @@ def _take_whole(rest: Part, takers: list[Part], criterion: Criterion, solid: Com
 def _divided(
     components: Sequence[Component], direction: FloatArray, offset: float
 ) -> tuple[list[Component], list[Component]]:
-    """What of the components lies below and above a plane."""
+    """The pieces of the components below and above a plane."""
     x, y, z = (float(c) for c in direction)
     below: list[Component] = []
     above: list[Component] = []
@@ -213,7 +213,7 @@ def _glued(pieces: Sequence[Part]) -> Part:
 
 
 def _mended(part: Part, criterion: Criterion) -> Part:
-    """Get the part as one component if it is made of many and that meets the criterion."""
+    """Get a part of many components as a single component, if that meets the criterion."""
     if len(part.members) <= PATCHES:
         return part
     whole = reunite(part.members)
