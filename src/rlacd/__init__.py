@@ -20,11 +20,16 @@ if TYPE_CHECKING:
         RlacdError,
     )
     from rlacd.io.robots import Rewritten, rewrite_robot
+    from rlacd.planes.sweep import Sweep
+    from rlacd.planes.sweep_cache import SweepCache
+    from rlacd.policies import Policy
     from rlacd.presets import PRESETS, Preset
     from rlacd.progress import Progress
+    from rlacd.solid.component import Component, Plane
 
 __all__ = [
     "PRESETS",
+    "Component",
     "Decomposition",
     "EmptyMeshError",
     "MeshDataError",
@@ -34,10 +39,14 @@ __all__ = [
     "NavigableSpace",
     "OptionError",
     "OutputError",
+    "Plane",
+    "Policy",
     "Preset",
     "Progress",
     "Rewritten",
     "RlacdError",
+    "Sweep",
+    "SweepCache",
     "__version__",
     "decompose",
     "rewrite_robot",
@@ -55,6 +64,11 @@ _HOME = {
     "Progress": "progress",
     "Rewritten": "io.robots",
     "rewrite_robot": "io.robots",
+    "Policy": "policies",
+    "Component": "solid.component",
+    "Plane": "solid.component",
+    "Sweep": "planes.sweep",
+    "SweepCache": "planes.sweep_cache",
     **dict.fromkeys((name for name in __all__ if name.endswith("Error")), "errors"),
 }
 

@@ -22,7 +22,7 @@ from rlacd.io.read.load import InputMesh, load_mesh
 from rlacd.merge import drop_slivers, in_input, limit_part, limit_roughly, merge_to_count, with_limits
 from rlacd.options import CONCAVITY, DEFAULT_RESOLUTION, DEFAULT_THRESHOLD, OPTION_NAMES, OpenName, Options, QualityName
 from rlacd.planes.sweep_cache import SweepCache
-from rlacd.policies import AS_PUBLISHED, make_policy
+from rlacd.policies import AS_PUBLISHED, Policy, make_policy
 from rlacd.presets import PresetName
 from rlacd.progress import ProgressCallback
 from rlacd.renamed import with_former
@@ -51,7 +51,7 @@ def decompose(
     max_vertices: int | None = None,
     max_faces: int | None = None,
     merge: bool = True,
-    policy: str = "greedy",
+    policy: str | Policy = "greedy",
     resolution: int = DEFAULT_RESOLUTION,
     open: OpenName = "auto",
     seed: int = 0,
@@ -87,9 +87,9 @@ def decompose(
         says by how much it is exceeded.
     merge : bool
         Unite parts whose joint hull still meets the threshold.
-    policy : str
-        What chooses the cuts: ``greedy``, ``greedy-SCORE``, ``navacd``, ``learned`` or the path of an ONNX file (see
-        `rlacd.policies.make_policy`).
+    policy : str or Policy
+        What chooses the cuts of the first pass: ``greedy``, ``greedy-SCORE``, ``navacd``, ``learned``, the path of an
+        ONNX file (see `rlacd.policies.make_policy`), or any object with a method ``choose``: see `rlacd.Policy`.
     resolution : int
         Cells along the longest side of the grid on which repair looks for enclosed rooms.
     open : "auto", "solid" or "thin"
@@ -215,7 +215,8 @@ def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Cl
     views = SweepCache()
     tree = CutTree(root, make_policy(options.policy, views, _scale(goal)), workers)
     parts, goal = _parts(tree, goal, options, workers, clock)
-    may_be_divided = options.merge and goal.obstacles is not None and options.policy not in AS_PUBLISHED
+    policy = options.policy if isinstance(options.policy, str) else ""
+    may_be_divided = options.merge and goal.obstacles is not None and policy not in AS_PUBLISHED
     found = None
     try:
         if may_be_divided and clock.stopped_by is None:
@@ -236,7 +237,7 @@ def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Cl
                     clock,
                     options.seed,
                     options.max_hulls,
-                    first=options.policy,
+                    first=policy,
                 )
     except Stopped:
         clock.note_stop()

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 from rlacd.errors import OptionError
-from rlacd.fields import check_fields, custom, integer, number, one_of, option, text
-from rlacd.policy_names import POLICIES, is_policy
+from rlacd.fields import check_fields, custom, integer, number, one_of, option
+from rlacd.policy_names import POLICIES, policy_name, read_policy
 from rlacd.presets import PRESETS, PresetName, find_preset
 from rlacd.space_options import NAVIGABLE, SpaceOptions
 
@@ -121,11 +121,15 @@ class Options:
         usual="merge",
         flags=("--merge/--no-merge",),
     )
-    policy: str = option(
+    policy: Any = option(
         "greedy",
         "What chooses the next cut: navacd is the quickest, learned asks a network, FILE.onnx is one of yours "
         "(both: extra rlacd[learned]).",
-        text(f"one of {', '.join(POLICIES)}, or an .onnx file", "greedy navacd learned FILE.onnx …", is_policy),
+        custom(
+            f"one of {', '.join(POLICIES)}, an .onnx file, or (in Python) an object with a method `choose`",
+            read_policy,
+            "greedy navacd learned FILE.onnx …",
+        ),
         panel=METHOD,
         metavar="NAME",
     )
@@ -211,8 +215,8 @@ class Options:
             _require(self.quality == "fast", "quality", self.quality, rule)
 
     def as_plain(self) -> dict[str, Any]:
-        """Everything as plain values, the criterion by its name or its own options."""
-        return dataclasses.asdict(self)
+        """Everything as plain values, the criterion by its name or its own options, a policy by its name."""
+        return dataclasses.asdict(dataclasses.replace(self, policy="greedy")) | {"policy": policy_name(self.policy)}
 
     def at_scale(self, scale: float) -> Options:
         """Get the same options with the threshold in the frame, of which one of the input's units takes `scale`.

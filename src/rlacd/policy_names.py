@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from typing import Any
 
 EDGES = "+edges"
 
@@ -16,6 +17,28 @@ POLICIES = ("greedy", *AS_PUBLISHED, "learned")
 
 WEIGHTS_ENDING = ".onnx"
 """A policy's name that ends so is the path of a network to use in place of the shipped one."""
+
+
+def read_policy(given: Any) -> Any:
+    """Take the name of a policy, or any object with a method `choose`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        It is neither.
+    """
+    if isinstance(given, str):
+        if not is_policy(given):
+            raise ValueError
+        return str.__str__(given)
+    if isinstance(given, type) or not callable(given.choose):
+        raise TypeError
+    return given
+
+
+def policy_name(policy: object) -> str:
+    """Get a policy's name: that of its class where it is an object."""
+    return policy if isinstance(policy, str) else type(policy).__qualname__
 
 
 def is_policy(name: object) -> bool:

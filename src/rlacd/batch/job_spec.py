@@ -92,6 +92,8 @@ class JobSpec:
             The format is unknown, or needs an extra.
         """
         checked = Options(**{"threads": 1, **options})
+        if not isinstance(checked.policy, str):
+            raise OptionError("policy has to be a name or a file in a batch: its processes are given plain values.")
         make_policy(checked.policy)
         ending, wanted = _file_kind(file_format, folders, checked.preset)
         check_model_options(DENSITY if density is None else density, up or "z")

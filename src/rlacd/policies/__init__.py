@@ -3,13 +3,13 @@
 from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies.greedy import SCORES, Greedy
 from rlacd.policies.navacd import CONCAVE_EDGES, NavACD
-from rlacd.policies.policy import Policy
+from rlacd.policies.policy import CheckedPolicy, Policy
 from rlacd.policies.qpolicy import QPolicy
 from rlacd.policy_names import AS_PUBLISHED, EDGES, POLICIES, WEIGHTS_ENDING, is_policy
 
 
-def make_policy(name: str, sweeps: SweepCache | None = None, scale: float | None = None) -> Policy:
-    """Build the policy called `name`.
+def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: float | None = None) -> Policy:
+    """Build the policy called `name`; an object with a method `choose` is one already.
 
     ``greedy`` looks at 150 planes and those of four concave edges, and takes the one with the least p-norm of excess
     volumes; ``greedy-SCORE`` takes the one with the least SCORE of the 150 alone, ``greedy-SCORE+edges`` of the 150 and
@@ -20,8 +20,8 @@ def make_policy(name: str, sweeps: SweepCache | None = None, scale: float | None
 
     Parameters
     ----------
-    name : str
-    views : Views, optional
+    name : str or Policy
+    sweeps : SweepCache, optional
         Sweeps over the 150 planes and those of four concave edges, shared with others.
     scale : float, optional
         The criterion's length in the frame, such as the concavity threshold; learned policies look at it.
@@ -35,6 +35,8 @@ def make_policy(name: str, sweeps: SweepCache | None = None, scale: float | None
     MissingExtraError
         A learned policy is asked for without the extra ``learned``.
     """
+    if not isinstance(name, str):
+        return CheckedPolicy(name)
     if name == "greedy":
         return Greedy(sweeps=sweeps)
     if name == "navacd":

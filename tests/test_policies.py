@@ -1,0 +1,87 @@
+"""Users' own policies: any object with a method `choose`."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from manifold3d import Manifold
+
+import rlacd
+from rlacd.policies import make_policy
+
+DOCS = Path(__file__).parent.parent / "docs" / "policies.md"
+
+
+def table() -> trimesh.Trimesh:
+    """A top and two legs of unlike sizes."""
+    parts = [((2, 1.2, 0.1), (0, 0, 1)), ((0.11, 0.12, 1), (-0.9, 0.5, 0.45)), ((0.14, 0.13, 1), (0.8, -0.4, 0.45))]
+    boxes = [Manifold.cube(size, True).translate(place) for size, place in parts]
+    mesh = (boxes[0] + boxes[1] + boxes[2]).to_mesh64()
+    return trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts)
+
+
+def of_the_docs(name: str) -> Any:
+    """A policy as the documentation writes it."""
+    code = next(
+        block for block in re.findall(r"```python\n(.*?)```", DOCS.read_text(), re.S) if f"class {name}" in block
+    )
+    scope: dict[str, Any] = {"np": np, "rlacd": rlacd}
+    exec(code.split("\nresult = ")[0], scope)
+    return scope[name]()
+
+
+@pytest.mark.parametrize("name", ["Halves", "LeastHulls"])
+def test_policies_of_the_docs_decompose(name: str) -> None:
+    result = rlacd.decompose(table(), policy=of_the_docs(name), quality="fast")
+    assert len(result) > 1
+    assert result.report["concavity"]["max"] <= 0.05
+    assert json.loads(json.dumps(result.report))["options"]["policy"] == name
+
+
+def test_the_least_hull_sum_written_by_a_user_is_ours() -> None:
+    ours = make_policy("greedy-hull-sum+edges")
+    root = rlacd.Component((np.asarray(table().vertices), np.asarray(table().faces, dtype=np.int32)))
+    chosen = [policy.choose(root) for policy in (of_the_docs("LeastHulls"), ours)]
+    sums = [sum(side.hull.volume for side in root.cut(plane) if side is not None) for plane in chosen]
+    assert sums[0] == pytest.approx(sums[1], rel=1e-9)
+
+
+def test_a_search_starts_from_a_users_policy() -> None:
+    alone = rlacd.decompose(table(), policy=of_the_docs("Halves"), quality="fast")
+    assert len(rlacd.decompose(table(), policy=of_the_docs("Halves"))) <= len(alone)
+
+
+class Answers:
+    """A policy that always gives the same answer."""
+
+    def __init__(self, answer: Any) -> None:
+        self.answer = answer
+
+    def choose(self, component: rlacd.Component, threads: int = 1) -> Any:
+        return self.answer
+
+
+def test_none_leaves_components_as_they_are() -> None:
+    result = rlacd.decompose(table(), policy=Answers(None), quality="fast")
+    assert len(result) == 1
+    assert any("exceed" in warning for warning in result.report["warnings"])
+
+
+@pytest.mark.parametrize(
+    "answer", ["x", 3, (1.0, 0.0, 0.0), rlacd.Plane((2.0, 0.0, 0.0), 0.0), rlacd.Plane((1.0, 0.0, 0.0), float("nan"))]
+)
+def test_answers_that_are_no_planes_are_refused(answer: Any) -> None:
+    with pytest.raises(rlacd.OptionError, match="Answers"):
+        rlacd.decompose(table(), policy=Answers(answer), quality="fast")
+
+
+@pytest.mark.parametrize("given", [Answers, object(), 7, "nonsense", lambda component: None])
+def test_what_cannot_choose_is_no_policy(given: Any) -> None:
+    with pytest.raises(rlacd.OptionError, match="policy"):
+        rlacd.decompose(table(), policy=given)
