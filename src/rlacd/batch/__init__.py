@@ -1,4 +1,4 @@
-"""Many meshes: limits, cache, resume; on any pool of processes."""
+"""Batches of meshes, with limits, a cache and resume, on any pool of processes."""
 
 from rlacd.batch.assets import ENDINGS, Asset, find_assets
 from rlacd.batch.batch import REDO, Batch, Summary, Watcher

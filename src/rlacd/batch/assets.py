@@ -1,4 +1,4 @@
-"""The meshes of a folder: which there are, what their results are called, and the hash of all a mesh is read from."""
+"""The meshes of a folder, the names of their results, and the hash of everything a mesh is read from."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from rlacd.io.read.companions import mesh_files
 from rlacd.io.write.folder import listed_hulls
 
 ENDINGS = (".obj", ".stl", ".ply", ".off", ".glb", ".gltf", ".dae", ".3mf")
-"""Of the files that count as meshes, whatever their case."""
+"""File endings that count as meshes, in upper or lower case."""
 
 EVERYTHING = "**"
 
 HULLS = "_hulls"
-"""What `rlacd decompose` adds to the name of a mesh for that of its hulls."""
+"""What `rlacd decompose` appends to a mesh's name to name its hulls."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Asset:
     path
         The file.
     place
-        What its result is called, relative to the folder of results, without an ending.
+        Name of its result, relative to the folder of results, without an ending.
     """
 
     name: str
@@ -43,7 +43,7 @@ class Asset:
     place: str
 
     def files(self) -> dict[str, bytes]:
-        """Read everything the mesh is read from, by name relative to its folder; its own file comes first.
+        """Read every file the mesh depends on, by name relative to its folder; the mesh file comes first.
 
         Raises
         ------
@@ -54,7 +54,7 @@ class Asset:
 
 
 def content_hash(files: dict[str, bytes]) -> str:
-    """SHA-256 over contents and the names of all but the first, which says nothing about the mesh but its format."""
+    """SHA-256 of all contents and of all names but the first, which only tells the mesh's format."""
     digest = hashlib.sha256()
     for number, (name, content) in enumerate(files.items()):
         label = name if number else PurePosixPath(name).suffix.lower()
@@ -69,22 +69,23 @@ def find_assets(folder: Path, glob: str = EVERYTHING, leave_out: Path | None = N
     Parameters
     ----------
     folder : Path
-        Hidden files and folders in it are passed over, and so are links to folders and hulls that `rlacd decompose` has
-        written there; links to files are followed.
+        Folder to search. Hidden files and folders, links to folders, and hulls written by `rlacd decompose` are
+        skipped; links to files are followed.
     glob : str
-        Which of them: compared with the name if it holds a slash, else with its last part. ``*`` takes slashes too.
+        Pattern to select meshes: matched against the name if it holds a slash, else against its last part. ``*``
+        matches slashes too.
     leave_out : Path, optional
-        A folder in it that is passed over: the results may lie there.
+        A folder inside `folder` to skip, such as the folder of results.
 
     Raises
     ------
     MeshFileError
-        `folder` is not there or no folder, or one in it cannot be looked into.
+        `folder` does not exist or is not a folder, or a folder in it cannot be read.
     """
     if not folder.is_dir():
         raise MeshFileError(f"{folder} is no folder; give the folder that holds the meshes.")
-    # Results are named with an eye on all meshes, not only those asked for: what a mesh's result is called must not
-    # depend on which others are done in the same run.
+    # Names of results depend on all meshes of the folder, not only on the selected ones, so that a mesh's result has
+    # the same name in every run.
     names = sorted(_names(folder, None if leave_out is None else leave_out.resolve()))
     places = _places(names)
     return [Asset(name, folder / name, places[name]) for name in names if _matches(name, glob)]
@@ -101,7 +102,7 @@ def _names(folder: Path, leave_out: Path | None) -> Iterator[str]:
 
 
 def _written_hulls(folder: Path, files: Sequence[str]) -> set[str]:
-    """Files that `rlacd decompose` wrote beside meshes: ``chair_hulls.glb`` of ``chair.obj``, and those it listed."""
+    """Find what `rlacd decompose` wrote beside meshes: ``chair_hulls.glb`` for ``chair.obj``, and files it listed."""
     meshes = {PurePosixPath(file).stem for file in files if PurePosixPath(file).suffix.lower() in ENDINGS}
     beside = {
         file for file in files if (stem := PurePosixPath(file).stem).endswith(HULLS) and stem[: -len(HULLS)] in meshes
@@ -117,14 +118,14 @@ def _refuse(error: OSError) -> None:
 def _matches(name: str, glob: str) -> bool:
     if glob == EVERYTHING:
         return True
-    pattern = glob.removeprefix("**/")  # folders of any depth are looked through anyway
+    pattern = glob.removeprefix("**/")  # subfolders are always searched
     return fnmatchcase(name if "/" in pattern else PurePosixPath(name).name, pattern)
 
 
 def _places(names: Sequence[str]) -> dict[str, str]:
-    """Name results: without the mesh's ending, or with it where two would be the same (``a.obj`` and ``a.stl``).
+    """Name results: without the mesh's ending, or with it where two names would clash (``a.obj`` and ``a.stl``).
 
-    Upper and lower case count as the same: there are disks on which they are.
+    Names that differ only in case clash too, because some file systems ignore case.
     """
     places = {name: str(PurePosixPath(name).with_suffix("")) for name in names}
     while True:

@@ -1,4 +1,4 @@
-"""Many meshes: what is finished is passed over, the rest goes through a pool, and every outcome becomes a row."""
+"""Run a batch: skip finished meshes, send the rest through a pool, and record a row for every outcome."""
 
 from __future__ import annotations
 
@@ -27,40 +27,40 @@ REDO: tuple[Redo, ...] = ("none", "failed", "all")
 
 
 LARGE = 5_000_000
-"""Bytes of 100,000 triangles in a binary STL file: larger meshes may take longer than the others by far."""
+"""Bytes of 100,000 triangles in a binary STL file; larger meshes may take much longer than the rest."""
 
 
 class Watcher(Protocol):
-    """Is told how the work goes on."""
+    """Receives the progress of a batch."""
 
     def begin(self, meshes: int) -> None:
-        """So many meshes were found."""
+        """Report the number of meshes found."""
 
     def passed_over(self, asset: Asset) -> None:
-        """The mesh's result is there already."""
+        """Report a mesh whose result already exists."""
 
     def finished(self, row: Row, timing: Row) -> None:
-        """A mesh has its row."""
+        """Report a mesh whose row is complete."""
 
 
 @dataclass
 class Summary:
-    """How a run went.
+    """Outcome of a run.
 
     Attributes
     ----------
     meshes
-        How many were found.
+        Number of meshes found.
     passed_over
-        How many had their result already; whatever it is, it is counted in `status` too.
+        Number of meshes whose result already existed, whatever its status; `status` counts them too.
     status
-        How many meshes there are of each status by now.
+        Number of meshes of each status at the end of the run.
     stopped
         Whether the run was stopped before the last mesh.
     seconds
         Wall time.
     failures
-        Rows of the meshes found that failed or were given their hull.
+        Rows of the meshes found that failed or fell back to their convex hull.
     slowest
         Names and seconds of the slowest meshes of this run.
     """
@@ -76,7 +76,7 @@ class Summary:
 
 @dataclass(frozen=True)
 class Batch:
-    """A folder of meshes and where their results go.
+    """A folder of meshes and the place of their results.
 
     Attributes
     ----------
@@ -87,13 +87,13 @@ class Batch:
     order
         What is done to each mesh.
     limits
-        What each may take.
+        Limits for each mesh.
     fallback
-        Whether a mesh that fails is given its convex hull.
+        Whether a mesh that fails gets its convex hull instead.
     glob
-        Which of the meshes; see `find_assets`.
+        Pattern that selects meshes; see `find_assets`.
     redo
-        Which results are made again: none, those that failed, or all.
+        Which existing results are recomputed: none, those that failed, or all.
     """
 
     assets: Path
@@ -105,7 +105,7 @@ class Batch:
     redo: Redo = "none"
 
     def large(self) -> list[tuple[Asset, int]]:
-        """List the meshes to do whose files hold more than `LARGE` bytes, with their sizes, the largest first.
+        """List the pending meshes whose files exceed `LARGE` bytes, with their sizes, largest first.
 
         Raises
         ------
@@ -116,7 +116,7 @@ class Batch:
         return sorted((entry for entry in sizes if entry[1] > LARGE), key=lambda entry: (-entry[1], entry[0].name))
 
     def plan(self) -> list[tuple[Asset, bool]]:
-        """List all meshes, and whether the result of each is there; writes nothing.
+        """List all meshes, and whether the result of each exists; writes nothing.
 
         Raises
         ------
@@ -128,15 +128,15 @@ class Batch:
         return [(asset, self._task(asset, manifest, store)[1]) for asset in assets]
 
     def run(self, pool: Pool, watcher: Watcher, stop: threading.Event | None = None) -> Summary:
-        """Do all meshes that are not done.
+        """Process all meshes whose result does not exist yet.
 
         Parameters
         ----------
         pool : Pool
-            Where meshes are done.
+            Where meshes are processed.
         watcher : Watcher
         stop : threading.Event, optional
-            Once it is set no further mesh is begun.
+            Once set, no further mesh is started.
 
         Returns
         -------
@@ -147,7 +147,7 @@ class Batch:
         MeshFileError
             There are no meshes.
         OptionError
-            The results would lie among the meshes.
+            The results would lie inside the folder of meshes.
         OutputError
             The results cannot be written, or another run is writing there.
         """
@@ -217,29 +217,29 @@ class Batch:
         return assets
 
     def _task(self, asset: Asset, manifest: Ledger, store: ResultStore) -> tuple[MeshTask, bool]:
-        """A mesh with the key of its result, and whether that is there."""
+        """Return the mesh with the key of its result, and whether that result exists."""
         try:
             content = content_hash(asset.files())
-        except MeshFileError as error:  # what is wrong with the file is then said by whoever loads it
+        except MeshFileError as error:  # loading the mesh reports what is wrong with the file
             content = str(error)
         task = MeshTask(asset, self.order.key(content, asset.name))
         return task, self.redo != "all" and self._is_finished(task, manifest.get(asset.name), store)
 
     def _is_finished(self, task: MeshTask, row: Row | None, store: ResultStore) -> bool:
         if row is None or row.get("key") != task.key or row.get("place") != task.asset.place:
-            return False  # where a result is put depends on the meshes beside it
+            return False  # the place of a result depends on the neighbouring meshes
         status = row.get("status")
         if status != "done" and (self.redo == "failed" or row.get("limits") != self._refusal()):
             return False
         return status is not None and all(store.size(name) == size for name, size in row.get("outputs", {}).items())
 
     def _row(self, task: MeshTask, outcome: MeshOutcome) -> Row:
-        """All that does not differ from run to run."""
+        """Collect everything that is the same in every run."""
         row: Row = {"mesh": task.asset.name, "status": outcome.status, "place": task.asset.place, "key": task.key}
         if outcome.error is not None:
             row |= {"error": outcome.error, "limits": self._refusal()}
         return {**row, **outcome.report, "outputs": dict(sorted(outcome.outputs.items()))}
 
     def _refusal(self) -> Row:
-        """On what a failure rests: with other limits it may be none."""
+        """The settings a failure depends on; with others the mesh may succeed."""
         return {"seconds": self.limits.seconds, "memory": self.limits.memory, "fallback": self.fallback}

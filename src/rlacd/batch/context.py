@@ -1,4 +1,4 @@
-"""What every task of a batch needs."""
+"""What every job of a batch shares."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from rlacd.pool import ProcessLimits, Shared
 
 @dataclass(frozen=True)
 class BatchContext:
-    """What every task needs.
+    """What every job of a batch shares.
 
     Attributes
     ----------
     order
         What is done to a mesh.
     limits
-        What it may take.
+        Limits for each mesh.
     fallback
-        Whether a mesh that fails is given its convex hull.
+        Whether a mesh that fails gets its convex hull instead.
     out
         Folder or address of the results.
     store
-        The same, open.
+        The store opened for `out`.
     stop
-        Once it is set no further mesh is begun.
+        Once set, no further mesh is started.
     shared
-        What all processes need: the network of a policy that is a file.
+        What all processes need: the network, if the policy is a file.
     """
 
     order: JobSpec

@@ -1,4 +1,4 @@
-"""All meshes through a pool: as many at a time as it has room for, written as they come."""
+"""Runs all meshes through a pool: as many at a time as it has room for, each written as it finishes."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from rlacd.batch.pipeline import MeshOutcome, MeshTask, Pipeline, pipeline
 from rlacd.pool import Answer, Pool, Request, WorkerDiedError
 
 LOOK = 1.0
-"""Seconds between two looks at whether there is room for more."""
+"""Seconds between checks for free room in the pool."""
 
 WRITERS = 4
-"""Results written at a time: each waits for a disk, not for a processor."""
+"""Results written concurrently; each waits for the disk, not for a processor."""
 
 _Going: TypeAlias = tuple[MeshTask, Pipeline]
 
 
 class Engine:
-    """Takes meshes to their outcomes.
+    """Runs mesh tasks to completion.
 
     Parameters
     ----------
     pool : Pool
-    work : Work
+    work : BatchContext
     """
 
     def __init__(self, pool: Pool, work: BatchContext) -> None:
@@ -37,9 +37,9 @@ class Engine:
         self._writers = ThreadPoolExecutor(WRITERS)
 
     def run(self, tasks: Iterator[MeshTask]) -> Iterator[tuple[MeshTask, MeshOutcome]]:
-        """Do tasks in any order; what an outcome's ``outputs`` name is in the store by then.
+        """Run tasks in any order; the files in an outcome's ``outputs`` are in the store when it is yielded.
 
-        No more tasks are taken from the iterator than can be worked on soon.
+        Tasks are taken from the iterator only as the pool has room for them.
 
         Raises
         ------
@@ -66,7 +66,7 @@ class Engine:
             self._go_on((task, pipeline(task, self._work, brought=self._pool.many_machines)), None)
 
     def _begin_last(self) -> bool:
-        """Begin one of the meshes that are to be alone; nothing else is going on."""
+        """Start one of the deferred meshes, which run alone; call only when nothing else is running."""
         if not self._last or self._work.stop.is_set():
             return False
         going, request = self._last.popleft()

@@ -1,4 +1,4 @@
-"""What is done to every mesh of a batch, as plain values that travel to any process; and the key of a result."""
+"""What is done to every mesh of a batch, as plain values that can be sent to any process; and the key of a result."""
 
 from __future__ import annotations
 
@@ -30,24 +30,24 @@ POLICY = "policy"
 
 @dataclass(frozen=True)
 class JobSpec:
-    """Options of a decomposition and of its file.
+    """Options of the decomposition and of its output file.
 
     Attributes
     ----------
     options
-        What `rlacd.decompose` is given, plain: a `NavigableSpace` is the dict of its fields.
+        Arguments of `rlacd.decompose` as plain values: a `NavigableSpace` is the dict of its fields.
     ending
-        Of the file that is written, with its dot; empty for a folder with one file a hull.
+        Ending of the output file, with its dot; empty for a folder with one file per hull.
     file_format
-        The format, where the ending does not tell it.
+        The format, if the ending does not determine it.
     density
         Mass per cubic unit, for formats that hold masses.
     up
         The axis that points up; None for y in files from glTF, else z.
     one_mesh
-        Whether a model has all its hulls in one mesh file.
+        Whether a model keeps all its hulls in one mesh file.
     weights
-        Hash of the network that a policy's file holds, and of the one that ships.
+        Hashes of the network in the policy's file and of the shipped one.
     """
 
     options: dict[str, Any] = field(default_factory=dict)
@@ -69,16 +69,15 @@ class JobSpec:
         up: str | None = None,
         one_mesh: bool = False,
     ) -> JobSpec:
-        """Check everything that can be checked before there is a mesh.
+        """Check everything that can be checked before a mesh is read.
 
         Parameters
         ----------
         options : dict
             Keyword arguments of `rlacd.decompose`, without ``progress``. Each mesh gets one thread by default.
         file_format : str, optional
-            A word that ``--format`` takes, or any ending of a file of hulls; what the preset says, or glb, by default.
-        folders : bool
-            A folder a mesh with one file a hull.
+            A value of ``--format``, or any ending of a hull file; by default the preset's format, else glb.
+            Whether each mesh gets a folder with one file per hull.
         density, up, one_mesh
             As for `rlacd.Decomposition.save`.
 
@@ -109,13 +108,13 @@ class JobSpec:
 
     @property
     def threads(self) -> int:
-        """Of one mesh."""
+        """Number of threads for one mesh."""
         return int(self.options["threads"])
 
     def key(self, content: str, name: str) -> str:
-        """Name the result of a mesh with this content by all that decides its bytes.
+        """Name the result of a mesh with this content by everything that determines its bytes.
 
-        Neither the number of threads nor the place of a policy's file decides anything.
+        The number of threads and the path of a policy's file do not affect the key.
         """
         options = Options(**self.arguments()).as_plain()
         del options["threads"]
@@ -124,7 +123,7 @@ class JobSpec:
         decides = [
             __version__,
             content,
-            PurePosixPath(name).stem,  # models are called so
+            PurePosixPath(name).stem,  # models carry this name
             self.weights,
             options,
             [self.ending, self.file_format, self.density, self.up_of(name), self.one_mesh],
@@ -132,7 +131,7 @@ class JobSpec:
         return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
 
     def up_of(self, name: str) -> str:
-        """Tell which axis of a mesh points up."""
+        """Return the axis of a mesh that points up."""
         return self.up or ("y" if PurePosixPath(name).suffix.lower() in (".glb", ".gltf") else "z")
 
     def arguments(self) -> dict[str, Any]:
@@ -143,23 +142,23 @@ class JobSpec:
         return {**self.options, "criterion": NavigableSpace(**space)}
 
     def with_policy(self, path: Path) -> JobSpec:
-        """Get the same order with the network in another place."""
+        """Return the same job with the network at another path."""
         return replace(self, options={**self.options, "policy": str(path)})
 
     def shared(self) -> dict[str, Shared]:
-        """Get what all processes need that make these decompositions: the network of a policy that is a file."""
+        """Return what every process needs for these decompositions: the network, if the policy is a file."""
         policy = str(self.options.get("policy", ""))
         if not policy.endswith(WEIGHTS_ENDING):
             return {}
         return {POLICY: Shared({"onnx": Path(policy).read_bytes()}, key=self.weights)}
 
     def as_plain(self) -> dict[str, Any]:
-        """Everything as plain values; ``JobSpec(**plain)`` makes the order of them again."""
+        """Convert to plain values; ``JobSpec(**plain)`` restores the job."""
         return asdict(self)
 
 
 def _file_kind(file_format: str | None, folders: bool, preset: str | None) -> tuple[str, str | None]:
-    """Ending and format of what a mesh gets; no ending for a folder, no format where the ending tells it."""
+    """Ending and format of the output: no ending for a folder, no format where the ending determines it."""
     wanted = None if file_format is None else file_format.lower().lstrip(".")
     endings = [ending for of_model in MODELS.values() for ending in of_model]
     if wanted is not None and wanted not in (*FORMATS, *MODELS, *endings):

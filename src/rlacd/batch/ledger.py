@@ -1,4 +1,4 @@
-"""A row of JSON a mesh: in a journal while the work goes on, sorted in a file when it ends."""
+"""One JSON row per mesh: appended to a journal during the run, written as a sorted file at its end."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from rlacd.batch.store import ResultStore
 from rlacd.errors import OutputError
 
 Row: TypeAlias = dict[str, Any]
-"""``mesh``, the asset's name, and what is known of it; in the manifest ``outputs``, the length of each of its files."""
+"""``mesh``, the asset's name, and facts about it; in the manifest also ``outputs``, the length of each of its files."""
 
 
 class Ledger:
-    """The rows of a folder of results; those of meshes that are not in this run are kept.
+    """The rows of a folder of results; rows of meshes outside this run are kept.
 
     Parameters
     ----------
     store : Store
     name : str
-        Of the file.
+        Name of the file.
 
     Raises
     ------
@@ -49,7 +49,7 @@ class Ledger:
         return [self._rows[mesh] for mesh in sorted(self._rows)]
 
     def add(self, row: Row) -> None:
-        """Keep a row in the place of an older one of the same mesh; files that only that one had are removed first."""
+        """Add a row, replacing an older one of the same mesh; files listed only in the old row are removed first."""
         old = self._rows.get(row["mesh"], {})
         for output in sorted(set(old.get("outputs", {})) - set(row.get("outputs", {}))):
             self._store.remove(output)
@@ -57,18 +57,18 @@ class Ledger:
         self._put(row)
 
     def finish(self) -> None:
-        """Write the sorted file; the journal has served."""
+        """Write the sorted file and remove the journal."""
         content = b"".join(_line(row) for row in self.rows())
         if content != (self._store.read(self._name) or b""):
             self._store.write(self._name, content)
         self._journal.remove()
 
     def close(self) -> None:
-        """Leave the journal to the next run."""
+        """Close the journal and leave it for the next run."""
         self._journal.close()
 
     def _put(self, row: Row) -> None:
-        """Take a row over; a mesh that is gone may have left its row, though its result's name is another's by now."""
+        """Store a row, and drop the row of any other mesh (deleted since) that claims the same outputs."""
         mesh = row["mesh"]
         for output in self._rows.pop(mesh, {}).get("outputs", {}):
             self._owner.pop(output, None)
@@ -83,7 +83,7 @@ def _line(row: Row) -> bytes:
     text = json.dumps(row, allow_nan=False, ensure_ascii=False)
     try:
         return text.encode() + b"\n"
-    except UnicodeEncodeError:  # a file name that is no Unicode: escapes hold the odd bytes that Python keeps of it
+    except UnicodeEncodeError:  # a file name that is not valid Unicode: escapes keep Python's surrogates
         return json.dumps(row, allow_nan=False).encode() + b"\n"
 
 
@@ -101,6 +101,6 @@ def _read(where: str, lines: Iterable[bytes]) -> Iterable[Row]:
 
 
 def _is_inside(output: str) -> bool:
-    """Tell whether a name leads to a file of the results: outputs of meshes that are done again are removed."""
+    """Tell whether a name stays inside the results; outputs of recomputed meshes are deleted, so this must hold."""
     parts = PurePosixPath(output).parts
     return bool(parts) and "\0" not in output and parts[0] != "/" and ".." not in parts

@@ -1,4 +1,4 @@
-"""One mesh from its file to a row: tried in the process at hand, once more alone, and at last its convex hull."""
+"""One mesh from file to row: try it in a shared process, retry alone in a new one, and fall back to its convex hull."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from rlacd.pool import Answer, MachineLostError, Request, WorkerDiedError
 Status = Literal["done", "fallback", "failed"]
 
 HULL_SECONDS = 60.0
-"""A hull takes milliseconds; a limit meant for decompositions is not to stand in its way."""
+"""A hull takes milliseconds; a time limit meant for decompositions must not prevent it."""
 
 
 @dataclass(frozen=True)
 class MeshTask:
-    """A mesh that is to be done.
+    """A mesh to process.
 
     Attributes
     ----------
     asset
         The mesh.
     key
-        Of its result.
+        Key of its result.
     """
 
     asset: Asset
@@ -37,36 +37,36 @@ class MeshTask:
 
     @property
     def stem(self) -> str:
-        """What its result's file or folder is called."""
+        """Name of its result's file or folder."""
         return PurePosixPath(self.asset.place).name
 
     @property
     def parent(self) -> str:
-        """Where its result goes."""
+        """Folder of its result."""
         return str(PurePosixPath(self.asset.place).parent)
 
 
 @dataclass
 class MeshOutcome:
-    """What became of a mesh.
+    """Outcome of a mesh.
 
     Attributes
     ----------
     status
-        ``fallback``: its convex hull stands in for a decomposition.
+        ``fallback``: its convex hull replaces the decomposition.
     report
-        What is said of the hulls.
+        Facts about the hulls.
     error
-        Why there is no decomposition.
+        Why the decomposition failed.
     unusable
-        Whether the mesh is at fault: then there is no hull either.
+        Whether the mesh itself is at fault; then there is no fallback either.
     files
-        What is to be written, by name relative to the results.
+        Files still to be written, by name relative to the results.
     outputs
-        What was written: the length of each file.
+        Length of each file written.
     timing
-        What differs from run to run: ``seconds`` and ``cpu`` of the mesh, ``peak_mb`` and name of its ``worker``,
-        and where it died once, ``attempts``, why it ``died``, and its ``last_words``.
+        What differs between runs: ``seconds`` and ``cpu`` of the mesh, ``peak_mb`` and the name of its ``worker``;
+        if its process died, also the number of ``attempts``, why it ``died``, and its ``last_words``.
     """
 
     status: Status
@@ -86,14 +86,14 @@ class MeshOutcome:
 
 @dataclass(frozen=True)
 class Step:
-    """What a mesh needs next.
+    """The next step of a mesh.
 
     Attributes
     ----------
     request
-        For the pool.
+        Request for the pool.
     last
-        Whether it should wait until all other meshes of this machine are done, and then be alone on it.
+        Whether it must wait until all other meshes on this machine are done, and then run alone.
     """
 
     request: Request
@@ -104,15 +104,15 @@ Pipeline: TypeAlias = Generator[Step, "Answer | WorkerDiedError", MeshOutcome]
 
 
 def pipeline(task: MeshTask, work: BatchContext, *, brought: bool) -> Pipeline:
-    """Take a mesh to its outcome: yields what it needs, and is sent what came of that.
+    """Take a mesh to its outcome: yields steps, and is sent the answer to each.
 
     Parameters
     ----------
-    task : Task
-    work : Work
+    task : MeshTask
+    work : BatchContext
     brought : bool
-        Whether the mesh's files travel with every request, and results for a shared place are written where they are
-        made.
+        Whether the mesh's files travel with every request, and results for a shared place are written by the process
+        that made them.
     """
     try:
         request = _request(task, work, brought)

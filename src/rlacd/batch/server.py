@@ -1,4 +1,4 @@
-"""What a process of the pool does for a batch: one mesh from its file to the files of its hulls."""
+"""The batch's part in a pool process: one mesh, from its file to the files of its hulls."""
 
 from __future__ import annotations
 
@@ -30,25 +30,25 @@ STAND_IN = "The convex hull of the whole mesh stands in for its decomposition."
 def make(
     order: JobSpec, mesh: Path, stem: str, staging: Path, hull_only: bool
 ) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """Decompose a mesh file and write what was asked for into a new folder.
+    """Decompose a mesh file and write the requested files into a new folder.
 
     Parameters
     ----------
-    order : Order
+    order : JobSpec
     mesh : Path
     stem : str
-        What the file or folder is called.
+        Name of the output file or folder.
     staging : Path
         An existing folder.
     hull_only : bool
-        Take the convex hull of all points instead, inside the limits asked for.
+        Compute the convex hull of all points instead, within the requested limits on hulls.
 
     Returns
     -------
     dict
-        What is said of the result.
+        Facts about the result.
     dict of bytes
-        The files by name relative to the staging folder; a file that names others comes last.
+        The files by name relative to the staging folder; a file that refers to others comes last.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def make(
 
 
 def _hull(order: JobSpec, mesh: Path) -> Decomposition:
-    """One hull around everything: a cloud of points has no shape but that."""
+    """Make a single hull of all points, which works for point clouds too."""
     source = load_mesh(mesh)
     used = source.vertices[np.unique(source.faces)] if len(source.faces) else source.vertices
     limits: dict[str, Any] = {
@@ -80,7 +80,7 @@ def _hull(order: JobSpec, mesh: Path) -> Decomposition:
 
 
 def _summary(report: dict[str, Any]) -> dict[str, Any]:
-    """What is the same whenever and wherever the mesh is decomposed."""
+    """Collect the facts that do not depend on when and where the mesh is decomposed."""
     same = ("parts", "faces", "vertices", "complete", "hausdorff")
     kept: dict[str, Any] = {what: report[what] for what in same if what in report}
     if "concavity" in report:
@@ -96,7 +96,7 @@ class MeshServer:
     Parameters
     ----------
     staging : Path
-        A folder for what is on its way.
+        A folder for temporary files.
     """
 
     def __init__(self, staging: Path) -> None:
@@ -105,31 +105,31 @@ class MeshServer:
     def __call__(
         self, values: dict[str, Any], blobs: Blobs, shared: Mapping[str, Shared]
     ) -> tuple[dict[str, Any], dict[str, bytes]]:
-        """Decompose a mesh; whatever goes wrong with it is part of the answer.
+        """Decompose a mesh; any error it causes becomes part of the answer.
 
         Parameters
         ----------
         values : dict
-            ``order``, as plain values; the mesh's ``path`` where it can be read here; its ``name``, for messages; the
-            ``stem`` of its result, and ``hull_only``: see `make`; ``out``, an address, with the ``parent`` of the
-            result in it, where the files are to be put from here.
+            ``order``, as plain values; the mesh's ``path`` if it can be read from this machine; its ``name``, for
+            messages; the ``stem`` of its result, and ``hull_only``: see `make`; ``out``, an address to write the files
+            to from this process, with the result's ``parent`` folder in it.
         blobs : dict of bytes
-            The files of the mesh (`rlacd.io.read.companions.mesh_files`), where it cannot be read here.
+            The files of the mesh (`rlacd.io.read.companions.mesh_files`), if it cannot be read from this machine.
         shared : dict of Shared
             See `JobSpec.shared`.
 
         Returns
         -------
         dict
-            ``report`` and ``outputs``, the lengths of files that were put from here; or ``error``, and whether the mesh
-            is at fault, ``unusable``. In any case ``seconds``, ``cpu`` and ``peak_mb``, of the process so far.
+            ``report`` and ``outputs``, the lengths of files written from this process; or ``error``, and ``unusable``,
+            whether the mesh is at fault. Always ``seconds``, ``cpu`` and ``peak_mb``, the peak of this process so far.
         dict of bytes
-            The files that are to be put.
+            The files left to write.
 
         Raises
         ------
         OutputError
-            Files cannot be put.
+            Files cannot be written.
         """
         wall, cpu = time.perf_counter(), time.process_time()
         files: dict[str, bytes] = {}
@@ -161,12 +161,12 @@ class MeshServer:
         order = JobSpec(**plain)
         if POLICY not in shared:
             return order
-        network = self._staging / f"{shared[POLICY].key}.onnx"  # it stays, so that it is read once
+        network = self._staging / f"{shared[POLICY].key}.onnx"  # kept, so that it is read only once
         if not network.exists():
             network.write_bytes(shared[POLICY].blobs["onnx"])
         return order.with_policy(network)
 
     def _sentence(self, error: Exception, path: Path, name: str) -> str:
-        """First line of a message, with the mesh's name where this machine's path to it stood."""
+        """First line of a message, with this machine's path replaced by the mesh's name."""
         line = (str(error).strip().splitlines() or ["no message"])[0]
         return line.replace(str(path), name).replace(str(self._staging), "")

@@ -1,4 +1,4 @@
-"""Where results go: a folder of this machine, or any address that fsspec knows (``s3://``, ``gs://``, ``memory://``)."""
+"""Where results go: a local folder, or any address that fsspec supports (``s3://``, ``gs://``, ``memory://``)."""
 
 from __future__ import annotations
 
@@ -17,70 +17,70 @@ from rlacd.io.read.open_file import read_file
 from rlacd.io.write.atomic import output_errors, write_file
 
 PRIVATE = ".rlacd"
-"""Folder in the results for what only the next run needs."""
+"""Folder inside the results for files that only the next run needs."""
 
 SEGMENT_SECONDS = 10.0
-"""An object store cannot append: so often a new object with the lines since the last one is written."""
+"""Seconds between journal objects: an object store cannot append, so each object holds the lines since the last."""
 
 
 class Journal(Protocol):
-    """Lines that outlive a kill of the process that writes them."""
+    """Lines that survive a kill of the process that writes them."""
 
     def lines(self) -> Iterator[bytes]:
-        """All whole lines, oldest first."""
+        """All complete lines, oldest first."""
 
     def add(self, line: bytes) -> None:
-        """Keep a line, which ends in a line's end."""
+        """Append a line, which must end in a newline."""
 
     def remove(self) -> None:
-        """Forget all lines, on the disk too."""
+        """Delete all lines, on disk too."""
 
     def close(self) -> None:
-        """Keep what is not kept yet."""
+        """Write any lines still pending."""
 
 
 class ResultStore(Protocol):
-    """A place for files; names are relative to it, with slashes.
+    """A place for files; names are relative to it, with forward slashes.
 
     Attributes
     ----------
     shared : bool
-        Whether every machine reaches it under the same address.
+        Whether every machine can reach it under the same address.
     """
 
     shared: bool
 
     def write(self, name: str, data: bytes) -> None:
-        """Put a file there, whole or not at all."""
+        """Write a file atomically."""
 
     def read(self, name: str) -> bytes | None:
-        """Get the content of a file; None if there is none."""
+        """Return the content of a file; None if it does not exist."""
 
     def size(self, name: str) -> int | None:
-        """Get the length of a file; None if there is none."""
+        """Return the length of a file; None if it does not exist."""
 
     def remove(self, name: str) -> None:
-        """Remove a file, and the folders that it leaves empty."""
+        """Remove a file, and any folders left empty."""
 
     def journal(self, name: str) -> Journal:
         """Open a journal."""
 
     def open(self) -> None:
-        """Get ready for writing, as the only run that does."""
+        """Prepare for writing and lock out other runs."""
 
     def close(self) -> None:
-        """Let other runs write."""
+        """Release the store to other runs."""
 
 
 def open_store(place: str) -> ResultStore:
-    """Find the store of a folder's name or an address.
+    """Open the store for a folder or an address.
 
     Raises
     ------
     MissingExtraError
-        It is an address, and fsspec or what it needs for that is not installed.
+        The place is an address, and fsspec or its driver is not installed.
     OptionError
-        fsspec does not know such addresses.
+        fsspec does not support the address.
     """
     if "://" not in place:
         return FolderStore(Path(place))
@@ -90,19 +90,19 @@ def open_store(place: str) -> ResultStore:
 
 
 def under(parent: str, files: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Name files as a store does, by the folder they go to."""
+    """Prefix file names with their folder."""
     return {str(PurePosixPath(parent) / name): data for name, data in files.items()}
 
 
 def put_files(store: ResultStore, files: Mapping[str, bytes]) -> dict[str, int]:
-    """Write files, the one that names others last; returns their lengths."""
+    """Write files; one that refers to others is written last. Returns their lengths."""
     for name, data in files.items():
         store.write(name, data)
     return {name: len(data) for name, data in files.items()}
 
 
 class FolderStore:
-    """A folder of this machine."""
+    """A folder on this machine."""
 
     shared = False
 
@@ -139,7 +139,7 @@ class FolderStore:
         path = self.folder / name
         with output_errors(path):
             path.unlink(missing_ok=True)
-        with contextlib.suppress(OSError):  # the first that is not empty ends it
+        with contextlib.suppress(OSError):  # stops at the first folder that is not empty
             for parent in path.parents:
                 if parent == self.folder:
                     break
@@ -150,7 +150,7 @@ class FolderStore:
         return _FileJournal(self.folder / PRIVATE / name)
 
     def open(self) -> None:
-        """Take the folder for this run, and remove what a killed one left half-written.
+        """Lock the folder for this run, and remove files left incomplete by a killed one.
 
         Raises
         ------
@@ -179,7 +179,7 @@ class FolderStore:
 
 
 class _FileJournal:
-    """Lines appended to a file, each on the disk before the next."""
+    """Lines appended to a file, each flushed to disk before the next."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -190,7 +190,7 @@ class _FileJournal:
             content = read_file(self._path, sys.maxsize) if self._path.exists() else b""
         whole = content.rfind(b"\n") + 1
         if whole < len(content):
-            os.truncate(self._path, whole)  # what a kill left of its last line
+            os.truncate(self._path, whole)  # drops an incomplete last line left by a kill
         yield from content[:whole].splitlines()
 
     def add(self, line: bytes) -> None:
@@ -213,7 +213,7 @@ class _FileJournal:
 
 
 class AddressStore:
-    """Anything fsspec has a driver for; the driver's own ways (environment, files) find the credentials."""
+    """Any address that fsspec has a driver for; the driver finds credentials its usual way (environment, files)."""
 
     shared = True
 
@@ -233,7 +233,7 @@ class AddressStore:
         self.shared = not address.startswith("memory://")
 
     def write(self, name: str, data: bytes) -> None:
-        """See `ResultStore`; whole or not at all where the system writes objects so, as all object stores do."""
+        """See `ResultStore`; atomic where the system writes objects atomically, as all object stores do."""
         path = self._path(name)
         with self._errors(path):
             self._system.makedirs(path.rpartition("/")[0], exist_ok=True)
@@ -275,10 +275,10 @@ class AddressStore:
         return _SegmentJournal(self, f"{PRIVATE}/{name}.parts")
 
     def open(self) -> None:
-        """Nothing to do: an object store has no locks, so two runs must not write to one address at a time."""
+        """Do nothing: an object store has no locks, so two runs must not write to one address at the same time."""
 
     def close(self) -> None:
-        """Nothing to do."""
+        """Do nothing."""
 
     def _path(self, name: str) -> str:
         return f"{self._root.rstrip('/')}/{name}"
@@ -289,13 +289,13 @@ class AddressStore:
             yield
         except (MemoryError, RecursionError):
             raise
-        except Exception as error:  # drivers raise whatever their clients raise
+        except Exception as error:  # drivers pass on any exception of their clients
             reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
             raise OutputError(f"cannot reach {path} ({reason}); check the address and your rights there.") from error
 
 
 class _SegmentJournal:
-    """Lines in numbered objects, one every few seconds; the lines of the last few seconds may be lost with a kill."""
+    """Lines in numbered objects, one every few seconds; a kill may lose the lines of the last few seconds."""
 
     def __init__(self, store: AddressStore, folder: str) -> None:
         self._store = store

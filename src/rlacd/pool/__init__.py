@@ -1,4 +1,4 @@
-"""Watched processes that do one request after another: here, on this machine, or on the machines of a Ray cluster."""
+"""Watched processes that answer requests one at a time: in this process, on this machine, or on a Ray cluster."""
 
 from rlacd.pool.in_process import InProcessPool
 from rlacd.pool.local import LocalPool

@@ -1,7 +1,7 @@
-"""The process in which requests are done: ``python -m rlacd.pool.child SOCKET SERVER FOLDER``, one after another.
+"""The process that answers requests, one at a time: ``python -m rlacd.pool.child SOCKET SERVER FOLDER``.
 
-Whatever a request does (crash, hang, eat all memory, make a library print) happens here. The process ends when whoever
-started it does.
+A request that crashes, hangs, exhausts memory or makes a library print does so here. The process exits when its parent
+does.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ READY = b"ready"
 
 def main() -> None:
     """Answer requests until the other end is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started it decides what Ctrl-C ends
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C stops
     os.dup2(2, 1)
     connection = Connection(int(sys.argv[1]))
     messages: queue.SimpleQueue[tuple[Values, dict[str, bytes]]] = queue.SimpleQueue()
@@ -33,7 +33,7 @@ def main() -> None:
             while True:
                 messages.put(receive(connection))
         except (EOFError, OSError):
-            os._exit(0)  # in the middle of a request, too: nobody waits for it any more
+            os._exit(0)  # even in the middle of a request: its answer is no longer needed
 
     threading.Thread(target=listen, daemon=True).start()
     serve = find_server(sys.argv[2])(Path(sys.argv[3]))

@@ -1,4 +1,4 @@
-"""A pool that is this process: nothing is watched, and nothing has to start."""
+"""A pool that runs requests in the calling process: nothing is watched, nothing has to start."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rlacd.pool.request import Answer, Request, Server
 
 
 class InProcessPool:
-    """Does every request when it is handed over; limits are not kept."""
+    """Answers each request during `submit`; limits are not enforced."""
 
     many_machines = False
     room = 1

@@ -12,7 +12,7 @@ from rlacd.pool.request import Answer, Request
 from rlacd.pool.worker import Worker
 
 PATIENCE = 10.0
-"""Seconds in which threads see that their processes are gone."""
+"""Seconds for threads to notice that their processes have ended."""
 
 
 class LocalPool:
@@ -21,7 +21,7 @@ class LocalPool:
     Parameters
     ----------
     jobs : int
-        How many.
+        Number of processes.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Messages between a worker and its process: a header of JSON that names blobs, then the blobs."""
+"""Messages between a worker and its process: a JSON header that names the blobs, then the blobs."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def receive(connection: Connection) -> tuple[Values, dict[str, bytes]]:
 
 
 def find_server(name: str) -> MakeServer:
-    """Import what ``module:name`` names."""
+    """Import the object that ``module:name`` refers to."""
     module, _, attribute = name.partition(":")
     make: MakeServer = getattr(importlib.import_module(module), attribute)
     return make

@@ -1,7 +1,7 @@
-"""The pool of many machines: every request is a task of Ray, which finds it a machine, and another if that is lost.
+"""The pool of many machines: every request is a Ray task; Ray picks the machine, and another if that one is lost.
 
-On each machine a request is done as on one: in a worker process with limits, watched by the process that Ray runs. What
-requests share lies in the object store once; a machine fetches it for the first process that has not been given it.
+On each machine a request runs as in a local pool: in a worker process with limits, watched by Ray's process. Data that
+requests share is put in the object store once; a machine fetches it for its first process that needs it.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from rlacd.pool.request import Answer, MachineLostError, ProcessLimits, Request,
 from rlacd.pool.worker import Worker
 
 LOCAL = "local"
-"""The address of a cluster that is this machine alone."""
+"""The address of a cluster on this machine alone."""
 
 LOST = 5
-"""Machines a request may be lost with before the last one."""
+"""Times a request is resent after its machine was lost."""
 
 QUEUE = 2
-"""Requests handed over per processor: one to work on, and one so that nobody waits for the next."""
+"""Requests submitted per processor: one running, and one queued so that the processor never waits."""
 
 RECOUNT = 10.0
-"""Seconds between two looks at how many processors there are."""
+"""Seconds between checks of the number of processors."""
 
 ANSWER = 10.0
-"""Seconds in which a cluster has to answer."""
+"""Seconds allowed for a cluster to answer."""
 
 
 class RayPool:
@@ -43,22 +43,22 @@ class RayPool:
     Parameters
     ----------
     address : str
-        Of the cluster, as ``ray.init`` takes it: ``local`` for one on this machine, ``auto``, ``ray://host:10001``.
+        Cluster address, as ``ray.init`` takes it: ``local`` for one on this machine, ``auto``, ``ray://host:10001``.
     jobs : int, optional
-        Processors of a local cluster, all by default.
+        Number of processors of a local cluster; all by default.
 
     Raises
     ------
     MissingExtraError
         Ray is not installed.
     OptionError
-        There is no cluster at the address, or `jobs` is given for one that knows its own size.
+        There is no cluster at the address, or `jobs` is given for an existing cluster.
     """
 
     many_machines = True
 
     def __init__(self, address: str, jobs: int | None = None) -> None:
-        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nothing is sent anywhere
+        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # disables usage reports
         try:
             import ray
         except ImportError as error:
@@ -83,25 +83,25 @@ class RayPool:
                 ) from error
         self._remote = ray.remote(max_retries=LOST, retry_exceptions=False)(_do)
         self._running: set[Any] = set()
-        self._finishing = ThreadPoolExecutor(1)  # what Ray calls back must not call Ray, and a callback of ours may
+        self._finishing = ThreadPoolExecutor(1)  # Ray's callbacks must not call Ray; ours may
         self._stored: weakref.WeakKeyDictionary[Shared, Any] = weakref.WeakKeyDictionary()
         self._processors, self._counted = 0.0, -RECOUNT
 
     @property
     def room(self) -> int:
-        """Requests of one thread that are worth handing over at a time; clusters grow and shrink."""
+        """Single-threaded requests worth submitting at once; clusters grow and shrink."""
         if time.monotonic() - self._counted > RECOUNT:
             self._processors = self._ray.cluster_resources().get("CPU", 0)
             self._counted = time.monotonic()
         return max(1, int(QUEUE * self._processors))
 
     def submit(self, request: Request) -> Future[Answer]:
-        """See `Pool`; the request is cheaper the less of it is not shared.
+        """See `Pool`; unshared data travels with every request, so share what is large.
 
         Raises
         ------
         OptionError
-            No machine has so many processors.
+            No machine has enough processors.
         """
         self._require_processors(request.threads)
         shared = {name: (given.key, [self._store(given)]) for name, given in request.shared.items()}
@@ -115,7 +115,7 @@ class RayPool:
         return future
 
     def close(self) -> None:
-        """End the tasks, and the cluster if it was started here."""
+        """Stop the tasks, and the cluster if it was started here."""
         for task in list(self._running):
             self._ray.cancel(task, force=True)
         self._running.clear()
@@ -129,7 +129,7 @@ class RayPool:
         self.close()
 
     def _hand_over(self, task: Any, done: Future[Any], future: Future[Answer]) -> None:
-        with contextlib.suppress(RuntimeError):  # the interpreter ends, and nobody waits
+        with contextlib.suppress(RuntimeError):  # the interpreter is exiting
             self._finishing.submit(self._finish, task, done, future)
 
     def _finish(self, task: Any, done: Future[Any], future: Future[Answer]) -> None:
@@ -158,7 +158,7 @@ class RayPool:
 
 
 def _require_answer(address: str) -> None:
-    """Find out in seconds whether anyone is there; Ray itself tries for minutes."""
+    """Fail within seconds if no cluster answers; Ray itself keeps trying for minutes."""
     host, _, port = address.removeprefix("ray://").rpartition(":")
     if not (host and port.isdecimal()):
         return
@@ -175,7 +175,7 @@ _fetched: dict[str, Shared] = {}
 def _do(
     version: str, plain: dict[str, Any], shared: Mapping[str, tuple[str, list[Any]]], limits: tuple[float, int]
 ) -> tuple[dict[str, Any], dict[str, bytes], str]:
-    """Do a request on whatever machine this is; plain values in and out."""
+    """Run a request on the current machine, with plain values in and out."""
     global _fetched
     if version != __version__:
         raise OptionError(
@@ -187,7 +187,7 @@ def _do(
 
 
 def _fetch(name: str, key: str, stored: list[Any]) -> Shared:
-    """What is shared, from the object store unless this process has it; refs in lists are not fetched by Ray itself."""
+    """Fetch shared data from the object store unless this process has it; Ray does not fetch refs inside lists."""
     import ray
 
     if name in _fetched and _fetched[name].key == key:

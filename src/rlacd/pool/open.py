@@ -1,4 +1,4 @@
-"""The pool that a command's ``--jobs`` and ``--ray`` ask for."""
+"""Open the pool that ``--jobs`` and ``--ray`` ask for."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ def open_pool(jobs: int | None, ray: str | None = None) -> Pool:
     Parameters
     ----------
     jobs : int, optional
-        Processes on this machine; 0 for this very process. On a cluster that is started here, its processors, all by
-        default.
+        Processes on this machine; 0 to run in the calling process. For a cluster started here, its number of
+        processors, all by default.
     ray : str, optional
         Address of a cluster.
 

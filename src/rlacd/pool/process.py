@@ -9,7 +9,7 @@ import subprocess
 
 
 def why_it_ended(code: int | None) -> str:
-    """Say what an exit status means: ``died of SIGSEGV``, ``ended with code 3``."""
+    """Describe an exit status: ``died of SIGSEGV``, ``ended with code 3``."""
     if code is None:
         return "closed its pipe"
     if code < 0:
@@ -18,12 +18,12 @@ def why_it_ended(code: int | None) -> str:
 
 
 def end(process: subprocess.Popen[bytes]) -> None:
-    """End a process and those it started, and wait until it is gone."""
+    """End a process and its children, and wait until it is gone."""
     kill_group(process)
     process.wait()
 
 
 def kill_group(process: subprocess.Popen[bytes]) -> None:
-    """End a process and those it started: it leads a group of its own."""
+    """Kill a process and its children; it must lead its own process group."""
     with contextlib.suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)

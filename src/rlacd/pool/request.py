@@ -1,4 +1,4 @@
-"""What a pool is asked and what comes back: plain values and bytes, so that they travel to any process or machine."""
+"""Requests to a pool and their answers: plain values and bytes, so that they can be sent to any process or machine."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from typing import Any, Protocol, TypeAlias
 from rlacd.errors import OptionError
 
 Values: TypeAlias = dict[str, Any]
-"""What JSON can say."""
+"""Values that JSON can represent."""
 
 Blobs: TypeAlias = Mapping[str, bytes]
 
 
 @dataclass(frozen=True)
 class ProcessLimits:
-    """What one request may take.
+    """Limits of one request.
 
     Attributes
     ----------
     seconds : float
         Wall time.
     memory : int
-        Bytes of main memory that its process holds; 0 for no limit.
+        Bytes of main memory that the process may hold; 0 for no limit.
 
     Raises
     ------
@@ -47,14 +47,14 @@ class ProcessLimits:
 
 @dataclass(frozen=True, eq=False)
 class Shared:
-    """Bytes that many requests need: every process is given them once.
+    """Bytes that many requests need: each process receives them once.
 
     Attributes
     ----------
     blobs
         The bytes by name.
     key
-        Tells them from all others.
+        Identifies the content.
     """
 
     blobs: Blobs
@@ -63,20 +63,20 @@ class Shared:
 
 @dataclass(frozen=True, eq=False)
 class Request:
-    """One thing to do. It has to be a pure function of what is written here, since it may be done twice.
+    """A job for a pool. It must be a pure function of its fields, since it may run twice.
 
     Attributes
     ----------
     server
-        Who does it: ``module:name`` of what makes a `Server`.
+        ``module:name`` of a factory that makes the `Server`.
     values, blobs, shared
-        What the server is given; a process keeps what is shared as long as requests name it.
+        Inputs of the server; a process keeps shared data as long as requests name it.
     limits
-        What it may take; its process is ended when it takes more.
+        Limits; the process is ended when it exceeds them.
     threads
-        Processors it uses.
+        Number of processors it uses.
     fresh
-        Whether it gets a new process.
+        Whether it needs a new process.
     """
 
     server: str
@@ -90,12 +90,12 @@ class Request:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a server has said.
+    """The answer of a server.
 
     Attributes
     ----------
     values, blobs
-        Of the server.
+        Results of the server.
     worker
         Process and machine.
     """
@@ -106,25 +106,25 @@ class Answer:
 
 
 Server: TypeAlias = Callable[[Values, Blobs, Mapping[str, Shared]], tuple[Values, dict[str, bytes]]]
-"""Answers requests. An `RlacdError` that it raises is raised to whoever asked; anything else ends its process."""
+"""Answers requests. An `RlacdError` that it raises is passed on to the caller; any other exception ends its process."""
 
 MakeServer: TypeAlias = Callable[[Path], Server]
-"""Called once a process, with a folder that is removed with it."""
+"""Called once per process, with a folder that is removed when the process ends."""
 
 
 class WorkerDiedError(Exception):
-    """A process has ended before its answer.
+    """A process ended before it answered.
 
     Attributes
     ----------
     reason : str
-        Why, in words that are the same every time.
+        Why, in the same words every time.
     last_words : str
-        The end of what it said on stderr.
+        The end of its stderr.
     """
 
     def __init__(self, reason: str, last_words: str = "") -> None:
-        super().__init__(reason, last_words)  # both, or a pickle loses one
+        super().__init__(reason, last_words)  # both, or pickling loses one
         self.reason = reason
         self.last_words = last_words
 
@@ -133,36 +133,36 @@ class WorkerDiedError(Exception):
 
 
 class MachineLostError(WorkerDiedError):
-    """Machine after machine was lost with the request."""
+    """The request was lost with its machine, again and again."""
 
 
 class Pool(Protocol):
-    """Where requests are done.
+    """Where requests are answered.
 
     Attributes
     ----------
     many_machines : bool
-        Whether there may be room on another machine for what needs much of one.
+        Whether another machine may have room for a request that needs a lot of memory.
     """
 
     many_machines: bool
 
     @property
     def room(self) -> int:
-        """Requests that are worth handing over at a time: more only wait here."""
+        """Number of requests worth submitting at once; more would only queue."""
 
     def submit(self, request: Request) -> Future[Answer]:
-        """Have a request done.
+        """Submit a request.
 
         The future raises `WorkerDiedError` if the process died or was ended, and any `RlacdError` of the server. A
-        process that died is replaced; the request is not tried again, unless its machine was lost.
+        process that died is replaced; the request is not retried unless its machine was lost.
         """
 
     def close(self) -> None:
-        """End all processes, whatever they are doing."""
+        """End all processes, even busy ones."""
 
     def __enter__(self) -> Pool:
-        """Nothing is started before it is needed."""
+        """Return the pool; processes start only when needed."""
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         """See `close`."""

@@ -1,4 +1,4 @@
-"""Second chances: a process may have died of what it had done before, or of its neighbours."""
+"""Retries: a process may have died because of an earlier request or of other processes."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from rlacd.pool.request import Answer, MachineLostError, Pool, Request, WorkerDi
 _K = TypeVar("_K")
 
 AHEAD = 2
-"""Requests handed over for each that there is room for, so that no process waits for the next one."""
+"""Requests submitted per free place, so that no process waits for the next one."""
 
 
 def submit_with_retry(pool: Pool, request: Request) -> Future[Answer]:
-    """Have a request done, and if its process dies once more in a new one; see `Pool.submit`."""
+    """Submit a request, and retry it once in a new process if its process dies; see `Pool.submit`."""
     outcome: Future[Answer] = Future()
     outcome.set_running_or_notify_cancel()
 
@@ -39,18 +39,18 @@ def submit_with_retry(pool: Pool, request: Request) -> Future[Answer]:
 
 
 def answers(pool: Pool, requests: Iterable[tuple[_K, Request]]) -> Iterator[tuple[_K, Answer | WorkerDiedError]]:
-    """Have many requests done, each with a second chance; yields what came of each as it comes.
+    """Submit many requests, each with one retry; yields each answer or death as it arrives.
 
     Parameters
     ----------
     pool : Pool
     requests : iterable of (key, Request)
-        No more are taken than can be done soon.
+        Taken only as the pool has room for them.
 
     Raises
     ------
     RlacdError
-        Whatever a server has raised.
+        Raised by a server.
     """
     waiting, asked = iter(requests), dict[Future[Answer], _K]()
     while True:

@@ -1,7 +1,7 @@
-"""A process for requests, watched from outside: it is ended when it takes too long or too much memory.
+"""A process for requests, watched from outside: it is ended when it exceeds its time or memory.
 
-Pools of the standard library and of other packages share a pipe or a lock between their processes; one that is killed
-while it holds it stops the whole pool. Here every process has a pipe of its own, and so its death is nobody else's.
+Pools of the standard library and of other packages share a pipe or a lock between their processes; killing one that
+holds it stops the whole pool. Here every process has its own pipe, so that its death affects no other.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from rlacd.pool.process import end, kill_group, why_it_ended
 from rlacd.pool.request import Answer, Request, WorkerDiedError
 
 LOOK = 0.05
-"""Seconds between two looks at a process that is busy."""
+"""Seconds between checks of a busy process."""
 
 START = 300.0
-"""Seconds that a process may take to start."""
+"""Seconds a process may take to start."""
 
 
 class Worker:
-    """One process; it starts with its first request, and again after it was ended."""
+    """One process; it starts at its first request, and restarts after it was ended."""
 
     def __init__(self) -> None:
         self._server = ""
@@ -47,14 +47,14 @@ class Worker:
         return f"{self._process.pid if self._process else '-'}@{socket.gethostname()}"
 
     def ask(self, request: Request) -> Answer:
-        """Have a request done.
+        """Send a request and wait for its answer.
 
         Raises
         ------
         WorkerDiedError
-            The process died or was ended; the next request gets a new one.
+            The process died or was ended; the next request gets a new process.
         RlacdError
-            Whatever the server has raised.
+            Raised by the server.
         """
         if request.fresh or request.server != self._server:
             self.close()
@@ -74,14 +74,14 @@ class Worker:
             raise
         name = self.name
         if limits.memory and self._memory() > limits.memory // 2:
-            self.close()  # what earlier requests have left behind is not to be held against the next
+            self.close()  # memory left over from earlier requests must not count against the next one
         if "error" in header:
             kind, said = header["error"]
             raise getattr(errors, kind, errors.RlacdError)(said)
         return Answer(header["values"], blobs, name)
 
     def close(self) -> None:
-        """End the process; only for whoever asks it."""
+        """End the process; only for the thread that calls `ask`."""
         if self._process is None:
             return
         process, self._process = self._process, None
@@ -92,7 +92,7 @@ class Worker:
         self._folder.cleanup()
 
     def kill(self) -> None:
-        """End the process for good, whoever is waiting for it; that one is told, and closes."""
+        """End the process for good, even while `ask` waits for it; `ask` then raises and closes."""
         with self._starting:
             self._killed = True
             if (process := self._process) is not None:
@@ -134,7 +134,7 @@ class Worker:
         send(self._pipe, {"shares": "", "values": request.values, "shared": list(request.shared)}, request.blobs)
 
     def _await(self, until: float, too_late: str, memory: int) -> None:
-        """Wait for something to read, or for the end of the process."""
+        """Wait until there is something to read or the process has ended."""
         while not self._pipe.poll(LOOK):
             if time.monotonic() > until:
                 raise WorkerDiedError(too_late)
@@ -147,12 +147,12 @@ class Worker:
         try:
             return int(psutil.Process(self._process.pid).memory_info().rss)
         except psutil.Error:
-            return 0  # it has just ended, which the pipe tells
+            return 0  # it has just ended; reading the pipe will show that
 
     def _death(self) -> WorkerDiedError:
         assert self._process is not None
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(timeout=10)  # the pipe closes a moment before the process is gone
+            self._process.wait(timeout=10)  # the pipe closes a moment before the process exits
         code = self._process.poll()
         self._said.seek(0)
         last_words = self._said.read().decode(errors="replace")[-500:].strip()
