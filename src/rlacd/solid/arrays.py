@@ -1,4 +1,4 @@
-"""Array types shared by all rooms."""
+"""Array types shared by the whole package."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Balls that stand for the space a decomposition has to leave free."""
+"""Balls that represent the space a decomposition must leave free."""
 
 from __future__ import annotations
 
@@ -25,5 +25,5 @@ class Balls:
         return len(self.radii)
 
     def in_input(self, frame: Frame) -> Balls:
-        """Carry balls in the normalised frame to the input's frame and unit."""
+        """Map balls from the normalised frame to the input's frame and unit."""
         return Balls(frame.to_input(self.centres), self.radii / frame.scale)

@@ -1,4 +1,4 @@
-"""Time for what cannot be stopped: manifold3d holds Python's lock until it has finished."""
+"""Time checks before operations that cannot be interrupted: manifold3d holds the GIL until it has finished."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from manifold3d import Manifold
 from rlacd._native import Stopped, poll_stop, seconds_left
 
 LONG = 50_000
-"""Triangles that manifold3d takes some tenths of a second for."""
+"""A number of triangles that manifold3d processes in some tenths of a second."""
 
 LATE = 0.3
-"""Seconds that it may take longer than there is time."""
+"""Seconds by which a boolean may overrun the time left."""
 
 _SEGMENTS = 64
 
 
 def require_time_for(triangles: int) -> None:
-    """Raise `Stopped` where the work has to stop, or will have to before so many triangles could be dealt with.
+    """Raise `Stopped` if the work must stop, or would have to before a boolean of this many triangles could finish.
 
-    How long that takes depends on the machine and on what else it does: a small task of the same kind tells.
+    How long a boolean takes depends on the machine and its load, so a small task of the same kind is timed.
     """
     poll_stop()
     left = seconds_left()

@@ -21,26 +21,26 @@ NEGLIGIBLE_VOLUME = 1e-12
 """Solids below this volume (the frame's box has 8) are rounding left over by a cut."""
 
 LOST = 1e-6
-"""Share of a solid's volume that may be lost by a boolean, or as shavings (see `rlacd.cut`)."""
+"""Share of a solid's volume that may be lost in a boolean, or as shavings (see `rlacd.cut`)."""
 
 
 FOLDED = 1e-2
-"""Share of a cap's area that may lie upside down: more than that where solids overlap themselves by a hair. Rims cross
-each other then, and triangles between them may lead far out of the solid; a boolean knows better what is inside."""
+"""Share of a cap's area that may be upside down. It is larger where a solid overlaps itself by a hair: rims cross each
+other, and triangles between them may lead far out of the solid. A boolean then decides better what is inside."""
 
 
 NEGLIGIBLE_FOLD = 1e-9
-"""A smaller share than this is rounding."""
+"""A share smaller than this is rounding."""
 
 
 MARGIN = 1e-3
-"""How far outside a box a solid is cut that is wanted in it, so that no cap touches what lies inside."""
+"""Margin around a box when the solid is cropped to it, so that no cap touches what lies inside the box."""
 
 FEW_FACES = 400
-"""A boolean with so few faces takes no longer than cutting them off first."""
+"""A boolean of this few faces takes no longer than cropping them first."""
 
 MANY_FACES = 2000
-"""Solids with more faces are halved before a box is cut out of them."""
+"""Solids with more faces are halved before they are cropped to a box."""
 
 
 @dataclass(frozen=True)
@@ -58,18 +58,19 @@ class Part:
     ----------
     vertices : float64 [V, 3]
     faces : int32 [F, 3]
-        A surface that bounds the solid, to measure distances to; parts glued from several are not closed meshes.
+        A surface that bounds the solid, for measuring distances; that of a part glued from several is not a closed
+        mesh.
     volume : float
         Of the solid.
     hull : Hull
-        A convex hull that contains the solid.
+        A convex polytope that contains the solid.
     piece_hulls : float, optional
-        Volumes of the hulls of the pieces it was glued from, added up; its own hull's volume by default.
+        Sum of the volumes of the hulls of the pieces it was glued from; its own hull's volume by default.
 
     Attributes
     ----------
     within : Part or None
-        A part whose hull contains this one's: what it was cut from.
+        A part whose hull contains this one's: the one it was cut from.
     """
 
     def __init__(
@@ -92,7 +93,7 @@ class Part:
 
     @property
     def members(self) -> tuple[Component, ...]:
-        """The components it was glued from; none where it was not made of components."""
+        """The components it consists of; empty if it was not made from components."""
         return ()
 
     @property
@@ -112,11 +113,11 @@ class Part:
 
     @property
     def size(self) -> int:
-        """Triangles of the surface, before what its pieces touch by is taken away."""
+        """Triangles of the surface, counting those where its pieces touch."""
         return self._size
 
     def with_hull(self, hull: Hull) -> Part:
-        """Get the same solid with another hull around it."""
+        """Return the same solid with another hull around it."""
         other = copy.copy(self)
         other.hull = hull
         other.within = None  # the other hull may be larger
@@ -124,10 +125,10 @@ class Part:
 
     @staticmethod
     def glued(first: Part, second: Part, hull: Hull | None = None) -> Part:
-        """Unite two parts with disjoint interiors; the regions where they touch are no surface of the union.
+        """Unite two parts with disjoint interiors; the regions where they touch are not part of the union's surface.
 
-        Where one of them is a `ClippedPart`, which has what others have too, so is the union. Their joint hull may be
-        given where it is known.
+        If either is a `ClippedPart`, which also holds what other parts contribute, the union is one too. Pass the joint
+        hull if it is known.
         """
         hull = hull or Hull.around(first.hull, second.hull)
         for part in (first, second):
@@ -141,7 +142,7 @@ class Part:
 
 
 class _Union(Part):
-    """Two parts as one. They are glued when the surface is first asked for: some criteria look at the hull only."""
+    """The union of two parts. They are glued when the surface is first needed: some criteria look at the hull only."""
 
     def __init__(self, first: Part, second: Part, hull: Hull) -> None:
         self._surface = None
@@ -155,14 +156,14 @@ class _Union(Part):
 
     @property
     def members(self) -> tuple[Component, ...]:
-        """Those of both parts."""
+        """The members of both parts."""
         return self._members
 
     def _resolved(self) -> tuple[FloatArray, IntArray]:
         if self._surface is None:
-            for union in reversed(self._unresolved()):  # a loop: a thousand unions in a row are too deep to recurse
+            for union in reversed(self._unresolved()):  # a loop: a thousand nested unions are too deep to recurse
                 operands = union._operands
-                if operands is not None:  # another thread may have been here
+                if operands is not None:  # another thread may have done it already
                     (a, b), (c, d) = (part._resolved() for part in operands)
                     union._surface = _native.glue(a, b, c, d)
                     union._operands = None
@@ -170,7 +171,7 @@ class _Union(Part):
         return self._surface
 
     def _unresolved(self) -> list[_Union]:
-        """This union and all below it that are not glued yet, the outer before the inner."""
+        """This union and all unglued unions below it, outer before inner."""
         found: list[_Union] = []
         waiting: list[Part] = [self]
         while waiting:
@@ -182,17 +183,17 @@ class _Union(Part):
 
 
 class ClippedPart(Part):
-    """What a solid fills of the joint hull of two of its parts, whomever it belongs to.
+    """All that the solid fills of the joint hull of two of its parts, whichever part it came from.
 
-    Parts on both sides of a third are one this way, as a beam that crosses another is: hulls may overlap, and what
-    lies in one of them is where it should be. The members stay disjoint, so that parts can be reunited and cut anew.
+    Parts on both sides of a third become one this way, such as a beam that another crosses: hulls may overlap, and
+    material that lies in any of them is covered. The members stay disjoint, so parts can be reunited and cut again.
 
     Parameters
     ----------
     solid : Component
-        All of it.
+        The whole solid.
     first, second : Part
-        Made of its components.
+        Consist of components of the solid.
     hull : Hull
         Their joint hull.
 
@@ -212,12 +213,12 @@ class ClippedPart(Part):
 
     @property
     def members(self) -> tuple[Component, ...]:
-        """Those of both parts."""
+        """The members of both parts."""
         return self._members
 
     @property
     def is_whole(self) -> bool:
-        """Whether all of the members is there: what touches the hull from inside is hard on booleans."""
+        """Whether no member lost volume in the clipping: booleans are unreliable where a surface touches the hull."""
         return self.volume >= (1 - LOST) * sum(member.volume for member in self.members)
 
 
@@ -232,7 +233,7 @@ class Component(Part):
     Raises
     ------
     ValueError
-        It is flat.
+        The solid is flat.
     """
 
     def __init__(self, solid: Manifold | tuple[FloatArray, IntArray]) -> None:
@@ -251,12 +252,12 @@ class Component(Part):
 
     @cached_property
     def manifold(self) -> Manifold:
-        """The solid for booleans."""
+        """The solid, ready for booleans."""
         return Manifold(Mesh64(self.vertices, self.faces.astype(np.uint64)))
 
     @cached_property
     def filling(self) -> _native.Filling:
-        """What hulls of its parts are held against."""
+        """Tests how well the hulls of the solid's parts are filled."""
         return _native.Filling(self.vertices, self.faces)
 
     @cached_property
@@ -274,7 +275,7 @@ class Component(Part):
         return axes
 
     def cut(self, plane: Plane) -> tuple[Component | None, Component | None]:
-        """Cut by a plane: what lies below and what lies above, None where nothing (of any volume) does."""
+        """Cut by a plane: returns the sides below and above, None for a side without volume."""
         open_sides = _native.cut_by_plane(self.vertices, self.faces, *plane.normal, plane.offset)
         (below, below_folded), (above, above_folded) = (_capped(*side) for side in open_sides)
         if max(below_folded, above_folded) > FOLDED and abs(self.manifold.volume() - self.volume) <= LOST * self.volume:
@@ -284,9 +285,9 @@ class Component(Part):
         return _component(below, self), _component(above, self)
 
     def around(self, box: FloatArray) -> Manifold:
-        """Get what the solid has in a box [2, 3] and a margin around it, for booleans with what lies in the box.
+        """Return the solid cropped to a box [2, 3] and a margin around it, for booleans with what lies in the box.
 
-        All of the solid where it is small, or where it is not cut cleanly.
+        Returns the whole solid if it is small, or if it cannot be cut cleanly.
         """
         surface = self._cell(box)
         room = np.stack([box[0] - self.box[0], self.box[1] - box[1]])  # beyond each side of the box
@@ -304,9 +305,9 @@ class Component(Part):
         return clipped if abs(clipped.volume() - volume) <= NEGLIGIBLE_VOLUME + LOST * volume else self.manifold
 
     def _cell(self, box: FloatArray) -> tuple[FloatArray, IntArray]:
-        """Get the smallest cell of the solid that a box lies in: it is halved across its longest side, time and again.
+        """Return the smallest cell of the solid that holds a box, by repeatedly halving it across its longest side.
 
-        Cells are kept: otherwise every look into a box would go through all faces.
+        Cells are cached: otherwise every crop would go through all faces.
         """
         cell, place = self.box, ""
         surface = self.vertices, self.faces
@@ -335,7 +336,7 @@ class Component(Part):
         return {}
 
     def pieces(self) -> list[Component]:
-        """Connected pieces, cavities kept inside the piece that encloses them; ``[self]`` when there is but one."""
+        """Connected pieces, cavities kept inside the piece that encloses them; ``[self]`` if it is connected."""
         bodies = _native.bodies(self.vertices, self.faces)
         if len(bodies) == 1:
             return [self]
@@ -355,7 +356,7 @@ def _surface_of(manifold: Manifold) -> tuple[FloatArray, IntArray]:
 def _halves(
     surface: tuple[FloatArray, IntArray], axis: int, offset: float
 ) -> tuple[tuple[FloatArray, IntArray] | None, ...]:
-    """Cut a closed surface across an axis of space: what lies below and above, None where it is not cut cleanly."""
+    """Cut a closed surface across a coordinate axis: the sides below and above, None if it cannot be cut cleanly."""
     x, y, z = np.eye(3)[axis].tolist()
     sides = (_capped(*side) for side in _native.cut_by_plane(*surface, x, y, z, offset))
     return tuple(side if folded <= NEGLIGIBLE_FOLD else None for side, folded in sides)
@@ -364,7 +365,7 @@ def _halves(
 def _capped(
     vertices: FloatArray, faces: IntArray, rims: list[IntArray], outlines: list[FloatArray]
 ) -> tuple[tuple[FloatArray, IntArray], float]:
-    """Close a side of a cut in the plane; and the share of the cap that lies upside down."""
+    """Close one side of a cut in the plane; also returns the share of the cap that is upside down."""
     if not rims:
         return (vertices, faces), 0.0
     triangles, folded = _triangulated(outlines)
@@ -373,9 +374,9 @@ def _capped(
 
 
 def _triangulated(outlines: list[FloatArray]) -> tuple[IntArray, float]:
-    """Triangles [T, 3] of loops in a plane, [R, 2] each, and the share of their area that lies upside down.
+    """Triangles [T, 3] of loops in a plane, [R, 2] each, and the share of their area that is upside down.
 
-    Where loops cross each other, it depends on chance, and on the way round, how far triangles fold.
+    Where loops cross each other, how far triangles fold depends on chance and on the direction of the loops.
     """
     points = np.concatenate(outlines)
     triangles = triangulate(outlines)
@@ -415,7 +416,7 @@ def _component(solid: Manifold | tuple[FloatArray, IntArray], within: Component)
 def _enclose(
     shells: list[tuple[float, tuple[FloatArray, IntArray]]], cavities: list[tuple[FloatArray, IntArray]]
 ) -> list[tuple[FloatArray, IntArray]]:
-    """Give every cavity (a shell of negative volume) back to the smallest shell, given with its volume, around it."""
+    """Assign every cavity (a shell of negative volume) to the smallest of the shells (volume, surface) around it."""
     by_shell = [[surface] for _, surface in shells]
     by_volume = sorted(range(len(shells)), key=lambda i: (shells[i][0], i))
     for cavity in cavities:

@@ -1,4 +1,4 @@
-"""What stands in for a decomposition that had no time to begin: a hull for every body of any input."""
+"""The fallback for a decomposition that had no time to begin: one hull for every body of any input."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from rlacd.solid.hull import Hull
 from rlacd.solid.solid import Solid
 
 MOST_HULLS = 2000
-"""Where there are more bodies, those that follow each other along a curve through space share a hull."""
+"""If there are more bodies, neighbours along a space-filling curve share a hull."""
 
 SECONDS = 0.3
-"""What has no exact hull after this time gets a wider one: hulls with half a million corners take seconds."""
+"""After this time the remaining bodies get a looser hull: exact hulls of half a million corners take seconds."""
 
 FEW = 10_000
-"""Of bodies with fewer points, only the box is taken then."""
+"""After that time, bodies with fewer points than this get their box only."""
 
 HALF_THICKNESS = 1e-3
-"""Flat bodies become as thick as repair makes sheets."""
+"""Flat bodies are made as thick as repair makes sheets."""
 
 _WIDER = 1e-9
 _DIRECTIONS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
@@ -37,17 +37,17 @@ _AT_ONCE = 100_000
 
 
 def cover(mesh: InputMesh, clock: Clock) -> tuple[Solid, list[Part]]:
-    """Take the hull of every body of an input, without repairing anything.
+    """Return the hull of every body of an input, without repairing anything.
 
-    Faces that share a corner, or have corners in one place, are one body. The hull of a body holds all of its points;
-    where it has too many corners to be found in little time, the planes that touch the body in 26 directions do.
+    Faces that share a corner, or have corners at the same place, form one body. The hull of a body holds all of its
+    points. If an exact hull would take too long, the supporting planes in 26 directions are used instead.
 
     Parameters
     ----------
-    mesh : InputMesh
+    Has at least one point.
         With a point at least.
     clock : Clock
-        Has stopped, and does not interrupt this.
+        Has stopped; it does not interrupt this.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def _used(mesh: InputMesh) -> NDArray[np.bool_]:
 
 
 def _bodies(vertices: FloatArray, faces: IntArray) -> list[FloatArray]:
-    """The points [N, 3] of each body, or of several that lie near each other."""
+    """The points [N, 3] of each body, or of several bodies near each other."""
     body = _native.point_bodies(vertices, faces)
     count = int(body.max()) + 1
     order = np.argsort(body, kind="stable")[int((body < 0).sum()) :]
@@ -97,7 +97,7 @@ def _bodies(vertices: FloatArray, faces: IntArray) -> list[FloatArray]:
 
 
 def _along_a_curve(points: FloatArray) -> NDArray[np.int64]:
-    """Places [N] of points [N, 3] of the frame along a Z-order curve."""
+    """Ranks [N] of points [N, 3], given in the frame, along a Z-order curve."""
     cell = np.clip((points + 1) * 512, 0, 1023).astype(np.int64)
     place = np.zeros(len(points), dtype=np.int64)
     for bit, axis in itertools.product(range(10), range(3)):
@@ -118,7 +118,7 @@ def _hull(points: FloatArray, clock: Clock) -> Hull:
 
 
 def _thickened(points: FloatArray) -> FloatArray:
-    """Points [N, 3] and others beside them, along the axes in which they have no extent."""
+    """Points [N, 3], with offset copies along the axes in which they have no extent."""
     middle = points.mean(axis=0)
     _, _, axes = np.linalg.svd(np.concatenate([points - middle, np.zeros((3, 3))]), full_matrices=False)
     extent = np.ptp((points - middle) @ axes.T, axis=0)
@@ -128,7 +128,7 @@ def _thickened(points: FloatArray) -> FloatArray:
 
 
 def _touching(points: FloatArray) -> Hull:
-    """What the planes that touch points [N, 3] in `_DIRECTIONS` hold."""
+    """The polytope of the supporting planes of points [N, 3] in `_DIRECTIONS`."""
     reach = np.full(len(_DIRECTIONS), -np.inf)
     for first in range(0, len(points), _AT_ONCE):
         np.maximum(reach, (points[first : first + _AT_ONCE] @ _DIRECTIONS.T).max(axis=0), out=reach)
@@ -141,7 +141,7 @@ def _touching(points: FloatArray) -> Hull:
 
 
 def _box(points: FloatArray) -> Hull:
-    """The box around points [N, 3], no thinner than sheets are made."""
+    """The box around points [N, 3], at least as thick as a repaired sheet."""
     box = np.array([points.min(axis=0), points.max(axis=0)])
     is_thin = box[1] - box[0] < HALF_THICKNESS
     box += np.where(is_thin, HALF_THICKNESS, _WIDER) * np.array([[-1.0], [1.0]])

@@ -1,8 +1,8 @@
 """Certified distances between surfaces, and between a decomposition and its input.
 
-All lengths are in the frame of the points handed in (elsewhere in this package the normalised one). An interval
+All lengths are in the frame of the given points (elsewhere in this package the normalised one). An interval
 ``(lower, upper)`` holds the true value: it comes from branch and bound over the triangles, not from samples. Rounding
-is about 1e-8 of the lengths involved. Results are the same for any number of threads.
+is about 1e-8 of the lengths involved. Results do not depend on the number of threads.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ Interval = tuple[float, float]
 """A certified lower and upper bound."""
 
 TOLERANCE = 2e-3
-"""Width of the intervals unless asked otherwise: 0.1 % of the input's longest side in the normalised frame."""
+"""Default width of the intervals: 0.1 % of the input's longest side in the normalised frame."""
 
 GAP = 1e-6
-"""Cracks between hulls narrower than this are closed: the two sides of a cut are no surface of the union."""
+"""Cracks between hulls narrower than this are closed: the two sides of a cut are not part of the union's surface."""
 
 
 def directed_hausdorff(
@@ -42,11 +42,11 @@ def directed_hausdorff(
     faces : int32 [F, 3]
         The mesh, of any quality.
     surface : _native.Surface
-        What to measure to.
+        The surface to measure to.
     tolerance
         Width of the interval.
     threads
-        None takes every core.
+        None uses every core.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def directed_hausdorff(
 
 @dataclass(frozen=True)
 class HullDistances:
-    """How well hulls stand for a surface.
+    """How closely hulls approximate a surface.
 
     Attributes
     ----------
@@ -94,13 +94,13 @@ def hull_distances(
     tolerance
         Width of both intervals.
     threads
-        None takes every core.
+        None uses every core.
 
     Notes
     -----
     Facets are clipped exactly against the other hulls, and the surface's triangles against all hulls; the maximum over
     the remaining pieces is found by branch and bound, with distance to a triangle or to a hull convex on each piece.
-    No hulls: nothing is added, and everything is missed by an infinite distance.
+    Without hulls, nothing is added (0) and everything is missed (infinity).
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The normalised frame every length is measured in: bounding box centred, longest side 2."""
+"""The normalised frame in which every length is measured: bounding box centred, longest side 2."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 FloatArray = NDArray[np.float64]
 
 SMALLEST = 1e-300
-"""Half the longest side of the least box that fills the frame; a smaller one becomes a speck in it."""
+"""Half the longest side of the smallest box that is scaled to fill the frame; a smaller one becomes a speck in it."""
 
 NOTHING = 2.0**-280
-"""Frame coordinates below this become 0: products of three, on which exact decisions rest, would underflow."""
+"""Frame coordinates below this become 0: products of three, which exact predicates rely on, would underflow."""
 
 
 @dataclass(frozen=True)
@@ -33,19 +33,19 @@ class Frame:
 
     @classmethod
     def of(cls, points: ArrayLike) -> Frame:
-        """Return the frame of a set of finite points ``[N, 3]``; no points give the identity."""
+        """Return the frame of finite points ``[N, 3]``; without points, the identity."""
         points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
         if len(points) == 0:
             return cls(np.zeros(3), 1.0)
         lower, upper = points.min(axis=0), points.max(axis=0)
-        # Halves are taken before adding: the sum of two coordinates near 1e308 would overflow.
+        # Halve before adding: the sum of two coordinates near 1e308 would overflow.
         center = lower / 2 + upper / 2
         half = float((upper / 2 - lower / 2).max())
         return cls(center, 1.0 / max(half, SMALLEST) if half > 0 else 1.0)
 
     @property
     def resolution(self) -> float:
-        """Distance of neighbouring coordinates of the input, in the frame; large where the input lies far from 0."""
+        """Spacing of adjacent coordinates of the input, in the frame; large where the input lies far from 0."""
         return float(np.finfo(np.float64).eps) * (float(np.abs(self.center).max()) * float(self.scale) + 1.0)
 
     def to_frame(self, points: ArrayLike) -> FloatArray:

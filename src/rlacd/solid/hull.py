@@ -35,7 +35,7 @@ class Hull:
 
     @classmethod
     def of(cls, points: FloatArray) -> Hull | None:
-        """Take the hull of points [N, 3]; None when they all lie in one plane."""
+        """Return the hull of points [N, 3]; None when they all lie in one plane."""
         points = np.ascontiguousarray(points, dtype=np.float64)
         indices, faces, rank = _native.convex_hull(points)
         if rank < 3:
@@ -45,7 +45,7 @@ class Hull:
 
     @classmethod
     def around(cls, *hulls: Hull) -> Hull:
-        """Take the joint hull of several."""
+        """Return the joint hull of several hulls."""
         joint = cls.of(np.concatenate([hull.vertices for hull in hulls]))
         assert joint is not None, "the hull of solid hulls is solid"
         return joint

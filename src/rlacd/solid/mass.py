@@ -1,4 +1,4 @@
-"""What a solid of density one weighs and how its mass lies: volume, centre and inertia."""
+"""Mass properties of a solid of density one: volume, centre of mass and inertia."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Mass:
     inertia_abs: FloatArray
 
     def scaled(self, density: float) -> Mass:
-        """Get the same body at another density."""
+        """Return the same body at another density."""
         return Mass(self.volume_abs * density, self.centre_abs, self.inertia_abs * density)
 
 
@@ -47,7 +47,7 @@ def mass_of(solid: Solid) -> Mass:
 def mass_of_triangles(triangles: FloatArray, frame: Frame) -> Mass:
     """Integrate over closed, outward triangles ``[F, 3, 3]`` in the frame."""
     found = mass_properties(triangles)
-    with np.errstate(over="ignore", under="ignore"):  # at the ends of float64, volumes have none
+    with np.errstate(over="ignore", under="ignore"):  # at the ends of float64's range, volumes overflow or underflow
         unit = np.minimum(np.float64(1.0) / frame.scale, _GREATEST)
         return Mass(
             float(_times(found["volume"], unit, 3)),
@@ -57,7 +57,7 @@ def mass_of_triangles(triangles: FloatArray, frame: Frame) -> Mass:
 
 
 def _times(value: Any, unit: np.float64, power: int) -> FloatArray:
-    """Multiply step by step, up to the greatest number there is: a power of the unit itself may be infinite."""
+    """Multiply step by step, clipped to the largest float: a power of the unit itself may be infinite."""
     result = np.asarray(value, dtype=np.float64)
     for _ in range(power):
         result = np.clip(result * unit, -_GREATEST, _GREATEST)

@@ -1,7 +1,7 @@
 """Reuniting components that touch into one solid that can be cut again.
 
-Two sides of a slanted cut agree to some 1e-16 only, which a mesh boolean takes for a gap: it leaves hairline walls
-where the components touch. So the faces that touch are moved out by `OVERLAP` first, and the components overlap.
+Two sides of a slanted cut agree only to about 1e-16, which a mesh boolean takes for a gap: it leaves hairline walls
+where the components touch. So touching faces are first moved out by `OVERLAP`, which makes the components overlap.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ OVERLAP = 2e-9
 """How far touching faces are moved: above rounding (1e-16), below `TOUCHING`."""
 
 CRUMBS = 5 * OVERLAP
-"""Edges shorter than this are what overlapping has left; they go again, so that triangles do not pile up."""
+"""Edges shorter than this are remnants of the overlap; they are collapsed, so that triangles do not pile up."""
 
 FILM = 4 * OVERLAP
-"""The reunited solid's volume differs from that of its components by no more than a film of this thickness on them."""
+"""The reunited solid's volume may differ from that of its components by a film of this thickness over them."""
 
 GROWN, SOME = 1.3, 100
-"""More faces than this multiple of the components', and some, are crumbs that were not found: they would pile up."""
+"""More faces than this multiple of the components', plus a few, mean undetected crumbs, which would pile up."""
 
 FOLDED, OFF = 1e-3, 1e-6
 """Or by this share of it, where the components overlap themselves or each other, as those of a solid with folds do; no
-corner of them is farther outside than this."""
+corner of theirs may lie farther outside than this."""
 
 
 def reunite(components: Sequence[Component]) -> Component | None:
-    """Unite components with disjoint interiors into one; None when no clean solid comes of it.
+    """Unite components with disjoint interiors into one; None if the result is not a clean solid.
 
     Parameters
     ----------
@@ -62,12 +62,12 @@ def reunite(components: Sequence[Component]) -> Component | None:
         return None
     if len(whole.faces) > GROWN * sum(len(component.faces) for component in components) + SOME:
         return None
-    # Less volume may be a fold less, or a piece that a boolean has lost.
+    # Volume may be missing because a fold is gone, or because a boolean lost a piece.
     return whole if abs(whole.volume - volume) <= FILM * area or _holds(whole, components) else None
 
 
 def _joined_again(components: Sequence[Component]) -> list[Component]:
-    """Put what was cut from a component in its place, where all of it is there: no boolean is as quick or as clean."""
+    """Put back the component that pieces were cut from if all of them are present: no boolean is as fast or clean."""
     found = list(components)
     while True:
         siblings: dict[Component, list[Component]] = {}
@@ -114,7 +114,7 @@ def _overlapping(which: int, components: Sequence[Component]) -> Manifold:
             outward += _outward(component, other)
     if not outward.any():
         return component.manifold
-    # Not out of the box around all: parts that are reunited again and again would creep out of the input.
+    # Stay within the common box: parts that are reunited repeatedly would creep out of the input.
     boxes = np.array([other.box for other in components])
     moved = np.clip(component.vertices + OVERLAP * outward, boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0))
     return Manifold(Mesh64(moved, component.faces.astype(np.uint64)))

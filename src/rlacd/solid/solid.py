@@ -1,4 +1,4 @@
-"""A repaired input: the closed solid to be cut, and the surface everything is measured against."""
+"""A repaired input: the closed solid to be cut, and the surface that everything is measured against."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class BodyRepair:
     faces_in, faces_out
         Triangles before and after; a body joined to others counts its share before the union.
     deviation
-        Farthest distance, in frame units, from the repaired surface to the input's, or from a point of the input that
+        Greatest distance, in frame units, from the repaired surface to the input's, or from a point of the input that
         the repaired solid misses to that solid.
     """
 
@@ -50,7 +50,7 @@ class Solid:
     bodies
         What was done to each body.
     warnings
-        One sentence for everything the user should know.
+        One sentence for each thing the user should know.
     """
 
     manifold: manifold3d.Manifold
