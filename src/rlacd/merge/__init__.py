@@ -1,4 +1,4 @@
-"""After the cuts: merging parts, limits on vertices and faces, slivers."""
+"""Merging parts, limiting vertices and faces of hulls, and dropping slivers."""
 
 from rlacd.merge.in_input import in_input
 from rlacd.merge.limited import limit_part, limit_roughly, with_limits

@@ -1,4 +1,4 @@
-"""Which parts are near each other, by their bounding boxes: sorted along one axis, so that few pairs are looked at."""
+"""Pairs of parts with nearby bounding boxes, found by sorting the boxes along one axis."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rlacd.solid.arrays import BoolArray, FloatArray, IntArray
 from rlacd.solid.component import Part
 
 Places: TypeAlias = "NDArray[np.intp]"
-"""Places among the boxes [N]."""
+"""Indices into the boxes [N]."""
 
 AT_ONCE = 1 << 20
 """Pairs of boxes held in memory at a time."""
@@ -33,22 +33,22 @@ class Boxes:
         self._boxes = np.array([part.box for part in parts.values()]).reshape(-1, 2, 3)
 
     def add(self, new: int, part: Part, gone: Sequence[int]) -> None:
-        """Take parts away and put a new one in their place, under an id larger than all before."""
+        """Replace parts by a new one, whose id is larger than all before."""
         kept = ~np.isin(self.ids, gone)
         self.ids = np.append(self.ids[kept], new)
         self._boxes = np.concatenate([self._boxes[kept], part.box[None]])
 
     def without(self, ids: Sequence[int]) -> Boxes:
-        """Get the boxes but for some."""
+        """Get all boxes except those with the given ids."""
         other = Boxes.__new__(Boxes)
         kept = ~np.isin(self.ids, ids)
         other.ids, other._boxes = self.ids[kept], self._boxes[kept]
         return other
 
     def pairs(self, new: Sequence[int], reach: float, across: bool = False) -> IntArray:
-        """Pairs of ids [P, 2], ascending, of a new part with any other whose boxes lie within reach.
+        """Pairs of ids [P, 2], ascending, of a new part and any other part with boxes within reach of each other.
 
-        With `across`, also pairs both of which are within reach of a third.
+        With `across`, also pairs that are both within reach of a third part.
         """
         if not len(self.ids):
             return np.zeros((0, 2), dtype=np.int32)
@@ -64,7 +64,7 @@ class Boxes:
         return np.ascontiguousarray(self.ids[pairs], dtype=np.int32)
 
     def _across(self, rows: Places, reach: float) -> tuple[Places, Places]:
-        """Places near those of rows, and near what is near them."""
+        """Pairs of a row and a box that are both within reach of some common box."""
         count = len(self.ids)
         if not np.isfinite(reach):
             return np.repeat(rows, count), np.tile(np.arange(count), len(rows))
@@ -80,12 +80,12 @@ class Boxes:
         return row, other
 
     def _near(self, some: Places, others: Places, reach: float) -> tuple[Places, Places]:
-        """Pairs of places, one of some and one of others, whose boxes lie within reach."""
+        """Pairs of indices, one from `some` and one from `others`, whose boxes are within reach."""
         if len(some) == 1 or not np.isfinite(reach) or len(some) * len(others) <= AT_ONCE:
             row, column = np.nonzero(_within(self._boxes[some][:, None], self._boxes[others][None], reach))
             return some[row], others[column]
         low, high = self._boxes[others, 0], self._boxes[others, 1]
-        extents = (high - low).max(axis=0)  # no box that reaches up to a place begins farther before it than this
+        extents = (high - low).max(axis=0)  # a box that contains a coordinate starts at most this far before it
         axis = int(np.argmin((extents + reach) / np.maximum(np.ptp(low, axis=0), 1e-300)))
         order = np.argsort(low[:, axis], kind="stable")
         begins = low[order, axis]
@@ -110,7 +110,7 @@ def _matrix(rows: Places, columns: Places, count: int) -> csr_array:
 
 
 def _within(a: FloatArray, b: FloatArray, reach: float) -> BoolArray:
-    """Whether boxes [..., 2, 3] lie within reach of each other."""
+    """Whether boxes [..., 2, 3] are within reach of each other."""
     gap = np.maximum(np.maximum(a[..., 0, :] - b[..., 1, :], b[..., 0, :] - a[..., 1, :]), 0.0)
     near: BoolArray = np.sqrt(np.square(gap).sum(axis=-1)) <= reach
     return near

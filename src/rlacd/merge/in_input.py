@@ -1,4 +1,4 @@
-"""Hulls in the input's unit, where coordinates may tell less apart than in the frame."""
+"""Hulls in the input's unit, where coordinates may resolve less than in the frame."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _BOX_VERTICES, _BOX_FACES = 8, 12
 def in_input(
     hull: Hull, frame: Frame, max_vertices: int | None = None, max_faces: int | None = None
 ) -> trimesh.Trimesh:
-    """Carry a hull from the frame to the input's unit: rounded there first, so that it is exactly convex there.
+    """Carry a hull from the frame to the input's unit: vertices are rounded first, so the result is exactly convex.
 
     Parameters
     ----------
@@ -25,12 +25,12 @@ def in_input(
         In the frame, inside the limits.
     frame : Frame
     max_vertices, max_faces : int, optional
-        Hold for what stands in for hulls that are thinner than coordinates can resolve, too.
+        Limits for the replacement of a hull that is thinner than the coordinates can resolve.
 
     Returns
     -------
     trimesh.Trimesh
-        Convex, closed, with volume.
+        Convex and closed, with positive volume.
     """
     points = frame.to_input(hull.vertices)
     there = Hull.of(points)
@@ -40,7 +40,7 @@ def in_input(
 
 
 def plain_hull(points: FloatArray, max_vertices: int | None, max_faces: int | None) -> Hull:
-    """Take a box around points [N, 3], or a tetrahedron where a box has too many vertices or triangles."""
+    """Get a box around points [N, 3], or a tetrahedron if a box has too many vertices or triangles."""
     fits = (max_vertices or _BOX_VERTICES) >= _BOX_VERTICES and (max_faces or _BOX_FACES) >= _BOX_FACES
     hull = Hull.of(_box_around(points) if fits else _tetrahedron_around(points))
     assert hull is not None
@@ -48,9 +48,9 @@ def plain_hull(points: FloatArray, max_vertices: int | None, max_faces: int | No
 
 
 def _box_around(points: FloatArray) -> FloatArray:
-    """Corners [8, 3] of a box around the points, just as thick everywhere as their largest coordinate can resolve.
+    """Corners [8, 3] of a box around the points, padded on every side by the resolution of their largest coordinate.
 
-    One step of floating point along an axis may be nothing beside a large coordinate on another.
+    One floating-point step along an axis may vanish next to a large coordinate on another axis.
     """
     limits = np.finfo(np.float64)
     step = np.abs(points).max() * limits.eps + limits.smallest_subnormal
@@ -60,10 +60,10 @@ def _box_around(points: FloatArray) -> FloatArray:
 
 
 def _tetrahedron_around(points: FloatArray) -> FloatArray:
-    """Corners [4, 3] of a tetrahedron around that box: one corner of the box, and three on the edges from there."""
+    """Corners [4, 3] of a tetrahedron around that box: one of its corners and three on the extended edges."""
     box = _box_around(points)
     lower, upper = box[0], box[-1]
     to_lower = lower / 2 + upper / 2 > 0  # edges lead towards the origin, where coordinates do not overflow
     corner, edge = np.where(to_lower, upper, lower), np.where(to_lower, lower - upper, upper - lower)
-    # 1/4 + 1/4 + 1/4 < 1: the far corner of the box stays inside, whatever is rounded.
+    # 1/4 + 1/4 + 1/4 < 1: the far corner of the box stays inside in spite of rounding.
     return np.concatenate([corner[None], corner + np.diag(4 * edge)])

@@ -1,4 +1,4 @@
-"""Hulls with few vertices and faces: the limit as part of the criterion, and its last application."""
+"""Limits on vertices and faces of hulls: as part of the criterion, and applied to the final hulls."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from rlacd.solid.component import Part
 from rlacd.solid.hull import Hull
 
 FEWEST_VERTICES, FEWEST_FACES = 24, 44
-"""Lower limits are applied at the end only, with a warning where a hull then exceeds the threshold: round parts would
-have to be cut very small to meet them (a ball into 75 pieces for 16 vertices at threshold 0.05, into 12 for 32)."""
+"""Lower limits are applied only at the end, with a warning if a hull then exceeds the threshold: to meet them, round
+parts would have to be cut very small (a ball into 75 pieces for 16 vertices at threshold 0.05, into 12 for 32)."""
 
 
 @dataclass(frozen=True)
 class LimitedCriterion:
-    """A criterion that has to hold for the limited hull too.
+    """A criterion that must hold for the limited hull too.
 
     Attributes
     ----------
@@ -38,12 +38,12 @@ class LimitedCriterion:
 
     @property
     def reach(self) -> float:
-        """The underlying criterion's."""
+        """That of the underlying criterion."""
         return self.criterion.reach
 
     @property
     def is_hereditary(self) -> bool:
-        """No: limited hulls need not lie in each other where the exact ones do."""
+        """No: limited hulls need not be nested even if the exact ones are."""
         return False
 
     def excludes(self, volume: float, hull_volume: float) -> bool:
@@ -77,7 +77,7 @@ class LimitedCriterion:
         return self.criterion.error(self._limited(part))
 
     def filled(self, part: PartLike) -> float:
-        """The underlying criterion's."""
+        """That of the underlying criterion."""
         return self.criterion.filled(part)
 
     def settled(self, parts: Sequence[PartLike]) -> LimitedCriterion:
@@ -88,16 +88,16 @@ class LimitedCriterion:
 
     @property
     def overhang(self) -> float:
-        """The underlying criterion's."""
+        """That of the underlying criterion."""
         return self.criterion.overhang
 
     @property
     def obstacles(self) -> Balls | None:
-        """The underlying criterion's."""
+        """Those of the underlying criterion."""
         return self.criterion.obstacles
 
     def summary(self, errors: Sequence[float] | None) -> CriterionSummary:
-        """The underlying criterion's."""
+        """That of the underlying criterion."""
         return self.criterion.summary(errors)
 
     def scaled(self, factor: float) -> LimitedCriterion:
@@ -117,7 +117,7 @@ class LimitedCriterion:
 
 
 def with_limits(criterion: Criterion, max_vertices: int | None, max_faces: int | None) -> Criterion:
-    """Add limits to a criterion where there are any that cutting can meet."""
+    """Add limits to a criterion, if there are any and none is too low for cutting to meet."""
     if max_vertices is None and max_faces is None:
         return criterion
     if (max_vertices or FEWEST_VERTICES) < FEWEST_VERTICES or (max_faces or FEWEST_FACES) < FEWEST_FACES:
@@ -126,7 +126,7 @@ def with_limits(criterion: Criterion, max_vertices: int | None, max_faces: int |
 
 
 def limit_roughly(part: Part, max_vertices: int | None, max_faces: int | None) -> Part:
-    """Get the part with a hull inside the limits at no cost: where its own is not, a box or a tetrahedron around it."""
+    """Get the part with a hull inside the limits, cheaply: if its hull exceeds them, a box or tetrahedron around it."""
     vertices, faces = len(part.hull.vertices), len(part.hull.faces)
     if vertices <= (max_vertices or vertices) and faces <= (max_faces or faces):
         return part
@@ -134,6 +134,6 @@ def limit_roughly(part: Part, max_vertices: int | None, max_faces: int | None) -
 
 
 def limit_part(part: Part, max_vertices: int | None, max_faces: int | None) -> Part:
-    """Get the part with a hull inside the limits, and without corners it hardly needs; the same part if it has that."""
+    """Get the part with a hull inside the limits and without nearly redundant corners; the same part if unchanged."""
     hull = limit_hull(part.hull, max_vertices, max_faces)
     return part if hull is part.hull else part.with_hull(hull)

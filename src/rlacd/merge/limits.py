@@ -1,4 +1,4 @@
-"""Hulls with few corners: physics engines limit them, and every corner costs time in every contact."""
+"""Simplifying hulls: physics engines limit the number of vertices, and each vertex costs time in every contact."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from rlacd.errors import OptionError
 from rlacd.solid.hull import Hull
 
 TOLERANCE = 1e-6
-"""Corners that change the hull by no more than this (normalised frame) go in any case."""
+"""Corners that change the hull by no more than this (in the frame) are always removed."""
 
 _NO_LIMIT = 2**31 - 1
 
@@ -15,24 +15,24 @@ _NO_LIMIT = 2**31 - 1
 def limit_hull(
     hull: Hull, max_vertices: int | None = None, max_faces: int | None = None, tolerance: float = TOLERANCE
 ) -> Hull:
-    """Return a hull around the hull with at most so many corners and triangles, and with little added volume.
+    """Enclose a hull in one with at most the given numbers of corners and triangles, adding little volume.
 
     Parameters
     ----------
     hull : Hull
-        Convex, closed, outward oriented.
-    max_vertices
-        At least 4; None is no limit.
-    max_faces
-        Triangles, at least 4; None is no limit. A triangulated hull of V corners has 2 V - 4 triangles.
-    tolerance
-        No point of the result is farther than this from the hull because of the clean-up alone, which takes away
-        corners and facets that the hull hardly needs.
+        Convex, closed, oriented outwards.
+    max_vertices : int, optional
+        At least 4; None means no limit.
+    max_faces : int, optional
+        Limit on triangles, at least 4; None means no limit. A triangulated hull of V corners has 2 V - 4 triangles.
+    tolerance : float
+        Removing nearly redundant corners and facets, which is always done, moves no point of the result farther than
+        this from the hull.
 
     Returns
     -------
     Hull
-        Convex; holds the given hull (to rounding, about 1e-12). The given hull itself where nothing had to change.
+        Convex; contains the given hull (up to rounding, about 1e-12). The given hull itself if nothing changed.
 
     Raises
     ------
@@ -41,9 +41,9 @@ def limit_hull(
 
     Notes
     -----
-    Edge collapses outwards (progressive hulls: Sander et al., "Silhouette Clipping", SIGGRAPH 2000), each the solution
-    of a linear program, cheapest first; then the remaining corners move, one at a time, to where the volume is least
-    while the hull stays convex and around the given one.
+    Edges are collapsed outwards, cheapest first, each by solving a linear program (progressive hulls: Sander et al.,
+    "Silhouette Clipping", SIGGRAPH 2000). Then the remaining corners are moved one at a time to minimise the volume
+    while the hull stays convex and contains the given one.
     """
     for name, limit in (("max_vertices", max_vertices), ("max_faces", max_faces)):
         if limit is not None and limit < 4:

@@ -1,4 +1,4 @@
-"""Merging: pairs of parts whose joint hull still meets the criterion become one part, cheapest pair first."""
+"""Merging: pairs of parts whose union still meets the criterion become one part, cheapest pair first."""
 
 from __future__ import annotations
 
@@ -21,15 +21,16 @@ from rlacd.work import Work
 from rlacd.workers import Workers
 
 FEW = 100
-"""Among so many parts every pair may be united across what lies between; among more, those that a third is near to."""
+"""Up to this many parts, any pair may be united across other parts; with more, only pairs near each other or near a
+common third part."""
 
 
 AT_ONCE = 512
-"""The clock is asked before so many pairs are held against the solid, or parts against all others."""
+"""Number of pairs tested against the solid between two checks of the clock."""
 
 
 class _Pair(NamedTuple):
-    cost: float  # volume of the joint hull - what the criterion counts as filled by each
+    cost: float  # volume of the joint hull minus what the criterion counts as filled for each part
     first: int
     second: int
 
@@ -44,24 +45,29 @@ def merge_parts(
 ) -> list[Part]:
     """Unite pairs of parts, the cheapest first, as long as the union meets the criterion.
 
-    The test looks at the glued union: its own surface against its own hull, both ways. When no pair is left that meets
-    it so, parts are united across what lies between them, where the solid is given: there the test looks at all that
-    the solid fills of the joint hull (`ClippedPart`). Pairs are tested a batch at a time on all workers, and taken in
-    the order of their cost whatever the number of workers.
+    First the criterion judges the glued union of each pair. When no more pairs can be united this way and `solid` is
+    given, parts are united across what lies between them: there it judges the solid clipped to the joint hull
+    (`ClippedPart`). Pairs are tested in batches on all workers and united in order of their cost, whatever the number
+    of workers.
 
     Parameters
     ----------
     parts : sequence of Part
-        Solids with disjoint interiors.
+        Parts with disjoint interiors.
+    criterion : Criterion
+        Every union meets it.
+    workers : Workers
+    clock : Clock
+        When it stops, the parts reached so far are returned.
     beside : sequence of Part
-        More of them, of which no two are to be united with each other: that has been tried before.
+        More parts. No two of them are united with each other: that has been tried before.
     solid : Component, optional
-        What all of them are parts of.
+        The solid that was decomposed.
 
     Returns
     -------
     list of Part
-        Parts that could not be united further, in the order of their first piece, those beside last.
+        Parts that could not be united further, in the order of their first piece, those from `beside` last.
     """
     pairs = _Adjoining(criterion, workers, clock)
     alive = _unite_pairs([*parts, *beside], len(parts), pairs, workers, clock)
@@ -74,28 +80,28 @@ def merge_parts(
 
 
 class _Pairing(Protocol):
-    """Which pairs of parts may become one, and how that is found out."""
+    """A way to find pairs of parts that may be united, and to unite them."""
 
     def pairs(
         self, alive: Mapping[int, Part], boxes: Boxes, new: Sequence[int]
     ) -> tuple[list[_Pair], list[tuple[int, int]]]:
-        """Pairs of a new part with any other in the boxes that may be united, and their costs; and those never to be.
+        """Pairs of a new part and another in the boxes that may be united, with costs; and pairs that never can be.
 
-        Fewer where the clock has no work left for more.
+        Incomplete if the clock's work runs out.
         """
 
     def price(self, first: Part, second: Part) -> float:
         """The work of uniting two parts."""
 
     def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
-        """Their union if it meets the criterion; otherwise None, and whether no larger union will either."""
+        """The union if it meets the criterion; otherwise None, and whether no larger union can meet it either."""
 
 
 def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, workers: Workers, clock: Clock) -> list[Part]:
-    """Unite pairs, of which one at least is among the first `new` parts or made of them."""
+    """Unite pairs of which at least one is among the first `new` parts or made from them."""
     alive: dict[int, Part] = dict(enumerate(parts))
     origin = {i: i for i in alive}
-    refused: dict[int, set[int]] = {i: set() for i in alive}  # whom a part, or a piece of it, can never be united with
+    refused: dict[int, set[int]] = {i: set() for i in alive}  # parts that a part can never be united with
 
     def refuse(first: int, second: int) -> None:
         refused[first].add(second)
@@ -107,7 +113,7 @@ def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, workers: Wo
         heapq.heapify(queue)
         for first, second in never:
             refuse(first, second)
-        verdicts: dict[_Pair, tuple[Part | None, bool]] = {}  # on pairs that are back in the queue
+        verdicts: dict[_Pair, tuple[Part | None, bool]] = {}  # for pairs put back into the queue
         count = newest = len(alive)
         while queue and clock.step(count - len(alive), None, len(alive)):
             batch = _cheapest(queue, alive, 2 * workers.threads)
@@ -117,7 +123,7 @@ def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, workers: Wo
             )
             for taken, pair in enumerate(batch, start=1):
                 union, for_good = verdicts.pop(pair)
-                # Paid for in the order of the pairs: how many are tested side by side must not matter.
+                # Pay in the order of the pairs: the batch size, which depends on the threads, must not matter.
                 if not clock.work.pay(pairing.price(alive[pair.first], alive[pair.second])):
                     break
                 if union is None:
@@ -138,13 +144,13 @@ def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, workers: Wo
                     heapq.heappush(queue, other)
                 newest += 1
                 break
-    except Stopped:  # between two unions
+    except Stopped:  # raised between two unions
         clock.note_stop()
     return [alive[i] for i in sorted(alive, key=origin.__getitem__)]
 
 
 def _cheapest(queue: list[_Pair], alive: dict[int, Part], most: int) -> list[_Pair]:
-    """Take the cheapest pairs of parts that are still there off the queue."""
+    """Pop the cheapest pairs whose parts both still exist."""
     batch: list[_Pair] = []
     while queue and len(batch) < most:
         pair = heapq.heappop(queue)
@@ -155,7 +161,7 @@ def _cheapest(queue: list[_Pair], alive: dict[int, Part], most: int) -> list[_Pa
 
 @dataclass(frozen=True)
 class _Adjoining:
-    """Pairs within the criterion's reach, judged by themselves."""
+    """Pairs within the criterion's reach, judged by their glued union."""
 
     criterion: Criterion
     workers: Workers
@@ -164,7 +170,7 @@ class _Adjoining:
     def pairs(
         self, alive: Mapping[int, Part], boxes: Boxes, new: Sequence[int]
     ) -> tuple[list[_Pair], list[tuple[int, int]]]:
-        """Those that the volume bound allows."""
+        """Pairs that the volume bound allows."""
         filled = self.criterion.filled
         pairs = boxes.pairs(new, self.criterion.reach)
         if not self.clock.work.pay(_sum_over(alive, pairs, work.joining)):
@@ -177,18 +183,18 @@ class _Adjoining:
         return found, []
 
     def price(self, first: Part, second: Part) -> float:
-        """Gluing and judging."""
+        """The work of gluing and judging."""
         return price_of_gluing(first, second)
 
     def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
-        """Glue them."""
+        """Glue the two parts."""
         union = Part.glued(first, second)
         return (union, False) if self.criterion.is_met(union) else (None, self.criterion.is_hereditary)
 
 
 @dataclass(frozen=True)
 class _Bridged:
-    """All pairs (of many parts, those near each other or a third), judged by the solid's share of the joint hull."""
+    """All pairs (see `FEW`), judged by the solid clipped to their joint hull."""
 
     criterion: Criterion
     workers: Workers
@@ -198,7 +204,7 @@ class _Bridged:
     def pairs(
         self, alive: Mapping[int, Part], boxes: Boxes, new: Sequence[int]
     ) -> tuple[list[_Pair], list[tuple[int, int]]]:
-        """Those with a chance: how much the solid fills is not known yet."""
+        """Pairs that may be feasible: how much of the joint hull the solid fills is not known yet."""
         filled = self.criterion.filled
         reach = np.inf if len(boxes.ids) <= FEW else self.criterion.reach
         pairs = boxes.pairs(new, reach, across=True)
@@ -222,11 +228,11 @@ class _Bridged:
         return found, never
 
     def price(self, first: Part, second: Part) -> float:
-        """A boolean and judging."""
+        """The work of clipping the solid and judging."""
         return price_of_share(first, second, self.solid)
 
     def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
-        """Take the solid's share of the joint hull."""
+        """Clip the solid to the joint hull."""
         return _clipped(first, second, Hull.around(first.hull, second.hull), self.criterion, self.solid), False
 
 
@@ -238,9 +244,9 @@ def unite(
     hull: Hull | None = None,
     account: Work | None = None,
 ) -> Part | None:
-    """Unite two parts of a solid, as they are or across what lies between them; None where neither is allowed.
+    """Unite two parts of a solid, glued or across what lies between them; None if neither meets the criterion.
 
-    Their joint hull may be given where it is known. None, too, where the account has no work left for it.
+    `hull` is their joint hull, if already known. Also None if the account has too little work left.
     """
     hull = hull or Hull.around(first.hull, second.hull)
     account = account or Work()
@@ -249,7 +255,7 @@ def unite(
     feasibility = criterion.feasibility(solid.filling, hull)
     if feasibility is Feasibility.NO:
         return None
-    if is_alone(first) and is_alone(second):  # otherwise they may overlap each other
+    if is_alone(first) and is_alone(second):  # otherwise they may overlap
         if not account.pay(price_of_gluing(first, second)):
             return None
         union = Part.glued(first, second, hull)
@@ -267,13 +273,13 @@ def price_of_gluing(first: Part, second: Part) -> float:
 
 
 def price_of_share(first: Part, second: Part, solid: Component) -> float:
-    """The work of taking what the solid fills of the joint hull of two parts, and judging it."""
+    """The work of clipping the solid to the joint hull of two parts, and judging the result."""
     faces, hull_faces = first.size + second.size, len(first.hull.faces) + len(second.hull.faces)
     return work.filling(solid.size, faces, hull_faces) + work.judging(faces, hull_faces)
 
 
 def is_alone(part: Part) -> bool:
-    """Tell whether a part is made of its members only, and of nothing that other parts have too."""
+    """Whether a part consists only of its members and shares nothing with other parts."""
     return part.volume <= (1 + LOST) * sum(member.volume for member in part.members)
 
 
@@ -286,7 +292,7 @@ def _clipped(first: Part, second: Part, hull: Hull, criterion: Criterion, solid:
 def neighbours(
     alive: Mapping[int, Part], new: Sequence[int], reach: float, workers: Workers
 ) -> list[tuple[int, int, float, float]]:
-    """Pairs of a new part with any other whose boxes lie within reach: (first, second, volume, joint hull's volume)."""
+    """Pairs of a new part and any other with boxes within reach: (first, second, volume, joint hull's volume)."""
     return joint_volumes(alive, Boxes(alive).pairs(new, reach), workers)
 
 
@@ -302,13 +308,13 @@ def joint_volumes(alive: Mapping[int, Part], pairs: IntArray, workers: Workers) 
 
 
 def _places(pairs: IntArray) -> tuple[list[int], IntArray]:
-    """The ids that pairs [P, 2] are made of, and the pairs as places among them."""
+    """The distinct ids in pairs [P, 2], and the pairs as indices into them."""
     used, places = np.unique(pairs, return_inverse=True)
     return used.tolist(), np.ascontiguousarray(places.reshape(-1, 2), dtype=np.int32)
 
 
 def _sum_over(alive: Mapping[int, Part], pairs: IntArray, price: Callable[[int], float]) -> float:
-    """The price of the vertices of each pair of hulls, added up."""
+    """Total price of pairs [P, 2], each priced by the number of vertices of its two hulls."""
     corners = {i: len(alive[i].hull.vertices) for i in np.unique(pairs).tolist()}
     return sum(price(corners[i] + corners[j]) for i, j in pairs.tolist())
 
@@ -321,15 +327,23 @@ def merge_to_count(
     clock: Clock,
     worst: float = np.inf,
 ) -> list[Part] | None:
-    """Unite parts, the pair with the least error of its union first, until no more than `count` are left.
+    """Unite parts, always the pair whose union has the least error, until at most `count` are left.
 
     Errors are measured only for pairs whose lower bound could make them the best (lazy best-first search), first among
     neighbours, then among all parts.
 
     Parameters
     ----------
+    parts : sequence of Part
+    count : int
+        At least 1.
+    criterion : Criterion
+        Measures the errors; unions need not meet it.
+    workers : Workers
+    clock : Clock
+        When it stops, the parts reached so far are returned, which may be more than `count`.
     worst : float
-        Give up (None) as soon as a union is needed whose error is not below this.
+        Give up and return None as soon as a union would have an error of at least this.
 
     Raises
     ------
@@ -368,7 +382,7 @@ def merge_to_count(
 
 @dataclass(order=True, frozen=True)
 class _BoundedPair:
-    error: float  # of the union: a lower bound, or the measured value
+    error: float  # of the union: a lower bound, or the value if `measured`
     first: int
     second: int
     measured: bool
@@ -386,7 +400,7 @@ def _bounded_pairs(
 
 
 def _pop_least(queue: list[_BoundedPair], alive: dict[int, Part], criterion: Criterion) -> _BoundedPair | None:
-    """Take the pair whose union has the least error off the queue; None when there is no pair left."""
+    """Pop the pair whose union has the least error; None if no pair is left."""
     while queue:
         pair = heapq.heappop(queue)
         if pair.first not in alive or pair.second not in alive:

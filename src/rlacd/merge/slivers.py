@@ -1,4 +1,4 @@
-"""Slivers: thin hulls that a cut shaved off and that nobody misses."""
+"""Slivers: thin hulls shaved off by cuts, dropped if the other hulls stand in for them."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from rlacd.solid.hull import Hull
 from rlacd.workers import Workers
 
 THIN = 0.01
-"""A hull is a sliver when its inscribed ball's radius is below this share of its largest extent."""
+"""A hull is a sliver if the radius of its inscribed ball is below this share of its largest extent."""
 
 FILM = 2e-4
-"""Mean thickness below which a part is a film: sheets are made ten times thicker, so that rounding left it over."""
+"""Mean thickness below which a part is a film left by rounding: repair makes real sheets ten times thicker."""
 
 MISSED = 2e-3
-"""A sliver is dropped when no point of it lies farther than this from the other hulls (0.1 % of the longest side)."""
+"""A sliver is dropped if none of its points is farther than this from the other hulls (0.1 % of the longest side)."""
 
 
 def drop_slivers(parts: Sequence[Part], workers: Workers, suspects: Sequence[Part] | None = None) -> list[Part]:
-    """Drop slivers and films that the other hulls stand for; slivers of parts that are thin themselves stay.
+    """Drop slivers and films that the other hulls stand in for; all others stay, such as those of thin solids.
 
     Parameters
     ----------
     parts : sequence of Part
         Parts with disjoint interiors.
     suspects : sequence of Part, optional
-        Those of the parts that may be dropped; all of them by default.
+        The parts that may be dropped; all by default.
 
     Returns
     -------
     list of Part
-        The rest, in the same order; every point of what was dropped lies within `MISSED` of the rest.
+        The remaining parts in the same order.
     """
     kept = list(parts)
     suspects = kept if suspects is None else suspects
@@ -54,12 +54,12 @@ def drop_slivers(parts: Sequence[Part], workers: Workers, suspects: Sequence[Par
 
 
 def is_film(part: Part) -> bool:
-    """Tell whether the part's mean thickness, twice its volume over its area, is below `FILM`."""
+    """Whether the part's mean thickness, twice its volume over its area, is below `FILM`."""
     return 2 * part.volume < FILM * _native.mesh_area(part.vertices, part.faces)
 
 
 def is_sliver(hull: Hull) -> bool:
-    """Tell whether the hull's inscribed ball is smaller than `THIN` times its largest extent."""
+    """Whether the radius of the hull's inscribed ball is less than `THIN` times its largest extent."""
     extent = float(np.ptp(hull.vertices, axis=0).max())
     # A convex body's inradius lies between volume / area and three times that.
     ratio = hull.volume / _native.mesh_area(hull.vertices, hull.faces)
