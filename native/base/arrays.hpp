@@ -1,4 +1,4 @@
-// Between numpy arrays and the kernels' own types.
+// Conversion between numpy arrays and the kernels' own types.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -42,7 +42,7 @@ inline Mesh to_mesh(const PointsIn& vertices, const FacesIn& faces) {
   return mesh;
 }
 
-// Beyond this, squares of distances overflow: no triangle would be the nearest.
+// Beyond this, squared distances overflow, and no triangle would be found nearest.
 constexpr double kFarthest = 1e150;
 
 inline void require_finite(const std::vector<Vec3>& points) {
@@ -54,14 +54,14 @@ inline void require_finite(const std::vector<Vec3>& points) {
     }
 }
 
-// As to_mesh, for kernels that compare distances: a NaN would compare false with everything and go unnoticed.
+// Like to_mesh, for kernels that compare distances: every comparison with a NaN is false, so it would go unnoticed.
 inline Mesh to_finite_mesh(const PointsIn& vertices, const FacesIn& faces) {
   Mesh mesh = to_mesh(vertices, faces);
   require_finite(mesh.vertices);
   return mesh;
 }
 
-// Hands a vector of rows to numpy without a copy; the array owns it from then on.
+// Hands a vector of rows to numpy without copying; the array then owns the data.
 template <class Scalar, class Row>
 nb::ndarray<nb::numpy, Scalar> to_array(std::vector<Row>&& rows) {
   constexpr std::size_t columns = sizeof(Row) / sizeof(Scalar);

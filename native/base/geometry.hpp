@@ -1,4 +1,4 @@
-// Points, triangles and boxes: the small vocabulary every kernel shares.
+// Points, triangles and boxes: the basic types that every kernel shares.
 #pragma once
 
 #include <algorithm>
@@ -50,7 +50,7 @@ struct Box {
     upper = {std::max(upper.x, p.x), std::max(upper.y, p.y), std::max(upper.z, p.z)};
   }
   bool is_empty() const { return !(lower.x <= upper.x); }
-  void extend(const Box& other) {  // not empty
+  void extend(const Box& other) {  // must not be empty
     extend(other.lower);
     extend(other.upper);
   }

@@ -1,4 +1,4 @@
-// Invariants that sanitizer and debug builds check. In a release build they cost nothing: the condition is compiled but
+// Invariants that sanitizer and debug builds check. They cost nothing in a release build: the condition is compiled but
 // never evaluated.
 #pragma once
 

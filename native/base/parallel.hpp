@@ -20,8 +20,8 @@ inline int resolve_threads(int threads) {
   return threads > 0 ? threads : std::max(1u, std::thread::hardware_concurrency());
 }
 
-// Calls task(i) once for every i in [0, count). Items are handed out in order; each must write only to its own slot,
-// which is what makes the result the same for every thread count. The first exception is rethrown here. What stops this
+// Calls task(i) once for every i in [0, count). Items are handed out in order. Each must write only to its own slot, so
+// that the result does not depend on the number of threads. The first exception is rethrown here. What stops this
 // thread stops all of them.
 template <class Task>
 void parallel_for(std::size_t count, int threads, const Task& task) {
@@ -70,10 +70,10 @@ void parallel_for(std::size_t count, int threads, const Task& task) {
       ++running;
     }
   } catch (const std::system_error&) {
-    // The system gives no more threads: those there are do all the work.
+    // The system grants no more threads: those already started do all the work.
   }
   work();
-  while (stop != nullptr) {  // only this thread can look whether it has to stop
+  while (stop != nullptr) {  // only this thread can check whether it must stop
     {
       std::unique_lock<std::mutex> lock(running_guard);
       if (finished.wait_for(lock, std::chrono::milliseconds(50), [&] { return running == 0; })) break;

@@ -23,7 +23,7 @@ std::uint64_t hash_of(Vec3 p) {
   return hash;
 }
 
-// For each point the first one in the same place, by a table with open addressing.
+// For each point, the first point at the same place, by hashing with open addressing.
 std::vector<std::int32_t> first_in_place(const std::vector<Vec3>& points) {
   std::size_t size = 16;
   while (size < 2 * points.size()) size *= 2;

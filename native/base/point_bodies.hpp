@@ -1,4 +1,4 @@
-// Which corners of a mesh hang together by faces, whatever its quality: those in one place do, too.
+// Connected components of a mesh of any quality: faces connect their corners, and equal corners are one.
 #pragma once
 
 #include <vector>
@@ -7,7 +7,7 @@
 
 namespace rlacd {
 
-// The body of each vertex, -1 for those of no face; bodies are numbered by their first faces.
+// The body of each vertex, -1 for vertices that no face uses; bodies are numbered by their first faces.
 std::vector<std::int32_t> point_bodies(const Mesh& mesh);
 
 }  // namespace rlacd

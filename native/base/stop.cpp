@@ -11,7 +11,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kBetweenLooks(100);
-constexpr double kForEver = 1e8;  // seconds; what is more overflows
+constexpr double kForEver = 1e8;  // seconds; a longer time would overflow
 
 }  // namespace
 
@@ -24,7 +24,7 @@ void Stop::begin(std::function<void()> look) {
   try {
     watcher_ = std::thread([this] { watch(); });
   } catch (const std::system_error&) {
-    attention_ |= kUnwatched;  // the system gives no more threads: polls read the clock
+    attention_ |= kUnwatched;  // the system grants no more threads: polls read the clock instead
   }
 }
 

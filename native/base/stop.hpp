@@ -1,8 +1,8 @@
-// Work that can be stopped from outside: by a deadline, by a caller who has lost interest, by Ctrl-C.
+// Work that can be stopped from outside: by a deadline, by a cancelling caller, by Ctrl-C.
 //
-// Whoever starts the work installs a Stop in each of its threads (ThisStop). Kernels call poll_stop() in every loop
-// that may run for more than some hundredths of a second; it throws Stopped once the Stop is tripped. Polling reads one
-// atomic, does nothing where no Stop is installed, and never changes a result that is reached.
+// The owner of the work installs a Stop in each of its threads (ThisStop). Kernels call poll_stop() in every loop that
+// may run for more than some hundredths of a second; it throws Stopped once the Stop is tripped. A poll reads one
+// atomic, does nothing if no Stop is installed, and never changes the result of work that completes.
 #pragma once
 
 #include <atomic>
@@ -24,20 +24,20 @@ class Stop {
  public:
   ~Stop() { end(); }
 
-  // Starts to watch the deadline, and asks `look` (which may throw) some ten times a second in the thread that calls
-  // this, as long as that thread polls.
+  // Starts to watch the deadline. Also calls `look` (which may throw) about ten times a second in the calling thread,
+  // as long as that thread polls.
   void begin(std::function<void()> look);
   void end();
 
-  // From now on, the work has so many seconds; infinity lifts the deadline. A Stop that was tripped no longer is.
+  // Sets the time left from now on; infinity lifts the deadline. Clears the tripped state.
   void arm(double seconds);
   void trip() { attention_ |= kTripped; }
-  // Trips at this poll from now on: for tests that need no time.
+  // Trips at this poll, counted from now: for tests that must not depend on time.
   void trip_after(std::int64_t polls);
-  // While it is shielded, what must be done is done: polls do not throw.
+  // While shielded, polls do not throw: for work that must be completed.
   void shield(bool on) { shielded_ = on; }
 
-  // Until the deadline; infinite where there is none, or nothing is stopped for now.
+  // Time until the deadline; infinite if there is none, or if the Stop is shielded.
   double seconds_left() const;
   bool is_tripped() const { return (attention_ & kTripped) != 0; }
   void poll() {
@@ -52,12 +52,12 @@ class Stop {
   void watch();
   bool is_late() const { return std::chrono::steady_clock::now() >= deadline_.load(); }
 
-  std::atomic<std::uint32_t> attention_{0};  // why a poll has to do more than nothing
+  std::atomic<std::uint32_t> attention_{0};  // why a poll has more to do than return
   std::atomic<bool> shielded_{false};
   std::atomic<std::int64_t> polls_left_{0};
   std::atomic<Time> deadline_{Time::max()};
   std::function<void()> look_;
-  bool is_looking_ = false;  // in the thread that looks; what it calls may poll
+  bool is_looking_ = false;  // within `look`, whose callees may poll
   std::thread::id looks_;
   std::thread watcher_;
   std::mutex guard_;
@@ -65,10 +65,10 @@ class Stop {
   bool is_over_ = false;
 };
 
-// The Stop of this thread, if there is one.
+// The Stop of this thread, or null.
 inline thread_local Stop* this_stop = nullptr;
 
-// Installs a Stop in this thread while it is alive.
+// Installs a Stop in this thread for the lifetime of this object.
 class ThisStop {
  public:
   explicit ThisStop(Stop* stop) : before_(this_stop) { this_stop = stop; }

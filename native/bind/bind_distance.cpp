@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::size_t kChunk = 256;
 
-// task(i) for every point, without the GIL, in chunks large enough to be worth a thread.
+// Runs task(i) for every point without the GIL, in chunks large enough to justify a thread.
 template <class Task>
 void for_each_point(std::size_t count, int threads, const Task& task) {
   const std::size_t chunks = (count + kChunk - 1) / kChunk;

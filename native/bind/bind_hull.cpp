@@ -13,7 +13,7 @@ namespace rlacd {
 
 namespace {
 
-constexpr std::size_t kPairsAThread = 8;  // starting a thread takes as long as some joint hulls of small parts
+constexpr std::size_t kPairsAThread = 8;  // starting a thread takes as long as a few joint hulls of small parts
 
 }  // namespace
 
@@ -22,7 +22,7 @@ void bind_hull(nb::module_& m) {
       "convex_hull",
       [](const PointsIn& array) {
         const std::vector<Vec3> points = to_points(array);
-        for (const Vec3& p : points)  // no predicate decides about infinity
+        for (const Vec3& p : points)  // the predicates are undefined for infinity and NaN
           if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
             throw std::invalid_argument("points must be finite");
         Hull hull;

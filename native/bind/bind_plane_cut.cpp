@@ -1,4 +1,4 @@
-// Python bindings of cutting by a plane, and of what hangs together.
+// Python bindings of plane cuts and of connected components.
 #include "base/arrays.hpp"
 #include "base/point_bodies.hpp"
 #include "cut/bodies.hpp"

@@ -1,4 +1,4 @@
-// Python bindings of what stops the work.
+// Python bindings of Stop.
 #include <nanobind/nanobind.h>
 
 #include <limits>

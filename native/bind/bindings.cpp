@@ -1,4 +1,4 @@
-// The Python module: one bind function a kernel, each defined beside its kernel's bindings.
+// The Python module: one bind function per kernel, each defined in the kernel's own bind file.
 #include <nanobind/nanobind.h>
 
 namespace rlacd {
@@ -19,7 +19,7 @@ NB_MODULE(_native, m) {
   m.doc() =
       "C++ kernels of rlacd. Arrays are float64 points [N, 3] and int32 faces [F, 3]; the GIL is released inside.";
 #ifdef NDEBUG
-  // A thread that is still at work when Python ends holds objects: that is no leak, and nothing to tell a user.
+  // A thread still at work when Python exits holds objects: that is not a leak, and nothing to warn a user about.
   nanobind::set_leak_warnings(false);
 #endif
   rlacd::bind_concave_edges(m);

@@ -1,4 +1,4 @@
-// Pieces of a mesh that edges connect: see bodies.hpp for input, output and algorithm.
+// Edge-connected pieces of a mesh: see bodies.hpp for input, output and algorithm.
 #include "cut/bodies.hpp"
 
 #include <algorithm>
@@ -11,11 +11,11 @@ namespace {
 
 struct Halfedge {
   std::int32_t high, apex, face;  // the larger of its vertices, and the third corner of its face
-  bool ascends;                   // runs to it
+  bool ascends;                   // runs towards `high`
 };
 
 // Sorts the halfedges between two vertices by angle, such that the solid lies between an ascending one and the one
-// before it. False where they do not take turns.
+// before it. False if ascending and descending halfedges do not alternate.
 bool sort_around(const Mesh& mesh, std::int32_t low, std::vector<Halfedge>::iterator begin,
                  std::vector<Halfedge>::iterator end) {
   const Vec3 origin = mesh.vertices[low], along = normalized(mesh.vertices[begin->high] - origin);
@@ -43,7 +43,7 @@ std::vector<Mesh> bodies(const Mesh& mesh) {
     const std::int32_t a = root(f), b = root(g);
     parent[std::max(a, b)] = std::min(a, b);
   };
-  std::vector<std::size_t> first(mesh.vertices.size() + 1, 0);  // halfedges by the smaller of their vertices
+  std::vector<std::size_t> first(mesh.vertices.size() + 1, 0);  // halfedges, bucketed by the smaller of their vertices
   for (const Triangle& f : mesh.faces)
     for (int e = 0; e < 3; ++e) ++first[std::min(f[e], f[(e + 1) % 3]) + 1];
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) first[v + 1] += first[v];

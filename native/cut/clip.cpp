@@ -55,7 +55,7 @@ RLACD_WIDE bool Clipper::is_separated(const Polygon& polygon, const HalfSpaces& 
 }
 
 // The parts of a polygon inside and outside a half-space. A polygon that only touches the plane stays whole: outside,
-// or inside when it lies in the plane.
+// or inside if it lies in the plane.
 void Clipper::split(const Polygon& polygon, Vec3 normal, double offset) {
   inside_.clear();
   outside_.clear();

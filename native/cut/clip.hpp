@@ -1,4 +1,4 @@
-// Convex polygons in space, cut by planes: what is left of a polygon outside a convex polytope.
+// Convex polygons in space, clipped by planes: the part of a polygon outside a convex polytope.
 #pragma once
 
 #include <utility>
@@ -11,27 +11,27 @@ namespace rlacd {
 
 using Polygon = std::vector<Vec3>;  // convex and flat
 
-// Corners this close to a plane lie on it: a cut leaves no polygon thinner than rounding.
+// Corners this close to a plane count as on it: no clipped polygon is thinner than rounding.
 constexpr double kOnPlane = 1e-12;
 
-// The facet planes of a convex polytope, each moved along its normal: the points with n_i . x <= offset_i for all i.
+// The facet planes of a convex polytope, each offset along its normal: the points with n_i . x <= offset_i for all i.
 struct HalfSpaces {
   explicit HalfSpaces(const ConvexPlanes& facets) : planes(&facets), offset(facets.offsets()) {}
 
   const ConvexPlanes* planes;
-  std::vector<double> offset;  // padded as the planes are
+  std::vector<double> offset;  // padded like the planes
 };
 
-// Remembers nothing but its memory, which many small polygons would otherwise ask for again and again.
+// Keeps only its buffers between calls: many small polygons would otherwise allocate them again and again.
 class Clipper {
  public:
-  // Replaces every polygon by what is left of it outside the intersection of half-spaces. One that does not meet the
+  // Replaces every polygon by its part outside the intersection of half-spaces. A polygon that does not meet the
   // intersection stays whole.
   void subtract(std::vector<Polygon>& polygons, const HalfSpaces& convex);
 
  private:
-  // Whether one of the half-spaces alone shows that a polygon does not reach inside all of them; else, the planes that
-  // it reaches beyond are kept in `crossed_`.
+  // Whether a single half-space shows that a polygon does not reach into the intersection; if not, the planes that the
+  // polygon crosses are stored in `crossed_`.
   bool is_separated(const Polygon& polygon, const HalfSpaces& convex);
   void split(const Polygon& polygon, Vec3 normal, double offset);
 

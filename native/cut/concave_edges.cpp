@@ -12,14 +12,14 @@ namespace rlacd {
 namespace {
 
 constexpr double kStraightOn = 0.8660254037844387;  // cosine of 30 degrees: edges that turn by less continue each other
-constexpr std::size_t kMostAtVertex = 4;  // more reflex edges at a vertex are not a crease but a rough surface
-constexpr std::size_t kContenders = 256;  // so many edges are weighed exactly; scans have thousands
-constexpr std::size_t kFacets = 64;       // so many facets of the hull, the largest, bound the depth of all edges
-constexpr double kFlat = 1e-6;            // single precision cannot tell corners so close to a face's plane from it
-constexpr double kHair = 1e-9;            // above rounding (1e-15), below the clean-up of hulls (1e-6)
-constexpr double kSameDirection = 3e-7;   // so close to a coordinate axis a normal is that axis
-constexpr double kSamePlane = 1e-4;       // between coordinates of planes
-constexpr double kTie = 1e-9;  // the first one of scores this close is taken, not the one that rounding prefers
+constexpr std::size_t kMostAtVertex = 4;            // more reflex edges at a vertex mean a rough surface, not a crease
+constexpr std::size_t kContenders = 256;            // number of edges weighed exactly; scans have thousands
+constexpr std::size_t kFacets = 64;      // number of hull facets, the largest, that bound the depth of all edges
+constexpr double kFlat = 1e-6;           // corners this close to a face's plane are on it in single precision
+constexpr double kHair = 1e-9;           // above rounding (1e-15), below the clean-up of hulls (1e-6)
+constexpr double kSameDirection = 3e-7;  // a normal this close to a coordinate axis is replaced by it
+constexpr double kSamePlane = 1e-4;      // between coordinates of planes
+constexpr double kTie = 1e-9;            // of scores this close the first is taken, so that rounding does not decide
 
 Vec3 divided(Vec3 a, double s) { return {a.x / s, a.y / s, a.z / s}; }
 
@@ -56,7 +56,8 @@ class Facets {
 
   std::size_t size() const { return normals_.size(); }
 
-  // Distance of a point inside from the nearest of the first `count` planes: with all, from the hull's surface.
+  // Distance of an interior point from the nearest of the first `count` planes; with all planes, from the hull's
+  // surface.
   double depth(Vec3 p, std::size_t count) const {
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < std::min(count, size()); ++i)
@@ -74,7 +75,7 @@ std::int32_t root_of(std::vector<std::int32_t>& parent, std::int32_t i) {
   return i;
 }
 
-// Length of the whole crease that each edge is a piece of, but no more than `most`.
+// Length of the whole crease that each edge belongs to, capped at `most`.
 std::vector<double> crease_lengths(const Mesh& mesh, const std::vector<ReflexEdge>& edges, double most) {
   struct End {
     std::int32_t vertex, edge;
@@ -111,8 +112,8 @@ Vec3 snapped(Vec3 n) {
   return (norm(n - nearest) < kSameDirection ? nearest : n) + Vec3{};  // no -0.0
 }
 
-// The three planes of an edge, which contain it: the one that halves the reflex angle, and those of its two faces,
-// their normals pointing outwards.
+// The three planes that contain an edge: the bisector of the reflex angle, and the planes of its two faces, normals
+// pointing outwards.
 using EdgePlanes = std::array<CandidatePlane, 3>;
 
 EdgePlanes planes_of(const Mesh& mesh, const ReflexEdge& edge) {
@@ -126,15 +127,15 @@ EdgePlanes planes_of(const Mesh& mesh, const ReflexEdge& edge) {
   return planes;
 }
 
-// Tells planes apart, whichever way their normals point, by four coordinates: the unit normal, and the height over the
-// centre of a box in radii of it.
+// Coordinates that tell planes apart regardless of the normal's sign: the unit normal, and the height above the centre
+// of a box in units of its radius.
 class PlaneSpace {
  public:
   explicit PlaneSpace(const Box& box)
       : centre_(0.5 * (box.lower + box.upper)), radius_(norm(box.upper - box.lower) / 2) {}
 
-  // From differences: a sum of squares less a product would leave 1e-8 of planes that are the same, and that noise
-  // would choose between edges that are alike.
+  // By differences: a sum of squares minus a product would leave 1e-8 between equal planes, and that noise would decide
+  // between equivalent edges.
   double difference(const CandidatePlane& p, const CandidatePlane& q) const {
     const double hp = height(p), hq = height(q);
     const double same_way = norm2(p.normal - q.normal) + (hp - hq) * (hp - hq);
@@ -155,7 +156,7 @@ struct Contender {
   Vec3 centre;
   EdgePlanes planes;
   double distance = 1;                     // to the nearest chosen edge, once there is one
-  std::array<double, 3> novelty{1, 1, 1};  // difference of each plane from the nearest of those chosen
+  std::array<double, 3> novelty{1, 1, 1};  // difference of each plane from the nearest chosen one
 
   double score() const {
     if (!(*std::max_element(novelty.begin(), novelty.end()) > kSamePlane)) return 0;
@@ -185,7 +186,7 @@ std::vector<ReflexEdge> spread_out(std::vector<Contender>& contenders, const Pla
   return chosen;
 }
 
-// The offset of a plane that has a face, and what is flat with it, below.
+// The offset that puts a face, and everything coplanar with it, below its plane.
 double above_face(const Mesh& mesh, const Triangle& face, Vec3 outward) {
   double top = -std::numeric_limits<double>::infinity();
   for (const std::int32_t corner : face) top = std::max(top, dot(mesh.vertices[corner], outward));
@@ -195,7 +196,7 @@ double above_face(const Mesh& mesh, const Triangle& face, Vec3 outward) {
   return max_abs(outward) == 1 ? flat : flat + kHair;
 }
 
-// Of the two ways to write a plane, the one whose normal has its largest coordinate positive.
+// Of the two representations of a plane, the one whose normal has a positive largest coordinate.
 CandidatePlane turned(const CandidatePlane& plane) {
   int largest = 0;
   for (const int axis : {1, 2})

@@ -1,12 +1,14 @@
 // Candidate planes at concave edges of a solid.
 //
-// Input:  a closed triangle mesh, its convex hull, and how many edges are wanted.
-// Output: edges in the order of choice, and up to three planes for each: the one that halves the reflex angle and those
-//         of the edge's two faces, near-duplicates left out.
-// Algorithm: every reflex edge is weighed by its depth below the hull's surface, its angle and the length of its whole
-// crease. They are chosen one after the other, the weight multiplied by the distance to the nearest one chosen and by
-// how much the edge's planes differ from theirs. (J. Andrews, "Navigation-Driven Approximate Convex Decomposition",
-// SIGGRAPH 2024.) Depth is first bounded by the largest facets of the hull; only the best are weighed exactly.
+// Input:  a closed triangle mesh, its convex hull, and the number of edges wanted.
+// Output: edges in the order of choice, and up to three planes for each: the bisector of the reflex angle and the
+// planes
+//         of the edge's two faces, without near-duplicates.
+// Algorithm: every reflex edge is weighted by its depth below the hull's surface, its angle and the length of its whole
+// crease. Edges are chosen one after the other, the weight multiplied by the distance to the nearest chosen one and by
+// how much the edge's planes differ from those already chosen. (J. Andrews, "Navigation-Driven Approximate Convex
+// Decomposition", SIGGRAPH 2024.) Depth is first bounded by the largest facets of the hull; only the best edges are
+// weighed exactly.
 #pragma once
 
 #include <cstddef>
@@ -17,17 +19,17 @@
 namespace rlacd {
 
 struct CandidatePlane {
-  Vec3 normal;  // of unit length, its largest coordinate positive
+  Vec3 normal;  // unit length, largest coordinate positive
   double offset;
 };
 
-// Up to `count` of a mesh's reflex edges; those that offer no new plane are never chosen.
+// Up to `count` of a mesh's reflex edges; edges that offer no new plane are never chosen.
 std::vector<ReflexEdge> choose_concave_edges(const Mesh& mesh, const Mesh& hull, std::size_t count);
 
-// The planes of these edges. A face's plane is moved out until the face, and what is coplanar with it in single
-// precision, lies wholly on one side: by nothing where the plane is normal to a coordinate axis (such cuts are exact),
-// else by a hair. On the face itself rounding would decide for every corner on which side it comes to lie, and the part
-// beyond would carry the face along as a film.
+// The planes of these edges. A face's plane is moved out until the face, and everything coplanar with it in single
+// precision, lies wholly on one side: not at all if the plane is normal to a coordinate axis (such cuts are exact),
+// else by a hair. A cut exactly through the face would let rounding decide the side of each corner, and the part beyond
+// would carry the face along as a film.
 std::vector<CandidatePlane> planes_of_edges(const Mesh& mesh, const Mesh& hull, const std::vector<ReflexEdge>& edges);
 
 }  // namespace rlacd

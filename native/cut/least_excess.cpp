@@ -16,9 +16,9 @@ namespace rlacd {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr std::size_t kFewPlanes = 3;  // a direction with fewer planes has so many more sections, to bound its hulls
-constexpr std::size_t kFewTrials = 1 << 17;  // of a point and a corner
-constexpr double kRounding = 1e-12;  // share of a box's volume that the rounding of a hull's volume stays far below
+constexpr std::size_t kFewPlanes = 3;  // a direction with fewer planes gets this many extra sections to bound its hulls
+constexpr std::size_t kFewTrials = 1 << 17;  // pairs of a point and a corner
+constexpr double kRounding = 1e-12;          // share of a box's volume; rounding of a hull's volume stays far below
 
 enum Side : std::size_t { kBelow, kAbove };
 
@@ -31,7 +31,7 @@ double box_volume(const Mesh& mesh) {
   return e.x * e.y * e.z;
 }
 
-// The planes of a bundle, and others where they are few.
+// The planes of a bundle, with extra ones if they are few.
 std::vector<double> section_offsets(const SolidMesh& solid, const Bundle& bundle) {
   std::vector<double> offsets = bundle.offsets;
   if (offsets.size() >= kFewPlanes) return offsets;
@@ -49,13 +49,14 @@ std::vector<double> section_offsets(const SolidMesh& solid, const Bundle& bundle
   return offsets;
 }
 
-// Volume between two parallel sections of a convex body whose areas have these roots, at least (Brunn and Minkowski).
+// Lower bound on the volume between two parallel sections of a convex body, given the roots of their areas
+// (Brunn-Minkowski).
 double frustum(double root, double other, double height) {
   return height / 3 * (root * root + root * other + other * other);
 }
 
-// Volumes that the hulls of what lies below (or above) each plane cannot be smaller than: see the algorithm. The roots
-// are those of the areas of the sections' hulls.
+// Lower bounds on the volumes of the hulls of everything below (or above) each plane: see the algorithm. `roots` are
+// the square roots of the areas of the sections' hulls.
 std::vector<double> least_hull_volumes(const Sections& sections, const std::vector<double>& roots, Side side) {
   struct Slice {
     double depth, root, volume;  // distance from the end; root of the area; volume between the end and here
@@ -81,10 +82,10 @@ std::vector<double> least_hull_volumes(const Sections& sections, const std::vect
   return least;
 }
 
-// The planes of one direction, and what is known of the excesses of their sides.
+// The planes of one direction, and the bounds known so far on the excesses of their sides.
 class Direction {
  public:
-  // Numbers are those of the bundle's planes among all candidates. Rounding changes volumes by less than the slack.
+  // Numbers are those of the bundle's planes among all candidates. The slack exceeds the rounding of volumes.
   Direction(const SolidMesh& mesh, const Bundle& bundle, const std::vector<std::ptrdiff_t>& numbers, double slack)
       : sections_(mesh, bundle.normal, section_offsets(mesh, bundle)), slack_(slack) {
     sections_.drop_heights();
@@ -107,9 +108,9 @@ class Direction {
   }
 
   std::size_t planes() const { return sections_.planes(); }
-  std::ptrdiff_t number(std::size_t j) const { return numbers_[j]; }  // -1 where the plane is no candidate
+  std::ptrdiff_t number(std::size_t j) const { return numbers_[j]; }  // -1 if the plane is no candidate
 
-  // What the excess of a side is not smaller than.
+  // Lower bound on the excess of a side.
   double least(Side side, std::size_t j) const { return least_[side][j]; }
 
   bool is_valid(std::size_t j, double least_solid, double sliver) const {
@@ -120,17 +121,18 @@ class Direction {
 
   // The excess of one side of a plane.
   double measure(Side side, std::size_t j) {
-    std::size_t from = j;  // the nearest plane on this side whose hull is known
+    std::size_t from = j;  // the nearest plane on this side with a known hull
     while (from != end(side) && !hulls_[side][from]) from = side == kBelow ? from - 1 : from + 1;
     std::vector<Vec3> points = sections_.outline(j);
     const auto append = [&points](Vec3 p) { points.push_back(p); };
     if (side == kBelow)
-      sections_.for_each_inside(from + 1, j + 1, append);  // from the first slab on, where no hull is known
+      sections_.for_each_inside(from + 1, j + 1, append);  // from the first slab beyond the known hulls
     else
       sections_.for_each_inside(j + 1, std::min(from, planes()) + 1, append);
     auto hull = std::make_unique<HullBuilder>(sections_.film());
     if (from != end(side)) {
-      // A hull that grows tries its facets on every point: where that takes too long, a new one takes its corners in.
+      // A growing hull tests its facets against every point: where that takes too long, a new hull takes in its
+      // corners.
       const std::vector<Vec3>& corners = hulls_[side][from]->points();
       if (points.size() * corners.size() <= kFewTrials)
         *hull = *hulls_[side][from];
@@ -146,15 +148,15 @@ class Direction {
   }
 
  private:
-  // One beyond the outermost plane.
+  // One past the outermost plane.
   std::size_t end(Side side) const { return side == kBelow ? static_cast<std::size_t>(-1) : planes(); }
 
   double solid(Side side, std::size_t j) const {
     return side == kBelow ? sections_.solid_below(j) : sections_.solid_above(j);
   }
 
-  // The excess below a plane, and what is missing between it and higher ones, bounds the excesses below those; the one
-  // above it those above all lower ones.
+  // The excess below a plane, plus the excess of the slabs up to a higher plane, bounds the excess below that one;
+  // likewise the excess above a plane bounds those above all lower ones.
   void raise(Side side, std::size_t j, double excess) {
     while (least_[side][j] < excess) {
       least_[side][j] = excess;
@@ -186,7 +188,7 @@ class Direction {
   Sections sections_;
   const double slack_;
   std::vector<std::ptrdiff_t> numbers_;
-  std::vector<double> between_;  // what hulls have more than the solid between planes j and j + 1, at least
+  std::vector<double> between_;                // lower bound on the excess of the hull between planes j and j + 1
   std::array<std::vector<double>, 2> least_;   // by side and plane: a lower bound of the excess
   std::array<std::vector<double>, 2> extent_;  // the largest extent of the side's box
   std::array<std::vector<std::unique_ptr<HullBuilder>>, 2> hulls_;
@@ -218,7 +220,7 @@ class Search {
  private:
   // Neighbouring planes of one direction, none of them measured.
   struct Interval {
-    double bound;  // of the costs of those that are still to be looked at
+    double bound;  // lower bound on the costs of the planes still unmeasured
     std::size_t direction, first, last;
 
     bool operator<(const Interval& other) const {  // the greatest is looked at first
@@ -282,7 +284,7 @@ class Search {
     return first;
   }
 
-  // The cost of a plane; infinity when one side alone rules it out.
+  // The cost of a plane; infinity if one side alone rules it out.
   double measure(Direction& direction, std::size_t j) {
     const Side side = direction.least(kBelow, j) >= direction.least(kAbove, j) ? kBelow : kAbove;
     const double excess = direction.measure(side, j);

@@ -11,8 +11,8 @@ namespace rlacd {
 
 namespace {
 
-constexpr double kOnPlane = 1e-13;  // of the mesh's farthest coordinate: the rounding of a height stays below
-constexpr double kFlat = 1e-12;     // of the same: corners so close to a line or a plane lie in it
+constexpr double kOnPlane = 1e-13;  // relative to the mesh's largest coordinate: above the rounding of a height
+constexpr double kFlat = 1e-12;     // relative to the same: corners this close to a line or a plane lie in it
 constexpr double kPi = 3.14159265358979323846;
 
 using Edge = std::array<std::int32_t, 2>;
@@ -80,7 +80,7 @@ class Cutter {
     return which < 0 ? up > 0 : up <= 0;
   }
 
-  // The point where an edge crosses the plane: on it to the last bit where that is possible.
+  // The point where an edge crosses the plane: exactly on it where possible.
   std::int32_t crossing(std::int32_t a, std::int32_t b) {
     if (a > b) std::swap(a, b);
     const auto key = static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint32_t>(b);
@@ -94,7 +94,7 @@ class Cutter {
     return known->second;
   }
 
-  // The edges less those that run the other way too.
+  // The edges without those that also run the other way.
   static std::vector<Edge> boundary(std::vector<Edge> edges) {
     const auto undirected = [](const Edge& e) { return std::minmax(e[0], e[1]); };
     std::sort(edges.begin(), edges.end(), [&](const Edge& e, const Edge& g) {
@@ -138,7 +138,7 @@ class Cutter {
     return loops;
   }
 
-  // Of the edges on from the end of one, the first to its left side on the way back.
+  // Of the edges that continue from the end of an edge, the first one to the left of the way back.
   std::size_t next(const std::vector<Edge>& edges, const std::vector<char>& is_used, const Edge& edge, int up) const {
     const auto begin = std::lower_bound(edges.begin(), edges.end(), Edge{edge[1], -1});
     std::size_t best = 0;
@@ -151,7 +151,7 @@ class Cutter {
     return best;
   }
 
-  // Between an edge and the one before it, on the side of the loop's inside; in (0, 2 pi].
+  // Angle between an edge and the one before it, on the inside of the loop; in (0, 2 pi].
   double angle_inside(const Edge& before, const Edge& edge, int up) const {
     const auto at = on_plane({points_[before[0]], points_[edge[0]], points_[edge[1]]}, up > 0 ? normal_ : -normal_);
     const double bx = at[0][0] - at[1][0], by = at[0][1] - at[1][1], ex = at[2][0] - at[1][0], ey = at[2][1] - at[1][1];
@@ -159,10 +159,10 @@ class Cutter {
     return angle > 0 ? angle : angle + 2 * kPi;
   }
 
-  // Takes corners of the rims away that flat parts of the surface have between two others on a line: there its
-  // triangles met. They would pile up, cut after cut.
+  // Removes corners of the rims that lie on a straight line in a flat part of the surface, where its triangles met.
+  // They would otherwise accumulate from cut to cut.
   void straighten(std::vector<Triangle>& faces, std::vector<std::vector<std::int32_t>>& loops) const {
-    std::vector<std::int32_t> times(points_.size(), 0);  // that a point is on a rim
+    std::vector<std::int32_t> times(points_.size(), 0);  // number of times a point is on a rim
     for (const std::vector<std::int32_t>& loop : loops)
       for (const std::int32_t v : loop) ++times[v];
     std::unordered_map<std::int32_t, std::vector<std::size_t>> around;  // faces at points on a rim
@@ -194,7 +194,7 @@ class Cutter {
     return dot(a, b) > 0 && norm(cross(a, b)) <= kFlat * farthest_ * norm(c);
   }
 
-  // Moves a point to another along the rim, if the faces around it lie in a plane and none turns over.
+  // Moves a point onto its neighbour on the rim, if the faces around it lie in a plane and none flips.
   bool moves_to(std::int32_t v, std::int32_t to, std::vector<Triangle>& faces,
                 std::unordered_map<std::int32_t, std::vector<std::size_t>>& around, std::vector<char>& is_gone) const {
     const auto doubled_area = [&](const Triangle& f) {

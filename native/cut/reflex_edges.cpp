@@ -12,8 +12,8 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kReflex = 10 * kPi / 180;  // flatter edges tessellate curves
 constexpr double kFold =
-    0.1 * kPi / 180;                    // so close to each other, two faces enclose a slit or a film: rounding decides
-constexpr double kThinnestFace = 1e-6;  // the normals of faces lower than this say nothing in single precision
+    0.1 * kPi / 180;  // two faces this close in angle enclose a slit or a film: rounding decides which
+constexpr double kThinnestFace = 1e-6;  // the normals of faces thinner than this are meaningless in single precision
 
 struct Halfedge {
   std::int32_t high;  // the larger of its two vertices
@@ -80,7 +80,7 @@ std::vector<ReflexEdge> reflex_edges(const Mesh& mesh) {
     for (auto h = begin, next = h; h != end; h = next) {
       next = std::find_if(h, end, [h](const Halfedge& g) { return g.high != h->high; });
       const auto ascending = std::count_if(h, next, [](const Halfedge& g) { return g.ascends; });
-      // A face with a doubled corner has a halfedge from a vertex to itself; it is no edge.
+      // A face with a repeated corner has a halfedge from a vertex to itself, which is not an edge.
       if (ascending == 1 && next - h == 2) add_if_reflex(static_cast<std::int32_t>(v), h->high, h->face, (h + 1)->face);
     }
   }

@@ -1,8 +1,8 @@
 // Edges at which a solid is not convex.
 //
 // Input:  a triangle mesh, closed or nearly so.
-// Output: the edges whose dihedral angle inside the solid exceeds a straight one, by ascending vertices.
-// Algorithm: halfedges are put into one bucket a vertex (the smaller of the two), and matched there: an edge counts
+// Output: the edges whose dihedral angle inside the solid exceeds pi, by ascending vertices.
+// Algorithm: halfedges are put into one bucket per vertex (the smaller of the two) and matched there: an edge counts
 // when exactly two faces use it, in opposite directions.
 #pragma once
 
@@ -17,10 +17,10 @@ struct ReflexEdge {
   std::int32_t end[2];   // vertices, ascending
   std::int32_t face[2];  // the first one runs from the first end to the second
   Vec3 normal[2];        // outward unit normals of the faces
-  double angle;          // by how much the dihedral angle exceeds a straight one, in (0, pi)
+  double angle;          // dihedral angle minus pi, in (0, pi)
 };
 
-// Folds, which rounding may turn inside out, and faces as thin as needles are left out.
+// Folds, which rounding may turn inside out, and needle-thin faces are left out.
 std::vector<ReflexEdge> reflex_edges(const Mesh& mesh);
 
 }  // namespace rlacd
