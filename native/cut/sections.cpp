@@ -12,9 +12,9 @@ namespace rlacd {
 namespace {
 
 constexpr double kFilm = 1e-13;         // relative to the mesh
-constexpr std::size_t kManyEdges = 24;  // at one vertex: pairs of them take long
-constexpr double kFlat = 1e-12;         // sine of an angle that is none
-constexpr std::size_t kFew = 20;        // so many points are quickly sorted
+constexpr std::size_t kManyEdges = 24;  // at one vertex; testing all pairs of more would take too long
+constexpr double kFlat = 1e-12;         // sine of an angle that counts as zero
+constexpr std::size_t kFew = 20;        // sorting this few points is fast
 constexpr double kWellInside = 1e-12;   // share of the area of the points' box: far above rounding
 
 int axis_of(Vec3 n) {
@@ -23,8 +23,8 @@ int axis_of(Vec3 n) {
   return -1;
 }
 
-// Drops most points that lie well inside the octagon of those that are outermost in eight directions: what is left is
-// quickly sorted (Akl and Toussaint, "A Fast Convex Hull Algorithm", 1978).
+// Drops most points well inside the octagon of the extreme points in eight directions, so that less is left to sort
+// (Akl and Toussaint, "A Fast Convex Hull Algorithm", 1978).
 template <int drop>
 void drop_inner(std::vector<Vec3>& points) {
   constexpr int u = (drop + 1) % 3, v = (drop + 2) % 3;
@@ -36,7 +36,7 @@ void drop_inner(std::vector<Vec3>& points) {
     for (int k = 0; k < 8; ++k)
       if (const double s = direction[k][0] * p[u] + direction[k][1] * p[v]; s > most[k]) most[k] = s, outermost[k] = p;
   const double well = kWellInside * (most[0] + most[4]) * (most[2] + most[6]);
-  if (!(well > 0)) return;  // they lie on a line, or in one place: the octagon has no inside
+  if (!(well > 0)) return;  // the points are collinear or equal: the octagon has no interior
   const auto is_inside = [&](Vec3 p) {
     for (int k = 0; k < 8; ++k) {
       const Vec3 a = outermost[k], b = outermost[(k + 1) % 8];
@@ -48,7 +48,7 @@ void drop_inner(std::vector<Vec3>& points) {
 }
 
 // Corners of the convex hull of points on a plane, by Andrew's monotone chain in the coordinates other than `drop`.
-// Rounding may drop a corner that stands out by some 1e-16, which no volume notices.
+// Rounding may drop a corner that protrudes by about 1e-16, which no volume depends on.
 template <int drop>
 void reduce_to_planar_hull(std::vector<Vec3>& points) {
   if (points.size() < 4) return;
@@ -74,7 +74,7 @@ void reduce_to_planar_hull(std::vector<Vec3>& points) {
   points = std::move(chain);
 }
 
-// The same without the coordinate that the plane's normal determines best.
+// The same, dropping the coordinate that the plane's normal determines best.
 void reduce_to_planar_hull(std::vector<Vec3>& points, Vec3 n) {
   if (std::fabs(n.x) >= std::fabs(n.y) && std::fabs(n.x) >= std::fabs(n.z))
     reduce_to_planar_hull<0>(points);
@@ -96,7 +96,7 @@ double mean_below(double s0, double s1, double s2, double d) {
   return (s0 + s1 + s2) / 3 - d - t * (s2 - d) / 3;
 }
 
-// The directions from each vertex to its neighbours, once a face: those of vertex v are edges[first[v]..first[v + 1]).
+// The directions from each vertex to its neighbours, one per face: those of vertex v are edges[first[v]..first[v + 1]).
 struct VertexEdges {
   std::vector<std::size_t> first;
   std::vector<Vec3> edges;
@@ -121,9 +121,9 @@ bool all_below(const Vec3* begin, const Vec3* end, Vec3 w, double height) {
   return std::all_of(begin, end, [w, height](Vec3 e) { return dot(w, e) <= height; });
 }
 
-// Whether there is a direction w with w . e < 0 for all edges e. Such directions are a cone, whose rays are normals of
-// two edges each: the sum of these rays is one of them. Where all edges lie in a plane, the cone has no rays, but holds
-// the directions away from the two outermost.
+// Whether there is a direction w with w . e < 0 for all edges e. Such directions form a cone, whose rays are normals of
+// two edges each: the sum of these rays is one of them. If all edges lie in a plane, the cone has no rays, but contains
+// the directions away from the two outermost edges.
 bool has_direction_away(const Vec3* begin, const Vec3* end) {
   Vec3 sum;
   for (const Vec3* e = begin; e != end; ++e)
@@ -144,12 +144,12 @@ bool has_direction_away(const Vec3* begin, const Vec3* end) {
 // Whether a vertex with these edges may be a corner of the hull of itself and its neighbours.
 bool sticks_out(const Vec3* begin, const Vec3* end) {
   if (begin == end) return false;
-  // Where a neighbour is in the same place, one of the two may.
+  // If a neighbour is at the same place, either of the two may be the corner.
   if (std::any_of(begin, end, [](Vec3 e) { return norm2(e) < 0.5; })) return true;
   Vec3 away;
   for (const Vec3* e = begin; e != end; ++e) away = away - *e;
   if (all_below(begin, end, away, -kFlat)) return true;
-  // With many edges, trying pairs takes longer than keeping the vertex.
+  // With many edges, testing pairs takes longer than keeping the vertex.
   return static_cast<std::size_t>(end - begin) > kManyEdges || has_direction_away(begin, end);
 }
 
@@ -199,7 +199,7 @@ void Sections::project() {
   film_ = kFilm * (highest_ - lowest_);
 }
 
-// Planes mostly stand at equal distances: the first guess is right then.
+// Planes are usually equidistant: then the first guess is right.
 std::int32_t Sections::first_above(double height) const {
   if (offsets_.empty()) return 0;
   const auto planes = static_cast<std::int32_t>(offsets_.size());
@@ -228,7 +228,7 @@ std::int32_t Sections::lowest_corner(const Triangle& f) const {
 }
 
 void Sections::fill_slabs() {
-  // On which sides of a vertex on a plane its faces go on: 1 below, 2 above.
+  // On which sides of a vertex on a plane its faces continue: 1 below, 2 above.
   std::vector<char> sides(mesh_.vertices.size(), 0);
   if (is_on_plane_)
     for (const Triangle& f : mesh_.faces) {
@@ -258,7 +258,7 @@ void Sections::fill_slabs() {
   for (const Entry& e : entries) order_[next[e.slab]++] = e.vertex;
 }
 
-// The point where an edge meets a plane; on the plane to the last bit when n is a coordinate axis.
+// The point where an edge meets a plane; exactly on the plane when n is a coordinate axis.
 Vec3 Sections::crossing(std::int32_t low, std::int32_t high, double offset) const {
   const Vec3 a = mesh_.vertices[low], b = mesh_.vertices[high];
   const double t = (offset - heights_[low]) / (heights_[high] - heights_[low]);
@@ -272,7 +272,7 @@ void Sections::cut_edges() {
   for (const Triangle& f : mesh_.faces) {
     if (is_between_planes(f)) continue;
     for (int e = 0; e < 3; ++e) {
-      // In a closed oriented mesh every edge is run through once in each direction: take the ascending one.
+      // In a closed oriented mesh every edge occurs once in each direction: take the ascending one.
       const std::int32_t a = f[e], b = f[(e + 1) % 3];
       if (heights_[a] >= heights_[b]) continue;
       for (auto j = static_cast<std::size_t>(above_[a]); j < offsets_.size() && offsets_[j] < heights_[b]; ++j)
@@ -305,7 +305,7 @@ void Sections::measure_solid() {
     std::size_t j = is_between_planes(f) && !is_on_plane_ ? above_[f[0]] : first_from(lowest_corner(f));
     for (; j < offsets_.size() && offsets_[j] < s[2]; ++j)
       solid_below_[j] += flux * mean_below(s[0], s[1], s[2], offsets_[j]);
-    // From here on the whole triangle lies below: flux * (mean - d), summed up as a line in d.
+    // From here on the whole triangle lies below: flux * (mean - d), accumulated as a linear function of d.
     slope[j] += flux;
     constant[j] += flux * ((s[0] + s[1] + s[2]) / 3);
   }
@@ -317,7 +317,7 @@ void Sections::measure_solid() {
   }
 }
 
-// Every triangle that a plane cuts adds a segment to the section's perimeter and (as a directed edge) its area.
+// Every triangle that a plane crosses adds a segment to the section's perimeter and, as a directed edge, to its area.
 std::vector<Sections::Measures> Sections::measure_sections() const {
   std::vector<Measures> measures(offsets_.size());
   std::vector<Vec3> area(offsets_.size());

@@ -1,10 +1,9 @@
-// Parallel planes through a mesh: where they cut it, what lies between them, and how much of the solid.
+// Parallel planes through a mesh: their sections, the slabs between them, and the volumes of the solid on both sides.
 //
 // Input:  a closed triangle mesh, a unit normal n and M ascending offsets d (planes n.x = d). They divide the mesh into
 //         M + 1 slabs; slab j lies below plane j and above plane j - 1.
-// Output: each slab's vertices that its convex hull may need, the corners of the convex hull of each plane's section,
-// and the volume of the solid
-//         below and above each plane.
+// Output: the vertices of each slab that its convex hull may need, the corners of the convex hull of each plane's
+//         section, and the volume of the solid below and above each plane.
 // Algorithm: vertices are sorted into slabs, and every edge is cut by the planes between its ends. Volumes come from
 // the
 //         divergence theorem with the field (n.x - d) n, which vanishes on the cut, so that no cap is needed.
@@ -17,35 +16,35 @@
 
 namespace rlacd {
 
-// What sections of a mesh in all directions have in common. Refers to the mesh for as long as it lives.
+// Data of a mesh that the sections of all directions share. Keeps a reference to the mesh.
 struct SolidMesh {
   explicit SolidMesh(const Mesh& solid);
 
   const Mesh& mesh;
   std::vector<Vec3> area;       // of every face, times its normal
   std::vector<char> is_corner;  // of a face, for every vertex
-  // For every vertex, whether it may be a corner of a hull of the solid's share of a half-space that it is inside of:
-  // one in the hull of its neighbours is none.
+  // For every vertex, whether it may be a corner of the hull of the solid's share of a half-space that contains it: a
+  // vertex in the hull of its neighbours is none.
   std::vector<char> sticks_out;
   double volume;
 };
 
 class Sections {
  public:
-  // Refers to the solid for as long as it lives.
+  // Keeps a reference to the solid.
   Sections(const SolidMesh& solid, Vec3 normal, std::vector<double> offsets);
 
   std::size_t planes() const { return offsets_.size(); }
   Vec3 normal() const { return normal_; }
   double offset(std::size_t plane) const { return offsets_[plane]; }
-  double lowest() const { return lowest_; }  // n.x of the vertices: infinity where there are none
+  double lowest() const { return lowest_; }  // least n.x of the vertices: infinity if there are none
   double highest() const { return highest_; }
-  // Points that stick out of a hull by less than this are rounding: the crossings of one long edge with many planes are
-  // collinear but for the last bits.
+  // Points that protrude from a hull by less than this are rounding: the crossings of one long edge with many planes
+  // are collinear only up to the last bits.
   double film() const { return film_; }
 
-  // Calls task(point) for the vertices of slabs [from, to) that stick out. A vertex on a plane belongs to a side when
-  // the surface goes on there: a face that lies in the plane bounds the solid on one side of it only.
+  // Calls task(point) for the vertices of slabs [from, to) that may be corners. A vertex on a plane belongs to a side
+  // if the surface continues there: a face that lies in the plane bounds the solid on one side of it only.
   template <class Task>
   void for_each_inside(std::size_t from, std::size_t to, const Task& task) const {
     for (std::size_t i = first_[from]; i < first_[to]; ++i) task(mesh_.vertices[order_[i]]);
@@ -64,7 +63,7 @@ class Sections {
   };
   std::vector<Measures> measure_sections() const;
 
-  // Gives back what only `measure_sections` needs.
+  // Frees the memory that only `measure_sections` needs.
   void drop_heights() {
     heights_ = {};
     above_ = {};
@@ -84,24 +83,24 @@ class Sections {
   const SolidMesh& solid_;
   const Mesh& mesh_;
   const Vec3 normal_;
-  const int axis_;  // the coordinate axis that the normal is, or -1
+  const int axis_;  // the coordinate axis that the normal equals, or -1
   const std::vector<double> offsets_;
   std::vector<double> heights_;      // n.x of every vertex
   std::vector<std::int32_t> above_;  // first plane with offset > n.x, of every vertex
   double lowest_ = std::numeric_limits<double>::infinity();
   double highest_ = -std::numeric_limits<double>::infinity();
   double film_ = 0;
-  bool is_on_plane_ = false;         // some vertex
+  bool is_on_plane_ = false;         // whether any vertex lies on a plane
   std::vector<std::int32_t> order_;  // vertices slab by slab
-  std::vector<std::size_t> first_;   // M + 2 places in it
+  std::vector<std::size_t> first_;   // M + 2 offsets into order_
   std::vector<std::vector<Vec3>> outlines_;
   std::vector<double> solid_below_;
 };
 
-// Area of a convex polygon across n, its corners in order.
+// Area of a convex polygon seen along n, its corners in order.
 double outline_area(const std::vector<Vec3>& outline, Vec3 n);
 
-// Planes n.x = d by their normal: equal ones share a bundle, in which every offset counts once.
+// Planes n.x = d grouped by normal: planes with equal normals share a bundle, in which every offset occurs once.
 struct Bundle {
   Vec3 normal;
   std::vector<double> offsets;  // ascending

@@ -11,8 +11,8 @@ namespace rlacd {
 
 namespace {
 
-// What a slab adds to the hulls: the corners of its own hull, but for those on the plane that it shares with the hull
-// so far, which are in it already.
+// The points that a slab adds to the hulls: the corners of its own hull, except those on the plane it shares with the
+// hull so far, which already has them.
 struct Slab {
   std::vector<Vec3> to_below, to_above;
 };
@@ -46,7 +46,7 @@ class DirectionSweep {
       const std::size_t first_upper = points.size();
       if (j < planes) points.insert(points.end(), sections_.outline(j).begin(), sections_.outline(j).end());
       hull.add(points);
-      if (planes == 1) continue;  // each of the two slabs is a whole side: nothing grows from its corners
+      if (planes == 1) continue;  // each of the two slabs is a whole side: no hull grows from its corners
       for (const std::int32_t corner : hull.corners()) {
         const auto i = static_cast<std::size_t>(corner);
         if (i >= first_inside) slabs_[j].to_below.push_back(points[i]);
@@ -86,7 +86,7 @@ class DirectionSweep {
   const Sections sections_;
   std::vector<PlaneScore> scores_;
   std::vector<Slab> slabs_;                 // M + 1 slabs
-  HullBuilder lowest_slab_, highest_slab_;  // which the hulls grow from
+  HullBuilder lowest_slab_, highest_slab_;  // the hulls that the others grow from
 };
 
 }  // namespace
@@ -97,7 +97,7 @@ std::vector<PlaneScore> sweep_direction(const Mesh& mesh, Vec3 direction, const 
 
 std::vector<PlaneScore> sweep(const Mesh& mesh, const std::vector<Vec3>& directions, const std::vector<double>& offsets,
                               int threads) {
-  // Principal axes are often coordinate axes, and faces parallel to them: equal directions share one sweep.
+  // Principal axes are often coordinate axes or parallel to face normals: equal directions share one sweep.
   const Bundles bundles = bundle_planes(directions, offsets);
   std::vector<std::vector<PlaneScore>> swept(bundles.all.size());
   const SolidMesh solid(mesh);

@@ -1,7 +1,7 @@
-// Plane sweep: what every candidate plane would do to a component, without cutting it.
+// Plane sweep: evaluates every candidate plane of a component without cutting it.
 //
 // Input:  a closed triangle mesh and, for each of K unit directions n, M ascending offsets d (planes n.x = d).
-// Output: for every plane, the volumes of the convex hulls of what lies below and above it, the volumes of the solid
+// Output: for every plane, the volumes of the convex hulls of the parts below and above it, the volumes of the solid
 //         below and above, the area and perimeter of the section, and the thickness and largest extent of both sides.
 // Algorithm: the planes of one direction cut the mesh into M + 1 slabs. Each slab's points are the vertices inside it
 // and the points where edges cross its two planes. The hull below plane j grows from the hull below plane j - 1 by the

@@ -1,11 +1,11 @@
 // The greatest value, over a surface, of a function that is a minimum of convex functions; certified.
 //
 // In:  triangles, and a *field*: f(x) = min over witnesses w of f_w(x), every f_w convex and 1-Lipschitz. Distance to a
-//      set of convex things (triangles, hulls) is such a function; so is depth under a set of planes.
+//      set of convex objects (triangles, hulls) is such a function; so is depth under a set of planes.
 //        Sample at(Vec3 p, int32 hint, double enough)  a witness with f_w(p) = f(p), or any with f_w(p) <= enough
 //        double from(int32 witness, Vec3 p)            f_w(p)
 //        double quick_upper(corners)                   a cheap upper bound over a triangle, or infinity
-//        void settled(corners, witness)                is told the witness that alone closed a triangle
+//        void settled(corners, witness)                is called with the single witness that closed a triangle
 // Out: an interval that holds the maximum, narrow enough for the goal.
 // How: branch and bound over the triangles, halved at their longest edge.
 //      Lower bound: f at the corners.
@@ -46,14 +46,14 @@ struct Cell {
 
 struct Goal {
   double tolerance;                                       // stop once the interval is this narrow
-  double pass = 0;                                        // what is certainly no larger need not be told apart
+  double pass = 0;                                        // values certainly no larger than this need not be resolved
   double fail = std::numeric_limits<double>::infinity();  // stop once the maximum is certainly larger
 };
 
-// Cells looked at before giving up with the interval reached so far; far above what real surfaces need.
+// Cells examined before giving up with the interval reached so far; far above what real surfaces need.
 constexpr std::size_t kMostCells = std::size_t{1} << 22;
 
-// A witness that is this share of what matters is as good as the best one, and found sooner.
+// A witness within this share of the relevant distance is as good as the best one, and found sooner.
 constexpr double kEnough = 0.5;
 
 // min over l in [0, 1] of max over j of l a[j] + (1 - l) b[j]: the upper envelope of three lines is least at an end or
@@ -127,7 +127,7 @@ inline Corners corners_of(const Mesh& mesh, const Triangle& face) {
 template <class Field>
 Interval maximize(Field& field, const Mesh& mesh, const Goal& goal) {
   Interval found;
-  double dropped = 0;  // greatest upper bound among the cells not looked into further
+  double dropped = 0;  // greatest upper bound among the cells not examined further
   const auto needed = [&] { return std::max(goal.pass, found.lower + goal.tolerance); };
   const auto enough = [&] { return kEnough * std::max(goal.pass, found.lower); };
   const auto learn = [&](const Sample& sample, double exact_above) {
@@ -196,8 +196,8 @@ Interval maximize(Field& field, const Mesh& mesh, const Goal& goal) {
   return found;
 }
 
-// Many threads: all open cells are halved at once, wave after wave. What a wave does depends only on the waves before
-// it, so the interval is the same for every number of threads.
+// Multi-threaded: all open cells are halved at once, wave after wave. A wave depends only on the waves before it, so
+// the interval does not depend on the number of threads.
 template <class Field>
 Interval maximize_in_waves(const Field& field, const Mesh& mesh, double tolerance, int threads) {
   constexpr std::size_t kChunk = 128;
@@ -214,7 +214,7 @@ Interval maximize_in_waves(const Field& field, const Mesh& mesh, double toleranc
   std::vector<char> is_corner(mesh.vertices.size(), 0);
   for (const Triangle& face : mesh.faces)
     for (const std::int32_t corner : face) is_corner[corner] = 1;
-  // A few corners first: they tell how much distance matters, so that most of the others need no exact answer.
+  // A few corners first: they show what distance matters, so that most of the others need no exact answer.
   for (const std::size_t stride : {std::size_t{kChunk}, std::size_t{1}}) {
     const double exact_above = kEnough * found.lower;
     for_each((at_vertex.size() + stride - 1) / stride, [&](std::size_t i) {

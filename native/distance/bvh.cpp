@@ -9,8 +9,8 @@ namespace {
 
 constexpr int kLeafSize = 4;
 constexpr int kBins = 8;
-// Deeper nodes are halved by count, so no tree is deeper than this plus log2 of the number of triangles: what is left
-// of 31 bits keeps every walk inside a stack of fixed size.
+// Deeper nodes are halved by count, so no tree is deeper than this plus log2 of the number of triangles: with the rest
+// of the 31 bits, every traversal fits in a stack of fixed size.
 constexpr int kDeepestHeuristicSplit = 48;
 constexpr int kStack = 96;
 
@@ -47,7 +47,7 @@ Items split(Items first, Items last, int depth) {
   for (Items item = first; item != last; ++item) centres.extend(item->centre);
   const Vec3 extent = centres.upper - centres.lower;
   const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
-  // Beside numbers smaller than these or beyond the largest, the scale would overflow or vanish.
+  // Below or above these numbers, the scale would vanish or overflow.
   const bool is_told_apart = extent[axis] > 0x1p-1000 && extent[axis] <= std::numeric_limits<double>::max();
   if (depth >= kDeepestHeuristicSplit || !is_told_apart) return halve(first, last, axis);
 
@@ -110,7 +110,7 @@ Bvh::Bvh(const Mesh& mesh) {
     poll_stop();
     const Range range = open.back();
     open.pop_back();
-    // A mesh of one triangle has no two halves: its second child stays an empty leaf.
+    // A mesh of one triangle cannot be halved: its second child stays an empty leaf.
     const Items middle = range.last - range.first > 1 ? split(range.first, range.last, range.depth) : range.last;
     const Items ends[3] = {range.first, middle, range.last};
     for (int side = 0; side < 2; ++side) {

@@ -1,10 +1,10 @@
 // A tree of boxes over triangles that answers "which point of the surface is closest?".
 //
-// In:  a triangle mesh, of any quality: open, self-intersecting, with triangles of no area.
+// In:  a triangle mesh of any quality: open, self-intersecting, with degenerate triangles.
 // Out: closest points, exact up to rounding.
 // How: top-down build, each node split where the surface-area heuristic is least over eight bins along the longest axis
-//      of its centroids (halved when that fails or the tree gets deep); a node holds the boxes of both its children,
-//      and a query walks the nearer child first and prunes by the best distance so far.
+//      of its centroids (halved by count if that fails or the tree gets deep); a node holds the boxes of both its
+//      children, and a query visits the nearer child first and prunes by the best distance so far.
 #pragma once
 
 #include <limits>
@@ -19,15 +19,15 @@ class Bvh {
  public:
   explicit Bvh(const Mesh& mesh);
 
-  // Triangles are kept in the order of the leaves; a *slot* is a place in that order.
+  // Triangles are stored in the order of the leaves; a *slot* is a position in that order.
   struct Hit {
     Vec3 point;
     double distance2 = std::numeric_limits<double>::infinity();
     std::int32_t slot = -1;
   };
 
-  // The closest point to p. A hint (the slot of a triangle thought to be near) only makes it faster. The search ends at
-  // the first triangle within `enough`: the distance then is at most `enough`, not the least. Where no triangle is
+  // The closest point to p. A hint (the slot of a triangle expected to be near) only makes the query faster. The search
+  // ends at the first triangle within `enough`: the distance is then at most `enough`, not the least. If no triangle is
   // nearer than `within`, the slot is -1.
   Hit closest(Vec3 p, std::int32_t hint = -1, double enough = 0,
               double within = std::numeric_limits<double>::infinity()) const;

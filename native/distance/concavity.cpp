@@ -33,7 +33,7 @@ class DepthField {
   double from(std::int32_t plane, Vec3 p) const { return std::max(planes_.depth(plane, p), 0.0); }
 
   // Triangles in the same direction from the hull's centre mostly lie below the same facet: the plane that settled the
-  // last one is tried first, and only when it fails are all planes looked at.
+  // last one is tried first, and all planes only if it fails.
   double quick_upper(const Corners& corner) const {
     const std::int32_t plane = settled_[direction_of(corner)];
     if (plane < 0) return std::numeric_limits<double>::infinity();
@@ -42,7 +42,7 @@ class DepthField {
   void settled(const Corners& corner, std::int32_t plane) { settled_[direction_of(corner)] = plane; }
 
  private:
-  // Directions are told apart by the face of a cube they leave through and an 8 x 8 grid on it.
+  // Directions are binned by the face of a cube they leave through and an 8 x 8 grid on it.
   static constexpr int kGrid = 8;
   std::size_t direction_of(const Corners& corner) const {
     Vec3 d = (1.0 / 3.0) * (corner[0] + corner[1] + corner[2]) - centre_;
@@ -97,7 +97,7 @@ bool meets_concavity(const Mesh& part, const Mesh& hull, double part_volume, dou
   if (!(kVolumeWeight * volume_radius(part_volume, hull_volume) <= threshold)) return false;
   const ConvexPlanes planes(hull);
 
-  // A few corners spread over the part turn most failures away before any triangle is looked at.
+  // A few corners spread over the part reject most failures before any triangle is examined.
   const std::size_t stride = std::max<std::size_t>(1, part.faces.size() / kProbes);
   for (std::size_t f = 0; f < part.faces.size(); f += stride)
     if (planes.nearest(part.vertices[part.faces[f][0]]).depth > threshold) return false;

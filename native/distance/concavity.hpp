@@ -30,11 +30,11 @@ struct Concavity {
 double volume_radius(double part_volume, double hull_volume);
 
 // The interval of the value is at most `tolerance` wide; that of a one-sided distance may be wider below the value,
-// where the others decide it. Values up to `floor` need not be told apart: the interval may then be (0, floor).
+// where the other terms decide it. Values up to `floor` need not be resolved: the interval may then be (0, floor).
 Concavity concavity(const Mesh& part, const Mesh& hull, double part_volume, double hull_volume, double tolerance,
                     double floor);
 
-// True only when the concavity is certainly <= threshold. False when it is larger, or within 1e-3 of the threshold and
+// True only if the concavity is certainly <= threshold. False if it is larger, or within 1e-3 of the threshold and
 // undecided.
 bool meets_concavity(const Mesh& part, const Mesh& hull, double part_volume, double hull_volume, double threshold);
 

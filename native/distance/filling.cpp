@@ -10,11 +10,11 @@
 namespace rlacd {
 namespace {
 
-constexpr std::size_t kSome = 40;  // corners: more than this take longer than to look at some first
+constexpr std::size_t kSome = 40;  // corners; with more than this it pays to test some of them first
 
 constexpr double kInside = 0.5, kAccuracy = 2;
 
-// Cells are looked at: so many besides the facets, down to this share of the threshold.
+// Limits on the cells examined: this many besides the facets, down to this share of the threshold.
 constexpr int kMostCells = 400;
 constexpr double kSmall = 0.2;
 
@@ -23,7 +23,8 @@ bool meet(const Box& a, const Box& b) {
          a.lower.z <= b.upper.z && b.lower.z <= a.upper.z;
 }
 
-// What lies deeper than t under all planes. Most things do not, and mostly for the same plane as those before them.
+// The region deeper than t under all planes. Most objects are outside it, and mostly because of the same plane as those
+// before them.
 class Depths {
  public:
   Depths(const ConvexPlanes& planes, double t) : planes_(planes), t_(t) {}
@@ -35,7 +36,7 @@ class Depths {
     return plane < 0;
   }
 
-  // Whether it is certain that no point of a box is in there.
+  // Whether a box certainly has no point in the region.
   bool misses(const Box& box) {
     const Vec3 middle = 0.5 * (box.lower + box.upper), half = 0.5 * (box.upper - box.lower);
     const auto is_off = [&](std::int32_t plane) {
@@ -50,10 +51,10 @@ class Depths {
     return true;
   }
 
-  // Whether some point of a triangle is.
+  // Whether some point of a triangle is in the region.
   bool meets(Vec3 a, Vec3 b, Vec3 c) {
     if (std::max({planes_.depth(last_, a), planes_.depth(last_, b), planes_.depth(last_, c)}) <= t_) return false;
-    constexpr int kMost = 24;  // a plane adds one corner at most, and most planes none
+    constexpr int kMost = 24;  // a plane adds at most one corner, and most planes none
     Vec3 polygon[kMost] = {a, b, c}, clipped[kMost];
     int count = 3;
     for (std::size_t i = 0; i < planes_.size(); ++i) {
@@ -68,7 +69,7 @@ class Depths {
       int kept = 0;
       for (int k = 0; k < count; ++k) {
         const int next = k + 1 < count ? k + 1 : 0;
-        if (kept + 2 > kMost) return false;  // not known
+        if (kept + 2 > kMost) return false;  // undecided
         if (depth[k] > 0) clipped[kept++] = polygon[k];
         if ((depth[k] > 0) != (depth[next] > 0)) {
           const double share = depth[k] / (depth[k] - depth[next]);
@@ -90,7 +91,7 @@ class Depths {
  private:
   const ConvexPlanes& planes_;
   const double t_;
-  std::int32_t last_ = 0;  // the plane that the last thing is not deep under
+  std::int32_t last_ = 0;  // the plane that excluded the last object
 };
 
 Mesh joint_hull(const std::vector<Vec3>& first, const std::vector<Vec3>& second) {
@@ -103,8 +104,9 @@ struct Cell {
   Vec3 corner[3];
   Vec3 middle;
   double radius;
-  std::int32_t hint;                                      // the slot of a face of the solid that is near
-  double most = std::numeric_limits<double>::infinity();  // how far a point of it outside the solid can be from it
+  std::int32_t hint;                                      // the slot of a nearby face of the solid
+  double most = std::numeric_limits<double>::infinity();  // upper bound on the distance from a point of the cell
+                                                          // outside the solid to it
 
   Cell(Vec3 a, Vec3 b, Vec3 c, std::int32_t near) : corner{a, b, c}, middle((1.0 / 3) * (a + b + c)), hint(near) {
     radius = std::sqrt(std::max({norm2(a - middle), norm2(b - middle), norm2(c - middle)}));
@@ -195,16 +197,16 @@ bool Filling::comes_deeper(const Mesh& hull, double threshold) const {
 
 bool Filling::is_missed(const Mesh& hull, const std::vector<Triangle>& facets, double threshold, int most) const {
   std::priority_queue<Cell> open;
-  // Whether the middle of a cell is missed; the cell stays open where another point of it may be.
+  // Whether the middle of a cell is missed; the cell stays open if another point of it may be.
   const auto look_at = [&](Cell cell) {
     poll_stop();
     if (cell.radius < kSmall * threshold) return false;
     const double enough = std::max(0.0, threshold - cell.radius), within = threshold + cell.radius;
     const Bvh::Hit hit = surface_.bvh().closest(cell.middle, cell.hint, enough, within);
-    const double distance = std::sqrt(hit.distance2);  // `within` where there is nothing nearer
+    const double distance = std::sqrt(hit.distance2);  // `within` if nothing is nearer
     const bool is_far = distance > threshold;
     if (is_far && surface_.winding().at(cell.middle, kAccuracy) < kInside) return true;
-    // On the way from a middle inside to a point outside, the surface comes after its distance at the soonest.
+    // On the way from a middle inside the solid to a point outside, the surface comes no sooner than its distance.
     cell.most = is_far ? cell.radius - distance : cell.radius + distance;
     cell.hint = hit.slot;
     if (cell.most > threshold) open.push(cell);
@@ -215,7 +217,7 @@ bool Filling::is_missed(const Mesh& hull, const std::vector<Triangle>& facets, d
   for (int looked = 0; looked < most && !open.empty(); looked += 2) {
     const Cell cell = open.top();
     open.pop();
-    // Across the longest side: the cells stay as round as they are.
+    // Across the longest side, so that cells stay well shaped.
     int from = 0;
     for (int k = 1; k < 3; ++k)
       if (norm2(cell.corner[(k + 1) % 3] - cell.corner[k]) > norm2(cell.corner[(from + 1) % 3] - cell.corner[from]))

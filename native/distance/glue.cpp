@@ -23,7 +23,7 @@ double doubled_area(const Polygon& p) {
   return sum;
 }
 
-// Thinner than kCoincident: what rounding leaves between two outlines that were meant to be the same.
+// Thinner than kCoincident: left by rounding between two outlines that were meant to be equal.
 bool is_film(const Polygon& p) {
   double longest2 = 0;
   for (std::size_t i = 0; i < p.size(); ++i)
@@ -32,7 +32,7 @@ bool is_film(const Polygon& p) {
   return doubled_area(p) <= kCoincident * std::sqrt(longest2);
 }
 
-// Splits a convex polygon by the line through a and b: what lies left of it (inside) and right of it (outside).
+// Splits a convex polygon by the line through a and b into the part left of it (inside) and right of it (outside).
 void split(const Polygon& p, Point2 a, Point2 b, Polygon& inside, Polygon& outside) {
   inside.clear();
   outside.clear();
@@ -71,7 +71,7 @@ void subtract(std::vector<Polygon>& polygons, const std::array<Point2, 3>& trian
   polygons = std::move(left);
 }
 
-// A triangle with its plane and the two coordinates that the plane is seen in.
+// A triangle with its plane and the two coordinates it is projected to.
 struct Facet {
   Vec3 corner[3], normal;
   double offset = 0, height = 0;  // height: twice the area over the longest edge
@@ -137,7 +137,7 @@ Box box_of(const Mesh& mesh) {
   return box;
 }
 
-// Appends to `out` what is left of mesh `a` where it does not touch `b`.
+// Appends to `out` the part of mesh `a` that does not touch `b`.
 void append_untouched(Mesh& out, const Mesh& a, const Mesh& b, const Box& common) {
   const std::vector<Facet> others = facets_within(b, common);
   const auto base = static_cast<std::int32_t>(out.vertices.size());
@@ -146,7 +146,7 @@ void append_untouched(Mesh& out, const Mesh& a, const Mesh& b, const Box& common
   for (const Triangle& face : a.faces) {
     poll_stop();
     const Facet facet(a, face);
-    if (facet.height <= kCoincident) continue;  // its edges are those of its neighbours
+    if (facet.height <= kCoincident) continue;  // its edges belong to its neighbours
     bool whole = true;
     if (overlap(facet.box, common)) {
       for (const Facet& other : others) {
@@ -191,7 +191,7 @@ Mesh glue(const Mesh& a, const Mesh& b) {
 
 namespace {
 
-// Whether a triangle of one solid and an opposite one of the other have more in common than an edge.
+// Whether a triangle of one solid and an opposite one of the other share more than an edge.
 bool share_area(const Facet& facet, const Facet& other) {
   if (!overlap(facet.box, other.box) || !facet.touches(other)) return false;
   Polygon common = {facet.project(facet.corner[0]), facet.project(facet.corner[1]), facet.project(facet.corner[2])};

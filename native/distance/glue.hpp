@@ -1,15 +1,14 @@
 // Gluing two solids that touch: the surface of their union.
 //
 // Input:  two closed triangle meshes with disjoint interiors, as two parts of one solid are.
-// Output: the triangles of both but for the regions where a triangle of one lies on an oppositely oriented triangle of
+// Output: the triangles of both except the regions where a triangle of one lies on an oppositely oriented triangle of
 //         the other: there the solids touch and the union has no surface. Exact up to kCoincident; triangles cut along
-//         such regions do not share vertices with their neighbours any more, so the result is a surface to measure
-//         distances to, not a mesh to cut.
+//         such regions no longer share vertices with their neighbours, so the result is a surface to measure distances
+//         to, not a mesh to cut.
 // Algorithm: from every triangle, the coincident triangles of the other mesh are subtracted in the triangle's plane.
-// What
-//         is left of a convex polygon outside a triangle is at most three convex polygons, so plain half-plane clipping
-//         does. (A mesh boolean would ask for exactly coincident faces; two sides of a slanted cut agree to some
-//         1e-16.)
+//         The part of a convex polygon outside a triangle is at most three convex polygons, so plain half-plane
+//         clipping suffices. (A mesh boolean would need exactly coincident faces; two sides of a slanted cut agree only
+//         to about 1e-16.)
 #pragma once
 
 #include "base/geometry.hpp"
@@ -20,9 +19,9 @@ constexpr double kCoincident = 1e-8;  // distance at which faces count as touchi
 
 Mesh glue(const Mesh& a, const Mesh& b);
 
-// For every vertex of a, the direction that leads out of all its faces that touch b: 1 along the normal of each such
-// plane (as far as more than one allow), zero where it has none. Moved along it by a little, the solids overlap where
-// they touched, and a mesh boolean unites them without a crack.
+// For every vertex of a, a direction that leads out of all its faces that touch b: 1 along the normal of each such
+// plane (as far as several normals allow), zero if it has none. Once the vertices are moved along it by a little, the
+// solids overlap where they touched, and a mesh boolean unites them without a crack.
 std::vector<Vec3> outward_where_touching(const Mesh& a, const Mesh& b);
 
 }  // namespace rlacd

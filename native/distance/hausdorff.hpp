@@ -2,7 +2,7 @@
 //
 // In:  a mesh and a surface with its tree of boxes; both of any quality.
 // Out: an interval, at most `tolerance` wide, that holds the greatest distance from a point of the mesh's faces to the
-//      surface. (Wider only if more than 4 million cells did not do.)
+//      surface. (Wider only if more than 4 million cells did not suffice.)
 // How: branch_and_bound.hpp over the mesh's triangles, many threads, the same bits for any number of them.
 #pragma once
 

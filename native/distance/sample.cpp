@@ -40,7 +40,7 @@ SurfaceSamples sample_surface(const Mesh& mesh, std::size_t count, std::uint64_t
   std::size_t f = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const double along = (static_cast<double>(i) + uniform(seed, i + 2)) / static_cast<double>(count) * area;
-    // Rounding can put the last place at the very end; faces of no area are never the first to reach beyond it.
+    // Rounding can put the last position at the very end; faces of zero area are never the first to reach beyond it.
     while (f + 1 < area_up_to.size() && area_up_to[f] <= along) ++f;
     while (area_up_to[f] <= (f > 0 ? area_up_to[f - 1] : 0.0)) --f;
     const double step = static_cast<double>(i + 1);

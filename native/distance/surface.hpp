@@ -1,4 +1,4 @@
-// A triangle surface with what its queries need, built once.
+// A triangle surface with the structures its queries need, built once.
 #pragma once
 
 #include <memory>

@@ -1,11 +1,11 @@
-// Distance from a point to a triangle, for every triangle: needles, segments and single points too.
+// Distance from a point to a triangle of any shape: needles, segments and single points too.
 #pragma once
 
 #include "base/geometry.hpp"
 
 namespace rlacd {
 
-// A triangle with the products that each query would otherwise repeat.
+// A triangle with the products that every query would otherwise recompute.
 struct TriangleFrame {
   Vec3 a, ab, ac;
   double ab_ab, ab_ac, ac_ac;
@@ -27,7 +27,7 @@ inline Vec3 closest_on_segment(Vec3 start, Vec3 along, Vec3 p) {
   return start + t * along;
 }
 
-// Edges are exact whatever the shape. The face is looked at only while its normal is known to 1e-8; below that the
+// Edges are exact whatever the shape. The face is considered only while its normal is accurate to 1e-8; below that the
 // triangle is narrower than 1e-8 of its length, and the edges are that close to all of it.
 inline Vec3 closest_on_slender_triangle(const TriangleFrame& t, Vec3 p) {
   Vec3 best = closest_on_segment(t.a, t.ab, p);
@@ -42,9 +42,9 @@ inline Vec3 closest_on_slender_triangle(const TriangleFrame& t, Vec3 p) {
   return norm2(q - p) < norm2(best - p) ? q : best;
 }
 
-// Finds the corner, edge or face whose Voronoi region holds p (Ericson, Real-Time Collision Detection, 2005, 5.1.5).
-// The answer always lies on the triangle, so a distance taken to it is never too small; it is too large by at most
-// about 1e-8 of the longest edge.
+// Finds the corner, edge or face whose Voronoi region contains p (Ericson, Real-Time Collision Detection, 2005, 5.1.5).
+// The answer always lies on the triangle, so the distance to it is never too small; it is too large by at most about
+// 1e-8 of the longest edge.
 inline Vec3 closest_on_triangle(const TriangleFrame& t, Vec3 p) {
   if (t.slender) return closest_on_slender_triangle(t, p);
   const Vec3 ap = p - t.a;

@@ -12,10 +12,10 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Planes are moved out by this before a triangle of the surface is clipped by them, so that the hulls on both sides of
-// a cut leave no slivers of rounding between them. What is lost is at most this far beyond every facet's plane.
+// a cut leave no rounding slivers between them. The material lost lies at most this far beyond every facet's plane.
 constexpr double kInsideSlack = 1e-9;
 
-// A facet in more pieces than this is left as it is.
+// A facet cut into more pieces than this is left whole.
 constexpr std::size_t kMostPieces = 4096;
 
 // Two facets face the same way when the angle between them is below 60 degrees.
@@ -42,7 +42,7 @@ double distance2_to_box(const Box& box, Vec3 p) {
   return sum;
 }
 
-// Polygons in one mesh, in which equal corners are one vertex: its distance is asked once.
+// Polygons merged into one mesh, in which equal corners are one vertex: its distance is computed once.
 class Gathering {
  public:
   void add(const Polygon& polygon) {
@@ -88,7 +88,7 @@ bool is_beyond(const ConvexPlanes& planes, std::int32_t plane, const Corners& co
          planes.depth(plane, corner[2]) < -gap;
 }
 
-// A plane that a triangle lies farther than `gap` beyond, or -1. The one given is tried first.
+// A plane that a triangle lies farther than `gap` beyond, or -1. The given plane is tried first.
 std::int32_t plane_before(const ConvexPlanes& planes, const Corners& corner, double gap, std::int32_t first) {
   if (first >= 0 && is_beyond(planes, first, corner, gap)) return first;
   for (std::int32_t i = 0; i < static_cast<std::int32_t>(planes.size()); ++i)
@@ -104,7 +104,7 @@ HullUnion::Member::Member(Mesh hull) : mesh(std::move(hull)), planes(mesh), bvh(
 }
 
 double HullUnion::Member::distance(Vec3 p, double enough) const {
-  // The farthest facet plane that p is beyond is no farther than the hull.
+  // The distance to the farthest facet plane that p is beyond is a lower bound of the distance to the hull.
   const double beyond = -planes.nearest(p).depth;
   if (beyond <= 0) return 0;
   return beyond >= enough ? beyond : std::sqrt(bvh.closest(p).distance2);
@@ -163,9 +163,9 @@ HullUnion::Exposed HullUnion::exposed(double gap, int threads) const {
       facet.pieces = {{corner.begin(), corner.end()}};
       for (std::size_t m = 0; m < members_.size() && !facet.pieces.empty(); ++m) {
         if (m == own || !overlap(box, members_[m]->box, gap)) continue;
-        // Where another hull's facet faces the other way (or across), the hull is grown by the gap: a touching facet is
-        // covered. Where it faces the same way, the hull is shrunk by less than that: of two facets in one plane
-        // neither covers the other, and of two hulls on both sides of a plane across this facet one always covers it.
+        // If another hull's facet faces the other way (or across), the hull is grown by the gap: a touching facet is
+        // covered. If it faces the same way, the hull is shrunk by less than that: of two facets in one plane neither
+        // covers the other, and of two hulls on both sides of a plane across this facet one always covers it.
         const ConvexPlanes& planes = members_[m]->planes;
         if (const std::int32_t plane = plane_before(planes, corner, gap, between[m]); plane >= 0) {
           between[m] = plane;
@@ -216,7 +216,7 @@ Interval HullUnion::under(const Mesh& surface, double tolerance, int threads) co
       for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) task(i, clipper);
     });
   };
-  std::vector<std::vector<std::int32_t>> holders(surface.vertices.size());  // the hulls that a corner is in
+  std::vector<std::vector<std::int32_t>> holders(surface.vertices.size());  // the hulls that contain a corner
   for_each(holders.size(), [&](std::size_t v, Clipper&) {
     const Vec3 p = surface.vertices[v];
     for (std::size_t m = 0; m < members_.size(); ++m)
@@ -233,7 +233,7 @@ Interval HullUnion::under(const Mesh& surface, double tolerance, int threads) co
     outside[f] = {{corner.begin(), corner.end()}};
     for (std::size_t m = 0; m < members_.size(); ++m) {
       if (!overlap(box, members_[m]->box, kInsideSlack)) continue;
-      if (outside[f].size() > kMostPieces) break;  // uncut pieces are in no way wrong here, only more work
+      if (outside[f].size() > kMostPieces) break;  // uncut pieces are not wrong here, only more work
       clipper.subtract(outside[f], grown[m]);
     }
   });

@@ -3,13 +3,13 @@
 // In:  convex hulls (closed, convex, outward oriented), which may touch and overlap; a triangle surface.
 // Out: over:  the greatest distance from the surface *of the union* to the given surface: what the hulls add;
 //      under: the greatest distance from the given surface to the union as a solid, 0 inside any hull: what they miss;
-//      each as an interval of the width asked for.
-// How: the triangles are clipped exactly against the hulls, so that what counts is a set of small convex polygons, and
-//      branch_and_bound.hpp finds the maximum over those. Over: a facet of a hull loses what lies inside other hulls
-//      and what touches another hull's facet from the opposite side; of two facets that coincide facing the same way,
-//      both stay. Under: a triangle of the surface loses what lies inside any hull; on the rest, distance to the union
-//      is the least of the distances to the hulls, which are convex. Triangles are independent and waves deterministic:
-//      the same bits for any number of threads.
+//      each as an interval of the requested width.
+// How: the triangles are clipped exactly against the hulls, which leaves a set of small convex polygons, and
+//      branch_and_bound.hpp finds the maximum over those. Over: a facet of a hull loses the regions inside other hulls
+//      and those that touch another hull's facet from the opposite side; of two facets that coincide facing the same
+//      way, both stay. Under: a triangle of the surface loses the regions inside any hull; on the rest, distance to the
+//      union is the least of the distances to the hulls, which are convex. Triangles are independent and waves
+//      deterministic: the same bits for any number of threads.
 #pragma once
 
 #include <memory>
@@ -29,8 +29,8 @@ class HullUnion {
   HullUnion& operator=(const HullUnion&) = delete;
 
   // The surface of the union as triangles. Cracks between hulls narrower than `gap` count as closed; next to inner
-  // corners of the surface, strips narrower than about `gap` are lost for it. A facet that lies
-  // in so many hulls that its pieces were not cut out to the end is left to `unresolved`: parts of it are hidden.
+  // corners of the surface, strips narrower than about `gap` are lost. A facet inside so many hulls that cutting it was
+  // abandoned is recorded in `unresolved`: parts of it are hidden.
   struct Exposed {
     Mesh exposed, unresolved;
   };
@@ -45,7 +45,8 @@ class HullUnion {
  private:
   struct Member {
     explicit Member(Mesh hull);
-    // 0 inside, else to the surface; may give up with any number >= `enough` once the distance is known to be that.
+    // 0 inside, else the distance to the surface; may return any number >= `enough` once the distance is known to be
+    // that large.
     double distance(Vec3 p, double enough) const;
 
     Mesh mesh;

@@ -5,7 +5,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-// Of the triangle seen from p (Van Oosterom and Strackee, 1983), positive when p is behind it.
+// Solid angle of the triangle seen from p (Van Oosterom and Strackee, 1983), positive when p is behind it.
 double solid_angle(const TriangleFrame& t, Vec3 p) {
   const Vec3 a = t.a - p, b = t.a + t.ab - p, c = t.a + t.ac - p;
   const double la = norm(a), lb = norm(b), lc = norm(c);
@@ -19,7 +19,7 @@ double radius_around(Vec3 centre, const Box& box) {
   return norm(reach);
 }
 
-// Adds the first moments of a group around its own centre to those around `centre`.
+// Adds the first moments of a group about its own centre to those about `centre`.
 void add_first(Vec3* rows, const Vec3* own, Vec3 shift, Vec3 normal) {
   for (int i = 0; i < 3; ++i) rows[i] = rows[i] + own[i] + shift[i] * normal;
 }

@@ -2,8 +2,7 @@
 //
 // In:  a tree of boxes over triangles.
 // Out: about 1 inside, about 0 outside a closed outward-oriented surface (2 where two bodies overlap); in between near
-// the
-//      holes of an open one.
+//      the holes of an open one.
 // How: Jacobson, Kavan, Sorkine-Hornung, "Robust Inside-Outside Segmentation using Generalized Winding Numbers" (2013):
 //      the sum of the solid angles of the triangles / 4 pi. Far groups of triangles are replaced by the first two terms
 //      of their multipole expansion: Barill et al., "Fast Winding Numbers for Soups and Clouds" (2018).

@@ -2,9 +2,9 @@
 //
 // In:  a closed convex triangle mesh.
 // Out: signed distances, negative inside; exact up to rounding.
-// How: inside, the nearest facet plane is the nearest surface. Outside, the farthest plane is a lower bound that
-// settles
-//      most questions; what it does not settle is asked of a tree of boxes over the facets, built when first needed.
+// How: inside, the nearest facet plane gives the distance. Outside, the farthest plane is a lower bound that settles
+// most
+//      queries; the rest go to a tree of boxes over the facets, built when first needed.
 #pragma once
 
 #include <memory>
@@ -21,7 +21,8 @@ class ConvexBody {
   ConvexBody(const ConvexBody&) = delete;
   ConvexBody& operator=(const ConvexBody&) = delete;
 
-  // Signed distance of p; once it is known to be at least `enough`, any number from there up to the distance.
+  // Signed distance of p; once the distance is known to be at least `enough`, any number between the two may be
+  // returned.
   double distance(Vec3 p, double enough = std::numeric_limits<double>::infinity()) const;
 
   // The closest point of the surface to a point outside.

@@ -10,11 +10,11 @@
 namespace rlacd {
 namespace {
 
-// Facets whose plane a new point misses by less than this are taken for seen: the point's new facets then never lie in
-// the plane of a neighbour, and have an area. What is lost by it is made good at the end by a scaling of that order.
+// Facets whose plane a new point misses by less than this count as visible, so that the point's new facets never lie in
+// the plane of a neighbour and have nonzero area. A final scaling of that order makes up for the loss.
 constexpr double kFlat = 1e-9;
 
-// A collapse whose point is farther away than this (the hull is about 2 wide) adds more than anyone wants.
+// A collapse whose point is farther away than this (the hull is about 2 wide) adds too much volume to be useful.
 constexpr double kReach = 50;
 
 }  // namespace
@@ -90,7 +90,7 @@ bool ConvexCollapse::gather(std::int32_t from, std::int32_t to) {
   return joined;
 }
 
-// Adds to region_ what else the point sees, over neighbours. False when it sees everything.
+// Adds to region_ all other facets visible from the point, by adjacency. False if all facets are visible.
 bool ConvexCollapse::extend(Vec3 point) {
   for (std::size_t next = 0; next < region_.size(); ++next)
     for (const std::int32_t f : facets_[region_[next]].neighbour) {
@@ -130,7 +130,7 @@ bool ConvexCollapse::trace_horizon() {
 
 std::optional<ConvexCollapse::Collapse> ConvexCollapse::plan(std::int32_t from, std::int32_t to) {
   if (!gather(from, to)) return std::nullopt;
-  // The volume between the facets and a point seeing them is sum area (n . x - h) / 3, linear in x.
+  // The volume between the facets and a point that sees them is sum area (n . x - h) / 3, linear in x.
   Vec3 objective;
   above_.clear();
   for (const std::int32_t f : region_) {
@@ -185,7 +185,7 @@ void ConvexCollapse::apply(const Collapse& collapse) {
     for (int k = 0; k < 3; ++k)
       if (beyond.corner[k] == ring[i].to && beyond.corner[(k + 1) % 3] == ring[i].from) beyond.neighbour[k] = fan[i];
   }
-  // Living corners of the region are those on the ring: the fan gave them a facet again.
+  // Corners of the region that remain are those on the ring: the fan has given them a facet again.
   ++alive_;
   for (const std::int32_t corner : touched) alive_ -= facet_of_[corner] < 0;
   for (const HorizonEdge& edge : ring) ++version_[edge.from];

@@ -1,4 +1,4 @@
-// A closed convex triangle mesh that shrinks its number of corners by growing.
+// A closed convex triangle mesh whose number of corners is reduced by letting it grow.
 //
 // In:  a convex hull around the origin, about as wide in all directions.
 // Out: convex hulls around it with fewer and fewer corners, the cheapest edge collapse first.
@@ -18,13 +18,13 @@ namespace rlacd {
 
 class ConvexCollapse {
  public:
-  // Edges of the hull that need not be tried can be left out: may_collapse(from, to).
+  // may_collapse(from, to) excludes edges of the hull that need not be tried.
   explicit ConvexCollapse(
       const Mesh& hull, const std::function<bool(std::int32_t, std::int32_t)>& may_collapse =
                             [](std::int32_t, std::int32_t) { return true; });
 
-  // Collapses edges while there are more than `most` corners, and further while the new corner is acceptable. False
-  // when no edge can be collapsed any more although there are too many corners.
+  // Collapses edges while there are more than `most` corners, and beyond that while the new corner is acceptable. False
+  // if no edge can be collapsed although there are still too many corners.
   template <class Acceptable>
   bool reduce(std::size_t most, const Acceptable& acceptable);
 
@@ -68,8 +68,8 @@ class ConvexCollapse {
   std::vector<Collapse> heap_;
   std::size_t alive_ = 0;
 
-  std::vector<std::int32_t> region_;  // facets that the point of the collapse at hand replaces
-  std::vector<std::uint32_t> mark_;   // of a facet: the last gathering it was part of
+  std::vector<std::int32_t> region_;  // facets that the point of the current collapse replaces
+  std::vector<std::uint32_t> mark_;   // of a facet: the last region it was part of
   std::uint32_t gathering_ = 0;
   std::vector<HorizonEdge> horizon_;
   std::vector<std::int32_t> horizon_at_;  // of a corner: the horizon edge that starts there

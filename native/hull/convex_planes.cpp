@@ -7,8 +7,8 @@
 namespace rlacd {
 namespace {
 
-// Normals closer than this are one plane. It is pushed out to touch the hull like every other, so taking it for its
-// twin shifts a depth by no more than this times the hull's diameter, and only upwards.
+// Planes whose normals are closer than this are one. Like every other it is pushed out to touch the hull, so merging
+// the two changes a depth by at most this times the hull's diameter, and only upwards.
 constexpr double kSameNormal = 1e-9;
 
 // Pushes planes out until they touch a point.

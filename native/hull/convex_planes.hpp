@@ -1,7 +1,7 @@
-// The facet planes of a convex polytope, laid out for speed, and depth under them.
+// The facet planes of a convex polytope in a vectorised layout, and depth under them.
 //
 // In:  a closed convex triangle mesh, whose facets may be slivers and whose flat sides may be cut into many triangles.
-// Out: unit normals n_i and offsets h_i with n_i . x <= h_i for every corner x, one plane a flat side.
+// Out: unit normals n_i and offsets h_i with n_i . x <= h_i for every corner x, one plane per flat side.
 // A sliver's computed normal can point anywhere. Every plane is therefore pushed out until it touches the hull's
 // farthest corner: it then supports the hull whatever its normal, and the distance from an inner point to it is never
 // less than the distance to the hull's surface.
@@ -39,7 +39,7 @@ class ConvexPlanes {
   };
   // The plane of least depth: for a point inside the hull, the distance to its surface; negative outside.
   Nearest nearest(Vec3 p) const;
-  // A plane that p is no deeper under than t, or -1.
+  // A plane that p is at most t deep under, or -1.
   std::int32_t first_within(Vec3 p, double t) const;
 
  private:
