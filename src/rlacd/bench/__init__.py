@@ -1,4 +1,4 @@
-"""Side by side with other tools, on the same meshes and by the same measure (extra ``bench``)."""
+"""Comparison with other tools on the same meshes, by the same metrics (extra ``bench``)."""
 
 from rlacd.bench.methods import Method, make_method
 from rlacd.bench.metrics import Metrics, measure

@@ -1,7 +1,7 @@
-"""The paper's experiments that train a policy for each arm: all arms equally long, from the same seed and meshes.
+"""The paper's experiments that train one policy per arm: all arms equally long, with the same seed and meshes.
 
-They are short beside the paper's million cuts; how long, the page says. An arm that was interrupted is resumed, and a
-finished one is not trained again.
+They are short compared with the paper's million cuts; the page states their length. An interrupted arm is resumed, and
+a finished one is not trained again.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ RATIOS = (0.01, 0.1, 1.0, 10.0, 100.0)
 """lambda 1 / lambda 2, as in 4.5.3."""
 
 LARGEST_WEIGHT = 1000.0
-"""The larger of the two weights is the paper's; what the smaller one is follows from the ratio."""
+"""The larger of the two weights, as in the paper; the ratio determines the smaller one."""
 
 
 def _weights(ratio: float) -> Changes:
@@ -48,7 +48,7 @@ ARMS: Mapping[str, Mapping[str, Changes]] = {
         **{f"{share:g} + {share:g}": {"discount": "static", "static_discount": share} for share in (0.5, 0.9, 0.99)},
     },
 }
-"""What each arm of an experiment changes of the preset."""
+"""Changes to the preset made by each arm of an experiment."""
 
 TITLES = {
     "paper-rewards": "Weights of the rewards (4.5.3)",
@@ -57,7 +57,7 @@ TITLES = {
 }
 
 VALIDATIONS = 4
-"""So often each arm is validated."""
+"""Number of validations of each arm."""
 
 
 def train_arms(
@@ -69,20 +69,20 @@ def train_arms(
     seed: int = 0,
     say: Callable[[str], None] = print,
 ) -> Page:
-    """Train every arm of an experiment and put their last validations and their curves on a page.
+    """Train every arm of an experiment and return a page with their last validations and their curves.
 
     Parameters
     ----------
     experiment : str
         A key of `ARMS`.
     meshes : Path
-        To train on; some of them are held out.
+        Training meshes; some of them are held out.
     folder : Path
-        Gets a folder an arm.
+        Run folder; each arm gets a subfolder.
     preset : str
         See `rlacd.learn.paper.options.PRESETS`.
     iterations : int, optional
-        Cuts an arm; the preset's by default.
+        Cuts per arm; the preset's number by default.
     seed : int
     say : callable
 

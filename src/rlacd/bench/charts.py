@@ -28,7 +28,7 @@ class Curve:
 def curves_chart(
     curves: Iterable[Curve], x: str, y: str, *, log_x: bool = False, log_y: bool = False, markers: bool = True
 ) -> bytes:
-    """Draw curves, with a marker at every point where wanted, as SVG.
+    """Draw curves as SVG, with a marker at every point if requested.
 
     Raises
     ------
@@ -47,13 +47,13 @@ def curves_chart(
 
 
 def pareto_chart(points: Iterable[tuple[str, float, float]], x: str, y: str) -> bytes:
-    """Draw one point a method, smaller being better on both axes, and join those that none beats on both; as SVG.
+    """Draw one point per method as SVG, smaller being better on both axes, and join the Pareto front.
 
     Parameters
     ----------
     points : iterable of (label, x, y)
     x, y : str
-        What the axes are; x is logarithmic.
+        Axis labels; x is logarithmic.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def pareto_chart(points: Iterable[tuple[str, float, float]], x: str, y: str) -> 
 
 
 def pareto_front(points: Sequence[tuple[float, ...]]) -> list[int]:
-    """Indices of the points that no other one beats: as small in every number, and smaller in one."""
+    """Indices of the points that no other point dominates, being no larger in every coordinate and smaller in one."""
 
     def beaten(p: tuple[float, ...]) -> bool:
         return any(q != p and all(a <= b for a, b in zip(q, p, strict=True)) for q in points)
@@ -87,7 +87,7 @@ _MARKERS = "osD^vPX*<>"
 
 def _figure() -> tuple[Any, Any]:
     try:
-        from matplotlib.figure import Figure  # without pyplot: no window system is asked for
+        from matplotlib.figure import Figure  # pyplot would look for a window system
     except ModuleNotFoundError as error:
         raise MissingExtraError("charts need an extra: run  pip install 'rlacd[bench]'  and try again.") from error
     figure = Figure(figsize=(6.4, 4.2), layout="constrained")
@@ -112,6 +112,6 @@ def _svg(figure: Any) -> bytes:
     import matplotlib
 
     drawn = io.BytesIO()
-    with matplotlib.rc_context({"svg.hashsalt": "rlacd"}):  # the same bytes every time
+    with matplotlib.rc_context({"svg.hashsalt": "rlacd"}):  # makes the bytes reproducible
         figure.savefig(drawn, format="svg", metadata={"Date": None})
     return drawn.getvalue()

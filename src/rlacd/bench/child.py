@@ -1,6 +1,6 @@
-"""The process in which a tool runs and its hulls are measured: ``python -m rlacd.bench.child``, one task each.
+"""The process that runs a tool and measures its hulls: ``python -m rlacd.bench.child``, one task per process.
 
-Whatever a tool does (crash, hang, eat all memory, print to stdout) happens here; what is to be known is in a file.
+A tool that crashes, hangs, exhausts memory or prints to stdout does so here; the results go to a file.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ _CUBE_FACES = np.array(
 
 
 def run_method(mesh: Path, name: str, setting: float, threads: int, hulls: Path) -> None:
-    """Run a method on a mesh file and keep hulls, seconds and memory.
+    """Run a method on a mesh file and save hulls, seconds and memory.
 
-    The clock runs from arrays in memory to arrays in memory: libraries are loaded before, by a cube.
+    The timing covers arrays in to arrays out: a run on a cube loads the libraries first.
     """
     method = make_method(name)
     source = load_mesh(mesh)
@@ -56,7 +56,7 @@ def run_method(mesh: Path, name: str, setting: float, threads: int, hulls: Path)
 
 
 def measure_hulls(mesh: Path, name: str, setting: float, threads: int, hulls: Path) -> Row:
-    """Measure what `run_method` kept."""
+    """Measure the hulls that `run_method` saved."""
     found, account = load_hulls(hulls)
     if not found:
         return {**account, "error": "returned no hulls"}
@@ -71,14 +71,14 @@ def _peak_mb() -> float:
 
 
 def _end_with_parent() -> None:
-    """Stdin is a pipe that ends when the parent does, however that dies."""
+    """Exit when stdin ends: it is a pipe that closes when the parent dies, for whatever reason."""
     while os.read(0, 1):
         pass
     os._exit(1)
 
 
 def main() -> None:
-    """Do the task that the one argument, JSON, describes; the answer goes to the file it names."""
+    """Do the task described by the only argument, a JSON text; the answer goes to the file it names."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
     task = json.loads(sys.argv[1])
     if task["memory"] and sys.platform == "linux":

@@ -1,4 +1,4 @@
-"""What a comparison shows: each method at a number of its own, at equal accuracy, and over a sweep of numbers."""
+"""The contents of a comparison: each method at its own setting, at equal accuracy, and over a sweep of settings."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ DEFAULT_METHODS = (
     "greedy:best",
     "learned:best",
 )
-"""All that `rlacd bench compare` runs unless told otherwise."""
+"""The methods that `rlacd bench compare` runs by default."""
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A method at one number, on every mesh."""
+    """A method at one setting, on every mesh."""
 
     method: str
     setting: float
@@ -44,12 +44,12 @@ class Entry:
 
     @property
     def label(self) -> str:
-        """The method and its number."""
+        """The method and its setting."""
         return f"{self.method} @ {self.setting:g}"
 
 
 def at_settings(bench: Bench, methods: Sequence[str], threshold: float | None = None) -> list[Entry]:
-    """Run methods, each at its tool's default number, or those that have a threshold at the one given."""
+    """Run methods, each at its tool's default setting, or at `threshold` if it has a concavity threshold."""
     entries = []
     for name in methods:
         method = make_method(name)
@@ -59,7 +59,7 @@ def at_settings(bench: Bench, methods: Sequence[str], threshold: float | None = 
 
 
 def compare_page(bench: Bench, title: str, entries: Sequence[Entry], pictures: int = 0, up: str = "z") -> Page:
-    """Put what the entries have in common into a page: table, trade-off, mesh by mesh, failures, pictures."""
+    """Build a page on the meshes that all entries solved: table, trade-off, details per mesh, failures, pictures."""
     page = Page(title, [about(bench)])
     groups = [(entry.label, entry.rows) for entry in entries]
     page.add(comparison(groups), details(groups))
@@ -73,7 +73,7 @@ def compare_page(bench: Bench, title: str, entries: Sequence[Entry], pictures: i
 
 
 def about(bench: Bench) -> Text:
-    """Say what was measured on what."""
+    """Describe the data and the measurements."""
     versions = sorted({f"{_package(r['method'])} {r['version']}" for r in bench.store.rows() if "version" in r})
     limits = bench.limits
     return Text(
@@ -88,7 +88,7 @@ def about(bench: Bench) -> Text:
 
 @lru_cache(maxsize=1)
 def machine() -> str:
-    """What the processor is called."""
+    """Name of the processor."""
     try:
         for line in Path("/proc/cpuinfo").read_text().splitlines():
             if line.startswith("model name"):
@@ -131,7 +131,7 @@ def _package(method: str) -> str:
 
 
 def curve_chart(bench: Bench, methods: Sequence[str]) -> tuple[Figure, Table]:
-    """Plot mean parts against mean D_h over all numbers at which a method has done every mesh."""
+    """Plot mean parts against mean D_h over all settings at which a method has finished every mesh."""
     lines: list[list[object]] = []
     drawn = []
     for method in methods:
@@ -154,7 +154,7 @@ def _means(point: Point, shared: set[str]) -> tuple[float, float, float]:
 
 
 def sheets(bench: Bench, entries: Sequence[Entry], meshes: Sequence[str], up: str = "z") -> list[Figure | Text]:
-    """Draw each mesh by every method that managed it."""
+    """Draw each mesh with the hulls of every method that solved it."""
     drawn: list[Figure | Text] = []
     names = short_names(bench.names)
     for mesh in meshes:
@@ -174,7 +174,7 @@ def sheets(bench: Bench, entries: Sequence[Entry], meshes: Sequence[str], up: st
 
 
 def save_csv(bench: Bench, folder: Path) -> None:
-    """Write every row the store has as ``results.csv``.
+    """Write every row of the store to ``results.csv``.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""The paper's deployment with its numbers left free: which planes there are, how many are asked, how they are ranked.
+"""The paper's deployment with free parameters: which planes exist, how many are evaluated, and how they are ranked.
 
-A ranking takes its best planes of those along the axes, planes of concave edges join them, and of all these the one
-with the least sum of hull volumes cuts. The paper's Tables 2 and 3 leave out kinds of planes and vary the two numbers.
+A ranking selects its best axis planes, planes of concave edges join them, and the one of least total hull volume is
+cut. The paper's Tables 2 and 3 leave out kinds of planes and vary the two numbers.
 """
 
 from __future__ import annotations
@@ -35,16 +35,16 @@ RANKINGS = ("learned", "excess")
 
 @dataclass(frozen=True)
 class Deployment:
-    """What may be varied.
+    """Parameters of the deployment.
 
     Attributes
     ----------
     ranking : str
         "learned": the shipped network; "excess": the greedy score ``rlacd.policies.greedy.excess_norm``.
     planes : int
-        So many of the best ranked planes along the axes go on (the paper's #AP).
+        Number of best-ranked axis planes to evaluate (the paper's #AP).
     edges : int
-        The planes of so many concave edges join them (the paper's #CE, three planes each).
+        Number of concave edges whose planes join them (the paper's #CE, three planes each).
     spatial, principal : bool
         Whether the planes along x, y, z and along the principal axes exist.
     """
@@ -90,13 +90,13 @@ class Deployment:
 
 
 class Deployed:
-    """A policy: the least hull sum among the best ranked planes along the axes and those of concave edges.
+    """A policy: the least total hull volume among the best-ranked axis planes and the planes of concave edges.
 
     Parameters
     ----------
     deployment : Deployment
     threshold : float
-        The criterion's; the network looks at it.
+        The criterion's threshold, an input of the network.
     """
 
     def __init__(self, deployment: Deployment, threshold: float) -> None:
@@ -113,16 +113,16 @@ class Deployed:
         return cheapest(scored, hull_sum(scored))
 
     def _best_along_axes(self, component: Component, threads: int) -> Candidates:
-        """The best ranked valid planes along those axes that there are."""
+        """The best-ranked valid planes along the enabled axes."""
         swept = sweep(
             component, candidates_of(component, OFFSETS_PER_AXIS), threads
-        )  # all that the network wants to see
+        )  # the network needs the full sweep
         kinds = np.repeat([self._of.spatial, self._of.principal], 3 * OFFSETS_PER_AXIS)
         exists = np.concatenate([kinds, np.zeros(len(swept.candidates) - len(kinds), dtype=bool)])
         valid = next((v for s in (SLIVER, SLIVER / 100) if (v := exists & swept.valid(s)).any()), exists & False)
         cost = excess_norm(swept) if self._learned is None else self._learned.rank(component, swept)
         ranked = np.argsort(np.where(valid, cost, np.inf), kind="stable")
-        best = np.sort(ranked[: min(self._of.planes, int(valid.sum()))])  # of planes that cost the same, the first cuts
+        best = np.sort(ranked[: min(self._of.planes, int(valid.sum()))])  # sweep order: ties go to the first
         return Candidates(swept.candidates.directions[best], swept.candidates.offsets[best])
 
 

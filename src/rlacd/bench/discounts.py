@@ -26,10 +26,10 @@ DISCOUNTS = {
 }
 THRESHOLD = 0.02
 SMALL_FILE = 15_000
-"""Bytes: the trees of small meshes are quickly grown."""
+"""Bytes: cut trees of small meshes take little time to build."""
 
 POINTS = 300
-"""On each curve."""
+"""Number of points on each curve."""
 
 ENDLESS = 1e12
 """Values beyond this are not drawn."""
@@ -42,9 +42,9 @@ def discounts_page(meshes: Path, names: list[str], count: int = 12, depth: int =
     ----------
     meshes : Path
     names : list of str
-        Meshes in that folder, of which those that are small and need a cut are drawn, always the same ones.
+        Meshes in that folder. A fixed sample is taken of those that are small and need a cut.
     count, depth, steps : int
-        Meshes, cuts deep, steps of Q-learning.
+        Number of meshes, depth of the cut trees, steps of Q-learning.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def _figure(name: str, curves: list[Curve], what: str) -> Figure:
 
 
 def _trees(meshes: Path, names: list[str], count: int, depth: int) -> list[Node]:
-    """Cut trees of the first `count` small meshes, in a fixed random order, that need a cut."""
+    """Cut trees of the first `count` small meshes that need a cut, in a fixed random order."""
     roots: list[Node] = []
     used = 0
     small = [name for name in sorted(names) if (meshes / name).stat().st_size < SMALL_FILE]

@@ -1,4 +1,4 @@
-"""The paper's experiments that need no training, each from a folder of meshes to a page."""
+"""The paper's experiments that need no training; each turns a folder of meshes into a page."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ TABLE_1_METHODS = (
 )
 
 APART = 0.05
-"""A method whose mean D_h cannot be brought this close to the target, relative to it, is marked."""
+"""A method whose mean D_h stays farther than this from the target, relative to it, is marked."""
 
 PAPER: Mapping[str, tuple[float | None, ...]] = {
     "CoACD": (10.7, 21.9, 44.2, 52.3),
@@ -41,7 +41,7 @@ PAPER: Mapping[str, tuple[float | None, ...]] = {
 
 
 def paper_table_1() -> Table:
-    """Set the paper's numbers as ours are: parts, parts over CoACD's, seconds, at both accuracies."""
+    """Format the paper's numbers like ours: parts, ratio to CoACD's parts, and seconds, at both accuracies."""
     lines = []
     for method, numbers in PAPER.items():
         cells: list[object] = [method]
@@ -84,7 +84,7 @@ def _label(method: str, point: Point, target: float) -> str:
 
 
 def vhacd_at_equal_parts(bench: Bench, reference: str, setting: float) -> Page:
-    """V-HACD, asked for as many hulls as the reference made of each mesh (4.4.2)."""
+    """Compare with V-HACD, limited on each mesh to the reference's number of hulls (4.4.2)."""
     ours = bench.run(reference, setting)
     counts = {row["mesh"]: row["parts"] for row in ours if "error" not in row}
     theirs = bench.run_tasks([BenchTask(mesh, "vhacdx:hulls", float(n)) for mesh, n in counts.items()])
@@ -126,7 +126,7 @@ def kinds_of_planes(bench: Bench, ranking: str, setting: float) -> Page:
 
 
 def numbers_of_planes(bench: Bench, ranking: str, setting: float, planes: Sequence[int], edges: Sequence[int]) -> Page:
-    """Vary how many ranked planes (#AP) and concave edges (#CE) are asked, one at a time (Table 3)."""
+    """Vary the numbers of ranked planes (#AP) and concave edges (#CE), one at a time (Table 3)."""
     if not planes and not edges:
         raise OptionError("there is nothing to vary; give numbers of planes or of edges.")
     arms = {f"#AP {n}, #CE 4": f"planes:ap={n}:{ranking}" for n in planes}

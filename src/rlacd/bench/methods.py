@@ -1,7 +1,7 @@
-"""What is compared: every tool behind one interface, with one number that says how tight its hulls shall be.
+"""The methods compared: every tool behind one interface, with one setting that controls how tight its hulls are.
 
 ========================  ============================================  =======================================
-name                      tool                                          its number
+name                      tool                                          setting
 ========================  ============================================  =======================================
 ``coacd``                 CoACD, default options                        concavity threshold
 ``vhacdx``                V-HACD 4, up to 1,024 hulls                   volume error, percent
@@ -36,27 +36,27 @@ Run: TypeAlias = Callable[[FloatArray, IntArray, float, int], list[RawHull]]
 """(vertices, faces, setting, threads) -> hulls."""
 
 STEPS = {"balanced": 24, "best": 100}
-"""Steps of the search: ``best`` goes by seconds otherwise, and what it finds in them depends on the machine."""
+"""Steps of the search: a time budget, the default of ``best``, would make results depend on the machine."""
 
 MOST_VHACD_HULLS = 1024
-"""V-HACD stops there when it goes by its volume error: ten levels of halving."""
+"""Hull limit of V-HACD when its setting is the volume error: ten levels of halving."""
 
 
 @dataclass(frozen=True)
 class Method:
-    """A tool with everything but its number fixed.
+    """A tool with all options but its setting fixed.
 
     Attributes
     ----------
     name : str
     version : str
-        Of the package it comes from.
+        Version of its package.
     setting : str
-        What its number means: "threshold", "tolerance", "percent" or "hulls".
+        Meaning of its setting: "threshold", "tolerance", "percent" or "hulls".
     default : float
-        The number the tool's authors chose.
+        The default of the tool's authors.
     run : callable
-        (vertices [V, 3], faces [F, 3], number, threads) -> hulls.
+        (vertices [V, 3], faces [F, 3], setting, threads) -> hulls.
     """
 
     name: str
@@ -67,11 +67,11 @@ class Method:
 
     @property
     def falls(self) -> bool:
-        """Whether a larger number asks for tighter hulls."""
+        """Whether a larger setting asks for tighter hulls."""
         return self.setting == "hulls"
 
     def concavity(self, number: float) -> float | None:
-        """The concavity that the method claims to keep, if it claims any."""
+        """The concavity that the method claims to keep; None if it claims none."""
         return number if self.setting == "threshold" else None
 
 
@@ -83,7 +83,7 @@ def make_method(name: str) -> Method:
     OptionError
         There is none.
     MissingExtraError
-        It is a peer that is not installed.
+        The method's tool is not installed.
     """
     base, *tags = name.split(":")
     if name == "coacd":
@@ -141,7 +141,7 @@ def _vhacd_by_hulls(vertices: FloatArray, faces: IntArray, number: float, thread
 def _vhacd(vertices: FloatArray, faces: IntArray, threads: int, **options: float) -> list[RawHull]:
     import vhacdx
 
-    # It takes faces as trimesh's importers once gave them: a count of 3 before each.
+    # vhacdx takes faces in VTK's flat layout: a count of 3 before each triangle.
     counted = np.column_stack([np.full(len(faces), 3), faces]).astype(np.uint32).ravel()
     found = vhacdx.compute_vhacd(np.asarray(vertices, dtype=np.float64), counted, asyncACD=threads > 1, **options)
     return [_as_arrays(v, np.asarray(f).reshape(-1, 3)) for v, f in found]

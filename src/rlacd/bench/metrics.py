@@ -1,4 +1,4 @@
-"""How good hulls are, whoever made them: one implementation, on the input mesh.
+"""Quality of hulls from any tool: one implementation, measured on the input mesh.
 
 Lengths are in the frame where the input's bounding box is centred and its longest side is 2.
 """
@@ -22,53 +22,53 @@ from rlacd.solid.hull import Hull
 from rlacd.solid.solid import Solid
 
 TOLERANCE = 1e-3
-"""Width of the certified intervals whose upper ends are the distances and the concavity."""
+"""Width of the certified intervals; distances and concavity are reported as their upper ends."""
 
 CRACK = 1e-3
-"""Cracks between hulls narrower than this are closed. Some tools leave gaps of 1e-5 where they cut, whose walls are
-inside the object by any reading but the literal one, and 0.3 from its surface."""
+"""Cracks between hulls narrower than this are closed. Some tools leave gaps of 1e-5 at their cuts, whose walls count as
+surface if taken literally, although they lie up to 0.3 inside the object."""
 
 COVERED = 1e-3
-"""A point of the input this near to a hull counts as covered."""
+"""A point of the input counts as covered if it lies within this distance of a hull."""
 
 SAMPLES = 50_000
-"""Points that the uncovered share is told from; its standard error is below 0.0023."""
+"""Sample points for the uncovered share; its standard error is below 0.0023."""
 
 NOTHING = 1e-9
-"""A hull that holds less of the solid than this volume is empty; the frame's box has 8."""
+"""A hull that contains less than this volume of the solid is empty; the frame's box has volume 8."""
 
 CONVEX = 1e-6
-"""A corner this far above a facet, relative to the hull's extent, is rounding."""
+"""A vertex less than this above a facet, relative to the hull's extent, is attributed to rounding."""
 
 
 @dataclass(frozen=True)
 class Metrics:
-    """What is measured of the hulls of one mesh.
+    """Metrics of the hulls of one mesh.
 
     Attributes
     ----------
     parts, faces, vertices : int
-        Hulls, and their triangles and corners as the tool returned them.
+        Number of hulls, and of their triangles and vertices as the tool returned them.
     over : float
-        Farthest that the surface of the hulls' union reaches from the input's surface. Where two hulls touch or
-        overlap is inside the union and does not count.
+        Largest distance from the surface of the hulls' union to the input's surface. Faces where two hulls touch or
+        overlap are inside the union and do not count.
     under : float
-        Farthest that the input's surface lies from the union as a solid.
+        Largest distance from the input's surface to the union as a solid.
     hausdorff : float
         The larger of both, D_h.
     concavity : float
-        Largest CoACD concavity of a part, decided by bounds and not by samples; a part is what of the repaired input
-        lies in a hull.
+        Largest CoACD concavity of a part, decided by bounds and not by samples; a part is the intersection of the
+        repaired input with a hull.
     exceeding : int or None
-        Parts that exceed the concavity the tool was asked to keep by more than 0.001; None if it was not asked.
+        Parts that exceed the requested concavity by more than 0.001; None if none was requested.
     volume : float
         Sum of the hulls' volumes over the repaired input's: 1 is perfect, overlaps count twice.
     uncovered : float
-        Share of the input's surface outside the union.
+        Fraction of the input's surface outside the union.
     invalid : int
-        Hulls that are not closed, outward oriented, convex and of positive volume.
+        Hulls that fail to be closed, outward oriented, convex and of positive volume.
     empty : int
-        Hulls that hold nothing of the input.
+        Hulls that contain nothing of the input.
     """
 
     parts: int
@@ -95,14 +95,14 @@ def measure(
     promised: float | None = None,
     threads: int = 1,
 ) -> Metrics:
-    """Measure hulls against the mesh they stand for.
+    """Measure hulls against their mesh.
 
     Parameters
     ----------
     solid : Solid
         The mesh, repaired; distances are to its original surface.
     hulls : sequence of (vertices [V, 3], faces [F, 3])
-        In the mesh's own frame and unit, of any quality.
+        In the mesh's frame and unit; they may be invalid.
     promised : float, optional
         The concavity that each part should keep.
     threads : int
@@ -113,7 +113,7 @@ def measure(
         There are no hulls with a volume, or the mesh has no surface.
     """
     vertices, faces = solid.surface
-    # The hull is taken anew: what a tool's wrong triangles leave out would be measured as missing.
+    # Hulls are recomputed from the points, or regions lost to a tool's wrong triangles would count as uncovered.
     there = [Hull.of(solid.frame.to_frame(points)) for points, _ in hulls]
     usable = [hull for hull in there if hull is not None]
     if not usable or not len(faces):
@@ -141,7 +141,7 @@ def measure(
 
 
 def _concavity(solid: Solid, hulls: Sequence[Hull], promised: float | None) -> tuple[float, int | None, int]:
-    """The largest concavity of a part, the parts that exceed what was promised, and the hulls that hold nothing."""
+    """The largest concavity of a part, the number of parts above the promised one, and the number of empty hulls."""
     worst, exceeding, empty = 0.0, 0, 0
     for hull in hulls:
         share = solid.manifold ^ to_manifold(hull.vertices, hull.faces.astype(np.int64))
@@ -151,7 +151,7 @@ def _concavity(solid: Solid, hulls: Sequence[Hull], promised: float | None) -> t
         mesh = share.to_mesh64()
         vertices = np.ascontiguousarray(mesh.vert_properties[:, :3], dtype=np.float64)
         part = Part(vertices, np.ascontiguousarray(mesh.tri_verts, dtype=np.int32), share.volume(), hull)
-        # What is no worse than the worst so far need not be known.
+        # Only the maximum is needed: parts below the current worst need no exact value.
         worst = max(worst, Concavity().measure(part, TOLERANCE, worst).value[1])
         if promised is not None:
             exceeding += not Concavity(promised + TOLERANCE).is_met(part)
@@ -159,10 +159,10 @@ def _concavity(solid: Solid, hulls: Sequence[Hull], promised: float | None) -> t
 
 
 def is_valid(vertices: FloatArray, faces: IntArray) -> bool:
-    """Tell whether a mesh is closed, outward oriented, convex and of positive volume; judged without our kernels."""
+    """Tell whether a mesh is closed, outward oriented, convex and of positive volume, without using our kernels."""
     if len(faces) < 4 or not np.isfinite(vertices).all() or faces.min() < 0 or faces.max() >= len(vertices):
         return False
-    vertices, same = np.unique(vertices, axis=0, return_inverse=True)  # some tools give every triangle its own corners
+    vertices, same = np.unique(vertices, axis=0, return_inverse=True)  # some tools repeat shared vertices
     faces = same.reshape(-1)[faces].astype(np.int32)
     halfedges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     if len(np.unique(halfedges, axis=0)) != len(halfedges):
@@ -177,7 +177,7 @@ def is_valid(vertices: FloatArray, faces: IntArray) -> bool:
     if not np.einsum("ij,ij->", corners[:, 0], normals) > 0:
         return False
     lengths = np.linalg.norm(normals, axis=1)
-    sound = lengths > 1e-9  # floating point cannot tell the plane of a needle
+    sound = lengths > 1e-9  # the plane of a needle is not defined in floating point
     normals = normals[sound] / lengths[sound, None]
     points_there = (vertices - vertices.mean(axis=0)) / extent
     offsets = np.einsum("ij,ij->i", normals, corners[sound, 0])

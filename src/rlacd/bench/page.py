@@ -1,4 +1,4 @@
-"""A page of results: text, tables, charts and pictures, as Markdown with files beside it and as one HTML file."""
+"""A page of results: text, tables, charts and pictures, as Markdown with separate files and as one HTML file."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Text:
 
 @dataclass(frozen=True)
 class Code:
-    """Commands, as they are typed."""
+    """Commands, as typed."""
 
     text: str
 
@@ -41,7 +41,7 @@ class Figure:
     Attributes
     ----------
     name : str
-        Of the file, with its ending: ``.svg`` or ``.png``.
+        File name with its ending, ``.svg`` or ``.png``.
     content : bytes
     caption : str
     """
@@ -56,7 +56,7 @@ Block: TypeAlias = Heading | Text | Code | Table | Figure
 
 @dataclass
 class Page:
-    """Blocks under a title.
+    """A title and blocks.
 
     Attributes
     ----------
@@ -68,11 +68,11 @@ class Page:
     blocks: list[Block] = field(default_factory=list)
 
     def add(self, *blocks: Block) -> None:
-        """Put blocks at the end."""
+        """Append blocks."""
         self.blocks += blocks
 
     def save(self, folder: Path, name: str) -> list[Path]:
-        """Write ``NAME.md`` with its pictures beside it, and ``NAME.html``, which needs no other file.
+        """Write ``NAME.md`` with its pictures beside it, and ``NAME.html``, which is self-contained.
 
         Raises
         ------
@@ -95,7 +95,7 @@ class Page:
 
 
 def as_html(pages: Sequence[Page]) -> str:
-    """Pages below each other as one HTML file without scripts, everything inside it."""
+    """Render pages below each other as one self-contained HTML file without scripts."""
     body = "\n".join(
         f"<section>\n<h1>{html.escape(page.title)}</h1>\n" + "\n".join(map(_html, page.blocks)) + "\n</section>"
         for page in pages

@@ -1,4 +1,4 @@
-"""Every mesh by every method, each in a process of its own, with limits; what is finished is not done again."""
+"""Runs every method on every mesh, each in its own process, with limits; finished tasks are not repeated."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class BenchLimits:
-    """What a task may take.
+    """Limits of a task.
 
     Attributes
     ----------
     seconds : float
-        Wall time of a process: for running a method, and again for measuring its hulls where that is not done yet.
+        Wall time of each process: for running a method, and again for measuring its hulls in a second process.
     memory : int
         Bytes of address space, on Linux; 0 for no limit.
     threads : int
         Threads of each process.
     jobs : int
-        Processes at a time.
+        Number of concurrent processes.
     """
 
     seconds: float = 600.0
@@ -47,13 +47,13 @@ class Bench:
     Parameters
     ----------
     meshes : Path
-        What the names of meshes are relative to.
+        Folder that mesh names are relative to.
     names : sequence of str
         The meshes.
-    store : Store
-    limits : Limits
+    store : BenchStore
+    limits : BenchLimits
     say : callable
-        Takes a line of progress.
+        Receives lines of progress.
     """
 
     def __init__(
@@ -68,11 +68,11 @@ class Bench:
         self._stopping = False
 
     def run(self, method: str, setting: float) -> list[Row]:
-        """All meshes by one method; in the order of the names."""
+        """Run one method on all meshes; rows in the order of the names."""
         return self.run_tasks([BenchTask(name, method, setting) for name in self.names])
 
     def run_tasks(self, tasks: Iterable[BenchTask]) -> list[Row]:
-        """Do what is not done yet, and return the rows of all tasks in their order."""
+        """Run unfinished tasks, and return the rows of all tasks in order."""
         tasks = list(tasks)
         waiting = [task for task in dict.fromkeys(tasks) if self.known(task) is None]
         self._stopping = False
@@ -82,7 +82,7 @@ class Bench:
                 what = row.get("error") or f"{row['parts']} parts, {row['cpu']:.1f} s, D_h {row['hausdorff']:.3f}"
                 self._say(f"{number}/{len(waiting)} {row['mesh']}  {row['method']} {row['setting']:g}  {what}")
         except BaseException:
-            self._stopping = True  # what is killed now has not failed
+            self._stopping = True  # processes killed from here on have not failed
             for process in list(self._running):
                 kill_group(process)
             raise
@@ -91,7 +91,7 @@ class Bench:
         return [found for task in tasks if (found := self.store.get(task)) is not None]
 
     def known(self, task: BenchTask) -> Row | None:
-        """The row of a task that is finished, unless another version of its tool made it."""
+        """The row of a finished task, unless another version of its tool made it."""
         row = self.store.get(task)
         return None if row is None or is_outdated(row) else row
 
@@ -99,11 +99,11 @@ class Bench:
         row: Row = {"mesh": task.mesh, "method": task.method, "setting": task.setting}
         hulls = self.store.hulls_of(task)
         if self.store.get(task) is not None:
-            hulls.unlink(missing_ok=True)  # another version's
+            hulls.unlink(missing_ok=True)  # made by another version
         with tempfile.TemporaryDirectory() as folder:
             answer = Path(folder) / "answer.json"
             failure = self._child(task, hulls, answer)
-            if failure is not None and hulls.exists():  # the tool has done its work; measuring has limits of its own
+            if failure is not None and hulls.exists():  # the tool has finished; measuring gets its own limits
                 failure = self._child(task, hulls, answer)
                 failure = failure and f"measuring: {failure}"
             row |= {"error": failure} if failure else json.loads(answer.read_text())
@@ -112,7 +112,7 @@ class Bench:
         return row
 
     def _child(self, task: BenchTask, hulls: Path, answer: Path) -> str | None:
-        """Run one process, which makes the hulls unless they are there; None, or what went wrong with it."""
+        """Run one process, which reuses hulls that exist; returns None, or a description of its failure."""
         order = {
             "mesh": str(self.meshes / task.mesh),
             "method": task.method,
@@ -124,7 +124,7 @@ class Bench:
         }
         environment = {**os.environ, "OMP_NUM_THREADS": str(self.limits.threads)}
         command = [sys.executable, "-m", "rlacd.bench.child", json.dumps(order)]
-        # The child reads a pipe that nothing is written to: when this process dies, the pipe ends, and then the child.
+        # The child reads a pipe that is never written to: when this process dies, the pipe closes and the child exits.
         read_end, write_end = os.pipe()
         try:
             process = subprocess.Popen(
@@ -154,15 +154,15 @@ class Bench:
 
 
 def is_outdated(row: Row) -> bool:
-    """Tell whether a row was made by another version of its tool than the one that is installed."""
+    """Tell whether a row was made by another version of its tool than the installed one."""
     return "version" in row and row["version"] != make_method(row["method"]).version
 
 
 def find_meshes(folder: Path, listed: Path | None = None) -> list[str]:
-    """Names of the meshes in a folder of any depth, or those of a list, one a line.
+    """Names of the meshes in a folder, at any depth, or of those in a list, one per line.
 
-    ShapeNetCore (v1 and v2), HumanBody and COSEG are read as they are distributed, folders of folders, in which voxels,
-    pictures and labels lie between the meshes.
+    ShapeNetCore (v1 and v2), HumanBody and COSEG are read as distributed: nested folders with voxels, pictures and
+    labels between the meshes.
     """
     if listed is not None:
         return [line for line in listed.read_text().splitlines() if line.strip() and not line.startswith("#")]

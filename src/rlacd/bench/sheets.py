@@ -1,4 +1,4 @@
-"""One object by every method, side by side, with the numbers under each: the paper's Fig. 5."""
+"""One object decomposed by every method, side by side, with the numbers under each: the paper's Fig. 5."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ COLUMNS = 5
 FOOTER = 62
 HEADER = 40
 SAMPLES = 6
-"""Light paths a pixel: the pictures are small."""
+"""Light paths per pixel; the pictures are small."""
 
 
 def draw_sheet(
@@ -37,11 +37,11 @@ def draw_sheet(
     mesh : Path
         The input.
     decompositions : sequence of (label, hulls, row)
-        In the order of the panels, after the input's.
+        In panel order, after the input.
     up : {"x", "y", "z"}
         The axis of the input that points up in the picture.
     samples : int
-        Light paths a pixel.
+        Light paths per pixel.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def draw_sheet(
         _write(sheet, label, (middle, top + height + 16), 17, INK, "mm")
         _write(sheet, numbers, (middle, top + height + 38), 14, FADED, "mm")
     encoded = io.BytesIO()
-    # Few colours on much white: a palette makes a third of the file, and nobody sees it.
+    # The sheet has few colours on white; a palette cuts the file to a third without a visible difference.
     sheet.quantize(256).save(encoded, format="PNG", optimize=True)
     return encoded.getvalue()
 

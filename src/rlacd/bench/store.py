@@ -1,4 +1,4 @@
-"""Results on disk: a line of JSON a mesh, method and number, and the hulls beside it, so that nothing is made twice."""
+"""Results on disk: one JSON line per mesh, method and setting, and the hulls beside it, so that no task is repeated."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from rlacd.bench.methods import RawHull
 from rlacd.errors import OutputError
 
 Row: TypeAlias = dict[str, Any]
-"""A finished task: ``mesh``, ``method``, ``setting``; ``error``, or what was measured."""
+"""A finished task: ``mesh``, ``method``, ``setting``, and either ``error`` or the metrics."""
 
 
 @dataclass(frozen=True)
 class BenchTask:
-    """One mesh, one method and its number.
+    """One mesh, one method and its setting.
 
     Attributes
     ----------
     mesh : str
         Path relative to the folder of meshes.
     method : str
-        A name that `make_method` knows.
+        A name accepted by `make_method`.
     setting : float
-        The method's number.
+        The method's setting.
     """
 
     mesh: str
@@ -41,12 +41,12 @@ class BenchTask:
 
     @property
     def key(self) -> tuple[str, str, float]:
-        """What tells it from other tasks."""
+        """Identity of the task."""
         return self.mesh, self.method, self.setting
 
     @property
     def file_name(self) -> str:
-        """A name for its hulls."""
+        """File name for its hulls."""
         digest = hashlib.sha256(repr(self.key).encode()).hexdigest()[:16]
         return f"{Path(self.mesh).stem[:40]}-{digest}.npz"
 
@@ -57,12 +57,12 @@ class BenchStore:
     Parameters
     ----------
     folder : Path
-        Made if it is not there.
+        Created if it does not exist.
 
     Raises
     ------
     OutputError
-        The folder cannot be made or written to, another run is writing to it, or a line of it is damaged.
+        The folder cannot be created or written to, another run is writing to it, or a line of its file is damaged.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -85,15 +85,15 @@ class BenchStore:
         return len(self._rows)
 
     def get(self, task: BenchTask) -> Row | None:
-        """The row of a task, if it is finished."""
+        """The row of a task; None if it is not finished."""
         return self._rows.get(task.key)
 
     def rows(self) -> list[Row]:
-        """All rows, in the order in which they were finished."""
+        """All rows, in the order in which they finished."""
         return list(self._rows.values())
 
     def add(self, row: Row) -> None:
-        """Write a row; one of the same task is replaced."""
+        """Write a row, replacing one of the same task."""
         with self._lock:
             line = json.dumps(row, allow_nan=False) + "\n"
             self._held.write(line)
@@ -102,16 +102,16 @@ class BenchStore:
             self._rows[_key(row)] = row
 
     def close(self) -> None:
-        """Let others write to the folder."""
+        """Release the folder to other runs."""
         self._held.close()
 
     def hulls_of(self, task: BenchTask) -> Path:
-        """Where the hulls of a task are, or will be."""
+        """Path of the hulls of a task, whether they exist yet or not."""
         return self.folder / "hulls" / task.file_name
 
 
 def save_hulls(path: Path, hulls: Sequence[RawHull], account: Row) -> None:
-    """Write hulls and what is known of how they were made; the file appears whole or not at all."""
+    """Write hulls and facts about how they were made, atomically."""
     temporary = path.with_suffix(".part.npz")
     np.savez_compressed(
         temporary,
@@ -127,7 +127,7 @@ def load_hulls(path: Path) -> tuple[list[RawHull], Row]:
     """Read what `save_hulls` wrote."""
     with np.load(path, allow_pickle=False) as file:
         ends = np.cumsum(file["counts"], axis=0)
-        vertices = np.split(file["vertices"], ends[:, 0])[:-1]  # nothing is left after the last
+        vertices = np.split(file["vertices"], ends[:, 0])[:-1]  # nothing follows the last hull
         faces = np.split(file["faces"], ends[:, 1])[:-1]
         account: Row = json.loads(str(file["account"]))
     return list(zip(vertices, faces, strict=True)), account
@@ -138,7 +138,7 @@ def _key(row: Row) -> tuple[str, str, float]:
 
 
 def _whole_lines(path: Path) -> Iterable[Row]:
-    """The rows of a file; what a killed run left of its last line is cut off."""
+    """Read the rows of a file; an incomplete last line left by a killed run is cut off."""
     content = path.read_bytes()
     whole = content.rfind(b"\n") + 1
     if whole < len(content):

@@ -40,12 +40,12 @@ COLUMNS = (
     "peak_mb",
     "error",
 )
-"""Of the CSV file."""
+"""Columns of the CSV file."""
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Mean, largest and standard deviation of a number over the meshes."""
+    """Mean, maximum and standard deviation of a number over the meshes."""
 
     mean: float
     most: float
@@ -53,31 +53,31 @@ class Spread:
 
     @classmethod
     def of(cls, values: Sequence[float]) -> Spread:
-        """Of at least one value; the deviation is the sample's, 0 of one value."""
+        """Of at least one value; the deviation is the sample standard deviation, 0 for one value."""
         return cls(statistics.fmean(values), max(values), statistics.stdev(values) if len(values) > 1 else 0.0)
 
     def text(self, digits: int) -> str:
-        """Write it as in the paper: mean (max, ± deviation), so many digits after the point."""
+        """Format as in the paper: mean (max, ± deviation), with `digits` decimals."""
         return f"{self.mean:.{digits}f} ({self.most:.{digits}f}, ± {self.deviation:.{digits}f})"
 
 
 def common_meshes(groups: Iterable[Sequence[Row]]) -> set[str]:
-    """The meshes on which every group of rows succeeded: only those can be averaged side by side."""
+    """The meshes on which every group of rows succeeded; averages are comparable only on these."""
     sets = [{row["mesh"] for row in rows if "error" not in row} for rows in groups]
     return set.intersection(*sets) if sets else set()
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table: what its columns are called, and its lines.
+    """A table with column headers and lines.
 
     Attributes
     ----------
     header : sequence of str
     lines : sequence of sequences
-        As many cells as the header has; each is shown as ``str`` gives it.
+        Lines with one cell per column; cells are shown by ``str``.
     note : str
-        A line below.
+        A line shown below the table.
     """
 
     header: Sequence[str]
@@ -85,7 +85,7 @@ class Table:
     note: str = ""
 
     def markdown(self) -> str:
-        """Set it in Markdown; the first column is left-aligned, the others right."""
+        """Format as Markdown; the first column is left-aligned, the others right-aligned."""
         header, *rows = (
             " | ".join(str(cell).replace("|", "\\|") for cell in line) for line in (self.header, *self.lines)
         )
@@ -95,12 +95,12 @@ class Table:
 
 
 def comparison(groups: Sequence[tuple[str, Sequence[Row]]]) -> Table:
-    """Compare methods on the meshes that all of them managed: a line each, as in the paper's Table 1.
+    """Compare methods on the meshes that all of them solved, one line each, as in the paper's Table 1.
 
     Parameters
     ----------
     groups : sequence of (label, rows)
-        The first is what the parts of the others are divided by.
+        The first is the reference for the ratio of parts.
     """
     good = _managed(groups)
     first = next(iter(good.values()), [])
@@ -118,7 +118,7 @@ def comparison(groups: Sequence[tuple[str, Sequence[Row]]]) -> Table:
 
 
 def details(groups: Sequence[tuple[str, Sequence[Row]]]) -> Table:
-    """Show what else was measured of the meshes that all methods managed, and how many each of them failed on."""
+    """Show the remaining metrics on the meshes that all methods solved, and each method's number of failures."""
     failed = {label: f"{sum('error' in row for row in rows)} of {len(rows)}" for label, rows in groups}
     lines = [
         [label, *(show(rows) if rows else "–" for show in _DETAILS.values()), failed[label]]
@@ -133,7 +133,7 @@ def _managed(groups: Sequence[tuple[str, Sequence[Row]]]) -> dict[str, list[Row]
 
 
 Show: TypeAlias = Callable[[Sequence[Row]], object]
-"""What a column says of the rows of one method."""
+"""Computes a column from the rows of one method."""
 
 
 def _spread(key: str, digits: int) -> Show:
@@ -179,7 +179,7 @@ _DETAILS: Mapping[str, Show] = MappingProxyType(
 
 
 def ratio_of_parts(rows: Sequence[Row], reference: Sequence[Row]) -> str:
-    """Geometric mean over the meshes of parts over the reference's, with its standard error."""
+    """Geometric mean over the meshes of the ratio of parts to the reference's, with its standard error."""
     shared = common_meshes([rows, reference])
     parts = {row["mesh"]: row["parts"] for row in rows if row["mesh"] in shared}
     logs = [math.log(parts[row["mesh"]] / row["parts"]) for row in reference if row["mesh"] in shared]
@@ -191,15 +191,15 @@ def ratio_of_parts(rows: Sequence[Row], reference: Sequence[Row]) -> str:
 
 
 def failures(rows: Iterable[Row]) -> str:
-    """One line for everything that went wrong; "none" otherwise."""
+    """List all failures in one line; "none" if there are none."""
     found = [f"- {r['mesh']}, {r['method']} {r['setting']:g}: {r['error']}" for r in rows if "error" in r]
     return "\n".join(found) or "none"
 
 
 def short_names(meshes: Sequence[str]) -> dict[str, str]:
-    """Call each mesh by the least of its path that tells it from the others.
+    """Shorten each mesh's path to the shortest name that is unique.
 
-    Where all files are called alike, as ShapeNetCore's ``models/model_normalized.obj``, their folders are named.
+    If all files have the same name, as ShapeNetCore's ``models/model_normalized.obj``, their folders name them.
     """
     paths = {mesh: Path(mesh).with_suffix("").parts for mesh in meshes}
     while len(paths) > 1 and len({path[-1] for path in paths.values()}) == 1 and min(map(len, paths.values())) > 1:
@@ -220,7 +220,7 @@ def short_names(meshes: Sequence[str]) -> dict[str, str]:
 
 
 def as_csv(rows: Iterable[Row]) -> str:
-    """Every row with all its numbers; an error leaves them empty."""
+    """Every row with all its numbers; failed rows have empty cells."""
     text = io.StringIO()
     writer = csv.DictWriter(text, COLUMNS, extrasaction="ignore", lineterminator="\n")
     writer.writeheader()

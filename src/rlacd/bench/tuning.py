@@ -1,7 +1,7 @@
-"""Equal accuracy: for each method the one number at which the mean D_h over a set of meshes is the one asked for.
+"""Equal accuracy: for each method, find the setting at which its mean D_h over a set of meshes matches a target.
 
-This is the protocol of RL-ACD (4.4): a tool that makes fewer hulls may only be looser, so the tools are compared where
-they are equally tight.
+This is the protocol of RL-ACD (4.4): fewer hulls may just mean looser hulls, so tools are compared where they are
+equally tight.
 """
 
 from __future__ import annotations
@@ -16,27 +16,27 @@ from rlacd.bench.store import Row
 from rlacd.errors import OptionError
 
 CLOSE = 0.02
-"""The mean D_h may be this share of the target away from it, unless told otherwise."""
+"""Default tolerance on the mean D_h, relative to the target."""
 
 TRIES = 8
-"""Numbers tried at most, beyond those already known."""
+"""Maximum number of settings to try beyond those already known."""
 
 STRIDE = 1.6
-"""How much the number changes where the target is not bracketed yet."""
+"""Factor between settings while the target is not bracketed."""
 
 RANGES = {"threshold": (0.005, 1.0), "tolerance": (0.005, 1.0), "percent": (0.01, 100.0), "hulls": (1.0, 1024.0)}
-"""Numbers that make sense, by what they mean."""
+"""Valid settings, by their meaning."""
 
 
 @dataclass(frozen=True)
 class Point:
-    """One number of a method, over the whole set of meshes.
+    """One setting of a method, over the whole set of meshes.
 
     Attributes
     ----------
     setting : float
     rows : list of Row
-        Every mesh, the failed ones included.
+        Rows of all meshes, including failed ones.
     """
 
     setting: float
@@ -49,18 +49,18 @@ class Point:
 
     @property
     def hausdorff(self) -> float:
-        """Mean D_h; nan where all failed."""
+        """Mean D_h; nan if all meshes failed."""
         good = self.good
         return sum(row["hausdorff"] for row in good) / len(good) if good else math.nan
 
 
 def curve(bench: Bench, method: str, settings: Sequence[float]) -> list[Point]:
-    """Run a method at several numbers."""
+    """Run a method at several settings."""
     return [Point(setting, bench.run(method, setting)) for setting in settings]
 
 
 def known_curve(bench: Bench, method: str) -> list[Point]:
-    """The numbers at which the store holds every mesh of the set, in ascending order."""
+    """Settings at which the store holds every mesh of the set, in ascending order."""
     by_setting: dict[float, dict[str, Row]] = {}
     for row in bench.store.rows():
         if row["method"] == method and not is_outdated(row):
@@ -70,10 +70,10 @@ def known_curve(bench: Bench, method: str) -> list[Point]:
 
 
 def tune(bench: Bench, method: str, target: float, close: float = CLOSE) -> Point:
-    """Find the number at which a method's mean D_h is the target, to within the share `close` of it.
+    """Find the setting at which a method's mean D_h matches the target to within the relative tolerance `close`.
 
-    What the store knows is where the search begins: between two numbers whose means lie on both sides, the next one is
-    interpolated; regula falsi, with bisection where that is slow.
+    The search starts from the settings in the store. Once two of them bracket the target, it uses regula falsi, with
+    bisection where that converges slowly.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def tune(bench: Bench, method: str, target: float, close: float = CLOSE) -> Poin
     Returns
     -------
     Point
-        The closest one found; of a method that cannot come close, too.
+        The closest one found, even if it misses the tolerance.
     """
     if not target > 0:
         raise OptionError(f"the mean D_h to reach is {target}; it has to be positive.")
@@ -104,7 +104,7 @@ def tune(bench: Bench, method: str, target: float, close: float = CLOSE) -> Poin
 
 
 def next_setting(tool: Method, known: Sequence[tuple[float, float]], target: float, attempt: int) -> float | None:
-    """Choose the number to try next, from known (number, mean D_h); None when there is none left to try."""
+    """Choose the next setting from known (setting, mean D_h); None if there is none left to try."""
     lowest, highest = RANGES[tool.setting]
     if not known:
         return _rounded(tool, target if tool.setting in ("threshold", "tolerance") else tool.default)
@@ -112,13 +112,13 @@ def next_setting(tool: Method, known: Sequence[tuple[float, float]], target: flo
     looser = [(s, d) for s, d in known if d > target]
     tighter = [(s, d) for s, d in known if d < target]
     if looser and tighter:
-        # Mean D_h need not be monotone: the two closest in number that enclose the target are taken.
+        # Mean D_h need not be monotone: the two closest settings that bracket the target are used.
         (a, da), (b, db) = min(
             ((t, loose) for t in tighter for loose in looser), key=lambda p: abs(math.log(p[0][0] / p[1][0]))
         )
         share = 0.5 if attempt % 3 == 2 else (target - da) / (db - da)
         return _rounded(tool, math.exp(math.log(a) + share * math.log(b / a)))
-    # All on one side: on along the line through the two closest, a stride at most.
+    # Not bracketed: extrapolate along the line through the two closest, by at most one stride.
     ordered = sorted(known, key=lambda k: abs(k[1] - target))
     outermost = ordered[0][0]
     step = math.log(STRIDE) * (sign if tighter else -sign)
@@ -132,5 +132,5 @@ def next_setting(tool: Method, known: Sequence[tuple[float, float]], target: flo
 
 
 def _rounded(tool: Method, number: float) -> float:
-    """Three digits: numbers that people can repeat."""
+    """Round to three digits, so that settings are easy to repeat."""
     return float(round(number)) if tool.setting == "hulls" else float(f"{number:.3g}")
