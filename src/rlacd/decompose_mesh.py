@@ -18,7 +18,7 @@ from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.decomposition import Decomposition
 from rlacd.fields import check_callback
-from rlacd.io.read.load import InputMesh, load_mesh
+from rlacd.io.read.load import load_mesh
 from rlacd.merge import drop_slivers, in_input, limit_part, limit_roughly, merge_to_count, with_limits
 from rlacd.options import CONCAVITY, DEFAULT_RESOLUTION, DEFAULT_THRESHOLD, OPTION_NAMES, OpenName, Options, QualityName
 from rlacd.planes.sweep_cache import SweepCache
@@ -32,6 +32,7 @@ from rlacd.search import eliminate_parts, level, search
 from rlacd.search.levels import SearchSummary
 from rlacd.solid.component import Component, Part
 from rlacd.solid.cover import cover
+from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import Solid
 from rlacd.workers import Workers
 

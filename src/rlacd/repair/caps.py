@@ -20,7 +20,8 @@ from rlacd.repair.distance import SurfaceQuery, spread_points
 from rlacd.repair.holes import LONGEST_EXACT_LOOP, cap
 from rlacd.repair.rims import Rims, rims_of
 from rlacd.repair.soup import Soup
-from rlacd.repair.topology import (
+from rlacd.solid.frame import FloatArray
+from rlacd.solid.topology import (
     BoolArray,
     IntArray,
     components,
@@ -29,7 +30,6 @@ from rlacd.repair.topology import (
     nondegenerate,
     signed_tetrahedra,
 )
-from rlacd.solid.frame import FloatArray
 
 HOLE, HOLE_SHARE = 0.1, 0.02
 """A body nearly closed, its holes no more than this share of its area, is closed with caps up to this far away: a scan

@@ -7,8 +7,8 @@ from functools import cached_property
 import numpy as np
 
 from rlacd._native import Surface, poll_stop
-from rlacd.repair.topology import BoolArray, IntArray
 from rlacd.solid.frame import FloatArray
+from rlacd.solid.topology import BoolArray, IntArray
 
 _CHUNK = 1_000_000
 _STEPS = np.array([1, 2, 3, *(s << k for k in range(1, 9) for s in (2, 3))])

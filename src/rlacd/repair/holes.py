@@ -13,8 +13,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from rlacd._native import poll_stop
-from rlacd.repair.topology import BoolArray, Edges, IntArray, components, first_of_doubled, nondegenerate
 from rlacd.solid.frame import FloatArray
+from rlacd.solid.topology import BoolArray, Edges, IntArray, components, first_of_doubled, nondegenerate
 
 # The best triangulation looks at every three corners; longer loops are cut by ears, or where that fails up to a length.
 _EXACT_LOOP = 60

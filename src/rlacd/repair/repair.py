@@ -24,23 +24,11 @@ from manifold3d import Manifold
 
 from rlacd._native import poll_stop
 from rlacd.errors import EmptyMeshError
-from rlacd.io.read.load import InputMesh
 from rlacd.repair.caps import FLAPS, close_holes
 from rlacd.repair.distance import SurfaceQuery, spread_points
 from rlacd.repair.holes import MOST_FREE_EDGES, close_cracks
 from rlacd.repair.skin import skin
 from rlacd.repair.soup import NO_AREA, Soup, hidden_faces, on_repeated_edge
-from rlacd.repair.topology import (
-    BoolArray,
-    Edges,
-    IntArray,
-    bodies_of,
-    face_areas,
-    first_of_doubled,
-    merge_equal_vertices,
-    nondegenerate,
-    signed_tetrahedra,
-)
 from rlacd.repair.union import (
     hull_of_points,
     slab_of_faces,
@@ -52,7 +40,19 @@ from rlacd.repair.union import (
 )
 from rlacd.repair.voxels import Reach
 from rlacd.solid.frame import FloatArray, Frame
+from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import BodyRepair, Solid
+from rlacd.solid.topology import (
+    BoolArray,
+    Edges,
+    IntArray,
+    bodies_of,
+    face_areas,
+    first_of_doubled,
+    merge_equal_vertices,
+    nondegenerate,
+    signed_tetrahedra,
+)
 
 STEPS = ("closed", "reoriented", "outer skin", "welded", "capped", "slab", "wrapped", "hull")
 """What can be done to a body, from the least change to the most."""

@@ -18,8 +18,8 @@ import numpy as np
 from rlacd._native import poll_stop
 from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.soup import Soup, across
-from rlacd.repair.topology import BoolArray, IntArray, components
 from rlacd.solid.frame import FloatArray
+from rlacd.solid.topology import BoolArray, IntArray, components
 
 # A flap has at most this share of its body's area.
 _FLAP = 0.05

@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from rlacd._native import poll_stop
-from rlacd.repair.topology import BoolArray, IntArray, Sides, components, facing_sides
 from rlacd.solid.frame import FloatArray
+from rlacd.solid.topology import BoolArray, IntArray, Sides, components, facing_sides
 
 # A sharp fold would push its vertex far out to keep the distance to both flanks; stop at this multiple.
 _LONGEST_MITER = 2.0

@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from rlacd.repair.distance import SurfaceQuery
-from rlacd.repair.topology import (
+from rlacd.solid.frame import FloatArray
+from rlacd.solid.topology import (
     BoolArray,
     Edges,
     IntArray,
@@ -18,7 +19,6 @@ from rlacd.repair.topology import (
     sides_of,
     signed_tetrahedra,
 )
-from rlacd.solid.frame import FloatArray
 
 NO_AREA = 1e-14
 """Faces below this area, in the frame, have none."""

@@ -8,9 +8,9 @@ from manifold3d import Error, Manifold, Mesh64, OpType
 
 from rlacd import _native
 from rlacd._native import poll_stop
-from rlacd.repair.topology import IntArray, face_areas, signed_tetrahedra
 from rlacd.solid.boolean_time import require_time_for
 from rlacd.solid.frame import FloatArray
+from rlacd.solid.topology import IntArray, face_areas, signed_tetrahedra
 
 # Where manifold3d moves faces by more than `_MOVED` on average, corners are moved by less than `_HAIR` (frame units).
 _MOVED, _HAIR = 1e-5, 1e-9

@@ -14,8 +14,8 @@ from scipy import ndimage
 
 from rlacd._native import poll_stop
 from rlacd.repair.distance import SurfaceQuery, spread_points
-from rlacd.repair.topology import BoolArray, IntArray
 from rlacd.solid.frame import FloatArray
+from rlacd.solid.topology import BoolArray, IntArray
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,11 @@ from scipy.spatial import HalfspaceIntersection, QhullError
 from rlacd import _native
 from rlacd._native import Stopped
 from rlacd.clock import Clock
-from rlacd.io.read.load import InputMesh
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Part
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
+from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import Solid
 
 MOST_HULLS = 2000

@@ -8,8 +8,8 @@ from typing import Any
 
 from rlacd.criteria import NavigableSpace
 from rlacd.errors import OptionError
-from rlacd.io.read.load import InputMesh
 from rlacd.options import CONCAVITY, QUALITIES, Options
+from rlacd.solid.input_mesh import InputMesh
 
 NAVIGABLE = "navigable"
 FAST = QUALITIES[0]

@@ -10,7 +10,6 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 from urllib.parse import unquote
@@ -27,8 +26,9 @@ from rlacd.io.read.off import is_off, plain_off
 from rlacd.io.read.open_file import LARGEST, read_file
 from rlacd.io.read.text import check_text, plain_obj, plain_ply, plain_stl
 from rlacd.io.read.xml import check_3mf, collada_of
-from rlacd.repair.topology import BoolArray, IntArray
 from rlacd.solid.frame import FloatArray
+from rlacd.solid.input_mesh import InputMesh
+from rlacd.solid.topology import BoolArray, IntArray
 
 Source: TypeAlias = str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]
 
@@ -37,28 +37,6 @@ FORMATS = ("obj", "stl", "ply", "off", "glb", "gltf", "dae", "zae", "3mf", "xyz"
 
 # Triangles are all we need of a file: no colours, and no images, whose decoders are the riskier part of any loader.
 _DATA_FILES = {".bin"}
-
-
-@dataclass(frozen=True)
-class InputMesh:
-    """Triangles as they were given.
-
-    Attributes
-    ----------
-    vertices
-        float64 ``[V, 3]``, finite, in the input's unit. Those no face uses are kept.
-    faces
-        int64 ``[F, 3]``, in range; empty for a point cloud.
-    name
-        File name, or what kind of object was given.
-    warnings
-        What was left out.
-    """
-
-    vertices: FloatArray
-    faces: IntArray
-    name: str
-    warnings: tuple[str, ...]
 
 
 def load_mesh(source: Source) -> InputMesh:
