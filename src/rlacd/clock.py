@@ -1,4 +1,4 @@
-"""The time a decomposition takes and when it has to stop: stages, timeout, progress, cancel."""
+"""Timing and stopping a decomposition: stages, timeout, progress, cancellation."""
 
 from __future__ import annotations
 
@@ -15,28 +15,29 @@ from rlacd.work import Work
 StoppedBy = Literal["timeout", "cancel"]
 
 GRACE, GRACE_SHARE, LEAST_GRACE = 0.4, 0.04, 0.1
-"""Seconds after a stop, and share of the timeout, that writing up the result may take, and seconds it has in any case;
-then what can be left out is. The promise is 1 s and 10 %: the rest is for what cannot be left out."""
+"""After a stop, writing up the result may take `GRACE` seconds plus `GRACE_SHARE` of the timeout, and always at least
+`LEAST_GRACE` seconds; then optional work is skipped. The promise is 1 s and 10 %: the rest is for what cannot be
+skipped."""
 
 _T = TypeVar("_T")
 
 
 class Clock:
-    """Seconds per stage, and whether the work has to stop.
+    """Measures seconds per stage and decides when the work has to stop.
 
-    Work is stopped in two ways: between steps, where `step` returns False; and in the middle of one, where kernels and
-    whatever else asks `rlacd._native.poll_stop` raise `Stopped`, as long as the clock is `running`. Whoever can go on
-    from an interrupted step with what was reached before catches it and calls `note_stop`.
+    Work is stopped in two ways: between steps, `step` returns False; within a step, kernels and all other code that
+    calls `rlacd._native.poll_stop` raise `Stopped` while the clock is `running`. Code that can continue with the result
+    of earlier steps catches it and calls `note_stop`.
 
     Parameters
     ----------
     timeout : float or None
         Seconds after which `stopped_by` becomes "timeout".
     progress : callable or None
-        Told about every step, and several times a second in long ones; when it returns False, `stopped_by` becomes
+        Called at every step, and several times a second during long ones; when it returns False, `stopped_by` becomes
         "cancel".
     work : Work, optional
-        What may be done; without bound by default. When it is spent, steps say so.
+        The work allowed; unlimited by default. When it is spent, `step` returns False.
     """
 
     def __init__(
@@ -55,11 +56,11 @@ class Clock:
         self._done = self._parts = 0
         self._total: int | None = None
         self._nothing_left_to_stop = False
-        self._end = math.inf  # of writing up, once there is nothing left to stop
+        self._end = math.inf  # deadline for writing up, set once there is nothing left to stop
 
     @contextmanager
     def running(self) -> Iterator[None]:
-        """Let the clock stop what this thread does inside, in the middle of steps too."""
+        """Let the clock interrupt what this thread does inside, within steps too."""
         before = use_stop(self.stop)
         self.stop.begin(self._look)
         self.stop.arm(math.inf if self._timeout is None else self._timeout - self.elapsed)
@@ -87,7 +88,7 @@ class Clock:
 
     @contextmanager
     def allowance(self, units: float) -> Iterator[None]:
-        """Leave no more than so many units of work to what is done inside; running out of them is not the end."""
+        """Limit the work inside the context to `units`; running out of them does not end the work outside."""
         account = self.work
         self.work = Work(min(units, account.left))
         try:
@@ -99,7 +100,7 @@ class Clock:
             self.work = account
 
     def step(self, done: int, total: int | None, parts: int) -> bool:
-        """Report a step of the current stage; True when the work may go on."""
+        """Report a step of the current stage; True if the work may continue."""
         self._done, self._total, self._parts = done, total, parts
         if self.stopped_by is None:
             told_to_stop = (
@@ -117,7 +118,7 @@ class Clock:
         return self._nothing_left_to_stop or (self.stopped_by is None and not self.work.is_spent)
 
     def goes_on(self) -> bool:
-        """Whether the work may go on, between two steps."""
+        """Report the last step again; True if the work may continue."""
         return self.step(self._done, self._total, self._parts)
 
     def note_stop(self) -> None:
@@ -127,7 +128,7 @@ class Clock:
 
     @contextmanager
     def shielded(self) -> Iterator[None]:
-        """Do what has to be done, in a stopped decomposition too: nothing raises `Stopped` inside."""
+        """Run work that must be completed even after a stop: nothing raises `Stopped` inside."""
         self.stop.shield(True)
         try:
             yield
@@ -135,9 +136,9 @@ class Clock:
             self.stop.shield(False)
 
     def nothing_left_to_stop(self) -> None:
-        """Say that the decomposition is reached: from here on the work is only written up, and cannot be incomplete.
+        """Declare the decomposition finished: from here on it is only written up, and a stop cannot make it incomplete.
 
-        For that there is some time after a stop, and after the timeout; then `if_in_time` gives up.
+        Writing up has some extra time after a stop or the timeout (see `GRACE`); then `if_in_time` takes its fallback.
         """
         self._nothing_left_to_stop = True
         self._end = math.inf if self._timeout is None else self._timeout * (1 + GRACE_SHARE) + GRACE
@@ -146,7 +147,7 @@ class Clock:
         self.stop.arm(max(self._end - self.elapsed, LEAST_GRACE))
 
     def if_in_time(self, work: Callable[[], _T], otherwise: Callable[[], _T]) -> _T:
-        """Do some work; where there is no time left for it, something quick that is not interrupted."""
+        """Do some work; if there is no time left for it, do something quick instead, without interruption."""
         try:
             return work()
         except Stopped:

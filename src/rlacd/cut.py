@@ -1,4 +1,4 @@
-"""Cutting: components are judged, split and cut, all unfinished ones of a round together."""
+"""Cutting: all unfinished components of a round are judged, split and cut together."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ FILM = 2e-4
 """Mean thickness (twice the volume over the area) below which a piece may be a shaving; sheets are 10 times thicker."""
 
 MISSED = 1e-3
-"""No point of a shaving is farther than this from the solid that stands for it."""
+"""No point of a shaving is farther than this from the solid across the cut."""
 
 
 class CutCache:
-    """What components fall into, each way of dividing one made once: several trees of cuts share their first levels."""
+    """Pieces and sides of components, each cut made once: several trees of cuts share their first levels."""
 
     def __init__(self) -> None:
         self._pieces: dict[Component, list[Component]] = {}
@@ -29,7 +29,7 @@ class CutCache:
         self._across: dict[Component, Component] = {}  # the other side of the last cut
 
     def pieces(self, component: Component) -> list[Component]:
-        """Get the connected pieces of a component, but for shavings; ``[component]`` when there is but one."""
+        """Get the connected pieces of a component without shavings; ``[component]`` if it is connected."""
         if component not in self._pieces:
             own = component.pieces()
             if len(own) == 1:
@@ -42,7 +42,7 @@ class CutCache:
         return self._pieces[component]
 
     def sides(self, component: Component, plane: Plane) -> list[Component]:
-        """Get what lies below and above a plane, but for shavings; nothing where one side would be empty."""
+        """Get the sides below and above a plane, without shavings; an empty list if one side would be empty."""
         key = component, plane
         if key not in self._sides:
             below, above = component.cut(plane)
@@ -55,10 +55,10 @@ class CutCache:
 
 
 class CutTree:
-    """The cuts a policy makes of a solid, made when first asked for.
+    """The tree of cuts that a policy makes of a solid, computed on demand.
 
-    Which plane cuts a component does not depend on the criterion, so a coarser criterion only stops higher up in the
-    same tree.
+    Which plane cuts a component does not depend on the criterion's threshold, so a coarser criterion only stops higher
+    up in the same tree.
 
     Parameters
     ----------
@@ -68,8 +68,8 @@ class CutTree:
         Chooses the planes.
     workers : Workers
         Runs the kernels.
-    divisions : Divisions, optional
-        Shared with other trees.
+    cache : CutCache, optional
+        Cuts shared with other trees.
     """
 
     def __init__(self, root: Component, policy: Policy, workers: Workers, cache: CutCache | None = None) -> None:
@@ -87,14 +87,14 @@ class CutTree:
         Parameters
         ----------
         most : float
-            Give up as soon as it is clear that there will be more components than this.
+            Stop as soon as it is clear that there will be more components than this.
 
         Returns
         -------
         done : list of Component
             Components that meet the criterion.
         left : list of Component
-            Components that do not: no plane cuts them, the clock ran out first, or there were more than `most`.
+            Components that do not: no plane cuts them, the clock stopped, or there would be more than `most`.
         """
         done: list[Component] = []
         left: list[Component] = []
@@ -109,7 +109,7 @@ class CutTree:
                 unmet = [c for c, met in zip(frontier, verdicts, strict=True) if not met]
                 if not clock.step(len(done), None, len(done) + len(left) + len(unmet)):
                     return done, left + unmet
-                if len(done) + len(left) + 2 * len(unmet) > most:  # each becomes two at least
+                if len(done) + len(left) + 2 * len(unmet) > most:  # each becomes at least two
                     return done, left + unmet
                 new = [c for c in unmet if c not in self._children]
                 if not clock.work.pay(sum(work.choosing(c.size) + work.cutting(c.size) for c in new)):
@@ -126,7 +126,7 @@ class CutTree:
         return done, left
 
     def _divide(self, components: Sequence[Component]) -> None:
-        """Split components into their connected pieces, and cut those that are in one piece already."""
+        """Split components into their connected pieces, and cut those that are connected."""
         pieces = [self._cache.pieces(component) for component in components]
         whole = [c for c, own in zip(components, pieces, strict=True) if own == [c]]
         threads = self._workers.share(len(whole))
@@ -137,10 +137,10 @@ class CutTree:
 
 
 def is_shaving(piece: Component, across: Component) -> bool:
-    """Tell whether a piece is a film that a cut nearly parallel to the surface has taken off the solid across it.
+    """Whether a piece is a film that a cut nearly parallel to the surface has shaved off the solid across the cut.
 
-    Films have ragged outlines that hardly any number of cuts makes convex, and the solid they came from stands for
-    them: every point of a shaving is within `MISSED` of it.
+    Films have ragged outlines that take very many cuts to become convex. They can be dropped because every point of a
+    shaving is within `MISSED` of the solid across the cut.
     """
     if 2 * piece.volume > FILM * _native.mesh_area(piece.vertices, piece.faces):
         return False

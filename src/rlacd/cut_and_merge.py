@@ -20,18 +20,18 @@ MOST_MERGING = 20e6
 
 @dataclass(frozen=True)
 class Pass:
-    """What one pass makes of a solid.
+    """Result of one pass over a solid.
 
     Attributes
     ----------
     pieces : list of Part
-        The parts after cutting, without the slivers among those that exceed the criterion.
+        The parts after cutting; those that do not meet the criterion include no slivers.
     unmet : list of Part
-        Those of the pieces that exceed the criterion.
+        The pieces that do not meet the criterion.
     parts : list of Part
-        The pieces merged, without slivers; the pieces themselves where nothing was merged.
+        The merged pieces, without slivers; the pieces themselves if merging was skipped.
     criterion : Criterion
-        The criterion the parts were merged by: the one asked for, as settled on the pieces.
+        The criterion used for merging: the requested one, settled on the pieces.
     """
 
     pieces: list[Part]
@@ -52,7 +52,7 @@ def cut_and_merge(
 ) -> Pass:
     """Cut a solid until every part meets the criterion, drop slivers, merge, and drop slivers again.
 
-    Merging stops after `MOST_MERGING` units of work; the parts then meet the criterion all the same.
+    Merging stops after `MOST_MERGING` units of work; the merged parts meet the criterion in any case.
 
     Parameters
     ----------
@@ -63,11 +63,11 @@ def cut_and_merge(
     clock : Clock
         Times the stages ``cut`` and ``merge``. When it stops, the parts reached so far are returned.
     merge : bool
-        Whether to merge. Without it no slivers are dropped in the end either.
+        Whether to merge, and to drop slivers afterwards.
     most : float
         Stop cutting as soon as it is clear that there will be more parts than this.
     strict : bool
-        Only a pass all of whose pieces meet the criterion is of use: do not merge the others.
+        Skip merging unless all pieces meet the criterion: the caller has no use for other passes.
     """
     with clock.stage("cut"):
         done, left = tree.cut_until(criterion, clock, most)
@@ -98,6 +98,6 @@ def cut_and_merge(
 
 
 def _apart(components: Sequence[Component], clock: Clock) -> list[Component]:
-    """Components that there was no time to cut: the connected pieces of each are its own at least."""
+    """The connected pieces of components that there was no time to cut."""
     with clock.shielded():
         return [piece for component in components for piece in component.pieces()]

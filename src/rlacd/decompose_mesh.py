@@ -1,4 +1,4 @@
-"""The loop: load, repair, cut until every component meets the criterion, merge, finish."""
+"""The public function: load, repair, cut until every component meets the criterion, merge, search, finish."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from rlacd.workers import Workers
 MeshLike: TypeAlias = "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]"
 
 COARSER = 1.5
-"""With `max_hulls`, decompositions at thresholds growing by this factor compete."""
+"""With `max_hulls`, thresholds that grow by this factor are tried, and the best decomposition is kept."""
 
 
 def decompose(
@@ -72,57 +72,57 @@ def decompose(
     mesh : path, trimesh.Trimesh, trimesh.Scene or (vertices, faces)
         Any triangle mesh or file of one; it need not be closed, oriented or clean.
     criterion : "concavity" or NavigableSpace
-        When a part is tight enough: when its concavity is at most `threshold`, or when its hull stays out of the space
+        Decides when a part is tight enough: its concavity is at most `threshold`, or its hull stays out of the space
         that a ball of a given size can reach.
     threshold : float
         Largest concavity of a part, in the frame where the input's longest side is 2 (CoACD's measure and frame):
-        the farthest that a part's surface and its hull's surface may lie apart. Between 0.001 and 2.
+        how far the surfaces of a part and its hull may lie apart. Between 0.001 and 2.
     threshold_abs : float, optional
         The same in the input's unit; replaces `threshold`.
     max_hulls : int, optional
-        No more hulls than this: the decomposition with the least concavity among those found. It may exceed the
-        threshold; ``report["warnings"]`` then says by how much.
+        Maximum number of hulls: returns the decomposition with the least concavity among those found. It may exceed
+        the threshold; ``report["warnings"]`` then says by how much.
     max_vertices, max_faces : int, optional
         Limits on the vertices and triangles of each hull. A limited hull still contains its part, and the threshold
-        holds for it too, unless the limit is below 24 vertices or 44 triangles or `max_hulls` is given: then a warning
-        says by how much it is exceeded.
+        holds for it too, unless the limit is below 24 vertices or 44 triangles, or `max_hulls` is given: if the
+        threshold is then exceeded, a warning says by how much.
     merge : bool
         Unite parts whose joint hull still meets the threshold.
     policy : str or Policy
         What chooses the cuts of the first pass: ``greedy``, ``greedy-SCORE``, ``navacd``, ``learned``, the path of an
         ONNX file (see `rlacd.policies.make_policy`), or any object with a method ``choose``: see `rlacd.Policy`.
     resolution : int
-        Cells along the longest side of the grid on which repair looks for enclosed rooms.
+        Cells along the longest side of the grid on which repair looks for enclosed spaces.
     open : "auto", "solid" or "thin"
-        What becomes of bodies with openings, such as cups and damaged scans. ``auto``: solid if nothing can get inside,
-        or if the openings look like missing faces; else a shell as thin as its faces. ``solid``: whatever is hollow is
-        filled. ``thin``: nothing is.
+        How to treat bodies with openings, such as cups and damaged scans. ``auto``: solid if nothing can get inside or
+        if the openings look like missing faces; otherwise a shell as thin as its faces. ``solid``: hollows are filled.
+        ``thin``: nothing is filled.
     seed : int
-        For whatever is random; the same input, options and seed give the same bytes.
+        Seed of all random choices; the same input, options and seed give the same bytes.
     threads : int, optional
-        Threads to use; all processors by default. The result does not depend on it.
+        Number of threads; all processors by default. The result does not depend on it.
     timeout : float, optional
-        Seconds after which the decomposition reached so far is returned: at most 1 s and 10 % later for inputs of up to
-        a million triangles. It covers the input in any case, at worst with a hull for each of its bodies.
+        Seconds after which the decomposition reached so far is returned, at most 1 s and 10 % late for inputs of up to
+        a million triangles. It always covers the input, at worst with one hull for each body.
     quality : str, optional
-        ``fast``: one pass of cuts; on navigable space, parts that can be divided among others go then, unless the
-        policy stands for a published method (``navacd``, ``greedy-SCORE``). ``balanced``, the default where parts are
-        merged: also a search for fewer parts, whose work is bounded by that of the pass. ``best``: the same, and a
-        long one.
-        Each level is never worse than the one before it: fewer hulls, or as many with less volume.
+        ``fast``: one pass of cuts; on navigable space, parts that can be divided among others are then eliminated,
+        unless the policy stands for a published method (``navacd``, ``greedy-SCORE``). ``balanced``, the default if
+        parts are merged: also a search for fewer parts, whose work is limited to a multiple of that of the pass.
+        ``best``: the same, followed by a long search.
+        No level is worse than the one before it: it gives fewer hulls, or equally many with no more volume.
     budget : float, optional
-        Seconds the search may take instead, whatever is found until then; what that is depends on the machine. ``best``
-        has 5, and more where ``balanced`` takes longer.
+        Seconds the search may take, instead of the limits of the level; the result then depends on the speed of the
+        machine. ``best`` has 5, and more if the search of ``balanced`` takes longer.
     search_steps : int, optional
-        Steps the search may take instead (about 10 to 20 a second on one core). The result
-        depends on nothing else.
+        Steps the search may take, instead of the limits of the level (about 10 to 20 a second on one core). The result
+        does not depend on the speed of the machine.
     preset : str, optional
         The engine the hulls are for: ``mujoco``, ``physx``, ``physx-gpu``, ``unity``, ``unreal``, ``newton`` or
-        ``bullet``. Its limits hold where `max_vertices` and `max_faces` are not given, and ``report["warnings"]`` says
-        what it will not take; see `rlacd.PRESETS`.
+        ``bullet``. Each of its limits applies unless `max_vertices` or `max_faces`, respectively, is given, and
+        ``report["warnings"]`` says what the engine will not accept; see `rlacd.PRESETS`.
     progress : callable, optional
         Called with a `Progress` between steps, and several times a second during long ones; when it returns False, the
-        decomposition reached so far is returned as soon as after a timeout.
+        decomposition reached so far is returned as promptly as after a timeout.
     threshold_m : float, optional
         The former name of `threshold_abs`.
 
@@ -134,17 +134,17 @@ def decompose(
     Raises
     ------
     MeshError
-        The input cannot be read or holds nothing to decompose.
+        The input cannot be read or contains nothing to decompose.
     OptionError
-        An option is of the wrong type or out of its range; nothing has been done yet.
+        An option has the wrong type or is out of range; raised before any work is done.
     MissingExtraError
-        A learned policy is asked for without the extra ``learned``.
+        A learned policy is requested without the extra ``learned``.
     """
     given = locals()
     chosen = with_former(Options, {name: given[name] for name in OPTION_NAMES}, {"threshold_m": threshold_m})
     options = Options(**chosen)
     check_callback("progress", progress, "a `rlacd.Progress`")
-    make_policy(options.policy)  # what is wrong with a network is said before any work is done
+    make_policy(options.policy)  # reports a bad network before any work is done
     clock = Clock(options.timeout, progress)
     with clock.running(), Workers(options.threads, clock.stop) as workers:
         with clock.stage("load"):
@@ -177,7 +177,7 @@ def decompose(
 
 
 class _Reached(NamedTuple):
-    """What a decomposition has come to: as asked for, or what there was when it was stopped."""
+    """The decomposition reached: complete, or the state when it was stopped."""
 
     solid: Solid
     options: Options
@@ -193,7 +193,7 @@ def _cleaned(reached: _Reached, max_vertices: int | None, max_faces: int | None,
 
 
 def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Clock) -> _Reached:
-    """Repair, cut, merge and search, until all is done or the clock stops it."""
+    """Repair, cut, merge and search, until done or stopped by the clock."""
     try:
         with clock.stage("repair"):
             solid = repair(
@@ -246,7 +246,7 @@ def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Cl
 
 
 def _scale(criterion: Criterion) -> float | None:
-    """How far a hull may reach, where the criterion says so: what a learned policy looks at."""
+    """How far a hull may reach beyond its part, if the criterion bounds that: an input of learned policies."""
     return criterion.overhang if math.isfinite(criterion.overhang) else None
 
 
@@ -266,7 +266,7 @@ def _unprepared(options: Options, solid: Solid) -> Criterion:
 def _parts(
     tree: CutTree, criterion: Criterion, options: Options, workers: Workers, clock: Clock
 ) -> tuple[list[Part], Criterion]:
-    """The parts, and the criterion they were settled on."""
+    """The parts, and the criterion as settled on them."""
     parts, criterion = _one_pass(tree, criterion, options, workers, clock)
     if options.max_hulls is None or len(parts) <= options.max_hulls:
         return parts, criterion

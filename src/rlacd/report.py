@@ -1,4 +1,4 @@
-"""What is said of a decomposition: measured on the input's surface, with everything that falls short in words."""
+"""The report of a decomposition: distances to the input's surface, and warnings about everything that falls short."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ from rlacd.solid.solid import Solid
 from rlacd.workers import Workers
 
 HONEST_WITHIN = 5e-3
-"""What the hulls' union may reach beyond the threshold before the report says so: repair and measurement."""
+"""How far the union of the hulls may reach beyond the threshold before the report warns: slack for repair and
+measurement."""
 
 
 def make_report(
@@ -35,11 +36,11 @@ def make_report(
     workers: Workers,
     clock: Clock,
 ) -> dict[str, Any]:
-    """Measure a finished decomposition; the keys are those of `rlacd.Decomposition`, without name and seconds.
+    """Measure a finished decomposition; the keys are those of `rlacd.Decomposition` without name, search and seconds.
 
-    What there is no time to measure is None.
+    Values that there was no time to measure are None.
     """
-    is_cover = solid.manifold.is_empty()  # hulls of what was not repaired: nothing is known of the parts in them
+    is_cover = solid.manifold.is_empty()  # hulls of an input that was not repaired: the parts in them are unknown
     errors = None if is_cover else clock.if_in_time(lambda: workers.map(criterion.error, parts), lambda: None)
     summary = criterion.summary(errors)
     over = under = None
@@ -92,7 +93,7 @@ def make_report(
 
 
 def _options(options: Options) -> dict[str, Any]:
-    """The options as they were used; lengths under their former names, ending in ``_m``, for one version more."""
+    """The options used; lengths also appear under their former names, ending in ``_m``, for one more version."""
     plain = options.as_plain()
     if isinstance(plain["criterion"], dict):
         plain["criterion"] |= {f"{name}_m": plain["criterion"][f"{name}_abs"] for name in ("radius", "tolerance")}
@@ -100,7 +101,7 @@ def _options(options: Options) -> dict[str, Any]:
 
 
 def _mass(mass: Mass) -> dict[str, Any]:
-    """The mass in the input's unit; under its former names too, for one version more."""
+    """The mass in the input's unit; also under its former names for one more version."""
     volume, centre, inertia = mass.volume_abs, mass.centre_abs.tolist(), mass.inertia_abs.tolist()
     now = {"volume_abs": volume, "centre_abs": centre, "inertia_abs": inertia}
     return now | {"volume_m": volume, "centre_m": centre, "inertia_m": inertia}
@@ -121,7 +122,7 @@ def _coarse(solid: Solid) -> list[str]:
 
 
 def _out_of_the_box(hulls: Sequence[Hull], solid: Solid) -> list[str]:
-    """Where balls decide, limits that no tight hull can keep to must not go unsaid: there are no balls so far out."""
+    """Warn of limits that no tight hull can meet: the criterion cannot see it, as there are no balls so far out."""
     lower, upper = np.array(solid.manifold.bounding_box()).reshape(2, 3)
     beyond = max(float(max((lower - hull.box[0]).max(), (hull.box[1] - upper).max())) for hull in hulls)
     if beyond <= HONEST_WITHIN:

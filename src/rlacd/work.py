@@ -1,7 +1,7 @@
-"""Work, counted instead of timed: the same on every machine, for every number of threads.
+"""Work, counted rather than timed, so that it is the same on every machine and for every number of threads.
 
-The unit is what takes about a microsecond of one core; the weights below were fitted to measured CPU times once
-(docs/search.md). A bound on work is known beforehand, and results that depend on it depend on the input alone.
+A unit takes about a microsecond on one core; the weights below were fitted to measured CPU times (docs/search.md).
+A limit on work does not depend on the clock, so results under such a limit depend only on the input.
 """
 
 from __future__ import annotations
@@ -10,19 +10,19 @@ import math
 
 
 class Work:
-    """An account of work with a bound: what is spent never exceeds it.
+    """An account of work with a limit that is never exceeded.
 
     Parameters
     ----------
     most : float
-        Units there are; what is less than a unit does not count.
+        Limit in units, rounded down.
 
     Attributes
     ----------
     done : int
         Units spent.
     is_spent : bool
-        Whether something was wanted that there was not enough left for.
+        Whether the account is closed: a payment exceeded what was left, or `close` was called.
     """
 
     def __init__(self, most: float = math.inf) -> None:
@@ -40,11 +40,11 @@ class Work:
         return self.left if math.isinf(self.left) else self.left // among
 
     def close(self) -> None:
-        """Spend nothing more."""
+        """Close the account: all further payments fail."""
         self.is_spent = True
 
     def pay(self, units: float) -> bool:
-        """Spend units, rounded up, if there are as many left; otherwise False, and the account is closed."""
+        """Spend units, rounded up; if fewer are left, close the account and return False."""
         units = math.ceil(units)
         if self.is_spent or units > self.left:
             self.is_spent = True
@@ -64,35 +64,35 @@ def judging(faces: int, hull_faces: int) -> float:
 
 
 def cutting(faces: int) -> float:
-    """Cut a component by a plane, and take the hulls of its sides."""
+    """Cut a component by a plane and compute the hulls of its sides."""
     return 280 + 0.8 * faces
 
 
 def joining(vertices: int) -> float:
-    """Take the joint hull of parts whose hulls have so many vertices in all."""
+    """Compute the joint hull of parts whose hulls have `vertices` vertices in total."""
     return 25 + 0.6 * vertices
 
 
 def screening(vertices: int) -> float:
-    """Hold the joint hull of two parts against the solid; most are refused at once."""
+    """Test the joint hull of two parts against the solid; most are rejected at once."""
     return 80 + 0.3 * vertices
 
 
 def holding(vertices: int) -> float:
-    """Hold a hull of so many vertices against the solid."""
+    """Test a hull against the solid."""
     return 150 + 1.4 * vertices
 
 
 def gluing(faces: int) -> float:
-    """Glue two parts that have so many faces together."""
+    """Glue two parts that have `faces` faces in total."""
     return 20 + 0.35 * faces
 
 
 def filling(solid_faces: int, faces: int, hull_faces: int) -> float:
-    """Take what a solid fills of a hull around parts that have so many faces."""
+    """Clip a solid to a hull around parts that have `faces` faces in total."""
     return 1200 + 0.65 * solid_faces + 7.0 * faces + 9.0 * hull_faces
 
 
 def reuniting(faces: int, count: int) -> float:
-    """Make one solid of a number of components that have so many faces together."""
+    """Reunite `count` components that have `faces` faces in total into one solid."""
     return 1300 + 6.5 * faces + 390.0 * count

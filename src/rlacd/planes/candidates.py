@@ -1,4 +1,4 @@
-"""The paper's candidate planes: equidistant along the coordinate axes and along the component's principal axes."""
+"""The paper's candidate planes: equidistant along the coordinate axes and the component's principal axes."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
 
 OFFSETS_PER_AXIS = 25
-"""25 planes along each of 6 axes: the paper's 150."""
+"""25 planes along each of 6 axes make the paper's 150."""
 
 
 SAME_AXIS = 1e-3
-"""Principal axes within this angle (radians) of a coordinate axis are taken to be that axis."""
+"""Principal axes within this angle (radians) of a coordinate axis are replaced by it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,13 +37,13 @@ class Candidates:
 
     @classmethod
     def joined(cls, *blocks: Candidates) -> Candidates:
-        """Put the planes of several blocks after each other, one a row; the sweep shares rows of equal directions."""
+        """Concatenate the planes of several blocks, one per row; the sweep groups rows of equal direction."""
         directions = [np.repeat(block.directions, block.offsets.shape[1], axis=0) for block in blocks]
         offsets = [block.offsets.reshape(-1, 1) for block in blocks]
         return cls(np.concatenate(directions), np.concatenate(offsets))
 
     def plane(self, index: int) -> Plane:
-        """Get plane number `index` of the K * M, counted direction by direction."""
+        """Get plane number `index` of the K * M, numbered direction by direction."""
         k, j = divmod(index, self.offsets.shape[1])
         x, y, z = (float(c) for c in self.directions[k])
         return Plane((x, y, z), float(self.offsets[k, j]))

@@ -1,9 +1,9 @@
-"""Candidate planes at concave edges: where a component has to be cut anyway, equidistant planes only come near.
+"""Candidate planes at concave edges, where a component has to be cut anyway and equidistant planes only come close.
 
-A component with a reflex edge is not convex, and it stays so until a plane through that edge (or nearly) separates its
-two faces. Each edge offers the plane that halves the reflex angle and the planes of its two faces; of the many edges of
-a mesh, few are asked: deep ones, sharp ones, long creases first, and spread out (Andrews, "Navigation-Driven
-Approximate Convex Decomposition", SIGGRAPH 2024). The work is done in native/cut/concave_edges.hpp.
+A component with a reflex edge is not convex, and stays non-convex until a plane through (or close to) that edge
+separates its two faces. Each edge offers the plane that bisects the reflex angle and the planes of its two faces. Of
+the many edges of a mesh, a few are chosen: deep, sharp and long ones first, and spread out (Andrews,
+"Navigation-Driven Approximate Convex Decomposition", SIGGRAPH 2024). Implemented in native/cut/concave_edges.hpp.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class ConcaveEdges:
     normals : float64 [E, 2, 3]
         Their outward unit normals.
     angle : float64 [E]
-        By how much the dihedral angle inside the solid exceeds a straight one, in (0, pi).
+        Interior dihedral angle minus pi, in (0, pi).
     """
 
     ends: IntArray
@@ -42,17 +42,17 @@ class ConcaveEdges:
 
 
 def reflex_edges(component: Component) -> ConcaveEdges:
-    """Find all edges whose dihedral angle exceeds 180 degrees by more than 10, folds and needles left out."""
+    """Find all edges whose interior dihedral angle exceeds 190 degrees, except at folds and needles."""
     ends, faces, normals, angle = _native.reflex_edges(component.vertices, component.faces)
     return ConcaveEdges(ends, faces, normals.reshape(-1, 2, 3), angle)
 
 
 def concave_edges(component: Component, count: int = 4) -> ConcaveEdges:
-    """Choose up to `count` reflex edges of a component: deep, sharp ones of long creases first, and spread out.
+    """Choose up to `count` reflex edges of a component: deep, sharp edges of long creases first, and spread out.
 
-    The first has the greatest depth x angle x length; depth is how far its midpoint lies below the hull's surface,
-    length that of its whole crease. For each further one the product is multiplied by its distance from the nearest
-    chosen one, and by how much its planes differ from those chosen; edges that offer no new plane are never chosen.
+    The first edge has the greatest depth x angle x length: the depth of its midpoint below the hull's surface, and the
+    length of its whole crease. For each further edge, the product is multiplied by its distance from the nearest chosen
+    one and by how much its planes differ from those chosen. Edges that offer no new plane are never chosen.
 
     Returns
     -------
@@ -67,12 +67,12 @@ def concave_edges(component: Component, count: int = 4) -> ConcaveEdges:
 
 
 def concave_edge_planes(component: Component, count: int = 4) -> Candidates:
-    """Candidates of one component: three planes for each of `count` concave edges, near-duplicates left out.
+    """Candidates of one component: three planes for each of `count` concave edges, without near-duplicates.
 
-    Per edge, the plane that halves the reflex angle, and the planes of its two faces. A face plane is moved outwards
-    until its face, and what is coplanar with it in single precision, lies wholly below: by nothing where the plane is
-    normal to a coordinate axis (such cuts are exact), else by 1e-9. On the face itself, rounding would decide for
-    every corner on which side it comes to lie, and the part beyond would carry the face along as a film.
+    Each edge gives the plane that bisects the reflex angle, and the planes of its two faces. A face plane is moved
+    outwards by 1e-9, so that its face and all that is coplanar with it in single precision lie below; planes normal to
+    a coordinate axis stay in place, because such cuts are exact. In the plane of the face itself, rounding would decide
+    the side of each corner, and the piece beyond would carry the face along as a film.
 
     Returns
     -------

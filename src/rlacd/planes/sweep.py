@@ -1,4 +1,4 @@
-"""What every candidate plane would do to a component, without cutting it."""
+"""The sweep: scores of all candidate planes of a component, without cutting it."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ SLIVER = 0.02
 """A side thinner than this share of its largest extent (an inscribed ball of 1/100) is a sliver."""
 
 ROUNDING = 10
-"""How much more than a negligible volume a side must have: the sweep and the cut round differently."""
+"""Least volume of a side as a multiple of the negligible volume: the sweep and the cut round differently."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """Scores of all candidate planes of one component; every array has one entry a plane, [K * M].
+    """Scores of all candidate planes of one component; every array has one entry per plane, [K * M].
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Sweep:
     extent_above: FloatArray
 
     def valid(self, sliver: float = SLIVER) -> BoolArray:
-        """Tell which planes meet the solid and leave no side thinner than `sliver` times its largest extent."""
+        """Whether each plane meets the solid and leaves no side thinner than `sliver` times its largest extent."""
         return (
             (self.solid_below > ROUNDING * NEGLIGIBLE_VOLUME)
             & (self.solid_above > ROUNDING * NEGLIGIBLE_VOLUME)

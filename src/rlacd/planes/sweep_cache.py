@@ -1,4 +1,4 @@
-"""Candidate planes and their sweeps that several policies look at, each made once."""
+"""Candidate planes and sweeps shared by several policies, each computed once."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from rlacd.solid.component import Component
 
 
 class SweepCache:
-    """The same kinds of planes of every component, and sweeps over them, kept as long as the component is.
+    """Candidate planes of components and their sweeps, kept as long as the component lives.
 
     Parameters
     ----------
     per_axis : int
         Planes along each of the six axes.
     concave_edges : int
-        How many concave edges add their planes.
+        Number of concave edges whose planes are added.
     """
 
     def __init__(self, per_axis: int = OFFSETS_PER_AXIS, concave_edges: int = 4) -> None:
@@ -37,7 +37,7 @@ class SweepCache:
             known = axis_and_principal(component, self._per_axis)
             if self._concave_edges > 0:
                 known = Candidates.joined(known, concave_edge_planes(component, self._concave_edges))
-            with self._lock:  # another thread may have been here: with the same result
+            with self._lock:  # another thread may have done the same, with the same result
                 self._candidates[component] = known
         return known
 
