@@ -64,13 +64,13 @@ def run_coacd(
     Parameters
     ----------
     mesh : Mesh
-        Or anything with ``vertices`` and ``indices``, such as CoACD's own.
+        Or any object with ``vertices`` and ``indices``, such as coacd's own.
     threshold : float
         Concavity, in CoACD's measure and frame, or in the mesh's unit with `real_metric`.
     max_convex_hull : int
-        No more hulls than this; -1 is no limit.
+        Maximum number of hulls; -1 for no limit.
     merge : bool
-        Unite parts again where one hull will do.
+        Merge parts that fit into one hull.
     decimate, max_ch_vertex
         With `decimate`, no hull has more than `max_ch_vertex` vertices.
     apx_mode : {"ch", "box"}
@@ -81,7 +81,7 @@ def run_coacd(
         Whether `threshold` is in the mesh's unit.
     preprocess_mode, preprocess_resolution, resolution, mcts_nodes, mcts_iterations, mcts_max_depth, pca, extrude, \
 extrude_margin
-        Accepted; a warning says once why they do nothing.
+        Accepted but unused; a warning explains this once.
 
     Returns
     -------
@@ -115,7 +115,7 @@ extrude_margin
 
 
 def set_log_level(level: str) -> None:
-    """Accept CoACD's log levels; nothing is logged here."""
+    """Accept CoACD's log levels; rlacd logs nothing."""
 
 
 def _defaults() -> dict[str, Any]:

@@ -1,7 +1,7 @@
-"""trimesh's convex decomposition, by rlacd.
+"""trimesh's convex decomposition, done by rlacd.
 
-trimesh has no place to register another backend than vhacdx. To have ``mesh.convex_decomposition()`` use rlacd
-everywhere in a program, put this function there once::
+trimesh offers no way to register a backend other than vhacdx. To make ``mesh.convex_decomposition()`` use rlacd
+throughout a program, replace its function once::
 
     import trimesh.decomposition
     from rlacd.compat.trimesh import convex_decomposition
@@ -44,7 +44,7 @@ def convex_decomposition(mesh: trimesh.Trimesh, **kwargs: Any) -> list[dict[str,
     Raises
     ------
     MeshError, OptionError
-        As those functions.
+        As raised by those functions.
     """
     if not _VHACD.isdisjoint(kwargs):
         return [{"vertices": v, "faces": f} for v, f in compute_vhacd(mesh.vertices, mesh.faces, **kwargs)]

@@ -1,4 +1,4 @@
-"""Say once, per function and option, that an option given to a stand-in does nothing here."""
+"""Warn once per function and option about options of a drop-in replacement that have no effect."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class UnusedOptionWarning(UserWarning):
 def say_unused(
     function: str, given: Mapping[str, Any], defaults: Mapping[str, Any], reasons: Mapping[str, str]
 ) -> None:
-    """Warn of the options in `reasons` whose value is not the default, each once in the life of the program."""
+    """Warn about the options in `reasons` that differ from their default, each once per process."""
     for name, reason in reasons.items():
         if not _same(given[name], defaults[name]) and (function, name) not in _SAID:
             _SAID.add((function, name))
@@ -24,5 +24,5 @@ def say_unused(
 
 
 def _same(given: Any, default: Any) -> bool:
-    """Whether an option was left alone; an array or the like is no default."""
+    """Tell whether an option has its default value; an array never does."""
     return isinstance(given, (str, bool, int, float)) and bool(given == default)

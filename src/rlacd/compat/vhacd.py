@@ -52,13 +52,13 @@ def compute_vhacd(
     faces : array-like [F, 3] or flat
         Triangles; or, as vhacdx takes them, one row of numbers ``3, a, b, c, 3, a, b, c, ...``.
     maxConvexHulls : int
-        No more hulls than this.
+        Maximum number of hulls.
     maxNumVerticesPerCH : int
-        No more vertices a hull than this.
+        Maximum number of vertices per hull.
     asyncACD : bool
-        Whether to use all processors; the result is the same.
+        Whether to use all processors; the result is the same either way.
     resolution, minimumVolumePercentErrorAllowed, maxRecursionDepth, shrinkWrap, fillMode, minEdgeLength, findBestPlane
-        Accepted; a warning says once why they do nothing.
+        Accepted but unused; a warning explains this once.
 
     Returns
     -------

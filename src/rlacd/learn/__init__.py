@@ -1,1 +1,1 @@
-"""Learning which plane to cut by (extra `train`); nothing outside imports this room but the command `rlacd train`."""
+"""Learning which plane to cut by (extra `train`); outside this package only the commands of `rlacd train` import it."""

@@ -1,7 +1,7 @@
-"""Checkpoints: a folder that holds all of a run's state, replaced as a whole, read without pickle.
+"""Checkpoints: a folder with the complete state of a run, replaced atomically and read without pickle.
 
 ``weights.safetensors`` holds the networks and Adam's moments, ``replay.npz`` the buffer, ``rollouts.npz`` the episodes
-that are not learned from yet, ``state.json`` the rest.
+not yet learned from, ``state.json`` the rest.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from rlacd.io.read.open_file import read_file
 FORMAT = 2
 
 DAMAGE = (OSError, ValueError, KeyError, TypeError, RecursionError, MemoryError)
-"""What reading a damaged file may raise, beside the exceptions of its format."""
+"""Exceptions that reading a damaged file may raise, beyond those of its format."""
 
 
 @dataclass(frozen=True)
@@ -51,12 +51,12 @@ class Checkpoint:
 
 
 def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
-    """Write a checkpoint; whenever the process dies, a whole one is left: the new or, if it got so far, the old.
+    """Write a checkpoint; if the process dies at any moment, a complete one remains, the old or the new.
 
     Raises
     ------
     OutputError
-        The disk is full or the folder cannot be written.
+        The disk is full or the folder is not writable.
     """
     fresh, old = folder.with_name(folder.name + ".new"), folder.with_name(folder.name + ".old")
     try:
@@ -84,7 +84,7 @@ def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
 
 
 def load_checkpoint(folder: Path) -> Checkpoint | None:
-    """Read a checkpoint; None where there is none.
+    """Read a checkpoint; None if there is none.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def load_checkpoint(folder: Path) -> Checkpoint | None:
 
 
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """Read arrays; they were written without compression, so that no file grows when it is read."""
+    """Read arrays; they are stored uncompressed, so a small file cannot expand in memory."""
     with zipfile.ZipFile(path) as archive:
         if any(member.compress_type != zipfile.ZIP_STORED for member in archive.infolist()):
             raise ValueError(f"{path.name} is compressed")
@@ -126,7 +126,7 @@ def adam_state(optimizer: torch.optim.Adam) -> dict[str, Tensor]:
 
 
 def restore_adam(optimizer: torch.optim.Adam, weights: Mapping[str, Tensor]) -> None:
-    """Take over what `adam_state` returned."""
+    """Restore the result of `adam_state`."""
     state: dict[int, dict[str, Tensor]] = {}
     for name, value in weights.items():
         if name.startswith("adam."):

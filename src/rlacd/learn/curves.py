@@ -1,4 +1,4 @@
-"""The curves of a run: a line of JSON a point, and the same for TensorBoard."""
+"""The curves of a run: one JSON line per point, and the same for TensorBoard."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from torch.utils.tensorboard import SummaryWriter
 
 
 class Curves:
-    """Curves that a resumed run goes on with where its checkpoint was, as if it had never been interrupted.
+    """Curves that a resumed run continues from its checkpoint as if it had never been interrupted.
 
     Parameters
     ----------
     run : Path
-        ``curves.jsonl`` and ``tensorboard/`` are put there.
+        Folder for ``curves.jsonl`` and ``tensorboard/``.
     counted : str
-        What the points are counted by.
+        Name of the step counter.
     """
 
     def __init__(self, run: Path, counted: str = "cuts") -> None:
@@ -27,7 +27,7 @@ class Curves:
         self._board: SummaryWriter | None = None
 
     def restart(self, count: int) -> None:
-        """Forget the points after `count`: they will be made again."""
+        """Drop the points after `count`: they will be recomputed."""
         kept = []
         if self._path.exists():
             lines = self._path.read_text().splitlines(keepends=True)
@@ -38,7 +38,7 @@ class Curves:
         self._board = SummaryWriter(str(self._folder / "tensorboard"), purge_step=count + 1)
 
     def add(self, count: int, values: Mapping[str, float], seconds: float) -> None:
-        """Add a point to each of several curves."""
+        """Append a point to several curves."""
         with open(self._path, "a") as file:
             file.write(json.dumps({self._counted: count, **values, "seconds": round(seconds, 3)}) + "\n")
         if self._board is not None:
@@ -47,6 +47,6 @@ class Curves:
                 self._board.add_scalar(group, value, count)
 
     def close(self) -> None:
-        """Write what TensorBoard still holds back."""
+        """Flush TensorBoard."""
         if self._board is not None:
             self._board.close()

@@ -1,4 +1,4 @@
-"""Where torch computes."""
+"""Choice of the torch device."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def pick_device(name: str) -> torch.device:
     Raises
     ------
     OptionError
-        A GPU is asked for and there is none.
+        A GPU is requested and there is none.
     """
     if name == "cuda" and not torch.cuda.is_available():
         raise OptionError("device is 'cuda', but torch finds no GPU; use cpu, or install torch for CUDA.")

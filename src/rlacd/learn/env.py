@@ -27,23 +27,23 @@ from rlacd.solid.component import Component
 PLANES = 6 * OFFSETS_PER_AXIS
 
 LARGEST_SCALE = 1024.0
-"""No component of a solid is larger against the threshold, nor smaller than two to minus this."""
+"""Bound on the log2 ratio of a component's size to the threshold, either way."""
 
 _Observed = dict[str, NDArray[Any]]
 
 
 class CutEnv(gymnasium.Env[_Observed, NDArray[np.int64]]):
-    """Cut solids until every component meets the criterion, in few components.
+    """Cut solids until every component meets the criterion, with as few components as possible.
 
-    The observation has `max_parts` slots, one for each component that is not finished; empty ones are zero:
+    The observation has `max_parts` slots, one per unfinished component; empty slots are zero:
 
-    - ``points`` float32 [S, 2, N, 3]: of the component's surface and of its hull's, in its own frame;
+    - ``points`` float32 [S, 2, N, 3]: points of the component's surface and of its hull's, in its own frame;
     - ``directions`` float32 [S, 6, 3]: normals of its candidate planes;
     - ``scale`` float32 [S, 3]: see `rlacd.policies.observe.Observation`;
-    - ``taken`` int8 [S]: 1 where there is a component.
+    - ``taken`` int8 [S]: 1 if the slot holds a component.
 
-    The action is a slot and one of its 150 planes. Planes that ``info["action_mask"]`` [S, 150] does not allow cut
-    nothing and give no reward, and count as a cut towards `max_cuts`.
+    The action is a slot and one of its 150 planes. Planes not allowed by ``info["action_mask"]`` [S, 150] cut nothing
+    and give no reward, but count towards `max_cuts`.
 
     The reward is lambda_1 r_1 + lambda_2 r_2 (the paper's eq. 2 and 3); ``info["saved"]`` is r_1 and
     ``info["finished"]`` is r_2. An episode terminates when nothing is left to cut, and is truncated at `max_cuts` cuts
@@ -54,12 +54,12 @@ class CutEnv(gymnasium.Env[_Observed, NDArray[np.int64]]):
     meshes : path
         A folder of mesh files, searched to any depth.
     threshold : float
-        Concavity that finishes a component.
+        Concavity at which a component is finished.
     points : int
         N.
     max_cuts, max_parts : int
     max_faces : int
-        Meshes with more triangles are left out.
+        Meshes with more triangles are skipped.
     rotate : bool
         Turn each solid about a random axis by 0, 45, 90 or 180 degrees.
     volume_reward, finish_reward : float
@@ -113,7 +113,7 @@ class CutEnv(gymnasium.Env[_Observed, NDArray[np.int64]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[_Observed, dict[str, Any]]:
-        """Begin with another solid, drawn at random; see `gymnasium.Env.reset`."""
+        """Start with another solid, drawn at random; see `gymnasium.Env.reset`."""
         super().reset(seed=seed)
         start, self._cutting = self._episodes.draw(self.np_random)
         self._name, self._cuts, self._seen = start.name, 0, {}
@@ -133,7 +133,7 @@ class CutEnv(gymnasium.Env[_Observed, NDArray[np.int64]]):
         return self._observed(), r, terminated, truncated, self._info(reward, made)
 
     def _shown(self) -> list[Observation]:
-        """Observations of the components in the slots; a frontier that has outgrown them is at its end."""
+        """Observations of the components in the slots; if the frontier outgrew them, the episode has ended."""
         components = self._cutting.frontier[: self._slots]
         self._seen = {
             c: self._seen.get(c) or observe(c, self._cutting.candidates(c), self._threshold, self._points)
@@ -144,7 +144,7 @@ class CutEnv(gymnasium.Env[_Observed, NDArray[np.int64]]):
     def _observed(self) -> _Observed:
         filled: _Observed = {name: np.zeros(s.shape, s.dtype) for name, s in self.observation_space.items()}  # type: ignore[attr-defined]
         for slot, seen in enumerate(self._shown()):
-            filled["points"][slot] = np.clip(seen.points, -1, 1)  # single precision may round a corner outwards
+            filled["points"][slot] = np.clip(seen.points, -1, 1)  # float32 rounding may move a corner outwards
             filled["directions"][slot] = np.clip(seen.directions, -1, 1)
             filled["scale"][slot] = np.clip(seen.scale, -LARGEST_SCALE, LARGEST_SCALE)
             filled["taken"][slot] = 1

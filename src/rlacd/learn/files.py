@@ -1,4 +1,4 @@
-"""Arrays as bytes, read without pickle, and files that are written whole or not at all."""
+"""Arrays as bytes, read without pickle, and atomic writes of files."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 
 def packed(arrays: Mapping[str, NDArray[Any]], *, compressed: bool = False) -> bytes:
-    """Get arrays as the content of an .npz file."""
+    """Pack arrays as the content of an .npz file."""
     file = io.BytesIO()
     if compressed:
         np.savez_compressed(file, allow_pickle=False, **arrays)
@@ -23,13 +23,13 @@ def packed(arrays: Mapping[str, NDArray[Any]], *, compressed: bool = False) -> b
 
 
 def unpacked(content: bytes) -> dict[str, NDArray[Any]]:
-    """Get the arrays of an .npz file's content back."""
+    """Unpack the content of an .npz file."""
     with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
         return dict(arrays)
 
 
 def save_bytes(path: Path, content: bytes) -> None:
-    """Write a file under its final name only when it is complete; processes may write the same one."""
+    """Write a file atomically, by renaming it when complete; several processes may write the same one."""
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f"{path.name}.{os.getpid()}.part")
     partial.write_bytes(content)

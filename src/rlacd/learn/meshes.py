@@ -1,7 +1,8 @@
-"""The solids to learn on: a folder of meshes, split into those to learn from and to judge by, each repaired once.
+"""The solids of a training: a folder of meshes, split into training and held-out ones, each repaired once.
 
-There are two lists. `list_meshes` reads every file, leaves out large ones by their triangles, and draws those held out;
-`small_files` and `is_held_out` decide by length and name alone, and so need not read thousands of files.
+There are two kinds of lists. `list_meshes` reads every file, skips those with too many triangles, and draws the
+held-out ones; `small_files` and `is_held_out` go by file size and name alone, so that thousands of files need not be
+read.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from rlacd.solid.frame import Frame
 ENDINGS = frozenset({".ply", ".obj", ".stl", ".off", ".glb", ".gltf", ".dae", ".3mf"})
 
 HELD_OUT = 24
-"""One mesh in this many is held out where its name decides."""
+"""One mesh in this many is held out by `is_held_out`."""
 
 TURNS = (0.0, 45.0, 90.0, 180.0)
 """Degrees about one axis: the paper's augmentation."""
@@ -39,14 +40,14 @@ TURNS = (0.0, 45.0, 90.0, 180.0)
 
 @dataclass(frozen=True)
 class MeshList:
-    """What a folder holds.
+    """The meshes of a folder.
 
     Attributes
     ----------
     training, validation : tuple of str
         Paths relative to the folder.
     unreadable, too_large : int
-        Files left out.
+        Number of files skipped.
     """
 
     training: tuple[str, ...]
@@ -61,7 +62,7 @@ def list_meshes(folder: Path, max_faces: int, validation: int, seed: int) -> Mes
     Raises
     ------
     TrainingError
-        Nothing is left to learn on.
+        No meshes are left for training.
     """
     names, unreadable, too_large = [], 0, 0
     for path in sorted(p for p in folder.rglob("*") if p.suffix.lower() in ENDINGS and p.is_file()):
@@ -84,12 +85,12 @@ def list_meshes(folder: Path, max_faces: int, validation: int, seed: int) -> Mes
 
 
 def list_once(meshes: Path, run: Path, max_faces: int, validation: int, seed: int) -> MeshList:
-    """List the meshes when a run begins; later the list is read from the run, so that new files change nothing.
+    """List the meshes at the start of a run; resumed runs read that list, so that new files change nothing.
 
     Raises
     ------
     TrainingError
-        There is no such folder, or nothing in it to learn on.
+        There is no such folder, or nothing in it to train on.
     """
     kept = run / "meshes.json"
     if kept.exists():
@@ -110,20 +111,20 @@ def small_files(folder: Path, max_bytes: int) -> list[str]:
 
 
 def is_held_out(name: str) -> bool:
-    """Tell whether a mesh is for judging only; decided by its name alone."""
+    """Tell whether a mesh is held out; its name alone decides."""
     return zlib.crc32(name.encode()) % HELD_OUT == 0
 
 
 def shuffled(names: Sequence[str], seed: int) -> list[str]:
-    """Put names in an order that depends on the seed only."""
+    """Shuffle names by the seed alone."""
     return [names[i] for i in np.random.default_rng(seed).permutation(len(names))]
 
 
 NOTHING = np.empty((0, 3)), np.empty((0, 3), dtype=np.uint64)
-"""Vertices and faces of what could not be repaired."""
+"""Vertices and faces that stand for a failed repair."""
 
 SOLID = "solid.npz"
-"""Name of a repaired solid among the files of a request and of its answer."""
+"""Name of a repaired solid among the blobs of a request and of its answer."""
 
 
 def repaired(path: Path) -> bytes:
@@ -143,20 +144,20 @@ def pack_solid(vertices: FloatArray, faces: NDArray[np.uint64]) -> bytes:
 
 
 def unpack_solid(content: bytes) -> Manifold | None:
-    """Get a solid back; None when it could not be repaired."""
+    """Unpack a solid; None if it could not be repaired."""
     arrays = unpacked(content)
     return Manifold(Mesh64(arrays["vertices"], arrays["faces"])) if len(arrays["faces"]) else None
 
 
 def take_solid(blobs: Mapping[str, bytes], staging: Path) -> tuple[Manifold | None, dict[str, bytes]]:
-    """Get the solid of a request (see `Solids.files`), and what the answer gives back of it: `SOLID` if it is new.
+    """Return the solid of a request (see `Solids.files`), and the blobs for the answer: `SOLID` if it is new.
 
     Parameters
     ----------
     blobs : mapping of bytes
         The repaired solid, or the files of a mesh.
     staging : Path
-        A folder for what is on its way.
+        A folder for temporary files.
     """
     if SOLID in blobs:
         return unpack_solid(blobs[SOLID]), {}
@@ -166,19 +167,19 @@ def take_solid(blobs: Mapping[str, bytes], staging: Path) -> tuple[Manifold | No
 
 
 def turned(solid: Manifold, axis: int, degrees: float) -> Component:
-    """Turn a solid about a coordinate axis, and carry it to its frame."""
+    """Turn a solid about a coordinate axis, and move it to its frame."""
     return Component(_framed(solid.rotate([degrees if i == axis else 0.0 for i in range(3)])) if degrees else solid)
 
 
 class Solids:
-    """Repaired solids by name, taken from the cache folder, or repaired and put there.
+    """Repaired solids by name, read from the cache folder, or repaired and stored there.
 
     Parameters
     ----------
     folder : Path
-        Of the meshes.
+        Folder of the meshes.
     cache : Path, optional
-        A folder of this class's own; several processes may share it. Without, solids are kept in memory only.
+        A folder used by this class only; several processes may share it. By default solids are kept in memory only.
     """
 
     def __init__(self, folder: Path, cache: Path | None = None) -> None:
@@ -189,12 +190,12 @@ class Solids:
             cache.mkdir(parents=True, exist_ok=True)
 
     def get(self, name: str, axis: int = 0, degrees: float = 0.0) -> Component | None:
-        """Get a solid turned about a coordinate axis, in its frame; None when it cannot be repaired."""
+        """Return a solid turned about a coordinate axis, in its frame; None if it cannot be repaired."""
         solid = self.manifold(name)
         return None if solid is None else turned(solid, axis, degrees)
 
     def manifold(self, name: str) -> Manifold | None:
-        """Get a solid as it is in its file; None when it cannot be repaired."""
+        """Return a solid as in its file; None if it cannot be repaired."""
         if name not in self._held:
             kept = self._kept(name)
             if kept is None:
@@ -204,7 +205,7 @@ class Solids:
         return self._held[name]
 
     def files(self, name: str) -> dict[str, bytes]:
-        """Get what another machine makes the solid of: the solid itself (`SOLID`), or the files of the mesh."""
+        """Return what another machine needs to get the solid: the solid itself (`SOLID`), or the files of the mesh."""
         kept = self._kept(name)
         try:
             return mesh_files(self._folder / name) if kept is None else {SOLID: kept}
@@ -212,7 +213,7 @@ class Solids:
             return {SOLID: pack_solid(*NOTHING)}
 
     def keep(self, name: str, content: bytes) -> None:
-        """Put what `repaired` gave into the cache."""
+        """Store the result of `repaired` in the cache."""
         if (place := self._place(name)) is not None:
             save_bytes(place, content)
 
@@ -226,7 +227,7 @@ class Solids:
 
 
 def _framed(solid: Manifold) -> Manifold:
-    """Carry a solid to where its box is centred and its longest side 2."""
+    """Move and scale a solid so that its box is centred and its longest side is 2."""
     box = np.asarray(solid.bounding_box(), dtype=np.float64).reshape(2, 3)
     frame = Frame.of(box)
     return solid.translate([float(-x) for x in frame.center]).scale([frame.scale] * 3)

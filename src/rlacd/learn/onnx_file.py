@@ -1,4 +1,4 @@
-"""Networks of torch as ONNX files."""
+"""Export of torch networks to ONNX."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ def to_onnx(
     outputs: Sequence[str],
     sizes: Mapping[str, Mapping[int, str]] | None = None,
 ) -> onnx.ModelProto:
-    """Translate a module of tensors [B, ...] to tensors [B, ...], for any B; nothing of this machine goes along.
+    """Export a module of tensors [B, ...] to tensors [B, ...], for any B, without traces of the exporting machine.
 
     Parameters
     ----------
     module : torch.nn.Module
     example : tuple of Tensor
-        Inputs of the shapes to come, but for B, which should be 2 here.
+        Inputs of the shapes to expect, except for B, which should be 2 here.
     inputs, outputs : sequence of str
         Names in the graph.
     sizes : mapping, optional
-        By input, other sizes that are left open: the name of each by its axis.
+        For each input, further dynamic axes: the name of each by its index.
     """
     names = ("batch", *dict.fromkeys(name for axes in (sizes or {}).values() for name in axes.values()))
     dims = {name: torch.export.Dim(name, min=1 if name == "batch" else 2) for name in names}
@@ -44,7 +44,7 @@ def to_onnx(
     for logger in ("torch.onnx", "onnxscript"):
         logging.getLogger(logger).setLevel(logging.ERROR)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the exporter's own deprecations
+        warnings.simplefilter("ignore")  # deprecations inside the exporter
         program = torch.onnx.export(
             module,
             example,
@@ -66,7 +66,7 @@ def to_onnx(
 
 
 def _without_traces(part: onnx.ModelProto | onnx.GraphProto | onnx.FunctionProto) -> None:
-    """Take out what the exporter says of its own run: source lines, with the paths of the machine it ran on."""
+    """Remove the exporter's record of its run: source lines, with paths on the exporting machine."""
     del part.metadata_props[:]
     if isinstance(part, onnx.ModelProto):
         return
@@ -81,7 +81,7 @@ def _without_traces(part: onnx.ModelProto | onnx.GraphProto | onnx.FunctionProto
 
 
 def onnx_bytes(model: onnx.ModelProto, about: Mapping[str, Any]) -> bytes:
-    """Get the content of a file whose metadata say what the policy has to know, as JSON."""
+    """Serialise a model with metadata for the policy, as JSON."""
     onnx.helper.set_model_props(model, {METADATA: json.dumps(about, sort_keys=True)})
     content: bytes = model.SerializeToString(deterministic=True)
     return content

@@ -1,7 +1,7 @@
-"""Our torch operators in ONNX's terms. onnxscript reads the source of these functions; they are not run as Python."""
+"""ONNX versions of our torch operators. onnxscript reads the source of these functions; they never run as Python."""
 
 # mypy: ignore-errors
-# What stands for a tensor here has ONNX's types, which onnxscript checks; Python's checker knows only half of them.
+# Tensors have ONNX's types here, which onnxscript checks; mypy understands only some of them.
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How good a policy is at what it is for: how many parts its cuts leave of solids that it never learned on."""
+"""The measure of a policy: how many parts its cuts leave of held-out solids."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from rlacd.workers import Workers
 
 @dataclass(frozen=True)
 class Score:
-    """Parts of each solid: after cutting, and after merging."""
+    """Parts of each solid, after cutting and after merging."""
 
     raw: list[int]
     merged: list[int]
 
     def against(self, other: Score) -> dict[str, float]:
-        """Get this score's mean counts, and their geometric means relative to another policy's."""
+        """Return this score's mean counts, and the geometric mean of their ratios to another policy's."""
         return {
             "parts": sum(self.raw) / len(self.raw),
             "merged": sum(self.merged) / len(self.merged),
@@ -33,7 +33,7 @@ class Score:
 
 
 def count_parts(policy: Policy, solids: Sequence[Component], criterion: Concavity, most: float = math.inf) -> Score:
-    """Decompose solids and count, on one thread.
+    """Decompose solids and count parts, on one thread.
 
     Parameters
     ----------
@@ -41,7 +41,8 @@ def count_parts(policy: Policy, solids: Sequence[Component], criterion: Concavit
     solids : sequence of Component
     criterion : Concavity
     most : float
-        Parts at which a policy is stopped: some never end. Its counts are then too small, not too large.
+        Number of parts at which a decomposition is stopped, since some never end. The counts are then too small, not
+        too large.
     """
     raw, merged = [], []
     with Workers(1) as workers:
@@ -53,6 +54,6 @@ def count_parts(policy: Policy, solids: Sequence[Component], criterion: Concavit
 
 
 def mean_ratio(counts: Sequence[int], others: Sequence[int]) -> float:
-    """Get the geometric mean of the ratios; a solid of no parts counts as one of one, no solids at all give 1."""
+    """Get the geometric mean of the ratios; a count of 0 is taken as 1, and without solids the result is 1."""
     logs = [math.log(max(a, 1) / max(b, 1)) for a, b in zip(counts, others, strict=True)]
     return math.exp(sum(logs) / len(logs)) if logs else 1.0

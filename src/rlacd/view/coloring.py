@@ -1,4 +1,4 @@
-"""Colours of hulls side by side: hulls that touch never share a hue, as long as there are hues enough."""
+"""Colours of hulls: hulls that touch never share a hue, as long as there are enough hues."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from rlacd.io.write.palette import TELLABLE, hull_colors
 from rlacd.solid.arrays import FloatArray
 
 HUES = len(TELLABLE) // 3
-"""Colours that everybody tells apart; see `rlacd.io.write.palette`."""
+"""Colours that are easy to tell apart, also for the colour-blind; see `rlacd.io.write.palette`."""
 
 NEAR = 2e-3
-"""Hulls nearer than this share of their common extent count as touching: closer than the eye separates."""
+"""Hulls count as touching if closer than this share of their common extent, too close for the eye to separate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class Coloring:
     ----------
     rgb : uint8 [N, 3]
     rank : int64 [N]
-        The number of the hue; differs between hulls that touch, unless more than `HUES` of them all touch each other.
+        Index of the hue; differs between hulls that touch, unless more than `HUES` of them all touch each other.
     """
 
     rgb: npt.NDArray[np.uint8]
@@ -35,10 +35,10 @@ class Coloring:
 
 
 def color_hulls(hulls: Sequence[trimesh.Trimesh]) -> Coloring:
-    """Choose colours by which hulls touch: neighbours differ in hue, and all differ in shade where hues return.
+    """Choose colours by which hulls touch: neighbours differ in hue, and hulls that share a hue differ in shade.
 
-    Hulls are coloured from the one with the most neighbours left down (smallest-last order, Matula & Beck 1983), each
-    in the hue that its neighbours leave free and that is used least.
+    Hulls are coloured greedily in smallest-last order (Matula & Beck 1983): each gets the least used hue that its
+    neighbours leave free.
     """
     beside = neighbours(hulls)
     rank = np.full(len(hulls), -1, dtype=np.int64)
@@ -54,9 +54,9 @@ def color_hulls(hulls: Sequence[trimesh.Trimesh]) -> Coloring:
 
 
 def neighbours(hulls: Sequence[trimesh.Trimesh]) -> list[set[int]]:
-    """Tell which convex hulls touch or overlap: those that no plane of a facet of either separates by `NEAR`.
+    """Find which convex hulls touch or overlap: no facet normal of either separates them by more than `NEAR`.
 
-    Two hulls that are apart only along a direction between two edges count as touching.
+    Hulls separated only along the cross product of two edges count as touching.
     """
     beside: list[set[int]] = [set() for _ in hulls]
     if not hulls:
@@ -76,7 +76,7 @@ def neighbours(hulls: Sequence[trimesh.Trimesh]) -> list[set[int]]:
 
 
 def _planes(hull: trimesh.Trimesh) -> tuple[FloatArray, FloatArray]:
-    """The facets' outward unit normals and offsets; facets too thin to have a normal are left out."""
+    """The facets' outward unit normals and offsets; facets too thin to have a normal are skipped."""
     triangles = np.asarray(hull.triangles, dtype=np.float64)
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     lengths = np.linalg.norm(normals, axis=1)
@@ -91,7 +91,7 @@ def _apart(planes: tuple[FloatArray, FloatArray], points: FloatArray, near: floa
 
 
 def _smallest_last(beside: list[set[int]]) -> list[int]:
-    """Order in which every hull has few neighbours before it: the one with the fewest left is taken off the end."""
+    """Smallest-last order: repeatedly move the hull with the fewest remaining neighbours to the end."""
     left = [set(others) for others in beside]
     waiting = set(range(len(beside)))
     order = []

@@ -1,4 +1,4 @@
-"""What the viewer shows as a command for a terminal."""
+"""The viewer's options as a command for a terminal."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ ENDING = ".glb"
 
 
 def as_command(mesh: str | os.PathLike[str], given: dict[str, Any], usual: Any) -> str:
-    """Write ``rlacd decompose`` with the options that the page's controls hold.
+    """Write ``rlacd decompose`` with the options set on the page.
 
     Parameters
     ----------
     mesh : path-like
     given : dict
-        What the controls hold, by the names of `usual`.
+        Values of the controls, by the field names of `usual`.
     usual : dataclass instance
-        What they hold where nothing is asked for; such options are left out.
+        Default values of the controls; options at their default are left out.
 
     Returns
     -------

@@ -1,8 +1,8 @@
-"""Connections of the viewer's server: how many, how long and how large they may be.
+"""Connections of the viewer's server, with bounds on their number, duration and size.
 
 Every connection has a thread, so their number is bounded; one more is answered 503 at once, without a thread. Each has
-a deadline for what it waits for: a request that trickles in, a reader that does not read and an idle connection end
-when it has passed.
+a deadline: a request that trickles in, a client that does not read and an idle connection are closed when it has
+passed.
 """
 
 from __future__ import annotations
@@ -18,35 +18,35 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, BinaryIO
 
 MOST_CONNECTIONS = 48
-"""Connections at a time; a browser opens up to six."""
+"""Concurrent connections; a browser opens up to six."""
 
 MOST_STREAMS = 16
-"""Of them, streams of events: pages that are open."""
+"""Concurrent event streams, one per open page."""
 
 LONGEST_HEAD = 16_384
-"""Bytes of a request line and headers."""
+"""Bytes of the request line and headers."""
 
 REQUEST_SECONDS = 10.0
-"""From the first byte waited for to the last of the headers and body; also how long an idle connection is kept."""
+"""Seconds to receive headers and body, from the first byte expected; also how long an idle connection is kept."""
 
 ANSWER_SECONDS = 120.0
-"""To take an answer of any size."""
+"""Seconds to send an answer of any size."""
 
 QUIET_SECONDS = 20.0
-"""For a single send or receive."""
+"""Seconds for a single send or receive."""
 
 LAST_WORDS = 0.3
-"""Seconds that connections have to end by themselves when the server does."""
+"""Seconds for connections to end by themselves when the server ends."""
 
 FULL = "too many connections to this viewer are open; close a page and reload this one."
 
 
 class HeadTooLong(http.client.HTTPException):
-    """A request whose line and headers are longer than `LONGEST_HEAD`."""
+    """A request whose request line and headers exceed `LONGEST_HEAD`."""
 
 
 class BoundedServer(ThreadingHTTPServer):
-    """A thread for each connection, no more than `MOST_CONNECTIONS`, each with a deadline."""
+    """A server with a thread for each connection, at most `MOST_CONNECTIONS`, each with a deadline."""
 
     daemon_threads = True
     request_queue_size = 64
@@ -59,30 +59,30 @@ class BoundedServer(ThreadingHTTPServer):
 
     @property
     def connections(self) -> int:
-        """How many connections are open."""
+        """Number of open connections."""
         with self._changed:
             return len(self._deadlines)
 
     def expect(self, connection: socket.socket, seconds: float) -> None:
-        """End a connection unless what it waits for comes in so many seconds; infinity while it waits for us."""
+        """End a connection unless its data arrives within `seconds`; infinity while it waits for this server."""
         with self._changed:
             if connection in self._deadlines:
                 self._deadlines[connection] = time.monotonic() + seconds
 
     def end(self, seconds: float) -> bool:
-        """Take no more connections and end those that are open; tells whether all have ended in so many seconds."""
+        """Refuse new connections and end the open ones; returns whether all have ended within `seconds`."""
         self.shutdown()
         self.server_close()
         until = time.monotonic() + seconds
         with self._changed:
-            # Those that send something say their last word first.
+            # Connections that are sending get time to finish.
             self._changed.wait_for(lambda: not self._deadlines, timeout=min(LAST_WORDS, max(0.0, seconds)))
             for connection in self._deadlines:
                 _hang_up(connection)
             return self._changed.wait_for(lambda: not self._deadlines, timeout=max(0.0, until - time.monotonic()))
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Give a connection its thread, or turn it away."""
+        """Start a thread for a connection, or turn it away."""
         with self._changed:
             full = len(self._deadlines) >= MOST_CONNECTIONS
             if not full:
@@ -94,14 +94,14 @@ class BoundedServer(ThreadingHTTPServer):
             super().process_request(request, client_address)
 
     def shutdown_request(self, request: Any) -> None:
-        """Close a connection and forget it."""
+        """Close a connection and remove its deadline."""
         super().shutdown_request(request)
         with self._changed:
             self._deadlines.pop(request, None)
             self._changed.notify_all()
 
     def service_actions(self) -> None:
-        """End what has passed its deadline; called several times a second."""
+        """End connections past their deadline; called several times a second."""
         now = time.monotonic()
         with self._changed:
             for connection, deadline in self._deadlines.items():
@@ -109,28 +109,28 @@ class BoundedServer(ThreadingHTTPServer):
                     _hang_up(connection)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Say nothing: pages that are closed break their connections."""
+        """Ignore errors: closing a page breaks its connections."""
 
 
 class BoundedHandler(BaseHTTPRequestHandler):
-    """Reads heads of bounded size in bounded time, and speaks JSON where it refuses."""
+    """A handler that reads heads of bounded size in bounded time, and reports errors as JSON."""
 
     server: BoundedServer
     protocol_version = "HTTP/1.1"
     timeout = QUIET_SECONDS
 
     def setup(self) -> None:
-        """Bound what is read before the first byte."""
+        """Bound the input before the first byte is read."""
         super().setup()
         self.rfile: Any = _BoundedReader(self.rfile)
 
     def handle_one_request(self) -> None:
-        """Give each request its own time and size."""
+        """Give each request its own deadline and size limit."""
         self.rfile.left = LONGEST_HEAD
         self.server.expect(self.connection, REQUEST_SECONDS)
         try:
             super().handle_one_request()
-        except HeadTooLong:  # in the request line: headers that are too long are answered by the base class
+        except HeadTooLong:  # in the request line; the base class answers headers that are too long
             self.close_connection = True
             self.command = self.requestline = ""
             self.request_version = self.protocol_version
@@ -139,28 +139,28 @@ class BoundedHandler(BaseHTTPRequestHandler):
             self.close_connection = True
 
     def read_body(self, length: int) -> bytes:
-        """Read the body of a request; may be shorter where the connection ends."""
+        """Read the body of a request; shorter than `length` if the connection ends early."""
         self.rfile.left = length
         body: bytes = self.rfile.read(length)
         return body
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
-        """Refuse what the base class refuses (methods, versions, heads), as JSON and for good."""
+        """Answer what the base class refuses (methods, versions, heads) with JSON, and close the connection."""
         self.close_connection = True
         reason = self.responses.get(code, ("refused", ""))[0]
         with contextlib.suppress(OSError):
             _send_refusal(self.connection, code, reason, f"{message or reason}.")
 
     def version_string(self) -> str:
-        """Name the program, not its Python."""
+        """Name the program, without the version of Python."""
         return "rlacd"
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Say nothing."""
+        """Log nothing."""
 
 
 class _BoundedReader:
-    """A connection's bytes, up to `left` of them."""
+    """Reads a connection, up to `left` bytes."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
@@ -194,16 +194,16 @@ FOREVER = math.inf
 
 
 def _hang_up(connection: socket.socket) -> None:
-    """Let whoever reads from or writes to a connection find its end."""
+    """Shut a connection down, so that pending reads and writes on it end."""
     with contextlib.suppress(OSError):
         connection.shutdown(socket.SHUT_RDWR)
 
 
 def _turn_away(connection: socket.socket) -> None:
-    """Answer 503 without waiting for anything."""
+    """Answer 503 without blocking."""
     connection.setblocking(False)
     with contextlib.suppress(OSError):
-        connection.recv(LONGEST_HEAD)  # what is left unread when a connection closes can destroy the answer
+        connection.recv(LONGEST_HEAD)  # closing a connection with unread input can destroy the answer
     with contextlib.suppress(OSError):
         _send_refusal(connection, 503, "Service Unavailable", FULL)
 

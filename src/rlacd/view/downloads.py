@@ -1,4 +1,4 @@
-"""What the viewer offers to keep: hulls in every format, models for simulators and engines, the balls, the report."""
+"""The viewer's downloads: hulls in every format, models for simulators and engines, the balls, the report."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rlacd.plain_json import to_json
 from rlacd.view.html_report import report_page
 
 FOLDERS = ("obj", "stl")
-"""Formats that are offered as a file a hull too."""
+"""Formats also offered with one file per hull."""
 
 
 @dataclass(frozen=True)
@@ -32,20 +32,20 @@ class Download:
 
 @dataclass(frozen=True)
 class Offer:
-    """Something that can be downloaded.
+    """An entry of the download menu.
 
     Attributes
     ----------
     name
-        What `download` is asked for.
+        The name that `download` takes.
     label
-        What people call it.
+        Its text in the menu.
     hint
-        What it holds, in a sentence.
+        A sentence about its content.
     group
-        What it stands under.
+        The heading it is listed under.
     missing
-        Why it cannot be had here; None where it can.
+        Why it is unavailable here; None if it is available.
     """
 
     name: str
@@ -66,7 +66,7 @@ _MODEL_NAMES = {
 
 
 def offered() -> list[Offer]:
-    """Name what can be downloaded."""
+    """List everything that can be downloaded."""
     return [
         *(Offer(ending, ending.upper(), f"All hulls in one .{ending} file.", "Hulls") for ending in FORMATS),
         *(
@@ -101,17 +101,17 @@ def _missing(model: str) -> str | None:
 
 
 def download(decomposition: Decomposition, wanted: str, *, up: str = "z", unit: str = "") -> Download:
-    """Make one of the files `offered`; what takes several files comes zipped.
+    """Make one of the files `offered`; several files are zipped.
 
     Parameters
     ----------
     decomposition : Decomposition
     wanted : str
-        The name of what is offered.
+        The name of the offer.
     up : {"x", "y", "z"}
         The axis of the input that points up.
     unit : str
-        The input's unit of length, for the report; empty where nobody says.
+        The input's unit of length, for the report; empty if unknown.
 
     Raises
     ------
@@ -151,7 +151,7 @@ def _zipped(folder: Path, files: list[Path]) -> bytes:
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
         for path in files:
-            # Without a date: the same hulls give the same bytes.
+            # Without a date, so that the same hulls give the same bytes.
             entry = zipfile.ZipInfo(path.relative_to(folder).as_posix())
             archive.writestr(entry, path.read_bytes(), zipfile.ZIP_DEFLATED)
     return content.getvalue()

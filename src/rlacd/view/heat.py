@@ -1,7 +1,7 @@
-"""Error heat map: how far each spot of the hulls' surface lies from the input's surface.
+"""Error heat map: the distance of the hulls' surface from the input's surface, point by point.
 
-Hulls have few corners, so their facets are divided first. Where a hull touches or enters another one, its surface is an
-inner wall of the union and no error: those spots are marked instead of measured.
+Hulls have few vertices, so their facets are subdivided first. Where a hull touches or enters another one, its surface
+is an inner wall of the union and not an error: those vertices are marked instead of measured.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from rlacd.solid.arrays import BoolArray, FloatArray, IntArray
 from rlacd.solid.frame import Frame
 
 FINEST = 0.02
-"""Facets are not divided below this edge length: 1 % of the input's longest side."""
+"""Facets are not subdivided below this edge length: 1 % of the input's longest side."""
 
 INNER = -1.0
-"""What stands for a distance on an inner wall."""
+"""Marks a vertex on an inner wall, in place of its distance."""
 
 TOUCH = 1e-5
-"""A spot this near to another hull lies on an inner wall: more than rounding, less than anyone can see."""
+"""A point this close to another hull lies on an inner wall: above rounding error, below what is visible."""
 
 
 @dataclass(frozen=True, eq=False)
 class HeatMesh:
-    """A hull's surface, divided, with the distance to the input's surface.
+    """A hull's surface, subdivided, with its distances to the input's surface.
 
     Attributes
     ----------
@@ -45,27 +45,27 @@ class HeatMesh:
 
 
 def heat_map(decomposition: Decomposition, *, triangles: int = 60_000, threads: int | None = None) -> list[HeatMesh]:
-    """Measure the hulls' surface against the input's, spot by spot.
+    """Measure the distance of the hulls' surface to the input's, point by point.
 
     Parameters
     ----------
     decomposition : Decomposition
     triangles : int
-        About as many triangles the facets are divided into, all hulls together; fewer where `FINEST` allows.
+        Approximate number of triangles for all hulls together; fewer if `FINEST` limits the subdivision.
     threads : int, optional
         All processors by default; the result does not depend on it.
 
     Returns
     -------
     list of HeatMesh
-        In the order of the hulls; empty where the input has no surface, being a cloud of points.
+        In the order of the hulls; empty if the input is a cloud of points, which has no surface.
     """
     source, frame = decomposition.source, frame_of(decomposition)
     if len(source.faces) == 0:
         return []
     surface = _native.Surface(frame.to_frame(source.vertices), np.ascontiguousarray(source.faces, dtype=np.int32))
     hulls = [(frame.to_frame(hull.vertices), np.asarray(hull.faces)) for hull in decomposition]
-    # Equilateral triangles of edge h have the area sqrt(3)/4 h²; there are more, since narrow facets have small ones.
+    # Equilateral triangles of edge h have the area sqrt(3)/4 h²; narrow facets give smaller ones, hence more of them.
     area = sum(float(trimesh.triangles.area(corners[faces]).sum()) for corners, faces in hulls)
     edge = max(FINEST, float(np.sqrt(4.0 * area / max(triangles, 1))))
     solids = [_HalfSpaces.of(*hull) for hull in hulls]
@@ -83,7 +83,7 @@ def heat_map(decomposition: Decomposition, *, triangles: int = 60_000, threads: 
 
 
 def frame_of(decomposition: Decomposition) -> Frame:
-    """Get the frame of the decomposition's report, about the middle of what there is to see."""
+    """Return a frame in the scale of the report, centred on the bounding box of the input and the hulls."""
     corners = [np.asarray(hull.bounds, dtype=np.float64) for hull in decomposition]
     if len(decomposition.source.faces):
         corners.append(np.asarray(decomposition.source.bounds, dtype=np.float64))
@@ -92,10 +92,10 @@ def frame_of(decomposition: Decomposition) -> Frame:
 
 
 def _divided(vertices: FloatArray, faces: IntArray, edge: float) -> tuple[FloatArray, IntArray]:
-    """Divide a closed mesh until no edge is much longer than `edge`; its surface stays the same."""
+    """Subdivide a closed mesh until no edge is much longer than `edge`; its surface stays the same."""
     solid = manifold3d.Manifold(manifold3d.Mesh64(vertices, faces.astype(np.uint64)))
     fine = solid.refine_to_length(edge).to_mesh64()
-    if len(fine.tri_verts) < len(faces):  # too thin to be taken for a solid
+    if len(fine.tri_verts) < len(faces):  # too thin to count as a solid
         return vertices, np.ascontiguousarray(faces, dtype=np.int32)
     corners = np.ascontiguousarray(fine.vert_properties[:, :3], dtype=np.float64)
     return corners, np.ascontiguousarray(fine.tri_verts, dtype=np.int32)

@@ -1,4 +1,4 @@
-"""The report: one HTML file with a 3-D view, the picture, and everything that was measured; opens without a network."""
+"""The report: one HTML file with a 3-D view, the picture, and all measurements; works offline."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from rlacd.view.picture import check_up, picture_bytes
 from rlacd.view.scene import heat_scene, scene
 
 HEAT_TRIANGLES = 16_000
-"""Of the error heat map in a file, or a few times as many: half a megabyte or so."""
+"""Approximate number of triangles of the error heat map in a file, up to a few times as many: about half a megabyte."""
 
 PICTURE_WIDTH = 1500
 
 
 def is_html(path: str | os.PathLike[str]) -> bool:
-    """Tell from its name whether a report is to be a page."""
+    """Tell from its name whether a report should be an HTML page."""
     return Path(path).suffix.lower() in (".html", ".htm")
 
 
@@ -35,9 +35,9 @@ def check_report_page(path: str | os.PathLike[str], up: str | None = None) -> Pa
     Raises
     ------
     OutputError
-        The name does not end in ``.html``, or the place cannot be written to.
+        The name does not end in ``.html``, or the place is not writable.
     OptionError
-        `up` is no axis.
+        `up` is not an axis.
     """
     place = Path(read(path_like(), "path", path))
     if not is_html(place):
@@ -52,8 +52,8 @@ def save_report_page(
 ) -> Path:
     """Write a report as one self-contained HTML file.
 
-    It holds a 3-D view to turn and pull apart, the list of parts, an error heat map, what was repaired, the times, the
-    options and the warnings. The same decomposition gives the same bytes.
+    It holds a 3-D view that can be rotated and exploded, the list of parts, an error heat map, the repairs, timings,
+    options and warnings. The same decomposition gives the same bytes.
 
     Parameters
     ----------
@@ -63,8 +63,8 @@ def save_report_page(
     up : {"x", "y", "z"}
         The axis of the input that points up.
     picture : bool
-        Draw the picture into it too, which takes some seconds. Where the extra ``view`` is not installed, it is left
-        out and a note says so.
+        Include the picture, which takes a few seconds to render. Without the extra ``view`` it is left out, and a note
+        says so.
 
     Returns
     -------
@@ -92,7 +92,7 @@ def report_page(decomposition: Decomposition, *, up: str = "z", picture: bool = 
 
 
 def _picture(decomposition: Decomposition, up: str) -> dict[str, str]:
-    """The picture as an address, or a note why there is none."""
+    """The picture as a data URL, or a note that explains its absence."""
     try:
         png = picture_bytes(decomposition, width=PICTURE_WIDTH, up=up, clear=True)
     except MissingExtraError as error:

@@ -1,9 +1,9 @@
-"""The page of the viewer and of the report as one HTML text: styles, scripts and data inside.
+"""The page of the viewer and of the report as one HTML text, with styles, scripts and data inside.
 
 three.js is a classic script that defines ``THREE``. The page's own scripts are ES modules behind an import map: the
-viewer's server gives them, a report holds each as a data address, since a page opened from a disk may not import its
-neighbours. The content policy names what may run by its hash and forbids every other source, so neither page can reach
-a network; the viewer may ask its own server.
+viewer's server delivers them, a report embeds each as a data URL, since a page opened from disk may not import files
+beside it. The content security policy lists scripts and styles by hash and forbids every other source, so neither page
+can reach a network; the viewer may only contact its own server.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Any
 from rlacd.plain_json import to_json
 
 MODULES = ("arrays", "camera", "controls", "facts", "ground", "hints", "keys", "link", "list", "stage", "widgets")
-"""Modules of the page beside ``main``; ``import ... from "page/list"``."""
+"""Modules of the page other than ``main``, imported as ``"page/list"``."""
 
 POLICY = (
     "default-src 'none'; script-src {modules} {scripts}; style-src {styles}; img-src data: blob:; "
@@ -30,14 +30,14 @@ POLICY = (
 
 @dataclass(frozen=True)
 class Page:
-    """An HTML text and its content policy, which stands in the text as well."""
+    """An HTML text and its content security policy, which the text includes."""
 
     text: str
     policy: str
 
 
 def live_page(title: str, config: dict[str, Any]) -> Page:
-    """Build the viewer's page, which asks its server for the scripts of `module` and everything it shows.
+    """Build the viewer's page, which loads the scripts of `module` and its data from its server.
 
     Parameters
     ----------
@@ -50,12 +50,12 @@ def live_page(title: str, config: dict[str, Any]) -> Page:
 
 
 def module(name: str) -> str | None:
-    """Get the text of one of the page's scripts; None where there is no such script."""
+    """Return the text of one of the page's scripts; None if there is no such script."""
     return _asset(f"{name}.js") if name in MODULES else None
 
 
 def still_page(title: str, config: dict[str, Any], scene: dict[str, Any]) -> str:
-    """Build a report: the same page with its data inside and no server.
+    """Build a report: the same page without a server, with its data embedded.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def still_page(title: str, config: dict[str, Any], scene: dict[str, Any]) -> str
     config : dict
         Plain values for the page.
     scene : dict
-        What `rlacd.view.scene.scene` gives, with ``heat`` and ``picture`` where there are any.
+        The result of `rlacd.view.scene.scene`, with ``heat`` and ``picture`` if available.
     """
     imports = {f"page/{name}": _data_address(_asset(f"{name}.js")) for name in MODULES}
     return _page(title, {"live": False, **config}, scene, imports, modules="data:", connect="'none'").text
@@ -78,7 +78,7 @@ def _page(
     modules: str,
     connect: str,
 ) -> Page:
-    # The same data always gives the same bytes: gzip would store the time otherwise.
+    # No time stamp in the gzip header, so that the same data gives the same bytes.
     packed = b"" if data is None else gzip.compress(to_json(data, indent=None).encode(), mtime=0)
     style = _asset("style.css")
     scripts = {
@@ -97,12 +97,12 @@ def _page(
         "config": _inert(to_json(config, indent=None)),
         "data": base64.b64encode(packed).decode("ascii"),
     }
-    # In one sweep, so that no value is searched for the names of others.
+    # All in one pass, so that no inserted value is searched for placeholders.
     return Page(re.sub(r"\{\{(\w+)\}\}", lambda match: values[match[1]], _asset("page.html")), policy)
 
 
 def _hash(text: str) -> str:
-    """What a content policy calls a script or style by."""
+    """Hash of a script or style, as a content security policy lists it."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode('ascii')}'"
 
 
@@ -115,5 +115,5 @@ def _data_address(script: str) -> str:
 
 
 def _inert(json_text: str) -> str:
-    """JSON that cannot end the script element it stands in."""
+    """Escape JSON so that it cannot close the script element that contains it."""
     return json_text.replace("<", "\\u003c")

@@ -1,4 +1,4 @@
-"""One PNG that tells how good a decomposition is: the input, its hulls, and the hulls pulled apart."""
+"""One PNG that shows the quality of a decomposition: the input, its hulls, and the exploded hulls."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 
 INPUT_COLOR = np.array([0.46, 0.47, 0.50])  # linear reflectance
 BALL_COLOR = np.array([0.10, 0.30, 0.75])
-PULL = 0.55  # how far hulls move apart: a hull's distance from the middle grows by this share
+PULL = 0.55  # explosion: a hull's distance from the centre grows by this share
 PAPER, INK, FADED = (255, 255, 255), (28, 30, 34), (120, 124, 132)
-TO_Z_UP = {  # rows: where the drawing's x, y, z axes come from
+TO_Z_UP = {  # rows: the source of the drawing's x, y, z axes
     "x": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
-    "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),  # +z, the front of glTF, is seen
+    "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),  # +z, the front of glTF, faces the camera
     "z": np.eye(3),
 }
 
@@ -41,11 +41,11 @@ def check_picture(path: str | os.PathLike[str], up: str | None = None) -> Path:
     Raises
     ------
     OutputError
-        The name does not end in ``.png``, or the place cannot be written to.
+        The name does not end in ``.png``, or the place is not writable.
     MissingExtraError
         The extra ``view`` is not installed.
     OptionError
-        `up` is no axis.
+        `up` is not an axis.
     """
     place = Path(read(path_like(), "path", path))
     check_up(up)
@@ -58,7 +58,7 @@ def check_picture(path: str | os.PathLike[str], up: str | None = None) -> Path:
 
 
 def check_up(up: str | None) -> None:
-    """Raise `OptionError` if `up` is no axis; None leaves the choice to others."""
+    """Raise `OptionError` if `up` is not an axis; None means no choice and is accepted."""
     checked(OutputOptions, "up", up)
 
 
@@ -70,7 +70,7 @@ def draw_picture(
     samples: int = 16,
     up: str = "z",
 ) -> Path:
-    """Draw the input, its hulls and the hulls pulled apart, side by side, with one line of numbers.
+    """Draw the input, its hulls and the exploded hulls side by side, with one line of numbers.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def draw_picture(
     width : int
         Pixels, from 300 to 8,000.
     samples : int
-        Light paths a pixel: more are slower and less grainy.
+        Light paths per pixel: more are slower and less grainy.
     up : {"x", "y", "z"}
         The axis of the input that points up in the picture.
 
@@ -95,7 +95,7 @@ def draw_picture(
     MissingExtraError
         The extra ``view`` is not installed.
     OutputError
-        The place cannot be written to.
+        The place is not writable.
     OptionError
         `width`, `samples` or `up` is out of range.
     """
@@ -109,7 +109,7 @@ def picture_bytes(
 ) -> bytes:
     """Draw the picture as the bytes of a PNG file; see `draw_picture`.
 
-    With `clear` it has no paper and no header, so that a page can put it on any ground.
+    With `clear` it has a transparent background and no header, so that it fits any page.
     """
     width = read(integer(300, 8000, rule="a number of pixels between 300 and 8000"), "width", width)
     samples = read(integer(1, 10_000), "samples", samples)
@@ -136,7 +136,7 @@ def picture_bytes(
         left = number % columns * panel_width
         top = header + number // columns * (panel_height + footer)
         pixels = render(bodies, panel_width, panel_height, samples=samples, clear=clear)
-        if veil is not None:  # the spheres let half of what is behind them through
+        if veil is not None:  # the spheres are half transparent
             veiled = render(bodies, panel_width, panel_height, samples=samples, spheres=veil, clear=clear)
             pixels = ((pixels.astype(np.uint16) + veiled + 1) // 2).astype(np.uint8)
         sheet.paste(image.fromarray(pixels), (left, top))
@@ -153,7 +153,7 @@ def picture_bytes(
 
 
 def caption(decomposition: Decomposition) -> str:
-    """One line of numbers: hulls, faces, concavity, seconds; only what the report holds."""
+    """One line of numbers: hulls, faces, concavity, seconds; omits what the report lacks."""
     report = decomposition.report
     count = len(decomposition)
     words = [f"{count} hull{'s' * (count != 1)}", f"{sum(len(hull.faces) for hull in decomposition)} triangles"]
@@ -172,7 +172,7 @@ def caption(decomposition: Decomposition) -> str:
 
 
 def apart(balls: Balls) -> Balls:
-    """Choose balls that do not overlap, the smallest first: all of them would be one cloud."""
+    """Choose balls that do not overlap, smallest first; all of them together would look like one cloud."""
     order = np.argsort(balls.radii, kind="stable")
     tree = cKDTree(balls.centres)
     hidden = np.zeros(len(balls), dtype=bool)

@@ -1,7 +1,7 @@
-"""Path-traced pictures of meshes on white paper, on any CPU.
+"""Path-traced pictures of meshes on a white background, on any CPU.
 
-Mitsuba 3 renders without display, GPU or OpenGL library, so it also works in a bare container, where VTK's wheels
-find no OpenGL and end the process.
+Mitsuba 3 renders without a display, GPU or OpenGL library, so it also works in a bare container, where VTK's wheels
+find no OpenGL and abort the process.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ import numpy.typing as npt
 from rlacd.errors import MissingExtraError
 from rlacd.io.write.palette import srgb_from_linear
 
-SKY, KEY = 0.42, 12.0  # radiance: an even sky, and one soft lamp that gives the shadows a direction
-PAPER = 1.0  # what shows where there is nothing
-FIELD_OF_VIEW = 22.0  # degrees, vertical; narrow, so that equal hulls look equal
+SKY, KEY = 0.42, 12.0  # radiance: a uniform sky, and one lamp that gives the shadows a direction
+PAPER = 1.0  # background
+FIELD_OF_VIEW = 22.0  # degrees, vertical; narrow, so that perspective barely changes the size of equal hulls
 ELEVATION, AZIMUTH = np.deg2rad(24.0), np.deg2rad(-58.0)
 
 
@@ -44,25 +44,25 @@ class Spheres:
 
 
 def require_extra(module: str) -> Any:
-    """Import a module of the extra ``view``, or say how to get it."""
+    """Import a module of the extra ``view``, or raise an error that says how to get it."""
     try:
         with _without_native_stderr():
             return importlib.import_module(module)
     except ModuleNotFoundError as error:
         raise MissingExtraError("pictures need an extra: run  pip install 'rlacd[view]'  and try again.") from error
     except ImportError as error:
-        # Installed, but a system library is absent: a container without a compiler may lack libatomic, for one.
+        # Installed, but a system library is missing, such as libatomic in a container without a compiler.
         raise MissingExtraError(f"pictures need {module}, which does not load here ({error}); install that.") from error
 
 
 @contextlib.contextmanager
 def _without_native_stderr() -> Iterator[None]:
-    """Keep C++ code from writing to stderr: while it loads, Mitsuba's compiler, not used here, complains about LLVM."""
+    """Silence stderr of C++ code: Mitsuba's compiler, which is not used here, complains about LLVM while loading."""
     if sys.stderr is not None:
         sys.stderr.flush()
     try:
         kept = os.dup(2)
-    except OSError:  # There is no stderr to keep clean.
+    except OSError:  # there is no stderr to silence
         yield
         return
     try:
@@ -83,20 +83,20 @@ def render(
     spheres: Spheres | None = None,
     clear: bool = False,
 ) -> npt.NDArray[np.uint8]:
-    """Render `bodies`, framed to fit, as sRGB bytes [height, width, 3 or 4]; the same bytes every time.
+    """Render `bodies`, framed to fit, as sRGB bytes [height, width, 3 or 4]; deterministic.
 
     Parameters
     ----------
     bodies : sequence of Body
-        Any size and place; the camera frames them.
+        Of any size and position; the camera frames them.
     width, height : int
         Pixels.
     samples : int
-        Light paths a pixel: more are slower and less grainy.
+        Light paths per pixel: more are slower and less grainy.
     spheres : Spheres, optional
-        Drawn too; the camera does not look for them.
+        Drawn too, but ignored by the camera's framing.
     clear : bool
-        Leave the paper out: a fourth channel holds what is covered.
+        Make the background transparent: the fourth channel holds the coverage.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def render(
     points = np.concatenate([body.triangles.reshape(-1, 3) for body in bodies])
     low, high = points.min(axis=0), points.max(axis=0)
     view = _view(points - (low + high) / 2.0, width / height)
-    # Everything is drawn about the origin and in one size, since the renderer computes in float32.
+    # The scene is centred and scaled, since the renderer computes in float32.
     size = float(np.linalg.norm(high - low)) or 1.0
     with _scalar_variant(mi):
         scene: dict[str, Any] = {
@@ -133,7 +133,7 @@ def render(
 
 
 def _view(points: npt.NDArray[np.float64], aspect: float) -> npt.NDArray[np.float64]:
-    """Eye position from which all `points` (about the origin) are inside the picture."""
+    """Camera position from which all `points` (about the origin) are inside the picture."""
     toward_eye = np.array([np.cos(ELEVATION) * np.cos(AZIMUTH), np.cos(ELEVATION) * np.sin(AZIMUTH), np.sin(ELEVATION)])
     right = np.cross([0.0, 0.0, 1.0], toward_eye)
     right /= np.linalg.norm(right)
@@ -175,7 +175,7 @@ def _lamp(mi: Any) -> dict[str, Any]:
 
 
 def _mesh(mi: Any, triangles: npt.NDArray[np.float64], color: npt.NDArray[np.float64]) -> Any:
-    # Both sides: the input's triangles may face any way.
+    # Two-sided: the input's triangles may be oriented either way.
     surface = {"type": "diffuse", "reflectance": {"type": "rgb", "value": color.tolist()}}
     properties = mi.Properties()
     properties["bsdf"] = mi.load_dict({"type": "twosided", "surface": surface})
@@ -200,7 +200,7 @@ def _sphere(centre: npt.NDArray[np.float64], radius: float, look: Spheres) -> di
 
 @contextlib.contextmanager
 def _scalar_variant(mi: Any) -> Iterator[None]:
-    """Mitsuba's plain C++ renderer, which needs no compiler at run time; the caller's own choice comes back after."""
+    """Select Mitsuba's scalar variant, which needs no compiler at run time; the caller's choice is restored after."""
     before = mi.variant()
     mi.set_variant("scalar_rgb")
     try:

@@ -1,6 +1,6 @@
-"""What the page draws: a decomposition as plain values, its arrays as base64 text.
+"""The page's scene: a decomposition as plain values, with arrays as base64 text.
 
-Positions are float32 in the normalised frame: small numbers about the origin, whatever the input's unit and place.
+Positions are float32 in the normalised frame, which keeps them small for inputs of any unit and position.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from rlacd.view.heat import HeatMesh, frame_of
 from rlacd.view.picture import apart
 
 SHOWN_BALLS = 4000
-"""More balls than this are not drawn."""
+"""Maximum number of balls drawn."""
 
 
 def scene(decomposition: Decomposition, up: str = "z", *, unit: str = "") -> dict[str, Any]:
@@ -30,16 +30,16 @@ def scene(decomposition: Decomposition, up: str = "z", *, unit: str = "") -> dic
     up : {"x", "y", "z"}
         The axis of the input that points up.
     unit : str
-        The input's unit of length, such as ``m``; empty where nobody says.
+        The input's unit of length, such as ``m``; empty if unknown.
 
     Returns
     -------
     dict
-        ``name``; ``up``; ``unit``; ``scale``, frame units to one of the input's; ``report`` as it is; ``input``,
+        ``name``; ``up``; ``unit``; ``scale``, frame units per unit of the input; the unchanged ``report``; ``input``,
         ``{vertices, faces}`` or None for a cloud of points; ``parts``, a list of ``{vertices, faces, color, rank,
-        error, volume}`` with ``rank`` the number of the hue, ``error`` what the criterion measures (or None) and
-        ``volume`` in the normalised frame; ``balls``, ``{centres, radii, shown, of}`` or None, with how many balls are
-        shown of how many.
+        error, volume}`` with ``rank`` the index of the hue, ``error`` the criterion's measurement (or None) and
+        ``volume`` in the normalised frame; ``balls``, ``{centres, radii, shown, of}`` or None, with the numbers of
+        balls shown and in all.
     """
     frame = frame_of(decomposition)
     source, report = decomposition.source, decomposition.report
@@ -76,7 +76,7 @@ def scene(decomposition: Decomposition, up: str = "z", *, unit: str = "") -> dic
 
 
 def input_scene(name: str, vertices: ArrayLike, faces: ArrayLike, up: str = "z", *, unit: str = "") -> dict[str, Any]:
-    """Describe an input of which there are no hulls yet: as `scene`, without parts or report."""
+    """Describe an input without hulls yet: as `scene`, without parts or report."""
     points, corners = np.asarray(vertices, dtype=np.float64), np.asarray(faces)
     frame = Frame.of(points[np.unique(corners)] if len(corners) else points)
     return {
@@ -97,7 +97,7 @@ def heat_scene(heat: list[HeatMesh]) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``parts``, a list of ``{vertices, faces, distance}``, and ``max``, the farthest spot in the normalised frame.
+        ``parts``, a list of ``{vertices, faces, distance}``, and ``max``, the largest distance in the normalised frame.
     """
     return {
         "parts": [{**_mesh(part.vertices, part.faces), "distance": floats(part.distance)} for part in heat],
@@ -116,7 +116,7 @@ def _mesh(vertices: ArrayLike, faces: ArrayLike) -> dict[str, str]:
 
 
 def _errors(report: dict[str, Any], count: int) -> list[float | None]:
-    """What the criterion measured of each part, whichever it was."""
+    """The criterion's measurement of each part, for either criterion."""
     measured = report.get("concavity") or report.get("navigable", {}).get("intrusion") or {}
     per_part = measured.get("per_part") or []
     return list(per_part) if len(per_part) == count else [None] * count

@@ -3,18 +3,18 @@
 ====================================  ===========================================================================
 ``GET /``, ``GET /page/NAME.js``      the page and its scripts
 ``GET /events``                       the state, with every change (server-sent events)
-``GET /state``                        the state as it is
-``GET /scene``, ``GET /heat``         what is drawn; see `rlacd.view.scene`
+``GET /state``                        the current state
+``GET /scene``, ``GET /heat``         the data to draw; see `rlacd.view.scene`
 ``GET /download?format=NAME``         a file
-``POST /open?name=NAME``              another mesh: the bytes of its file
+``POST /open?name=NAME``              open another mesh: the bytes of its file
 ``POST /command``                     the options as a command for a terminal
 ``POST /decompose``, ``POST /cancel``  JSON in, JSON out
 ====================================  ===========================================================================
 
-It listens on the loopback address alone. Pages of other sites are kept out: a request must name this server as its
-host, so that no foreign name can be pointed at it, and must not come from a page of another origin. What is held is
-bounded: connections and their time in `rlacd.view.connections`, one input of at most `LARGEST_MESH` bytes, one
-decomposition with its scene and heat map, and `HEAVY` answers that are worked out at a time.
+It listens on the loopback address alone. Pages of other sites are kept out: a request's Host header must name this
+server, which defeats DNS rebinding, and the request must not come from a page of another origin. Resources are bounded:
+connections and their time in `rlacd.view.connections`, one input of at most `LARGEST_MESH` bytes, one decomposition
+with its scene and heat map, and `HEAVY` costly answers at a time.
 """
 
 from __future__ import annotations
@@ -53,10 +53,10 @@ from rlacd.view.wishes import Subject, ViewerControls
 ADDRESS = "127.0.0.1"
 USUAL_PORT = 8765
 LONGEST_REQUEST = 10_000  # bytes of JSON
-LARGEST_MESH = 2**28  # bytes of a file that a page sends
+LARGEST_MESH = 2**28  # bytes of an uploaded file
 QUICKEST = 0.05  # seconds between two reports of progress
-HEARTBEAT = 3.0  # seconds after which a stream in which nothing happens says so, and finds out whether it is read
-HEAVY = 2  # answers that take memory and time, at once
+HEARTBEAT = 3.0  # seconds of silence before a stream sends a sign of life, which shows whether the client still reads
+HEAVY = 2  # concurrent answers that take much memory and time
 
 HARDENING = {
     "Cache-Control": "no-store",
@@ -76,11 +76,11 @@ class ViewServer(BoundedServer):
     ----------
     session : Session
     subject : Subject
-        What is looked at first.
+        The input shown first.
     port : int, optional
-        Where to listen; without it the usual port, or any free one.
-    options : Wishes
-        What the page's controls hold at first.
+        Port to listen on; by default the usual port, or any free one.
+    options : ViewerControls
+        Initial values of the page's controls.
     accept : callable
         From the page's options to `ViewerControls`; raises `OptionError`.
     read : callable
@@ -89,7 +89,7 @@ class ViewServer(BoundedServer):
     Raises
     ------
     OptionError
-        The port is in use, may not be used, or is none.
+        The port is in use, forbidden, or out of range.
     """
 
     def __init__(
@@ -123,16 +123,16 @@ class ViewServer(BoundedServer):
 
     @property
     def address(self) -> str:
-        """Where the page is."""
+        """URL of the page."""
         return f"http://{ADDRESS}:{self.server_address[1]}/"
 
     @property
     def folder(self) -> Path | None:
-        """Where the mesh lies that a page has sent; None before."""
+        """Folder of an uploaded mesh; None if there is none."""
         return None if self._folder is None else Path(self._folder.name)
 
     def decompose(self, wishes: ViewerControls, *, other_input: bool = False) -> None:
-        """Decompose the subject next: a draft at once, then what is wished for."""
+        """Decompose the subject next: first a draft, then with the requested options."""
         mesh = {"mesh": self.subject.path}
         draft = wishes.draft()
         self.session.decompose(
@@ -140,12 +140,12 @@ class ViewServer(BoundedServer):
         )
 
     def open_mesh(self, name: str, content: bytes, wishes: ViewerControls) -> None:
-        """Look at another mesh from now on: the content of a file.
+        """Replace the subject by an uploaded file.
 
         Raises
         ------
         MeshError
-            It cannot be read or holds nothing usable; what is looked at stays.
+            It cannot be read or holds nothing usable; the subject stays.
         """
         with self._opening:
             folder = tempfile.TemporaryDirectory(prefix="rlacd-view-", ignore_cleanup_errors=True)
@@ -162,13 +162,13 @@ class ViewServer(BoundedServer):
             self._folder = folder
 
     def server_close(self) -> None:
-        """Stop listening, and remove what pages have sent."""
+        """Stop listening, and remove uploaded files."""
         super().server_close()
         if self._folder is not None:
             self._folder.cleanup()
 
     def scene(self) -> bytes:
-        """Give the scene as JSON; worked out once for whatever there is to draw."""
+        """Return the scene as JSON; computed once per subject or result."""
         subject, result = self.subject, self.session.result
         if result is None:
             mesh = subject.mesh
@@ -178,7 +178,7 @@ class ViewServer(BoundedServer):
         return self._once("scene", result[0], lambda: scene(result[1], subject.up, unit=subject.unit))
 
     def heat(self, version: int, decomposition: Decomposition) -> bytes:
-        """Give the error heat map as JSON; worked out once for a decomposition."""
+        """Return the error heat map as JSON; computed once per decomposition."""
         return self._once("heat", version, lambda: heat_scene(heat_map(decomposition)))
 
     def _once(self, what: str, version: int, make: Callable[[], dict[str, Any]]) -> bytes:
@@ -275,7 +275,7 @@ class _Handler(BoundedHandler):
         except (TimeoutError, ConnectionError):
             self.close_connection = True
         except _Refused as error:
-            self.close_connection = True  # what else was sent is not read
+            self.close_connection = True  # the rest of the request stays unread
             self._send_json({"error": str(error)}, error.status)
         except RlacdError as error:
             self._send_json({"error": str(error)}, HTTPStatus.BAD_REQUEST)
@@ -284,7 +284,7 @@ class _Handler(BoundedHandler):
             self._send_json({"error": said}, HTTPStatus.INTERNAL_SERVER_ERROR)
 
     def _check_sender(self) -> None:
-        """Refuse requests for another host, and those of pages of other origins."""
+        """Refuse requests for another host, and those from pages of other origins."""
         hosts = self.headers.get_all("Host") or []
         if len(hosts) != 1 or urllib.parse.urlsplit(f"//{hosts[0]}").hostname not in (ADDRESS, "localhost"):
             raise _Refused(HTTPStatus.FORBIDDEN, f"this viewer answers to {ADDRESS} and localhost only.")
@@ -296,7 +296,7 @@ class _Handler(BoundedHandler):
             raise _Refused(HTTPStatus.FORBIDDEN, "this viewer answers to its own page only.")
 
     def _body(self) -> dict[str, Any]:
-        if self.headers.get_content_type() != "application/json":  # forms of other sites cannot send this
+        if self.headers.get_content_type() != "application/json":  # forms of other sites cannot send this type
             raise _Refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "this viewer takes JSON only.")
         return _object(self._read(LONGEST_REQUEST, REQUEST_SECONDS))
 
@@ -363,7 +363,7 @@ class _Handler(BoundedHandler):
 
 
 class _Refused(Exception):
-    """A request that is none of ours."""
+    """A request that the server refuses."""
 
     def __init__(self, status: HTTPStatus, said: str) -> None:
         super().__init__(said)
@@ -381,14 +381,14 @@ def _object(text: str | bytes) -> dict[str, Any]:
 
 
 def file_name(name: str) -> str:
-    """The name of a file that a page has sent, without folders and what a file system may not take."""
+    """Clean the name of an uploaded file: no folders, and no characters that a file system may refuse."""
     last = re.split(r"[/\\]", name)[-1]
     plain = re.sub(r'[\x00-\x1f\x7f<>:"|?*]', "_", last).strip(". ")[-120:]
     return plain.encode(errors="replace").decode() or "mesh"
 
 
 def preset_words(name: str) -> dict[str, Any]:
-    """What the page says of a preset: the engine, its limits, and the format that is for it."""
+    """Describe a preset for the page: its engine, limits and format."""
     preset = PRESETS[name]
     ending = preset.ending.lstrip(".")
     model = next((model for model, endings in MODELS.items() if ending in endings), ending)
@@ -401,8 +401,8 @@ def preset_words(name: str) -> dict[str, Any]:
 
 
 def _calmly(changes: Iterator[SessionState | None]) -> Iterator[SessionState | None]:
-    """Slow progress down to what an eye can follow; the last state of every kind always comes."""
+    """Limit the rate of progress to what the eye can follow; the last state of every kind is always sent."""
     for state in changes:
         yield state
         if state is not None and state.state == "working":
-            time.sleep(QUICKEST)  # changes meanwhile are seen as one
+            time.sleep(QUICKEST)  # changes in the meantime are combined

@@ -1,7 +1,7 @@
-"""What the viewer works on: one mesh, decomposed again and again with other options.
+"""The viewer's work: one mesh, decomposed again and again with other options.
 
-One thread does the work. Asking for other options ends the work that is under way and drops what it reached; stopping
-keeps it. Everybody else reads the state and waits for it to change.
+One thread does the work. A request for other options cancels the current work and drops its result; stopping keeps the
+result so far. All other threads read the state and wait for it to change.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ from rlacd.errors import RlacdError
 from rlacd.progress import Progress
 
 Run = Callable[..., Decomposition]
-"""Takes ``progress`` and the options, gives a decomposition: `rlacd.decompose` with the mesh bound."""
+"""Takes ``progress`` and the options, returns a decomposition: `rlacd.decompose` with the mesh bound."""
 
 
 @dataclass(frozen=True)
 class SessionState:
-    """What a session is doing.
+    """State of a session.
 
     Attributes
     ----------
     state : "idle", "working" or "closed"
     run : int or None
-        Number of the last decomposition that was finished; None before the first.
+        Number of the last finished decomposition; None before the first.
     version : int
-        Grows whenever there is something else to draw: another input, a draft, a decomposition.
+        Grows whenever there is something new to draw: another input, a draft, a decomposition.
     draft : bool
-        Whether the hulls there are come of a quick first pass, which better ones may replace.
+        Whether the current hulls come from a quick first pass and may still be replaced.
     stage, done, total, parts, seconds
-        Of the work under way; see `rlacd.progress.Progress`.
+        Progress of the current work; see `rlacd.progress.Progress`.
     error : str or None
-        Why the work asked for last gave nothing.
+        Why the last requested work failed.
     """
 
     state: str = "idle"
@@ -54,23 +54,23 @@ class SessionState:
 
 
 _SESSIONS: weakref.WeakSet[Session] = weakref.WeakSet()
-AT_EXIT = 30.0  # seconds that work may take to end when Python does
+AT_EXIT = 30.0  # seconds that work may take to end when Python exits
 
 
 class Session:
-    """Decomposes on a thread of its own.
+    """Runs decompositions on its own thread.
 
     Parameters
     ----------
     run : callable
-        Called with ``progress`` and the options asked for.
+        Called with ``progress`` and the requested options.
     """
 
     def __init__(self, run: Run) -> None:
         self._run = run
         self._changed = threading.Condition()
         self._state = SessionState()
-        self._count = 0  # changes of the state so far
+        self._count = 0  # number of state changes so far
         self._wanted: list[dict[str, Any]] | None = None  # options of the draft, if any, and of the result
         self._stopped = False
         self._result: Decomposition | None = None
@@ -86,13 +86,13 @@ class Session:
 
     @property
     def state(self) -> SessionState:
-        """What is being done now."""
+        """Current state."""
         with self._changed:
             return self._state
 
     @property
     def result(self) -> tuple[int, Decomposition] | None:
-        """The hulls there are and their version; None before the first and after another input came."""
+        """The current hulls and their version; None before the first result and after the input changed."""
         with self._changed:
             return None if self._result is None else (self._state.version, self._result)
 
@@ -104,15 +104,15 @@ class Session:
     def decompose(
         self, options: dict[str, Any], draft: dict[str, Any] | None = None, *, other_input: bool = False
     ) -> None:
-        """Decompose with these options next, instead of what is under way.
+        """Cancel the current work and decompose with these options instead.
 
         Parameters
         ----------
         options : dict
         draft : dict, optional
-            Options of a quick pass that comes first, whose hulls are there until better ones are.
+            Options of a quick first pass, whose hulls are shown until better ones are ready.
         other_input : bool
-            Drop the hulls there are: they belong to another input.
+            Drop the current hulls, which belong to another input.
         """
         with self._changed:
             self._wanted, self._stopped = [dict(draft)] if draft else [], False
@@ -124,15 +124,15 @@ class Session:
             self._tell(now)
 
     def stop(self) -> None:
-        """End the work under way and keep what it reached."""
+        """End the current work and keep its result so far."""
         with self._changed:
             self._stopped = True
 
     def close(self, patience: float = 1.0) -> bool:
-        """End the work, drop it, and let those who wait go; tells whether the work has ended in so many seconds.
+        """Cancel the work and release all waiting threads; tells whether the work ended within `patience` seconds.
 
-        Work that has not is told to end; its thread is waited for when Python ends, since nothing may hold objects of
-        C++ libraries then.
+        If it has not, Python waits for its thread on exit, since no objects of C++ libraries may be held beyond
+        that.
         """
         with self._changed:
             if self._state.state != "closed":
@@ -141,7 +141,7 @@ class Session:
         return self.ended
 
     def changes(self, patience: float = 15.0) -> Iterator[SessionState | None]:
-        """Yield the state now and after every change until the session is closed; None after so many quiet seconds."""
+        """Yield the current state, then every new one until the session closes; None after `patience` quiet seconds."""
         seen = -1
         while True:
             with self._changed:
@@ -161,14 +161,14 @@ class Session:
             self._take(passes)
 
     def _take(self, passes: list[dict[str, Any]]) -> None:
-        """Make a draft, if one is wanted, and then the result."""
+        """Run the draft, if there is one, and then the requested decomposition."""
         for number, options in enumerate(passes, start=1):
             result, error = self._attempt(options)
             with self._changed:
                 if self._state.state == "closed" or self._wanted is not None:
                     return
                 is_last = number == len(passes) or self._stopped or error is not None
-                # Cut short before its search, a pass is worth less than the draft, which is finished.
+                # A pass that was stopped before its search is worth less than the finished draft.
                 if number > 1 and result is not None and _is_cut_short(result):
                     result = None
                 state = self._state
@@ -189,7 +189,7 @@ class Session:
             return None, str(error)
         except MemoryError:
             return None, "there is not enough memory for this mesh; simplify it or use a larger machine."
-        except Exception as error:  # the viewer stays up, and says what happened
+        except Exception as error:  # the viewer stays up and shows the error
             return None, f"a bug in rlacd ({type(error).__name__}: {error}); please report it."
 
     def _follow(self, progress: Progress) -> bool:
@@ -207,13 +207,13 @@ class Session:
 
 
 def _is_cut_short(result: Decomposition) -> bool:
-    """Whether the work was stopped before its first pass was done."""
+    """Tell whether the work was stopped during its first pass."""
     return result.report.get("complete") is False and result.report.get("search") is None
 
 
 @atexit.register
 def _end_all() -> None:
-    """End work that goes on when Python ends: its thread would hold what C++ libraries then report as leaked."""
+    """End running work when Python exits: its thread would hold objects that C++ libraries report as leaked."""
     until = time.monotonic() + AT_EXIT
     sessions = list(_SESSIONS)
     for session in sessions:

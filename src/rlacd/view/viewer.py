@@ -22,7 +22,7 @@ from rlacd.view.server import ViewServer
 from rlacd.view.session import AT_EXIT, Session
 from rlacd.view.wishes import Subject, ViewerControls
 
-LEAVING = 0.8  # seconds that work under way has to end when the viewer is closed
+LEAVING = 0.8  # seconds for current work to end when the viewer is closed
 
 
 @contextlib.contextmanager
@@ -36,18 +36,18 @@ def open_viewer(
 ) -> Iterator[Viewer]:
     """Serve a page that shows a mesh and its hulls, until the block ends.
 
-    The first decomposition begins at once. The page is for this machine alone and needs no network.
+    The first decomposition starts at once. The page is only reachable from this machine and needs no network.
 
     Parameters
     ----------
     mesh : path-like
-        Any file `rlacd.decompose` takes; it is read anew for every decomposition, so that changes to it are seen.
+        Any file `rlacd.decompose` takes; it is read again for every decomposition, so that changes to it take effect.
     options : dict, optional
-        What the page's controls hold at first: fields of `ViewerControls`.
+        Initial values of the page's controls: fields of `ViewerControls`.
     up : {"x", "y", "z"}, optional
-        The axis of the mesh that points up; y for glTF and z for all else by default.
+        The axis of the mesh that points up; by default y for glTF and z otherwise.
     port : int, optional
-        Where to listen; 8765, or any free one, by default.
+        Port to listen on; 8765, or any free one, by default.
     threads : int, optional
         Threads to use; all processors by default.
 
@@ -80,20 +80,20 @@ def open_viewer(
         yield Viewer(session, server, thread)
     finally:
         until = time.monotonic() + LEAVING
-        session.close(0.0)  # first, so that pages that follow it are let go
+        session.close(0.0)  # first, so that event streams end
         if not server.end(until - time.monotonic()):
-            atexit.register(server.end, AT_EXIT)  # an answer is being worked out
+            atexit.register(server.end, AT_EXIT)  # an answer is still being computed
         session.close(max(0.0, until - time.monotonic()))
 
 
 @dataclasses.dataclass(frozen=True)
 class Viewer:
-    """A viewer that is open.
+    """An open viewer.
 
     Attributes
     ----------
     session : Session
-        What it works on.
+        The session that does the work.
     """
 
     session: Session
@@ -102,33 +102,33 @@ class Viewer:
 
     @property
     def address(self) -> str:
-        """Where the page is."""
+        """URL of the page."""
         return self._server.address
 
     @property
     def connections(self) -> int:
-        """How many connections are open."""
+        """Number of open connections."""
         return self._server.connections
 
     @property
     def folder(self) -> Path | None:
-        """Where the mesh lies that a page has sent; None before."""
+        """Folder of an uploaded mesh; None if there is none."""
         return self._server.folder
 
     @property
     def at_work(self) -> bool:
-        """Whether work goes on, even after the viewer is closed: a kernel ends what it has begun."""
+        """Whether work is still running, even after the viewer is closed: a kernel cannot be interrupted."""
         return not self.session.ended or self.connections > 0
 
     def wait(self) -> None:
         """Serve until Ctrl-C."""
         with contextlib.suppress(KeyboardInterrupt):
-            while self._thread.is_alive():  # a wait without end would not hear Ctrl-C on Windows
+            while self._thread.is_alive():  # a wait without timeout would not notice Ctrl-C on Windows
                 self._thread.join(0.5)
 
 
 def read_subject(mesh: str | os.PathLike[str], up: str | None = None) -> Subject:
-    """Read the mesh that is to be looked at.
+    """Read the mesh to be viewed.
 
     Raises
     ------
@@ -141,12 +141,12 @@ def read_subject(mesh: str | os.PathLike[str], up: str | None = None) -> Subject
 
 
 def read_controls(given: dict[str, Any]) -> ViewerControls:
-    """Take what a page or a command line gave.
+    """Check the options given by a page or a command line.
 
     Raises
     ------
     OptionError
-        An option is unknown or not of its kind.
+        An option is unknown or of the wrong type.
     """
     known = {field.name for field in dataclasses.fields(ViewerControls)}
     for name in given:

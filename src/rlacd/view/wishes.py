@@ -1,4 +1,4 @@
-"""What the viewer is asked for: the input it looks at, and what the page's controls hold."""
+"""The viewer's input and the values of the page's controls."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _DEFAULTS, _SPACE = Options(), NavigableSpace()
 
 @dataclasses.dataclass(frozen=True)
 class ViewerControls:
-    """What the page's controls hold; see `rlacd.decompose` for the meaning of each."""
+    """Values of the page's controls; see `rlacd.decompose` for their meaning."""
 
     criterion: str = CONCAVITY
     threshold: float = _DEFAULTS.threshold
@@ -53,26 +53,26 @@ class ViewerControls:
         return options
 
     def draft(self) -> dict[str, Any] | None:
-        """Get the options of a quick first pass; None where these are quick themselves."""
+        """Get the options of a quick first pass; None if the requested options are already quick."""
         return None if self.quality == FAST else {**self.options(), "quality": FAST}
 
 
 @dataclasses.dataclass(frozen=True)
 class Subject:
-    """An input that is looked at.
+    """An input shown in the viewer.
 
     Attributes
     ----------
     path : pathlib.Path
-        Read anew for every decomposition.
+        Read again for every decomposition.
     name : str
-        For the page.
+        Shown on the page.
     up : {"x", "y", "z"}
         The axis that points up.
     unit : str
-        The unit of length, where the format says one; else empty.
+        The unit of length if the format defines one; else empty.
     mesh : InputMesh
-        As it was first read.
+        The mesh as first read.
     """
 
     path: Path

@@ -1,4 +1,4 @@
-"""What describes a component to the Q network: an encoder by name, and the features it gives."""
+"""State encoders, which describe a component to the Q network, by name."""
 
 from rlacd.learn.encoders.encoder import Encoder, describe
 from rlacd.learn.encoders.i2p_mae import I2PMAEEncoder

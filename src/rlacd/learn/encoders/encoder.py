@@ -1,7 +1,7 @@
-"""State encoders: from points of a component and of its hull to the features that the Q network sees.
+"""State encoders: from surface points of a component and of its hull to the features that the Q network sees.
 
-An encoder is a torch module without state of its own in training: it is fixed (or frozen), the features of a component
-are computed once and kept in the replay buffer, and the module is exported to ONNX in front of the Q network.
+An encoder is a torch module whose state does not change in training: its features are computed once per component and
+kept in the replay buffer, and the module is exported to ONNX in front of the Q network.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from rlacd.policies.observe import Float32Array, Observation
 
 @runtime_checkable
 class Encoder(Protocol):
-    """What the training asks of an encoder; a `torch.nn.Module` with a `dim` is one."""
+    """The interface of an encoder in training; a `torch.nn.Module` with a `dim` satisfies it."""
 
     @property
     def dim(self) -> int:
-        """Features a component."""
+        """Number of features per component."""
 
     def encode(self, points: Tensor, directions: Tensor) -> Tensor:
-        """Describe components by points of their surface and their hull's.
+        """Describe components by points of their surface and of their hull's.
 
         Parameters
         ----------
         points : float32 [B, 2, N, 3]
             In each component's own frame: bounding box centred, longest side 2.
         directions : float32 [B, 6, 3]
-            The unit normals of the candidate planes. An encoder need not look at them.
+            The unit normals of the candidate planes. An encoder may ignore them.
 
         Returns
         -------
@@ -40,7 +40,7 @@ class Encoder(Protocol):
 
 
 def describe(encoder: Encoder, observations: list[Observation], scale_input: bool) -> Float32Array:
-    """Features [B, dim (+ 3)] of components, as they are kept in replay: rounded to half precision."""
+    """Features [B, dim (+ 3)] of components, rounded to half precision as they are stored in replay."""
     points = torch.from_numpy(np.stack([o.points for o in observations]))
     directions = torch.from_numpy(np.stack([o.directions for o in observations]))
     with torch.inference_mode():

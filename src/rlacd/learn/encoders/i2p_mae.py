@@ -26,15 +26,15 @@ from rlacd.learn.encoders.transformer import Blocks, position_embedding
 from rlacd.learn.encoders.weights_file import load_weights
 
 REMEMBERED = 8192
-"""Components whose features are kept: the same solids come back in every episode and validation."""
+"""Size of the feature cache, in components: the same solids return in every episode and validation."""
 
 SCALES = 3
 
 LARGEST = 65536
-"""No size is larger than this."""
+"""Upper bound of every size."""
 
 AT_ONCE = 16
-"""Components encoded side by side on a GPU."""
+"""Batch size of components on a GPU."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +44,11 @@ class Sizes:
     Attributes
     ----------
     groups, neighbors, widths : tuple of int
-        Per scale: point groups, members of each, and channels of its token.
+        Per scale: number of point groups, members of each, and channels of its token.
     depth, heads : int
-        Transformer blocks of a scale, and heads of each.
+        Transformer blocks per scale, and attention heads of each.
     embedding : int
-        Channels a point has within its group, before the group becomes a token.
+        Channels of a point within its group, before the group is pooled into a token.
     """
 
     groups: tuple[int, ...] = (512, 256, 64)
@@ -60,12 +60,12 @@ class Sizes:
 
     @classmethod
     def from_plain(cls, plain: Mapping[str, Any]) -> Sizes:
-        """Make them of plain JSON values; what is not given is as published.
+        """Make them from plain JSON values; missing values are as published.
 
         Raises
         ------
         ValueError
-            They are no sizes of an encoder.
+            The values are not valid sizes.
         """
         known = {field.name for field in dataclasses.fields(cls)}
         given: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in plain.items()}
@@ -93,11 +93,11 @@ SIZES: Mapping[str, Sizes] = MappingProxyType(
         "tiny": Sizes((32, 16, 8), (8, 4, 4), (12, 24, 48), depth=1, heads=2, embedding=16),
     }
 )
-"""Named sizes: the paper's, one for a processor, one to try things out."""
+"""Named sizes: the paper's, one suited to CPUs, and one for quick trials."""
 
 
 class GroupEmbedding(nn.Module):
-    """A shared MLP over the members of a group, with the group's maximum told to each, and its maximum in the end."""
+    """A shared MLP over the members of a group that concatenates the group's maximum to each, with a final maximum."""
 
     def __init__(self, inputs: int, first: int, inner: int, second: int, outputs: int) -> None:
         super().__init__()
@@ -109,7 +109,8 @@ class GroupEmbedding(nn.Module):
         groups, size, _ = members.shape
         first, second = _matrix(self.first_conv[0]), _matrix(self.second_conv[0])
         inner = _rest(self.first_conv, F.linear(members.flatten(0, 1), *first)).reshape(groups, size, -1)
-        # The second layer sees (group's maximum, member). It is linear: the maximum's half is computed once a group.
+        # The second layer sees (group's maximum, member). It is linear, so the maximum's half is computed once per
+        # group.
         of_group, of_member = second[0].chunk(2, dim=1)
         hidden = F.linear(inner, of_member) + F.linear(inner.amax(dim=1), of_group, second[1])[:, None]
         return _rest(self.second_conv, hidden.flatten(0, 1)).reshape(groups, size, -1).amax(dim=1)
@@ -123,9 +124,9 @@ class Scale:
     ----------
     centers : float32 [B, G, 3]
     members : int64 [B, G, K]
-        Indices of the nearest centres of the scale before (of points, in the first).
+        Indices of the nearest centres of the previous scale (of points, for the first).
     offsets : float32 [B, G, K, 3]
-        Where they lie, seen from the centre.
+        Positions relative to the centre.
     """
 
     centers: Tensor
@@ -134,11 +135,11 @@ class Scale:
 
 
 def seen_below(scales: list[Scale], top: Tensor) -> list[Tensor]:
-    """Tell for every scale which groups are seen, 1 or 0 [B, G], by those of the last scale that are.
+    """Tell for every scale which groups are seen, 1 or 0 [B, G], given those of the last scale.
 
-    A group is seen when it is a member of a seen group of the next scale; the others are not attended to, in use just
-    as in pretraining. In use all groups of the last scale are seen, but now and then one of a finer scale is nobody's
-    member: the published weights never met it.
+    A group is seen if it is a member of a seen group of the next scale; the others are masked in attention, in
+    inference as in pretraining. In inference all groups of the last scale are seen, but occasionally a group of a finer
+    scale belongs to no group: the published weights were never trained on it.
     """
     seen = [top]
     for below, above in pairwise(reversed(scales)):
@@ -149,7 +150,7 @@ def seen_below(scales: list[Scale], top: Tensor) -> list[Tensor]:
 
 
 class HierarchicalEncoder(nn.Module):
-    """The pyramid; what it does is in `I2PMAEEncoder.features`, with parts hidden in `rlacd.learn.pretrain`."""
+    """The pyramid; for its use see `I2PMAEEncoder.features`, and with hidden groups `rlacd.learn.pretrain`."""
 
     def __init__(self, sizes: Sizes) -> None:
         super().__init__()
@@ -164,7 +165,7 @@ class HierarchicalEncoder(nn.Module):
         self.encoder_norms = nn.ModuleList(nn.LayerNorm(width) for width in sizes.widths)
 
     def pyramid(self, points: Tensor) -> list[Scale]:
-        """Group points [B, N, 3]; each scale's centres are chosen among the centres of the one before."""
+        """Group points [B, N, 3]; each scale's centres are chosen among those of the previous one."""
         scales = []
         for count, size in zip(self.sizes.groups, self.sizes.neighbors, strict=True):
             centers = gather(points, farthest_points(points, count))
@@ -206,14 +207,14 @@ class I2PMAEEncoder(nn.Module):
 
     @classmethod
     def from_checkpoint(cls, path: str | Path) -> I2PMAEEncoder:
-        """Read the published checkpoint (``.pth``), or weights that ``rlacd pretrain`` made (``.safetensors``).
+        """Read the published checkpoint (``.pth``), or weights made by ``rlacd pretrain`` (``.safetensors``).
 
-        Only tensors are read, never arbitrary pickle; what the file holds beside the encoder is left alone.
+        Only tensors are read, never arbitrary pickle; anything else in the file is ignored.
 
         Raises
         ------
         WeightsError
-            The file is missing, damaged, or not of this encoder: the first parameter that is missing is named.
+            The file is missing, damaged, or for another encoder; the message names the first missing parameter.
         """
         weights = load_weights(Path(path))
         try:
@@ -225,18 +226,18 @@ class I2PMAEEncoder(nn.Module):
         return encoder
 
     def features(self, clouds: Tensor) -> Tensor:
-        """Describe point clouds as they are: float32 [B, N, 3] to [B, 384]."""
+        """Describe point clouds without normalising them: float32 [B, N, 3] to [B, 384]."""
         self.require_points(clouds.shape[1])
         tokens: Tensor = self.h_encoder(clouds)
         return tokens.amax(dim=1)
 
     def require_points(self, count: int) -> None:
-        """Make sure that clouds of so many points can be grouped.
+        """Check that clouds of `count` points can be grouped.
 
         Raises
         ------
         OptionError
-            They are too few.
+            `count` is too small.
         """
         if count < self.sizes.groups[0]:
             raise OptionError(
@@ -244,9 +245,9 @@ class I2PMAEEncoder(nn.Module):
             )
 
     def forward(self, points: Tensor, directions: Tensor) -> Tensor:
-        """See `Encoder.encode`; the directions are not looked at.
+        """See `Encoder.encode`; the directions are ignored.
 
-        Component and hull are brought into the unit ball together, since the clouds of the pretraining fill it.
+        Component and hull are scaled together into the unit ball, which the clouds of the pretraining fill.
         """
         batch, _, count, _ = points.shape
         radius = points.square().sum(-1).amax(dim=(1, 2)).sqrt().clamp_min(1e-12)
@@ -254,10 +255,10 @@ class I2PMAEEncoder(nn.Module):
         return self.features(clouds).reshape(batch, self.dim)
 
     def encode(self, points: Tensor, directions: Tensor) -> Tensor:
-        """See `Encoder.encode`; features come back on the processor, and are remembered.
+        """See `Encoder.encode`; features are returned on the CPU and cached.
 
-        On a processor components are encoded one by one: what is known already, or comes along in the same call, then
-        changes no bit.
+        On a CPU components are encoded one by one, so that neither the cache nor the other components of a call affect
+        a component's bits.
         """
         device = next(self.parameters()).device
         at_once = 1 if device.type == "cpu" else AT_ONCE
@@ -275,7 +276,7 @@ class I2PMAEEncoder(nn.Module):
         return features
 
     def digest(self) -> str:
-        """Identify sizes and weights, wherever they are and whatever file they came from."""
+        """Identify sizes and weights, independent of the device and the file they came from."""
         found = hashlib.sha256(repr(dataclasses.astuple(self.sizes)).encode())
         for name, value in sorted(self.state_dict().items()):
             found.update(name.encode() + value.cpu().contiguous().numpy().tobytes())
@@ -287,11 +288,11 @@ def _shared_mlp(inputs: int, inner: int, outputs: int) -> nn.Sequential:
 
 
 def _matrix(layer: nn.Module) -> tuple[Tensor, Tensor | None]:
-    """Weight and bias of a convolution of width one, to apply to rows: much faster than to sequences of K."""
+    """Weight and bias of a width-one convolution as a matrix: much faster on rows than on sequences of K."""
     assert isinstance(layer, nn.Conv1d)
     return layer.weight[:, :, 0], layer.bias
 
 
 def _rest(mlp: nn.Sequential, hidden: Tensor) -> Tensor:
-    """What follows a shared MLP's first layer."""
+    """Apply the layers of a shared MLP after the first."""
     return F.linear(F.relu(mlp[1](hidden), inplace=True), *_matrix(mlp[3]))

@@ -1,4 +1,4 @@
-"""Encoders by the names that the command line knows."""
+"""Encoders by their names on the command line."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def make_encoder(name: str, weights: str | Path = "", device: torch.device | str
     weights : path
         For ``i2p-mae``: the published checkpoint, or a file made by ``rlacd pretrain``.
     device : torch.device
-        Where ``i2p-mae`` runs; the light ones stay where the points are.
+        Device of ``i2p-mae``; the light encoders run where the points are.
 
     Raises
     ------
     OptionError
-        There is none of this name, it needs weights and has none, or has no use for them.
+        The name is unknown, or the encoder lacks weights that it needs or is given weights that it cannot use.
     WeightsError
         The file of weights cannot be used.
     """

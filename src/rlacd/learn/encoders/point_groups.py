@@ -1,7 +1,7 @@
 """Grouping of points in plain torch: farthest-point sampling, nearest neighbours, gathering by index.
 
-Squared distances are written as single products and sums, in one order. A library's reduction may add in another, and a
-last bit that differs makes farthest-point sampling take another point, after which all later ones differ: so written,
+Squared distances are written as explicit products and sums in a fixed order. A library's reduction may use another, and
+one different bit makes farthest-point sampling pick another point, after which all later ones differ. Written this way,
 CPU, GPU and onnxruntime choose the same points.
 """
 
@@ -13,10 +13,10 @@ from torch import Tensor
 
 @torch.library.custom_op("rlacd::farthest_points", mutates_args=())
 def farthest_points(points: Tensor, count: int) -> Tensor:
-    """Choose points that lie far apart: the first one, then each time the one farthest from those chosen.
+    """Farthest-point sampling: take the first point, then repeatedly the one farthest from those chosen.
 
-    A torch operator of its own, so that its loop is exported as a loop (`rlacd.learn.paper.export`) instead of `count`
-    copies of its body.
+    This is a custom torch operator, so that it is exported as a loop (`rlacd.learn.paper.export`) instead of `count`
+    copies of the loop's body.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def farthest_points(points: Tensor, count: int) -> Tensor:
     Returns
     -------
     int64 [B, count]
-        Indices; of equally far points the one that comes first.
+        Indices; ties go to the first point.
     """
     axes = points.permute(2, 0, 1).contiguous()  # [3, B, N]
     last = torch.zeros(1, points.shape[0], 1, dtype=torch.long, device=points.device)

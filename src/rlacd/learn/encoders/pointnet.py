@@ -1,4 +1,4 @@
-"""A point-cloud encoder that needs no weights: random features of points, pooled."""
+"""A point-cloud encoder that needs no weights file: random features of points, pooled."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from torch import Tensor, nn
 
 
 class PointNetEncoder(nn.Module):
-    """A frozen PointNet with seeded random weights: the largest and the mean of random features over the points.
+    """A frozen PointNet with seeded random weights: the maximum and the mean of random features over the points.
 
-    Source: Qi et al., "PointNet", CVPR 2017, for the architecture; extreme-learning style, the weights stay random.
+    Source: Qi et al., "PointNet", CVPR 2017, for the architecture; as in extreme learning machines, weights stay
+    random.
     """
 
     def __init__(self, width: int = 128, seed: int = 0) -> None:
@@ -25,7 +26,7 @@ class PointNetEncoder(nn.Module):
         self.dim = 4 * width
 
     def forward(self, points: Tensor, directions: Tensor) -> Tensor:
-        """See `Encoder.encode`; the directions are not looked at."""
+        """See `Encoder.encode`; the directions are ignored."""
         hidden = torch.relu(self.second(torch.relu(self.first(3 * points))))
         return torch.cat([hidden.amax(dim=2), hidden.mean(dim=2)], dim=-1).flatten(1)
 

@@ -1,4 +1,4 @@
-"""The light default: how component and hull are spread along the candidate planes' own directions."""
+"""The light default: profiles of component and hull along the candidate planes' normals."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import torch
 from torch import Tensor, nn
 
 SLABS = 26
-"""Slabs between and beyond the 25 planes along each direction."""
+"""Slabs that the 25 planes of each direction bound, including the outer two."""
 
 
 class ProfileEncoder(nn.Module):
-    """How component and hull are spread along the candidate planes' own directions; nothing learned.
+    """Profiles of component and hull along the candidate planes' normals; nothing is learned.
 
     Along each of the 6 directions the extent is divided into the 26 slabs that the 25 planes bound. Per slab: the share
-    of the component's surface in it, the same of the hull's, and the root mean square distance of both from the middle
-    of the component's box across the direction. A plane between two slabs that differ much is a promising cut; a slab
-    where component and hull agree is convex there. This is the light default: features line up with the planes that
-    the values are asked for, which an order-free set encoder first has to learn (docs/experiments.md compares).
+    of the component's surface in it, the same of the hull's, and the root mean square distance of both from the axis
+    through the centre of the component's box. A plane between two slabs that differ much is a promising cut; a slab
+    where component and hull agree is convex. The features line up with the planes whose values are predicted, an
+    alignment that an order-free set encoder first has to learn (docs/experiments.md compares them).
     """
 
     dim = 6 * SLABS * 4
@@ -44,7 +44,7 @@ class ProfileEncoder(nn.Module):
 
 
 class ProfileWithoutHull(ProfileEncoder):
-    """The same of the component's own points in place of its hull's: what the hull is worth (the paper's 4.5.2)."""
+    """The same with the component's own points in place of its hull's: shows the hull's worth (the paper's 4.5.2)."""
 
     def forward(self, points: Tensor, directions: Tensor) -> Tensor:
         """See `Encoder.encode`."""

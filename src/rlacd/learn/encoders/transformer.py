@@ -1,4 +1,4 @@
-"""The transformer blocks of I2P-MAE; names of parameters are those of its published checkpoint."""
+"""The transformer blocks of I2P-MAE; parameters are named as in its published checkpoint."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ MLP_RATIO = 4
 
 
 class Attention(nn.Module):
-    """Multi-head self-attention without a bias in front."""
+    """Multi-head self-attention without bias in the query, key and value projection."""
 
     def __init__(self, width: int, heads: int) -> None:
         super().__init__()
@@ -18,7 +18,7 @@ class Attention(nn.Module):
         self.proj = nn.Linear(width, width)
 
     def forward(self, x: Tensor, mask: Tensor | None = None) -> Tensor:
-        """Attend among tokens x [B, T, C]; `mask` bool [B, 1, 1, T] tells which of them may be looked at."""
+        """Attend among tokens x [B, T, C]; `mask`, bool [B, 1, 1, T], is True where a token may be attended to."""
         q, k, v = self.qkv(x).unflatten(-1, (3, self.heads, -1)).permute(2, 0, 3, 1, 4).unbind(0)
         seen = F.scaled_dot_product_attention(q, k, v, attn_mask=mask)
         out: Tensor = self.proj(seen.transpose(1, 2).flatten(2))
@@ -26,7 +26,7 @@ class Attention(nn.Module):
 
 
 class Mlp(nn.Module):
-    """Two layers with GELU between."""
+    """Two linear layers with GELU between them."""
 
     def __init__(self, width: int) -> None:
         super().__init__()
@@ -57,7 +57,7 @@ class Block(nn.Module):
 
 
 class Blocks(nn.Module):
-    """Blocks in a row; positions are added in front of each."""
+    """A stack of blocks; positions are added before each."""
 
     def __init__(self, width: int, heads: int, depth: int) -> None:
         super().__init__()
@@ -71,5 +71,5 @@ class Blocks(nn.Module):
 
 
 def position_embedding(width: int) -> nn.Sequential:
-    """Build the map from a place in space to what is added to the tokens there."""
+    """Build the map from a position in space to the embedding added to the token there."""
     return nn.Sequential(nn.Linear(3, width), nn.GELU(), nn.Linear(width, width))

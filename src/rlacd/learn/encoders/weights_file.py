@@ -18,28 +18,28 @@ from torch import Tensor
 from rlacd.errors import OutputError, WeightsError
 
 METADATA = "rlacd"
-"""Key of a safetensors file's metadata under which our own JSON stands."""
+"""Key of our JSON in a safetensors file's metadata."""
 
 WRAPPERS = ("base_model", "model", "state_dict")
-"""Entries under which checkpoints keep the state; the published one has the first."""
+"""Keys under which checkpoints keep the state; the published one uses the first."""
 
 FIRST = "h_encoder.token_embed.0.first_conv.0.weight"
 """The first parameter of the encoder."""
 
 HARMLESS = [np.dtype, np.dtypes.Float64DType, np.dtypes.Float32DType, np.dtypes.Int64DType]
-"""Kinds of numpy numbers, which checkpoints hold as their score; beyond torch's own list nothing else is let in."""
+"""Kinds of numpy numbers, used by checkpoints for their score; nothing else is allowed beyond torch's own list."""
 
 
 @dataclass(frozen=True)
 class Weights:
-    """What a file holds.
+    """Contents of a weights file.
 
     Attributes
     ----------
     path : Path
     state : dict of Tensor
     sizes : dict
-        The sizes that the file states; none in the published one.
+        The sizes stated in the file; empty for the published one.
     """
 
     path: Path
@@ -52,7 +52,7 @@ class Weights:
         Raises
         ------
         WeightsError
-            The first that is missing, of another shape, or not finite.
+            A tensor is missing, has another shape, or is not finite; the first is named.
         """
         for name, wanted in expected.items():
             found = self.state.get(name)
@@ -72,12 +72,12 @@ class Weights:
 
 
 def load_weights(path: Path) -> Weights:
-    """Read a file of weights; keys may stand below ``base_model`` and begin with ``module.``.
+    """Read a file of weights; keys may be nested under ``base_model`` and begin with ``module.``.
 
     Raises
     ------
     WeightsError
-        The file is missing, damaged, or holds something else than tensors by name.
+        The file is missing, damaged, or holds anything but named tensors.
     """
     if not path.is_file():
         raise WeightsError(f"there is no file {path}; give the weights that --encoder-weights shall read.")
@@ -93,17 +93,17 @@ def load_weights(path: Path) -> Weights:
 
 
 def save_weights(path: Path, state: Mapping[str, Tensor], about: Mapping[str, Any]) -> None:
-    """Write a safetensors file as a whole; `about` goes into its metadata as JSON, ``about["sizes"]`` is read back.
+    """Write a safetensors file atomically; `about` goes into its metadata as JSON, and ``about["sizes"]`` is read back.
 
     Raises
     ------
     OutputError
-        It cannot be written.
+        The file cannot be written.
     """
     partial = path.with_name(path.name + ".new")
     try:
         save_file({name: value.detach().cpu().contiguous() for name, value in state.items()}, partial, _metadata(about))
-        partial.chmod(0o644)  # it is written for its owner only
+        partial.chmod(0o644)  # temporary files are private to their owner
         partial.replace(path)
     except (OSError, SafetensorError) as error:
         raise OutputError(f"{path} cannot be written ({error}); choose another place.") from error
