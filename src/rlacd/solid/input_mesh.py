@@ -1,4 +1,4 @@
-"""A mesh as it was read: what loading hands to repair."""
+"""A mesh as read: the output of loading, the input of repair."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from rlacd.solid.topology import IntArray
 
 @dataclass(frozen=True)
 class InputMesh:
-    """Triangles as they were given.
+    """The triangles as given.
 
     Attributes
     ----------
     vertices
-        float64 ``[V, 3]``, finite, in the input's unit. Those no face uses are kept.
+        float64 ``[V, 3]``, finite, in the input's unit. Vertices that no face uses are kept.
     faces
         int64 ``[F, 3]``, in range; empty for a point cloud.
     name
-        File name, or what kind of object was given.
+        File name, or the kind of object given.
     warnings
         What was left out.
     """

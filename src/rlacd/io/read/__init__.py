@@ -1,1 +1,1 @@
-"""Meshes from files: parsers of well-kept libraries behind checks of what a file promises."""
+"""Meshes from files: maintained parsers behind checks of what a file declares."""

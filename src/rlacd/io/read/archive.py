@@ -1,4 +1,4 @@
-"""Archives: how much they unpack to is looked up before anything is unpacked."""
+"""Archives: the unpacked size is checked before anything is unpacked."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from rlacd.errors import MeshFileError
 from rlacd.io.read.limits import MOST_MEMBERS, most_unpacked
 
 PLAIN = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-"""Ways to compress that mesh formats allow, and of which Python unpacks no more than a member says it holds."""
+"""Compression methods that mesh formats allow and for which Python never unpacks more than a member declares."""
 
 
 def open_archive(path: Path, content: bytes) -> zipfile.ZipFile:
-    """Open an archive that can be unpacked without regret.
+    """Open an archive that is safe to unpack.
 
     Raises
     ------
     MeshFileError
-        It is damaged, or would unpack to too much.
+        The archive is damaged, or would unpack to too much.
     """
     try:
         archive = zipfile.ZipFile(io.BytesIO(content))
@@ -43,12 +43,12 @@ def open_archive(path: Path, content: bytes) -> zipfile.ZipFile:
 
 
 def unpack(path: Path, archive: zipfile.ZipFile, name: str) -> bytes:
-    """Get the content of a member.
+    """Return the content of a member.
 
     Raises
     ------
     MeshFileError
-        It is missing, damaged, or locked by a password.
+        The member is missing, damaged, or encrypted.
     """
     try:
         return archive.read(name)

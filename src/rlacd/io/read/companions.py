@@ -1,4 +1,4 @@
-"""All the files that a mesh is read from, as bytes: what has to travel with it, and what its hash is taken of."""
+"""The content of all files that a mesh is read from: what is sent along with it, and what its hash covers."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from rlacd.io.read.open_file import LARGEST, read_file
 
 
 def mesh_files(path: Path, name: str | None = None) -> dict[str, bytes]:
-    """Read everything a mesh is read from, by name relative to its folder; its own file comes first.
+    """Read all files that make up a mesh, by name relative to its folder; the mesh file itself comes first.
 
     Parameters
     ----------
     path : Path
         The mesh file.
     name : str, optional
-        What it is called in messages.
+        Its name in messages.
 
     Raises
     ------
@@ -35,7 +35,7 @@ def mesh_files(path: Path, name: str | None = None) -> dict[str, bytes]:
 
 
 def lay_out(files: Mapping[str, bytes], folder: Path) -> Path:
-    """Write what `mesh_files` has read into a folder; returns the mesh file. Names that lead out of it are left out."""
+    """Write the files read by `mesh_files` to a folder, except names that lead outside; returns the mesh file."""
     for name, content in files.items():
         target = folder / name
         if target.resolve().is_relative_to(folder.resolve()):
@@ -45,7 +45,7 @@ def lay_out(files: Mapping[str, bytes], folder: Path) -> Path:
 
 
 def _buffers(path: Path, content: bytes) -> dict[str, bytes]:
-    """Files beside a glTF file that its buffers name; what is missing or leads out of the folder is for the loader."""
+    """Files beside a glTF file that its buffers name; the loader reports those missing or outside the folder."""
     if path.suffix.lower() != ".gltf":
         return {}
     try:

@@ -1,8 +1,8 @@
-"""What a glTF file promises, weighed against what it holds.
+"""What a glTF file declares, checked against what it holds.
 
-Its JSON may use one array for any number of meshes, take any part of a buffer any number of times, and promise arrays
-that no bytes stand for. A parser makes room for all of it, one after another; and it copies names and whatever else
-hangs on a mesh for each of its primitives. So it is given the triangles and their places, and nothing else.
+Its JSON may use one array for any number of meshes, take any part of a buffer any number of times, and declare arrays
+without any bytes behind them. A parser would allocate memory for all of them, and copy names and everything else
+attached to a mesh for each of its primitives. So the parser receives only the triangles and their transforms.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ ITEM_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 ITEMS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
 UNREAD = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
-"""Extensions that hide the triangles: without what decodes them, files hold zeros in their place."""
+"""Extensions that encode the triangles: without the decoder, the file holds zeros in their place."""
 
 KEPT = {
     "buffers": ("byteLength", "uri"),
@@ -35,27 +35,27 @@ KEPT = {
     "nodes": ("children", "mesh", "matrix", "translation", "rotation", "scale"),
     "scenes": ("nodes",),
 }
-"""What the triangles and their places follow from, beside the meshes."""
+"""The fields that determine the triangles and their transforms, besides the meshes."""
 
 UNREADABLE = "cannot be read as glTF: it is damaged or cut off"
 
 
 def plain_gltf(path: Path, content: bytes, beside: Callable[[str], bytes]) -> bytes:
-    """Make a glTF file with the same triangles and nothing else, unless it promises what it does not hold.
+    """Return a glTF file with the same triangles and nothing else; refuse one that declares more than it holds.
 
     Parameters
     ----------
     path : Path
-        Of the file, to speak of it.
+        Of the file, for messages.
     content : bytes
-        What it holds, JSON or binary (GLB).
+        Its content, JSON or binary (GLB).
     beside : callable
-        Gets the content of a file that a buffer names.
+        Returns the content of a file that a buffer names.
 
     Raises
     ------
     MeshFileError
-        It does, or asks for more than anybody could use.
+        It declares more than it holds, or more than is reasonable.
     FileNotFoundError
         Raised by `beside`.
     """
@@ -75,7 +75,7 @@ def plain_gltf(path: Path, content: bytes, beside: Callable[[str], bytes]) -> by
 
 
 def _header(path: Path, content: bytes) -> tuple[Json, bytes | None]:
-    """Take a file apart into its JSON and, if it is binary, what follows that."""
+    """Split a file into its JSON and, if it is binary, the bytes that follow."""
     text, rest = content, None
     if content.startswith(MAGIC):
         if len(content) < 20 or content[16:20] != JSON_CHUNK:
@@ -122,7 +122,7 @@ def _only(item: Json, fields: tuple[str, ...]) -> Json:
 
 
 def _bytes_given(path: Path, header: Json, own: int, beside: Callable[[str], bytes]) -> int:
-    """Count the bytes of the file and of those its buffers name."""
+    """Count the bytes of the file and of the files its buffers name."""
     buffers = header.get("buffers", [])
     if len(buffers) > MOST_PLACES:
         raise MeshFileError(f"{path} has {len(buffers)} buffers, more than {MOST_PLACES}: export it again, with one")
@@ -151,7 +151,7 @@ def _check(path: Path, header: Json, given: int) -> None:
 
 
 class _Accessor:
-    """How much an array takes: ``bytes`` in the file, and ``as_loaded`` in a mesh, where all numbers take eight."""
+    """The size of an array: ``bytes`` in the file, and ``as_loaded`` in a mesh, with eight bytes per number."""
 
     def __init__(self, path: Path, accessor: Json, views: list[Json]) -> None:
         count = _natural(path, accessor["count"], "count")
@@ -159,7 +159,7 @@ class _Accessor:
         self.bytes = count * row
         self.as_loaded = 8 * count * ITEMS[accessor["type"]]
         if "bufferView" not in accessor:
-            return  # zeros, or what an extension puts there
+            return  # zeros, or data of an extension
         view = views[_natural(path, accessor["bufferView"], "bufferView")]
         start = _natural(path, accessor.get("byteOffset", 0), "byteOffset")
         _natural(path, view.get("byteOffset", 0), "byteOffset")
@@ -170,7 +170,7 @@ class _Accessor:
 
 
 def _used(primitive: Json) -> Iterator[int]:
-    """Give the accessors of a primitive."""
+    """Yield the accessors of a primitive."""
     yield from primitive["attributes"].values()
     if "indices" in primitive:
         yield primitive["indices"]

@@ -1,8 +1,8 @@
 """From a file or an object in memory to one list of triangles.
 
 Input: a path, a `trimesh.Trimesh` or `Scene`, or arrays. Output: an `InputMesh` whose vertices are finite and whose
-faces are in range, in the input's own frame and unit. Parsing is trimesh's; this file decides what may be opened, bakes
-scenes, and turns whatever goes wrong into one sentence.
+faces are in range, in the input's own frame and unit. trimesh parses; this module decides what may be opened, bakes
+scenes, and turns every failure into one sentence.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ from rlacd.solid.topology import BoolArray, IntArray
 Source: TypeAlias = str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]
 
 FORMATS = ("obj", "stl", "ply", "off", "glb", "gltf", "dae", "zae", "3mf", "xyz")
-"""What is read. trimesh has parsers of more formats, but what they do with a hostile file nobody has looked at."""
+"""The formats that are read. trimesh parses more, but those parsers have not been reviewed against hostile files."""
 
-# Triangles are all we need of a file: no colours, and no images, whose decoders are the riskier part of any loader.
+# Only triangles are needed: no colours, and no images, whose decoders are the riskier part of any loader.
 _DATA_FILES = {".bin"}
 
 
@@ -56,12 +56,12 @@ def load_mesh(source: Source) -> InputMesh:
     Raises
     ------
     MeshFileError
-        The file is missing, empty, cut off, or not what its name says; or it is made to take more memory or time
-        than a mesh is worth.
+        The file is missing, empty, truncated, or not in the format its name says; or it would take more memory or time
+        than is reasonable.
     MeshDataError
         The arrays have the wrong shape, indices are out of range, or no face is finite.
     EmptyMeshError
-        There is no point at all.
+        There are no points at all.
     """
     if isinstance(source, str | os.PathLike):
         path = Path(source)
@@ -77,8 +77,8 @@ def load_mesh(source: Source) -> InputMesh:
 
 
 def _read(path: Path) -> trimesh.Scene:
-    """Parse a file; raises MeshFileError with the likeliest reason."""
-    # The content is opened here and not by name: a name that looks like an address must never be fetched.
+    """Parse a file; raises MeshFileError with the most likely reason."""
+    # Opened here, not by name in the parser: a name that looks like a URL must never be fetched.
     try:
         content = read_file(path)
     except FileNotFoundError as error:
@@ -106,14 +106,14 @@ def _read(path: Path) -> trimesh.Scene:
             process=False,
             skip_materials=True,
         )
-    except Exception as error:  # parsers of damaged files raise anything
+    except Exception as error:  # parsers may raise anything on damaged files
         if holds and holds != extension:
             raise MeshFileError(f"{path} is not {extension} but {holds}: rename it to .{holds}") from error
         if isinstance(error, MeshFileError):
             raise
         if isinstance(error, MemoryError):
             raise MeshFileError(f"{path} takes more memory than there is: simplify the mesh first") from error
-        # A parser that misses a module was trying an encoding no mesh has: that says nothing about the file.
+        # A missing module means that the parser tried an encoding no mesh has: that says nothing about the file.
         reason = (
             "" if isinstance(error, ImportError) else f" ({str(error).splitlines()[0][:200]})" if str(error) else ""
         )
@@ -126,7 +126,7 @@ def _read(path: Path) -> trimesh.Scene:
 
 
 def _checked(path: Path, content: bytes, extension: str, beside: _FolderResolver) -> tuple[bytes, str]:
-    """Get what a parser is given, once nothing in the file makes it run wild; raises MeshFileError."""
+    """Return the content to parse, in a form that is safe for the parser; raises MeshFileError."""
     match extension:
         case "gltf" | "glb":
             return plain_gltf(path, content, beside.get), extension
@@ -176,10 +176,10 @@ _OBJ_WORDS = {b"v", b"vn", b"vt", b"vp", b"f", b"l", b"p", b"g", b"o", b"s", b"m
 
 
 class _FolderResolver(Resolver):  # type: ignore[misc]
-    """Hands out data files of one folder and nothing else.
+    """Serves data files of one folder only.
 
-    A name that leads out of the folder, by ``..``, an absolute path or a link, does not exist for it; nor do images
-    and material libraries.
+    A name that leads out of the folder, by ``..``, an absolute path or a link, counts as missing; so do images and
+    material libraries.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -187,7 +187,7 @@ class _FolderResolver(Resolver):  # type: ignore[misc]
         self._read: dict[Path, bytes] = {}
 
     def get(self, name: str) -> bytes:
-        """Return the content of a file in the folder; once read it is kept, as a file may be named any number of times.
+        """Return the content of a file in the folder, cached, since a file may be named any number of times.
 
         Raises
         ------
@@ -201,7 +201,7 @@ class _FolderResolver(Resolver):  # type: ignore[misc]
                     continue
                 if path not in self._read:
                     self._read[path] = read_file(path, LARGEST - sum(map(len, self._read.values())))
-            except (OSError, ValueError, RuntimeError):  # a name with a NUL, links in a circle
+            except (OSError, ValueError, RuntimeError):  # a name with a NUL, circular links
                 continue
             return self._read[path]
         raise FileNotFoundError(f"{name!r:.200} is not a data file beside the mesh")
@@ -211,7 +211,7 @@ class _FolderResolver(Resolver):  # type: ignore[misc]
         raise PermissionError(name)
 
     def namespaced(self, namespace: str) -> _FolderResolver:
-        """Refuse to leave the folder."""
+        """Stay in the same folder."""
         raise FileNotFoundError(namespace)
 
     def keys(self) -> Iterator[str]:
@@ -220,7 +220,7 @@ class _FolderResolver(Resolver):  # type: ignore[misc]
 
 
 def _bake(source: trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud, name: str) -> tuple[FloatArray, IntArray]:
-    """Concatenate all triangles of a scene, every instance in its place; points are kept if there are no triangles."""
+    """Concatenate all triangles of a scene, with every instance transformed; if there are none, its points."""
     vertices: list[FloatArray] = []
     faces: list[IntArray] = []
     points: list[FloatArray] = []
@@ -249,7 +249,7 @@ def _bake(source: trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud, name: st
 
 
 def _instances(source: Any, name: str) -> Iterator[tuple[Any, FloatArray | None]]:
-    """Give each geometry of a scene with its transform, None for the identity, as often as it is placed."""
+    """Yield each geometry of a scene with its transform, None for the identity, once per instance."""
     if not isinstance(source, trimesh.Scene):
         yield source, None
         return
@@ -265,7 +265,7 @@ def _instances(source: Any, name: str) -> Iterator[tuple[Any, FloatArray | None]
 
 
 def _placed(graph: Any, node: Any, placed: dict[Any, FloatArray], name: str) -> FloatArray:
-    """Find a node's transform [4, 4] from those of its ancestors, each of which is multiplied only once."""
+    """Return a node's transform [4, 4]; the transforms of its ancestors are multiplied only once."""
     chain: list[tuple[Any, Any]] = []
     at = node
     while at not in placed:
@@ -283,7 +283,7 @@ def _placed(graph: Any, node: Any, placed: dict[Any, FloatArray], name: str) -> 
 
 
 def _placed_otherwise(graph: Any, node: Any, name: str) -> FloatArray:
-    """Find the transform of a node that is not below the base: a scene in memory may have turned its edges round."""
+    """Return the transform of a node that is not below the base: a scene in memory may have reversed edges."""
     try:
         return np.asarray(graph[node][0], dtype=np.float64)
     except ValueError as error:
@@ -291,7 +291,7 @@ def _placed_otherwise(graph: Any, node: Any, name: str) -> FloatArray:
 
 
 def _arrays(vertices: Any, faces: Any) -> tuple[FloatArray, IntArray]:
-    """Check the shapes and kinds of arrays; quads become two triangles each."""
+    """Check the shapes and dtypes of arrays; quads become two triangles each."""
     try:
         v = np.asarray(vertices, dtype=np.float64)
         f = np.asarray(faces)
@@ -315,7 +315,7 @@ def _raise_out_of_range(faces: IntArray, count: int) -> None:
 
 
 def _clean(vertices: FloatArray, faces: IntArray, name: str) -> InputMesh:
-    """Check the indices and drop what is not finite."""
+    """Check the indices and drop faces and vertices that are not finite."""
     if len(faces) and (faces.min() < 0 or faces.max() >= len(vertices)):
         _raise_out_of_range(faces, len(vertices))
     warnings = []

@@ -1,4 +1,4 @@
-"""OFF files in all their variants, as the plain one that the parser reads.
+"""OFF files in all their variants, rewritten as the plain variant that the parser reads.
 
 The format is Geomview's: a keyword, the numbers of vertices, faces and edges, a line per vertex, a line per face.
 Letters before ``OFF`` say what else the line of a vertex holds: texture coordinates (``ST``), a colour (``C``), a
@@ -21,7 +21,7 @@ BINARY = re.compile(rb"\s*BINARY\b")
 
 
 def is_off(head: bytes) -> bool:
-    """Whether these first bytes of a file, or those after comments, are an OFF file's keyword."""
+    """Whether these first bytes of a file, after any comments, are the keyword of an OFF file."""
     lines = (line.lstrip() for line in head.splitlines())
     first = next((line for line in lines if line and not line.startswith(b"#")), b"")
     return KEYWORD.match(first) is not None
@@ -30,13 +30,13 @@ def is_off(head: bytes) -> bool:
 def plain_off(path: Path, content: bytes) -> bytes:
     """Rewrite an OFF file of any variant as keyword, counts and lines: positions of three coordinates, and triangles.
 
-    Normals, colours and texture coordinates stay behind the positions, where the parser ignores them. Of polygons, the
-    parser takes only those with up to four corners.
+    Normals, colours and texture coordinates stay behind the positions, where the parser ignores them. The parser takes
+    only polygons with up to four corners.
 
     Raises
     ------
     MeshFileError
-        It is binary or not in three dimensions, or its counts are no numbers or promise more than it holds.
+        It is binary or not three-dimensional, or its counts are not numbers or exceed what it holds.
     """
     content = content.removeprefix(b"\xef\xbb\xbf")
     keyword = KEYWORD.match(content)
@@ -63,7 +63,7 @@ def plain_off(path: Path, content: bytes) -> bytes:
 
 
 def _take_keyword(lines: list[bytes]) -> bytes:
-    """Take the keyword off the first line, the line too where it holds nothing else; the letters before ``OFF``."""
+    """Remove the keyword from the first line, or that line if it holds nothing else; returns the letters before it."""
     found = KEYWORD.match(lines[0]) if lines else None
     if found is None:
         return b""
@@ -73,7 +73,7 @@ def _take_keyword(lines: list[bytes]) -> bytes:
 
 
 def _check_dimension(path: Path, letters: bytes, lines: list[bytes]) -> None:
-    """Take the dimension of the space off the lines, and refuse any other than three."""
+    """Remove the dimension of the space from the lines, and refuse any other than three."""
     word, _, rest = lines[0].partition(b" ") if lines else (b"", b"", b"")
     lines[:1] = [rest.strip()] if rest.strip() else []
     dimension = count_in(path, word)

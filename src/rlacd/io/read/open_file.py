@@ -1,4 +1,4 @@
-"""Reading files that others made: ordinary ones only, and none that would not fit into memory."""
+"""Reading untrusted files: regular files only, and none that would not fit into memory."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ LARGEST = 2**30
 
 
 def read_file(path: str | os.PathLike[str], most: int = LARGEST) -> bytes:
-    """Read all that a file holds at the moment it is opened, even if it grows meanwhile.
+    """Read the content of a file as of opening it, even if it grows meanwhile.
 
     Parameters
     ----------
@@ -26,10 +26,10 @@ def read_file(path: str | os.PathLike[str], most: int = LARGEST) -> bytes:
         The file cannot be opened, is no regular one (pipes and devices may never end), or is too large; ``strerror``
         says which.
     """
-    _check(os.stat(path), path, most)  # opening a device may set it going
+    _check(os.stat(path), path, most)  # opening a device may have side effects
     handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)  # opening a pipe would wait for a writer
     try:
-        opened = os.fstat(handle)  # the name may mean another file by now
+        opened = os.fstat(handle)  # the name may refer to another file by now
         _check(opened, path, most)
     except OSError:
         os.close(handle)

@@ -1,7 +1,7 @@
-"""What headers promise of the lines that follow, and text that parsers would take too long for.
+"""Checks of what headers declare about the lines that follow, and of text that would take parsers too long.
 
-A check raises MeshFileError. What `plain_…` returns holds the same triangles as it was given, in a form that every
-parser reads in time that grows with its length.
+A check raises MeshFileError. A ``plain_…`` function returns the same triangles in a form that every parser reads in
+time linear in its length.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from rlacd.errors import MeshFileError
 from rlacd.io.read.limits import MOST_TRIANGLES
 
 MOST_FIELDS = 2000
-"""Lines of a PLY file's header: for each list among its properties, all before it are looked at again."""
+"""Lines of a PLY file's header: the parser revisits all earlier properties for every list among them."""
 
 PLY_ELEMENT = re.compile(rb"^element\s+(\S+)\s+(\S+)", re.MULTILINE)
 PLY_END = re.compile(rb"^end_header[ \t]*\r?\n", re.MULTILINE)
@@ -22,7 +22,7 @@ BODY_END = re.compile(rb"endsolid", re.IGNORECASE)
 
 
 def check_text(path: Path, content: bytes) -> None:
-    """Refuse text in which every character takes two bytes, and text of more lines than any mesh has."""
+    """Refuse text in UTF-16, and text of more lines than any mesh has."""
     if b"\0" in content.rstrip(b"\0"):
         raise MeshFileError(f"{path} is no plain text: save it as UTF-8, or export it again if it is damaged")
     lines = content.count(b"\n")
@@ -31,13 +31,13 @@ def check_text(path: Path, content: bytes) -> None:
 
 
 def plain_obj(path: Path, content: bytes) -> bytes:
-    """Take out which material a face has: each makes a mesh of its own, with a table as long as all vertices."""
+    """Remove the materials of faces: each would make a separate mesh with a table as long as all vertices."""
     check_text(path, content)
     return content.replace(b"usemtl ", b"# ")
 
 
 def plain_stl(path: Path, content: bytes) -> bytes:
-    """Compare a binary file's length with its count, as a short one would be read as text; join the bodies of text."""
+    """Check a binary file's length against its count (a short one would be read as text); join the solids of text."""
     if b"\0" in content[:512]:
         count = int.from_bytes(content[80:84], "little")
         if len(content) < 84 + 50 * count:
@@ -51,9 +51,9 @@ def plain_stl(path: Path, content: bytes) -> bytes:
 
 
 def plain_ply(path: Path, content: bytes) -> bytes:
-    """Compare a text file's lines with the counts in its header, without the empty ones.
+    """Check a text file's lines against the counts in its header, and drop empty lines.
 
-    The parser does so itself for binary files, but for elements of less than none.
+    The parser itself checks binary files, except for negative counts.
     """
     end = PLY_END.search(content)
     if end is None:
@@ -73,7 +73,7 @@ def plain_ply(path: Path, content: bytes) -> bytes:
 
 
 def count_in(path: Path, word: bytes) -> int:
-    """Read a count in a header; raises MeshFileError where it is none."""
+    """Read a count in a header; raises MeshFileError if it is not one."""
     if not re.fullmatch(rb"\+?\d{1,18}", word):
         said = word[:20].decode(errors="replace")
         raise MeshFileError(f"{path} has {said!r} in its header where a count belongs: it is damaged; export it again")

@@ -1,8 +1,8 @@
 """Mesh formats that are XML: 3MF and COLLADA.
 
-Both let a part be placed any number of times inside other parts, so that forty lines make 2^40 boxes, and XML lets a
-word stand for other words likewise. Neither is unfolded here: documents with a type are refused, and instances counted
-along the graph of parts.
+Both let a part be instanced any number of times inside other parts, so that forty lines make 2^40 boxes, and XML
+entities can expand likewise. Neither is expanded here: documents with a document type are refused, and instances are
+counted along the graph of parts.
 """
 
 from __future__ import annotations
@@ -24,33 +24,33 @@ from rlacd.io.read.archive import open_archive, unpack
 from rlacd.io.read.limits import DEEPEST, LONGEST_NAME, MOST_ITEMS, MOST_PLACES, MOST_TRIANGLES, most_in_memory
 
 WORLD = ""
-"""The part that everything else is placed in; no identifier is empty."""
+"""The root part that all others are placed in; no identifier is empty."""
 
 PARSER: dict[str, Any] = {"resolve_entities": False, "no_network": True, "load_dtd": False}
-"""For lxml."""
+"""Parser options for lxml."""
 
 PIECE = 1 << 16
 
 
 @dataclass
 class XmlPart:
-    """A part of a scene: how many triangles it has of its own, and which other parts are placed in it."""
+    """A part of a scene: the number of its own triangles, and the other parts placed in it."""
 
     triangles: int = 0
     parts: list[str] = field(default_factory=list)
 
 
 class _RootReached(Exception):
-    """All that comes before the first element has been read."""
+    """Everything before the first element has been read."""
 
 
 def check_prologue(path: Path, data: bytes) -> None:
-    """Refuse a document type, and with it every entity: no word expands, and no other file is read.
+    """Refuse a document type, and with it every entity: nothing expands, and no other file is read.
 
     Raises
     ------
     MeshFileError
-        There is one, or what comes before the first element is no XML.
+        There is one, or the text before the first element is not XML.
     """
     parser = expat.ParserCreate()
 
@@ -77,7 +77,7 @@ def check_prologue(path: Path, data: bytes) -> None:
 
 
 def check_3mf(path: Path, content: bytes) -> None:
-    """Refuse a 3MF file that would unpack, expand or multiply to more than anybody could use.
+    """Refuse a 3MF file that would unpack, expand or multiply to more than is reasonable.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def check_3mf(path: Path, content: bytes) -> None:
 
 
 class _Reads:
-    """The XML files of an archive; a parser reads one again for every part that names it, which is added up."""
+    """The XML files of an archive, with a running total: a parser reads one again for every part that names it."""
 
     def __init__(self, path: Path, archive: ZipFile) -> None:
         self._path = path
@@ -115,7 +115,7 @@ class _Reads:
         self._triangles: dict[str, int] = {}
 
     def elements(self, name: str) -> Iterator[Any]:
-        """Give the objects of a model and what it builds of them."""
+        """Yield the objects of a model and its build items."""
         data = unpack(self._path, self._archive, name)
         check_prologue(self._path, data)
         try:
@@ -139,12 +139,12 @@ class _Reads:
 
 
 def collada_of(path: Path, content: bytes, extension: str) -> bytes:
-    """Get the XML of a COLLADA file, out of its archive if it is a ``zae``, and check it.
+    """Return the XML of a COLLADA file, unpacked if it is a ``zae``, and check it.
 
     Raises
     ------
     MeshFileError
-        It would expand or multiply to more than anybody could use.
+        It would expand or multiply to more than is reasonable.
     """
     if extension == "zae":
         archive = open_archive(path, content)
@@ -159,7 +159,7 @@ def collada_of(path: Path, content: bytes, extension: str) -> bytes:
 
 
 def check_collada(path: Path, data: bytes) -> None:
-    """Refuse a COLLADA file that would expand or multiply to more than anybody could use.
+    """Refuse a COLLADA file that would expand or multiply to more than is reasonable.
 
     Raises
     ------
@@ -190,7 +190,7 @@ PRIMITIVES = ("{*}triangles", "{*}polylist", "{*}polygons", "{*}tristrips", "{*}
 
 
 def _corners(path: Path, primitive: Any) -> int:
-    """Bound the corners of a primitive's polygons by its length: a number takes two characters."""
+    """Bound the corners of a primitive's polygons by its length: a number takes at least two characters."""
     corners = sum(len(numbers.text or "") // 2 + 1 for numbers in primitive.iter("{*}p"))
     counts = primitive.find("{*}vcount")
     if counts is not None and counts.text:
@@ -201,13 +201,13 @@ def _corners(path: Path, primitive: Any) -> int:
 
 
 def _sum(text: str) -> float:
-    """Add up whole numbers; what is none is for the parser to complain about."""
+    """Add up whole numbers; anything else is left for the parser to report."""
     numbers = [abs(int(word)) for word in re.findall(r"\S+", text) if re.fullmatch(r"[-+]?\d{1,18}", word)]
     return float(np.sum(np.array(numbers, dtype=np.float64)))
 
 
 def _placed(element: Any) -> list[str]:
-    """What is placed anywhere in an element."""
+    """The names of everything instanced in an element, at any depth."""
     kinds = {"instance_node": "node", "instance_geometry": "geometry"}
     found = element.iter("{*}instance_node", "{*}instance_geometry")
     return [f"{kinds[etree.QName(one).localname]} {one.get('url', '')[1:]}" for one in found]
@@ -224,7 +224,7 @@ def _is(element: Any, name: str) -> bool:
 
 
 def check_instances(path: Path, parts: dict[str, XmlPart], most_places: int = MOST_PLACES) -> None:
-    """Refuse parts that hold themselves, nest too deep, or make too many instances or triangles of themselves.
+    """Refuse parts that contain themselves, nest too deep, or expand to too many instances or triangles.
 
     Raises
     ------
@@ -235,7 +235,7 @@ def check_instances(path: Path, parts: dict[str, XmlPart], most_places: int = MO
     open_parts: set[str] = set()
 
     def count(name: str, depth: int) -> tuple[int, int]:
-        """Instances and triangles of a part and all in it."""
+        """Instances and triangles of a part and everything in it."""
         if name in done:
             return done[name]
         if name in open_parts:

@@ -1,4 +1,4 @@
-"""What a COLLADA file says of itself besides its numbers: readers of robot descriptions multiply by its unit."""
+"""The unit and up axis of a COLLADA file: readers of robot descriptions scale by its unit."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _UP = re.compile(rb"<up_axis>\s*([XYZ]_UP)\s*</up_axis>")
 
 
 def collada_unit(path: Path) -> tuple[float, list[str]]:
-    """Get the metres a unit of the file has, 1 for other formats, and what to warn of.
+    """Return the metres per unit of the file, 1 for other formats, and warnings.
 
     ROS, Gazebo and Bullet apply the unit. Whether a file whose y axis points up is turned differs between them.
     """

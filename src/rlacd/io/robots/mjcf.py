@@ -1,9 +1,9 @@
-"""MJCF: each geom that collides as a mesh becomes one geom a hull.
+"""MJCF: each geom that collides as a mesh becomes one geom per hull.
 
-What a geom is follows from its own attributes and from defaults: its class, or the nearest ``childclass`` above it, and
-the classes that class is nested in (https://mujoco.readthedocs.io, "Default settings").
+A geom's settings come from its own attributes and from defaults: its class, or the nearest ``childclass`` above it, and
+the classes that contain that class (https://mujoco.readthedocs.io, "Default settings").
 
-A geom in a group that MuJoCo shows by default (0, 1, 2) may be the only thing seen of its body. Unless another geom
+A geom in a group that MuJoCo shows by default (0, 1, 2) may be the only visible one of its body. Unless another geom
 shows the same mesh there, it stays, without contacts and mass, and the hulls go to group 3.
 """
 
@@ -35,7 +35,7 @@ class Defaults:
 
     @classmethod
     def of(cls, root: Element) -> Defaults:
-        """Gather the ``<default>`` sections of a file."""
+        """Collect the ``<default>`` sections of a file."""
         defaults = cls({"main": None})
         for section in root.named("default"):
             defaults.top = section.attributes.get("class", defaults.top)
@@ -51,7 +51,7 @@ class Defaults:
                 self.own.setdefault((name, child.tag), {}).update(child.attributes)
 
     def full(self, element: Element, childclass: str | None = None) -> dict[str, str]:
-        """Get the element's attributes with those of its classes behind them."""
+        """Return the element's attributes, completed by those of its classes."""
         name: str | None = element.attributes.get("class", childclass or self.top)
         chain: list[dict[str, str]] = []
         while name is not None and name in self.parents and len(chain) <= len(self.parents):
@@ -86,7 +86,7 @@ def plan_mjcf(document: Document, references: References, named: Callable[[str, 
     for body in (element for element in root.walk() if element.tag in BODIES):
         geoms += [geom for geom in _colliding(body, defaults) if _is_file(assets, geom, defaults, warnings)]
     for geom in geoms:
-        _mass(geom.attributes)  # before any work
+        _mass(geom.attributes)  # fail before any work
     uses = {
         name: _use(assets[name], defaults, references, folder, document)
         for name in dict.fromkeys(geom.mesh for geom in geoms)
@@ -123,7 +123,7 @@ def plan_mjcf(document: Document, references: References, named: Callable[[str, 
 
 
 def mesh_folder(document: Document) -> Path:
-    """Get the folder that mesh files are named from.
+    """Return the folder that mesh file names are relative to.
 
     Raises
     ------
@@ -151,7 +151,7 @@ def _geom_edit(document: Document, geom: _Geom, names: list[str], hulls: list[Hu
         pieces.append(document.with_attributes(element, seen if own is None else {**seen, "name": f"{own}_visual"}))
     for index, (mesh, hull) in enumerate(zip(names, hulls, strict=True)):
         values = {"mesh": mesh}
-        if own is not None and index:  # the first keeps the name, for whatever refers to it
+        if own is not None and index:  # the first keeps the name, since other elements may refer to it
             values["name"] = f"{own}_{index:03d}"
         if geom.stays:
             values["group"] = HIDDEN_GROUP
@@ -170,7 +170,7 @@ def _mass(attributes: Mapping[str, str]) -> float:
 
 
 def _colliding(body: Element, defaults: Defaults) -> Iterator[_Geom]:
-    """Give the geoms of one body that collide as meshes."""
+    """Yield the geoms of one body that collide as meshes."""
     childclass = _childclass(body)
     geoms = [(geom, defaults.full(geom, childclass)) for geom in body.named("geom")]
     seen = {full.get("mesh") for _, full in geoms if not _collides(full)}
@@ -220,7 +220,7 @@ def _mesh_name(mesh: Element, defaults: Defaults) -> str:
 
 
 def _fresh(name: str, count: int, taken: set[str]) -> list[str]:
-    """Make names that nothing in the file has, from that of the mesh."""
+    """Derive names from that of the mesh which nothing in the file uses."""
     stem = name
     while any(f"{stem}_{index:03d}" in taken for index in range(count)):
         stem += "_hull"

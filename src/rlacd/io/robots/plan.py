@@ -1,4 +1,4 @@
-"""What rewriting a robot takes: which meshes to decompose, and how the file changes once their hulls are known."""
+"""The plan of a rewrite: which meshes to decompose, and how the file changes once their hulls are known."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ Scale: TypeAlias = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class MeshUse:
-    """A mesh file at a scale: decomposed once, however often it is used.
+    """A mesh file at a scale: decomposed once, however many times it is used.
 
     Attributes
     ----------
     path
         The file.
     scale
-        What the description multiplies its coordinates by; negative ones mirror.
+        The factors that the description applies to its coordinates; negative ones mirror.
     """
 
     path: Path
@@ -47,11 +47,11 @@ class Plan:
     uses
         The meshes to decompose, in the order of the file, each once.
     edit
-        Gets the hull files of each, and gives the changes to the file's bytes.
+        Takes the hull files of each and returns the edits of the file's bytes.
     relative
         Paths that other parts of the file name relative to its folder: they break if the result goes elsewhere.
     warnings
-        What is left as it is, and why.
+        What is left unchanged, and why.
     """
 
     uses: list[MeshUse]

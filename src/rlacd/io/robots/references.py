@@ -1,8 +1,8 @@
-"""Which file a robot description means: relative paths, ``package://`` and ``file://``, and none outside its package.
+"""Resolving the file references of a robot description: relative paths, ``package://`` and ``file://``.
 
-A description is a file that others made. What it may name is limited to its own package (the nearest folder above it
-with a ``package.xml``, else the folder above its own, since ``../meshes`` is where most keep them), the packages it
-refers to, and the folders the user allows. Links are followed: workspaces of ROS are made of them.
+A description is untrusted. It may refer only to files in its own package (the nearest folder above it with a
+``package.xml``, else the parent of its folder, since most keep meshes in ``../meshes``), in the packages it refers to,
+and in the folders the user allows. Links are followed: ROS workspaces consist of them.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ PACKAGE_SCHEMES = ("package", "model")
 
 
 class References:
-    """Finds the files that one robot description names.
+    """Finds the files that a robot description refers to.
 
     Parameters
     ----------
@@ -53,12 +53,12 @@ class References:
         self._allowed.append(self.root)
 
     def find(self, reference: str, folder: Path) -> Path:
-        """Get the file that `reference` means in a description that reads relative paths from `folder`.
+        """Return the file that `reference` means in a description whose relative paths start at `folder`.
 
         Raises
         ------
         MeshFileError
-            There is no such file or package, or it lies outside what the description may name.
+            There is no such file or package, or it lies outside what the description may refer to.
         """
         package = self.package_of(reference)
         parts = urlsplit(reference) if "://" in reference else None
@@ -83,7 +83,7 @@ class References:
         return place
 
     def package_of(self, reference: str) -> Path | None:
-        """Get the folder of the package that ``package://NAME/...`` names; None for any other reference.
+        """Return the folder of the package in ``package://NAME/...``; None for any other reference.
 
         Raises
         ------
@@ -104,12 +104,12 @@ class References:
         )
 
     def _candidates(self, name: str) -> Iterator[Path]:
-        """Where a package may be, likeliest first: above the file, beside those folders, in ROS' search paths."""
+        """Candidate folders of a package, likeliest first: above the file, beside those folders, in ROS paths."""
         for folder in self._robot.parents:
             if folder.name == name or _package_name(folder) == name:
                 yield folder
             elif (folder / name / "package.xml").is_file() or folder.is_relative_to(self.root):
-                yield folder / name  # some take any folder beside the file for a package
+                yield folder / name  # some treat any folder beside the file as a package
         yield from (folder / name for folder in self._allowed[:-1])
         for path in _paths("AMENT_PREFIX_PATH"):
             yield path / "share" / name

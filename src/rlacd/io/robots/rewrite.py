@@ -44,7 +44,7 @@ class RewrittenMesh:
 
 @dataclass(frozen=True)
 class Rewritten:
-    """What rewriting a robot has done.
+    """The result of rewriting a robot.
 
     Attributes
     ----------
@@ -86,15 +86,15 @@ def rewrite_robot(
     Parameters
     ----------
     robot : path-like
-        ``*.urdf``, or ``*.xml`` for MJCF. Its meshes are looked for relative to it, in packages
-        (``package://NAME/...``), and nowhere outside its own package.
+        ``*.urdf``, or ``*.xml`` for MJCF. Its meshes are looked up relative to it and in packages
+        (``package://NAME/...``), never outside the packages it refers to and `package_dirs`.
     output : path-like
         The new file, of the same kind. Hulls go to a folder beside it, ``robot_acd_urdf`` for ``robot_acd.urdf``.
     package_dirs : sequence of str
-        ``NAME=FOLDER`` says where a package is; ``FOLDER`` alone may be read and searched for packages.
+        ``NAME=FOLDER`` says where a package is; ``FOLDER`` alone may be read and is searched for packages.
     **options
-        Those of `rlacd.decompose`, for each mesh. Lengths such as `threshold_abs` are in the robot's unit, behind the
-        scale of a mesh; a `timeout` is for each mesh.
+        Those of `rlacd.decompose`, for each mesh. Lengths such as `threshold_abs` are in the robot's unit, after the
+        scale of a mesh; a `timeout` applies to each mesh.
 
     Returns
     -------
@@ -179,7 +179,7 @@ def _plan(document: Document, kind: str, references: References, place: Path, fo
 
 
 def _reference(old: str, hull: str, references: References, folder: Path) -> str:
-    """Name a hull the way the mesh was named: by its package if it lies in that package, else relative to the file."""
+    """Refer to a hull the way the mesh was: by its package if it lies in that package, else relative to the file."""
     package = references.package_of(old)
     target = Path(os.path.abspath(folder)) / hull
     if package is not None and target.is_relative_to(package):
@@ -200,7 +200,7 @@ def _decomposed(use: MeshUse, unit: float, options: Mapping[str, Any]) -> Decomp
 
 
 def _unscaled(hull: trimesh.Trimesh, use: MeshUse) -> trimesh.Trimesh:
-    """Take the description's scale out of a hull: it will be applied again when that is read."""
+    """Divide a hull by the description's scale, which is applied again when the hull is read."""
     with np.errstate(over="ignore"):
         points = np.ascontiguousarray(hull.vertices / use.scale)
     if not np.isfinite(points).all():
@@ -213,7 +213,7 @@ def _unscaled(hull: trimesh.Trimesh, use: MeshUse) -> trimesh.Trimesh:
 
 
 def _stems(paths: Sequence[Path]) -> list[str]:
-    """Name each mesh after its file; where two would be the same, on any file system, a number follows."""
+    """Name each mesh after its file; names that would collide on any file system get a number."""
     stems: list[str] = []
     for path in paths:
         plain = stem = file_stem(path.stem)

@@ -1,8 +1,8 @@
-"""XML with the place of every element in the file's bytes, so that a part can be replaced and the rest kept as it is.
+"""XML with the byte range of every element, so that a part can be replaced and the rest kept as it is.
 
 Input: the bytes of a file. Output: a tree of `Element`, and `replaced`, which puts new bytes in place of old ones.
-Python's expat is used because it tells byte positions, which lxml does not. A document type is refused, and with it
-every entity: no file can expand (the "billion laughs") or make another file or address be read.
+Python's expat is used because it reports byte positions, which lxml does not. A document type is refused, and with it
+every entity: no file can expand (the "billion laughs") or cause another file or address to be read.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from xml.sax.saxutils import quoteattr
 from rlacd.errors import MeshFileError
 
 DEEPEST = 500
-"""Elements inside elements; robots have some fifty."""
+"""Depth of nested elements; robots have about fifty."""
 
 MOST_ELEMENTS = 500_000
-"""Of a file. An element takes about a kilobyte."""
+"""Elements of a file. Each takes about a kilobyte."""
 
 LARGEST_DESCRIPTION = 2**26
 """Bytes of the largest file that is read."""
@@ -33,7 +33,7 @@ _TAG = re.compile(rb"""<(?:[^"'>]|"[^"]*"|'[^']*')*>""")
 
 @dataclass(eq=False)
 class Element:
-    """An element and where it is: ``data[start:head]`` is its start tag, ``data[start:end]`` all of it."""
+    """An element and its byte range: ``data[start:head]`` is its start tag, ``data[start:end]`` all of it."""
 
     tag: str
     attributes: dict[str, str]
@@ -44,13 +44,13 @@ class Element:
     children: list[Element] = field(default_factory=list)
 
     def walk(self) -> Iterator[Element]:
-        """Give this element and all below it, in the order of the file."""
+        """Yield this element and all below it, in the order of the file."""
         yield self
         for child in self.children:
             yield from child.walk()
 
     def named(self, *tags: str) -> Iterator[Element]:
-        """Give the children of one of these tags."""
+        """Yield the children with one of these tags."""
         return (child for child in self.children if child.tag in tags)
 
 
@@ -64,11 +64,11 @@ class Document:
     encoding: str
 
     def text(self, element: Element) -> bytes:
-        """Get the element's bytes."""
+        """Return the element's bytes."""
         return self.data[element.start : element.end]
 
     def indent(self, element: Element) -> bytes:
-        """Get the white space before the element, back to the line's end; nothing if something else is there."""
+        """Return the white space between the start of the line and the element; nothing if something else is there."""
         start = element.start
         while start and self.data[start - 1] in b" \t\r\n":
             start -= 1
@@ -77,7 +77,7 @@ class Document:
         return space[at - (space[at - 1 : at] == b"\r") :] if at >= 0 else b""
 
     def with_attributes(self, element: Element, values: Mapping[str, str]) -> bytes:
-        """Get the element's bytes with attributes set in its start tag, and all else as it is."""
+        """Return the element's bytes with attributes set in its start tag, and the rest unchanged."""
         head, rest = self.data[element.start : element.head], self.data[element.head : element.end]
         left = {
             name.encode(): quoteattr(value).encode(self.encoding, "xmlcharrefreplace") for name, value in values.items()
@@ -96,8 +96,8 @@ def parse(path: Path, data: bytes) -> Document:
     Raises
     ------
     MeshFileError
-        It is not well-formed, has a document type, nests too deep or is too long, or is not in an encoding that holds
-        ASCII as it is.
+        It is not well-formed, has a document type, nests too deep or is too long, or is not in an encoding that is a
+        superset of ASCII.
     """
     parser = expat.ParserCreate()
     top: list[Element] = []
@@ -124,7 +124,7 @@ def parse(path: Path, data: bytes) -> Document:
     def end(tag: str) -> None:
         element = open_elements.pop()
         at = parser.CurrentByteIndex
-        # An element without content has one tag, and expat reports both of its ends at or just behind its start.
+        # An element without content has one tag, and expat reports both of its ends at or just after its start.
         element.end = element.head if data[element.head - 2 : element.head] == b"/>" else _tag_end(data, at)
 
     parser.StartDoctypeDeclHandler = refuse

@@ -1,4 +1,4 @@
-"""URDF: each ``<collision>`` with a mesh becomes one such element a hull, otherwise like it."""
+"""URDF: each ``<collision>`` with a mesh becomes one such element per hull, otherwise unchanged."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ def plan_urdf(document: Document, references: References, named: Callable[[str, 
     document : Document
         The file.
     references : References
-        Finds the files it names.
+        Resolves the files it refers to.
     named : callable
-        Gets the reference to the mesh and a hull's file name, and gives the reference to the hull.
+        Takes the reference to the mesh and a hull's file name; returns the reference to the hull.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def read_scale(text: str | None, where: str) -> Scale:
     Raises
     ------
     MeshFileError
-        They are no numbers, or one of them is zero.
+        They are not numbers, or one of them is zero.
     """
     try:
         values = [float(word) for word in (text or "1 1 1").split()]
@@ -82,7 +82,7 @@ def read_scale(text: str | None, where: str) -> Scale:
 
 
 def _collision(document: Document, collision: Element, mesh: Element, reference: str, index: int) -> bytes:
-    """Get the bytes of the collision with another mesh in it and, if it has a name, the hull's number behind that."""
+    """Return the bytes of the collision with another mesh; its name, if any, gets the hull's number as a suffix."""
     whole = document.text(collision)
     inner = document.with_attributes(mesh, {"filename": reference})
     at, end = mesh.start - collision.start, mesh.end - collision.start

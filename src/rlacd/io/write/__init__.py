@@ -1,4 +1,4 @@
-"""Hulls as files: GLB, OBJ, PLY, STL, a folder with one file a hull, or a model for a simulator or an engine."""
+"""Hulls as files: GLB, OBJ, PLY, STL, a folder with one file per hull, or a model for a simulator or an engine."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def save(
     Raises
     ------
     OutputError, OptionError
-        As for `hull_target` and `model_of`, and for a disk that fails while writing.
+        As for `hull_target` and `model_of`, and if the disk fails while writing.
     MissingExtraError
         The format needs an extra that is not installed.
     """
@@ -106,7 +106,7 @@ def save_hulls(
     path : path-like
         A file ``*.glb``, ``*.obj``, ``*.ply``, ``*.stl``, or a folder.
     stem : str
-        Files in a folder are called ``<stem>_000.obj``, ``<stem>_001.obj``, ...
+        Files in a folder are named ``<stem>_000.obj``, ``<stem>_001.obj``, ...
     file_format : str, optional
         The format inside a folder.
 
@@ -118,7 +118,7 @@ def save_hulls(
     Raises
     ------
     OutputError, OptionError
-        As for `hull_target`, and for a disk that fails while writing.
+        As for `hull_target`, and if the disk fails while writing.
     """
     if not hulls:
         raise OutputError("there are no hulls to write; decompose a mesh first.")
@@ -134,6 +134,6 @@ def save_hulls(
 
 
 def file_stem(name: str) -> str:
-    """Make a file's name of any name: a file may not be called anything, and its name is counted in bytes."""
+    """Make a valid file name of any name: some names are not allowed, and the length limit is in bytes."""
     plain = re.sub(r'[\x00-\x1f/\\:*?"<>|]', "_", name).strip(". ")
     return plain.encode(errors="replace")[:150].decode(errors="ignore").strip(". ") or "mesh"

@@ -1,4 +1,4 @@
-"""Write files so that nobody ever sees half of one."""
+"""Atomic file writes: no reader ever sees a partial file."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from rlacd.errors import OutputError
 
 
 def write_file(path: Path, data: bytes) -> None:
-    """Put `data` at `path`, whole or not at all.
+    """Write `data` to `path`, completely or not at all.
 
-    The bytes go to a hidden file in the same folder, reach the disk, and only then take the name `path`, which
-    replaces an older file in one step. A link is followed: the file it points to is replaced. Folders that are missing
-    are made.
+    The bytes go to a hidden file in the same folder, are flushed to disk, and only then renamed to `path`, which
+    replaces an older file in one step. A link is followed: the file it points to is replaced. Missing folders are
+    created.
 
     Raises
     ------
@@ -26,7 +26,7 @@ def write_file(path: Path, data: bytes) -> None:
     """
     with output_errors(path):
         final = path.resolve()
-        # Not made of the final name, which may be as long as a name can be.
+        # Not derived from the final name, which may already have the maximum length.
         temporary = final.with_name(f".rlacd-{secrets.token_hex(8)}.tmp")
         final.parent.mkdir(parents=True, exist_ok=True)
         try:
@@ -40,14 +40,14 @@ def write_file(path: Path, data: bytes) -> None:
 
 @contextlib.contextmanager
 def output_errors(path: Path) -> Iterator[None]:
-    """Turn what the operating system refuses into an `OutputError` that names `path` and says what to do."""
+    """Turn an operating system error into an `OutputError` that names `path` and says what to do."""
     try:
         yield
     except OutputError:
         raise
     except OSError as error:
         raise OutputError(f"cannot write {path}: {_reason(error)}.") from error
-    except (RuntimeError, ValueError) as error:  # what pathlib makes of links in a circle and of null characters
+    except (RuntimeError, ValueError) as error:  # raised by pathlib for circular links and null characters
         raise OutputError(f"cannot write {str(path)!r}: {error}; choose another name.") from error
 
 
@@ -62,7 +62,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def _write_to_disk(path: Path, data: bytes) -> None:
-    # 0o666 is narrowed by the user's umask, as for any file they make; tempfile's 0o600 would lock out their group.
+    # The user's umask narrows 0o666, as for any file they create; tempfile's 0o600 would lock out their group.
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
     with os.fdopen(os.open(path, flags, 0o666), "wb") as file:
         file.write(data)

@@ -1,4 +1,4 @@
-"""Balls as a file: their numbers, or spheres to look at."""
+"""Balls as a file: a table of numbers, or spheres to look at."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def save_balls(balls: Balls, path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     OutputError
-        As for `check_balls`, and for a disk that fails while writing.
+        As for `check_balls`, and if the disk fails while writing.
     """
     place = check_balls(path)
     write_file(place, _ENCODERS[place.suffix.lower()](balls))

@@ -1,8 +1,8 @@
 """Hulls as the bytes of a file: GLB, OBJ, PLY, STL.
 
 Every encoder takes the hulls in the order of their names (``hull_000``, ``hull_001``, ...) and keeps each one a closed
-convex hull *in the file*: the text formats and PLY carry float64 exactly, and for GLB and binary STL the hull is taken
-again after rounding to float32.
+convex hull *in the file*: the text formats and PLY hold float64 exactly, and for GLB and binary STL the hull is
+recomputed after rounding to float32.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ FloatArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 Color: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
 VISUAL_COLOR: Color = np.array([180, 182, 186], dtype=np.uint8)
-"""The input beside its hulls: grey, since its own colours are not carried over."""
+"""Colour of the input beside its hulls: grey, since its own colours are not kept."""
 
 
 def hull_name(index: int) -> str:
@@ -36,11 +36,10 @@ def encode_glb(
     names: Sequence[str] | None = None,
     visual: tuple[str, trimesh.Trimesh] | None = None,
 ) -> bytes:
-    """Binary glTF 2.0 with a node, a mesh and a material a hull, called `names`, after one for the `visual`.
+    """Binary glTF 2.0 with a node, a mesh and a material per hull, named `names`, after those of the `visual`.
 
-    Positions in glTF are float32. A hull whose shape that would ruin, because it lies far from the origin, is stored
-    about its own centre and its node carries the translation; all others are stored in place, for readers that ignore
-    transforms.
+    Positions in glTF are float32. A hull too far from the origin to keep its shape is stored about its own centre, with
+    the translation in its node; all others are stored in place, for readers that ignore transforms.
 
     Raises
     ------
@@ -76,10 +75,10 @@ def encode_obj(
     names: Sequence[str] | None = None,
     visual: tuple[str, trimesh.Trimesh] | None = None,
 ) -> bytes:
-    """Wavefront OBJ with an object a hull, its colour on every vertex, and every digit of the coordinates.
+    """Wavefront OBJ with an object per hull, its colour on every vertex, and every digit of the coordinates.
 
-    trimesh's writer prints a fixed number of decimals, which erases small meshes; the shortest text that reads back
-    to the same float64 does not. Hulls are called `names` and follow the `visual`, if there is one.
+    trimesh's writer prints a fixed number of decimals, which erases small meshes; here every number is the shortest
+    text that reads back to the same float64. Hulls are named `names` and follow the `visual`, if there is one.
     """
     names = names or [hull_name(index) for index in range(len(hulls))]
     objects = list(zip(names, hulls, hull_colors(len(hulls)), strict=True))
@@ -97,7 +96,7 @@ def encode_obj(
 
 
 def encode_plain_obj(mesh: trimesh.Trimesh) -> bytes:
-    """One mesh as Wavefront OBJ that every reader takes: no object, no colours, every digit."""
+    """One mesh as Wavefront OBJ that every reader accepts: no object, no colours, every digit."""
     lines = [f"# {GENERATOR}"]
     lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist()]
     lines += [f"f {a} {b} {c}" for a, b, c in (mesh.faces + 1).tolist()]
@@ -136,10 +135,10 @@ def encode_ply(hulls: Sequence[trimesh.Trimesh]) -> bytes:
 
 
 def encode_stl(hulls: Sequence[trimesh.Trimesh]) -> bytes:
-    """STL: binary for one hull, which every reader takes; text with a ``solid`` a hull for several.
+    """STL: binary for one hull, which every reader accepts; text with a ``solid`` per hull for several.
 
-    Binary STL knows neither several solids nor float64, so the text form also serves a single hull that float32
-    cannot hold.
+    Binary STL supports neither several solids nor float64, so text is also used for a single hull that float32 cannot
+    represent.
     """
     if len(hulls) == 1 and (rounded := rounded_hull(hulls[0])) is not None:
         return bytes(rounded.export(file_type="stl"))
@@ -159,5 +158,5 @@ ENCODERS: dict[str, Callable[[Sequence[trimesh.Trimesh]], bytes]] = {
 
 
 def _gltf_color(srgb: Color) -> list[float]:
-    # glTF wants base colours in linear light.
+    # glTF expects base colours in linear light.
     return [*linear_from_srgb(srgb).tolist(), 1.0]

@@ -1,4 +1,4 @@
-"""A folder with one file a hull, which can be written again and never holds hulls of two runs."""
+"""A folder with one file per hull, which can be written again and never mixes hulls of two runs."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from rlacd.io.write.atomic import output_errors, sync_folder, write_file
 def write_folder(
     folder: Path, stem: str, files: Mapping[str, bytes], *, then: Callable[[], None] = lambda: None
 ) -> None:
-    """Put `files` into `folder`, all of them or none, beside a list of them, ``<stem>_hulls.json``.
+    """Write `files` into `folder`, all or none, together with a list of them, ``<stem>_hulls.json``.
 
-    A new folder appears under its name only when it is complete. In a folder that exists, files are replaced one by
-    one once all of them are safely on disk; then those that an earlier run listed and this one did not write are
-    removed, since a reader that takes every ``*.obj`` would mix two results. Nothing else in the folder is touched.
-    Between the two, `then` is called: what it writes finds all the files it names, old and new.
+    A new folder appears under its name only when it is complete. In an existing folder, files are replaced one by one
+    once all of them are safely on disk; then files that an earlier run listed and this one did not write are removed,
+    since a reader that takes every ``*.obj`` would mix two results. Nothing else in the folder is touched. `then` is
+    called between the two steps: it finds all files, old and new.
 
     Raises
     ------
@@ -33,7 +33,7 @@ def write_folder(
     contents = json.dumps({"generator": "rlacd", "files": list(files)}, indent=1).encode()
     with output_errors(folder):
         exists = folder.is_dir()
-        # Inside an existing folder, not beside it: it may be the root of a disk, and renames cannot leave a disk.
+        # Inside an existing folder, not beside it: it may be the root of a disk, and renames cannot cross disks.
         parent = folder if exists else folder.resolve().parent
         parent.mkdir(parents=True, exist_ok=True)
         staging = Path(tempfile.mkdtemp(prefix=".rlacd-", suffix=".tmp", dir=parent))
@@ -57,7 +57,7 @@ def write_folder(
 
 
 def check_names(folder: Path, stem: str, names: Sequence[str]) -> None:
-    """Raise OutputError if a file that no run of rlacd has listed would be replaced in a folder of its own naming."""
+    """Raise OutputError if writing would replace a file that no run of rlacd has listed."""
     with output_errors(folder):
         ours = listed_hulls(folder / f"{stem}_hulls.json", stem)
         taken = [name for name in names if name not in ours and (folder / name).exists()]
@@ -69,17 +69,17 @@ def check_names(folder: Path, stem: str, names: Sequence[str]) -> None:
 
 
 def listed_hulls(listing: Path, stem: str) -> set[str]:
-    """Hull files an earlier run wrote; only names of the form it writes, whatever the list says by now."""
+    """Hull files an earlier run wrote; entries of any other form are ignored, whatever the list says by now."""
     try:
         names = json.loads(listing.read_bytes())["files"]
         ours = re.compile(re.escape(stem) + r"(_[^/\\]+)?_(\d{3,}|visual|collision)\.(glb|obj|ply|stl)")
         return {name for name in names if ours.fullmatch(name)}
     except (OSError, ValueError, KeyError, TypeError):
-        return set()  # No list, or one that somebody else made: then nothing here is known to be ours.
+        return set()  # No list, or one from another program: then no file here is known to be ours.
 
 
 def _open_to_umask(folder: Path) -> None:
-    # mkdtemp makes the folder private to the user; give it the mode any new folder of theirs would have.
+    # mkdtemp makes the folder private to the user; give it the mode of any new folder of theirs.
     umask = os.umask(0)
     os.umask(umask)
     folder.chmod(0o777 & ~umask)

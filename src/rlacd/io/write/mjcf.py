@@ -1,4 +1,4 @@
-"""MJCF: a free body for MuJoCo, with its hulls in class ``collision`` and the mesh to look at in class ``visual``."""
+"""MJCF: a free body for MuJoCo, with its hulls in class ``collision`` and the visible mesh in class ``visual``."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ LEAST_INERTIA = 1e-14
 
 
 def encode_mjcf(model: Model, hulls: list[MeshFile], visual: MeshFile | None, folder: str) -> bytes:
-    """Describe the body; mesh files are in `folder`, named from where the model is.
+    """Describe the body; mesh files are in `folder`, relative to the model.
 
-    Groups follow the habit of the MuJoCo Menagerie: 2 is seen, 3 collides and is hidden until asked for.
+    Groups follow the convention of the MuJoCo Menagerie: 2 is visible, 3 collides and is hidden by default.
     """
     root = etree.Element("mujoco", model=model.name)
     compiler = etree.SubElement(root, "compiler", angle="radian")
@@ -44,7 +44,8 @@ def encode_mjcf(model: Model, hulls: list[MeshFile], visual: MeshFile | None, fo
     )
 
     def add(kind: str, name: str, file: MeshFile, **extra: str) -> None:
-        # The body's mass is said above, so the volume of a mesh does not matter; "shell" takes open and flat ones too.
+        # The body's mass is given above, so the volume of a mesh does not matter; "shell" accepts open and flat ones
+        # too.
         etree.SubElement(asset, "mesh", name=name, file=f"{folder}/{file.name}", inertia="shell")
         geom = etree.SubElement(body, "geom", {"name": name, "class": kind, "mesh": name, **extra})
         if file.shift.any():

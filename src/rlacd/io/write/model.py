@@ -1,4 +1,4 @@
-"""What a simulator or an engine is told of a body: hulls to collide with, a mesh to look at, mass, which way is up."""
+"""A body as a simulator or an engine needs it: hulls for collision, a visible mesh, mass, and the up axis."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ TO_Z_UP = {
     "y": (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0),
     "z": (1.0, 0.0, 0.0, 0.0),
 }
-"""Quaternions (w, x, y, z) that stand a body up whose own axis points up, in a world where z does."""
+"""Quaternions (w, x, y, z) that rotate a body's up axis to z."""
 
 
 @dataclass(frozen=True)
@@ -38,13 +38,13 @@ class Model:
     Attributes
     ----------
     name
-        Printable, without line breaks; as the user's file is called.
+        Printable, without line breaks; from the name of the user's file.
     hulls
         At least one.
     visual
-        The input as it was read; None for a cloud of points.
+        The input as it was read; None for a point cloud.
     mass
-        Of the repaired solid, at the density asked for.
+        Of the repaired solid, at the requested density.
     up
         The axis of the input that points up.
     """
@@ -58,13 +58,13 @@ class Model:
 
 @dataclass(frozen=True)
 class MeshFile:
-    """A mesh beside the model: what it is called, what is in it, and where it goes in the body's frame.
+    """A mesh file beside the model: its name, content, and position in the body's frame.
 
     Attributes
     ----------
     name
         File name.
-    data
+    Its content.
         Its bytes.
     shift
         ``[3]``; zero unless the body lies too far from its origin for float32.
@@ -76,14 +76,14 @@ class MeshFile:
 
 
 def model_of(result: Decomposition, *, density: float = DENSITY, up: str = "z") -> Model:
-    """Gather what is to be written of a decomposition.
+    """Collect everything to be written of a decomposition.
 
     Raises
     ------
     OutputError
         There are no hulls, or the body weighs nothing at this density.
     OptionError
-        `density` is not positive, or `up` is no axis.
+        `density` is not positive, or `up` is not an axis.
     """
     density, up = check_model_options(density, up)
     if not result.hulls:
@@ -92,14 +92,14 @@ def model_of(result: Decomposition, *, density: float = DENSITY, up: str = "z") 
     if not (0 < mass.volume_abs < math.inf and np.isfinite(mass.inertia_abs).all()):
         raise OutputError(f"the mass of {result.name} at density {density:g} is {mass.volume_abs:g}; scale the mesh.")
     visual = result.source if len(result.source.faces) else None
-    name = printable_name(result.name).replace("::", "_")  # which parts names in SDF
+    name = printable_name(result.name).replace("::", "_")  # a separator between names in SDF
     if name == "world" or re.fullmatch("__.*__", name):
-        name = f"body_{name.strip('_')}"  # simulators keep those names for themselves
+        name = f"body_{name.strip('_')}"  # simulators reserve those names
     return Model(name, result.hulls, visual, mass, up)
 
 
 def check_model_options(density: float, up: str) -> tuple[float, str]:
-    """Get both as plain values; raises OptionError unless `density` is a positive number and `up` is x, y or z."""
+    """Return both as plain values; raises OptionError unless `density` is a positive number and `up` is x, y or z."""
     return (
         read(about(OutputOptions, "density").kind, "density", density),
         read(about(OutputOptions, "up").kind, "up", up),
@@ -107,25 +107,25 @@ def check_model_options(density: float, up: str) -> tuple[float, str]:
 
 
 def printable_name(name: str) -> str:
-    """Keep of a name what every text format can hold: no control characters, no broken Unicode."""
+    """Remove from a name what some text format cannot hold: control characters, broken Unicode."""
     plain = "".join("_" if ord(mark) < 32 or ord(mark) == 127 else mark for mark in name)
     return plain.encode(errors="replace").decode().translate({0xFFFE: "_", 0xFFFF: "_"}).strip() or "mesh"
 
 
 def node_name(name: str) -> str:
-    """Make the name one word, for formats where a blank ends it."""
+    """Make the name one word, for formats where a space ends it."""
     return re.sub(r"\s+", "_", printable_name(name))
 
 
 def mesh_files(model: Model, stem: str, *, one_mesh: bool = False) -> tuple[list[MeshFile], MeshFile | None]:
-    """Encode the hulls and the mesh to look at as OBJ files of their own, ``<stem>_000.obj`` and ``<stem>_visual.obj``.
+    """Encode the hulls and the visible mesh as OBJ files, ``<stem>_000.obj``, ... and ``<stem>_visual.obj``.
 
     With `one_mesh`, the hulls are the objects of a single file, ``<stem>_collision.obj``.
 
     Raises
     ------
     OutputError
-        A hull is too thin for the single precision that simulators compute in.
+        A hull is too thin for the single precision of simulators.
     """
     hulls = []
     for index, hull in enumerate(model.hulls):
@@ -136,7 +136,7 @@ def mesh_files(model: Model, stem: str, *, one_mesh: bool = False) -> tuple[list
                 "scale the mesh, or write .obj, .ply or .stl."
             )
         rounded, shift = placed
-        exact = rounded if shift.any() else hull  # readers that keep double precision get it where they can
+        exact = rounded if shift.any() else hull  # readers in double precision get the exact hull if possible
         hulls.append(MeshFile(f"{stem}_{index:03d}.obj", encode_plain_obj(exact), shift))
     if one_mesh:
         hulls = [_one_file(model, f"{stem}_collision.obj", any(hull.shift.any() for hull in hulls))]
@@ -147,7 +147,7 @@ def mesh_files(model: Model, stem: str, *, one_mesh: bool = False) -> tuple[list
 
 
 def numbers(values: Sequence[float] | FloatArray) -> str:
-    """Write numbers with every digit, a blank between."""
+    """Write numbers with every digit, separated by spaces."""
     return " ".join(repr(float(value) + 0.0) for value in values)  # + 0.0: no negative zero
 
 

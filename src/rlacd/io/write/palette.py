@@ -1,23 +1,23 @@
-"""Colours that tell hulls apart, without end and always in the same order."""
+"""An endless, fixed sequence of colours that tell hulls apart."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-# Found by a greedy search in Oklab (Ottosson 2020, https://bottosson.github.io/posts/oklab/): each next colour is the
-# one farthest from all before it, as those see it who see it least, of people with normal sight, protanopia,
-# deuteranopia and tritanopia (Machado et al. 2009, https://doi.org/10.1109/TVCG.2009.113); tests/test_palette.py.
+# Found by a greedy search in Oklab (Ottosson 2020, https://bottosson.github.io/posts/oklab/): each colour is the
+# farthest from all before it, as seen by whoever distinguishes it least among normal sight, protanopia, deuteranopia
+# and tritanopia (Machado et al. 2009, https://doi.org/10.1109/TVCG.2009.113); tests/test_palette.py.
 TELLABLE = bytes.fromhex("5899e0f8d05cb05315ec8781abd2fe8a5e97ad8b1c65f2c353c1c54b7f5fbdba42d26ea4")
 
-SHADES = 0.08  # how far the lightness of a colour's returns is spread
+SHADES = 0.08  # how far the lightness of repeated colours is spread
 
 
 def hull_colors(count: int) -> npt.NDArray[np.uint8]:
-    """Give `count` colours as sRGB, uint8 [count, 3].
+    """Return `count` colours as sRGB, uint8 [count, 3].
 
-    Twelve colours that colour-blind people can tell apart too, then the same again a little lighter or darker, and so
-    on without end: the first two hundred all differ. The first colours do not depend on `count`.
+    Twelve colours that colour-blind people can tell apart too, then the same colours slightly lighter or darker, and so
+    on: the first two hundred all differ. The first colours do not depend on `count`.
     """
     twelve = oklab_from_linear(linear_from_srgb(np.frombuffer(TELLABLE, dtype=np.uint8).reshape(-1, 3)))
     index = np.arange(count)
@@ -27,7 +27,7 @@ def hull_colors(count: int) -> npt.NDArray[np.uint8]:
 
 
 def _spread(index: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
-    """Numbers in (-1/2, 1/2), the first 0, that never return: van der Corput's sequence, whose halves alternate."""
+    """Numbers in (-1/2, 1/2) without repetition, the first 0: the van der Corput sequence with alternating halves."""
     reversed_bits, weight = np.zeros(len(index)), 0.5
     while index.any():
         reversed_bits += weight * (index % 2)

@@ -1,4 +1,4 @@
-"""SDFormat: a model for Gazebo and Drake, with a ``<collision>`` a hull."""
+"""SDFormat: a model for Gazebo and Drake, with a ``<collision>`` per hull."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ DRAKE = "http://drake.mit.edu"
 
 
 def encode_sdf(model: Model, hulls: list[MeshFile], visual: MeshFile | None, folder: str) -> bytes:
-    """Describe the body; mesh files are in `folder`, named from where the model is."""
+    """Describe the body; mesh files are in `folder`, relative to the model."""
     root = etree.Element("sdf", version="1.9", nsmap={"drake": DRAKE})
     described = etree.SubElement(root, "model", name=model.name)
     if model.up != "z":
@@ -37,7 +37,7 @@ def encode_sdf(model: Model, hulls: list[MeshFile], visual: MeshFile | None, fol
     if visual is not None:
         add("visual", visual, f"{model.name}_visual")
     for index, hull in enumerate(hulls):
-        # Without this word Drake takes the mesh for a surface and gives it far poorer contacts.
+        # Without this element Drake treats the mesh as a surface, with far poorer contacts.
         etree.SubElement(add("collision", hull, f"{model.name}_{index:03d}"), f"{{{DRAKE}}}declare_convex")
     etree.indent(root)
     return bytes(etree.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"

@@ -1,4 +1,4 @@
-"""Hulls that are still convex and closed after their coordinates were rounded to float32."""
+"""Hulls that stay convex and closed when their coordinates are rounded to float32."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import trimesh
 
 from rlacd._native import convex_hull, mesh_volume
 
-# A hull keeps its shape if its volume changes by less than this share: a flat or tiny hull far from the origin
-# loses much more, or all of it, when float32 has no digits left for its thickness.
+# A hull keeps its shape if its volume changes by less than this share: a flat or tiny hull far from the origin loses
+# much more, or all of it, when float32 has no digits left for its thickness.
 VOLUME_TOLERANCE = 1e-3
 
 STEP = 1e-4
@@ -17,10 +17,10 @@ STEP = 1e-4
 
 
 def rounded_hull(hull: trimesh.Trimesh, shift: npt.ArrayLike = (0.0, 0.0, 0.0)) -> trimesh.Trimesh | None:
-    """Round the vertices of ``hull - shift`` to float32 and take their convex hull again.
+    """Round the vertices of ``hull - shift`` to float32 and recompute their convex hull.
 
     Rounding moves vertices by different amounts, which can dent a hull along its flat regions or fold a thin triangle.
-    Taking the hull of the rounded points, with exact predicates, gives a hull that stays one in a float32 file.
+    Taking the hull of the rounded points, with exact predicates, gives a hull that is still convex in a float32 file.
 
     Parameters
     ----------
@@ -47,12 +47,12 @@ def rounded_hull(hull: trimesh.Trimesh, shift: npt.ArrayLike = (0.0, 0.0, 0.0)) 
 
 
 def placed_hull(hull: trimesh.Trimesh) -> tuple[trimesh.Trimesh, npt.NDArray[np.float64]] | None:
-    """Round a hull to float32 where it lies or, where that would ruin it, about its own centre.
+    """Round a hull to float32 in place or, if that would ruin it, about its own centre.
 
     Returns
     -------
     (trimesh.Trimesh, shift [3]) or None
-        The hull is the mesh moved by the shift, which is zero wherever that will do. None if it is too thin for its
+        The hull is the mesh moved by the shift, which is zero wherever that suffices. None if it is too thin for its
         size even about its own centre.
     """
     shift = np.zeros(3)
@@ -64,7 +64,7 @@ def placed_hull(hull: trimesh.Trimesh) -> tuple[trimesh.Trimesh, npt.NDArray[np.
 
 
 def placed_mesh(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, npt.NDArray[np.float64]]:
-    """Do the same for a mesh to look at, where a change below `STEP` of its size cannot be seen."""
+    """Do the same for a visible mesh, where a change below `STEP` of its size cannot be seen."""
     used = mesh.vertices[np.unique(mesh.faces)]
     lower, upper = used.min(axis=0), used.max(axis=0)
     step = np.abs([lower, upper]).max() * np.finfo(np.float32).eps

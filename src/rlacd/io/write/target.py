@@ -1,4 +1,4 @@
-"""Where the hulls go and in which format: decided, and checked, before any work begins."""
+"""Output path and format: decided and checked before any work begins."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rlacd.io.write.usd import require_usd
 from rlacd.output_options import OutputOptions
 
 FORMATS = ("glb", "obj", "ply", "stl")
-"""Hulls and nothing else; also what the files of a folder may be."""
+"""Formats of hulls only; also those of the files in a folder."""
 
 MODELS: dict[str, tuple[str, ...]] = {
     "mjcf": ("xml",),
@@ -24,14 +24,14 @@ MODELS: dict[str, tuple[str, ...]] = {
     "unreal": ("glb", "obj"),
     "godot": ("glb",),
 }
-"""Hulls with the mesh they stand for, in a simulator's or an engine's own words, and the endings of each."""
+"""Formats of hulls with their mesh, for a simulator or an engine, and the endings of each."""
 
 _MODEL_OF = {ending: name for name, endings in MODELS.items() for ending in endings if ending not in FORMATS}
 
 _UNWRITABLE = re.compile("[\x00-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
 
 WITH_MESHES = ("mjcf", "urdf", "sdf")
-"""Models that name mesh files beside them."""
+"""Models that refer to mesh files beside them."""
 
 FOLDER_FORMAT = "obj"
 SEPARATORS = tuple(mark for mark in (os.sep, os.altsep) if mark)
@@ -39,7 +39,7 @@ SEPARATORS = tuple(mark for mark in (os.sep, os.altsep) if mark)
 
 @dataclass(frozen=True)
 class Target:
-    """A checked place for hulls: one file, or a folder that gets one file a hull.
+    """A checked output: one file, or a folder with one file per hull.
 
     Attributes
     ----------
@@ -57,22 +57,22 @@ class Target:
 
 
 def hull_target(path: str | os.PathLike[str], file_format: str | None = None, *, one_mesh: bool = False) -> Target:
-    """Read `path` the way `Decomposition.save` does and check that it can be written to.
+    """Interpret `path` as `Decomposition.save` does and check that it can be written to.
 
     Parameters
     ----------
     path : path-like
         An existing folder, text ending in ``/``, or a name without ending given with a `file_format` is a folder;
-        anything else is one file, its format told by its ending.
+        anything else is one file, its format given by its ending.
     file_format : str, optional
         The format of the files in a folder.
     one_mesh : bool
-        Whether a model is to have all its hulls in one mesh file; URDF alone can.
+        Whether a model shall have all its hulls in one mesh file; only URDF supports that.
 
     Raises
     ------
     OutputError
-        Unknown ending, no permission, or a folder where a file is meant or the reverse.
+        Unknown ending, no permission, or a folder where a file is expected or the reverse.
     OptionError
         `file_format` is unknown, or given for a single file with another ending; or `one_mesh` for anything but URDF.
     """
@@ -116,15 +116,15 @@ def _target(text: str, file_format: str | None) -> Target:
 
 
 def mesh_folder(path: Path, file_format: str) -> Path:
-    """Where a model that is not one file keeps its meshes: ``chair.urdf`` in ``chair_urdf``.
+    """Return the folder of a multi-file model's meshes: ``chair_urdf`` for ``chair.urdf``.
 
-    The format is part of the name, so that two models of one thing do not take each other's meshes.
+    The format is part of the name, so that two models of one body do not overwrite each other's meshes.
     """
     return path.with_name(f"{path.stem}_{file_format}")
 
 
 def check_name(path: Path) -> None:
-    """Raise OutputError if a file's name cannot be written down in XML, as that of its folder of meshes will be."""
+    """Raise OutputError if a file's name cannot be written in XML, since its mesh folder is named after it."""
     if _UNWRITABLE.search(path.name):
         raise OutputError(f"cannot write {str(path)!r}: XML cannot hold some marks of its name; choose another name.")
 
@@ -168,7 +168,7 @@ def _check_folder(folder: Path) -> None:
 
 
 def _check_parent(path: Path) -> None:
-    # resolve() follows a link to where the bytes will really go. Folders that are missing are made with the file.
+    # resolve() follows a link to the actual target. Missing folders are created with the file.
     parent = path.resolve().parent
     while not parent.exists() and parent != parent.parent:
         parent = parent.parent

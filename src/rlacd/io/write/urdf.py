@@ -1,4 +1,4 @@
-"""URDF: a link with its mass, the mesh to look at, and a ``<collision>`` a hull."""
+"""URDF: a link with its mass, the visible mesh, and a ``<collision>`` per hull."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from rlacd.io.write.model import MeshFile, Model, numbers
 
 
 def encode_urdf(model: Model, hulls: list[MeshFile], visual: MeshFile | None, folder: str) -> bytes:
-    """Describe the body; mesh files are in `folder`, named from where the model is."""
+    """Describe the body; mesh files are in `folder`, relative to the model."""
     robot = etree.Element("robot", name=model.name)
-    # MuJoCo reads URDF too, but by default looks for every mesh beside it and drops what is only seen.
+    # MuJoCo reads URDF too, but by default looks for every mesh beside it and drops visual-only geometry.
     extension = etree.SubElement(robot, "mujoco")
     etree.SubElement(extension, "compiler", strippath="false", discardvisual="false")
     link = etree.SubElement(robot, "link", name=model.name)

@@ -18,7 +18,7 @@ from rlacd.io.write.single_precision import placed_hull, placed_mesh
 
 
 def require_usd() -> None:
-    """Raise MissingExtraError, saying how to get it, unless USD can be imported."""
+    """Raise MissingExtraError, with installation advice, unless USD can be imported."""
     try:
         for module in ("pxr", "pxr.UsdPhysics"):
             importlib.import_module(module)
@@ -27,12 +27,12 @@ def require_usd() -> None:
 
 
 def encode_usd(model: Model, ending: str) -> bytes:
-    """Write a stage: ``/<name>`` is the rigid body, ``visual`` under it is seen, ``collision/hull_000``, ... collide.
+    """Write a stage: the rigid body ``/<name>``, with ``visual`` (visible) and ``collision/hull_000``, ... (colliding).
 
     Parameters
     ----------
     model : Model
-        USD says which way is up, y or z; a body whose x points up is turned.
+        USD supports y or z as the up axis; a body whose x axis points up is rotated.
     ending : {"usda", "usd", "usdc"}
         Text for ``usda``, else binary.
 
@@ -82,7 +82,7 @@ def encode_usd(model: Model, ending: str) -> bytes:
 
 
 def identifier(name: str) -> str:
-    """Make a prim's name of any name: letters of any script, digits and ``_``, no digit first."""
+    """Make a valid prim name of any name: letters of any script, digits and ``_``, no leading digit."""
     plain = re.sub(r"\W", "_", unicodedata.normalize("NFC", name))
     return plain if re.match(r"[^\W\d]", plain) else f"_{plain}"
 
@@ -120,7 +120,7 @@ def _bytes(layer: Any, ending: str) -> bytes:
 
     if ending == "usda":
         return str(layer.ExportToString()).encode()
-    with tempfile.TemporaryDirectory(prefix="rlacd-") as folder:  # the binary form is only ever written to a file
+    with tempfile.TemporaryDirectory(prefix="rlacd-") as folder:  # the binary form can only be written to a file
         path = Path(folder) / f"stage.{ending}"
         layer.Export(str(path))
         return path.read_bytes()
