@@ -1,4 +1,4 @@
-"""When a component is done."""
+"""Criteria: when a component is done."""
 
 from rlacd.criteria.concavity import Concavity
 from rlacd.criteria.criterion import Criterion

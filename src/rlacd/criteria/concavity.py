@@ -1,9 +1,9 @@
 """CoACD concavity, decided strictly.
 
-The concavity of a part with convex hull CH is ``max(H_b, 0.3 R_v)``: ``H_b`` the two-sided Hausdorff distance between
-the *surfaces* of the part and of its hull, ``R_v = cbrt(3 (|CH| - |part|) / 4 pi)`` the radius of a ball as large as
-the volume between them (Wei et al., "Approximate Convex Decomposition for 3D Meshes with Collision-Aware Concavity and
-Tree Search", SIGGRAPH 2022). CoACD samples ``H_b``; here it is bounded.
+The concavity of a part with convex hull CH is ``max(H_b, 0.3 R_v)``, where ``H_b`` is the two-sided Hausdorff distance
+between the *surfaces* of the part and of its hull, and ``R_v = cbrt(3 (|CH| - |part|) / 4 pi)`` is the radius of a ball
+with the volume between them (Wei et al., "Approximate Convex Decomposition for 3D Meshes with Collision-Aware Concavity
+and Tree Search", SIGGRAPH 2022). CoACD samples ``H_b``; here it is bounded.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ VOLUME_WEIGHT = 0.3
 
 
 def volume_radius(volume: float, hull_volume: float) -> float:
-    """Return ``R_v``, the radius of a ball as large as the volume between a part and its hull."""
+    """Return ``R_v``, the radius of a ball with the volume between a part and its hull."""
     return math.pow(max(0.0, 3 * (hull_volume - volume) / (4 * math.pi)), 1 / 3)
 
 
@@ -34,7 +34,7 @@ class ConcavityValue:
     Attributes
     ----------
     value
-        The concavity, at most the tolerance wide.
+        The concavity; the interval is at most as wide as the tolerance.
     part_to_hull
         Greatest distance from the part's surface to the hull's surface.
     hull_to_part
@@ -42,7 +42,7 @@ class ConcavityValue:
     volume_radius
         ``R_v``.
 
-    A one-sided interval may be wider than the tolerance below the value, where the other terms decide it.
+    The interval of a one-sided distance may be wider than the tolerance if another term decides the value.
     """
 
     value: tuple[float, float]
@@ -67,13 +67,13 @@ class Concavity:
 
     Notes
     -----
-    Inside a convex polytope the distance to its surface is the least distance to a facet's plane; the distance to the
-    part is the least distance to one of its triangles. Both are minima of convex functions ``f_w``, so over a
-    triangle ``T`` and for weights ``l_w >= 0`` that add up to 1 the distance is at most the greatest value of
-    ``sum l_w f_w`` at the corners of ``T``. Branch and bound over the triangles with that bound, single witnesses and
-    pairs of them, closes the interval around the maximum; no sampling decides anything but an early "no". Facets of
-    the hull are pushed out to its farthest corner, so that a sliver's normal can make a distance larger, never
-    smaller. Rounding is about 1e-8 of the lengths involved.
+    Inside a convex polytope, the distance to its surface is the least distance to a facet's plane; the distance to the
+    part is the least distance to one of its triangles. Both are minima of convex functions ``f_w``, so over a triangle
+    ``T`` and for weights ``l_w >= 0`` that sum to 1, the distance is at most the greatest value of ``sum l_w f_w`` at
+    the corners of ``T``. Branch and bound over the triangles with this bound, for single witnesses and pairs of them,
+    closes the interval around the maximum; sampling decides nothing but an early "no". Facet planes of the hull are
+    moved out to its farthest corner, so that the inexact normal of a sliver can make a distance larger, never smaller.
+    Rounding errors are about 1e-8 of the lengths involved.
     """
 
     threshold: float = 0.05
@@ -84,12 +84,12 @@ class Concavity:
 
     @property
     def reach(self) -> float:
-        """Twice the threshold: between parts farther apart, the middle of the hull's surface is too far from both."""
+        """Twice the threshold: if parts are farther apart, the middle of the joint hull is too far from both."""
         return 2 * self.threshold
 
     @property
     def is_hereditary(self) -> bool:
-        """No: what is missing from a part's hull may be another part."""
+        """No: another part may fill what is missing from a part's hull."""
         return False
 
     def excludes(self, volume: float, hull_volume: float) -> bool:
@@ -97,29 +97,29 @@ class Concavity:
         return self.least_error(volume, hull_volume) > self.threshold
 
     def least_error(self, volume: float, hull_volume: float) -> float:
-        """``0.3 R_v``, which the concavity is never less than."""
+        """``0.3 R_v``, a lower bound of the concavity."""
         return VOLUME_WEIGHT * volume_radius(volume, hull_volume)
 
     def feasibility(self, filling: _native.Filling, hull: Hull) -> Feasibility:
-        """Look at the solid's corners and at points of the hull."""
+        """Test the solid's corners and points of the hull."""
         return Feasibility(filling.feasibility(hull.vertices, hull.faces, self.threshold))
 
     def feasibilities(
         self, filling: _native.Filling, hulls: Sequence[Hull], pairs: IntArray, threads: int
     ) -> tuple[FloatArray, IntArray]:
-        """Look at the solid's corners and at points of the joint hulls."""
+        """Test the solid's corners and points of the joint hulls."""
         return filling.joint_feasibilities([hull.vertices for hull in hulls], pairs, self.threshold, threads)
 
     def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
-        """Whether the solid's surface comes deeper inside the hull than the threshold."""
+        """Whether the solid's surface reaches deeper into the hull than the threshold."""
         return filling.comes_deeper(hull.vertices, hull.faces, self.threshold)
 
     def filled(self, part: Part) -> float:
-        """The solid's volume: what is left is what ``R_v`` is made of."""
+        """The part's volume: the rest of the hull is the volume in ``R_v``."""
         return part.volume
 
     def settled(self, parts: Sequence[Part]) -> Concavity:
-        """The same: parts that exceed the threshold are reported."""
+        """Unchanged: parts that exceed the threshold are reported."""
         return self
 
     def scaled(self, factor: float) -> Concavity:
@@ -149,7 +149,7 @@ class Concavity:
         return CriterionSummary(entries, (warning,) if exceeding else ())
 
     def error(self, part: Part) -> float:
-        """Upper end of the measured concavity; no more than the threshold where the part certainly meets it."""
+        """Upper end of the measured concavity; at most the threshold if the part certainly meets it."""
         measured = self.measure(part, tolerance=self.threshold / 50).value[1]
         if not self.threshold < measured <= 1.02 * self.threshold:
             return measured
@@ -158,7 +158,7 @@ class Concavity:
     def is_met(self, part: Part) -> bool:
         """Whether the part's concavity is certainly at most the threshold.
 
-        False when it is larger, and when it is within 0.1 % of the threshold and branch and bound gave up.
+        False if it is larger, or if it is within 0.1 % of the threshold and branch and bound cannot decide.
         """
         hull = part.hull
         return _native.meets_concavity(
@@ -168,9 +168,8 @@ class Concavity:
     def measure(self, part: Part, tolerance: float = 1e-3, floor: float = 0.0) -> ConcavityValue:
         """Measure the concavity to within ``tolerance`` (same frame as the threshold).
 
-        Values up to ``floor`` need not be told apart: for them the interval may be as wide as ``(0, floor)``. That is
-        much faster for nearly convex parts with many faces, where it takes cells as small as the tolerance to tell
-        almost nothing from nothing.
+        Values up to ``floor`` need not be resolved: for them the interval may be as wide as ``(0, floor)``. That is
+        much faster for nearly convex parts with many faces, which otherwise need cells as small as the tolerance.
         """
         if not tolerance > 0:
             raise OptionError(f"The tolerance must be positive, not {tolerance}; 0.001 is usual.")

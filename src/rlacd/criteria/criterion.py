@@ -1,4 +1,4 @@
-"""What the loop, the merging and the finish ask of a criterion."""
+"""The interface of criteria for cutting, merging, search and report."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from rlacd.solid.hull import Hull
 
 
 class Feasibility(IntEnum):
-    """Whether what a solid fills of a hull may meet a criterion (see native/distance/filling.hpp)."""
+    """Whether a solid clipped to a hull may meet a criterion (see native/distance/filling.hpp)."""
 
     MAYBE = 0
     NO = 1
     NEVER = 2
-    """Nor does what it fills of any hull that holds this one."""
+    """The solid clipped to any hull that contains this one does not meet it either."""
 
 
 class Part(Protocol):
@@ -43,19 +43,19 @@ class Part(Protocol):
 
     @property
     def piece_hulls(self) -> float:
-        """Volumes of the hulls of the pieces it was glued from, added up."""
+        """Total volume of the hulls of the pieces it was glued from."""
 
     @property
     def within(self) -> Part | None:
-        """A part whose hull contains this one's: what it was cut from."""
+        """The part it was cut from, whose hull contains this one's."""
 
     def with_hull(self, hull: Hull) -> Part:
-        """Get the same solid with another hull around it."""
+        """Get the same solid with another hull."""
 
 
 @dataclass(frozen=True)
 class CriterionSummary:
-    """What a report says of a criterion.
+    """A criterion's contribution to the report.
 
     Attributes
     ----------
@@ -74,47 +74,47 @@ class Criterion(Protocol):
 
     @property
     def reach(self) -> float:
-        """No union of two components farther apart than this can meet the criterion."""
+        """Distance beyond which the union of two components cannot meet the criterion."""
 
     @property
     def is_hereditary(self) -> bool:
-        """Whether a part that does not meet the criterion cannot meet it together with others either."""
+        """Whether no union that contains a part that fails the criterion can meet it."""
 
     def excludes(self, volume: float, hull_volume: float) -> bool:
-        """Tell from the volumes alone that a part cannot meet the criterion (cheap, necessary)."""
+        """Whether the volumes alone show that a part cannot meet the criterion (cheap)."""
 
     def feasibility(self, filling: _native.Filling, hull: Hull) -> Feasibility:
-        """Tell cheaply whether what a solid fills of a hull may meet the criterion."""
+        """Decide cheaply whether a solid clipped to a hull may meet the criterion."""
 
     def feasibilities(
         self, filling: _native.Filling, hulls: Sequence[Hull], pairs: IntArray, threads: int
     ) -> tuple[FloatArray, IntArray]:
-        """Volumes [P] of the joint hulls of pairs [P, 2] of hulls, but for `NEVER`, and the `feasibility` [P] of
+        """Volumes [P] of the joint hulls of pairs [P, 2] of hulls (undefined for `NEVER`), and the `feasibility` [P] of
         each."""
 
     def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
-        """Whether what a solid fills of a hull, and of any that holds it, does not meet it: cheaper than `feasibility`.
+        """Whether the solid clipped to a hull, or to any hull that contains it, certainly fails the criterion.
 
-        It need not be known; False then.
+        Cheaper than `feasibility`; False if unknown.
         """
 
     def is_met(self, part: Part) -> bool:
         """Decide strictly whether the part meets the criterion."""
 
     def filled(self, part: Part) -> float:
-        """Volume that a joint hull may fill at no cost for this part's sake; cheapest pairs are merged first."""
+        """Volume that a joint hull may fill for free on account of this part; the cheapest pairs are merged first."""
 
     def settled(self, parts: Sequence[Part]) -> Criterion:
-        """Get the criterion as it is to be from now on, given the finest parts that cutting has reached.
+        """Get the criterion to use after cutting, given the parts that cutting has reached.
 
-        Where no cut could make a part meet it, a criterion may have to give way, and say so.
+        If no cut could make a part meet it, a criterion may relax, and must report that.
         """
 
     def least_error(self, volume: float, hull_volume: float) -> float:
-        """Bound from below, by the volumes alone, what the criterion measures."""
+        """Lower bound of the measured error, from the volumes alone."""
 
     def error(self, part: Part) -> float:
-        """Bound from above, tightly, what the criterion compares with its threshold."""
+        """Tight upper bound of the error that the criterion compares with its threshold."""
 
     def scaled(self, factor: float) -> Criterion:
         """Get the same criterion with a threshold larger by `factor`."""
@@ -125,7 +125,7 @@ class Criterion(Protocol):
 
     @property
     def obstacles(self) -> Balls | None:
-        """Balls that no hull may touch, where the criterion is made of them."""
+        """Balls that no hull may touch, if the criterion is defined by balls."""
 
     def summary(self, errors: Sequence[float] | None) -> CriterionSummary:
-        """Tell how well finished parts meet the criterion, given the error of each; None where they are not known."""
+        """Summarise how well finished parts meet the criterion; `errors` holds that of each part, None if unknown."""

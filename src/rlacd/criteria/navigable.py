@@ -1,15 +1,16 @@
-"""Navigable space: a part is done when its hull keeps out of where a ball can go.
+"""Navigable space: a part is done when its hull stays out of the space that a ball can reach.
 
-The space that a ball of radius r can use around a solid is kept free of hulls; what no ball can reach may be filled.
+Hulls must leave free the space that a ball of radius r can use around a solid; what no ball can reach may be filled.
 The definition follows Andrews, "Navigation-Driven Approximate Convex Decomposition" (SIGGRAPH 2024). In the frame where
 the input's bounding box is centred and its longest side is 2, the space is the set of points
 
-- outside the solid and at least r + t away from its surface, t the tolerance,
+- outside the solid and at least r + t away from its surface, where t is the tolerance,
 - no farther than r from its convex hull,
-- where a ball of radius r stays out of the closed half-spaces, and
-- which the centre of such a ball can reach.
+- at which a ball of radius r stays out of the closed half-spaces, and
+- that the centre of such a ball can reach.
 
-It is represented by balls whose centres are spread over its boundary, each as large as leaves t to the surface.
+It is represented by balls with centres spread over its boundary, each as large as possible at distance t from the
+surface.
 """
 
 from __future__ import annotations
@@ -34,13 +35,13 @@ from rlacd.solid.solid import Solid
 from rlacd.space_options import Point, SpaceOptions
 
 MOST_CELLS = 256
-"""Cells along the longest side of the grid: where a radius asks for more, balls stand wider apart than it."""
+"""Maximum number of grid cells along the longest side: for radii that need more, the balls are spaced more widely."""
 
 TOUCH = 1e-9
-"""Hulls that reach no deeper into a ball than this do not touch it."""
+"""A hull that reaches no deeper than this into a ball does not touch it."""
 
 LEAST_RADIUS = 0.1
-"""Share of the radius below which a ball that had to shrink is dropped."""
+"""A ball that has to shrink below this share of the radius is dropped."""
 
 _OPEN = ("capped", "slab", "wrapped", "hull")
 
@@ -52,53 +53,53 @@ class NavigableSpace(SpaceOptions):
     Parameters
     ----------
     radius : float
-        Of the ball, as a fraction of the longest side of the input's bounding box.
+        Radius of the ball, as a fraction of the longest side of the input's bounding box.
     tolerance : float
-        How far a hull may lead away from the surface, as such a fraction too.
+        Distance from the surface within which space may be filled, as a fraction of the same length.
     reachable_only : bool
-        Count only what the ball can reach; otherwise every place outside the solid with room for the ball counts,
-        sealed cavities too.
+        Count only space that the ball can reach; otherwise all space outside the solid with room for the ball counts,
+        including sealed cavities.
     seeds : array_like [S, 3], optional
-        Points, in the input's frame and unit, that balls come from; by default they come from outside.
+        Points, in the input's frame and unit, from which balls start; by default they start outside.
     closed_planes : sequence of (normal [3], offset)
-        Half-spaces n.x < offset, in the input's frame and unit, that balls cannot enter: ``((0, 0, 1), 0)`` is a ground
-        at z = 0. The normal need not have length 1; the offset goes with the normal as given.
+        Half-spaces n.x < offset, in the input's frame and unit, that balls cannot enter: ``((0, 0, 1), 0)`` is ground
+        at z = 0. The normal need not have length 1; the offset refers to the normal as given.
     radius_abs, tolerance_abs : float, optional
-        In the input's unit; they replace `radius` and `tolerance`.
+        The same lengths in the input's unit; they replace `radius` and `tolerance`.
     radius_m, tolerance_m : float, optional
-        The former names of those.
+        The former names of `radius_abs` and `tolerance_abs`.
 
     Raises
     ------
     OptionError
-        A length is out of its range, or seeds or planes do not have the right shape.
+        A length is out of range, or seeds or planes have the wrong shape.
     """
 
     def prepare(self, solid: Solid, threads: int = 0) -> Navigable:
-        """Find the space around a solid and spread its balls.
+        """Find the space around a solid and place its balls.
 
         Parameters
         ----------
         solid : Solid
-            What the input was repaired to; its cavities count only with ``keep_cavities``.
+            The repaired input; its cavities count only if it was repaired with ``keep_cavities``.
         threads : int
-            0 takes every core. The result does not depend on it.
+            0 uses every core. The result does not depend on it.
 
         Raises
         ------
         OptionError
-            A seed lies inside the solid, nearer than the radius to it, or in a closed half-space; or a length in the
-            input's unit is too small or too large for the object.
+            A seed lies inside the solid, closer than the radius to it or to a closed plane, or in a closed half-space;
+            or a length in the input's unit is too small or too large for the object.
 
         Notes
         -----
-        Distances are exact. Ways in are found on a grid half a radius wide, and where that leaves the answer open, by
-        following the way itself: none narrower than 99 % of the ball counts, and one as wide as the ball is found
-        unless it is so contorted that it cannot be followed in steps of half a radius.
+        Distances are exact. Passages are found on a grid with cells half a radius wide; if the grid leaves the answer
+        open, the passage itself is followed. No passage narrower than 99 % of the ball counts, and one as wide as the
+        ball is found unless it is too contorted to be followed in steps of half a radius.
 
-        Well inside the hull of the solid, 99 % of the space's boundary were seen to be within 0.6 ball radii of a
-        centre, and all of it within 0.75: between balls, a hull can reach a fifth of their radius beyond the boundary
-        unseen, and hardly ever a third.
+        Measured well inside the hull of the solid, 99 % of the space's boundary is within 0.6 ball radii of a centre,
+        and all of it within 0.75: between balls, a hull can reach a fifth of their radius past the boundary undetected,
+        and very rarely a third.
         """
         scale = solid.frame.scale
         radius, tolerance = self.in_frame(scale)
@@ -138,7 +139,7 @@ class NavigableSpace(SpaceOptions):
         return Navigable(self, radius, tolerance, balls, tuple(warnings))
 
     def unprepared(self, scale: float) -> Navigable:
-        """Stand in for the space around a solid that there was no time to look for: there are no balls.
+        """Make the criterion for a solid whose space there was no time to find: it has no balls.
 
         Parameters
         ----------
@@ -151,20 +152,20 @@ class NavigableSpace(SpaceOptions):
 
     @property
     def sees_cavities(self) -> bool:
-        """Whether sealed cavities may count, so that repair has to keep them."""
+        """Whether sealed cavities may count, so repair has to keep them."""
         return not self.reachable_only or self.seeds is not None
 
 
 @dataclass(frozen=True)
 class Conflicts:
-    """What finished parts cost the balls.
+    """How many balls had to give way to parts.
 
     Attributes
     ----------
     shrunk, dropped : int
-        Balls that were made smaller, and that were given up.
+        Number of balls that shrank, and that were dropped.
     most : float
-        Largest reduction of a radius, in the normalised frame; all of it for a ball that was given up.
+        Largest reduction of a radius, in the normalised frame; the whole radius for a dropped ball.
     """
 
     shrunk: int = 0
@@ -180,15 +181,15 @@ class Navigable:
     Attributes
     ----------
     space : NavigableSpace
-        What was asked for.
+        The requested space.
     radius, tolerance : float
     balls : Balls
     allowance : float
-        How deep a hull may reach into a ball: 0 but for `scaled` criteria.
+        How deep a hull may reach into a ball: 0 except for `scaled` criteria.
     warnings : tuple of str
-        One sentence for everything the user should know.
+        Sentences for the user.
     conflicts : Conflicts
-        What `settled` did to the balls.
+        Changes that `settled` made to the balls.
     """
 
     def __init__(
@@ -214,7 +215,7 @@ class Navigable:
 
     @property
     def reach(self) -> float:
-        """Twice radius and tolerance: through a wider gap between two parts a ball can come."""
+        """Twice the sum of radius and tolerance: a ball can pass through a wider gap between two parts."""
         return 2 * (self.radius + self.tolerance)
 
     @property
@@ -223,21 +224,21 @@ class Navigable:
         return True
 
     def excludes(self, volume: float, hull_volume: float) -> bool:
-        """Nothing: volumes say nothing about balls."""
+        """False: volumes say nothing about balls."""
         return False
 
     def feasibility(self, filling: _native.Filling, hull: Hull) -> Feasibility:
-        """None: what is inside a hull does not count, and hulls of pairs have been tried."""
+        """`NEVER`: only the hull counts, whatever fills it, and the glued union of the pair has been tried already."""
         return Feasibility.NEVER
 
     def feasibilities(
         self, filling: _native.Filling, hulls: Sequence[Hull], pairs: IntArray, threads: int
     ) -> tuple[FloatArray, IntArray]:
-        """None, and no volumes: they are not asked for."""
+        """`NEVER` for all pairs; the volumes are not needed."""
         return np.zeros(len(pairs)), np.full(len(pairs), int(Feasibility.NEVER), dtype=np.int32)
 
     def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
-        """Not known: balls are asked of parts, not of hulls."""
+        """False, meaning unknown: balls are tested against parts, not hulls."""
         return False
 
     def least_error(self, volume: float, hull_volume: float) -> float:
@@ -246,7 +247,7 @@ class Navigable:
 
     @property
     def overhang(self) -> float:
-        """No bound: places nobody can reach may be filled, however far from the surface."""
+        """Infinite: space that no ball can reach may be filled, however far from the surface."""
         return math.inf
 
     @property
@@ -255,7 +256,7 @@ class Navigable:
         return self.balls
 
     def summary(self, errors: Sequence[float] | None) -> CriterionSummary:
-        """How many balls there are, what became of them, and how deep the parts' hulls reach into them."""
+        """The number of balls, how many gave way, and how deep the parts' hulls reach into them."""
         exceeding = [error for error in errors or () if error > 0]
         sentences = list(self.warnings)
         if errors is None:
@@ -281,11 +282,14 @@ class Navigable:
         return CriterionSummary({"navigable": entries}, tuple(sentences))
 
     def filled(self, part: Part) -> float:
-        """Volume of the hulls of the pieces: filling what a piece's own hull fills already costs nothing."""
+        """Total volume of the hulls of the pieces: what their hulls fill already is free."""
         return part.piece_hulls
 
     def is_met(self, part: Part) -> bool:
-        """Whether the part's hull touches no ball, or the part is smaller than half the tolerance."""
+        """Whether the hull reaches no deeper than the allowance into balls larger than that, or the part is small.
+
+        Small is a part whose hull is smaller than half the sum of tolerance and allowance.
+        """
         if self._is_small(part) or len(self.balls) == 0:
             return True
         if not self._intrusions.any_beyond(part, max(self.allowance, TOUCH)):
@@ -295,20 +299,20 @@ class Navigable:
         return self.allowance >= self._deepest(part, self.allowance)
 
     def error(self, part: Part) -> float:
-        """How deep the part's hull reaches into a ball at most: radius less signed distance of the ball's centre."""
+        """Greatest depth of the part's hull in a ball: the radius minus the signed distance of the ball's centre."""
         return 0.0 if self._is_small(part) else self._deepest(part, 0.0)
 
     def scaled(self, factor: float) -> Navigable:
-        """Coarser: hulls may reach so far into the balls that the tolerance, all in all, grows by `factor`."""
+        """Coarser: hulls may reach into the balls by so much that tolerance plus allowance grow by `factor`."""
         other = Navigable.__new__(Navigable)
         other.__dict__.update(self.__dict__)
         other.allowance = max(0.0, (self.tolerance + self.allowance) * factor - self.tolerance)
         return other
 
     def settled(self, parts: Sequence[Part]) -> Navigable:
-        """Give way to finished parts: balls that their hulls touch shrink to the outside of the hull, or are dropped.
+        """Give way to finished parts: balls that their hulls touch shrink until they no longer do, or are dropped.
 
-        Dropped is what would be left with less than a tenth of the radius. What was done is in `conflicts`.
+        Balls that would shrink below a tenth of the radius are dropped. `conflicts` of the result counts the changes.
         """
         radii = self.balls.radii.copy()
         for part in parts:
@@ -345,9 +349,9 @@ class Navigable:
 
 
 class _Intrusions:
-    """Which balls each part touches and how deep, remembered as long as the part lives.
+    """Which balls each part touches and how deep, cached as long as the part lives.
 
-    A part's hull lies within that of the part it was cut from, so it can only touch balls that one touches.
+    A part's hull lies within that of the part it was cut from, so it can only touch balls that the latter touches.
     """
 
     def __init__(self, balls: Balls) -> None:
@@ -356,19 +360,19 @@ class _Intrusions:
         self._lock = threading.Lock()
 
     def of(self, part: Part) -> tuple[IntArray, FloatArray]:
-        """Balls that the part's hull touches [K], ascending, and its depths in them [K]."""
+        """Indices of the balls that the part's hull touches [K], ascending, and its depths in them [K]."""
         known = self._recall(part)
         if known is None:
             within = part.within
             candidates = None if within is None else self.of(within)[0]
             known = self._balls.intrusions(part.hull.vertices, part.hull.faces, candidates, TOUCH)
-            with self._lock:  # another thread may have been here: with the same result
+            with self._lock:  # another thread may have done the same, with the same result
                 self._known[part] = known
         return known
 
     def any_beyond(self, part: Part, depth: float) -> bool:
         """Whether the part's hull reaches deeper than `depth` into any ball."""
-        if part.within is None and self._recall(part) is None:  # a union: most fail, and at the first ball
+        if part.within is None and self._recall(part) is None:  # a union: most fail, so stop at the first ball
             first, _ = self._balls.intrusions(part.hull.vertices, part.hull.faces, None, depth, first=True)
             return len(first) > 0
         _, depths = self.of(part)
