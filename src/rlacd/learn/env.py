@@ -27,7 +27,7 @@ from rlacd.solid.component import Component
 PLANES = 6 * OFFSETS_PER_AXIS
 
 LARGEST_SCALE = 1024.0
-"""Bound on the log2 ratio of a component's size to the threshold, either way."""
+"""Bound on the absolute value of every entry of ``scale``; larger values are clipped."""
 
 _Observed = dict[str, NDArray[Any]]
 

@@ -1,4 +1,4 @@
-"""Episodes: which solid is cut next, turned how, and when the cutting of it is broken off."""
+"""Episodes: which solid is cut next, how it is turned, and when cutting is truncated."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rlacd.learn.paper.mdp import CutProcess
 from rlacd.solid.component import Component
 
 TRIES = 1000
-"""So many solids in a row without anything to cut, and there is nothing to learn on."""
+"""Training stops with an error after this many consecutive solids without anything to cut."""
 
 
 @dataclass(frozen=True)
@@ -27,20 +27,20 @@ class Start:
 
 
 def draw_start(names: Sequence[str], rotate: bool, rng: np.random.Generator) -> Start:
-    """Draw a mesh, and if wanted a turn as the paper's (`TURNS`)."""
+    """Draw a mesh and, if requested, one of the paper's rotations (`TURNS`)."""
     name = names[int(rng.integers(len(names)))]
     axis = int(rng.integers(3))
     return Start(name, axis, TURNS[int(rng.integers(len(TURNS)))] if rotate else 0.0)
 
 
 def begin(solid: Component, criterion: Criterion, max_parts: int) -> CutProcess | None:
-    """Begin an episode; None when there is nothing to cut, or too much."""
+    """Start an episode; None if there is nothing to cut, or too many components."""
     cutting = CutProcess(solid, criterion)
     return None if cutting.over or cutting.count > max_parts else cutting
 
 
 def nothing_to_cut(tries: int, meshes: int) -> TrainingError:
-    """Say that so many solids in a row were drawn in vain."""
+    """Build the error for `tries` consecutive solids that need no cut."""
     return TrainingError(
         f"none of {tries} solids drawn from {meshes} meshes needs a cut; give other meshes, or a smaller threshold."
     )
@@ -59,7 +59,7 @@ class Episodes:
     rotate : bool
         Turn solids as the paper does (`TURNS`).
     max_cuts, max_parts : int
-        Where episodes are broken off.
+        Limits at which episodes are truncated.
     """
 
     solids: Solids
@@ -75,7 +75,7 @@ class Episodes:
         Raises
         ------
         TrainingError
-            There seems to be none.
+            Many consecutive solids needed no cut.
         """
         for _ in range(TRIES):
             start = draw_start(self.names, self.rotate, rng)
@@ -84,10 +84,10 @@ class Episodes:
         raise nothing_to_cut(TRIES, len(self.names))
 
     def begin(self, start: Start) -> CutProcess | None:
-        """Begin an episode; None when the solid cannot be had, or there is nothing to cut or too much."""
+        """Start an episode; None if the solid cannot be repaired, needs no cut, or has too many components."""
         solid = self.solids.get(start.name, start.axis, start.degrees)
         return None if solid is None else begin(solid, self.criterion, self.max_parts)
 
     def is_capped(self, cutting: CutProcess, cuts: int) -> bool:
-        """Tell whether an episode has to be broken off after so many cuts."""
+        """Tell whether an episode has to be truncated after `cuts` cuts."""
         return cuts >= self.max_cuts or cutting.count >= self.max_parts

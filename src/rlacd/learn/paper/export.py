@@ -1,4 +1,4 @@
-"""The trained policy as files: ONNX to run, safetensors to train on, JSON to tell what it is."""
+"""The trained policy as files: ONNX for inference, safetensors for further training, JSON for its description."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class PointsToValues(nn.Module):
         features = self.encoder(points, directions)
         if self.scale_input:
             features = torch.cat([features, scale], dim=1)
-        else:  # the input stays in the graph, so that all exported policies are asked alike
+        else:  # the input stays in the graph, so that all exported policies have the same inputs
             features = features + 0 * scale.sum(dim=1, keepdim=True)
         values: Tensor = self.network(features)
         return values
@@ -49,7 +49,7 @@ def export_policy(path: Path, encoder: AnyEncoder, network: QNetwork, options: T
     Raises
     ------
     TrainingError
-        onnxruntime does not compute what torch does.
+        onnxruntime and torch give different results.
     """
     module = PointsToValues(encoder.cpu(), network.cpu(), options.scale_input).eval()
     generator = torch.Generator().manual_seed(0)

@@ -1,7 +1,7 @@
-"""The dual-state Bellman loss: a cut leads to two states at once, and the values of both count.
+"""The dual-state Bellman loss: a cut leads to two successor states, and the values of both are added.
 
-Values are additive over components, so the target of Q(p, m) is the reward and the discounted values of everything the
-cut leaves to be done (eq. 8): r + gamma_l V(m_l) + gamma_r V(m_r). Connected pieces of a side stand for it. Soft
+Values are additive over components, so the target of Q(p, m) is the reward plus the discounted values of both sides of
+the cut (eq. 8): r + gamma_l V(m_l) + gamma_r V(m_r). The unfinished connected pieces of a side stand for it. Soft
 Q-learning (Haarnoja et al., "Reinforcement Learning with Deep Energy-Based Policies", 2017) makes V a soft maximum.
 """
 
@@ -23,7 +23,7 @@ def soft_value(q: Tensor, mask: Tensor, temperature: float) -> Tensor:
 
 
 def boltzmann(q: Tensor, mask: Tensor, temperature: float) -> Tensor:
-    """Probabilities [B, A] in proportion to exp(Q(p) / T) over valid planes; T = 0 puts all on the first best."""
+    """Probabilities [B, A] proportional to exp(Q(p) / T) over valid planes; T = 0 takes the first best plane."""
     q = q.masked_fill(~mask, -torch.inf)
     if temperature == 0:
         return torch.nn.functional.one_hot(q.argmax(dim=1), q.shape[1]).to(q.dtype)
@@ -31,15 +31,15 @@ def boltzmann(q: Tensor, mask: Tensor, temperature: float) -> Tensor:
 
 
 def dual_state_target(reward: Tensor, values: Tensor, discounts: Tensor, owner: Tensor) -> Tensor:
-    """Right-hand side of eq. 8 [B]: each reward, plus the discounted values of what its cut left unfinished.
+    """Right-hand side of eq. 8 [B]: each reward, plus the discounted values of the unfinished children of its cut.
 
     Parameters
     ----------
     reward : float32 [B]
     values, discounts : float32 [C]
-        Of all unfinished children of the batch. Finished ones have no value left and are not listed.
+        Of all unfinished children in the batch. Finished ones have value 0 and are not listed.
     owner : int64 [C]
-        The transition that each belongs to.
+        The transition of each child.
     """
     return reward.index_add(0, owner, discounts * values)
 
@@ -51,10 +51,10 @@ def bellman_loss(q: Tensor, planes: Tensor, target: Tensor, weight: Tensor, unit
     ----------
     q : float32 [B, A]
     planes : int64 [B]
-        The planes that were taken.
+        The planes taken.
     target : float32 [B]
     weight : float32 [B]
-        Importance weights of prioritised replay; ones otherwise.
+        Importance weights of prioritised replay; otherwise ones.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The decision process: a solid's unfinished components, the cuts that can be made, and the reward of each.
+"""The decision process: a solid's unfinished components, the valid cuts, and the reward of each.
 
 The components, planes, splitting and criterion are those of `rlacd.decompose` (see `rlacd.cut`).
 """
@@ -18,19 +18,19 @@ from rlacd.solid.component import Component, Plane
 
 @dataclass(frozen=True)
 class Reward:
-    """The two terms of a cut's reward, not weighted.
+    """The two terms of a cut's reward, unweighted.
 
     Attributes
     ----------
     saved : float
-        Eq. 2, relative to the component's own hull: (|CH(m_i)| - the sum of |CH| over what it falls into) / |CH(m_i)|.
-        It is the reward of the decision process whose solid is m_i, which is how a partial observation sees it.
+        Eq. 2, relative to the component's own hull: (|CH(m_i)| - the sum of |CH| over its pieces) / |CH(m_i)|.
+        This is the reward of the decision process whose solid is m_i, consistent with the partial observation.
     share : float
         |CH(m_i)| / |CH(m)|, m the whole solid: `share` times `saved` is eq. 2 itself.
     finished : float
-        Eq. 3: 1 / (1 + log(|M'| - 1)) when this cut leaves every component of the solid finished, else 0.
+        Eq. 3: 1 / (1 + log(|M'| - 1)) if this cut leaves every component of the solid finished, else 0.
     sides_finished : float
-        The same for the process whose solid is m_i: what it falls into is finished.
+        The same for the process whose solid is m_i, when all its pieces are finished.
     """
 
     saved: float
@@ -41,20 +41,20 @@ class Reward:
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """What a cut has led to.
+    """Outcome of a cut.
 
     Attributes
     ----------
     unfinished : list of Component
-        Connected, not yet meeting the criterion, with a valid plane left: they join the frontier.
+        Connected components that miss the criterion and have a valid plane left: they join the frontier.
     discounts : list of float
-        Eq. 9 for each of those: |CH(child)| / |CH(component)|; they never add up to more than 1.
+        Eq. 9 for each of those: |CH(child)| / |CH(component)|; their sum is at most 1.
     finished : list of Component
-        They meet the criterion.
+        Components that meet the criterion.
     stuck : list of Component
-        They do not, and no valid plane is left.
+        Components that miss the criterion and have no valid plane left.
     made : bool
-        False when the plane has left nothing on one side, or only a shaving: the component is then `stuck`.
+        False if the plane left nothing, or only a sliver, on one side: the component is then `stuck`.
     """
 
     reward: Reward
@@ -67,7 +67,7 @@ class Cut:
 
 @dataclass
 class CutResult:
-    """Components sorted by what can be done with them."""
+    """Components sorted by status."""
 
     unfinished: list[Component] = field(default_factory=list)
     finished: list[Component] = field(default_factory=list)
@@ -75,7 +75,7 @@ class CutResult:
 
     @property
     def all(self) -> list[Component]:
-        """All of them."""
+        """All components."""
         return self.unfinished + self.finished + self.stuck
 
 
@@ -85,17 +85,17 @@ def terminal_reward(parts: int) -> float:
 
 
 class CutProcess:
-    """One solid on its way to parts.
+    """The decision process of one solid.
 
-    The state is the *frontier*, connected components that do not meet the criterion, and the parts done so far. Every
-    unfinished component has to be cut sooner or later, and what becomes of it does not depend on the others, so the
-    process does not ask which comes first.
+    The state is the *frontier*, the connected components that miss the criterion, and the parts finished so far. Every
+    unfinished component has to be cut eventually, and its cuts do not depend on the other components, so the order is
+    no part of the process.
 
     Parameters
     ----------
     solid : Component
     criterion : Criterion
-        When a component is finished.
+        Decides when a component is finished.
     """
 
     def __init__(self, solid: Component, criterion: Criterion) -> None:
@@ -110,27 +110,27 @@ class CutProcess:
 
     @property
     def count(self) -> int:
-        """Components in all, |M|."""
+        """Number of all components, |M|."""
         return len(self.frontier) + len(self.finished) + len(self.stuck)
 
     @property
     def over(self) -> bool:
-        """Nothing is left to cut."""
+        """True if nothing is left to cut."""
         return not self.frontier
 
     @property
     def terminal(self) -> bool:
-        """Every component meets the criterion."""
+        """True if every component meets the criterion."""
         return not self.frontier and not self.stuck
 
     def candidates(self, component: Component) -> Candidates:
-        """Get the planes that a component of the frontier can be cut by."""
+        """Get the candidate planes of a component of the frontier."""
         if component not in self._candidates:
             self._candidates[component] = candidates_of(component)
         return self._candidates[component]
 
     def largest(self) -> int:
-        """Index in the frontier of the component with the largest hull: coarse cuts come first."""
+        """Index in the frontier of the component with the largest hull, so that coarse cuts come first."""
         return max(range(len(self.frontier)), key=lambda i: self.frontier[i].hull.volume)
 
     def cut(self, index: int, plane: Plane) -> Cut:
@@ -148,7 +148,7 @@ class CutProcess:
             finished=terminal_reward(self.count) if self.terminal else 0.0,
             sides_finished=terminal_reward(len(children)) if made and len(settled.finished) == len(children) else 0.0,
         )
-        # Hulls of connected pieces may overlap, two links of a chain do; the value must not grow by that.
+        # Hulls of connected pieces may overlap (two links of a chain, say); discounts must not add up to more than 1.
         whole = max(own, sum(children))
         discounts = [child.hull.volume / whole for child in settled.unfinished]
         return Cut(reward, settled.unfinished, discounts, settled.finished, settled.stuck, made)
@@ -160,7 +160,7 @@ class CutProcess:
         return _together([self._settle(side) for side in sides]), True
 
     def _settle(self, component: Component) -> CutResult:
-        """Judge a component, split it if it has to be cut, and judge its pieces."""
+        """Evaluate a component, split it if it has to be cut, and evaluate its pieces."""
         if self._criterion.is_met(component):
             return CutResult(finished=[component])
         pieces = self._cache.pieces(component)

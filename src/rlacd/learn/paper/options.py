@@ -1,4 +1,4 @@
-"""The options of a training run: one dataclass, whose fields are also the command line and its help."""
+"""The options of a training run: one dataclass, whose fields also define the command line and its help."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from rlacd.fields import check_fields, option, refuse_unknown
 
 @dataclass(frozen=True)
 class TrainOptions:
-    """Everything that decides the outcome of a training run; the defaults are the paper's where it states a value.
+    """All options that affect the outcome of a training run; defaults are the paper's where it states a value.
 
-    Each field's help is in its metadata, and is the help of the command line too.
+    Each field's help is in its metadata and serves the command line too.
 
     Raises
     ------
@@ -101,12 +101,12 @@ class TrainOptions:
 
     @property
     def unit(self) -> float:
-        """What values are measured in, so that a network's outputs are of the order of 1."""
+        """Scale of the values: the network predicts them in this unit, so that its outputs are of order 1."""
         return max(self.volume_reward, self.finish_reward, 10 * self.cut_cost, 1e-9)
 
     @classmethod
     def preset(cls, name: str, **changes: Any) -> TrainOptions:
-        """Get the options called `name` in `PRESETS`, some of them changed.
+        """Get the preset `name` from `PRESETS` with the given changes.
 
         Raises
         ------
@@ -160,5 +160,5 @@ PRESETS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
         },
     }
 )
-"""What differs from the defaults: the paper's run; the same sized for two cores; the same method with the number of
-cuts as its objective, as the first runs taught (docs/experiments.md); a few minutes' look at the whole machinery."""
+"""Changes to the defaults: the paper's run; the same scaled to two cores; the same method with the number of cuts as
+its objective, as the first runs suggested (docs/experiments.md); and a run of a few minutes to try everything out."""

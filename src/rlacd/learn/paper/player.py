@@ -1,4 +1,4 @@
-"""Playing an episode: cutting a solid until nothing is left to cut, by the network as it is, and telling all of it."""
+"""Playing an episode: cut a solid with the current network until nothing is left to cut, and record every step."""
 
 from __future__ import annotations
 
@@ -37,16 +37,16 @@ class Player:
 
     Attributes
     ----------
-    cutting : Cutting
-        The solid, uncut, with something to cut.
+    cutting : CutProcess
+        The uncut solid; it must need a cut.
     options : TrainOptions
     encoder : Encoder
     network : QNetwork or None
-        None: every valid plane is as good as any other.
+        None for uniformly random valid planes.
     epsilon : float
-        Share of cuts for which that holds in any case.
+        Fraction of cuts that are uniformly random anyway.
     rng : Generator
-        Of this episode alone.
+        Generator of this episode only.
     """
 
     cutting: CutProcess
@@ -57,7 +57,7 @@ class Player:
     rng: np.random.Generator
 
     def play(self) -> Record:
-        """Cut the largest component again and again; a pure function of the attributes, on one thread of torch."""
+        """Repeatedly cut the largest component; a pure function of the attributes, with torch on one thread."""
         cutting, frontier = self.cutting, self._see(self.cutting.frontier)
         everything, joined, discounts = list(frontier), [len(frontier)], [1.0] * len(frontier)
         index: list[int] = []
@@ -111,7 +111,7 @@ class Player:
         ]
 
     def _choose(self, seen: _Seen) -> tuple[int, float]:
-        """Choose a plane, at random or by the Boltzmann policy; also the greatest Q, nan where nobody looked."""
+        """Choose a plane, at random or by the Boltzmann policy; also returns the greatest Q, nan without a network."""
         chances, value = seen.mask / seen.mask.sum(), np.nan
         if self.network is not None:
             mask = torch.from_numpy(seen.mask)[None]
@@ -125,7 +125,7 @@ class Player:
 
 @contextlib.contextmanager
 def one_thread() -> Iterator[None]:
-    """Have torch compute on one thread: sums of several have bits of their own."""
+    """Run torch on one thread: sums over several threads round differently."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:

@@ -20,10 +20,10 @@ class QNetwork(nn.Module):
     Parameters
     ----------
     inputs : int
-        Features a component.
+        Number of features per component.
     unit : float
-        What the outputs are multiplied by. Rewards weigh 1000; a network whose last layer has to grow to that spends
-        its first hundred thousand steps on it.
+        Factor applied to the outputs. Rewards are weighted by 1000; without the factor the last layer needs the first
+        hundred thousand steps just to reach that scale.
     hidden : sequence of int
     outputs : int
     """
@@ -43,6 +43,6 @@ class QNetwork(nn.Module):
 
     @torch.no_grad()
     def copy_from(self, other: QNetwork) -> None:
-        """Take over the weights of another network of the same shape."""
+        """Copy the weights of another network of the same shape."""
         for own, theirs in zip(self.parameters(), other.parameters(), strict=True):
             own.copy_(theirs)

@@ -1,4 +1,4 @@
-"""What an episode has to teach, as arrays: they come from wherever it was played, and wait in checkpoints."""
+"""An episode's transitions as arrays, so that it can be sent from where it was played and stored in checkpoints."""
 
 from __future__ import annotations
 
@@ -17,34 +17,34 @@ from rlacd.solid.arrays import BoolArray, FloatArray
 Longs: TypeAlias = NDArray[np.int64]
 
 ENDED = ("terminal", "stuck", "cap", "nothing", "lost")
-"""How episodes end: all parts are finished, or cannot be cut; broken off; nothing to cut; nobody could play it."""
+"""Ways to end: all parts finished; some cannot be cut; truncated; nothing to cut; the episode could not be played."""
 
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """An episode of T cuts, in which N components were to be cut.
+    """An episode of T cuts, with N components in the frontier over time.
 
     Attributes
     ----------
     features : float16 [N, D]
-        Of the components, in the order in which they joined the frontier, always at its end.
+        Of the components, in the order in which they were appended to the frontier.
     masks : bool [N, A]
         Their valid planes.
     fill : float64 [N]
-        Share of the hull that the solid fills: 1 - fill is all the volume that cutting can save.
+        Fraction of the hull that the solid fills: 1 - fill bounds the volume that cutting can save.
     discounts : float64 [N]
-        Of each, as a child of what was cut; 1 for those that the episode began with.
+        Discount of each as a child; 1 for the initial components.
     joined : int64 [1 + T]
-        How many joined when the episode began, and by each cut.
+        Number of components that joined at the start, and by each cut.
     index : int64 [T]
-        Which of the frontier was cut; it left the frontier.
+        Index in the frontier of the component cut; the cut removes it.
     planes : int64 [T]
     rewards : float64 [T, 4]
         The fields of `Reward`.
     values : float64 [T]
-        The greatest Q of what was cut, as the player saw it; nan where it did not look.
+        The greatest Q of the component cut, as seen by the player; nan without a network.
     parts : int64
-        Components at the end.
+        Number of components at the end.
     ended : int64
         Index into `ENDED`.
     """
@@ -63,7 +63,7 @@ class Record:
 
     @classmethod
     def empty(cls, ended: str) -> Record:
-        """Make the record of an episode without a cut."""
+        """Create the record of an episode without a cut."""
         ints, floats = np.empty(0, np.int64), np.empty(0)
         return cls(
             features=np.empty((0, 0), np.float16),
@@ -81,12 +81,12 @@ class Record:
 
     @property
     def cuts(self) -> int:
-        """T."""
+        """Number of cuts T."""
         return len(self.planes)
 
     @property
     def how(self) -> str:
-        """Tell how it ended."""
+        """Return how it ended."""
         return ENDED[self.ended]
 
     def reward(self, cut: int) -> Reward:
@@ -94,20 +94,20 @@ class Record:
         return Reward(*self.rewards[cut].tolist())
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
-        """Get everything as arrays."""
+        """Return all fields as arrays."""
         return {field.name: np.asarray(getattr(self, field.name)) for field in dataclasses.fields(self)}
 
     @classmethod
     def of(cls, arrays: Mapping[str, NDArray[np.generic]]) -> Record:
-        """Make the record of what `arrays` gave."""
+        """Restore a record from `arrays`."""
         whole = {"parts": int(arrays["parts"]), "ended": int(arrays["ended"])}
         return cls(**{**arrays, **whole})  # type: ignore[arg-type]
 
     def as_bytes(self) -> bytes:
-        """Write it, to be read by `from_bytes`."""
+        """Serialise it for `from_bytes`."""
         return packed(self.arrays())
 
     @classmethod
     def from_bytes(cls, content: bytes) -> Record:
-        """Read what `as_bytes` wrote."""
+        """Read the result of `as_bytes`."""
         return cls.of(unpacked(content))

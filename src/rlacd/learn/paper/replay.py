@@ -1,7 +1,7 @@
-"""The replay buffer: transitions of single components, by their features.
+"""The replay buffer: transitions of single components, stored by their features.
 
-A component's features are kept once, as a row in half precision, though a transition starts from it and another led
-to it; rows that no transition in the buffer needs any more are used again.
+A component's features are stored once, as a row in half precision, even if one transition starts from it and another
+leads to it; rows that no transition in the buffer refers to are reused.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from rlacd.policies.observe import Float32Array
 from rlacd.solid.arrays import BoolArray
 
 LEAST_PRIORITY = 1e-3
-"""Added to every error, so that no transition is lost for good."""
+"""Added to every error, so that every transition keeps a chance to be drawn."""
 
 
 @dataclass(frozen=True, eq=False)
 class TransitionBatch:
-    """B transitions and the C components they left unfinished.
+    """B transitions and their C unfinished children.
 
     Attributes
     ----------
     index : int64 [B]
-        Where in the buffer, for `Replay.set_errors`.
+        Positions in the buffer, for `Replay.set_errors`.
     features : float32 [B, D]
     planes : int64 [B]
     rewards : float32 [B]
@@ -37,11 +37,11 @@ class TransitionBatch:
         Importance weights, at most 1.
     child_features : float32 [C, D]
     child_masks : bool [C, A]
-        Never all False.
+        Never all False in a row.
     child_discounts, child_bounds : float32 [C]
-        gamma, and what `Replay.add_component` was told their value cannot exceed.
+        gamma, and the upper bounds on their values given to `Replay.add_component`.
     owner : int64 [C]
-        Row of the batch that each child belongs to.
+        Batch row of each child.
     """
 
     index: NDArray[np.int64]
@@ -62,15 +62,15 @@ class Replay:
     Parameters
     ----------
     capacity : int
-        Transitions kept.
+        Maximum number of transitions.
     dim : int
-        Features a component.
+        Number of features per component.
     actions : int
-        Planes a component.
+        Number of planes per component.
     priority : float
         Exponent of prioritised replay (Schaul et al. 2016); 0 draws uniformly.
     correction : float
-        Exponent of its importance weights.
+        Exponent of the importance weights.
     """
 
     def __init__(self, capacity: int, dim: int, actions: int, priority: float = 0.0, correction: float = 0.4) -> None:
@@ -96,12 +96,12 @@ class Replay:
 
     @property
     def components(self) -> int:
-        """Rows of features in use."""
+        """Number of feature rows in use."""
         return len(self._users) - len(self._free)
 
     def add_component(self, features: Float32Array, mask: BoolArray, bound: float = np.inf) -> int:
-        """Keep a component's features [D] and valid planes [A]; the row stays until `release`, and as long as a
-        transition needs it.
+        """Store a component's features [D] and valid planes [A]; the row stays until `release`, and while a transition
+        refers to it.
         """
         if not self._free:
             self._grow()
@@ -111,7 +111,7 @@ class Replay:
         return row
 
     def release(self, row: int) -> None:
-        """Say that nobody outside the buffer will name this row again."""
+        """Mark a row as no longer referenced from outside the buffer."""
         self._users[row] -= 1
         if self._users[row] == 0:
             self._free.append(row)
@@ -126,7 +126,7 @@ class Replay:
         return np.unpackbits(packed, axis=1, count=self.actions).astype(bool)
 
     def add(self, state: int, plane: int, reward: float, children: Sequence[int], discounts: Sequence[float]) -> None:
-        """Add a transition between rows; the oldest one leaves a full buffer."""
+        """Add a transition between rows; a full buffer drops its oldest one."""
         i = self._next
         for row in (state, *children):
             self._users[row] += 1
@@ -169,7 +169,7 @@ class Replay:
         )
 
     def set_errors(self, index: NDArray[np.int64], errors: Float32Array) -> None:
-        """Set the priorities of transitions to their temporal-difference errors; no matter where draws are uniform."""
+        """Set the priorities of transitions to their temporal-difference errors; no effect on uniform draws."""
         if self._tree is None:
             return
         priorities = (np.abs(errors).astype(np.float64) + LEAST_PRIORITY) ** self._priority
@@ -177,7 +177,7 @@ class Replay:
         self._tree.set(index, priorities)
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """Everything as arrays, for a checkpoint."""
+        """Return everything as arrays, for a checkpoint."""
         children, discounts = self._children[: self._count], self._discounts[: self._count]
         return {
             "features": self._features,
@@ -197,7 +197,7 @@ class Replay:
         }
 
     def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """Take over what `state` returned of a buffer with the same parameters."""
+        """Restore the result of `state` from a buffer with the same parameters."""
         self._features, self._masks = state["features"].copy(), state["masks"].copy()
         self._bounds, self._users = state["bounds"].copy(), state["users"].copy()
         self._free = state["free"].tolist()

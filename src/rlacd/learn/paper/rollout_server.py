@@ -1,4 +1,4 @@
-"""What a process of the pool does for the training: one episode, from a mesh to its record."""
+"""The training's part in a pool process: one episode, from a mesh to its record."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class RolloutServer:
     Parameters
     ----------
     staging : Path
-        A folder for what is on its way.
+        A folder for temporary files.
     """
 
     def __init__(self, staging: Path) -> None:
@@ -51,17 +51,17 @@ class RolloutServer:
         Parameters
         ----------
         values : dict
-            ``axis`` and ``degrees`` of the turn, ``epsilon``, and the ``seed`` of what is drawn.
+            ``axis`` and ``degrees`` of the turn, ``epsilon``, and the ``seed`` of the random numbers.
         blobs : dict of bytes
             The repaired solid (`rlacd.learn.meshes.SOLID`), or the files of the mesh.
         shared : dict of Shared
             ``setting``: ``options`` as JSON, and the ``encoder``'s file of weights if it has one. ``network``:
-            ``weights``; while there is none, cuts are random.
+            ``weights``; without it, cuts are random.
 
         Returns
         -------
         dict
-            Nothing.
+            Empty.
         dict of bytes
             ``record``, and `SOLID` if it had to be repaired.
         """
@@ -82,7 +82,7 @@ class RolloutServer:
         return Player(cutting, options, self._encoder, network, values["epsilon"], rng).play()
 
     def _take_over(self, shared: Mapping[str, Shared]) -> None:
-        """Make of what is shared what has changed since the last time."""
+        """Rebuild whatever changed in the shared data since the last request."""
         setting = shared["setting"]
         if setting.key != self._setting:
             self._options = TrainOptions(**json.loads(setting.blobs["options"]))

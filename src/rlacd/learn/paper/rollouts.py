@@ -1,8 +1,8 @@
-"""Episodes played by a pool, some ahead of the learner, and taken over in the order of their numbers.
+"""Episodes played by a pool, some ahead of the learner, and consumed in order of their numbers.
 
-Episode n is drawn from the seed and n alone, and is played by the network as it is when episode n - E has been taken
-over, E being how many are side by side. So what is learned does not depend on how many processes play, where they are,
-how fast, or whether one of them dies: its episode is played again.
+Episode n is drawn from the seed and n alone, and is played by the network as of the moment when episode n - E has been
+consumed, where E is the number of concurrent episodes. So the result of learning does not depend on the number, place
+or speed of the processes, or on the death of one: its episode is played again.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from rlacd.learn.paper.rollout_server import SERVER
 from rlacd.pool import Answer, Pool, ProcessLimits, Request, Shared, WorkerDiedError, submit_with_retry
 
 LOST = 10
-"""So many episodes in a row that no process could play, and it is not the meshes' fault."""
+"""Training stops after this many consecutive episodes that could not be played, since the meshes cannot be at fault."""
 
 MESH, ACT = 1, 2
-"""Streams of an episode's random numbers."""
+"""Random streams of an episode."""
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,9 @@ class Acting:
     Attributes
     ----------
     network : Shared or None
-        Weights of the Q network; None for cuts at random.
+        Weights of the Q network; None for random cuts.
     epsilon : float
-        Share of cuts at random in any case.
+        Fraction of random cuts in any case.
     """
 
     network: Shared | None
@@ -51,20 +51,20 @@ class Acting:
 
 
 class Rollouts:
-    """Plays episodes without end.
+    """An endless sequence of episodes.
 
     Parameters
     ----------
     pool : Pool
-        Closed by whoever made it.
+        Closed by the caller.
     solids : Solids
     names : sequence of str
         The meshes to draw from.
     options : TrainOptions
-    limits : Limits
-        Of one episode.
+    limits : ProcessLimits
+        Limits of one episode.
     say : callable
-        Is told of episodes that nobody could play.
+        Receives messages about episodes that could not be played.
     """
 
     def __init__(
@@ -88,20 +88,20 @@ class Rollouts:
         self._lost = 0
 
     def begin(self, acting: Acting) -> None:
-        """Begin episodes until there are as many ahead as there should be."""
+        """Start episodes until the required number is ahead."""
         while len(self._ahead) < self._options.environments:
             self._ahead.append(self._episode(self._begun, acting))
             self._begun += 1
 
     def take(self) -> Record:
-        """Wait for the next episode, by number, and take it over; one without a cut has nothing to teach.
+        """Wait for the next episode in order and return it; episodes without a cut are skipped.
 
         Raises
         ------
         TrainingError
-            Many in a row had nothing to teach, or none of them could be played.
+            Many consecutive episodes had no cut, or none of them could be played.
         RlacdError
-            What went wrong with all of them: no GPU where one is asked for, ...
+            The error of all of them, such as a missing GPU.
         """
         record = self._record(self._ahead.popleft())
         self._in_vain = 0 if record.cuts else self._in_vain + 1
@@ -116,7 +116,7 @@ class Rollouts:
         return record
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """Wait for all that is ahead; returns everything as arrays."""
+        """Wait for all episodes ahead, and return everything as arrays."""
         self._ahead = deque(self._record(episode) for episode in self._ahead)
         arrays: dict[str, NDArray[Any]] = {"counts": np.array([self._begun, len(self._ahead), self._in_vain])}
         for i, record in enumerate(self._ahead):
@@ -125,7 +125,7 @@ class Rollouts:
         return arrays
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Go back to where `state` was told."""
+        """Restore the result of `state`."""
         self._begun, ahead, self._in_vain = (int(count) for count in arrays["counts"])
         fields = [field.name for field in dataclasses.fields(Record)]
         self._ahead = deque(Record.of({name: arrays[f"{i}.{name}"] for name in fields}) for i in range(ahead))
@@ -159,7 +159,7 @@ class Rollouts:
 
 @dataclass(frozen=True)
 class _Episode:
-    """An episode that is being played."""
+    """An episode in progress."""
 
     number: int
     start: Start

@@ -1,4 +1,4 @@
-"""Draws in proportion to weights that change: a binary tree of sums."""
+"""Sampling in proportion to changing weights: a binary sum tree."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from numpy.typing import ArrayLike, NDArray
 
 
 class SumTree:
-    """Weights of `size` items; setting and drawing take time in the logarithm of it.
+    """Weights of `size` items; setting and drawing take logarithmic time.
 
-    Invariant: node i holds the sum of nodes 2 i and 2 i + 1; the items are the leaves. Sums are always taken from the
-    two children, never updated by differences, so they depend on the weights alone, not on their history.
+    Invariant: node i holds the sum of nodes 2 i and 2 i + 1; the items are the leaves. Sums are always recomputed from
+    the two children, never updated by differences, so they depend on the weights alone, not on their history.
     """
 
     def __init__(self, size: int) -> None:
@@ -29,7 +29,7 @@ class SumTree:
         return weights
 
     def set(self, items: NDArray[np.int64], weights: NDArray[np.float64]) -> None:
-        """Set weights >= 0; of items named twice the last counts."""
+        """Set weights >= 0; for an item named twice the last weight counts."""
         nodes = np.asarray(items, dtype=np.int64) + self._leaves
         self._sums[nodes] = weights
         for _ in range(self._depth):
@@ -37,12 +37,12 @@ class SumTree:
             self._sums[nodes] = self._sums[2 * nodes] + self._sums[2 * nodes + 1]
 
     def draw(self, at: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Items at shares `at` in [0, 1) of the accumulated weights."""
+        """Return the items at fractions `at`, in [0, 1), of the cumulative weights."""
         remaining = np.asarray(at) * self.total
         nodes = np.ones(len(remaining), dtype=np.int64)
         for _ in range(self._depth):
             left = self._sums[2 * nodes]
-            # A share that rounding puts beyond the last weight stays with the last item that has one.
+            # If rounding pushes a fraction past the last weight, it stays with the last item of positive weight.
             right = (remaining >= left) & (self._sums[2 * nodes + 1] > 0)
             remaining = np.where(right, remaining - left, remaining)
             nodes = 2 * nodes + right

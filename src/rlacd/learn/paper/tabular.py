@@ -1,11 +1,11 @@
 """Tabular dual-state Q-learning on cut trees small enough to solve exactly (the paper's appendix A).
 
-A *cut tree* holds everything that a few planes can make of a solid in a few cuts. Its nodes are states of their own, or
-all nodes that look alike are one state: a partial observation knows a component's shape but not its size, so that a
-component and what is cut from it can be the same state, and the process has loops though every solid is finite.
-With discounts that add up to less than 1 the Bellman operator contracts in the maximum norm, and Q-learning converges;
-with shares of the hull volume that is so wherever a cut saves volume. Constant discounts that add up to more than 1
-make values grow along the loops without bound; at exactly 1 they grow as long as a loop earns anything.
+A *cut tree* holds everything that a few planes can make of a solid in a few cuts. Either every node is its own state,
+or all nodes that look alike share one: a partial observation sees a component's shape but not its size, so a component
+and a piece of it can be the same state, and the process has loops although every solid is finite. With discounts that
+add up to less than 1 the Bellman operator is a contraction in the maximum norm, and Q-learning converges; for shares of
+the hull volume that holds wherever a cut saves volume. With constant discounts that add up to more than 1 values grow
+along the loops without bound; at exactly 1 they grow as long as a loop has a positive reward.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from rlacd.solid.component import Component
 MIDDLE = OFFSETS_PER_AXIS // 2
 
 DIVERGED = 1e100
-"""Values beyond this do not come back."""
+"""Values beyond this have diverged."""
 
 UNKNOWN = -1
-"""A child below the lowest cuts of the tree that looks like no state: its value is 0."""
+"""A child below the tree's last level that looks like no known state: its value is 0."""
 
 
 @dataclass(frozen=True)
 class TabularOutcome:
-    """What a plane makes of a node.
+    """Outcome of cutting a node by a plane.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class TabularOutcome:
     finished : float
         r_2 of the process whose solid is the node.
     children : list of Node
-        The unfinished ones.
+        The unfinished children.
     discounts : list of float
         Eq. 9.
     """
@@ -57,12 +57,12 @@ class TabularOutcome:
 
 @dataclass(eq=False)
 class Node:
-    """A component and what a few planes make of it; none at the lowest depth.
+    """A component and its outcomes for a few planes; empty at the last level.
 
     Attributes
     ----------
     looks : tuple of int
-        What a coarse partial observation sees: shape, not size.
+        A coarse partial observation: shape, not size.
     """
 
     hull_volume: float
@@ -71,12 +71,12 @@ class Node:
 
 
 def middle_planes(axes: Sequence[int] = (0, 1, 2)) -> list[int]:
-    """Numbers of the candidates that halve a component's extent along some of its 6 directions."""
+    """Indices of the candidates that halve a component's extent along the given directions (of 6)."""
     return [axis * OFFSETS_PER_AXIS + MIDDLE for axis in axes]
 
 
 def grow(solid: Component, criterion: Criterion, planes: Sequence[int], depth: int, bins: int = 3) -> list[Node]:
-    """Try all of `planes` on a solid's unfinished components, on what they leave, and so on, `depth` cuts deep.
+    """Try all of `planes` on a solid's unfinished components, then on their pieces, and so on, `depth` cuts deep.
 
     Returns
     -------
@@ -123,11 +123,11 @@ class Process:
 
     Attributes
     ----------
-    pair : int64 [N]
+    State * actions + action of each sample.
         Of each sample, state * actions + action.
     reward : float64 [N]
     owner, child : int64 [C]
-        Sample and state of each child, `UNKNOWN` where its value is 0.
+        Sample and state of each child; `UNKNOWN` for a child of value 0.
     discount : float64 [C]
     states, actions : int
     """
@@ -142,13 +142,13 @@ class Process:
 
     @property
     def possible(self) -> NDArray[np.bool_]:
-        """Which (state, action) have a sample [S, A]."""
+        """Which (state, action) pairs have a sample [S, A]."""
         seen: NDArray[np.bool_] = np.zeros(self.states * self.actions, dtype=bool)
         seen[self.pair] = True
         return seen.reshape(self.states, self.actions)
 
     def values(self, q: FloatArray) -> FloatArray:
-        """V(s) = max_a Q(s, a) over possible actions [S], and 0 for `UNKNOWN`, which comes last [S + 1]."""
+        """V(s) = max_a Q(s, a) over possible actions [S], followed by 0 for `UNKNOWN` [S + 1]."""
         best = np.where(self.possible, q, -np.inf).max(axis=1)
         return np.append(np.where(np.isfinite(best), best, 0.0), 0.0)
 
@@ -166,7 +166,7 @@ class Process:
         return backed
 
     def solve(self, iterations: int = 10_000, tolerance: float = 1e-10) -> FloatArray | None:
-        """Exact dynamic programming: Q* [S, A]; None when it does not converge."""
+        """Exact dynamic programming: Q* [S, A]; None if it does not converge."""
         q = np.zeros((self.states, self.actions))
         for _ in range(iterations):
             backed = self.backup(q)
@@ -187,14 +187,14 @@ def process_of(
     volume_reward: float = 1.0,
     finish_reward: float = 1.0,
 ) -> Process:
-    """Make a process of cut trees.
+    """Build a process from cut trees.
 
     Parameters
     ----------
     alike : bool
-        Nodes that look alike are one state; else each node is its own.
+        Whether nodes that look alike share a state; otherwise each node is its own.
     static_discount : float, optional
-        For each child, instead of its share of the hull volume (eq. 9).
+        Constant discount of each child, instead of its share of the hull volume (eq. 9).
     """
     nodes = [node for node in all_nodes(roots) if node.outcomes]
     key: Callable[[Node], object] = (lambda node: node.looks) if alike else id
@@ -218,14 +218,14 @@ def process_of(
 def q_learning(
     process: Process, steps: int, rng: np.random.Generator, *, every: int = 1000, rate: float = 0.51
 ) -> list[FloatArray]:
-    """Learn Q from samples one at a time, all pairs alike; the step size is (visits of the pair) ** -rate.
+    """Learn Q from one sample at a time, all pairs equally likely; the step size is (visits of the pair) ** -rate.
 
     Step sizes with a rate in (1/2, 1] meet the conditions of stochastic approximation.
 
     Returns
     -------
     list of float64 [S, A]
-        Q before the first step, and after each `every` steps; the last ones may be infinite.
+        Q before the first step, and after every `every` steps; the last ones may be infinite.
     """
     q = np.zeros((process.states, process.actions))
     possible = process.possible

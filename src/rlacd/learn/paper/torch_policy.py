@@ -1,4 +1,4 @@
-"""The Q network as it is in training, as a policy."""
+"""The Q network in training as a policy."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rlacd.policies.qpolicy import QPolicy
 
 
 def torch_policy(network: QNetwork, encoder: Encoder, options: TrainOptions, **deployment: int) -> QPolicy:
-    """Make a policy of the network as it is now; `deployment` is `QPolicy`'s shortlist and concave_edges."""
+    """Make a policy of the current network; `deployment` is `QPolicy`'s shortlist and concave_edges."""
     device = next(network.parameters()).device
 
     def values(seen: Observation) -> Float32Array:

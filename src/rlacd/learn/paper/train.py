@@ -1,9 +1,9 @@
-"""RL-ACD's training, from top to bottom as the paper tells it: cut, remember, learn from what a cut left behind.
+"""RL-ACD's training, from top to bottom as in the paper: cut, store, and learn from the children of each cut.
 
 Deep soft Q-learning on the dual-state Bellman equation (`rlacd.learn.paper.loss`), with components as states
 (`rlacd.learn.paper.mdp`). A pool of processes plays episodes (`rlacd.learn.paper.rollouts`), and this process learns
 from them. On CPU the same meshes, options and seed give the same weights bit for bit, wherever episodes are played and
-whether the run was interrupted or not: a checkpoint holds everything that decides what comes next.
+whether or not the run was interrupted: a checkpoint holds the complete state.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from rlacd.pool import InProcessPool, Pool, ProcessLimits, Shared
 Say = Callable[[str], None]
 
 MOST_PARTS = 64
-"""A policy that makes more of one solid is stopped there when it is validated: early in training some never end."""
+"""Maximum number of parts of a solid in validation: early in training some policies never finish."""
 
 
 def train(
@@ -68,13 +68,13 @@ def train(
         Folder for the curves (``curves.jsonl``, ``tensorboard/``), the checkpoint and the exported policy.
     options : TrainOptions
     resume : bool
-        Go on from the checkpoint in `run`, exactly; without one, start.
+        Continue exactly from the checkpoint in `run`; without one, start afresh.
     say : callable
-        Takes a line of progress.
+        Receives lines of progress.
     pool : Pool, optional
-        Where episodes are played; in this process by default. It decides nothing but how long that takes.
+        Where episodes are played; in this process by default. It affects only the time taken.
     limits : Limits, optional
-        Of one episode.
+        Limits of one episode.
 
     Returns
     -------
@@ -84,9 +84,9 @@ def train(
     Raises
     ------
     OptionError
-        `run` holds another run, or the options do not fit the one to be resumed.
+        `run` holds another run, or the options do not match the run to be resumed.
     TrainingError
-        There are no usable meshes, the checkpoint is damaged, or no process can play.
+        There are no usable meshes, the checkpoint is damaged, or episodes cannot be played.
     """
     torch.set_num_threads(options.threads)
     checkpoint = load_checkpoint(run / "checkpoint")
@@ -150,13 +150,13 @@ class Training:
         self.sums: dict[str, float] = {}
         self.best = np.inf
         self.baseline: Score | None = None
-        self.shown: tuple[int, Shared] | None = None  # the network that was shared last, after so many steps
+        self.shown: tuple[int, Shared] | None = None  # number of steps and weights of the network last shared
         self.curves = Curves(run)
 
     # The algorithm
 
     def run(self) -> None:
-        """Have episodes played and learn from them until the last iteration."""
+        """Play episodes and learn from them until the last iteration."""
         options, started, saved, before = self.options, time.perf_counter(), time.perf_counter(), self.seconds
         while self.cuts < options.iterations:
             self.rollouts.begin(self.acting())
@@ -173,7 +173,7 @@ class Training:
         self.save()
 
     def acting(self) -> Acting:
-        """Say how episodes that begin now are played: at random at first, then by the network as it is."""
+        """Return how new episodes are played: at random at first, then by the current network."""
         options = self.options
         if self.cuts < options.warmup:
             return Acting(None, 1.0)
@@ -184,7 +184,7 @@ class Training:
         return Acting(self.shown[1], epsilon)
 
     def learn_from(self, record: Record) -> None:
-        """Put an episode into the replay buffer cut by cut, and learn after each."""
+        """Add an episode to the replay buffer cut by cut, and learn after each."""
         rows = iter(self._keep(record))
         frontier = list(islice(rows, int(record.joined[0])))
         discounts = iter(record.discounts[int(record.joined[0]) :].tolist())
@@ -216,14 +216,14 @@ class Training:
         return earned - self.options.cut_cost
 
     def learn(self) -> None:
-        """Take a gradient step on the dual-state Bellman loss of a batch."""
+        """Take a gradient step on the dual-state Bellman loss of one batch."""
         options = self.options
         batch = self.replay.sample(options.batch, self.rng)
         with torch.no_grad():
             q = self.target(self._tensor(batch.child_features))
             values = soft_value(q, self._tensor(batch.child_masks), options.temperature)
             if options.value_bound:
-                # Nothing is ever worse than to cut until the episode is broken off.
+                # The worst possible return is to cut until the episode is truncated.
                 values = values.clamp_min(-options.cut_cost * options.max_cuts)
                 values = torch.minimum(values, self._tensor(batch.child_bounds))
             target = dual_state_target(
@@ -241,10 +241,10 @@ class Training:
         self._add("loss", float(loss.detach()))
         self._add("target", float(target.mean()))
 
-    # What is told of it
+    # Logging and validation
 
     def log(self) -> None:
-        """Write a point of the curves: means since the last one."""
+        """Append a point to the curves: means since the last one."""
         counts = {name[2:]: n for name, n in self.sums.items() if name.startswith("n ")}
         means = {name: self.sums[name] / n for name, n in counts.items() if not name.startswith("ended_")}
         means |= {name: self.sums[name] for name in counts if name.startswith("ended_")}
@@ -270,10 +270,10 @@ class Training:
             self.best = values["merged_ratio"]
             self._save_weights("best.safetensors")
 
-    # Beginning, ending, going on
+    # Start, checkpoint, resume, finish
 
     def begin(self) -> None:
-        """Begin with nothing."""
+        """Initialise a new run."""
         self.curves.restart(0)
 
     def save(self) -> None:
@@ -296,7 +296,7 @@ class Training:
         save_checkpoint(self.folder / "checkpoint", checkpoint)
 
     def restore(self, checkpoint: Checkpoint) -> None:
-        """Go back to where a checkpoint was written."""
+        """Restore a checkpoint."""
         state = checkpoint.state
         require_same(state["options"], self.options, MAY_CHANGE)
         if state.get("encoder", "") != _digest(self.encoder):
@@ -316,7 +316,7 @@ class Training:
         self.curves.restart(self.cuts)
 
     def export(self) -> Path:
-        """Export the best network, or the last one where none was validated."""
+        """Export the best network, or the current one if none was validated."""
         from safetensors.torch import load_file
 
         best = self.folder / "best.safetensors"
@@ -327,7 +327,7 @@ class Training:
         return export_policy(self.folder / "policy.onnx", self.encoder, network, self.options)
 
     def close(self) -> None:
-        """End the curves."""
+        """Close the curves."""
         self.curves.close()
 
     def _keep(self, record: Record) -> list[int]:
@@ -367,7 +367,7 @@ MAY_CHANGE = frozenset(
         "encoder_weights",
     }
 )
-"""Options that a resumed run may be given anew: how long it goes on, what it tells, where it and its files are."""
+"""Options that may change when a run is resumed: its length, its logging, its place and files."""
 
 
 def _encoder(options: TrainOptions) -> AnyEncoder:
@@ -378,7 +378,7 @@ def _encoder(options: TrainOptions) -> AnyEncoder:
 
 
 def _digest(encoder: AnyEncoder) -> str:
-    """Identify an encoder's weights; those without a file always have the same."""
+    """Identify an encoder's weights; encoders without a weights file always have the same."""
     return encoder.digest() if isinstance(encoder, I2PMAEEncoder) else ""
 
 

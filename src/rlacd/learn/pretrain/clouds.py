@@ -1,4 +1,4 @@
-"""Point clouds to pretrain on: many points of each mesh, kept once, of which every step draws some."""
+"""Point clouds for pretraining: many points of each mesh, sampled once; every step draws a subset."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from rlacd.learn.meshes import TURNS
 from rlacd.policies.observe import Float32Array
 
 KEPT = 8192
-"""Points of a mesh that are kept."""
+"""Points stored per mesh."""
 
 
 class Clouds:
-    """Clouds of the surfaces of meshes as they stand in their files, centred, in the unit ball.
+    """Surface samples of meshes in their files' orientation, centred, in the unit ball.
 
     Parameters
     ----------
     folder : Path
-        Of the meshes.
+        Folder of the meshes.
     names : sequence of str
-        Relative to it. A mesh without any surface is left out.
+        Relative to it. Meshes without a surface are skipped.
     kept : Path
-        A file of this class's own, ``.npy``: written once, then mapped into memory; its ``.json`` lists the names.
+        Cache file of this class, ``.npy``: written once, then mapped into memory; its ``.json`` lists the names.
 
     Raises
     ------
@@ -50,13 +50,13 @@ class Clouds:
         return len(self.names)
 
     def draw(self, rows: Sequence[int], count: int, rng: np.random.Generator) -> Float32Array:
-        """Draw `count` points of each of some clouds, [B, count, 3], in random order."""
+        """Draw `count` points from each of the given clouds, [B, count, 3], in random order."""
         order = rng.random((len(rows), KEPT), dtype=np.float32).argsort(axis=1)[:, :count]
         return np.stack([self._points[row][chosen] for row, chosen in zip(rows, order, strict=True)])
 
 
 def augmented(clouds: Float32Array, rotate: bool, stretch: float, rng: np.random.Generator) -> Float32Array:
-    """Turn each cloud [B, N, 3] about an axis, stretch it along each, and bring it back into the unit ball."""
+    """Turn each cloud [B, N, 3] about an axis, stretch it along each, and rescale it into the unit ball."""
     changed = np.empty_like(clouds)
     for i, cloud in enumerate(clouds):
         matrix = _turn(int(rng.integers(3)), float(rng.choice(TURNS))) if rotate else np.eye(3)
@@ -66,14 +66,14 @@ def augmented(clouds: Float32Array, rotate: bool, stretch: float, rng: np.random
 
 
 def in_unit_ball(points: np.ndarray) -> np.ndarray:
-    """Centre the box around points [N, 3] and scale the farthest one to distance 1."""
+    """Centre the bounding box of points [N, 3] and scale the farthest point to distance 1."""
     centered = points - (points.min(axis=0) + points.max(axis=0)) / 2
     scaled: np.ndarray = centered / np.sqrt((centered**2).sum(axis=1).max())
     return scaled
 
 
 def epoch_rows(clouds: int, batch: int, step: int, seed: int) -> list[int]:
-    """Tell which clouds a step sees: every cloud once, in random order, before any comes again."""
+    """Return the clouds of a step: every cloud once per epoch, in random order."""
     places = range(step * batch, (step + 1) * batch)
     orders = {e: np.random.default_rng([seed, 1, e]).permutation(clouds) for e in {p // clouds for p in places}}
     return [int(orders[p // clouds][p % clouds]) for p in places]

@@ -1,10 +1,10 @@
-"""Masked point reconstruction: the 3-D half of I2P-MAE, with all that is hidden left out of the encoder's work.
+"""Masked point reconstruction: the 3-D half of I2P-MAE, in which the encoder skips everything hidden.
 
-Most groups of the coarsest scale are hidden, and of the finer scales those that no seen group has as a member. The
-encoder sees the rest. A light decoder then says, for each hidden group of the scale before the last, where its members
-lie around its centre; the loss is the Chamfer distance to where they do. It is told in squares of the distance that a
-cloud's members have from their centres in the mean: to say that all lie at the centre costs 2. I2P-MAE's other half,
-which chooses and paints by what networks of 2-D pictures know, is not here.
+Most groups of the coarsest scale are hidden, and with them those of the finer scales that no seen group has as a
+member. The encoder processes the rest. A light decoder then predicts, for each hidden group of the scale before the
+last, the positions of its members around its centre; the loss is the Chamfer distance to the true ones. Its unit is the
+mean squared distance of a cloud's members from their centres, so predicting all at the centre costs 2. I2P-MAE's other
+half, which uses 2-D image networks to choose what is hidden and to add targets, is not implemented.
 
 Source: Zhang et al., "Point-M2AE", NeurIPS 2022, and "I2P-MAE", CVPR 2023.
 """
@@ -19,11 +19,11 @@ from rlacd.learn.encoders.point_groups import gather, nearest_points
 from rlacd.learn.encoders.transformer import Blocks, position_embedding
 
 INTERPOLATED = 3
-"""Coarse tokens that a finer one is made of."""
+"""Coarse tokens from which a finer one is interpolated."""
 
 
 class MaskedAutoencoder(nn.Module):
-    """Encoder and decoder; what is kept in the end is `encoder`.
+    """Encoder and decoder; only `encoder` is kept after pretraining.
 
     Parameters
     ----------
@@ -51,9 +51,9 @@ class MaskedAutoencoder(nn.Module):
         ----------
         clouds : float32 [B, N, 3]
         chances : float32 [B, G]
-            One number a group of the coarsest scale; those with the greatest are hidden.
+            A random number per group of the coarsest scale; the groups with the greatest are hidden.
         hidden : float
-            Their share.
+            Fraction of groups to hide.
         """
         pyramid = self.encoder.h_encoder
         scales = pyramid.pyramid(clouds)
@@ -61,7 +61,7 @@ class MaskedAutoencoder(nn.Module):
         tokens = encode_seen(pyramid, scales, seen)
         unseen = seen[-2] == 0
         found = self.members(self._decode(scales, seen, tokens)[unseen]).unflatten(-1, (-1, 3))
-        # In the clouds' own unit the members lie so close together that to say "all at the centre" is where it ends.
+        # In the clouds' own unit members lie so close together that training gets stuck at "all at the centre".
         true = scales[-2].offsets
         unit = true.square().sum(-1).mean(dim=(1, 2)).sqrt()
         return chamfer(found, (true / unit[:, None, None, None])[unseen])
@@ -76,19 +76,19 @@ class MaskedAutoencoder(nn.Module):
 
 
 def seen_groups(chances: Tensor, hidden: float) -> Tensor:
-    """Tell which groups are seen, 1 or 0 [B, G]: as many in every cloud, at least one, and at least one is not."""
+    """Which groups are seen, 1 or 0 [B, G]: the same number in every cloud, with at least one seen and one hidden."""
     groups = chances.shape[1]
     count = min(max(round(groups * (1 - hidden)), 1), groups - 1)
     return torch.zeros_like(chances).scatter(1, chances.argsort(dim=1, stable=True)[:, :count], 1.0)
 
 
 def encode_seen(encoder: HierarchicalEncoder, scales: list[Scale], seen: list[Tensor]) -> list[Tensor]:
-    """Encode what is seen, and touch nothing else.
+    """Encode only the seen groups.
 
     Returns
     -------
     list of float32 [S, C]
-        Per scale the tokens of its seen groups, in the order of ``seen == 1``, after the scale's norm.
+        Tokens of the seen groups per scale, in the order of ``seen == 1``, after the scale's norm.
     """
     normed = []
     below: Tensor | None = None
@@ -96,7 +96,7 @@ def encode_seen(encoder: HierarchicalEncoder, scales: list[Scale], seen: list[Te
         cloud = visible.nonzero()[:, 0]
         members = scale.members[visible]
         embedded = encoder.token_embed[i](scale.offsets[visible] if below is None else below[cloud[:, None], members])
-        # Clouds differ in how many groups of a finer scale are seen: they are packed to the front of equal rows.
+        # Clouds differ in their number of seen groups at finer scales: these are packed to the front of equal rows.
         longest = int(visible.sum(dim=1).max())
         slots = (~visible).int().argsort(dim=1, stable=True)[:, :longest]
         present = visible.gather(1, slots)
@@ -111,18 +111,18 @@ def encode_seen(encoder: HierarchicalEncoder, scales: list[Scale], seen: list[Te
 
 
 def interpolated(tokens: Tensor, at: Tensor, to: Tensor) -> Tensor:
-    """Carry tokens [B, G, C] from centres `at` [B, G, 3] to others [B, F, 3], nearer ones counting more."""
+    """Interpolate tokens [B, G, C] from centres `at` [B, G, 3] to others [B, F, 3], weighted by proximity."""
     nearest = nearest_points(at, to, INTERPOLATED)
     weight = 1 / ((gather(at, nearest) - to[:, :, None]).square().sum(-1, keepdim=True) + 1e-8)
     return (gather(tokens, nearest) * (weight / weight.sum(dim=2, keepdim=True))).sum(dim=2)
 
 
 def chamfer(found: Tensor, true: Tensor) -> Tensor:
-    """Mean squared distance of points [M, K, 3] to the nearest true one, and the other way, added."""
+    """Mean squared distance of points [M, K, 3] to the nearest true one, plus the same in reverse."""
     squares = (found[:, :, None] - true[:, None]).square().sum(-1)
     return squares.amin(dim=2).mean() + squares.amin(dim=1).mean()
 
 
 def _placed(tokens: Tensor, seen: Tensor, hidden: Tensor) -> Tensor:
-    """Tokens [B, G, C]: those of seen groups at their places, `hidden` [C] at the others."""
+    """Tokens [B, G, C]: those of seen groups in place, `hidden` [C] elsewhere."""
     return hidden.expand(*seen.shape, -1).masked_scatter(seen[:, :, None] > 0, tokens)

@@ -1,4 +1,4 @@
-"""The options of a pretraining: one dataclass, whose fields are also the command line and its help."""
+"""The options of pretraining: one dataclass, whose fields also define the command line and its help."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rlacd.fields import check_fields, option
 
 @dataclass(frozen=True)
 class PretrainOptions:
-    """Everything that decides the weights; ``(paper)`` marks what Point-M2AE and I2P-MAE state.
+    """All options that affect the weights; ``(paper)`` marks values stated by Point-M2AE and I2P-MAE.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Pretraining of the I2P-MAE encoder on a folder of meshes, from top to bottom.
 
-Whatever is random in a step comes from the seed and the step's number alone, so that a resumed run is the run that was
-never stopped, and on CPU the same seed gives the same weights.
+The random numbers of a step come from the seed and the step's number alone, so a resumed run equals an uninterrupted
+one, and on CPU the same seed gives the same weights.
 """
 
 from __future__ import annotations
@@ -32,26 +32,26 @@ from rlacd.policies.observe import Float32Array
 Say = Callable[[str], None]
 
 MAY_CHANGE = frozenset({"threads", "device", "log_every", "validate_every", "checkpoint_seconds"})
-"""Options that a resumed run may be given anew."""
+"""Options that may change when a run is resumed."""
 
 VALIDATION_BATCH = 32
 
 
 def pretrain(meshes: Path, out: Path, options: PretrainOptions, *, resume: bool = False, say: Say = print) -> Path:
-    """Make encoder weights out of a folder of meshes, without any labels.
+    """Pretrain encoder weights on a folder of meshes, without labels.
 
     Parameters
     ----------
     meshes : Path
         Folder of mesh files, searched to any depth.
     out : Path
-        The weights, ``.safetensors``. Beside it the folder ``<name>.run`` gets the points, the curves
+        Output file of the weights, ``.safetensors``. The folder ``<name>.run`` beside it gets the points, the curves
         (``curves.jsonl``, ``tensorboard/``) and the checkpoint.
     options : PretrainOptions
     resume : bool
-        Go on from the checkpoint, exactly; without one, start.
+        Continue exactly from the checkpoint; without one, start afresh.
     say : callable
-        Takes a line of progress.
+        Receives lines of progress.
 
     Returns
     -------
@@ -61,7 +61,7 @@ def pretrain(meshes: Path, out: Path, options: PretrainOptions, *, resume: bool 
     Raises
     ------
     OptionError
-        `out` has another ending, its run was begun already, or the options do not fit the one to be resumed.
+        `out` has another ending or already has a run, or the options do not match the run to be resumed.
     TrainingError
         There are no usable meshes, or the checkpoint is damaged.
     """
@@ -112,7 +112,7 @@ class Pretraining:
         self.curves = Curves(folder, "step")
 
     def run(self) -> None:
-        """Learn until the last step."""
+        """Train until the last step."""
         options, started, saved, before = self.options, time.perf_counter(), time.perf_counter(), self.seconds
         while self.step < options.steps:
             self.losses.append(self.learn())
@@ -150,7 +150,7 @@ class Pretraining:
 
     @torch.no_grad()
     def validate(self) -> float:
-        """Get the loss on the held-out clouds: always the same points, and the same groups hidden."""
+        """Return the loss on the held-out clouds: always the same points, with the same groups hidden."""
         self.model.eval()
         rng = np.random.default_rng([self.options.seed, 3])
         total = 0.0
@@ -160,7 +160,7 @@ class Pretraining:
         return total / len(self.held_out)
 
     def log(self) -> None:
-        """Write a point of the curves: the mean loss since the last one."""
+        """Append a point to the curves: the mean loss since the last one."""
         loss = sum(self.losses) / len(self.losses)
         self.losses = []
         rate = learning_rate(self.options, self.step)
@@ -180,7 +180,7 @@ class Pretraining:
         save_checkpoint(self.folder / "checkpoint", Checkpoint(weights, {}, state))
 
     def restore(self, checkpoint: Checkpoint) -> None:
-        """Go back to where a checkpoint was written."""
+        """Restore a checkpoint."""
         state = checkpoint.state
         require_same(state["options"], self.options, MAY_CHANGE)
         self.model.load_state_dict({k[6:]: v for k, v in checkpoint.weights.items() if k.startswith("model.")})
@@ -197,7 +197,7 @@ class Pretraining:
 
 
 def learning_rate(options: PretrainOptions, step: int) -> float:
-    """Get the rate of a step: a straight rise, then half a cosine down to nothing."""
+    """Return the learning rate of a step: linear warm-up, then half a cosine down to zero."""
     rise = options.rise * options.steps
     if step < rise:
         return options.learning_rate * (step + 1) / (rise + 1)

@@ -1,1 +1,1 @@
-"""The guide: a small network that ranks the planes of a sweep by the parts they will end in, learned from rollouts."""
+"""The plane ranker: a small network that ranks planes by the final number of parts, learned from rollouts."""

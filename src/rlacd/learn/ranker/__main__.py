@@ -1,4 +1,4 @@
-"""``python -m rlacd.learn.ranker MESHES WORK``: train a guide from scratch, or go on with a run."""
+"""``python -m rlacd.learn.ranker MESHES WORK``: train a plane ranker from scratch, or continue a run."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rlacd.pool import open_pool
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; 1 with one sentence on standard error when it cannot."""
+    """Run the command; returns 1 after one sentence on standard error if it fails."""
     about = "Train a guide from scratch, or go on with a run."
     parser = argparse.ArgumentParser(prog="python -m rlacd.learn.ranker", description=about)
     for option in fields(TrainOptions):

@@ -25,7 +25,8 @@ def export(network: Ensemble, path: Path, about: dict[str, Any]) -> None:
     path : Path
         Ends in ``.onnx``.
     about : dict
-        Goes into both files' metadata as JSON: what the policy has to know (see `rlacd.policies.learned`), and where
+        Goes into both files' metadata as JSON: inputs of the policy (see `rlacd.policies.learned`), and the weights'
+        origin.
         the weights come from.
     """
     about = {"kind": "guide", "features": VERSION, "per_axis": OFFSETS_PER_AXIS, "width": network.width, **about}
@@ -39,7 +40,7 @@ def export(network: Ensemble, path: Path, about: dict[str, Any]) -> None:
     path.write_bytes(onnx_bytes(model, about))
     weights = path.with_suffix(".safetensors")
     save_file(network.state_dict(), weights, {"rlacd": json.dumps(about, sort_keys=True)})
-    weights.chmod(0o644)  # it is written for its owner only
+    weights.chmod(0o644)  # temporary files are private to their owner
 
 
 def load_network(path: Path) -> Ensemble:

@@ -16,10 +16,10 @@ from rlacd.learn.ranker.network import RankerNetwork
 from rlacd.policies.features import features
 
 SHARPNESS = 8.0
-"""Of the distributions that the listwise loss compares: 10 % more parts halve a plane's weight (2 ** -1.1)."""
+"""Temperature of the distributions in the listwise loss: 10 % more parts halve a plane's weight (2 ** -1.1)."""
 
 THINNED = 0.3
-"""Share of the batches of which every second plane is left out, since rollouts see components that way."""
+"""Fraction of batches with every second plane left out, since rollouts see components that way."""
 
 
 @dataclass
@@ -32,13 +32,13 @@ class Dataset:
     edges : float32 [S, 12, 22]
     component : float32 [S, 10]
     index : int64 [S, W]
-        Numbers of the labelled planes, those of the edges after the others; 0 where there are fewer than W.
+        Indices of the labelled planes, those of concave edges last; padded with 0 up to W.
     parts : float32 [S, W]
         log(parts).
     known : bool [S, W]
         Whether there is a label.
     given_up : bool [S, W]
-        The true number may be larger.
+        Whether the rollout was given up, so that the true number may be larger.
     """
 
     planes: Tensor
@@ -53,7 +53,7 @@ class Dataset:
         return len(self.component)
 
     def take(self, rows: Tensor) -> Dataset:
-        """Pick states."""
+        """Select states."""
         return Dataset(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
     def thinned(self) -> Dataset:
@@ -104,7 +104,7 @@ def load_labels(paths: Sequence[Path]) -> Dataset:
 def loss(network: RankerNetwork, batch: Dataset, listwise: float) -> Tensor:
     """Mean loss of a batch.
 
-    A label that was given up is only a lower bound: predictions above it cost nothing.
+    A label that was given up is only a lower bound: predictions above it are not penalised.
     """
     q, value = _of_labels(network, batch)
     known = batch.known
@@ -172,7 +172,7 @@ def fit(
 
 @torch.no_grad()
 def judge(network: RankerNetwork, data: Dataset, listwise: float) -> dict[str, float]:
-    """Loss on held-out labels, and how much worse than the best labelled plane the network's and the policy's are."""
+    """Loss on held-out labels, and the regret of network and policy against the best labelled plane."""
     network.eval()
     total, regret, policy = 0.0, 0.0, 0.0
     for rows in torch.split(torch.arange(len(data)), 1024):

@@ -1,7 +1,7 @@
-"""Labels: states of a mesh's cut tree, and how many parts each of some planes ends in.
+"""Labels: states of a mesh's cut tree, and the final number of parts for some planes of each.
 
-For a state and a plane: cut, let the policy finish both sides, merge what is left, count. That is what the policy
-would get in the end, up to the merging of parts of this component with others.
+The label of a state and a plane: cut, let the policy finish both sides, merge, and count the parts. This is what the
+policy would reach in the end, except that parts of this component are not merged with others.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component
 
 ROOM = 1.6
-"""A rollout is given up when it has this many times the parts of the first (and `SPARE` more)."""
+"""A rollout is given up at this multiple of the first one's parts (plus `SPARE`)."""
 
 SPARE = 3
 
 USUAL = 8
-"""States that end in more parts are labelled the less often, in proportion to what a rollout costs."""
+"""States that end in more parts are labelled less often, in proportion to the cost of a rollout."""
 
 RANKED = 4
-"""Planes labelled of those that the ranking puts first."""
+"""Number of planes labelled from the top of the ranking."""
 
 
 @dataclass
 class Labels:
-    """States of one mesh, and labels of some of their planes.
+    """States of one mesh, and labels for some of their planes.
 
     As arrays (see `arrays`): ``grid`` [S, 6, M, 10], ``edges`` [S, 12, 10] (see `rlacd.policies.features.tables`),
     ``whole`` [S, 4] and ``scale`` [S] of the S states; ``state``, ``plane``, ``parts`` (merged; where given up, more
@@ -51,7 +51,7 @@ class Labels:
     given_up: list[bool] = field(default_factory=list)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Get everything as arrays; nothing where there are no labels."""
+        """Return all arrays; empty if there are no labels."""
         if not self.parts:
             return {}
         kinds = {"state": np.int32, "plane": np.int16, "parts": np.int16, "given_up": np.bool_}
@@ -66,20 +66,20 @@ def label(
     rng: np.random.Generator,
     most: int = 40,
 ) -> Labels:
-    """Label states met when a solid is cut by a policy.
+    """Label states visited while a policy cuts a solid.
 
     Parameters
     ----------
     manifold : Manifold
         The solid.
     threshold : float
-        Of the concavity criterion.
+        Threshold of the concavity criterion.
     cost : Cost
-        The policy that rollouts follow; the planes that cost it least are labelled.
+        The policy that rollouts follow; its planes of least cost are labelled.
     budget : int
-        Sweeps after which no new state is begun.
+        Number of sweeps after which no new state is started.
     most : int
-        States that end in more parts than this are only passed through.
+        States that end in more parts than this are not labelled.
     """
     rollouts = Rollouts(Concavity(threshold), cost)
     waiting = list(rollouts.settle(Component(manifold)).open)
@@ -119,7 +119,7 @@ def _add(labels: Labels, rollouts: Rollouts, state: RolloutState, planes: list[i
 
 
 def _candidates(state: RolloutState, cost: Cost, rng: np.random.Generator) -> list[int]:
-    """The policy's plane, the best of its ranking and of each greedy score, and some that are drawn."""
+    """The policy's plane, the best of its ranking and of each greedy score, and some random ones."""
     planes: list[int] = []
     costs = cost(state.component, state.sweep)
     scores = [score(state.sweep) for score in (excess_norm, hull_sum, max_excess)]
@@ -136,7 +136,7 @@ def _candidates(state: RolloutState, cost: Cost, rng: np.random.Generator) -> li
 
 
 def shortlist(cost: FloatArray, count: int, per_axis: int) -> list[int]:
-    """Pick the `count` planes of least cost (infinite: not to be taken), no two of them neighbours.
+    """Pick the `count` planes of least cost, no two of them neighbours; planes of infinite cost are excluded.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def shortlist(cost: FloatArray, count: int, per_axis: int) -> list[int]:
 
 
 def _same(s: Sweep, i: int, j: int) -> bool:
-    """Tell whether two planes are the same one, once as a coordinate and once as a principal direction."""
+    """Tell whether two planes coincide, one along a coordinate axis and one along a principal axis."""
     return i == j or (
         s.hull_below[i] == s.hull_below[j]
         and s.hull_above[i] == s.hull_above[j]

@@ -1,4 +1,4 @@
-"""What a process of the pool does for the guide: the labels of one mesh."""
+"""The plane ranker's part in a pool process: the labels of one mesh."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from rlacd.policies.learned import PlaneRanker, ranked_cost
 from rlacd.pool import Blobs, Shared
 
 OTHERS = 0.4
-"""Share of the meshes that are labelled at another threshold, from half to twice the usual one."""
+"""Fraction of meshes labelled at another threshold, from half to twice the usual one."""
 
 TOO_MANY_FACES = 3000
-"""Repaired meshes with more are left out: the same time labels several smaller ones."""
+"""Repaired meshes with more faces are skipped: several smaller ones can be labelled in the same time."""
 
 SERVER = "rlacd.learn.ranker.label_server:LabelServer"
 
@@ -31,7 +31,7 @@ class LabelServer:
     Parameters
     ----------
     staging : Path
-        A folder for what is on its way.
+        A folder for temporary files.
     """
 
     def __init__(self, staging: Path) -> None:
@@ -47,17 +47,17 @@ class LabelServer:
         Parameters
         ----------
         values : dict
-            ``threshold`` that most meshes are labelled at, ``budget`` (see `rlacd.learn.ranker.label.label`), and the
-            ``seed`` of what is drawn.
+            ``threshold`` for most meshes, ``budget`` (see `rlacd.learn.ranker.label.label`), and the ``seed`` of the
+            random numbers.
         blobs : dict of bytes
             The repaired solid (`rlacd.learn.meshes.SOLID`), or the files of the mesh.
         shared : dict of Shared
-            ``network``, ``{"onnx": bytes}``: the guide whose choices are labelled; without one, the greedy policy's.
+            ``network``, ``{"onnx": bytes}``: the plane ranker to follow; without it, the greedy policy.
 
         Returns
         -------
         dict
-            ``labels``: how many.
+            ``labels``: their number.
         dict of bytes
             ``labels``, as an .npz file, and `SOLID` if it had to be repaired.
         """
@@ -70,7 +70,7 @@ class LabelServer:
         return {"labels": len(found.parts)}, {"labels": packed(found.arrays(), compressed=True), **kept}
 
     def _cost(self, threshold: float, shared: Mapping[str, Shared]) -> Cost:
-        """The policy whose choices are labelled: greedy at first, then the last network's."""
+        """The policy to follow: greedy at first, then the last network."""
         if "network" not in shared:
             return lambda component, swept: excess_norm(swept)
         if shared["network"].key != self._key:

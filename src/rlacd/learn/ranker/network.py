@@ -1,4 +1,4 @@
-"""The guide network: from the features of a sweep to the logarithm of the number of parts each plane ends in."""
+"""The plane ranker's network: from the features of a sweep to the logarithm of the final number of parts per plane."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rlacd.policies.features import COMPONENT_FEATURES, MIRRORED, PLANE_FEATURES
 class RankerNetwork(nn.Module):
     """Shared dilated convolutions along every direction, pooled over planes and directions.
 
-    Reversing a direction (planes back to front, *below* and *above* exchanged) and permuting the coordinate axes or
+    Reversing a direction (planes in reverse order, *below* and *above* exchanged) and permuting the coordinate axes or
     the principal axes permute the outputs likewise, by construction.
 
     Parameters
@@ -45,16 +45,16 @@ class RankerNetwork(nn.Module):
         planes : Tensor [B, K, 22, M]
             K directions, the coordinate axes first, with M planes each.
         edges : Tensor [B, E, 22]
-            Planes of concave edges, each a direction of its own.
+            Planes of concave edges, each its own direction.
         component : Tensor [B, 10]
 
         Returns
         -------
         q : Tensor [B, K * M]
-            When the plane is taken.
+            If the plane is taken.
         q_edges : Tensor [B, E]
         value : Tensor [B]
-            When the best of the planes is taken.
+            If the best of the planes is taken.
         """
         is_axis = (torch.arange(planes.shape[1], device=planes.device) < 3).to(planes.dtype)
         h, along = self._along(planes, is_axis)
@@ -87,7 +87,7 @@ class RankerNetwork(nn.Module):
 
 
 class Ensemble(nn.Module):
-    """The mean of several networks: labels are noisy, and so is what one network makes of them."""
+    """The mean of several networks, which averages out noise of labels and training."""
 
     def __init__(self, members: Sequence[RankerNetwork]) -> None:
         super().__init__()
@@ -95,7 +95,7 @@ class Ensemble(nn.Module):
         self.width = members[0].width
 
     def forward(self, planes: Tensor, edges: Tensor, component: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Predict as the members do on average; shapes as in `RankerNetwork.forward`."""
+        """Predict the mean of the members; shapes as in `RankerNetwork.forward`."""
         outputs = [member(planes, edges, component) for member in self.members]
         q, q_edges, value = (torch.stack(column).mean(0) for column in zip(*outputs, strict=True))
         return q, q_edges, value

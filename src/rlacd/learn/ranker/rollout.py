@@ -1,7 +1,7 @@
-"""Completing a component by a policy, and counting the parts that are left after merging.
+"""Completing a component by a policy, and counting the parts after merging.
 
-This is `CutTree` one component at a time, with every sweep and every cut kept: rollouts from the same state share
-their beginnings.
+This is `CutTree` one component at a time, with every sweep and cut cached: rollouts from the same state share their
+first steps.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ from rlacd.solid.component import Component
 from rlacd.workers import Workers
 
 Cost = Callable[[Component, Sweep], FloatArray]
-"""A policy: the cost of every plane of a component's sweep; the valid one of least cost is taken."""
+"""A policy: the cost of every plane of a component's sweep; the valid plane of least cost is taken."""
 
 COARSE = slice(1, None, 2)
-"""Rollouts try every second plane of a direction: half the work, for a few percent more parts."""
+"""Stride between the planes of a direction in rollouts: half the work, for a few percent more parts."""
 
 
 class RolloutState:
-    """A connected component that does not meet the criterion, and what is known of its cuts.
+    """A connected component that misses the criterion, with its cached sweeps and cuts.
 
-    Planes are numbered as in the full sweep everywhere: direction by direction, then those of the concave edges.
+    Planes are always numbered as in the full sweep: direction by direction, then those of the concave edges.
     """
 
     def __init__(self, component: Component, across: Component | None) -> None:
         self.component = component
         self.across = across
         self.outcomes: dict[int, RolloutOutcome] = {}
-        self.chosen: int | None = None  # by the policy in a rollout; -1 when no plane is left
+        self.chosen: int | None = None  # by the policy in a rollout; -1 if no plane is left
 
     @cached_property
     def candidates(self) -> Candidates:
@@ -48,7 +48,7 @@ class RolloutState:
 
     @cached_property
     def sweep(self) -> Sweep:
-        """The sweep over them."""
+        """The sweep over all candidates."""
         return sweep(self.component, self.candidates)
 
     @cached_property
@@ -57,7 +57,7 @@ class RolloutState:
         return valid_planes(self.sweep)
 
     def choose(self, cost: Cost) -> int:
-        """Choose a plane by the full sweep; -1 when none is valid."""
+        """Choose a plane by the full sweep; -1 if none is valid."""
         if not self.valid.any():
             return -1
         costs = cost(self.component, self.sweep)
@@ -78,13 +78,13 @@ class RolloutState:
 
 
 def valid_planes(scored: Sweep) -> BoolArray:
-    """Planes that may be taken: those that leave slivers only where no other is left."""
+    """Planes that may be taken; those that leave slivers only if there are no others."""
     valid = scored.valid(SLIVER)
     return valid if valid.any() else scored.valid(SLIVER / 100)
 
 
 class RolloutOutcome:
-    """What is left of a component: parts that meet the criterion (or cannot be cut), and states to go on with."""
+    """Result of a step: parts that meet the criterion or cannot be cut, and states to continue from."""
 
     def __init__(self, done: list[Component], open_states: list[RolloutState]) -> None:
         self.done = done
@@ -103,7 +103,7 @@ class Rollouts:
     Attributes
     ----------
     sweeps : int
-        Sweeps made so far: the measure of work, the same on every machine.
+        Number of sweeps so far: a measure of work that is the same on every machine.
     """
 
     def __init__(self, criterion: Concavity, cost: Cost) -> None:
@@ -113,7 +113,7 @@ class Rollouts:
         self._workers = Workers(1)
 
     def settle(self, component: Component, across: Component | None = None) -> RolloutOutcome:
-        """Judge a component and split it into connected pieces, as `CutTree` does."""
+        """Evaluate a component and split it into connected pieces, as `CutTree` does."""
         if self.criterion.is_met(component):
             return RolloutOutcome([component], [])
         pieces = component.pieces()
@@ -131,7 +131,7 @@ class Rollouts:
         return RolloutOutcome(done, states)
 
     def cut(self, state: RolloutState, plane: int) -> RolloutOutcome:
-        """Cut a state by a plane of its sweep; a plane that does not cut leaves the state as a part."""
+        """Cut a state by a plane of its sweep; if the plane does not cut, the state becomes a part."""
         if plane not in state.outcomes:
             below, above = state.component.cut(state.candidates.plane(plane)) if plane >= 0 else (None, None)
             if below is None or above is None:
@@ -154,7 +154,7 @@ class Rollouts:
         return state.chosen
 
     def complete(self, start: RolloutOutcome, most: int) -> list[Component] | None:
-        """Follow the policy until nothing is left to cut; None when it takes more than `most` parts."""
+        """Follow the policy until nothing is left to cut; None if it takes more than `most` parts."""
         parts = list(start.done)
         states = list(start.open)
         while states:
@@ -167,5 +167,5 @@ class Rollouts:
         return parts
 
     def merged(self, parts: Sequence[Component]) -> int:
-        """Count the parts that are left after merging."""
+        """Count the parts after merging."""
         return len(merge_parts(parts, self.criterion, self._workers, Clock()))

@@ -1,7 +1,7 @@
-"""Training the guide from scratch: label, fit, deploy, and again with the network's own choices.
+"""Training the plane ranker from scratch: label, fit, deploy, and repeat with the network's own choices.
 
-Every step leaves a file, and no step that has one is repeated: a run that was stopped goes on where it stopped and
-ends with the same weights.
+Every step writes a file and is skipped if the file exists: an interrupted run resumes where it stopped and ends with
+the same weights.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ SCALES = (0.025, 0.1)
 
 @dataclass(frozen=True)
 class TrainOptions:
-    """What a training run depends on; the field's help is the command's."""
+    """All options of a training run; the fields' help is the command's help."""
 
     meshes: Path = field(metadata={"help": "folder of meshes to learn from"})
     work: Path = field(metadata={"help": "folder for labels, networks and curves; a run goes on from what is there"})
@@ -57,25 +57,25 @@ class TrainOptions:
 
 
 def train(options: TrainOptions, say: Callable[[str], None] = print, pool: Pool | None = None) -> Path:
-    """Train a guide.
+    """Train a plane ranker.
 
     Parameters
     ----------
     options : TrainOptions
     say : callable
-        Takes a line of progress.
+        Receives lines of progress.
     pool : Pool, optional
-        Where meshes are labelled; in this process by default. It decides nothing but how long that takes.
+        Where meshes are labelled; in this process by default. It affects only the time taken.
 
     Returns
     -------
     Path
-        The last round's network (ONNX; its weights lie beside it as safetensors).
+        The last round's network (ONNX; its weights are beside it as safetensors).
 
     Raises
     ------
     OptionError
-        There are no meshes to learn from.
+        There are no meshes for training.
     """
     torch.set_num_threads(1)
     torch.use_deterministic_algorithms(True)
