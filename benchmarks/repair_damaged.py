@@ -18,11 +18,11 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from rlacd.solid.repair_distance import SurfaceQuery, spread_points
 
 import rlacd
 from fuzz.flaws import FAMILIES
 from rlacd.io.read.load import load_mesh
+from rlacd.repair.distance import SurfaceQuery, spread_points
 from rlacd.repair.repair import repair
 from rlacd.solid.frame import Frame
 

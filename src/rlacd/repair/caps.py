@@ -19,7 +19,7 @@ from rlacd._native import poll_stop
 from rlacd.repair.distance import SurfaceQuery, spread_points
 from rlacd.repair.holes import LONGEST_EXACT_LOOP, cap
 from rlacd.repair.rims import Rims, rims_of
-from rlacd.repair.soup import Soup
+from rlacd.repair.soup import Soup, crossed_share
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.topology import (
     BoolArray,
@@ -47,6 +47,8 @@ _DAMAGED, _DAMAGED_SHARE, _DAMAGED_EDGES, _DAMAGED_WOUND = 4, 0.3, 60, 0.25
 _WOUNDS = 0.7
 # An open body that caps would give this much volume for its area is hollow; with less it is a sheet, a leaf or a cloth.
 _ROOMY = 0.02
+# A body closed over large wounds may cross itself in this share of its area.
+_CROSSED = 0.08
 # A solid may have a few faces sticking out of it, up to this share of its area, beside flaps.
 FLAPS = 0.05
 
@@ -154,7 +156,6 @@ def close_holes(
     chosen[loop_body] = True
     if not fill:
         chosen[loop_body[place[far & ~excused]]] = False
-    refused = np.setdiff1d(loop_body, np.flatnonzero(chosen))
 
     def capped() -> tuple[Soup, BoolArray]:
         some, whole = chosen[loop_body[owner]], chosen[body]
@@ -172,6 +173,11 @@ def close_holes(
     volume = np.bincount(trial.body_of_side(), np.maximum(trial.sides.volume, 0), bodies)
     chosen &= volume > thickness * np.bincount(trial.body, trial.area, bodies)
     chosen &= trial.sheet_share(bodies, flap) <= FLAPS
+    # Nor where caps of large wounds cross the body: what is inside out there would be cut into ever more pieces.
+    for one in np.unique(loop_body[place[far & wound[place]]]).tolist():
+        some = (trial.body == one) & ~flap
+        chosen[one] &= not chosen[one] or crossed_share(trial.vertices, trial.faces[some]) <= _CROSSED
+    refused = np.setdiff1d(loop_body, np.flatnonzero(chosen))
     by_room = np.zeros(bodies, dtype=bool)
     by_room[loop_body[place[unreachable & ~excused]]] = True
     wide = far & chosen[loop_body[place]]

@@ -121,14 +121,26 @@ def on_repeated_edge(faces: IntArray, count: int) -> BoolArray:
 
 def hidden_faces(vertices: FloatArray, faces: IntArray) -> BoolArray:
     """Return ``[F]`` which faces of one body it winds around on both sides."""
+    beside = _winding_beside(vertices, faces)
+    # On a skin the sides have 0 and 1; a wall inside has 0.5 and 1.5. A skin that lies double has 0 and 2.
+    result: BoolArray = (beside.mean(axis=0) > 0.75) & (beside.min(axis=0) > 0.25)
+    return result
+
+
+def crossed_share(vertices: FloatArray, faces: IntArray) -> float:
+    """Return the share of the area of one closed body that lies inside it, or bounds what is inside out."""
+    front, back = _winding_beside(vertices, faces)
+    area = face_areas(vertices, faces)
+    wrong = (np.abs(front) > 0.25) | (np.abs(back - 1) > 0.25)
+    return float(area[wrong].sum() / max(area.sum(), NO_AREA))
+
+
+def _winding_beside(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return ``[2, F]`` how often faces wind around a point before each face and one behind; positive inside."""
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     normal = np.cross(b - a, c - a)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
     middle = (a + b + c) / 3
     query = SurfaceQuery(vertices, faces)
     beside = np.stack([query.winding(middle + _BESIDE * normal), query.winding(middle - _BESIDE * normal)])
-    if signed_tetrahedra(vertices, faces).sum() < 0:
-        beside = -beside
-    # On a skin the sides have 0 and 1; a wall inside has 0.5 and 1.5. A skin that lies double has 0 and 2.
-    result: BoolArray = (beside.mean(axis=0) > 0.75) & (beside.min(axis=0) > 0.25)
-    return result
+    return -beside[::-1] if signed_tetrahedra(vertices, faces).sum() < 0 else beside
