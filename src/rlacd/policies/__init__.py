@@ -1,4 +1,4 @@
-"""Which plane to cut next."""
+"""Policies: which plane cuts a component."""
 
 from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies.greedy import SCORES, Greedy
@@ -9,14 +9,15 @@ from rlacd.policy_names import AS_PUBLISHED, EDGES, POLICIES, WEIGHTS_ENDING, is
 
 
 def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: float | None = None) -> Policy:
-    """Build the policy called `name`; an object with a method `choose` is one already.
+    """Build the policy called `name`; an object with a method `choose` is wrapped to check its answers.
 
-    ``greedy`` looks at 150 planes and those of four concave edges, and takes the one with the least p-norm of excess
-    volumes; ``greedy-SCORE`` takes the one with the least SCORE of the 150 alone, ``greedy-SCORE+edges`` of the 150 and
-    those of the edges (SCORE ``hull-sum`` is the paper's baseline); ``navacd`` takes the least sum of hull volumes of
-    three planes and those of four concave edges; ``learned``, or the path of an ONNX file, ranks all these planes by
-    the parts that the component is expected to end in. Where that file is a Q network, as ``rlacd train`` exports it,
-    the paper's rule holds instead: of the network's ten best planes and those of four concave edges the least sum.
+    - ``greedy``: the plane with the least p-norm of excess volumes, among 150 planes and those of four concave edges.
+    - ``greedy-SCORE``: the plane with the least SCORE among the 150 alone (``hull-sum`` is the paper's baseline);
+      ``greedy-SCORE+edges``: among the 150 and those of the edges.
+    - ``navacd``: the plane with the least sum of hull volumes, among three planes and those of four concave edges.
+    - ``learned``, or the path of an ONNX file: ranks the planes of ``greedy`` by the number of parts the component is
+      expected to end in. If the file is a Q network, as exported by ``rlacd train``, the paper's rule applies instead:
+      the least sum of hull volumes among the network's ten best planes and those of four concave edges.
 
     Parameters
     ----------
@@ -24,7 +25,7 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
     sweeps : SweepCache, optional
         Sweeps over the 150 planes and those of four concave edges, shared with others.
     scale : float, optional
-        The criterion's length in the frame, such as the concavity threshold; learned policies look at it.
+        The criterion's length in the frame, such as the concavity threshold; an input of learned policies.
 
     Raises
     ------
@@ -33,7 +34,7 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
     WeightsError
         The network cannot be loaded.
     MissingExtraError
-        A learned policy is asked for without the extra ``learned``.
+        A learned policy is requested without the extra ``learned``.
     """
     if not isinstance(name, str):
         return CheckedPolicy(name)

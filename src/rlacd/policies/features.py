@@ -1,7 +1,7 @@
-"""What the guide network sees of a component: its sweep, made comparable between sizes and between directions.
+"""The plane ranker's inputs: a component's sweep, normalised for size and arranged by direction.
 
-Lengths are given twice: relative to the component, and relative to the criterion's scale. Only the second tells how
-far from being done a side would be.
+Lengths are given twice: relative to the component, and relative to the criterion's scale. Only the latter shows how
+far a side is from being done.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from rlacd.solid.arrays import BoolArray, FloatArray
 from rlacd.solid.component import Component
 
 VERSION = 2
-"""Of the features; weights made for another version are refused."""
+"""Version of the features; weights for another version are rejected."""
 
 SWEEP_COLUMNS = (
     "hull_below",
@@ -35,13 +35,13 @@ SWEEP_COLUMNS = (
 )
 
 MIRRORED = (1, 0, 3, 2, 5, 4, 7, 6, 9, 8, 11, 10, 13, 12, 14, 15, 16, 17, 18, 19, 20, 21)
-"""Where each plane feature goes when a direction is reversed: *below* and *above* change places."""
+"""Permutation of the plane features when a direction is reversed: *below* and *above* are swapped."""
 
 DIRECTIONS = 6
 
 CONCAVE_EDGES = 4
 EDGE_PLANES = 3 * CONCAVE_EDGES
-"""Most planes that the concave edges add."""
+"""Maximum number of planes that the concave edges add."""
 
 PLANE_FEATURES = len(MIRRORED)
 COMPONENT_FEATURES = 10
@@ -49,28 +49,28 @@ COMPONENT_FEATURES = 10
 Features = NDArray[np.float32]
 
 _TINY = 1e-30
-_P = 1.3  # of the greedy score that is an input
+_P = 1.3  # exponent of the greedy score among the inputs
 
 
 def candidates_of(component: Component, per_axis: int) -> Candidates:
-    """Get the planes that are ranked: `per_axis` along each of six directions, then those of a few concave edges."""
+    """Get the planes to rank: `per_axis` along each of six directions, then those of up to four concave edges."""
     return Candidates.joined(axis_and_principal(component, per_axis), concave_edge_planes(component, CONCAVE_EDGES))
 
 
 def planes_per_axis(s: Sweep) -> int:
-    """Count the planes along each of the six directions of a sweep over `candidates_of`: the first ones are all x."""
+    """Count the planes per direction of a sweep over `candidates_of`: those along x come first."""
     other = (s.candidates.directions != s.candidates.directions[0]).any(axis=1)
     return int(np.argmax(other))
 
 
 def tables(s: Sweep) -> tuple[FloatArray, FloatArray]:
-    """Get a sweep over `candidates_of` as arrays, their columns in the order of `SWEEP_COLUMNS`.
+    """Get a sweep over `candidates_of` as arrays with the columns of `SWEEP_COLUMNS`.
 
     Returns
     -------
     grid : float64 [6, per_axis, 10]
     edges : float64 [12, 10]
-        Planes of concave edges; zeros, as for a plane that misses the solid, where there are fewer.
+        Planes of concave edges; padded with zeros, as for planes that miss the solid.
     """
     per_axis = planes_per_axis(s)
     table = np.stack([getattr(s, name) for name in SWEEP_COLUMNS], axis=-1)
@@ -106,19 +106,19 @@ def features(
     whole : float64 [B, 4]
         See `measures`.
     scale : float64 [B]
-        The criterion's length: a part is about done when it deviates from its hull by no more.
+        The criterion's length: a part is roughly done when it deviates from its hull by no more than this.
 
     Returns
     -------
     planes : float32 [B, 6, 22, M]
-        One column a plane. Reversing a direction reverses M and permutes the features by `MIRRORED`.
+        One column per plane. Reversing a direction reverses M and permutes the features by `MIRRORED`.
     edges : float32 [B, 12, 22]
     component : float32 [B, 10]
     """
     hull, solid, area, hull_area = whole.T
     length = np.cbrt(hull)
     costs = [cost[..., None] for cost in _greedy_costs(grid, hull[:, None, None])]
-    thickness = (grid[..., 6] + grid[..., 7]).max(axis=2)  # of the component along each direction
+    thickness = (grid[..., 6] + grid[..., 7]).max(axis=2)  # extent of the component along each direction
     extent = np.maximum(thickness.max(axis=1), _TINY)
     valid = _valid(grid)
     usable = valid | np.logical_not(valid.any(axis=(1, 2), keepdims=True))
@@ -155,7 +155,7 @@ def _valid(table: FloatArray) -> BoolArray:
 
 
 def _greedy_costs(table: FloatArray, hull: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Logarithms of three greedy scores: p-norm of the excesses, sum of the hulls, larger excess."""
+    """Logarithms of three greedy scores: p-norm of the excesses, sum of the hull volumes, larger excess."""
     hb, ha, sb, sa = np.moveaxis(table[..., :4], -1, 0)
     below, above = np.maximum(hb - sb, 0), np.maximum(ha - sa, 0)
     norm = np.log(below**_P + above**_P + (1e-6 * hull) ** _P) / _P
@@ -163,7 +163,7 @@ def _greedy_costs(table: FloatArray, hull: FloatArray) -> tuple[FloatArray, Floa
 
 
 def _of_planes(table: FloatArray, of_component: Sequence[FloatArray]) -> FloatArray:
-    """Features [..., 22] of planes, given their sweep [..., 10]."""
+    """Features [..., 22] of planes, from their sweep [..., 10]."""
     hull, extent, unit, *least = of_component
     hb, ha, sb, sa, section, perimeter, tb, ta, eb, ea = np.moveaxis(table, -1, 0)
     length = np.cbrt(hull)
@@ -199,5 +199,5 @@ def _of_planes(table: FloatArray, of_component: Sequence[FloatArray]) -> FloatAr
 
 
 def _squash(x: FloatArray) -> FloatArray:
-    """Map 0..inf to 0..2, steepest around 1."""
+    """Map [0, inf) to [0, 2), with 1 fixed."""
     return 2 * x / (1 + x)

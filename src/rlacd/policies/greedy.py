@@ -1,4 +1,4 @@
-"""Greedy: the valid candidate plane with the best score of its two sides, one step ahead."""
+"""Greedy: the valid candidate plane whose two sides have the best score, looking one step ahead."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
 
 EXPONENT = 1.3
-"""Of the norm that gives the fewest parts (docs/benchmarks.md)."""
+"""Exponent of the norm that gives the fewest parts (docs/benchmarks.md)."""
 
 
 def hull_sum(s: Sweep) -> FloatArray:
@@ -29,21 +29,21 @@ def max_excess(s: Sweep) -> FloatArray:
 
 
 def excess_norm(s: Sweep) -> FloatArray:
-    """p-norm of the two sides' |CH(m_i)| - |m_i| with p = `EXPONENT`: between the sum (p = 1) and the maximum."""
+    """p-th power of the p-norm of the two sides' |CH(m_i)| - |m_i|, p = `EXPONENT`: between the sum and the maximum."""
     below, above = np.maximum(s.hull_below - s.solid_below, 0), np.maximum(s.hull_above - s.solid_above, 0)
     norm: FloatArray = below**EXPONENT + above**EXPONENT
     return norm
 
 
 SCORES: Mapping[str, float] = MappingProxyType({"hull-sum": 1.0, "max-excess": math.inf, "excess-norm": EXPONENT})
-"""Exponents of the norms that order planes as these functions of a sweep do."""
+"""Exponents of the norms that order planes as the functions of a sweep above do."""
 
 
 def cheapest(scored: Sweep, cost: FloatArray) -> Plane | None:
-    """Get the valid plane of least cost; None when every plane misses the solid or shaves off a film.
+    """Get the valid plane of least cost; None if every plane misses the solid or shaves off a film.
 
-    Planes that leave slivers are taken only where no other is left. Of planes that cost the same but for rounding, as
-    they do in symmetric shapes, the first is taken, so that the cuts do not depend on the input's unit and place.
+    Planes that leave slivers are taken only if there is no other. Of planes whose costs are equal up to rounding, as in
+    symmetric shapes, the first is taken, so that the cuts do not depend on the unit and position of the input.
     """
     for sliver in SLIVERS:
         valid = scored.valid(sliver)
@@ -54,16 +54,16 @@ def cheapest(scored: Sweep, cost: FloatArray) -> Plane | None:
 
 
 class Greedy:
-    """The plane with the least score, out of the paper's 150 and those of a few concave edges.
+    """Chooses the plane with the least score among the paper's 150 and those of a few concave edges.
 
     Parameters
     ----------
     score : str
         A key of `SCORES`.
     concave_edges : int
-        How many concave edges add their planes; with 0, the paper's baseline.
-    views : Views, optional
-        Where the planes come from; decides about them then.
+        Number of concave edges whose planes are added; 0 with `hull-sum` is the paper's baseline.
+    sweeps : SweepCache, optional
+        Provides the planes, to share them with other policies; `concave_edges` is then ignored.
     """
 
     def __init__(self, score: str = "excess-norm", concave_edges: int = 4, sweeps: SweepCache | None = None) -> None:
@@ -71,5 +71,5 @@ class Greedy:
         self._sweep_cache = sweeps or SweepCache(concave_edges=concave_edges)
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
-        """Choose the plane to cut a component by; None when every candidate misses it or shaves off a film."""
+        """Choose the plane to cut a component by; None if every candidate misses it or shaves off a film."""
         return least_excess(component, self._sweep_cache.candidates(component), self._exponent, threads)

@@ -1,7 +1,7 @@
-"""The learned policy: a small network ranks the planes of the sweep by the parts it expects to be left in the end.
+"""The learned policy: a small network ranks the planes of a sweep by the number of parts it expects in the end.
 
-The network (see `rlacd.learn.ranker`) is run by onnxruntime, on one thread: several components at a time share the
-processors already.
+The network (see `rlacd.learn.ranker`) is run by onnxruntime on one thread, because components are processed in parallel
+already.
 """
 
 from __future__ import annotations
@@ -26,39 +26,39 @@ from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
 
 SHIPPED = "ranker.onnx"
-"""The weights in `rlacd.weights`."""
+"""File name of the weights in `rlacd.weights`."""
 
 INPUTS = ["planes", "edges", "component"]
 OUTPUTS = ["q", "q_edges", "value"]
 
 DECIMALS = 4
-"""Predictions are rounded to these, so that planes which mirror each other cost the same."""
+"""Predictions are rounded to this many decimals, so that planes that mirror each other cost the same."""
 
 NOTHING = 1e-9
-"""Least greedy score, relative to the hull."""
+"""Added to the greedy score, relative to the hull, so that it is positive."""
 
 MOST_PLANES = 1000
-"""Along a direction that a network may ask for; the shipped one asks for 25."""
+"""Maximum number of planes per direction that a network may ask for; the shipped one uses 25."""
 
 USUAL_SCALE = 0.05
-"""Scale for criteria that have none: the usual concavity threshold."""
+"""Scale for criteria without one: the usual concavity threshold."""
 
 
 @dataclass(frozen=True)
 class About:
-    """What the metadata of a weights file say.
+    """Metadata of a weights file.
 
     Attributes
     ----------
     per_axis : int
         Planes along each direction.
     scales : tuple of float
-        Least and greatest scale met in training; others are taken to be the nearest of the two.
+        Least and greatest scale seen in training; other scales are clipped to this range.
     blend : float
-        Weight of the greedy score beside the network's prediction.
+        Weight of the greedy score relative to the network's prediction.
     edge_bonus : float
-        Taken off the logarithm of the cost of concave edges' planes: few of them were labelled, which makes the
-        network's predictions for them timid.
+        Subtracted from the predicted logarithm for planes of concave edges: few of them were labelled, so the network's
+        predictions for them are too cautious.
     """
 
     per_axis: int
@@ -68,7 +68,7 @@ class About:
 
 
 class PlaneRanker:
-    """The network, ready to be asked.
+    """The plane ranker: a network loaded for inference.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class PlaneRanker:
     Raises
     ------
     WeightsError
-        The file is missing, damaged, or no guide of this version.
+        The file is missing, damaged, or not a plane ranker of this version.
     """
 
     def __init__(self, weights: str | os.PathLike[str] | None = None) -> None:
@@ -94,7 +94,7 @@ class PlaneRanker:
             raise WeightsError(f"{name} is no guide network; export the policy again.")
 
     def log_parts(self, component: Component, swept: Sweep, scale: float) -> FloatArray:
-        """Predict, for every plane of a component's sweep, log(parts the component ends in, merged)."""
+        """Predict for every plane of a component's sweep the log of the number of parts after cutting and merging."""
         grid, edges = tables(swept)
         scales = np.clip(np.array([scale]), *self.about.scales)
         inputs = features(grid[None], edges[None], measures(component)[None], scales)
@@ -106,10 +106,10 @@ class PlaneRanker:
 def ranked_cost(
     ranker: PlaneRanker, component: Component, swept: Sweep, scale: float, blend: float | None = None
 ) -> FloatArray:
-    """Cost of every plane of a sweep: parts expected * greedy score ** blend, a little less for concave edges' planes.
+    """Cost of every plane of a sweep: expected parts * greedy score ** blend, slightly less for concave edges' planes.
 
-    The greedy score counts what the network cannot know: it has been told of few planes of a component what they end
-    in, and the best of 150 guesses is one that is wrong.
+    The greedy score corrects for prediction errors: only a few planes per component were labelled in training, and the
+    best of 150 predictions tends to be an optimistic error.
     """
     blend = ranker.about.blend if blend is None else blend
     greedy = (excess_norm(swept) / component.hull.volume**1.3 + NOTHING) ** (1 / 1.3)
@@ -121,18 +121,18 @@ def ranked_cost(
 
 
 class Learned:
-    """The plane of least cost by the network and the greedy score together.
+    """Chooses the plane of least cost by the network and the greedy score combined.
 
     Parameters
     ----------
     weights : path, optional
         The network; the shipped one by default.
     scale : float, optional
-        The criterion's length, such as the concavity threshold, in the frame.
+        The criterion's length, such as the concavity threshold, in the frame; `USUAL_SCALE` by default.
     blend : float, optional
-        Weight of the greedy score; what the weights file says by default.
-    views : Views, optional
-        Where the sweeps come from, to share them with others; decides about the planes then.
+        Weight of the greedy score; that of the weights file by default.
+    sweeps : SweepCache, optional
+        Provides the planes and their sweeps, to share them with other policies.
 
     Raises
     ------
@@ -153,12 +153,12 @@ class Learned:
         self._blend = blend
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
-        """Choose the plane to cut a component by; None when every candidate misses it or shaves off a film."""
+        """Choose the plane to cut a component by; None if every candidate misses it or shaves off a film."""
         swept = self._sweep_cache.of(component, threads)
         return cheapest(swept, self.rank(component, swept))
 
     def rank(self, component: Component, swept: Sweep) -> FloatArray:
-        """Cost of every plane of a component's sweep over axes and concave edges, whatever its planes per axis."""
+        """Cost of every plane of a component's sweep over axes and concave edges; it may have any number per axis."""
         return ranked_cost(self._guide, component, swept, self._scale, self._blend)
 
 
@@ -168,7 +168,7 @@ def _cached(weights: str | None) -> PlaneRanker:
 
 
 def load_ranker(weights: str | os.PathLike[str] | None = None) -> PlaneRanker:
-    """Get the guide of a file; the last few are kept.
+    """Load the plane ranker of a file; the last four are cached.
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""ONNX files, opened so that they can do no more than compute.
+"""ONNX files, opened so that they can do nothing but compute.
 
-A network is a program of sums and products: it can ask for time and memory when it runs, but for nothing else.
+A network is an arithmetic program: running it can cost time and memory, but it has no access to anything else.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ except ImportError as error:
 
 
 def open_network(content: bytes, optimized: bool = True) -> onnxruntime.InferenceSession:
-    """Make a network ready to run on one thread: several components at a time share the processors already.
+    """Load a network to run on one thread: components are processed in parallel already.
 
-    Weights in files of their own, which an ONNX file can name, are not looked for.
+    External files with weights, which an ONNX file can refer to, are not read.
 
     Raises
     ------
     Exception
-        It is damaged; onnxruntime's own exceptions have no public base.
+        The file is damaged; onnxruntime's exceptions have no public base class.
     """
     settings = onnxruntime.SessionOptions()
     settings.intra_op_num_threads = settings.inter_op_num_threads = 1

@@ -1,4 +1,4 @@
-"""What a policy may know of a component: points of its surface and of its hull, its candidate planes, and their use."""
+"""Observations of a component for Q networks: surface and hull points, candidate planes, and which are valid."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rlacd.solid.component import Component
 Float32Array = NDArray[np.float32]
 
 SCALE_INPUTS = 3
-"""Numbers in `Observation.scale`."""
+"""Length of `Observation.scale`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,15 +27,15 @@ class Observation:
     Attributes
     ----------
     points : float32 [2, N, 3]
-        Points of the component's surface and of its hull's, in the component's own frame: its bounding box centred,
-        the longest side 2.
+        Points on the surfaces of the component and of its hull, in a frame where the component's bounding box is
+        centred and its longest side is 2.
     directions : float32 [6, 3]
-        Unit normals of the candidate planes: the coordinate axes, then the principal ones.
+        Unit normals of the candidate planes: the coordinate axes, then the principal axes.
     scale : float32 [3]
-        What that frame hides: log2 of the component's size in the solid's frame, 0.3 R_v over the threshold, and the
-        share of its hull that it fills.
+        What that frame hides: log2 of half the longest side of the component's box in the solid's frame, 0.3 R_v over
+        the threshold, and the share of its hull that the component fills.
     mask : bool [150]
-        The planes that may be taken.
+        Which planes are valid.
     """
 
     points: Float32Array
@@ -50,11 +50,11 @@ def observe(component: Component, candidates: Candidates, threshold: float, coun
     Parameters
     ----------
     candidates : Candidates
-        Of this component, as by `axis_and_principal`.
+        Candidates of this component, from `axis_and_principal`.
     threshold : float
-        The criterion's, in the solid's frame.
+        The criterion's threshold, in the solid's frame.
     count : int
-        Points on each of the two surfaces.
+        Number of points on each of the two surfaces.
     """
     lower, upper = component.box
     radius = float((upper - lower).max()) / 2
@@ -76,11 +76,11 @@ def observe(component: Component, candidates: Candidates, threshold: float, coun
 
 
 def valid_planes(component: Component, candidates: Candidates) -> BoolArray:
-    """Tell which candidates [K * M] leave no side thinner than 2 % of the component's extent.
+    """Whether each of the candidates [K * M] leaves no side thinner than 2 % of the component's extent.
 
-    The component is connected, so each plane within its extent meets it, and the sides are as thick as the plane is
-    far from the ends: no sweep is needed. It is a little stricter than `Sweep.valid`, which compares a side with its
-    own extent. Where nothing is left, as in a thin sheet, sides of a hundredth of that are valid.
+    The component is connected, so every plane within its extent meets it, and the thickness of a side is the plane's
+    distance from that end: no sweep is needed. This is slightly stricter than `Sweep.valid`, which compares a side with
+    its own extent. If no plane is valid, as in a thin sheet, the limit is lowered to a hundredth.
     """
     heights = component.hull.vertices @ candidates.directions.T
     lower, upper = heights.min(axis=0), heights.max(axis=0)
@@ -94,5 +94,5 @@ def valid_planes(component: Component, candidates: Candidates) -> BoolArray:
 
 
 def candidates_of(component: Component) -> Candidates:
-    """Get the paper's 150 planes: those every policy here chooses among."""
+    """Get the paper's 150 planes, from which a Q network chooses."""
     return axis_and_principal(component)

@@ -1,6 +1,6 @@
-"""What the loop asks of a policy.
+"""The interface of policies.
 
-Any object with such a method is one::
+Any object with a method `choose` is a policy::
 
     class Halves:
         def choose(self, component, threads=1):
@@ -35,17 +35,17 @@ class Policy(Protocol):
             A connected piece of the solid that does not meet the criterion yet, in the frame where the input's longest
             side is 2: `vertices` [V, 3], `faces` [F, 3], `volume`, `hull`, `box` [2, 3], `principal_axes` [3, 3].
         threads : int
-            Threads the choice may use. Several components may be asked for at the same time, from different threads.
+            Number of threads the choice may use. `choose` may be called from several threads at the same time.
 
         Returns
         -------
         Plane or None
-            None when the component cannot sensibly be cut further.
+            None if the component cannot sensibly be cut further.
         """
 
 
 class CheckedPolicy:
-    """A user's policy whose answers are looked at before they are used.
+    """A user's policy whose answers are checked before they are used.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class CheckedPolicy:
         Raises
         ------
         OptionError
-            What it answers is no plane.
+            The answer is not a plane.
         """
         plane = self._policy.choose(component, threads)
         if plane is None or _is_plane(plane):

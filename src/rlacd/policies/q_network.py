@@ -1,4 +1,4 @@
-"""A Q network with its encoder as one ONNX file, run by onnxruntime (`rlacd.learn.paper.export` writes it)."""
+"""A Q network and its encoder in one ONNX file, run by onnxruntime (written by `rlacd.learn.paper.export`)."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ if TYPE_CHECKING:
     import onnxruntime
 
 KIND = "q"
-"""What the metadata of such a file say that it is."""
+"""The `kind` in the metadata of such a file."""
 
 INPUTS = ("points", "directions", "scale")
 
 OUTPUTS = ("values",)
 
 MOST_POINTS = 2**17
-"""That a network may ask for on a surface; the paper's asks for 2,048."""
+"""Maximum number of points per surface that a network may ask for; the paper's uses 2,048."""
 
 METADATA = "rlacd"
-"""Key of the metadata under which our own JSON stands."""
+"""Metadata key of rlacd's JSON."""
 
 
 class OnnxQ:
-    """An exported Q network on one thread: several components at a time share the processors already.
+    """An exported Q network, run on one thread because components are processed in parallel already.
 
     Parameters
     ----------
@@ -40,14 +40,14 @@ class OnnxQ:
     Attributes
     ----------
     points : int
-        Points on each of the two surfaces that it was trained with.
+        Number of points on each of the two surfaces in training.
     threshold : float
-        Concavity that it was trained for.
+        Concavity threshold of the training.
 
     Raises
     ------
     WeightsError
-        The file is missing, damaged, or no Q network of this version.
+        The file is missing, damaged, or not a Q network of this version.
     """
 
     points: int
@@ -87,16 +87,16 @@ class OnnxQ:
 
 @lru_cache(maxsize=2)
 def load_q_network(path: str) -> OnnxQ | None:
-    """Get the Q network of a file, the last two are kept; None where the file says that it is something else.
+    """Load the Q network of a file; the last two are cached. None if the file is unreadable or something else.
 
     Raises
     ------
     WeightsError
-        It is a Q network, but not of this version.
+        The file is a Q network, but not of this version.
     """
     try:
         kind = _about(open_network(read_file(path), optimized=False)).get("kind")
-    except Exception:  # whoever else reads policies says what is wrong with the file
+    except Exception:  # the plane ranker's loader reports what is wrong with the file
         return None
     return OnnxQ(path) if kind == KIND else None
 

@@ -1,4 +1,4 @@
-"""Deciding by a Q network: which of the 150 planes, alone or as the paper deploys it."""
+"""Choosing a plane by a Q network: the best of the 150 planes, or by the paper's deployment rule."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ if TYPE_CHECKING:
     from rlacd.policies.q_network import OnnxQ  # onnxruntime takes a while to import
 
 SHORTLIST = 10
-"""Planes of greatest value among which the paper takes the one with the least sum of hull volumes."""
+"""Number of planes of greatest value from which the paper takes the one with the least sum of hull volumes."""
 
 QFunction = Callable[[Observation], Float32Array]
 """Values [150] of the planes of an observed component."""
 
 
 class QPolicy:
-    """Takes the plane of greatest value, or the least hull sum among the best ones (the paper's deployment).
+    """Takes the plane of greatest value, or the one with the least hull sum among the best (the paper's deployment).
 
     Parameters
     ----------
     values : callable
-        The Q network: in torch (`rlacd.learn.paper.torch_policy`) or as exported (`rlacd.policies.q_network.OnnxQ`).
+        The Q network, in torch (`rlacd.learn.paper.torch_policy`) or exported (`rlacd.policies.q_network.OnnxQ`).
     threshold : float
-        The criterion's.
+        The criterion's threshold.
     points : int
-        Points on each of the two surfaces.
+        Number of points on each of the two surfaces.
     shortlist : int
-        So many best planes go on; of them the one with the least sum of hull volumes is taken (paper: 10).
+        Number of best planes from which the one with the least sum of hull volumes is taken (paper: 10).
     concave_edges : int
-        The planes of so many concave edges join them (paper: 4, three planes each).
+        Number of concave edges whose planes join the shortlist (paper: 4, three planes each).
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class QPolicy:
         return cls(network, threshold, network.points, SHORTLIST, CONCAVE_EDGES)
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
-        """Choose the plane to cut a component by; None when no candidate is valid."""
+        """Choose the plane to cut a component by; None if no candidate is valid."""
         candidates = candidates_of(component)
         seen = observe(component, candidates, self._threshold, self._points)
         if not seen.mask.any():
@@ -76,7 +76,7 @@ class QPolicy:
 
 
 def best_planes(values: Float32Array, mask: NDArray[np.bool_], count: int) -> NDArray[np.intp]:
-    """Indices of up to `count` valid planes of greatest value, the greatest first; equal ones in their order."""
+    """Indices of up to `count` valid planes of greatest value, greatest first; ties in index order."""
     order = np.argsort(-np.where(mask, values, -np.inf), kind="stable")
     kept: NDArray[np.intp] = order[: min(count, int(mask.sum()))]
     return kept
