@@ -1,10 +1,10 @@
-"""What a batch costs beside its meshes: meshes a minute, processor time per task that is not the mesh's, memory.
+"""The overhead of a batch: meshes per minute, CPU time per task beyond the mesh's own, memory.
 
     python benchmarks/batch.py MESHES --count 60 --jobs 1 --jobs 2
     python benchmarks/batch.py MESHES --count 0 --jobs 2 --keep RESULTS
 
-MESHES is a folder; every n-th of its meshes by name is taken, or all of them (0). Wall times are only worth something
-on a machine that does nothing else; processor times are nearly the same on a busy one.
+MESHES is a folder; every n-th of its meshes by name is taken, or all of them (0). Wall times are meaningful only on an
+idle machine; CPU times barely depend on the load.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ MB = 2**20
 
 
 def measured(command: list[str]) -> tuple[float, float, float, float]:
-    """Run a command; wall and processor seconds of it and all its processes, and MB held by it and by all together."""
+    """Run a command; wall and CPU seconds of all its processes, and peak MB of the command and of all."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     start = time.perf_counter()
     process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
@@ -79,7 +79,7 @@ def main(
             ]
             command += ["--jobs", str(number), *(option or [])]
             wall, cpu, own, together = measured(command)
-            _, idle, _, _ = measured(command)  # nothing is left to do: starting, reading and hashing
+            _, idle, _, _ = measured(command)  # all results exist: starting, reading and hashing
             rows = [json.loads(line) for line in (out / "timings.jsonl").read_text().splitlines()]
             spent = np.array([row.get("cpu", 0.0) for row in rows])
             beside = (cpu - spent.sum()) / len(rows)

@@ -1,12 +1,12 @@
-r"""Decompose every mesh of a folder and say what went wrong: crashes, hangs, invalid hulls, broken promises.
+r"""Decompose every mesh of a folder and report failures: crashes, hangs, invalid hulls, broken promises.
 
     python benchmarks/corpus.py MESHES/test --out test.jsonl [--jobs 2] [--limit 120] [--options '{"max_vertices": 32}']
     python benchmarks/corpus.py MESHES/test --out space.jsonl --options \
         '{"criterion": {"radius": 0.05, "tolerance": 0.01}, "policy": "navacd"}'
     python benchmarks/corpus.py --table test.jsonl
 
-Each mesh is decomposed in a worker process with one thread; a worker that crashes or exceeds the limit is replaced and
-the mesh recorded. Finished meshes are not computed again, so a run can be stopped and resumed.
+Each mesh is decomposed in a worker process with one thread; if a worker crashes or exceeds the limit, it is replaced
+and the mesh recorded. Finished meshes are skipped, so a run can be stopped and resumed.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ ENDINGS = {".ply", ".obj", ".stl", ".off", ".glb", ".gltf", ".dae", ".3mf"}
 
 
 def invalid_hulls(hulls: list[Any]) -> int:
-    """Count hulls that are not closed, outward oriented and convex, judged without our own kernels."""
+    """Count hulls that are not closed, outward oriented and convex, without using our kernels."""
     bad = 0
     for hull in hulls:
         vertices, faces = np.asarray(hull.vertices), np.asarray(hull.faces)
@@ -36,7 +36,7 @@ def invalid_hulls(hulls: list[Any]) -> int:
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         lengths = np.linalg.norm(normals, axis=1)
         extent = np.ptp(vertices, axis=0).max()
-        # Height of every vertex over every facet, but for needles, whose planes floating point cannot tell.
+        # Height of every vertex over every facet except needles, whose plane is not defined in floating point.
         sound = lengths > 1e-9 * extent**2
         heights = (vertices[None] - corners[sound, :1]) @ (normals[sound] / lengths[sound, None])[:, :, None]
         convex = heights.max(initial=0.0) <= 1e-6 * extent
@@ -45,7 +45,7 @@ def invalid_hulls(hulls: list[Any]) -> int:
 
 
 def overlapped_balls(hulls: list[Any], balls: Any, slack: float) -> int:
-    """Count pairs of a hull and a ball that overlap by more than `slack`, judged without our own kernels."""
+    """Count hull-ball pairs that overlap by more than `slack`, without using our kernels."""
     count = 0
     for hull in hulls:
         corners = hull.triangles
@@ -53,7 +53,7 @@ def overlapped_balls(hulls: list[Any], balls: Any, slack: float) -> int:
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
         normals = normals[lengths[:, 0] > 0] / lengths[lengths[:, 0] > 0]
         offsets = (normals @ np.asarray(hull.vertices).T).max(axis=1)
-        # A ball beyond one facet's plane is apart; only the others need their distance.
+        # A ball beyond one facet's plane is disjoint; only the others need a distance.
         height = np.full(len(balls), -np.inf)
         for normal, offset in zip(normals, offsets, strict=True):
             np.maximum(height, balls.centres @ normal - offset, out=height)
@@ -64,7 +64,7 @@ def overlapped_balls(hulls: list[Any], balls: Any, slack: float) -> int:
 
 
 def distance_to_triangles(points: Any, corners: Any) -> Any:
-    """Distances [N]: the plane of each triangle where the projection falls inside, its three edges always."""
+    """Distances [N]: to the plane of each triangle if the projection falls inside, and always to its three edges."""
     best = np.full(len(points), np.inf)
     if len(points) == 0:
         return best

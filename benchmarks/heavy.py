@@ -1,8 +1,8 @@
-"""CPU seconds, memory and hulls of inputs that are hard on the default: thousands of bodies, sponges, sheets, lattices.
+"""CPU seconds, memory and hulls of inputs that are hard for the defaults: many bodies, sponges, sheets, lattices.
 
     python benchmarks/heavy.py --out heavy.jsonl [--quality fast] [NAME ...]
 
-Each is made here, has at most 100,000 triangles, and is decomposed on one thread in a process of its own. A process is
+Each input is generated, has at most 100,000 triangles, and is decomposed on one thread in its own process. A process is
 ended after `--limit` CPU seconds.
 """
 
@@ -85,7 +85,7 @@ def gyroid(edge: float, waves: float = 6.5) -> Manifold:
 
 
 def sheet(heights: Any, below: Any) -> trimesh.Trimesh:
-    """Close the space between two graphs [n, n] over a square."""
+    """Close the space between two height fields [n, n] over a square."""
     n = len(heights)
     x, y = np.meshgrid(*[np.linspace(-1, 1, n)] * 2, indexing="ij")
     points = np.concatenate([np.stack([x, y, z], axis=-1).reshape(-1, 3) for z in (heights, below)])

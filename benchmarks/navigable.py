@@ -1,12 +1,12 @@
-"""Navigable space on real meshes: the greedy policies beside CoACD.
+"""Navigable space on real meshes: the greedy policies compared with CoACD.
 
     python benchmarks/navigable.py MESHES --list MESHES/quick.txt --out navigable.jsonl [--methods navacd,coacd]
     python benchmarks/navigable.py --table navigable.jsonl
 
-Every method and mesh runs in a process of its own, pinned to the cores given. Ours are timed three times after a first
-run (median; load, repair and report included), CoACD once, at its default threshold 0.05: it knows no radius, so its
-row is there to compare the distances and the time, not the number of parts at equal rules. Distances are those of
-`rlacd.solid.distance`, in the frame where the longest side is 2. Finished rows are not computed again.
+Every method and mesh runs in its own process, pinned to the cores given. Ours are timed three times after a first run
+(median; load, repair and report included), CoACD once, at its default threshold 0.05: it has no radius option, so
+compare its distances and time, not its number of parts. Distances are those of `rlacd.solid.distance`, in the frame
+where the longest side is 2. Finished rows are skipped.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ METHODS: dict[str, dict[str, Any]] = {
     "best": {"quality": "best", "budget": 5.0},
 }
 COACD_CRACKS = 1e-3
-"""CoACD's hulls leave cracks of some 1e-5 between them; narrower ones than this are closed, else their walls count."""
+"""CoACD's hulls leave cracks of about 1e-5; cracks narrower than this are closed, or their walls would count."""
 
 
 def run_ours(path: Path, method: str, setting: str, threads: int) -> dict[str, Any]:

@@ -28,7 +28,7 @@ POLICIES = ("greedy-excess-norm", "greedy", "greedy-hull-sum", "navacd")
 
 
 def drawn(folder: Path, count: int) -> list[str]:
-    """Files of train/ with fewer than 8,000 faces, always the same ones."""
+    """A fixed sample of files of train/ with fewer than 8,000 faces."""
     with (folder / "index.csv").open() as index:
         files = [row["file"] for row in csv.DictReader(index) if row["split"] == "train" and int(row["faces"]) < 8000]
     random.Random(7).shuffle(files)

@@ -1,10 +1,10 @@
-r"""What searching brings: hulls of every quality level, against one pass, and the CPU seconds of one core they take.
+r"""The benefit of searching: hulls of every quality level against one pass, and CPU seconds on one core.
 
     python benchmarks/quality.py MESHES --list MESHES/quick.txt --out quality.jsonl
     python benchmarks/quality.py --table quality.jsonl [--baseline earlier.jsonl]
 
-Runs with one thread, pinned to one core where the system can. All seconds, the search's own budget included, are CPU
-seconds, so that a busy machine does not matter. Finished runs are not computed again.
+Runs with one thread, pinned to one core where the system allows it. All seconds, the search's budget included, are CPU
+seconds, independent of the load. Finished runs are skipped.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def measure(path: Path, options: dict[str, Any]) -> dict[str, Any]:
 
 
 def table(rows: list[dict[str, Any]], baseline: list[dict[str, Any]]) -> str:
-    """Means over the meshes of the ratio of hulls, with their standard errors; only meshes all methods were run on."""
+    """Mean ratios of hulls over the meshes, with standard errors; only meshes that all methods have run on."""
     runs = {(row["mesh"], row["method"]): row for row in rows}
     compared = {(row["mesh"], row["method"]): row["parts"] for row in baseline}
     methods = [m for m in METHODS if any(row["method"] == m for row in rows)]

@@ -1,8 +1,8 @@
-"""Repair every mesh under a folder and tell what it took.
+"""Repair every mesh under a folder and report the steps and times.
 
 python benchmarks/repair_corpus.py FOLDER [--every N] [--out results.jsonl]
 
-Prints the steps taken, the seconds, the worst deviations and every failure; writes one JSON line a file.
+Prints the steps taken, the seconds, the largest deviations and every failure; writes one JSON line per file.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def measure(path: Path) -> dict[str, Any]:
 
 
 def table(rows: list[dict[str, Any]]) -> str:
-    """Sum up the rows: steps by file and by body, times, the worst."""
+    """Summarise the rows: steps by file and by body, times, the worst cases."""
     good = [row for row in rows if "seconds" in row]
     lines = [f"{len(rows)} files, {len(good)} repaired"]
     lines += [f"  {row['file']}: {row.get('error') or row['crash']}" for row in rows if row not in good]

@@ -1,11 +1,12 @@
-"""Damage closed meshes and see whether they stay the solids they were.
+"""Damage closed meshes and measure how well repair recovers the original solids.
 
     python -m benchmarks.repair_damaged FOLDER FILE ... [--shares 0.05,0.1,0.2] [--out damaged.jsonl]
     python -m benchmarks.repair_damaged --table damaged.jsonl
 
-Every family of `fuzz.flaws` at every share of damaged faces; hulls by quality="fast" with one thread. `under` is how
-far points of the undamaged surface lie from the hulls, `over` how far the hulls' surface leads from the damaged input
-and the undamaged one, whichever is nearer: a fin is part of the input. Lengths are in the frame of the undamaged mesh.
+Runs every family of `fuzz.flaws` at every share of damaged faces, with quality="fast" and one thread. `under` is the
+largest distance of the undamaged surface from the hulls; `over` is the largest distance of the hulls' surface from the
+damaged or undamaged input, whichever is nearer: a fin is part of the input. Lengths are in the frame of the undamaged
+mesh.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ UNDER, OVER = 0.005, THRESHOLD + 0.01
 
 
 def measure(vertices: Any, faces: Any, family: str, share: float) -> dict[str, Any]:
-    """Damage one mesh, decompose it, and hold the hulls against the undamaged mesh."""
+    """Damage one mesh, decompose it, and compare the hulls with the undamaged mesh."""
     frame = Frame.of(vertices)
     damaged = FAMILIES[family](vertices, faces, share, np.random.default_rng(0))
     started = time.process_time()
@@ -72,7 +73,7 @@ def measure(vertices: Any, faces: Any, family: str, share: float) -> dict[str, A
 
 
 def table(rows: list[dict[str, Any]]) -> str:
-    """One line for each family and share."""
+    """One line per family and share."""
     lines = ["| family | share | hulls | under mean | worst | over mean | worst | outside the bars | and untold |"]
     lines += ["|---|---|---|---|---|---|---|---|---|"]
     for family, share in dict.fromkeys((row["family"], row["share"]) for row in rows):

@@ -1,10 +1,10 @@
-"""Put the tables of a run into docs/results.md, so that each is what a command printed.
+"""Copy the tables of a run into docs/results.md, so that each is exactly what a command printed.
 
     sh benchmarks/paper.sh MESHES LIST TRAINING_MESHES RUN
     python benchmarks/results.py RUN docs/results.md
 
-The document says where each table comes from: the lines between ``<!-- PAGE.md, table N -->`` and ``<!-- end -->`` are
-replaced by the N-th table of RUN/PAGE.md. The chart it shows is put beside it.
+The document names the source of each table: the lines between ``<!-- PAGE.md, table N -->`` and ``<!-- end -->`` are
+replaced by the N-th table of RUN/PAGE.md. The chart it shows is copied beside it.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from pathlib import Path
 
 PLACE = re.compile(r"(<!-- (?P<page>\S+\.md), table (?P<number>\d+) -->\n).*?(<!-- end -->)", re.DOTALL)
 CHARTS = {"quick/curves.svg": "parts_against_error.svg"}
-"""From a run's folder to the document's."""
+"""Charts, from their name in a run's folder to their name in the document."""
 
 TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
 
 
 def fill(document: str, run: Path) -> str:
-    """Replace the tables of a document by those of a run's pages."""
+    """Replace the tables of a document by those in a run's pages."""
 
     def table(place: re.Match[str]) -> str:
         page, number = run / place["page"], int(place["number"])

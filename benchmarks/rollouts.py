@@ -1,4 +1,4 @@
-"""What training's episodes cost, where they are played, and what a request costs a pool beside what it asks for.
+"""The cost of training episodes by where they are played, and the overhead of a request to a pool.
 
     python benchmarks/rollouts.py train MESHES --count 150 --jobs 0 --jobs 1 --jobs 2
     python benchmarks/rollouts.py overhead --jobs 2
@@ -6,8 +6,8 @@
     python benchmarks/rollouts.py boxes --jobs 2
     python benchmarks/rollouts.py boxes --ray local --jobs 2
 
-Processor seconds of this process and of all that it started, which are nearly the same on a busy machine; wall times
-are only worth something on one that does nothing else. Over Ray, what Ray's own servers take is told apart.
+CPU seconds are those of this process and all its descendants, and barely depend on the load; wall times are meaningful
+only on an idle machine. With Ray, the CPU time of Ray's own servers is reported separately.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Ray = Annotated[str | None, typer.Option(help="A cluster: local, auto, or its ad
 
 
 class Used:
-    """Wall and processor seconds since the beginning."""
+    """Wall and CPU seconds since the start."""
 
     def __init__(self) -> None:
         self._start, self._own, self._others = time.perf_counter(), self._seconds(), self._family()
@@ -51,7 +51,7 @@ class Used:
         return usage.ru_utime + usage.ru_stime
 
     def _family(self) -> dict[str, float]:
-        """Processes that have ended are counted by whoever waited for them, and so by their parents."""
+        """CPU seconds by kind of process; the time of an ended process is part of its parent's, which waited for it."""
         spent = {"workers": 0.0, "servers": 0.0}
         usage = resource.getrusage(resource.RUSAGE_CHILDREN)
         spent["workers"] += usage.ru_utime + usage.ru_stime
@@ -75,7 +75,7 @@ def train(
     warmup: int = 1000,
     environments: int = 4,
 ) -> None:
-    """Train a little and tell cuts a second and processor seconds, of the learner and of those who play."""
+    """Train briefly and print cuts per second and CPU seconds, of the learner and of the players."""
     import rlacd.learn.paper.train as module
     from rlacd.learn.paper.options import TrainOptions
 
@@ -106,7 +106,7 @@ def train(
 
 @app.command()
 def overhead(count: int = 300, jobs: int = 2, ray: Ray = None) -> None:
-    """Ask for episodes of a solid that is none: the way there and back, without and with a new network each time."""
+    """Request episodes of an invalid solid: measures the round trip, without and with a new network each time."""
     import torch
     from safetensors.torch import save
 
@@ -129,7 +129,7 @@ def overhead(count: int = 300, jobs: int = 2, ray: Ray = None) -> None:
 
     print(f"a network is {len(weights) / 1e6:.1f} MB")
     with open_pool(jobs, ray) as pool:
-        _ask(pool, requests(False), 0)  # processes start
+        _ask(pool, requests(False), 0)  # starts the processes
         for networks in (False, True):
             _ask(pool, requests(networks), count, "with a new network" if networks else "with nothing")
 
@@ -154,7 +154,7 @@ class _Nothing:
 
 @app.command()
 def boxes(count: int = 300, jobs: int = 2, ray: Ray = None) -> None:
-    """Do a batch of boxes, which need no cut, and tell what each costs beside its decomposition."""
+    """Run a batch of boxes, which need no cut, and print the overhead of each beside its decomposition."""
     with tempfile.TemporaryDirectory() as folder, open_pool(jobs, ray) as pool:
         for part in ("warm", "boxes"):
             for number in range(count if part == "boxes" else 2 * jobs):

@@ -1,4 +1,4 @@
-"""Where the time goes, how it grows with the number of faces, and the peak of memory.
+"""Time per stage, its growth with the number of faces, and peak memory.
 
     python benchmarks/scaling.py stages MESH [MESH ...]     seconds of each stage
     python benchmarks/scaling.py faces [--most 1000000]     one shape (a torus), from 1k faces up

@@ -1,9 +1,9 @@
-"""Real meshes through every simulator: decompose, write, load, let fall, and count what goes wrong.
+"""Real meshes in every simulator: decompose, write, load, drop, and count failures.
 
     python benchmarks/simulators.py LIST_OF_FILES FOLDER_OF_MESHES [--every N]
 
-Prints a line a mesh and simulator that is not as it should be (not loaded, another number of hulls or mass, not finite
-after the fall), and totals. Run from the root of a checkout with the extras sim, usd and drake.
+Prints a line per failing mesh and simulator (not loaded, wrong number of hulls or mass, not finite after the fall), and
+totals. Run from the root of a checkout with the extras sim, usd and drake.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def main() -> None:
         mesh = load_mesh(options.folder / name)
         used = mesh.vertices[np.unique(mesh.faces)]
         low, size = used.min(axis=0), float(np.ptp(used, axis=0).max())
-        # One size for all, on the ground: simulators are tuned for things of a metre.
+        # All meshes in one size, on the ground: simulators are tuned for objects of about a metre.
         standing = ((mesh.vertices - low) / size, mesh.faces)
         result = rlacd.decompose(standing, policy="navacd", quality="fast", preset=options.preset, threads=1)
         mass = result.report["mass"]["volume_abs"] * 1000.0

@@ -1,12 +1,12 @@
-"""How late a decomposition ends when it is told to: by `timeout`, and by Ctrl-C on the command line.
+"""How late a decomposition ends when stopped by `timeout`, or by Ctrl-C on the command line.
 
     python benchmarks/timeout.py timeout [--seconds 2] [SHAPE ...]
     python benchmarks/timeout.py interrupt [--seconds 2] [SHAPE ...]
 
 SHAPE is a name in `tests/shapes_large.py` (all of them by default) or the path of a mesh. Every run is a fresh process.
-Lateness is wall time: of `rlacd.decompose`, from its call, beyond the timeout, with the CPU seconds in that;
-and of the command, from SIGINT, so many seconds after it began, to its exit. It grows when others use the machine, so
-the load (1 minute) is printed beside it.
+Lateness is wall time: for `rlacd.decompose` from its call, beyond the timeout, with the CPU seconds spent in it; for
+the command from SIGINT, sent `--seconds` after its start, to its exit. It grows with the load of the machine, whose
+1-minute average is printed too.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from tests.shapes_large import LARGE
 
 PROMISE, SHARE = 1.0, 0.1
-"""No more than so many seconds late, and this share of the timeout."""
+"""Allowed lateness: seconds, and a share of the timeout."""
 
 GIVE_UP = 120.0
 
@@ -38,7 +38,7 @@ def mesh_of(shape: str) -> Any:
 
 
 def one(shape: str, seconds: float) -> dict[str, Any]:
-    """Decompose here, and tell how long each stage lasted beyond the timeout."""
+    """Decompose in this process, and report how long each stage lasted beyond the timeout."""
     import rlacd
 
     mesh = mesh_of(shape)
@@ -88,7 +88,7 @@ def _ignore_interrupts() -> None:
 
 
 def _ignores_interrupts(process: int) -> bool:
-    """Whether the command has not begun yet: then it minds SIGINT (Linux)."""
+    """Tell whether the command still ignores SIGINT because it has not started its work (Linux)."""
     ignored = next(line for line in Path(f"/proc/{process}/status").read_text().splitlines() if "SigIgn" in line)
     return bool(int(ignored.split()[1], 16) >> (signal.SIGINT - 1) & 1)
 

@@ -1,4 +1,4 @@
-"""Failures of a soak as small JSON files, tried again by number, or by the triangles and options that they need."""
+"""Failures of a soak as small JSON files, which can be rerun by number, or from the triangles and options they hold."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from rlacd import NavigableSpace
 Case = dict[str, Any]
 
 SMALL = 60
-"""Triangles that are written into a case; larger ones are made again from their number."""
+"""Maximum number of triangles stored in a case; larger shapes are regenerated from their number."""
 
 
 def case_of(trial: Trial, shape: Shape | None = None) -> Case:
-    """Everything that is needed to try it again, and to understand it."""
+    """Collect everything needed to rerun and understand a trial."""
     options = {name: _plain(value) for name, value in trial.options.items()}
     case: Case = {"seed": trial.seed, "number": trial.number, "kind": trial.kind, "end": trial.end, "said": trial.said}
     case |= {"story": trial.story, "options": options}
@@ -29,7 +29,7 @@ def case_of(trial: Trial, shape: Shape | None = None) -> Case:
 
 
 def inputs(laboratory: Laboratory, case: Case) -> tuple[Shape, dict[str, Any]]:
-    """The shape and options of a case of the kinds ``shape`` and ``mesh``."""
+    """Return the shape and options of a case of the kinds ``shape`` and ``mesh``."""
     if "vertices" in case:
         vertices, faces = np.array(case["vertices"], float), np.array(case["faces"], np.int64)
         shape = Shape(vertices, faces, tuple(case["story"]), case["closed"])
@@ -39,14 +39,14 @@ def inputs(laboratory: Laboratory, case: Case) -> tuple[Shape, dict[str, Any]]:
 
 
 def try_case(laboratory: Laboratory, case: Case) -> Trial:
-    """Try a case again."""
+    """Rerun a case."""
     if case["kind"] not in ("shape", "mesh"):
         return laboratory.trial(case["number"])
     return laboratory.retry(Trial(case["seed"], case["number"], case["kind"]), *inputs(laboratory, case))
 
 
 def minimised(laboratory: Laboratory, case: Case, tries: int) -> Case:
-    """Leave out options and triangles without which a case ends alike, in ever smaller pieces."""
+    """Remove options and triangles, in ever smaller pieces, as long as the case still fails the same way."""
     if case["kind"] not in ("shape", "mesh") or case["end"] == "hang":
         return case
     shape, options = inputs(laboratory, case)
@@ -73,7 +73,7 @@ def minimised(laboratory: Laboratory, case: Case, tries: int) -> Case:
 
 
 def _fewer(faces: np.ndarray, fails: Callable[[np.ndarray], bool]) -> None:
-    """Leave out ever smaller pieces."""
+    """Remove ever smaller pieces of the faces."""
     step = len(faces) // 2
     while step:
         at = 0
@@ -92,7 +92,7 @@ def _only(shape: Shape, faces: np.ndarray) -> Shape:
 
 
 def _alike(now: Trial, then: Trial) -> bool:
-    """Whether the complaint is the same but for its numbers."""
+    """Tell whether the complaints agree except for their numbers."""
     words = [{word for line in said for word in line.split() if word.isalpha()} for said in (now.said, then.said)]
     return len(words[0] & words[1]) >= 0.7 * len(words[1])
 
@@ -104,5 +104,5 @@ def _plain(value: Any) -> Any:
 
 
 def _lively(name: str, value: Any) -> Any:
-    """An option as `rlacd.decompose` takes it."""
+    """Convert an option to the value that `rlacd.decompose` takes."""
     return NavigableSpace(**value) if name == "criterion" and isinstance(value, dict) else value

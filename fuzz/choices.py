@@ -1,4 +1,4 @@
-"""Options of a decomposition at random, as plain keyword arguments of `rlacd.decompose`."""
+"""Random options of a decomposition, as plain keyword arguments of `rlacd.decompose`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rlacd.policies import POLICIES
 
 
 def draw_options(seed: int) -> dict[str, Any]:
-    """Draw the options of a seed; `threads` is among them."""
+    """Draw the options of a seed, including `threads`."""
     random = np.random.default_rng([seed, 2])
 
     def chance(share: float) -> bool:
@@ -41,7 +41,7 @@ def draw_options(seed: int) -> dict[str, Any]:
     if chance(0.2):
         options["resolution"] = int(random.choice([20, 60]))
     if "criterion" in options and options["criterion"].radius < 0.05:
-        options["timeout"] = 30.0  # loose sheets and small balls may make tens of thousands of parts
+        options["timeout"] = 30.0  # loose sheets and small balls may give tens of thousands of parts
     if chance(0.05):
         options["timeout"] = float(random.choice([1e-6, 0.05, 0.5]))
     return options

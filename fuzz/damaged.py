@@ -41,7 +41,7 @@ from rlacd.pool import ProcessLimits, WorkerDiedError
 from rlacd.weights import __name__ as weights_package
 
 CPU_SECONDS, SECONDS, MEMORY = 60.0, 1800.0, 2 * 2**30
-"""What an input may take: time of a processor, time by the clock, bytes. A decomposition is to stop after a second."""
+"""Limits of an input: CPU time, wall time, bytes. A decomposition gets a timeout of one second."""
 
 Row = dict[str, Any]
 
@@ -54,17 +54,17 @@ SMALL_MESHES = 12
 BOX = trimesh.creation.box()
 
 OFF_LETTERS = {"4": " 1", "N": " 0 0 1", "C": " 255 128 0 255", "ST": " 0.5 0.25"}
-"""What a letter before ``OFF`` adds to the line of each vertex, in this order."""
+"""Numbers that each letter before ``OFF`` adds to a vertex's line, in this order."""
 
 WELL = ("loaded", "refused")
-"""How an input may end."""
+"""Acceptable outcomes of an input."""
 
 ENDS = (*WELL, "crash", "hang", "memory", "untyped", "invalid")
-"""How inputs end: ``untyped`` is an error that is not the tool's own, ``invalid`` a hull that is none."""
+"""All outcomes: ``untyped`` is an error that is not one of the package's own, ``invalid`` an invalid hull."""
 
 
 def seeds_of(meshes: Path) -> dict[str, list[Seed]]:
-    """Real files and small real meshes in every format, by format."""
+    """Collect real files, and small real meshes written in every format, by format."""
     found: dict[str, list[Seed]] = {}
     for path in sorted((meshes / "raw").iterdir()):
         if path.stat().st_size < LARGEST_SEED:
@@ -80,7 +80,7 @@ def seeds_of(meshes: Path) -> dict[str, list[Seed]]:
 
 
 def written(mesh: trimesh.Trimesh) -> Iterator[tuple[str, Seed]]:
-    """A mesh in every format."""
+    """Write a mesh in every format."""
     mesh = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     scene = trimesh.Scene()
     scene.add_geometry(mesh, node_name="first", geom_name="mesh")
@@ -91,7 +91,7 @@ def written(mesh: trimesh.Trimesh) -> Iterator[tuple[str, Seed]]:
     yield "stl", Seed(mesh.export(file_type="stl_ascii").encode())
     yield "ply", Seed(mesh.export(file_type="ply"))
     yield "ply", Seed(mesh.export(file_type="ply", encoding="ascii"))
-    with mock.patch("uuid.uuid4", side_effect=(uuid.UUID(int=i) for i in count())):  # the same names every time
+    with mock.patch("uuid.uuid4", side_effect=(uuid.UUID(int=i) for i in count())):  # reproducible names
         yield "dae", Seed(re.sub(rb"\d{4}-\d\d-\d\dT[^<]*", b"2000-01-01T00:00:00", mesh.export(file_type="dae")))
         yield "3mf", Seed(repacked({}, scene.export(file_type="3mf")))
     yield "glb", Seed(scene.export(file_type="glb"))
@@ -101,7 +101,7 @@ def written(mesh: trimesh.Trimesh) -> Iterator[tuple[str, Seed]]:
 
 
 def off_variant(mesh: trimesh.Trimesh, letters: str) -> bytes:
-    """A mesh as an OFF file with what these letters before its keyword stand for on each vertex's line."""
+    """Write a mesh as an OFF file, with the vertex data that the letters before its keyword announce."""
     behind = "".join(text for letter, text in OFF_LETTERS.items() if letter in letters)
     lines = [f"{letters}OFF{' 3' * ('n' in letters)} # {mesh.extents}", f"{len(mesh.vertices)} {len(mesh.faces)} 0"]
     lines += [f"{x} {y} {z}{behind}" for x, y, z in mesh.vertices.tolist()]
@@ -111,7 +111,7 @@ def off_variant(mesh: trimesh.Trimesh, letters: str) -> bytes:
 
 @dataclass
 class Fuzzer:
-    """Makes inputs and has them decomposed."""
+    """Makes damaged inputs and decomposes them."""
 
     seeds: dict[str, list[Seed]]
     seed: int
@@ -119,7 +119,7 @@ class Fuzzer:
     worker: Watched = field(default_factory=lambda: Watched(ProcessLimits(SECONDS, MEMORY), CPU_SECONDS))
 
     def input(self, number: int) -> tuple[str, Path]:
-        """Write the input of a number; its format, and its file."""
+        """Write the input of a number; returns its format and its file."""
         rng = np.random.default_rng([self.seed, number])
         kind = list(self.seeds)[number % len(self.seeds)]
         seeds = self.seeds[kind]
@@ -131,7 +131,7 @@ class Fuzzer:
         return kind, path
 
     def result(self, path: Path) -> Row:
-        """How it ended (see `ENDS`), what was said, and how many seconds of a processor it took."""
+        """Return the outcome (see `ENDS`), its message, and the CPU seconds."""
         mesh, options = path, dict(BUDGET)
         if path.suffix == ".onnx":
             mesh = path.with_suffix(".stl")
@@ -188,7 +188,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def minimise(path: Path) -> None:
-    """Cut out whatever a finding ends alike without, in ever smaller pieces; written beside it as ``small-…``."""
+    """Remove ever smaller pieces as long as a finding ends the same way; the result is written as ``small-…``."""
     content = path.read_bytes()
     with TemporaryDirectory(prefix="rlacd-fuzz-") as scratch:
         fuzzer = Fuzzer({}, 0, Path(scratch))
@@ -216,7 +216,7 @@ def minimise(path: Path) -> None:
 
 
 def table(tally: dict[str, Counter[str]]) -> str:
-    """Totals as Markdown."""
+    """Format the totals as Markdown."""
     lines = ["| format | tried | " + " | ".join(ENDS) + " |", "|---|--:|" + "--:|" * len(ENDS)]
     total: Counter[str] = sum(tally.values(), Counter())
     for kind, counter in [*sorted(tally.items()), ("all", total)]:

@@ -25,25 +25,25 @@ import rlacd
 from fuzz.geometry import Floats, Ints, Polytope, distance_to_triangles, distance_to_union, sampled
 
 SEAM = 1e-5
-"""Two hulls that are no farther apart than this touch: cuts leave 1e-6, files in single precision 1e-7."""
+"""Hulls closer than this touch: cuts leave gaps of 1e-6, single-precision files 1e-7."""
 
 PROMISING = 64
-"""Points whose distance is measured exactly; which they are is told by a cloud of points."""
+"""Number of points whose distance is computed exactly; a point cloud selects them."""
 
 LEAST_A_HULL = 60
-"""Samples a hull has in any case, so that small ones are looked at too."""
+"""Minimum number of samples per hull, so that small hulls are examined too."""
 
 
 @dataclass(frozen=True)
 class Farthest:
-    """The farthest of some points from something, and how far it is.
+    """The point of a set that is farthest from something, and its distance.
 
     Attributes
     ----------
     distance
-        0 where there is no point.
+        0 if there is no point.
     point
-        [3], NaN where there is none.
+        [3], NaN if there is none.
     """
 
     distance: float
@@ -54,15 +54,15 @@ NOWHERE = Farthest(0.0, np.full(3, np.nan))
 
 
 def farthest_from_triangles(points: Floats, corners: Floats, random: np.random.Generator) -> Farthest:
-    """The farthest of points [N, 3] from triangles [F, 3, 3].
+    """Find the point of [N, 3] that is farthest from triangles [F, 3, 3].
 
-    Its distance is exact; which point it is, is guessed from distances to a cloud on the triangles.
+    Its distance is exact, but the point is chosen by approximate distances to a cloud on the triangles.
     """
     if len(points) == 0 or len(corners) == 0:
         return NOWHERE
     flat = corners.reshape(-1, 3)
     cloud = sampled(flat, np.arange(len(flat)).reshape(-1, 3), max(20_000, len(corners)), random)
-    near = np.asarray(cKDTree(cloud).query(points)[0])  # never less than the distance
+    near = np.asarray(cKDTree(cloud).query(points)[0])  # an upper bound of the distance
     chosen = np.argsort(-near, kind="stable")[:PROMISING]
     centre = corners.mean(axis=1)
     radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
@@ -78,7 +78,7 @@ def farthest_from_triangles(points: Floats, corners: Floats, random: np.random.G
 
 
 def outer_points(hulls: Sequence[Polytope], count: int, random: np.random.Generator) -> Floats:
-    """About `count` points, spread by area, of the hulls' facets, and their corners: those that are outer."""
+    """Sample about `count` points of the hulls' facets by area, add their vertices, and keep the outer ones."""
     area = np.array([hull.area for hull in hulls])
     share = np.maximum(LEAST_A_HULL, np.ceil(count * area / max(1e-300, area.sum()))).astype(int)
     boxes = [(hull.vertices.min(axis=0) - SEAM, hull.vertices.max(axis=0) + SEAM) for hull in hulls]
@@ -95,14 +95,14 @@ def outer_points(hulls: Sequence[Polytope], count: int, random: np.random.Genera
 
 
 def seen_over(hulls: Sequence[Polytope], corners: Floats, count: int, random: np.random.Generator) -> Farthest:
-    """How far, at least, the union of the hulls reaches from the input's triangles [F, 3, 3]."""
+    """Lower bound of the distance by which the union of the hulls leaves the input's triangles [F, 3, 3]."""
     return farthest_from_triangles(outer_points(hulls, count, random), corners, random)
 
 
 def seen_under(
     hulls: Sequence[Polytope], vertices: Floats, faces: Ints, count: int, random: np.random.Generator
 ) -> Farthest:
-    """How far, at least, the input leads out of the hulls."""
+    """Lower bound of the distance by which the input leaves the hulls."""
     points = np.concatenate([sampled(vertices, faces, count, random), vertices[np.unique(faces)]])
     boxes = [(hull.vertices.min(axis=0), hull.vertices.max(axis=0)) for hull in hulls]
     for hull, (lower, upper) in zip(hulls, boxes, strict=True):
@@ -120,7 +120,7 @@ def seen_under(
 def in_frame(
     vertices: Floats, faces: Ints, hulls: Sequence[tuple[Floats, Ints]]
 ) -> tuple[Floats, Ints, list[Polytope]]:
-    """The input and hulls with the box of the input's faces centred, its longest side 2, and no faces without area."""
+    """Transform input and hulls so that the input's box is centred with longest side 2; drops faces without area."""
     used = vertices[np.unique(faces)]
     lower, upper = used.min(axis=0), used.max(axis=0)
     centre, size = lower / 2 + upper / 2, float((upper - lower).max()) / 2

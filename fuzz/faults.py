@@ -1,7 +1,7 @@
-"""The command `rlacd` under faults: what it may end with, and what it may leave behind.
+"""The command `rlacd` under faults: how it may end, and which files it may leave.
 
-`faults.c` makes the faults: a disk that is full, renamings that fail, a clock that jumps, signals at a given moment.
-Each is told by the environment, so the same fault comes again.
+`faults.c` injects the faults: a full disk, failing renames, a clock that jumps, signals at a given moment. Environment
+variables control each, so that it can be repeated.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from rlacd import NavigableSpace
 Tree = dict[str, bytes]
 
 STARTING = 0.7
-"""Seconds of a processor before the work begins."""
+"""CPU seconds before the work begins."""
 
 PATIENCE = 1800.0
 
 NO_THREAD = 127
-"""What the C library ends a process with when there is no memory for the data of a thread."""
+"""Exit code of the C library when it cannot allocate thread-local data."""
 
 MAIN = "from rlacd.cli.main import main; main()"
 
@@ -49,24 +49,24 @@ limit = held + int(sys.argv.pop(1))
 resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
 rlacd.cli.main.main()
 """
-"""Python code that runs the command with so much more memory than it has when all libraries are loaded and warm."""
+"""Python code that runs the command with a given memory allowance beyond its use once all libraries are loaded."""
 
 
 @dataclass(frozen=True)
 class Fault:
-    """What goes wrong.
+    """A fault to inject.
 
     Attributes
     ----------
     name
     codes
-        The exit codes that it may end in; signals are negative.
+        Exit codes that are acceptable; signals are negative.
     environment
         See `faults.c`.
     memory
-        Bytes that the command may take, beside what it is made of; 0 for no limit.
+        Bytes that the command may allocate beyond its loaded libraries; 0 for no limit.
     words
-        Added to the command.
+        Words added to the command line.
     """
 
     name: str
@@ -77,19 +77,19 @@ class Fault:
 
     @property
     def kills(self) -> bool:
-        """Whether the command has no chance to tidy up."""
+        """Whether the command has no chance to clean up."""
         return any(code in self.codes for code in (-signal.SIGKILL, -signal.SIGTERM))
 
 
 @dataclass(frozen=True)
 class Run:
-    """How a command ended.
+    """Outcome of a command.
 
     Attributes
     ----------
     code, said
     cpu
-        Seconds of a processor, with its children.
+        CPU seconds, including its children.
     """
 
     code: int
@@ -104,9 +104,9 @@ def draw_fault(random: np.random.Generator, cpu: float, size: int) -> Fault:
     ----------
     random
     cpu : float
-        Seconds of a processor that its work takes when nothing goes wrong.
+        CPU seconds that its work takes without a fault.
     size : int
-        Bytes that it writes then.
+        Bytes that it writes without a fault.
     """
     moment = int(1000 * random.uniform(0.5 * STARTING, 1.1 * (STARTING + cpu)))
     change = int(random.integers(1, 12))
@@ -132,7 +132,7 @@ def draw_fault(random: np.random.Generator, cpu: float, size: int) -> Fault:
 
 
 def command(words: list[str], fault: Fault | None = None) -> Run:
-    """Run the command, and wait for its end."""
+    """Run the command and wait for its end."""
     environment = dict(os.environ)
     arguments = ["-c", MAIN]
     if fault is not None:
@@ -140,7 +140,7 @@ def command(words: list[str], fault: Fault | None = None) -> Run:
         environment |= {"LD_PRELOAD": str(library()), **fault.environment} if fault.environment else {}
         if fault.memory:
             arguments = ["-c", SMALL, str(fault.memory)]
-            environment |= {"OPENBLAS_NUM_THREADS": "1", "MALLOC_ARENA_MAX": "1"}  # threads reserve memory of their own
+            environment |= {"OPENBLAS_NUM_THREADS": "1", "MALLOC_ARENA_MAX": "1"}  # threads reserve memory
     process = subprocess.Popen(
         [sys.executable, *arguments, *words], env=environment, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE
     )
@@ -157,7 +157,7 @@ def command(words: list[str], fault: Fault | None = None) -> Run:
 
 @cache
 def library() -> Path:
-    """`faults.c`, compiled for this process."""
+    """Compile `faults.c` for this process."""
     place = Path(mkdtemp(prefix="rlacd-faults-")) / "faults.so"
     source = Path(__file__).with_name("faults.c")
     subprocess.run(["cc", "-std=c11", "-O1", "-shared", "-fPIC", "-o", place, source, "-ldl", "-lrt"], check=True)
@@ -165,7 +165,7 @@ def library() -> Path:
 
 
 def complaints(fault: Fault, run: Run) -> list[str]:
-    """What is wrong with how a command ended."""
+    """List what is wrong with the outcome of a command."""
     found = []
     lines = run.said.strip().splitlines()
     if run.code not in fault.codes:
@@ -178,16 +178,16 @@ def complaints(fault: Fault, run: Run) -> list[str]:
 
 
 def left_behind(fault: Fault, code: int, main: str, before: Tree, after: Tree, whole: Tree) -> list[str]:
-    """What is wrong with the files that a command left.
+    """List what is wrong with the files that a command left.
 
     Parameters
     ----------
     fault : Fault
     code : int
     main : str
-        The file that names all others; empty for a folder.
+        The file that refers to all others; empty for a folder.
     before, after, whole : dict of bytes
-        The files before, now, and after a run in which nothing goes wrong.
+        The files before, now, and after a run without a fault.
     """
     strays = [name for name in after if name not in before and name not in whole]
     found = [f"{name} was left behind" for name in strays if not fault.kills]
@@ -207,12 +207,12 @@ def left_behind(fault: Fault, code: int, main: str, before: Tree, after: Tree, w
 
 
 def tree(folder: Path) -> Tree:
-    """All files of a folder."""
+    """Read all files of a folder."""
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def words_of(options: dict[str, Any]) -> list[str]:
-    """Options of `rlacd.decompose` for the command line."""
+    """Convert options of `rlacd.decompose` to command-line arguments."""
     words = []
     for name, value in options.items():
         if isinstance(value, NavigableSpace):

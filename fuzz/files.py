@@ -1,4 +1,4 @@
-"""Exact files in and out, read and written without the package's own code."""
+"""Exact input and output files, read and written without the package's own code."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fuzz.geometry import Floats, Ints
 
 
 def write_mesh(path: Path, vertices: Floats, faces: Ints) -> Path:
-    """Write a binary PLY that holds every bit of the coordinates."""
+    """Write a binary PLY with coordinates in full precision."""
     header = (
         "ply\nformat binary_little_endian 1.0\n"
         f"element vertex {len(vertices)}\n" + "".join(f"property double {axis}\n" for axis in "xyz") + ""
@@ -23,7 +23,7 @@ def write_mesh(path: Path, vertices: Floats, faces: Ints) -> Path:
 
 
 def read_hulls(content: bytes, ending: str) -> list[tuple[Floats, Ints]]:
-    """Read the hulls of an .obj (an object each) or a .ply (a number on each face)."""
+    """Read the hulls of an .obj (one object each) or a .ply (a number on each face)."""
     vertices, faces, owner = _read_obj(content) if ending == "obj" else _read_ply(content)
     hulls = []
     for hull in range(int(owner.max(initial=-1)) + 1):

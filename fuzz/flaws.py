@@ -1,7 +1,7 @@
-"""Closed meshes damaged the way scans and exports are: fins, moth holes, patches missing or flipped, and all at once.
+"""Closed meshes damaged like scans and exports: fins, scattered holes, missing or flipped patches, and a mixture.
 
-Every function takes vertices float64 ``[V, 3]``, faces int64 ``[F, 3]``, the share of the faces to damage and a random
-generator, and returns new vertices and faces. The vertices of the input keep their numbers.
+Every function takes vertices float64 ``[V, 3]``, faces int64 ``[F, 3]``, the fraction of faces to damage and a random
+generator, and returns new vertices and faces. The input's vertices keep their indices.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ Mesh = tuple[Floats, Ints]
 Damage = Callable[[Floats, Ints, float, np.random.Generator], Mesh]
 
 PATCH = 8
-"""Faces of a patch, where there are that many around its first one."""
+"""Faces per patch, if there are that many around its first one."""
 
 LONGEST_FIN = 0.1
-"""Height of a fin, where the longest side of the mesh is 2."""
+"""Height of a fin, for a mesh whose longest side is 2."""
 
 
 def fins(vertices: Floats, faces: Ints, share: float, random: np.random.Generator) -> Mesh:
-    """Stick a triangle on an edge of a share of the faces; it leads outwards, up to 45 degrees to a side."""
+    """Add a triangle on an edge of the chosen fraction of faces, pointing outwards, tilted by up to 45 degrees."""
     some = random.permutation(len(faces))[: _count(faces, share)]
     corner = random.integers(3, size=len(some))
     a, b = faces[some, corner], faces[some, (corner + 1) % 3]
@@ -43,24 +43,24 @@ def fins(vertices: Floats, faces: Ints, share: float, random: np.random.Generato
 
 
 def moth_holes(vertices: Floats, faces: Ints, share: float, random: np.random.Generator) -> Mesh:
-    """Take faces away here and there."""
+    """Remove scattered faces."""
     return vertices, np.delete(faces, random.permutation(len(faces))[: _count(faces, share)], axis=0)
 
 
 def missing_patches(vertices: Floats, faces: Ints, share: float, random: np.random.Generator) -> Mesh:
-    """Take faces away, some neighbours at a time."""
+    """Remove patches of adjacent faces."""
     return vertices, np.delete(faces, _patches(faces, share, random), axis=0)
 
 
 def flipped_patches(vertices: Floats, faces: Ints, share: float, random: np.random.Generator) -> Mesh:
-    """Turn faces inside out, some neighbours at a time."""
+    """Flip patches of adjacent faces."""
     faces, some = faces.copy(), _patches(faces, share, random)
     faces[some] = faces[some, ::-1]
     return vertices, faces
 
 
 def mixture(vertices: Floats, faces: Ints, share: float, random: np.random.Generator) -> Mesh:
-    """All of it, a quarter of the share each."""
+    """Apply all of them, each to a quarter of the fraction."""
     for damage in (flipped_patches, moth_holes, missing_patches, fins):
         vertices, faces = damage(vertices, faces, share / 4, random)
     return vertices, faces
@@ -80,7 +80,7 @@ def _count(faces: Ints, share: float) -> int:
 
 
 def _patches(faces: Ints, share: float, random: np.random.Generator) -> Ints:
-    """Faces of patches that together are a share of all."""
+    """Faces of patches that together make up the given fraction."""
     edge = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     _, edge_of = np.unique(edge, axis=0, return_inverse=True)
     incidence = coo_array((np.ones(len(edge)), (np.repeat(np.arange(len(faces)), 3), edge_of.reshape(-1)))).tocsr()

@@ -1,4 +1,4 @@
-"""Distances and hulls for the judges, with none of the kernels they judge."""
+"""Distances and hulls for the judges, computed without the kernels under test."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ Floats: TypeAlias = npt.NDArray[np.float64]
 Ints: TypeAlias = npt.NDArray[np.int64]
 
 PAIRS = 400_000
-"""Points times triangles that are looked at at once."""
+"""Pairs of points and triangles per block."""
 
 
 def distance_to_triangles(points: Floats, corners: Floats) -> Floats:
-    """Distances [N] of points [N, 3] to the nearest of triangles [F, 3, 3], by trying them all."""
+    """Distances [N] of points [N, 3] to the nearest of triangles [F, 3, 3], by brute force."""
     best = np.full(len(points), np.inf)
     step = max(1, PAIRS // max(1, len(points)))
     for start in range(0, len(corners), step):
@@ -32,7 +32,7 @@ def _distances(points: Floats, corners: Floats) -> Floats:
     normal = np.cross(b - a, c - a)
     length = np.linalg.norm(normal, axis=-1, keepdims=True)
     longest = np.maximum(np.square(b - a).sum(-1), np.square(c - a).sum(-1))
-    usable = length[..., 0] > 1e-10 * longest  # what is thinner is its edges
+    usable = length[..., 0] > 1e-10 * longest  # thinner triangles are covered by their edges
     unit = normal / np.where(length > 0, length, 1)
     height = np.einsum("nfk,nfk->nf", p - a, np.broadcast_to(unit, (len(points), *unit.shape[1:])))
     inside = np.broadcast_to(usable, height.shape).copy()
@@ -49,7 +49,7 @@ def _to_segments(p: Floats, start: Floats, end: Floats) -> Floats:
 
 
 def sampled(vertices: Floats, faces: Ints, count: int, random: np.random.Generator) -> Floats:
-    """Points on triangles, by area, and all corners of up to `count` of them."""
+    """Sample points on triangles by area, and add all vertices of up to `count` triangles."""
     corners = vertices[faces]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     chosen = random.permutation(len(faces))[:count]
@@ -62,7 +62,7 @@ def sampled(vertices: Floats, faces: Ints, count: int, random: np.random.Generat
 
 
 class Polytope:
-    """A convex hull as others see it: by Qhull where it can, by its own triangles where Qhull cannot."""
+    """A convex hull from Qhull, or from its own triangles if Qhull fails."""
 
     def __init__(self, vertices: Floats, faces: Ints) -> None:
         self.vertices, self.faces = vertices, faces
@@ -75,7 +75,7 @@ class Polytope:
         self.area = float(length.sum() / 2)
 
     def height(self, points: Floats) -> Floats:
-        """How far [N] points are above the highest facet's plane; negative inside."""
+        """Height [N] of points above the highest facet plane; negative inside."""
         return np.asarray((points @ self.normals.T - self.offsets).max(axis=1))
 
     def distance(self, points: Floats) -> Floats:
@@ -92,7 +92,7 @@ def distance_to_union(points: Floats, hulls: list[Polytope]) -> Floats:
     """Distances [N] of points to the nearest hull."""
     best = np.full(len(points), np.inf)
     for hull in hulls:
-        lower = hull.height(points)  # never more than the distance
+        lower = hull.height(points)  # a lower bound of the distance
         near = np.flatnonzero(lower < best)
         if len(near):
             best[near] = np.minimum(best[near], hull.distance(points[near]))
@@ -100,9 +100,9 @@ def distance_to_union(points: Floats, hulls: list[Polytope]) -> Floats:
 
 
 def why_not_convex(vertices: Floats, faces: Ints) -> str | None:
-    """Say what is wrong with a hull, None when it is closed, outward oriented and convex.
+    """Explain what is wrong with a hull; None if it is closed, outward oriented and convex.
 
-    Small ones are judged in rational arithmetic; of large ones the volume is compared with that of Qhull's hull.
+    Small hulls are judged in rational arithmetic; the volume of large ones is compared with that of Qhull's hull.
     """
     edges = [(int(f[i]), int(f[(i + 1) % 3])) for f in faces for i in range(3)]
     directed = set(edges)
@@ -119,13 +119,13 @@ def why_not_convex(vertices: Floats, faces: Ints) -> str | None:
     size = np.ptp(vertices, axis=0)
     if not (size > 0).all():
         return "it is flat"
-    points = (vertices - vertices.min(axis=0)) / size  # convexity does not mind, and Qhull likes it
+    points = (vertices - vertices.min(axis=0)) / size  # does not affect convexity, and suits Qhull
     own = float(
         np.einsum("ij,ij->i", np.cross(*(points[faces[:, k]] for k in range(2))), points[faces[:, 2]]).sum() / 6
     )
     try:
         reference = float(ConvexHull(points).volume)
-    except Exception as error:  # Qhull gives up on what is nearly flat
+    except Exception as error:  # Qhull fails on nearly flat input
         return None if "QH" in str(error) else str(error)
     return (
         None if abs(own - reference) <= 1e-7 * reference + 1e-12 else f"its volume is {own / reference} of its hull's"

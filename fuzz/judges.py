@@ -1,8 +1,8 @@
-"""What has to hold of hulls, judged without the kernels that made them.
+"""Properties that hulls must have, judged without the kernels that made them.
 
-Distances are sampled from below or taken over all triangles, hulls are checked in rational arithmetic or by Qhull,
-solids are manifold3d's. Lengths are in the frame where the longest side is 2. Each judge returns sentences, none when
-all is well.
+Distances are sampled from below or computed over all triangles, hulls are checked in rational arithmetic or by Qhull,
+and solids are manifold3d's. Lengths are in the frame where the longest side is 2. Each judge returns its complaints as
+sentences, none if all is well.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from fuzz.recipes import Shape
 from rlacd import PRESETS, NavigableSpace
 
 HONEST_WITHIN = 5e-3
-"""What hulls may miss of the input, or reach beyond the threshold, without a word in the report."""
+"""Distance by which hulls may miss the input or exceed the threshold without a warning in the report."""
 
 ROUNDING = 1e-5
 
 HAIR = 1e-6
-"""By this share hulls are larger when they are intersected with the input."""
+"""Relative growth of hulls before they are intersected with the input."""
 
 SAMPLES = 400
 
@@ -37,14 +37,14 @@ THIN = 1e-3
 
 @dataclass(frozen=True)
 class Case:
-    """An input, what was asked of it, and what came out.
+    """An input, the options, and the result.
 
     Attributes
     ----------
     shape : Shape
     options : dict
     hulls : list of (vertices [V, 3], faces [F, 3])
-        In the input's unit, as they were read from the file.
+        In the input's unit, as read from the output file.
     report : dict
         Parts, hausdorff, warnings, complete, and what the criterion says.
     """
@@ -60,13 +60,13 @@ class Case:
 
 
 def finite_faces(shape: Shape) -> Ints:
-    """The faces all of whose corners are finite."""
+    """The faces with finite vertices only."""
     finite: npt.NDArray[np.bool_] = np.asarray(np.isfinite(shape.vertices).all(axis=1))
     return shape.faces[finite[shape.faces].all(axis=1)]
 
 
 def judge(case: Case, samples: int = SAMPLES) -> list[str]:
-    """Ask all judges, who look at about `samples` points of the input and of the hulls each."""
+    """Run all judges, each with about `samples` points of the input and of the hulls."""
     found = [f"hull {i}: {why}" for i, hull in enumerate(case.hulls) if (why := why_not_convex(*hull))]
     found += limits(case)
     faces = finite_faces(case.shape)
@@ -108,7 +108,7 @@ def limits(case: Case) -> list[str]:
 def coverage(
     case: Case, where: Floats, faces: Ints, hulls: list[Polytope], random: np.random.Generator, samples: int
 ) -> list[str]:
-    """Every point of the input lies in a hull, or as near as the report says, and says in words if that is far."""
+    """Every point of the input lies in a hull or as near as the report says; it must warn of large distances."""
     missed = seen_under(hulls, where, faces, samples, random)
     said = case.report["hausdorff"]["under"]
     found = []
@@ -122,9 +122,9 @@ def coverage(
 def overhang(
     case: Case, corners: Floats, hulls: list[Polytope], random: np.random.Generator, samples: int
 ) -> list[str]:
-    """No point of the hulls' outside is farther from the input than the report says, or than the threshold says.
+    """No point of the hulls' outer surface is farther from the input than the report or the threshold allows.
 
-    Faces without an area need not be covered, but hulls may reach for them.
+    Faces without area need not be covered, but hulls may extend to them.
     """
     reached = seen_over(hulls, corners, samples, random)
     said = case.report["hausdorff"]["over"]
@@ -139,11 +139,11 @@ def overhang(
 
 
 def filled_solid(where: Floats, faces: Ints) -> manifold3d.Manifold | None:
-    """The closed input as a solid without cavities; None where manifold3d does not take it for one."""
+    """The closed input as a solid without cavities; None if manifold3d does not accept it."""
     solid = manifold3d.Manifold(manifold3d.Mesh64(np.ascontiguousarray(where), faces.astype(np.uint64)))
     pieces = solid.decompose()
     if any(abs(piece.volume()) < THIN * piece.surface_area() for piece in pieces):
-        return None  # repair makes slabs of sheets
+        return None  # repair turns sheets into slabs
     outer = [piece for piece in pieces if piece.volume() > 0]
     return manifold3d.Manifold.batch_boolean(outer, manifold3d.OpType.Add) if outer else None
 
@@ -156,10 +156,10 @@ def triangles_of(solid: manifold3d.Manifold) -> tuple[Floats, Ints]:
 def concavity(
     case: Case, solid: manifold3d.Manifold, hulls: list[Polytope], random: np.random.Generator, samples: int
 ) -> list[str]:
-    """What the solid fills of each hull shows how concave its part is at least.
+    """The intersection of the solid with each hull gives a lower bound of its part's concavity.
 
-    The part lies in the hull's share of the solid, so the share leaves no more of the hull empty than the part does,
-    and no point of the hull's surface is farther from it.
+    The part lies in that intersection, which therefore leaves no more of the hull empty than the part does, and no
+    point of the hull's surface is farther from the intersection than from the part.
     """
     told = case.report.get("concavity")
     if told is None:
@@ -172,10 +172,10 @@ def concavity(
         return found
     for i, hull in enumerate(hulls):
         body = manifold3d.Manifold(manifold3d.Mesh64(hull.vertices, hull.faces.astype(np.uint64)))
-        # manifold3d can lose a spike where faces coincide, and a film anywhere: the better of two ways counts.
+        # manifold3d can lose a spike where faces coincide, and a film anywhere: the better of two attempts counts.
         shares = [share for share in (solid ^ body, solid ^ _a_hair_larger(body)) if not share.is_empty()]
         if body.is_empty() or not shares:
-            continue  # thinner than booleans can tell
+            continue  # too thin for booleans
         points = sampled(hull.vertices, hull.faces, max(LEAST_A_HULL, samples // len(hulls)), random)
         least = min(_least_concavity(body, share, points, random) for share in shares)
         if least > told + 1e-3:
@@ -186,23 +186,24 @@ def concavity(
 def _least_concavity(
     body: manifold3d.Manifold, share: manifold3d.Manifold, points: Floats, random: np.random.Generator
 ) -> float:
-    """Bound from below the concavity of a part that lies in a hull's share of the solid, by points of the hull."""
+    """Lower bound, from points of the hull, of the concavity of the part in the hull's intersection with the solid."""
     radius = math.pow(max(0.0, 3 * (body.volume() - share.volume()) / (4 * math.pi)), 1 / 3)
     vertices, faces = triangles_of(share)
     return max(0.3 * radius, farthest_from_triangles(points, vertices[faces], random).distance)
 
 
 def _a_hair_larger(body: manifold3d.Manifold) -> manifold3d.Manifold:
-    """The same, but for faces that lie in those of another."""
+    """Scale a body slightly, so that its faces do not coincide with those of another."""
     middle = np.reshape(body.bounding_box(), (2, 3)).mean(axis=0)
     return body.translate(-middle).scale([1 + HAIR] * 3).translate(middle)
 
 
 def free_space(case: Case, solid: manifold3d.Manifold, hulls: list[Polytope], random: np.random.Generator) -> list[str]:
-    """No hull leads far into a place that a ball can certainly get to.
+    """No hull reaches far into a place that a ball can certainly get to.
 
-    Certain are the cells of a grid so far from the surface that the ball, with the tolerance around it, fits everywhere
-    in them and on the straight way to their neighbours, and that are joined to the outside by such cells.
+    Certain are the grid cells that are so far from the surface that the ball, enlarged by the tolerance, fits
+    everywhere in them and on the straight line to their neighbours, and that are connected to the outside by such
+    cells.
     """
     space = case.options.get("criterion")
     if not isinstance(space, NavigableSpace) or space.closed_planes or not case.report["complete"]:
@@ -230,12 +231,12 @@ def free_space(case: Case, solid: manifold3d.Manifold, hulls: list[Polytope], ra
     reached = reached[random.permutation(len(reached))[:2000]]
     depth = radius - distance_to_union(reached, hulls)
     worst = float(depth.max())
-    # Between the balls a hull can reach a third of their radius unseen.
+    # Between the balls a hull can reach a third of their radius without being noticed.
     return [f"a hull reaches {worst:.6g} into a ball of {radius:g}"] if worst > 0.4 * radius + pitch else []
 
 
 def _dense(vertices: Floats, faces: Ints, spacing: float) -> Floats:
-    """Points such that none of the triangles is farther than `spacing` from one of them."""
+    """Sample points such that every point of the triangles is within `spacing` of one."""
     points = [vertices]
     for a, b, c in vertices[faces]:
         longest = max(np.linalg.norm(b - a), np.linalg.norm(c - b), np.linalg.norm(a - c))

@@ -27,13 +27,13 @@ from rlacd.solid.hull import Hull
 Soup = tuple[Floats, Any]
 
 ROUNDING = 1e-7
-"""What a kernel may be off beside coordinates up to 1: its comments promise 1e-8."""
+"""Error allowed for kernels on coordinates up to 1; they promise 1e-8."""
 
 TOLERANCE = 2e-3
 
 
 def soup(seed: int) -> Soup:
-    """The faces of a seed's shape in the frame, int32."""
+    """The faces of a seed's shape in the frame, as int32."""
     shape = make_shape(seed)
     faces = finite_faces(shape)
     used, corner = np.unique(faces, return_inverse=True)
@@ -42,7 +42,7 @@ def soup(seed: int) -> Soup:
 
 
 def same(call: Callable[[int], Any]) -> Any:
-    """What a call gives on one thread; it has to give the same bits on four."""
+    """Return the result of a call on one thread, after checking that four threads give the same bits."""
     one, four = call(1), call(4)
     for a, b in zip(*((x if isinstance(x, tuple) else (x,)) for x in (one, four)), strict=True):
         assert np.asarray(a).tobytes() == np.asarray(b).tobytes(), "other bits on other threads"
@@ -50,7 +50,7 @@ def same(call: Callable[[int], Any]) -> Any:
 
 
 def hull_of(mesh: Soup, random: np.random.Generator) -> Hull | None:
-    """The convex hull, which nothing may stick out of, and its simplification, which holds it."""
+    """Check that the convex hull contains every point, and its simplification the hull."""
     points = mesh[0]
     indices, faces, rank = _native.convex_hull(points)
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False) if len(points) > 1 else np.zeros(3)
@@ -76,7 +76,7 @@ def hull_of(mesh: Soup, random: np.random.Generator) -> Hull | None:
 
 
 def surface_queries(mesh: Soup, other: Soup, random: np.random.Generator) -> _native.Surface:
-    """Closest points, winding numbers and the one-sided Hausdorff distance."""
+    """Check closest points, winding numbers and the one-sided Hausdorff distance."""
     surface = _native.Surface(*mesh)
     corners = mesh[0][mesh[1]]
     points = np.concatenate([random.uniform(-2, 2, (20, 3)), sampled(*mesh, 10, random)])
@@ -96,7 +96,7 @@ def surface_queries(mesh: Soup, other: Soup, random: np.random.Generator) -> _na
 
 
 def union_queries(hulls: list[Hull], mesh: Soup, surface: _native.Surface, random: np.random.Generator) -> None:
-    """Hulls as one solid, against a surface."""
+    """Check the union of hulls against a surface."""
     union = _native.HullUnion([hull.vertices for hull in hulls], [hull.faces for hull in hulls], 1)
     solids = [Polytope(hull.vertices, hull.faces.astype(np.int64)) for hull in hulls]
     points = np.concatenate([random.uniform(-2, 2, (20, 3)), sampled(*mesh, 20, random)])
@@ -120,7 +120,7 @@ def union_queries(hulls: list[Hull], mesh: Soup, surface: _native.Surface, rando
 
 
 def part_queries(mesh: Soup, other: Soup, hull: Hull, random: np.random.Generator) -> None:
-    """What a component is asked: planes, sweeps, concavity, gluing. Most soups are no solids; no kernel may mind."""
+    """Run the queries on components: planes, sweeps, concavity, gluing. Kernels must accept any soup."""
     directions = random.normal(size=(6, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]
     directions[:3] = np.eye(3)
@@ -147,7 +147,7 @@ def part_queries(mesh: Soup, other: Soup, hull: Hull, random: np.random.Generato
 
 
 def ball_queries(hull: Hull, surface: _native.Surface, random: np.random.Generator) -> None:
-    """Balls around the shape, none of which comes nearer to it than the tolerance."""
+    """Check balls around the shape: none comes closer to it than the tolerance."""
     radius, tolerance = float(random.choice([0.2, 0.5, 1.0])), float(random.choice([0.02, 0.1]))
     reachable, ground = bool(random.random() < 0.5), np.array([[0, 0, 1, -0.5]])[: int(random.integers(2))]
     centres, radii = same(
@@ -170,7 +170,7 @@ def ball_queries(hull: Hull, surface: _native.Surface, random: np.random.Generat
 
 
 def try_seed(seed: int) -> None:
-    """Ask everything about one seed's shape; raises AssertionError."""
+    """Run all queries on one seed's shape; raises AssertionError."""
     random = np.random.default_rng([seed, 4])
     mesh, other = soup(seed), soup(seed + 10**6)
     if len(mesh[1]) == 0 or len(other[1]) == 0:
@@ -180,7 +180,7 @@ def try_seed(seed: int) -> None:
     if not hulls:
         return
     union_queries(hulls, mesh, surface, random)
-    if len(hulls) == 2:  # the first is the mesh's own
+    if len(hulls) == 2:  # the first is the hull of the mesh
         part_queries(mesh, other, hulls[0], random)
         ball_queries(hulls[0], surface, random)
 

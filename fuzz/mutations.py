@@ -1,4 +1,4 @@
-"""Ways to damage a file: some know nothing of it, some know numbers, lines, tags, JSON, chunks or archives."""
+"""Ways to damage a file: some blindly, some aware of numbers, lines, tags, JSON, chunks or archives."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ WORDS = [
 ]
 
 BITS = [0, 1, 0x7F, 0x80, 0xFF, 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, 0x7F800000, 0x7FC00000, 0xFF7FFFFF]
-"""As 32 bits: small and large whole numbers, infinity, NaN and the largest float."""
+"""As 32 bits: small and large integers, infinity, NaN and the largest float."""
 
 VALUES: list[Any] = [
     0,
@@ -48,19 +48,19 @@ VALUES: list[Any] = [
     5120,
     5126,
 ]
-"""For JSON."""
+"""Replacement values for JSON."""
 
 
 @dataclass(frozen=True)
 class Seed:
-    """A sound file, and the files that lie beside it."""
+    """A valid file, and the files beside it."""
 
     content: bytes
     beside: dict[str, bytes] = field(default_factory=dict)
 
 
 def mutated(kind: str, seed: Seed, others: list[Seed], rng: Rng) -> bytes:
-    """One mutation, or up to four in a row."""
+    """Apply one to four mutations in a row."""
     data = seed.content
     for _ in range(rng.choice([1, 2, 3, 4], p=[0.6, 0.2, 0.1, 0.1])):
         ways = _ways(kind, data)
@@ -82,7 +82,7 @@ def _ways(kind: str, data: bytes) -> list[Callable[[bytes, bytes, Rng], bytes]]:
 
 
 def _span(data: bytes, rng: Rng) -> tuple[int, int]:
-    """A piece of a file, short ones as likely as long ones."""
+    """A random piece of a file; short and long ones are equally likely."""
     if not data:
         return 0, 0
     length = int(np.exp(rng.uniform(0, np.log(len(data) + 1))))
@@ -98,7 +98,7 @@ def flip(data: bytes, _: bytes, rng: Rng) -> bytes:
 
 
 def overwrite(data: bytes, _: bytes, rng: Rng) -> bytes:
-    """Put a nasty number somewhere, more often near the start and where a number may begin."""
+    """Write a nasty number somewhere, preferably near the start and where a number may begin."""
     if len(data) < 8:
         return data
     end = min(len(data), 200) if rng.random() < 0.5 else len(data)
@@ -122,25 +122,25 @@ def double(data: bytes, _: bytes, rng: Rng) -> bytes:
 
 
 def splice(data: bytes, other: bytes, rng: Rng) -> bytes:
-    """Put a piece of another file in the place of one."""
+    """Replace a piece by a piece of another file."""
     start, end = _span(data, rng)
     begin, stop = _span(other, rng)
     return data[:start] + other[begin:stop] + data[end:]
 
 
 def number(data: bytes, _: bytes, rng: Rng) -> bytes:
-    """Replace some numbers, by nasty ones or others of the same file."""
+    """Replace some numbers by nasty ones or by others of the same file."""
     found = [match.span() for match in NUMBER.finditer(data)]
     for at in sorted({int(rng.integers(len(found))) for _ in range(rng.integers(1, 4))} if found else [], reverse=True):
         start, end = found[at]
-        other = found[rng.integers(at + 1)]  # before it, where nothing has moved yet
+        other = found[rng.integers(at + 1)]  # an earlier one, whose position has not changed
         word = WORDS[rng.integers(len(WORDS))] if rng.random() < 0.5 else data[slice(*other)]
         data = data[:start] + word + data[end:]
     return data
 
 
 def head(data: bytes, other: bytes, rng: Rng) -> bytes:
-    """Do something to the first lines only."""
+    """Damage only the first lines."""
     at = min(len(data), 300)
     way = (number, lines, flip)[rng.integers(3)]
     return way(data[:at], other[:300], rng) + data[at:]
@@ -155,7 +155,7 @@ def tags(data: bytes, _: bytes, rng: Rng) -> bytes:
 
 
 def _pieces(data: bytes, between: bytes, rng: Rng) -> bytes:
-    """Double, delete, swap or move pieces."""
+    """Duplicate, delete, swap or move pieces."""
     pieces = data.split(between)
     for _ in range(rng.integers(1, 4)):
         i, j = sorted(rng.integers(len(pieces), size=2).tolist())
@@ -173,7 +173,7 @@ def _pieces(data: bytes, between: bytes, rng: Rng) -> bytes:
 
 
 def in_json(data: bytes, other: bytes, rng: Rng) -> bytes:
-    """Replace, delete or double a value of the tree."""
+    """Replace, delete or duplicate a value of the tree."""
     try:
         tree = json.loads(data)
     except ValueError:
@@ -207,7 +207,7 @@ def _places(tree: Any) -> Any:
 
 
 def in_chunk(data: bytes, other: bytes, rng: Rng) -> bytes:
-    """Change a GLB's JSON or its binary chunk, and mend the lengths."""
+    """Change the JSON or binary chunk of a GLB, and correct the lengths."""
     if len(data) < 28 or struct.unpack_from("<I", data, 12)[0] > len(data) - 20:
         return flip(data, other, rng)
     end = 20 + struct.unpack_from("<I", data, 12)[0]
@@ -222,7 +222,7 @@ def in_chunk(data: bytes, other: bytes, rng: Rng) -> bytes:
 
 
 def in_member(data: bytes, _: bytes, rng: Rng) -> bytes:
-    """Change a member of an archive, and pack it again."""
+    """Change a member of an archive, and repack it."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = {name: archive.read(name) for name in archive.namelist()}
@@ -238,7 +238,7 @@ def in_member(data: bytes, _: bytes, rng: Rng) -> bytes:
 
 
 def repacked(changed: dict[str, bytes], data: bytes) -> bytes:
-    """An archive with some members changed, and no dates: the same bytes every time."""
+    """Repack an archive with some members changed, without dates, so that the bytes are reproducible."""
     file = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(data)) as old, zipfile.ZipFile(file, "w") as new:
         for name in old.namelist():

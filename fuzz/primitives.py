@@ -1,4 +1,4 @@
-"""Closed, outward oriented solids about 1 in size, each a function of a random generator."""
+"""Closed, outward oriented solids of size about 1, each a function of a random generator."""
 
 from __future__ import annotations
 
@@ -53,13 +53,13 @@ def needle(random: Random) -> Triangles:
 
 
 def wedge(random: Random) -> Triangles:
-    """A block that ends in an edge, or nearly so."""
+    """A block that tapers to an edge, or nearly so."""
     x, y = random.choice([0.0, 1e-9, 1e-3, 0.3], 2)
     return extruded(np.array([[0, 0], [1, 0], [1, y], [0, 1 + x]]) if y else np.array([[0, 0], [1, 0], [0, 1 + x]]))
 
 
 def star(random: Random) -> Triangles:
-    """A prism over a star, whose points may be thin."""
+    """A prism over a star with possibly thin points."""
     count = 2 * int(random.integers(3, 8))
     radius = np.where(np.arange(count) % 2, random.choice([0.02, 0.3, 0.7]), 1.0)
     angle = 2 * np.pi * np.arange(count) / count

@@ -1,7 +1,7 @@
-"""Shapes that no modeller would make on purpose, each a function of its seed alone.
+"""Random shapes full of degeneracies, each a function of its seed alone.
 
-A shape is put together from primitives on a coarse grid, so that faces, edges and corners coincide, by boolean
-operations or as a mere heap; then it is damaged in the ways files of triangles are. `Shape.steps` tells its story.
+A shape combines primitives on a coarse grid, so that faces, edges and vertices coincide, by boolean operations or as a
+plain heap; then it is damaged in the ways triangle files usually are. `Shape.steps` lists what was done.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ Ints: TypeAlias = npt.NDArray[np.int64]
 Random: TypeAlias = np.random.Generator
 
 NEARLY = (0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-4)
-"""How far apart what coincides may be, beside primitives whose sides are 1 to 4."""
+"""Distance between features meant to coincide, for primitives with sides of 1 to 4."""
 
 
 @dataclass(frozen=True)
 class Shape:
-    """Triangles and how they came about.
+    """Triangles and how they were made.
 
     Attributes
     ----------
     vertices : float64 [V, 3]
     faces : int64 [F, 3]
     steps
-        What was done, in words.
+        The operations, in words.
     is_closed
-        The surface bounds a solid exactly: nothing was damaged.
+        Whether the surface bounds a solid exactly: nothing was damaged.
     """
 
     vertices: Floats
@@ -61,11 +61,11 @@ def pick(random: Random, choices: dict[str, Callable[..., Shape]]) -> Callable[.
     return choices[str(random.choice(list(choices)))]
 
 
-# --- how primitives are put together ----------------------------------------------------------------------------------
+# --- combining primitives ---------------------------------------------------------------------------------------------
 
 
 def piece(random: Random, spread: float = 4) -> Shape:
-    """A primitive of whole-numbered size at a whole-numbered place, sometimes turned or nearly so."""
+    """A primitive of integer size at an integer position, sometimes rotated, exactly or nearly."""
     name = str(random.choice(list(PRIMITIVES)))
     vertices, faces = PRIMITIVES[name](random)
     vertices = (vertices - vertices.min(axis=0)) * random.integers(1, 5, 3)
@@ -80,13 +80,13 @@ def piece(random: Random, spread: float = 4) -> Shape:
 
 
 def heap(random: Random) -> Shape:
-    """Primitives through, in and beside each other."""
+    """Primitives that cross, contain or touch each other."""
     pieces = [piece(random) for _ in range(random.integers(1, 6))]
     return replace(concatenated(pieces), is_closed=len(pieces) == 1)
 
 
 def carved(random: Random) -> Shape:
-    """Primitives united with and taken from each other: one closed surface."""
+    """Unions and differences of primitives: one closed surface."""
     first = piece(random, 1)
     solid = as_manifold(first)
     if solid.is_empty():
@@ -106,7 +106,7 @@ def carved(random: Random) -> Shape:
 
 
 def row(random: Random) -> Shape:
-    """Copies in a row: stairs, combs, fences; neighbours touch, overlap a little or leave a slit."""
+    """Copies in a row: stairs, combs, fences; neighbours touch, overlap slightly or leave a slit."""
     one = piece(random, 0)
     size = np.ptp(one.vertices, axis=0)
     gap = float(random.choice([0.0, *NEARLY, -0.1, 0.1, 0.5]))
@@ -115,7 +115,7 @@ def row(random: Random) -> Shape:
 
 
 def shells(random: Random) -> Shape:
-    """A surface inside itself, inside itself; inner ones may be turned."""
+    """Nested copies of a surface; inner ones may be flipped."""
     one = piece(random, 0)
     center = one.vertices.mean(axis=0)
     inner = []
@@ -142,7 +142,7 @@ def sheets(random: Random) -> Shape:
 
 
 def triangles(random: Random) -> Shape:
-    """Triangles at random, often among few points, so that they share corners, cross and are doubled."""
+    """Random triangles, often on few points, so that they share vertices, cross and repeat."""
     points = int(random.choice([3, 4, 6, 12]))
     vertices = random.choice([random.normal(size=(points, 3)), random.integers(0, 3, (points, 3)).astype(float)])
     faces = random.integers(0, points, (int(random.choice([1, 2, 4, 8])), 3))
@@ -161,7 +161,7 @@ COMPOSITIONS: dict[str, Callable[..., Shape]] = {
 }
 
 
-# --- what files do to them --------------------------------------------------------------------------------------------
+# --- damage typical of files ------------------------------------------------------------------------------------------
 
 
 def jittered(shape: Shape, random: Random) -> Shape:
@@ -172,7 +172,7 @@ def jittered(shape: Shape, random: Random) -> Shape:
 
 
 def torn(shape: Shape, random: Random) -> Shape:
-    """Every triangle with corners of its own, which nearly coincide."""
+    """Give every triangle its own vertices, which nearly coincide."""
     size = float(random.choice(NEARLY))
     corners = shape.vertices[shape.faces].reshape(-1, 3)
     return shape.after(
@@ -181,7 +181,7 @@ def torn(shape: Shape, random: Random) -> Shape:
 
 
 def doubled(shape: Shape, random: Random) -> Shape:
-    """The whole surface twice, nearly in the same place."""
+    """Repeat the whole surface, nearly in the same place."""
     shift = float(random.choice(NEARLY)) * random.normal(size=3)
     faces = shape.faces[:, ::-1] if random.random() < 0.3 else shape.faces
     return shape.after(
@@ -215,7 +215,7 @@ def with_some_repeated(shape: Shape, random: Random) -> Shape:
 
 
 def with_fins(shape: Shape, random: Random) -> Shape:
-    """Triangles that stick out of edges."""
+    """Add triangles that stick out of edges."""
     edges = shape.faces[random.integers(len(shape.faces), size=random.integers(1, 5))][:, :2]
     tips = shape.vertices[edges].mean(axis=1) + random.normal(size=(len(edges), 3))
     corner = len(shape.vertices) + np.arange(len(edges))
@@ -227,7 +227,7 @@ def with_fins(shape: Shape, random: Random) -> Shape:
 
 
 def with_needles(shape: Shape, random: Random) -> Shape:
-    """Faces split at a point on or nearly on one of their edges, which the neighbour does not know."""
+    """Split faces at a point on or nearly on an edge that the neighbour does not share."""
     some = random.permutation(len(shape.faces))[: random.integers(1, 6)]
     a, b, c = shape.faces[some].T
     along = random.choice([0.5, 1e-12, 1e-9, 1e-6, 1 / 3], (len(some), 1))
@@ -253,7 +253,7 @@ def with_faces_of_no_area(shape: Shape, random: Random) -> Shape:
 
 
 def rounded(shape: Shape, random: Random) -> Shape:
-    """Coordinates on a grid, as single precision or few decimals leave them."""
+    """Round coordinates to a grid, like single precision or few decimals."""
     steps = float(random.choice([2.0, 64.0, 1000.0]))
     if random.random() < 0.4:
         return shape.after("float32", shape.vertices.astype(np.float32).astype(np.float64), shape.faces)
@@ -273,7 +273,7 @@ def stretched(shape: Shape, random: Random) -> Shape:
 
 
 def with_stray_points(shape: Shape, random: Random) -> Shape:
-    """Points that no face uses, far away; and with luck one face that does."""
+    """Add distant points that no face uses, and sometimes one face that does."""
     far = float(random.choice([10.0, 1e3, 1e6]))
     vertices = np.concatenate([shape.vertices, far * random.normal(size=(3, 3))])
     if random.random() < 0.7:
@@ -311,7 +311,7 @@ FAULTS: dict[str, Callable[..., Shape]] = {
 
 
 def placed(shape: Shape, random: Random) -> Shape:
-    """Turn, scale and move the whole."""
+    """Rotate, scale and move the whole shape."""
     vertices = shape.vertices
     turn = float(random.choice([0.0, 0.0, 1.0, 1e-9]))
     if turn:
@@ -322,7 +322,7 @@ def placed(shape: Shape, random: Random) -> Shape:
     steps = tuple(
         f"{what} {x:g}" for what, x in (("turn", turn), ("scale", scale), ("offset", offset)) if x not in (0, 1)
     )
-    closed = shape.is_closed and offset < 1e6  # far away, corners that differ become one
+    closed = shape.is_closed and offset < 1e6  # far away, distinct vertices become equal
     return Shape(vertices * scale + offset * scale * random.normal(size=3), shape.faces, (*shape.steps, *steps), closed)
 
 
@@ -330,7 +330,7 @@ def placed(shape: Shape, random: Random) -> Shape:
 
 
 def rotation(random: Random, angle: float) -> Floats:
-    """A rotation matrix [3, 3] about a random axis, by up to so many radians."""
+    """A rotation matrix [3, 3] about a random axis, by up to `angle` radians."""
     x, y, z = random.normal(size=3)
     length = float(np.sqrt(x * x + y * y + z * z))
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) / length

@@ -34,30 +34,30 @@ from rlacd.batch import JobSpec
 from rlacd.pool import ProcessLimits, WorkerDiedError
 
 AGAIN = 4
-"""One of so many seeds is decomposed twice."""
+"""One in this many seeds is decomposed twice."""
 
 FORMATS = ("obj", "obj", "obj", "ply", "ply", "glb", "stl", "urdf")
 
 
 @dataclass
 class Row:
-    """What became of a seed.
+    """Outcome of a seed.
 
     Attributes
     ----------
     seed
     status
-        ``done``, ``refused`` (as it should be), ``crash``, ``hang`` (or too much memory), ``bug`` (an error that is not
-        the tool's own), ``wrong`` (a judge's word).
+        ``done``, ``refused`` (rightly), ``crash``, ``hang`` (or too much memory), ``bug`` (an error that is not one of
+        the package's own), ``wrong`` (according to a judge).
     said
-        Why, unless done.
+        The reason, unless done.
     steps, options, faces
-        Of the input.
+        Facts about the input.
     parts, seconds
     cpu
-        Seconds of a processor.
+        CPU seconds.
     twice
-        It was decomposed again, with the same bytes.
+        Whether it was decomposed again, with the same bytes.
     """
 
     seed: int
@@ -88,7 +88,7 @@ def judged(
     worker: Watched | Here,
     folder: Path,
 ) -> Row:
-    """Decompose a shape, if need be twice, on another number of threads, and fill in its row."""
+    """Decompose a shape, possibly again with another number of threads, and fill in its row."""
     order = JobSpec.of(options, file_format=ending)
     row = replace(row, steps=list(shape.steps), options=order.as_plain()["options"], faces=len(shape.faces))
     mesh = write_mesh(folder / f"{row.seed}.ply", shape.vertices, shape.faces)
@@ -120,7 +120,7 @@ def judged(
 
 
 def _refusal(shape: Shape, ending: str, said: dict[str, Any]) -> tuple[str, list[str]]:
-    """Whether an error is the right one for this input."""
+    """Tell whether an error is the right one for this input."""
     error = said["error"]
     if error.startswith("a bug in rlacd") or "memory" in error:
         return "bug", [error]
@@ -131,7 +131,7 @@ def _refusal(shape: Shape, ending: str, said: dict[str, Any]) -> tuple[str, list
 
 
 def again(seed: int) -> None:
-    """One seed here, told in full."""
+    """Run one seed in this process and print everything about it."""
     shape, options = make_shape(seed), draw_options(seed)
     print(f"{len(shape.vertices)} points, {len(shape.faces)} faces: {', '.join(shape.steps)}\n{options}")
     result = rlacd.decompose((shape.vertices, shape.faces), **options)

@@ -27,16 +27,16 @@ from fuzz.trials import WELL, Laboratory, Trial
 from rlacd import __version__
 
 CHUNK = 50
-"""Numbers that make a row of the ledger."""
+"""Number of trials per row of the ledger."""
 
 TRIES = 40
-"""Smaller inputs that are tried for every failure."""
+"""Number of smaller inputs tried for every failure."""
 
 Row = dict[str, Any]
 
 
 class Ledger:
-    """What has been done, a line of JSON for every chunk of numbers.
+    """The finished trials, one JSON line per chunk of numbers.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class Ledger:
         self.rows: list[Row] = [json.loads(line) for line in lines if line.endswith("}")]
 
     def done(self, seed: int) -> set[int]:
-        """The first numbers of the chunks of a seed that are done."""
+        """The first numbers of a seed's finished chunks."""
         return {row["first"] for row in self.rows if row["seed"] == seed}
 
     def add(self, row: Row) -> None:
@@ -61,7 +61,7 @@ class Ledger:
 
 
 def do_chunk(laboratory: Laboratory, first: int, until: float, folder: Path) -> Row | None:
-    """Make the trials of a chunk; None when time runs out before all are made."""
+    """Run the trials of a chunk; None if time runs out first."""
     ends, counts, cpu = Counter[str](), Counter[str](), 0.0
     for number in range(first, first + CHUNK):
         if time.monotonic() > until:
@@ -83,7 +83,7 @@ def do_chunk(laboratory: Laboratory, first: int, until: float, folder: Path) -> 
 
 
 def report(laboratory: Laboratory, trial: Trial, folder: Path) -> None:
-    """Say what has failed, and write it as a case, as small as can be found quickly."""
+    """Report a failure, and write it as a case, minimised as far as is quickly possible."""
     place = folder / f"{trial.seed}-{trial.number}.json"
     print(f"{trial.kind} {trial.number} {trial.end}: {'; '.join(trial.said)}\n  {place}", flush=True)
     case = case_of(trial)
@@ -125,7 +125,7 @@ def soak(args: argparse.Namespace) -> int:
 
 
 def meshes_of(folder: Path | None) -> Path | None:
-    """The folder of real meshes, if it is there."""
+    """The folder of real meshes, if it exists."""
     return folder if folder is not None and (folder / "index.csv").is_file() else None
 
 

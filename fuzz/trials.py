@@ -1,4 +1,4 @@
-"""The trials of a soak: each is made of a seed and its number alone, tries one thing, and says how that ended.
+"""The trials of a soak: each is a function of a seed and its number alone, tests one thing, and reports the outcome.
 
 A trial is a damaged file, a random shape, a real mesh, a command under a fault, or a batch under a fault.
 """
@@ -33,43 +33,43 @@ from rlacd.batch import JobSpec
 from rlacd.pool import ProcessLimits
 
 KINDS = {"file": 0.86, "shape": 0.115, "mesh": 0.012, "fault": 0.011, "batch": 0.002}
-"""How many of the trials are of each kind."""
+"""Relative frequency of each kind of trial."""
 
 WELL = ("done", "loaded", "refused")
-"""How a trial may end."""
+"""Acceptable outcomes of a trial."""
 
 LARGEST_MESH = 20_000
-"""Triangles of a real mesh."""
+"""Maximum number of triangles of a real mesh."""
 
 SHAPE_SECONDS = 300.0
-"""Time of a processor that a shape may take."""
+"""CPU seconds allowed for a shape."""
 
 LATE = 1.0, 1.1
-"""What a timeout may be exceeded by: seconds, and a factor."""
+"""How far a timeout may be exceeded: seconds, and a factor."""
 
 
 @dataclass
 class Trial:
-    """What was tried and how it ended.
+    """A trial and its outcome.
 
     Attributes
     ----------
     seed, number
-        What it is made of.
+        Determine the trial.
     kind
         See `KINDS`.
     end
         See `WELL`; else ``crash``, ``hang``, ``memory``, ``untyped``, ``invalid``, ``bug`` or ``wrong``.
     said
-        What is wrong.
+        Complaints.
     story
-        The input, in words.
+        A description of the input.
     options
-        Of the decomposition.
+        Options of the decomposition.
     counts
-        Decompositions, hulls, and what else is counted.
+        Numbers of decompositions, hulls and other things.
     cpu
-        Seconds of a processor.
+        CPU seconds.
     """
 
     seed: int
@@ -88,13 +88,13 @@ class Trial:
 
 
 class Laboratory:
-    """Makes trials.
+    """Runs trials.
 
     Parameters
     ----------
     seed : int
     meshes : Path, optional
-        The folder of real meshes; without one, files of a few simple shapes are damaged, and there are no real meshes.
+        The folder of real meshes; without it, files of a few simple shapes are damaged instead.
     """
 
     def __init__(self, seed: int, meshes: Path | None) -> None:
@@ -114,12 +114,12 @@ class Laboratory:
         self._scratch.cleanup()
 
     def kind(self, number: int) -> str:
-        """What a number stands for."""
+        """The kind of trial of a number."""
         kind = str(np.random.default_rng([self.seed, number, 10]).choice(list(KINDS), p=list(KINDS.values())))
         return "shape" if kind == "mesh" and not self._small else kind
 
     def trial(self, number: int) -> Trial:
-        """Make a trial and see how it ends."""
+        """Run a trial."""
         trial = Trial(self.seed, number, self.kind(number))
         start = time.thread_time()
         make: dict[str, Callable[[Trial, np.random.Generator], Trial]] = {
@@ -146,7 +146,7 @@ class Laboratory:
         return placed(shape, random), draw_options(self._shape_seed(number))
 
     def retry(self, trial: Trial, shape: Shape, options: dict[str, Any]) -> Trial:
-        """Try a shape and options of one's own in the way of a trial."""
+        """Rerun a trial with another shape and options."""
         random = np.random.default_rng([self.seed, trial.number, 11])
         ending, twice = str(random.choice(FORMATS)), bool(random.random() < 0.25)
         row = judged(Row(trial.number, "done"), shape, options, ending, twice, self._shapes, self.folder)
@@ -171,15 +171,15 @@ class Laboratory:
     _mesh = _shape
 
     def _fault(self, trial: Trial, random: np.random.Generator) -> Trial:
-        """Decompose undisturbed; by the command under a fault, over an older result; and by the command again."""
+        """Decompose without a fault, by the command under a fault over an older result, and by the command again."""
         shape, options = self.shape(trial.number)
         options.pop("timeout", None)
         if options.get("preset") == "unreal":
-            del options["preset"]  # its files are of another format
+            del options["preset"]  # its files have another format
         ending = str(random.choice([*FORMATS, "mjcf", "folder"]))
         space = options.get("criterion")
         if isinstance(space, NavigableSpace) and space.radius is not None and space.radius < 0.05:
-            del options["criterion"]  # tens of thousands of parts
+            del options["criterion"]  # would give tens of thousands of parts
         order = JobSpec.of(options, file_format=None if ending == "folder" else ending, folders=ending == "folder")
         trial = replace(trial, story=[*shape.steps, ending], options=options)
         with TemporaryDirectory(dir=self.folder) as place:
@@ -220,7 +220,7 @@ class Laboratory:
         )
 
     def _batch(self, trial: Trial, random: np.random.Generator) -> Trial:
-        """A batch undisturbed; under a fault; and again, after which all files have to be the same."""
+        """Run a batch without a fault; under a fault; and again, after which all files must be equal."""
         with TemporaryDirectory(dir=self.folder) as place:
             assets = Path(place) / "assets"
             assets.mkdir()
@@ -234,7 +234,7 @@ class Laboratory:
             words.append(f"--format={random.choice(['obj', 'glb', 'urdf'])}")
             calm = faults.command([*words, "-o", f"{place}/calm"])
             fault = draw_fault(random, calm.cpu / 4, 20_000)
-            while fault.memory or fault.words or fault.name == "clock jumps":  # those are other trials
+            while fault.memory or fault.words or fault.name == "clock jumps":  # other trials cover those
                 fault = draw_fault(random, calm.cpu / 4, 20_000)
             trial.story.append(f"{fault.name} {fault.environment}")
             codes = tuple(5 if code == 0 else code for code in fault.codes)
@@ -255,7 +255,7 @@ class Laboratory:
 
 
 def words_for(ending: str) -> list[str]:
-    """What tells the command the format of a folder."""
+    """Command-line words that choose the format of a folder."""
     return ["--format", "obj"] if ending == "folder" else []
 
 
@@ -269,7 +269,7 @@ def _results(folder: Path) -> faults.Tree:
 
 
 def _lateness(cpu: float, timeout: float, threads: int) -> list[str]:
-    """How late a command came back at least: time by the clock is no less than that of its processors, shared."""
+    """Lower bound of a command's lateness: wall time is at least CPU time over the number of threads."""
     late = (cpu - 4 * faults.STARTING) / min(threads, os.cpu_count() or 1) - LATE[1] * timeout
     return [f"it came {late:.1f} s after its timeout of {timeout:g} s, at least"] if late > LATE[0] else []
 
@@ -280,7 +280,7 @@ def _small_meshes(meshes: Path) -> list[Path]:
 
 
 def _simple_seeds() -> dict[str, list[Seed]]:
-    """Files of simple shapes, by format, where there is no folder of real ones."""
+    """Files of simple shapes, by format, for use without the folder of real meshes."""
     bodies = [trimesh.creation.box((2, 0.4, 0.4)), trimesh.creation.cylinder(0.3, 1, sections=5)]
     found: dict[str, list[Seed]] = {}
     for mesh in (*bodies, trimesh.util.concatenate(bodies)):

@@ -1,4 +1,4 @@
-"""A mesh decomposed as a batch does it: in a watched process, or in this one."""
+"""Decompose a mesh as a batch does: in a watched process, or in this one."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from rlacd.pool import ProcessLimits, Request, WorkerDiedError
 from rlacd.pool.worker import Worker
 
 Said = tuple[dict[str, Any], dict[str, bytes]]
-"""What `rlacd.batch.server.MeshServer` answers."""
+"""The answer of `rlacd.batch.server.MeshServer`."""
 
 
 class Watched:
-    """A process that is ended when a mesh takes more than the limits.
+    """A process that is ended when a mesh exceeds the limits.
 
     Parameters
     ----------
-    limits : Limits
+    limits : ProcessLimits
     cpu_seconds : float
-        Time of a processor that a mesh may take, however busy the machine is.
+        CPU seconds allowed per mesh, independent of the load of the machine.
     """
 
     def __init__(self, limits: ProcessLimits, cpu_seconds: float = math.inf) -> None:
@@ -37,11 +37,11 @@ class Watched:
 
     @property
     def pid(self) -> int:
-        """Of the process; 0 where there is none."""
+        """Process id; 0 if there is no process."""
         return int(self._worker.name.partition("@")[0].replace("-", "0"))
 
     def run(self, order: JobSpec, mesh: Path, name: str, stem: str) -> Said:
-        """Have a mesh decomposed.
+        """Decompose a mesh.
 
         Raises
         ------
@@ -67,7 +67,7 @@ class Watched:
 
 
 class _Watch:
-    """Ends the process of a `Watched` that has kept a processor busy for too long."""
+    """Ends the process of a `Watched` that uses too much CPU time."""
 
     def __init__(self, watched: Watched) -> None:
         self.too_long = False
@@ -96,7 +96,7 @@ class _Watch:
 
 
 class Here:
-    """Does the same in this process, so that a sanitizer's words can be read; a crash ends everything."""
+    """Does the same in this process, so that sanitizer output stays readable; a crash ends everything."""
 
     def run(self, order: JobSpec, mesh: Path, name: str, stem: str) -> Said:
         """Decompose a mesh."""
@@ -105,7 +105,7 @@ class Here:
             return MeshServer(Path(staging))(_values(order, mesh, name, stem), {}, {})
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing."""
 
 
 def _values(order: JobSpec, mesh: Path, name: str, stem: str) -> dict[str, Any]:

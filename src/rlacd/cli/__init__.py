@@ -1,1 +1,1 @@
-"""The `rlacd` command: a module a subcommand, and what they print."""
+"""The `rlacd` command: one module per subcommand, and what they print."""

@@ -1,4 +1,4 @@
-"""The command `rlacd batch`: a folder of meshes at once, on this machine or on a cluster."""
+"""The command `rlacd batch`: a folder of meshes in one run, on this machine or on a cluster."""
 
 from __future__ import annotations
 
@@ -49,10 +49,10 @@ BATCH_EPILOG = """\b
 """
 
 BATCH = "Batch"
-"""The panel of this command's own options."""
+"""Help panel of this command's own options."""
 
 WRITTEN = ("density", "up", "one_mesh")
-"""Options of decompose that say how hulls are written."""
+"""Options of `rlacd decompose` that describe how hulls are written."""
 
 
 def _option(default: Any, kind: Any, *names: str, **about: Any) -> tuple[Any, Any]:
@@ -151,11 +151,11 @@ def _pool(own: dict[str, Any]) -> Pool:
 
 
 NAMED = 5
-"""Large meshes that are named."""
+"""Maximum number of large meshes listed by name."""
 
 
 def _tell_large(batch: Batch) -> None:
-    """Say in one line, before anything is done, which meshes are large."""
+    """Print one line that lists the large meshes, before any work."""
     from rlacd.cli.terminal import say
     from rlacd.plain_json import printable
 
@@ -191,7 +191,7 @@ def _run(batch: Batch, own: dict[str, Any], *, quiet: bool) -> None:
         say("stopping; what is running will be finished (Ctrl-C again to quit at once)")
 
     previous: Any = None
-    with suppress(ValueError):  # not in the main thread: then nobody presses Ctrl-C
+    with suppress(ValueError):  # not in the main thread, which alone receives Ctrl-C
         previous = signal.signal(signal.SIGINT, on_interrupt)
     try:
         with _pool(own) as pool, Screen(quiet=quiet) as screen:

@@ -1,4 +1,4 @@
-"""What `rlacd batch` shows: a bar with rate and time left, a line for each mesh that failed, a summary."""
+"""The output of `rlacd batch`: a bar with rate and time left, a line for each mesh that failed, a summary."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from rlacd.batch.ledger import Row
 
 TELL_EVERY = 30.0
-"""Seconds between lines where stderr is no terminal."""
+"""Seconds between progress lines if stderr is not a terminal."""
 
 SHOWN = 10
-"""Failures that the summary names."""
+"""Maximum number of failures listed in the summary."""
 
 
 class Screen:
-    """Watches a batch; says nothing but failures where it is to be quiet.
+    """Shows the progress of a batch; if quiet, only its failures.
 
     Parameters
     ----------
@@ -89,13 +89,13 @@ class Screen:
 
 
 def failure_line(row: Row) -> str:
-    """Say what became of a mesh that failed."""
+    """Describe the failure of a mesh in one line."""
     instead = " (given its convex hull)" if row["status"] == "fallback" else ""
     return f"  {row['mesh']}: {row['error']}{instead}"
 
 
 def summary_lines(summary: Summary, out: str) -> list[str]:
-    """Tell what a run did, what failed, and what took longest."""
+    """Summarise a run: what was done, what failed, and what took longest."""
     made = sum(summary.status.values()) - summary.passed_over
     meshes = counted(summary.meshes, "mesh", "meshes")
     words = [f"{summary.status['done']} of {meshes} {'is' if summary.meshes == 1 else 'are'} done"]
@@ -116,7 +116,7 @@ def summary_lines(summary: Summary, out: str) -> list[str]:
 
 
 def duration(seconds: float) -> str:
-    """Say a time in the unit that suits it."""
+    """Format a time in a suitable unit."""
     if seconds < 60:
         return f"{seconds:.0f} s" if seconds >= 10 else f"{seconds:.1f} s"
     minutes, hours = seconds / 60, seconds / 3600

@@ -1,4 +1,4 @@
-"""The commands `rlacd bench ...`: side by side with other tools, and the paper's experiments."""
+"""The commands `rlacd bench ...`: comparison with other tools, and the paper's experiments."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ Runs: Parameters = {
 
 
 def experiment(name: str) -> Callable[[Callable[..., Page]], Callable[..., Page]]:
-    """Make a command of a function that takes a `Bench`, and options of its own, and returns a page."""
+    """Make a command of a function that takes a `Bench` and its own options, and returns a page."""
 
     def register(make_page: Callable[..., Page]) -> Callable[..., Page]:
         hints = get_type_hints(make_page, {**globals(), "Bench": Any, "Page": Any}, include_extras=True)
@@ -268,7 +268,7 @@ def _names(given: str | None, usual: tuple[str, ...]) -> list[str]:
     if not names:
         raise OptionError("--methods is empty; name at least one.")
     for name in names:
-        make_method(name)  # unknown or missing ones are told before any work
+        make_method(name)  # unknown or missing methods are reported before any work
     return list(dict.fromkeys(names))
 
 

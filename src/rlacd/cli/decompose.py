@@ -19,7 +19,7 @@ from rlacd.output_options import Axis, OutputOptions
 STDOUT = "-"
 ROBOTS = (".urdf", ".xml")
 IN_METRES = (*ROBOTS, ".glb", ".gltf")
-"""Files whose unit is the metre, as their formats say."""
+"""File formats that define the metre as their unit."""
 
 HELP = """Turn a mesh into convex hulls for collision.
 
@@ -71,7 +71,7 @@ def _decompose(mesh: Path, asked: OutputOptions, how: dict[str, Any]) -> None:
 
 
 def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any]) -> bool:
-    """Decompose a mesh and write all that is wanted; whether it is complete."""
+    """Decompose a mesh and write all requested files; returns whether it is complete."""
     from rlacd.cli.terminal import Watch, say, summary
     from rlacd.decompose_mesh import decompose
     from rlacd.io.write import write_file
@@ -100,7 +100,7 @@ def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any]) -> bool:
 
 
 def _rewrite(robot: Path, wanted: OutputOptions, options: dict[str, Any]) -> bool:
-    """Replace the collision meshes of a robot; whether all are complete."""
+    """Replace the collision meshes of a robot; returns whether all are complete."""
     from rlacd.cli.terminal import Watch, rewrite_summary, say
     from rlacd.io.robots import rewrite_robot
     from rlacd.io.write import write_file
@@ -120,7 +120,7 @@ def _rewrite(robot: Path, wanted: OutputOptions, options: dict[str, Any]) -> boo
 
 
 def _named(mesh: Path, asked: OutputOptions, preset: str | None) -> OutputOptions:
-    """Fill in where to write and in which format, as far as a preset or the input decides that."""
+    """Fill in the output path and format that the preset or the input determines."""
     from rlacd.io.write import MODELS
     from rlacd.presets import find_preset
 
@@ -142,7 +142,7 @@ def _named(mesh: Path, asked: OutputOptions, preset: str | None) -> OutputOption
 
 
 def _check_mesh(wanted: OutputOptions) -> None:
-    """Check before any work that everything can be written."""
+    """Check before any work that all outputs can be written."""
     from rlacd.io.write import check_balls, check_file, hull_target
     from rlacd.view import check_picture
 
@@ -158,7 +158,7 @@ def _check_mesh(wanted: OutputOptions) -> None:
 
 
 def _check_robot(asked: OutputOptions, wanted: OutputOptions) -> None:
-    """Refuse what belongs to a single mesh, and check that the report can be written."""
+    """Reject options for single meshes, and check that the report can be written."""
     from rlacd.io.write import check_file
     from rlacd.view import is_html
 
@@ -173,7 +173,7 @@ def _check_robot(asked: OutputOptions, wanted: OutputOptions) -> None:
 
 
 def _check_input(mesh: Path) -> None:
-    """Say that the input is missing before anything is said of the output; loading says what else may be wrong."""
+    """Report a missing input before any problem with the output; loading reports everything else."""
     try:
         mesh.stat()
     except FileNotFoundError as error:
@@ -183,7 +183,7 @@ def _check_input(mesh: Path) -> None:
 
 
 def _check_output(mesh: Path, wanted: OutputOptions) -> None:
-    """No file may be written twice, and the input never."""
+    """Check that no file is written twice, and that the input is never overwritten."""
     seen = {_same(mesh): "the input"}
     for name, flag in (("output", "-o"), ("report", "--report"), ("picture", "--picture"), ("balls", "--balls")):
         path = getattr(wanted, name)
@@ -195,7 +195,7 @@ def _check_output(mesh: Path, wanted: OutputOptions) -> None:
 
 
 def _same(path: str | Path) -> str:
-    return os.path.normcase(os.path.realpath(path))  # unlike Path.resolve, at ease with links in a circle
+    return os.path.normcase(os.path.realpath(path))  # unlike Path.resolve, accepts circular links
 
 
 def _usual_up(mesh: Path) -> Axis:

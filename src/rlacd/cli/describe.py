@@ -1,4 +1,4 @@
-"""What a mesh file holds and how it would be repaired."""
+"""The contents of a mesh file, and how it would be repaired."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rlacd.repair.repair import repair
 
 
 def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Load and repair a mesh file, and tell what was found, as plain values.
+    """Load and repair a mesh file, and describe the findings as plain values.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def describe_text(facts: dict[str, Any]) -> str:
-    """Say what `describe` found in a few lines for people."""
+    """Format the result of `describe` as a few lines of text."""
     size = np.subtract(facts["bounds"][1], facts["bounds"][0])
     bodies = facts["repair"]
     lines = [

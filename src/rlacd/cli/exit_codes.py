@@ -1,4 +1,4 @@
-"""What a command tells the shell, and how every error becomes one sentence.
+"""Exit codes of the commands, and the conversion of every error into one sentence.
 
 Exit codes: 0 done; 1 a bug in rlacd; 2 bad input or option; 3 the output cannot be written; 4 stopped early (timeout or
 Ctrl-C), a valid decomposition was written; 5 a batch is done, but some meshes failed; 130 interrupted at once, no file
@@ -20,7 +20,7 @@ from rlacd.errors import OutputError, RlacdError
 
 
 class ExitCode(IntEnum):
-    """What the command tells the shell."""
+    """Exit codes of the commands."""
 
     OK = 0
     BUG = 1
@@ -31,7 +31,7 @@ class ExitCode(IntEnum):
     INTERRUPTED = 130
 
 
-# \b keeps the lines of a paragraph apart in the help.
+# \b preserves line breaks in the help.
 EPILOG = """\b
 [bold]Exit codes[/bold]
   0    done
@@ -53,7 +53,7 @@ def exit_codes() -> Iterator[None]:
     except KeyboardInterrupt:
         _fail("interrupted; no file is left half-written.", ExitCode.INTERRUPTED)
     except BrokenPipeError:
-        # The reader of stdout (head, jq) has left; say no more, not even when Python flushes at exit.
+        # The reader of stdout (head, jq) has closed it; print nothing more, not even when Python flushes at exit.
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115
         raise typer.Exit(ExitCode.CANNOT_WRITE) from None
     except OutputError as error:
@@ -68,7 +68,7 @@ def exit_codes() -> Iterator[None]:
 
 
 def leave(code: int) -> NoReturn:
-    """End the process now, whatever its threads are doing; for when nothing is left to write."""
+    """End the process now, even if threads are running; only for when nothing is left to write."""
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError, ValueError, AttributeError):
             stream.flush()

@@ -1,4 +1,4 @@
-"""The command line: one command a verb, nothing but wiring."""
+"""The command line: one module per command; this one only assembles them."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from rlacd.plain_json import printable
 
 
 class Commands(TyperGroup):
-    """Tells those who give a file where a command belongs what to type instead."""
+    """Suggests the right command if a file is given in its place."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Look the command up that the words begin with."""
+        """Find the command that the arguments start with."""
         word = args[0]
         if self.get_command(ctx, word) is None and (Path(word).suffix or os.path.exists(word)):
             verb = "batch" if os.path.isdir(word) else "decompose"

@@ -1,4 +1,4 @@
-"""From what the user gave on the command line to the keyword arguments of `rlacd.decompose`."""
+"""Conversion of command-line options to the keyword arguments of `rlacd.decompose`."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ _METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
 def how_parameters() -> Parameters:
-    """Make the parameters that say how to decompose."""
+    """Make the parameters that control the decomposition."""
     return option_parameters(Options) | option_parameters(SpaceOptions)
 
 
 def decompose_options(
     given: dict[str, Any], *, metres: bool = False, warn: Callable[[str], None] = lambda sentence: None
 ) -> dict[str, Any]:
-    """Keep what the user gave, and make the criterion of its own options.
+    """Keep the options that were given, and build the criterion from its own options.
 
     Parameters
     ----------
     given : dict
-        Options that say how to decompose, by name; None where not given.
+        Options that control the decomposition, by name; None if not given.
     metres : bool
         Whether the mesh is in metres, so that lengths with a unit can be taken.
     warn : callable
-        Told that a name is a former one.
+        Receives a message about the use of a former name.
 
     Returns
     -------
@@ -47,7 +47,7 @@ def decompose_options(
     Raises
     ------
     OptionError
-        Options contradict each other, or are not what they should look like.
+        Options contradict each other or are malformed.
     """
     given = _renamed(chosen(given), warn)
     given = _lengths(given, metres)
@@ -71,7 +71,7 @@ def decompose_options(
 
 
 def _typed(name: str, space: dict[str, Any]) -> str:
-    """Spell an option as the user has."""
+    """Spell an option as on the command line."""
     flags = about(SpaceOptions, name).flags or (f"--{name.replace('_', '-')}",)
     yes, _, no = flags[0].partition("/")
     return no if space[name] is False else yes
@@ -90,7 +90,7 @@ def _renamed(given: dict[str, Any], warn: Callable[[str], None]) -> dict[str, An
 
 
 def _lengths(given: dict[str, Any], metres: bool) -> dict[str, Any]:
-    """Read lengths that are words: a number, a share of the longest side (5%), or metres (0.05m)."""
+    """Parse lengths: a number, a share of the longest side (5%), or metres (0.05m)."""
     taken = dict(given)
     for name, of_longest in (("threshold", 2.0), ("radius", 1.0), ("tolerance", 1.0)):
         word = taken.get(name)

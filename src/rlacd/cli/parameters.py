@@ -1,4 +1,4 @@
-"""Commands made of options that are stated once: the parameters that typer looks up, from the fields of a dataclass."""
+"""Commands from options that are stated once: typer's parameters, built from the fields of a dataclass."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ import typer
 from rlacd.fields import About
 
 Parameters = dict[str, tuple[Any, Any]]
-"""Of a command: name to default and annotation."""
+"""Parameters of a command: name to default and annotation."""
 
 REQUIRED = inspect.Parameter.empty
-"""The default of a parameter that has to be given."""
+"""The default of a parameter that is required."""
 
 
 def command(run: Callable[..., None], text: str, parameters: Parameters) -> Callable[..., None]:
-    """Give a function that takes keywords its parameters, as typer looks them up, and its help."""
+    """Give a function of keyword arguments the signature and help that typer inspects."""
     run.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
         [
             inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
@@ -34,18 +34,18 @@ def command(run: Callable[..., None], text: str, parameters: Parameters) -> Call
 def option_parameters(
     options: type[Any], *, only: Collection[str] | None = None, note: str = "default: ", panel: str | None = None
 ) -> Parameters:
-    """Make a parameter of each field of a dataclass, of its former name too; None where it is not given.
+    """Make a parameter for each field of a dataclass, and for its former name; the default is None.
 
     Parameters
     ----------
     options : type
         A dataclass of fields declared with `rlacd.fields.option`.
     only : collection of str, optional
-        The fields to take.
+        The fields to include.
     note : str
-        What stands before each default.
+        Text before each default in the help.
     panel : str, optional
-        The heading they stand under, in place of their own.
+        Heading for all of them, in place of their own.
     """
     parameters: Parameters = {}
     for field in dataclasses.fields(options):
@@ -69,7 +69,7 @@ def option_parameters(
 
 
 def usual_value(field: dataclasses.Field[Any]) -> str:
-    """Get the default of an option in words; empty where leaving it out means nothing more than that."""
+    """Describe the default of an option; empty if omitting the option needs no explanation."""
     known: About = field.metadata["option"]
     if known.usual is not None:
         return known.usual
@@ -79,18 +79,18 @@ def usual_value(field: dataclasses.Field[Any]) -> str:
 
 
 def chosen(given: dict[str, Any]) -> dict[str, Any]:
-    """Keep what the user gave: defaults are stated once, by the fields."""
+    """Keep the options that were given; defaults are stated once, by the fields."""
     return {name: value for name, value in given.items() if value is not None and value != []}
 
 
 def taken(given: dict[str, Any], options: type[Any]) -> dict[str, Any]:
-    """Take what was given for the fields of a dataclass out of `given`."""
+    """Remove the options of a dataclass from `given` and return them."""
     names = {field.name for field in dataclasses.fields(options)} & set(given)
     return chosen({name: given.pop(name) for name in sorted(names)})
 
 
 def _help(known: About, usual: str, note: str) -> str:
-    """One text for the help; ``[`` begins markup there."""
+    """Build the help text; ``[`` is escaped, since it begins markup."""
     values = known.kind.values if known.metavar is None or known.kind.values not in known.metavar.split("|") else ""
     facts = [f"{note}{usual}"] if usual not in ("", "–") else []
     if known.kind.typed is not bool and values and values.replace(" ", "|") != known.metavar:

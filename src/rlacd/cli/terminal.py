@@ -1,4 +1,4 @@
-"""What the command line shows while it works and when it is done, and how Ctrl-C stops it."""
+"""Output of the command line during and after the work, and graceful stopping by Ctrl-C."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 
 
 def say(text: str) -> None:
-    """Print a line to stderr; stdout is kept for what the user asked to be written there."""
+    """Print a line to stderr; stdout is reserved for requested output."""
     typer.echo(text, err=True)
 
 
 class Watch:
     """Shows progress on a terminal and turns Ctrl-C into a graceful stop.
 
-    The first Ctrl-C makes the decomposition stop at its next step and keep what it has; the second one interrupts at
-    once. The bar is drawn only where stderr is a terminal.
+    The first Ctrl-C makes the decomposition stop at its next step and keep its result so far; the second interrupts at
+    once. The bar is drawn only if stderr is a terminal.
     """
 
     def __init__(self, *, quiet: bool) -> None:
@@ -47,7 +47,7 @@ class Watch:
         self._previous: Any = None
 
     def __enter__(self) -> Watch:
-        # Python runs signal handlers in the main thread only, and refuses to set them from another one.
+        # Python runs signal handlers only in the main thread, and refuses to set them from any other.
         if threading.current_thread() is threading.main_thread():
             self._previous = signal.signal(signal.SIGINT, self._on_interrupt)
         self._bars.start()
@@ -59,7 +59,7 @@ class Watch:
             signal.signal(signal.SIGINT, self._previous)
 
     def __call__(self, progress: Progress) -> bool:
-        """Show `progress`; False when the user wants to stop."""
+        """Show `progress`; returns False if the user wants to stop."""
         self._bars.update(
             self._task,
             description=progress.stage,
@@ -76,7 +76,7 @@ class Watch:
 
 
 def summary(result: Decomposition, written: str) -> str:
-    """Tell in a few lines what came out, how good it is, and what the user should know."""
+    """Summarise the result in a few lines: its size, its quality, and any warnings."""
     report = result.report
     triangles = sum(len(hull.faces) for hull in result)
     lines = [f"{written}: {_count(len(result))}, {triangles} triangles{_time(report)}"]
@@ -86,7 +86,7 @@ def summary(result: Decomposition, written: str) -> str:
 
 
 def rewrite_summary(done: Rewritten) -> str:
-    """Tell the same of a robot: its meshes, each with its number of hulls."""
+    """Summarise the result for a robot: its meshes, each with its number of hulls."""
     total = sum(len(mesh.files) for mesh in done.meshes)
     lines = [f"{done.path}: {counted(len(done.meshes), 'mesh', 'meshes')}, {_count(total)} in {done.folder}"]
     lines += [f"  {mesh.path.name}: {_count(len(mesh.files))}; {_fit(mesh.result.report)}" for mesh in done.meshes]
@@ -95,7 +95,7 @@ def rewrite_summary(done: Rewritten) -> str:
 
 
 def counted(count: int, one: str, many: str) -> str:
-    """Say how many there are of something."""
+    """Format a count with the singular or plural noun."""
     return f"{count} {one if count == 1 else many}"
 
 

@@ -1,4 +1,4 @@
-"""The commands `rlacd train` and `rlacd pretrain`: their options, and their help, are the fields of a dataclass."""
+"""The commands `rlacd train` and `rlacd pretrain`; their options and help are the fields of a dataclass."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ WHERE: Parameters = {
         Annotated[float, typer.Option(metavar="GB", min=0.0, help="What a process that cuts may hold; 0: no limit.")],
     ),
 }
-"""Where episodes are played, which decides nothing but how long that takes."""
+"""Where episodes are played; affects only the time taken."""
 
 RESUME = (False, Annotated[bool, typer.Option("--resume", help="Go on from the run's last checkpoint.")])
 

@@ -1,4 +1,4 @@
-"""The command `rlacd view`: a page in the browser, served by this machine to itself."""
+"""The command `rlacd view`: a page in the browser, served on this machine only."""
 
 from __future__ import annotations
 
@@ -66,4 +66,4 @@ def view(
                 webbrowser.open(server.address)
             server.wait()
         if server.at_work:
-            leave(0)  # Python would wait for every thread, and a kernel ends what it has begun
+            leave(0)  # Python would wait for every thread, and a running kernel cannot be interrupted
