@@ -11,7 +11,7 @@
 namespace rlacd {
 namespace {
 
-constexpr double kEnoughProgress = 2e-4;  // of the volume, in one sweep
+constexpr double kEnoughProgress = 2e-4;  // relative change of the volume in one sweep
 constexpr double kReach = 100;
 
 struct RingEdge {
@@ -32,8 +32,9 @@ std::vector<std::vector<RingEdge>> rings(const Mesh& mesh) {
   return around;
 }
 
-// The plane through the edge a -> b, turned down from the facet (a, b, w) until it touches the inner hull. In the frame
-// (across the facet, along its normal) every inner point lies below; the first one met has the least angle below.
+// The plane through the edge a -> b, rotated down from the facet (a, b, w) until it touches the inner hull. In the
+// frame (across the facet, along its normal) every inner point lies below; the plane first meets the one with the
+// smallest angle below it.
 Above touching_plane(Vec3 a, Vec3 b, Vec3 w, const Mesh& inner) {
   const Vec3 normal = normalized(cross(b - a, w - a)), across = normalized(cross(normal, b - a));
   double x = -1, y = 0;  // half a turn: no restriction

@@ -1,4 +1,4 @@
-// A convex polytope around another one, tightened without more corners.
+// A convex polytope around another one, tightened without adding corners.
 //
 // In:  an outer convex hull that holds an inner one; both around the origin, about as wide in all directions.
 // Out: an outer hull with no more corners and no more volume.

@@ -14,9 +14,9 @@ namespace rlacd {
 namespace {
 
 constexpr double kRoundoff = 0x1p-53;
-constexpr int kExactRange = 100;  // largest binary exponent of coordinates, either way, that is not scaled away
+constexpr int kExactRange = 100;  // coordinates with binary exponents beyond this, either way, are scaled
 constexpr std::int32_t kBetweenPolls = 4096;
-constexpr double kFat = 1e-2;  // least ratio of inradius to extent for which the tolerance applies
+constexpr double kFat = 1e-2;  // least ratio of inradius to extent at which the tolerance applies
 
 }  // namespace
 
@@ -105,7 +105,7 @@ void HullBuilder::assign(std::int32_t point, const std::vector<std::int32_t>& fa
   }
 }
 
-// Finds four points in general position, if there are any, and makes them the first hull.
+// Finds four points in general position, if any, and makes them the first hull.
 bool HullBuilder::initialise() {
   const auto count = static_cast<std::int32_t>(points_.size());
   if (count == 0) return false;
@@ -131,7 +131,8 @@ bool HullBuilder::initialise() {
   rank_ = 1;
   const Vec3 axis = points_[p1] - points_[p0];
   std::int32_t p2 = argmax([&](std::int32_t i) { return norm2(cross(axis, points_[i] - points_[p0])); });
-  if (collinear_exact(points_[p0], points_[p1], points_[p2])) {  // rounding may have hidden the only other point
+  if (collinear_exact(points_[p0], points_[p1],
+                      points_[p2])) {  // rounding may have hidden the only non-collinear point
     p2 = -1;
     for (std::int32_t i = 0; i < count && p2 < 0; ++i)
       if (!collinear_exact(points_[p0], points_[p1], points_[i])) p2 = i;
@@ -171,7 +172,7 @@ void HullBuilder::add(const std::vector<Vec3>& points) {
     if (!initialise()) return;
     first = 0;
   }
-  std::vector<std::int32_t> alive;  // the newest first: points that come in order see these
+  std::vector<std::int32_t> alive;  // newest first: points in sorted order mostly see these
   alive.reserve(facets_.size());
   for (std::size_t i = facets_.size(); i-- > 0;)
     if (facets_[i].alive) alive.push_back(static_cast<std::int32_t>(i));
@@ -248,7 +249,7 @@ void HullBuilder::insert(std::int32_t point, std::int32_t facet, std::vector<std
     }
   }
 
-  // Exact signs make the horizon one simple loop: it is walked by the edge that starts at each corner.
+  // Exact signs make the horizon one simple loop; it is walked by looking up the edge that starts at each corner.
   first_edge_.resize(points_.size());
   for (std::size_t i = 0; i < horizon_.size(); ++i) first_edge_[horizon_[i].from] = static_cast<std::int32_t>(i);
 
@@ -273,7 +274,7 @@ void HullBuilder::insert(std::int32_t point, std::int32_t facet, std::vector<std
     facets_[id].neighbour[0] = e.beyond;
     edge = first_edge_[e.to];
     RLACD_ASSERT(horizon_[edge].from == e.to);
-    RLACD_ASSERT((edge == 0) == (i + 1 == length));  // back at the start after all edges, and not before
+    RLACD_ASSERT((edge == 0) == (i + 1 == length));  // back at the start after exactly all edges
   }
   for (std::size_t i = 0; i < length; ++i) {  // edge 1 is (to, point), edge 2 is (point, from)
     facets_[created_[i]].neighbour[1] = created_[(i + 1) % length];
@@ -282,7 +283,7 @@ void HullBuilder::insert(std::int32_t point, std::int32_t facet, std::vector<std
   free_.insert(free_.end(), visible_.begin(), visible_.end());
 
   // A point that saw a removed facet and still lies outside sees one of the new facets, so only those are searched. It
-  // may see them by less than the tolerance and another facet by more: here nothing is left out.
+  // may see them by less than the tolerance and another facet by more: no such point is dropped here.
   const auto strictly = [this](const Facet& f, Vec3 q) { return sees(f, q); };
   for (const std::int32_t orphan : orphans_) assign(orphan, created_, strictly);
   for (const std::int32_t id : created_)
@@ -316,8 +317,8 @@ std::vector<Triangle> HullBuilder::triangles() const {
   return result;
 }
 
-// A corner is extreme when at least three of the edges around it are creases (their two facets not exactly coplanar):
-// none or two creases mean that it lies inside a facet or an edge of the polytope.
+// A corner is extreme if at least three of the edges around it are creases (their two facets not exactly coplanar).
+// None or two creases mean that it lies inside a facet or an edge of the polytope.
 std::vector<std::int32_t> HullBuilder::extreme_corners() const {
   std::vector<std::int32_t> creases(points_.size(), 0);
   for (std::size_t id = 0; id < facets_.size(); ++id) {
@@ -370,7 +371,7 @@ int exponent_out_of_range(const std::vector<Vec3>& points) {
 
 Hull convex_hull(const std::vector<Vec3>& points) {
   Hull hull;
-  // Scaling by a power of two rounds nothing, so it decides nothing differently.
+  // Scaling by a power of two is exact, so no decision changes.
   if (const int exponent = exponent_out_of_range(points); exponent != 0) {
     std::vector<Vec3> scaled = points;
     for (Vec3& p : scaled) p = {std::ldexp(p.x, -exponent), std::ldexp(p.y, -exponent), std::ldexp(p.z, -exponent)};

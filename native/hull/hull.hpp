@@ -1,12 +1,12 @@
 // Convex hull of points: quickhull on exact predicates, growable by further batches of points.
 //
-// Input:  points in any number, order and degeneracy (duplicates, coplanar, cocircular).
-// Output: a closed triangle mesh, outward oriented, with exactly convex position of its corners: no input point lies
+// Input:  points in any number, order and degeneracy (duplicate, coplanar, cocircular).
+// Output: a closed triangle mesh, outward oriented, with its corners in exactly convex position: no input point lies
 //         strictly above any facet's plane, decided without rounding.
-// Algorithm: Barber, Dobkin, Huhdanpaa, "The Quickhull Algorithm for Convex Hulls" (1996). A point's side of a facet
-// is read from the facet's floating-point plane where an a-priori error bound allows it and from exact arithmetic
-// where it does not. A point on a facet's plane does not see it; since exact signs make the facets that a point sees a
-// topological disk, the horizon is one simple loop and no new triangle is degenerate.
+// Algorithm: Barber, Dobkin, Huhdanpaa, "The Quickhull Algorithm for Convex Hulls" (1996). The side of a facet on which
+// a point lies is read from the facet's floating-point plane where an a-priori error bound allows it, and from exact
+// arithmetic elsewhere. A point on a facet's plane does not see it; since exact signs make the facets that a point sees
+// a topological disk, the horizon is one simple loop and no new triangle is degenerate.
 #pragma once
 
 #include <array>
@@ -19,17 +19,17 @@ namespace rlacd {
 
 class HullBuilder {
  public:
-  // Points about `tolerance` outside the hull reached so far, unless it is flat, may be left out; 0 for the exact hull.
-  // Decisions about the points that are taken in stay exact.
+  // Points up to about `tolerance` outside the current hull may be dropped, unless the hull is flat; 0 gives the exact
+  // hull. Decisions about the points that are added stay exact.
   explicit HullBuilder(double tolerance = 0) : tolerance_(tolerance) {}
 
   void reserve(std::size_t points);
   void clear();
 
-  // Extends the hull by a batch of points. Points seen so far keep their numbers, in the order they were added.
+  // Extends the hull by a batch of points. Earlier points keep their numbers, in the order they were added.
   void add(const std::vector<Vec3>& points);
 
-  // Forgets the points that are no corners, as far as there are facets; the others get new numbers.
+  // Drops the points that are not corners, once there are facets; the others are renumbered.
   void drop_inner_points();
 
   // Dimension of the points' affine hull: -1 (none), 0 (one point), 1 (a line), 2 (a plane), 3. Facets exist for 3.
@@ -40,7 +40,7 @@ class HullBuilder {
   const Box& extent() const { return extent_; }  // of all points
   std::vector<Triangle> triangles() const;
   std::vector<std::int32_t> corners() const;  // ascending: points that are corners of facets (rank 3), or all points
-  std::vector<std::int32_t> extreme_corners() const;  // those that are inside no facet or edge of the polytope (rank 3)
+  std::vector<std::int32_t> extreme_corners() const;  // those not inside a facet or an edge of the polytope (rank 3)
 
  private:
   struct Facet {
@@ -59,7 +59,7 @@ class HullBuilder {
   bool sees(const Facet& f, Vec3 p) const;
   bool sees_closely(const Facet& f, Vec3 p) const;
   bool initialise();
-  bool is_closed() const;  // every edge of a facet is its neighbour's, the other way round
+  bool is_closed() const;  // every edge of a facet is an edge of its neighbour in the opposite direction
   std::int32_t new_facet(std::int32_t a, std::int32_t b, std::int32_t c);
   template <class Sees>
   void assign(std::int32_t point, const std::vector<std::int32_t>& facets, const Sees& sees);
@@ -92,7 +92,7 @@ struct Hull {
 // The hull with every corner an extreme point: points inside a facet or an edge are left out.
 Hull convex_hull(const std::vector<Vec3>& points);
 
-// The same as a mesh; empty where the points lie in a plane.
+// The same as a mesh; empty if the points are coplanar.
 Mesh hull_mesh(const std::vector<Vec3>& points);
 
 }  // namespace rlacd

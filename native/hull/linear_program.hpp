@@ -1,9 +1,9 @@
-// The lowest point above a few planes: linear programs in up to three variables.
+// The lowest point above a few planes: linear programs in at most three variables.
 //
 // In:  an objective c and constraints n_i . x >= h_i, few of them, |n_i| about 1; a box [-reach, reach]^3.
-// Out: the point of the box that minimises c . x, or none when no point satisfies all constraints.
-// How: Seidel, "Small-Dimensional Linear Programming and Convex Hulls Made Easy" (1991), in the order given. Where the
-//      optimum so far violates a constraint, the new optimum lies on its plane: a problem with one variable less.
+// Out: the point of the box that minimises c . x, or none if no point satisfies all constraints.
+// How: Seidel, "Small-Dimensional Linear Programming and Convex Hulls Made Easy" (1991), in the given order. If the
+//      current optimum violates a constraint, the new optimum lies on its plane: a problem with one variable less.
 #pragma once
 
 #include <cmath>
@@ -78,7 +78,7 @@ inline std::optional<Vec3> lowest_point(Vec3 objective, const std::vector<Above>
   for (std::size_t i = 0; i < constraints.size(); ++i) {
     const Vec3 n = constraints[i].normal;
     if (dot(n, best) >= constraints[i].offset - kViolated) continue;
-    RLACD_ASSERT(norm2(n) > 0.5 && norm2(n) < 2);  // a face without a plane is a constraint that always holds
+    RLACD_ASSERT(norm2(n) > 0.5 && norm2(n) < 2);  // a face without a plane would be a constraint that always holds
     const Vec3 origin = constraints[i].offset / norm2(n) * n;
     const Vec3 unit = normalized(n);
     const Vec3 helper = std::fabs(unit.x) < 0.6   ? Vec3{1, 0, 0}

@@ -12,22 +12,22 @@
 namespace rlacd {
 namespace {
 
-// With more corners than this, edge collapse was better than a plain cover on every hull tried.
+// With more corners than this, edge collapse beat a plain cover on every hull tested.
 constexpr std::size_t kFewCorners = 10;
 
-// Collapses leave room between the hulls, and what they cost shows only after it is used up: on the last stretch, from
-// this many times the corners asked for, collapses and relaxation take turns.
+// Collapses leave room between the hulls, and their cost only shows once that room is used up: on the last stretch,
+// from this multiple of the target number of corners, collapses and relaxation alternate.
 constexpr double kLastStretch = 1.5, kStep = 1.1;
 constexpr int kSweepsOnTheWay = 3, kSweepsAtTheEnd = 30;
 
-// Hulls thinner than this share of their length are given that thickness first: rounding is 1e-4 of a thickness of
-// 1e-12, and where two facets meet at the tip of a needle that much of its length would be left outside.
+// Hulls thinner than this share of their length are first thickened to it: rounding is 1e-4 of a thickness of 1e-12,
+// and where two facets meet at the tip of a needle that much of its length would be left outside.
 constexpr double kThinnest = 1e-9;
 
-// A facet with less area than this share of a square on its longest side has no normal worth the name.
+// A facet with less area than this share of a square on its longest side has no usable normal.
 constexpr double kSliver = 1e-6;
 
-// So many times more than the tolerance is needed, since normals and depths are rounded.
+// Safety factor on the tolerance, since normals and depths are rounded.
 constexpr double kSafely = 4;
 
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
@@ -62,8 +62,8 @@ class Whitening {
   Vec3 from(Vec3 p) const {
     return centre_ + scale_[0] * p.x * axes_[0] + scale_[1] * p.y * axes_[1] + scale_[2] * p.z * axes_[2];
   }
-  // The points, moved to both sides along every axis in which they are not `share` as thick as they are long, so that
-  // they are; none if there is no such axis.
+  // The points, moved to both sides along every axis in which they are thinner than `share` of their length, so that
+  // they reach it; empty if there is no such axis.
   std::vector<Vec3> thickened(const std::vector<Vec3>& points, double share) const {
     const double enough = share * std::max({scale_[0], scale_[1], scale_[2]}), by = 2 * enough;
     std::vector<Vec3> moved = points;
@@ -86,8 +86,7 @@ class Whitening {
 
 double volume_of(const Mesh& mesh) { return mesh_volume(mesh.vertices, mesh.faces); }
 
-// The corners of the intersection of half-spaces n . x <= h that all hold the origin inside: facets of the hull of n /
-// h.
+// The corners of the intersection of half-spaces n . x <= h that all contain the origin: facets of the hull of n / h.
 std::vector<Vec3> corners_of_intersection(const std::vector<Above>& planes) {
   std::vector<Vec3> dual;
   for (const Above& plane : planes) dual.push_back(1 / plane.offset * plane.normal);
@@ -102,7 +101,7 @@ std::vector<Vec3> corners_of_intersection(const std::vector<Above>& planes) {
 }
 
 // The normals of three large facets in different directions, divided by the hull's width along them: in these
-// coordinates any parallelepiped is the unit cube.
+// coordinates a parallelepiped is the unit cube.
 std::array<Vec3, 3> main_directions(const Mesh& hull) {
   std::array<Vec3, 3> best;
   for (int i = 0; i < 3; ++i) {
@@ -124,7 +123,7 @@ std::array<Vec3, 3> main_directions(const Mesh& hull) {
   return best;
 }
 
-// Polytopes of supporting planes in a few directions that have at most `most` corners: tetrahedra, prisms, a box.
+// Polytopes with at most `most` corners from supporting planes in a few directions: tetrahedra, prisms, a box.
 std::vector<Mesh> plain_covers(const Mesh& hull, std::size_t most) {
   const auto cover = [&](const std::vector<Vec3>& normals) {
     std::vector<Above> planes;
@@ -151,7 +150,7 @@ std::vector<Mesh> plain_covers(const Mesh& hull, std::size_t most) {
   return covers;
 }
 
-// How much larger than 1 a scaling about the origin must be for `outer` to hold every corner of `inner`.
+// The least scaling about the origin, at least 1, with which `outer` contains every corner of `inner`.
 double missing_scale(const Mesh& outer, const Mesh& inner) {
   const auto reach = [](const Mesh& mesh, Vec3 normal) {
     double farthest = 0;
@@ -168,7 +167,7 @@ double missing_scale(const Mesh& outer, const Mesh& inner) {
   return scale;
 }
 
-// Out of the whitened frame, scaled by the hair that tolerances and rounding may have left it too small.
+// Maps back from the whitened frame, scaled up by the little that tolerances and rounding may have removed.
 Mesh brought_back(Mesh outer, const Mesh& inner, const Whitening& whitening) {
   const double scale = missing_scale(outer, inner);
   for (Vec3& p : outer.vertices) p = whitening.from(scale * p);
@@ -184,12 +183,12 @@ std::vector<std::size_t> stages(std::size_t corners, std::size_t most) {
   return sizes;
 }
 
-// For every corner of a convex hull, how many times farther from it than t a point of the hull may be that lies no
-// deeper than t under any facet around the corner; infinity where that is not known.
+// For every corner of a convex hull, the greatest distance to a point of the hull at most t deep under every facet
+// around the corner, in multiples of t; infinity if no bound is known.
 //
-// The cone of the edges a -> v from a corner a holds the hull: x - a = sum c_v (v - a) with c_v >= 0. With N the mean
-// of the normals of the facets around a, the mean depth of x is N . (a - x) = sum c_v N . (a - v) <= t, so that |x - a|
-// <= sum c_v |v - a| is at most t times the greatest |v - a| / N . (a - v).
+// The cone of the edges a -> v from a corner a contains the hull: x - a = sum c_v (v - a) with c_v >= 0. With N the
+// mean of the normals of the facets around a, the mean depth of x is N . (a - x) = sum c_v N . (a - v) <= t, so that |x
+// - a| <= sum c_v |v - a| is at most t times the greatest |v - a| / N . (a - v).
 std::vector<double> reach_of_corners(const Mesh& hull) {
   std::vector<Vec3> normal(hull.vertices.size());
   std::vector<double> facets(hull.vertices.size(), 0), reach(hull.vertices.size(), 0);
@@ -204,7 +203,7 @@ std::vector<double> reach_of_corners(const Mesh& hull) {
     }
   }
   for (const Triangle& f : hull.faces)
-    for (int e = 0; e < 3; ++e) {  // every edge from both of its ends: the mesh is closed
+    for (int e = 0; e < 3; ++e) {  // every edge from both ends: the mesh is closed
       const std::int32_t a = f[e];
       const Vec3 edge = hull.vertices[f[(e + 1) % 3]] - hull.vertices[a];
       const double depth = -dot(normal[a], edge) / facets[a];
@@ -217,7 +216,7 @@ std::vector<double> reach_of_corners(const Mesh& hull) {
 
 Mesh simplify_hull(const Mesh& hull, std::size_t max_vertices, std::size_t max_faces, double tolerance) {
   if (max_vertices < 4 || max_faces < 4) throw std::invalid_argument("a hull has at least 4 vertices and 4 faces");
-  // A triangulated convex polytope has twice as many triangles as corners, less four.
+  // A triangulated convex polytope has twice as many triangles as corners, minus four.
   const std::size_t most = std::min(max_vertices, (max_faces + 4) / 2);
   const Whitening whitening(hull.vertices);
   if (const std::vector<Vec3> thick = whitening.thickened(hull.vertices, kThinnest); !thick.empty())

@@ -1,6 +1,6 @@
-// Functions that the compiler makes twice: for every processor, and with wider registers where there are some.
+// Functions that are compiled twice: for every processor, and with wider registers for those that have them.
 //
-// Which of the two runs is decided when the library is loaded. Both give the same bits: no operation is fused.
+// The choice is made when the library is loaded. Both give the same bits: no operations are fused.
 #pragma once
 
 #include <limits>  // tells which C library this is

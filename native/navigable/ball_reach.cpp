@@ -7,7 +7,7 @@
 namespace rlacd {
 namespace {
 
-// Shares of the radius that may be missing along a way, and at the points it is put together from.
+// Shares of the radius that may be missing along a path, and at its vertices.
 constexpr double kSlackOfWay = 0.01, kSlackOfPoint = 0.004;
 constexpr double kRounding = 1e-6;
 constexpr int kPushes = 24;
@@ -97,7 +97,7 @@ void BallReach::start_on_border() {
   }
 }
 
-// Pushes a place away from what is nearest, from one side to the other where it is narrow, until it is free.
+// Pushes a point away from the nearest surface, alternating between both sides of a narrow passage, until it is free.
 bool BallReach::push(Place& place) const {
   for (int i = 0; i < kPushes; ++i) {
     const NavigableField::Value value = field_.clearance(place.at, place.slot);
@@ -126,16 +126,16 @@ bool BallReach::is_way(const Place& a, const Place& b) const {
   if (a.clearance + b.clearance >= length + 2 * (1 - kSlackOfWay) * field_.radius()) return true;
   const Vec3 middle = 0.5 * (a.at + b.at);
   Place between = {middle, 0, a.slot};
-  // Both halves have to be shorter, or the halving would not end.
+  // Both halves must be shorter, or the bisection would not end.
   if (!push(between) || norm(between.at - middle) > 0.35 * length) return false;
   return is_way(a, between) && is_way(between, b);
 }
 
-// Whether the region can be connected with the start at all: through cells that may hold a free point.
+// Whether the region can be connected with the start at all, through cells that may hold a free point.
 bool BallReach::may_be_reached(const std::vector<std::int32_t>& cells, std::int32_t region) {
   std::vector<std::int32_t> open;
   const std::int32_t start = root(kStart);
-  const auto enter = [&](std::int32_t cell) {  // whether it settles the question
+  const auto enter = [&](std::int32_t cell) {  // returns whether the question is settled
     if (mark_[cell] == region) return false;
     mark_[cell] = region;
     open.push_back(cell);
@@ -159,7 +159,7 @@ void BallReach::grow(const std::vector<std::int32_t>& points, const std::vector<
                      std::int32_t region) {
   std::vector<std::int32_t> open;
   const auto enter = [&](std::int32_t cell) {
-    if (mark_[cell] == kShut || mark_[cell] == region) return;  // from a shut cell nothing more can be reached
+    if (mark_[cell] == kShut || mark_[cell] == region) return;  // nothing more can be reached from a shut cell
     mark_[cell] = region;
     open.push_back(cell);
   };
@@ -208,7 +208,7 @@ void BallReach::look_closely(const std::vector<std::int32_t>& points, int thread
   mark_.assign(grid_.size(), -1);
   for (std::size_t r = 0; r < regions.size(); ++r) {
     poll_stop();
-    if (reached(regions[r][0])) continue;  // through a region that came before
+    if (reached(regions[r][0])) continue;  // through an earlier region
     std::vector<std::int32_t> cells;
     for (const std::int32_t point : regions[r]) {
       const auto [i, j, k] = grid_.over(points_[point]);

@@ -1,14 +1,14 @@
-// Where the centre of a ball can go.
+// The region that the centre of a ball can reach.
 //
 // In:  the clearance on a grid, and points.
 // Out: which points can be joined by a path along which the clearance nowhere falls below the radius r.
-// How: the clearance changes no faster than one moves, so a straight way from a to b is certainly free when
+// How: the clearance is 1-Lipschitz, so a straight segment from a to b is certainly free if
 //      clearance(a) + clearance(b) >= |ab| + 2 r. Neighbouring cells are joined by that rule first, which nearly always
-//      answers the question. What is still apart is looked at closely: it grows, cell by cell, through cells whose
-//      centre may be taken but that hold a free point nearby, over ways that are halved where the rule leaves them
-//      open, their middle being pushed off what is nearest.
-// Every way found is free for a ball of 0.99 r. A passage is missed only where it is so contorted that, between points
-// half a radius apart, the way cannot be found by pushing.
+//      answers the question. Regions that are still apart are examined closely: they grow, cell by cell, through cells
+//      whose centre may be blocked but that hold a free point nearby, along segments that are bisected where the rule
+//      is undecided, with their midpoint pushed away from the nearest surface.
+// Every path found is free for a ball of 0.99 r. A passage is missed only if it is so contorted that, between points
+// half a radius apart, pushing does not find the path.
 #pragma once
 
 #include <unordered_map>
@@ -21,10 +21,10 @@ class BallReach {
  public:
   BallReach(const NavigableField& field, ClearanceGrid& grid);
 
-  // A further point, with its clearance, which has to be at least the radius; returns its number, counted from 0.
+  // Adds a point with its clearance, which must be at least the radius; returns its number, counted from 0.
   std::int32_t add(Vec3 point, double clearance);
 
-  // Makes everything around the grid, or a point, a place to start from.
+  // Makes everything around the grid, or a point, a start.
   void start_outside() {
     from_outside_ = true;
     start_on_border();
@@ -32,11 +32,11 @@ class BallReach {
   void start_at(std::int32_t point);
 
   bool reached(std::int32_t point) { return root(node_of(point)) == root(kStart); }
-  // Points with the same number can reach each other; cells that are not free are alone.
+  // Points with the same number can reach each other; cells that are not free are isolated.
   std::int32_t region(std::int32_t point) { return root(node_of(point)); }
   std::int32_t region_of_cell(std::int32_t cell) { return root(node_of_cell(cell)); }
 
-  // Looks closely at what is not reached but holds one of these points. It resolves the grid.
+  // Examines closely the regions that are not reached but hold one of these points. Resolves cells of the grid.
   void look_closely(const std::vector<std::int32_t>& points, int threads);
 
  private:
@@ -51,7 +51,7 @@ class BallReach {
   std::int32_t node_of(std::int32_t point) const { return 1 + grid_.size() + point; }
   static std::int32_t node_of_cell(std::int32_t cell) { return 1 + cell; }
   std::int32_t root(std::int32_t node);
-  bool join(std::int32_t a, std::int32_t b);  // whether they were apart
+  bool join(std::int32_t a, std::int32_t b);  // returns whether they were separate
 
   void start_on_border();
   bool is_free(std::int32_t cell) const { return grid_.clearance[cell] >= least_; }
@@ -74,7 +74,7 @@ class BallReach {
   bool from_outside_ = false;
   std::vector<std::int32_t> parent_;
   std::unordered_map<std::int32_t, Place> places_;  // clearance 0: the cell has none
-  // By cell: which look at which region has seen it, or that everything that can be reached from it has been.
+  // By cell: the region whose search has seen it, or a mark that everything reachable from it has been seen.
   std::vector<std::int32_t> mark_;
 };
 

@@ -10,9 +10,9 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::int32_t kBlock = 8;  // cells along a side of the largest cubes
 constexpr double kHalfDiagonal = 0.8660254037844387;
-// Up to how many pitches from the level a cell is said to be crossed. Beyond the half diagonal, so that along any
-// straight line there is a cell on either side: those above come down on all of the boundary, those below come up into
-// its creases and corners.
+// Distance from the level, in pitches, within which a cell counts as crossed. More than the half diagonal, so that
+// every straight line has such a cell on either side: those above the level descend to the whole boundary, those below
+// climb into its creases and corners.
 constexpr double kCrossed = 1.0;
 
 struct Found {
@@ -38,7 +38,7 @@ class Filling {
     if (others + margin < level && std::min(away, ground) - reach >= radius)
       return fill_free(cube, x, std::min(away, ground));
 
-    // One triangle often shows that the cube is too near the surface.
+    // One triangle often shows that the cube is too close to the surface.
     const double most = cube.slot >= 0 ? field_.surface().distance(cube.slot, x) : kInfinity;
     if (std::min(most, ground) + reach < radius) return;
     if (std::min(most, others) + margin < level && !to_the_end_) return found.unresolved.push_back(cube);

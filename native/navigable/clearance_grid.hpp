@@ -1,8 +1,8 @@
 // The clearance on a grid of cells around a solid, and the cells that the boundary of the navigable space crosses.
 //
-// How: cubes of cells are halved as long as the fields at their centre, which change no faster than one moves, leave
-//      open what holds for all of them. First only near the boundary of the space; that a cell farther off is free is
-//      left unsaid unless a large cube says so, which is nearly always all that the way of a ball depends on.
+// How: cubes of cells are halved while the 1-Lipschitz fields at their centre do not decide for all of their cells.
+//      First only near the boundary of the space; cells farther off are known to be free only if a large cube shows it,
+//      which is nearly always enough for the path of a ball.
 #pragma once
 
 #include "navigable/navigable_field.hpp"
@@ -14,14 +14,14 @@ struct ClearanceGrid {
   double pitch = 0;
   std::int32_t count[3] = {0, 0, 0};
 
-  // At the centre of each cell. Where the whole cell is free it may be a lower bound that says so; where no point of
-  // the cell is, or the cell is not resolved, -infinity.
+  // At the centre of each cell. If the whole cell is free it may be a lower bound that shows so; if no point of the
+  // cell is free, or the cell is not resolved, it is -infinity.
   std::vector<float> clearance;
 
   // Cells that the boundary of the space may cross, ascending, and the room at their centres.
   struct Crossed {
     std::int32_t cell;
-    double inside;  // at most the depth of its centre in the hull
+    double inside;  // lower bound on the depth of its centre in the hull
     NavigableField::Value room;
   };
   std::vector<Crossed> boundary;
@@ -29,8 +29,8 @@ struct ClearanceGrid {
   struct Cube {
     std::array<std::int32_t, 3> first;
     std::int32_t side;
-    std::int32_t slot;  // of a triangle thought to be near
-    double inside;      // at most the depth of its centre in the hull
+    std::int32_t slot;  // of a triangle expected to be near
+    double inside;      // lower bound on the depth of its centre in the hull
   };
   std::vector<Cube> unresolved;
 
@@ -46,7 +46,7 @@ struct ClearanceGrid {
   bool holds(std::int32_t i, std::int32_t j, std::int32_t k) const {
     return i >= 0 && j >= 0 && k >= 0 && i < count[0] && j < count[1] && k < count[2];
   }
-  // Coordinates of the cell that holds x, perhaps off the grid.
+  // Coordinates of the cell that contains x, possibly off the grid.
   std::array<std::int32_t, 3> over(Vec3 x) const {
     const auto floor_of = [this](double a, double b) { return static_cast<std::int32_t>(std::floor((a - b) / pitch)); };
     return {floor_of(x.x, origin.x), floor_of(x.y, origin.y), floor_of(x.z, origin.z)};

@@ -1,13 +1,12 @@
-// The two fields whose level sets bound what a ball can do around a solid.
+// The two fields whose level sets bound where a ball can be around a solid.
 //
 // In:  the surface of a closed solid, its convex hull, closed half-spaces; the ball's radius r and the tolerance t.
 // Out: clearance(x): the radius of the largest ball around x that touches neither the surface nor a closed half-space.
 //                    A ball may stand at x where clearance >= r.
-//      room(x):      at least r + t exactly where, besides, the surface is t farther away than it has to be, and x is
-//                    no farther than r from the hull: the navigable space, but for sides and ways in.
-// Both are minima of distances, so they change no faster than x moves, and each value comes with the direction in which
-// it grows. Which side of the surface x is on neither of them knows: a path along which the clearance stays positive
-// does not change sides.
+//      room(x):      at least r + t exactly if, in addition, the surface is t farther away than necessary, and x is at
+//                    most r from the hull: the navigable space, apart from sides and entrances.
+// Both are minima of distances, hence 1-Lipschitz, and each value comes with the direction in which it grows. Neither
+// knows on which side of the surface x lies: a path along which the clearance stays positive does not change sides.
 #pragma once
 
 #include <vector>
@@ -43,12 +42,12 @@ class NavigableField {
     Limit by = Limit::kSurface;
   };
   Value clearance(Vec3 x, std::int32_t hint = -1) const { return by_surface_and_ground(x, hint, 0); }
-  // The room but for the hull's part in it.
+  // The room without the hull's term.
   Value room_near(Vec3 x, std::int32_t hint = -1) const { return by_surface_and_ground(x, hint, tolerance_); }
 
-  // Distance to the nearest closed half-space, negative in it.
+  // Distance to the nearest closed half-space, negative inside it.
   double above_ground(Vec3 x) const;
-  // What the room is where the hull is `away`: it ends at r from the hull.
+  // The room's term of the hull at distance `away`: the room ends at r from the hull.
   double room_by_hull(double away) const { return level() + radius_ - away; }
 
  private:

@@ -23,17 +23,17 @@ struct Candidate {
   double sharpness = 0;
 };
 
-// Climbs to the boundary from near it. In a crease the places that were nearest on the way are kept at the level
-// together, up to three at a time: Newton's method on the planes in front of them.
+// Climbs to the boundary from nearby. In a crease, the surface points that were nearest on the way are kept at the
+// level together, up to three at a time: Newton's method on the planes in front of them.
 class Climb {
  public:
   Climb(const NavigableField& field, Vec3 x, const NavigableField::Value& value)
       : field_(field), start_(x), x_(x), value_(value) {}
 
-  // What is nearest somewhere else too may be in the way.
+  // A surface point that was nearest elsewhere may be in the way here too.
   void beware(Vec3 there, const NavigableField::Value& value_there) { see(there, value_there); }
 
-  // Pushed off whatever is too near, as often as it takes.
+  // Pushes away from whatever is too near, repeatedly.
   bool by_pushing(double farthest) {
     for (int push = 0; push < kPushes && !is_there(); ++push) {
       see(x_, value_);
@@ -42,7 +42,7 @@ class Climb {
     return is_there();
   }
 
-  // The first step goes into the crease between what is nearest here and what to beware of.
+  // The first step goes into the crease between the nearest surface here and the one to watch.
   bool into_crease(double farthest) {
     for (int step = 0; step == 0 || (step < kSteps && !is_there()); ++step) {
       see(x_, value_);
@@ -100,7 +100,7 @@ class Climb {
 
   double value_at(const Seen& seen) const { return dot(x_ - seen.level, seen.uphill); }
 
-  // Takes in what is nearest, in the place of what it is nearly the same as, or of what was seen first.
+  // Adds the nearest surface, replacing one that is nearly the same, or the oldest.
   void see(Vec3 x, const NavigableField::Value& value) {
     const Seen seen = {x + (field_.level() - value.value) * value.uphill, value.uphill};
     for (int i = 0; i < count_; ++i)
@@ -113,7 +113,7 @@ class Climb {
     seen_[count_++] = seen;
   }
 
-  // The least step onto the planes of all that has been seen, or of the newest where those hardly meet.
+  // The smallest step onto the planes of all surfaces seen, or of the newest if those hardly intersect.
   Vec3 correction() {
     for (; count_ > 1; std::rotate(seen_, seen_ + 1, seen_ + count_), --count_) {
       const Vec3 a = seen_[count_ - 1].uphill, b = seen_[count_ - 2].uphill;
@@ -139,7 +139,7 @@ class Climb {
   int count_ = 0;
 };
 
-// Finds cells next to which the ways up meet: there the boundary has a crease.
+// Finds cells whose uphill directions converge: there the boundary has a crease.
 class Meeting {
  public:
   explicit Meeting(const ClearanceGrid& grid) : grid_(grid), index_(grid.size(), -1) {
@@ -148,7 +148,7 @@ class Meeting {
         index_[grid.boundary[i].cell] = static_cast<std::int32_t>(i);
   }
 
-  // The neighbour whose way up meets a cell's most head-on; none on a smooth place.
+  // The neighbour whose uphill direction opposes a cell's most; none on a smooth part.
   const ClearanceGrid::Crossed* at(const ClearanceGrid::Crossed& crossed) const {
     if (index_[crossed.cell] < 0) return nullptr;
     const auto [i, j, k] = grid_.place(crossed.cell);
@@ -199,7 +199,7 @@ class Spreading {
         const ClearanceGrid::Crossed* other = meeting.at(crossed);
         if (crossed.room.value >= field_.level())
           all[2 * i] = down_from(crossed);
-        else if (other != nullptr)  // elsewhere a cell above the level comes to the same place
+        else if (other != nullptr)  // otherwise a cell above the level gives the same position
           all[2 * i] = up_from(crossed, *other, false);
         if (other != nullptr) all[2 * i + 1] = up_from(crossed, *other, true);
       }
@@ -208,7 +208,7 @@ class Spreading {
     return all;
   }
 
-  // Whether a cell is free, but on the inner side of the surface. All places of a region are on one side.
+  // Whether a cell is free, but on the inner side of the surface. All points of a region are on one side.
   bool is_inside(std::int32_t cell, BallReach& reach) const {
     if (grid_.clearance[cell] < field_.radius()) return false;
     return is_inside(reach.region_of_cell(cell), grid_.centre(cell));
@@ -239,7 +239,7 @@ class Spreading {
     const double distance = value.by == NavigableField::Limit::kSurface
                                 ? field_.level()
                                 : std::sqrt(field_.surface().closest(at, value.slot).distance2);
-    // It keeps t from the surface, and all of it out of the closed half-spaces.
+    // It keeps t from the surface, and lies entirely outside the closed half-spaces.
     const double ground = field_.above_ground(at);
     const double radius = std::min(distance - field_.tolerance(), ground);
     const bool in_hull = crossed.inside >= norm(at - grid_.centre(crossed.cell));
@@ -275,14 +275,14 @@ class Spreading {
     return kept;
   }
 
-  // The sharpest first, a candidate is taken unless a centre is closer than the spacing of both.
+  // In order of sharpness, a candidate is taken unless a taken centre is closer than the spacing of both.
   Balls spread(const std::vector<Candidate>& candidates) const {
     std::vector<std::int32_t> order(candidates.size());
     std::iota(order.begin(), order.end(), 0);
     std::stable_sort(order.begin(), order.end(),
                      [&](std::int32_t a, std::int32_t b) { return candidates[a].sharpness > candidates[b].sharpness; });
     const double least = kBallSpacing * field_.radius();
-    std::vector<Taken> by_size;  // spacings of [2^i, 2^(i + 1)) times the least
+    std::vector<Taken> by_size;  // spacings of [2^i, 2^(i + 1)) times the smallest
     std::vector<std::int32_t> taken;
     for (const std::int32_t c : order) {
       poll_stop();
@@ -305,7 +305,7 @@ class Spreading {
     return balls;
   }
 
-  // Chosen candidates of about one size, in cells as wide as the largest spacing among them.
+  // Chosen candidates of similar size, in cells as wide as the largest spacing among them.
   class Taken {
    public:
     explicit Taken(double width) : width_(width) {}

@@ -1,14 +1,15 @@
-// Balls that stand for the navigable space around a solid.
+// Balls that represent the navigable space around a solid.
 //
-// In:  a closed surface and its convex hull; the radius r of the ball that has to find its way, and the tolerance t.
+// In:  a closed surface and its convex hull; the radius r of the moving ball, and the tolerance t.
 // Out: balls with their centres on the boundary of the space, each as large as leaves t to the surface (so r at least),
 //      those that touch the hull.
 // The space: points outside the solid, at least r + t from its surface, at most r from the hull, where a ball of radius
 // r stays out of the closed half-spaces, and which the centre of such a ball can reach.
-// How: cells that the boundary crosses (clearance_grid.hpp) give one candidate each, moved onto the boundary exactly;
-//      in creases, where several places of the surface are nearest, to the crease. Sides of the surface are told by the
-//      winding number, once a connected region; ways in by ball_reach.hpp. Then candidates are taken greedily, the
-//      sharpest first, unless a ball is there already. The same bits for any number of threads.
+// How: cells that the boundary crosses (clearance_grid.hpp) give one candidate each, moved exactly onto the boundary;
+// in
+//      creases, where several points of the surface are nearest, onto the crease. Sides of the surface are decided by
+//      the winding number, once per connected region; reachability by ball_reach.hpp. Then candidates are taken
+//      greedily, the sharpest first, unless a ball is already there. The same bits for any number of threads.
 #pragma once
 
 #include "distance/surface.hpp"
@@ -28,8 +29,8 @@ struct BallSources {
   std::vector<Vec3> seeds;  // ... or from here
 };
 
-// Centres are no closer than this share of the radius of the smaller ball; a place of the boundary is no farther from
-// one than that and the way from there to the next candidate, which is about half the pitch.
+// Centres are no closer than this share of the radius of the smaller ball. A point of the boundary is no farther from
+// one than that plus the distance to the next candidate, which is about half the pitch.
 constexpr double kBallSpacing = 0.45;
 
 Balls spread_balls(const Surface& surface, const NavigableField& field, const BallSources& sources, double pitch,

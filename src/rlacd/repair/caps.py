@@ -1,11 +1,11 @@
-"""Which holes of a soup are closed: those that somebody lost, not those that somebody made.
+"""Which holes of a soup are closed: those left by damage, not those made on purpose.
 
-Input: a soup, what its surface was, and where a ball can go around it. Output: the soup with caps, and what was capped.
+Input: a soup, its input surface, and where a ball can go around it. Output: the soup with caps, and what was capped.
 
-A body is closed when every one of its holes may be; a cap that leaves another hole open would be one more sheet. A
-hole may be closed if its cap stays near the surface, if the ball cannot come to it, if it is small against the body, or
-if it is a wound: few edges, and a cap that goes on where the faces around it end, as missing faces leave it. The mouth
-of a bottle has faces that turn away from its cap all around. Where there are many wounds, other small holes are too.
+A body is closed only if every one of its holes may be closed: a cap that leaves another hole open would be one more
+sheet. A hole may be closed if its cap stays near the surface, if the ball cannot reach it, if it is small relative to
+the body, or if it is a wound: few edges, and a cap that smoothly continues the faces around it, as at missing faces.
+Around the mouth of a bottle, faces turn away from the cap. A body with many wounds gets its other small holes closed.
 """
 
 from __future__ import annotations
@@ -32,20 +32,20 @@ from rlacd.solid.topology import (
 )
 
 HOLE, HOLE_SHARE = 0.1, 0.02
-"""A body nearly closed, its holes no more than this share of its area, is closed with caps up to this far away: a scan
+"""A nearly closed body, with holes of at most this share of its area, is closed with caps up to this far away: a scan
 with a few holes is meant as a solid, a cup is not. The caps are reported."""
 
-# A wound has at most so many edges, and a share of the area of its body; where it is one missing face, a larger one.
+# Limits on a wound's edges and on its share of the area of its body; larger where it is a single missing face.
 _WOUND_EDGES, _WOUND, _MISSING_FACE = 12, 0.1, 0.2
-# A single ring of more edges than this is a mouth, not a wound: its corners lie this well on a circle.
+# A single ring of more edges than this is a mouth, not a wound, if its corners lie on a circle to this accuracy.
 _RING, _ROUND = 6, 0.1
-# Along this share of its rim at least, the cap turns by less than this from the faces beside it (cosine of 45 degrees).
+# Along at least this share of its rim, the cap turns by less than this from the adjacent faces (cosine of 45 degrees).
 _SMOOTH_SHARE, _SMOOTH = 0.3, 0.7
-# With so many wounds, and at least this share of all holes, all are that have at most so many edges, and so much area.
+# If there are this many wounds, and at least this share of all holes, then all holes within these limits are wounds.
 _DAMAGED, _DAMAGED_SHARE, _DAMAGED_EDGES, _DAMAGED_WOUND = 4, 0.3, 60, 0.25
-# Wounds take no more than this share of the area that is left: a cage is no damaged ball.
+# Wounds take at most this share of the remaining area: a cage is not a damaged ball.
 _WOUNDS = 0.7
-# An open body that caps would give this much volume for its area is hollow; with less it is a sheet, a leaf or a cloth.
+# An open body whose caps would give it this much volume per area is hollow; with less it is a sheet, leaf or cloth.
 _ROOMY = 0.02
 # A body closed over large wounds may cross itself in this share of its area.
 _CROSSED = 0.08
@@ -55,7 +55,7 @@ FLAPS = 0.05
 
 @dataclass(frozen=True)
 class Closed:
-    """What was closed.
+    """The result of closing holes.
 
     Attributes
     ----------
@@ -64,15 +64,15 @@ class Closed:
     bodies
         The bodies that were capped.
     by_room
-        ``[bodies]``, bodies that were capped only because nothing can come to a cap.
+        ``[bodies]``, bodies that were capped only because nothing can reach a cap.
     far
-        Distances of caps from the surface, of each body where something can come there.
+        Distances of caps from the surface, for each body with a cap that something can reach.
     where
-        The places of `far`, ``[N, 3]``.
+        The positions of `far`, ``[N, 3]``.
     hollow
         Bodies that stay open although caps would give them an inside.
     mouths
-        The middle of the widest opening of each of them, ``[N, 3]``.
+        The centre of the widest opening of each of them, ``[N, 3]``.
     """
 
     soup: Soup
@@ -101,19 +101,19 @@ def close_holes(
     soup
         The faces.
     bodies
-        How many bodies they are of.
+        Number of bodies.
     surface
-        What caps shall stay near.
+        The surface that caps must stay near.
     covers
-        Whether the ball can come to points.
+        Whether the ball can reach given points.
     gap
-        How far a cap may lead from the surface anyway.
+        Distance from the surface up to which caps are always allowed.
     thickness
-        A body that has less volume for its area is none.
+        A body with less volume per area has no inside.
     fill
-        Close every body that closing gives an inside, whatever can come in.
+        Close every body that has an inside once closed, even if something can get in.
     bend
-        What bending weighs when caps are made; see `cap`.
+        Weight of bending in caps; see `cap`.
 
     Returns
     -------
@@ -164,11 +164,11 @@ def close_holes(
         owners = np.concatenate([np.where(whole, body, soup.body), loop_body[owner][some]])
         no_cap = np.zeros(int(some.sum()), dtype=bool)
         kept = first_of_doubled(faces, len(soup.vertices))
-        # Where more than two faces met before, which continue each other is a guess: no caps made them meet.
+        # Where more than two faces met before, which of them continue each other is a guess: caps did not cause that.
         trusted = np.concatenate([whole & ~rims.flap & ~soup.at_valence(soup.edges.valence > 2), ~no_cap])
         return Soup(soup.vertices, faces, owners, trusted).only(kept), np.concatenate([rims.flap, no_cap])[kept]
 
-    # A cap is worth having only where it gives the body an inside: a strip whose cap lies on itself stays a sheet.
+    # A cap is useful only if it gives the body an inside: a strip whose cap lies on itself stays a sheet.
     trial, flap = capped()
     volume = np.bincount(trial.body_of_side(), np.maximum(trial.sides.volume, 0), bodies)
     chosen &= volume > thickness * np.bincount(trial.body, trial.area, bodies)
@@ -181,7 +181,7 @@ def close_holes(
     by_room = np.zeros(bodies, dtype=bool)
     by_room[loop_body[place[unreachable & ~excused]]] = True
     wide = far & chosen[loop_body[place]]
-    # What every cap together would enclose, by the windings found.
+    # The volume that all caps together would enclose, by the windings found.
     sign = np.where(rims.inverted, -1, 1) * ~rims.flap
     enclosed = np.bincount(body, sign * signed_tetrahedra(soup.vertices, soup.faces), bodies)
     enclosed += np.bincount(loop_body[owner], signed_tetrahedra(soup.vertices, caps), bodies)
@@ -195,9 +195,9 @@ def close_holes(
 
 
 def _caps(soup: Soup, rims: Rims, bend: float) -> tuple[IntArray, IntArray]:
-    """Triangulate the loops, where bending counts no two across the same edge if that can be avoided.
+    """Triangulate the loops; if bending counts, no two across the same edge if possible.
 
-    Returns the faces ``[C, 3]``, without those that have a vertex twice, and the loop ``[C]`` of each.
+    Returns the faces ``[C, 3]``, without those with a repeated vertex, and the loop ``[C]`` of each.
     """
     count = len(soup.vertices)
     edges = soup.edges.vertices @ np.array([count, 1])  # in ascending order
@@ -226,7 +226,7 @@ def _caps(soup: Soup, rims: Rims, bend: float) -> tuple[IntArray, IntArray]:
 
 
 def _smooth_share(soup: Soup, rims: Rims, caps: IntArray, owner: IntArray) -> FloatArray:
-    """Return ``[L]`` along which share of each loop its cap goes on where the faces beside it end."""
+    """Return ``[L]`` the share of each loop along which its cap continues the adjacent faces."""
     a, b, c = (soup.vertices[caps[:, i]] for i in range(3))
     normal = np.cross(b - a, c - a)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
@@ -247,7 +247,7 @@ def _smooth_share(soup: Soup, rims: Rims, caps: IntArray, owner: IntArray) -> Fl
 
 
 def _wounds(rims: Rims, smooth: BoolArray, ring: BoolArray, part: FloatArray, depth: FloatArray) -> BoolArray:
-    """Return ``[L]`` whether each loop runs around missing faces; see the module.
+    """Return ``[L]`` whether each loop bounds missing faces; see the module.
 
     `part` is the area of its cap as a share of its body's, `depth` how far the cap leads away from the surface.
     """

@@ -1,4 +1,4 @@
-"""Where points lie relative to a triangle soup, and the points on a soup to ask that from."""
+"""Where points lie relative to a triangle soup, and sample points on a soup for such queries."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class SurfaceQuery:
         return np.asarray(found), np.asarray(face, dtype=np.int64)
 
     def winding(self, points: FloatArray) -> FloatArray:
-        """Return ``[N]`` how often the faces wind around each point."""
+        """Return ``[N]`` how many times the faces wind around each point."""
         return np.asarray(self._surface.winding(np.ascontiguousarray(points), threads=self.threads or 0))
 
     def inside(self, points: FloatArray) -> BoolArray:

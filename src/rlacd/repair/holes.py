@@ -1,6 +1,6 @@
-"""Cracks are welded and holes get caps: new faces that connect the free edges of a soup.
+"""Welding cracks and capping holes: new faces that connect the free edges of a soup.
 
-Input: a soup and its edges. Output: changed faces, or extra ones. Nothing here decides whether a cap is honest; the
+Input: a soup and its edges. Output: changed faces, or extra ones. Nothing here decides whether a cap is justified; the
 caller measures that.
 """
 
@@ -16,28 +16,28 @@ from rlacd._native import poll_stop
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.topology import BoolArray, Edges, IntArray, components, first_of_doubled, nondegenerate
 
-# The best triangulation looks at every three corners; longer loops are cut by ears, or where that fails up to a length.
+# Optimal triangulation considers all triples of corners; longer loops are cut by ears, or up to a length if that fails.
 _EXACT_LOOP = 60
 LONGEST_EXACT_LOOP = 250
-"""Loops of more edges than this are not triangulated in the best way."""
+"""Loops of more edges than this are not triangulated optimally."""
 
-# What area weighs against bending.
+# Weight of area against bending.
 _AREA = 0.1
-# What an edge that is there already weighs: more than anything else, but it is better than no cap.
+# Cost of an edge that already exists: above everything else, but still better than no cap.
 _TAKEN = 1e3
 
-# Edges whose neighbours are looked up before the next look at whether the work has to stop.
+# Edges processed between two polls of the stop.
 _AT_ONCE = 1000
 
 
-# Tracing loops is the one step of a repair that walks edge by edge; a soup with more free edges is no scan with holes.
+# Tracing loops is the one repair step that walks edge by edge; a soup with more free edges is not a scan with holes.
 MOST_FREE_EDGES = 500_000
 
 
 def close_cracks(vertices: FloatArray, faces: IntArray, tolerances: Sequence[float]) -> tuple[IntArray, IntArray]:
-    """Merge free edges that nearly coincide, trying ever wider tolerances.
+    """Merge free edges that nearly coincide, with increasing tolerances.
 
-    A try that closes nothing, or leaves no face, is undone.
+    An attempt that closes nothing, or leaves no face, is undone.
 
     Returns the faces ``[G, 3]`` and ``[G]`` the given face each comes from.
     """
@@ -116,7 +116,7 @@ def split_at_free_vertices(vertices: FloatArray, faces: IntArray, tolerance: flo
     order = np.lexsort((vertex, along, edge))
     edge, vertex = edge[order], vertex[order]
     split = np.unique(edge)
-    # The corners along each split edge: a, the inserted vertices, b; every consecutive pair makes a face with c.
+    # The corners along each split edge: a, the inserted vertices, b; every consecutive pair forms a face with c.
     chain_edge = np.concatenate([split, edge, split])
     chain_vertex = np.concatenate([a[split], vertex, b[split]])
     place = np.concatenate([np.zeros(len(split)), np.ones(len(edge)), np.full(len(split), 2)])
@@ -151,14 +151,14 @@ def cap(points: FloatArray, beside: FloatArray, taken: BoolArray | None = None, 
         ``[N, 3]``, the unit normal of the face on the other side of the edge from each point to the next. It runs along
         that edge in the order of the loop.
     taken
-        ``[N, N]``, between which points an edge would be one too many, because there is one or because they are one.
+        ``[N, N]``, pairs of points that must not get an edge, because one exists already or because they are equal.
     bend
-        What bending weighs; with 0 the area is least.
+        Weight of bending; with 0 the area is minimised.
 
     Returns
     -------
     IntArray
-        ``[N - 2, 3]`` corners, none of them new, which run against the loop, as the faces beside it would have them.
+        ``[N - 2, 3]`` corners, all of them points of the loop, oriented against the loop to match the adjacent faces.
     """
     if len(points) <= 3:
         return np.array([[0, 2, 1]])
@@ -168,7 +168,7 @@ def cap(points: FloatArray, beside: FloatArray, taken: BoolArray | None = None, 
     _, _, axes = np.linalg.svd(points - middle, full_matrices=False)
     flat = np.ascontiguousarray((points - middle) @ axes[:2].T)
     ears = mapbox_earcut.triangulate_float64(flat, np.array([len(points)], dtype=np.uint32)).reshape(-1, 3)
-    if len(ears) != len(points) - 2:  # the loop's shadow crosses itself: no plane is right
+    if len(ears) != len(points) - 2:  # the loop's projection crosses itself: no plane fits
         if len(points) <= LONGEST_EXACT_LOOP:
             return _least_bent(points, beside, taken, bend)[:, ::-1]
         return _strips(len(points))[:, ::-1]
@@ -191,17 +191,17 @@ def _strips(count: int) -> IntArray:
 
 
 def _least_bent(points: FloatArray, beside: FloatArray, taken: BoolArray | None, bend: float) -> IntArray:
-    """Triangulate a loop so that it bends least, by dynamic programming.
+    """Triangulate a loop with the least bending, by dynamic programming.
 
-    What is least is the sum over all edges, those of the loop included, of length times angle between the faces: the
-    total absolute mean curvature, which brings the sharp edges of an object back where a small area would cut them off.
-    The area, a little of it, decides where nothing bends. After Liepa, "Filling holes in meshes" (2003).
+    The cost is the sum over all edges, those of the loop included, of length times angle between the faces: the total
+    absolute mean curvature, which restores the sharp edges of an object where least area would cut them off. A small
+    weight on area decides where nothing bends. After Liepa, "Filling holes in meshes" (2003).
     """
     n = len(points)
     cost, choice = np.zeros((n, n)), np.zeros((n, n), dtype=np.int64)
     normal = np.zeros((n, n, 3))  # of the triangle behind the chord from i to k
     ring = np.arange(n)
-    # Triangles here run with the loop, the faces beside it against them.
+    # The triangles here run with the loop, the adjacent faces against it.
     normal[ring[:-1], ring[1:]] = -beside[:-1]
     span_of = np.linalg.norm(points[:, None] - points, axis=2)
     per_area = _AREA / max(float(span_of.max()), np.finfo(float).tiny)

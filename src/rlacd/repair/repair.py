@@ -1,17 +1,17 @@
 """From any soup of triangles to one closed, oriented solid, by the least change that works.
 
-Input: an `InputMesh`. Output: a `Solid`, with the step every body needed. In order:
+Input: an `InputMesh`. Output: a `Solid`, with the step that every body needed. In order:
 
 1. equal vertices are merged; degenerate and doubled faces dropped;
 2. free edges that nearly coincide are welded, T-junctions included;
 3. the sides of the faces are joined around the edges (`topology`): a body whose faces all have an inside and an outside
    is solid and keeps its faces exactly, whatever their windings were; faces it encloses are dropped;
-4. holes are capped where every point of the cap stays near the input's surface, or where nothing can reach it;
-5. what is still open is made of sheets: each is thickened into a slab, face by face, without remeshing;
+4. holes are capped if every point of the cap stays near the input's surface, or if nothing can reach it;
+5. whatever is still open consists of sheets: each is thickened into a slab, face by face, without remeshing;
 6. all solids are united and their cavities filled;
-7. a room that remains and that no ball can enter is closed by a wrap of voxels drawn onto the surface.
+7. any remaining room that no ball can enter is closed by a voxel wrap projected onto the surface.
 
-The watertight-manifold algorithm of Huang et al. (2018) would serve for 5 too, but it grows every sheet by a voxel and
+The watertight-manifold algorithm of Huang et al. (2018) could replace step 5, but it grows every sheet by a voxel and
 turns a dozen exact faces into tens of thousands of approximate ones; steps 3 to 5 keep the faces of the input.
 """
 
@@ -55,22 +55,22 @@ from rlacd.solid.topology import (
 )
 
 STEPS = ("closed", "reoriented", "outer skin", "welded", "capped", "slab", "wrapped", "hull")
-"""What can be done to a body, from the least change to the most."""
+"""The possible steps for a body, from the least change to the most."""
 
 HALF_THICKNESS = 1e-3
 """Half the thickness of the slab a sheet becomes, in frame units."""
 
 GAP = 0.03
-"""Farthest a cap may lead from the input's surface, and the radius of the ball a gap must stop, in frame units."""
+"""Greatest distance of a cap from the input's surface, and the radius of the ball a gap must stop, in frame units."""
 
 _WELDS = (2e-5, 5e-4)
 _WRAP_ERROR = 4e-3
 # What a capped body may lose before its caps are made another way.
 _LOST = 5e-3
-# More sheets than this are not united one by one: it would take seconds, and cutting what comes out longer. So it does
-# when fewer of them all cross each other: 40 do so 780 times (a second or two), 80 3,160 times (ten).
+# More sheets than this are not united one by one: that would take seconds, and cutting the result even longer. Neither
+# are fewer sheets that all cross each other: 40 have 780 crossings (a second or two), 80 have 3,160 (ten seconds).
 _CROWD, _CROSSINGS = 300, 1000
-# A closed body with less volume per area is flat: nothing could be cut from it.
+# A closed body with less volume per area is flat: there is nothing to cut.
 _FLAT = 1e-6
 
 
@@ -82,23 +82,23 @@ def repair(
     threads: int | None = None,
     keep_cavities: bool = False,
 ) -> Solid:
-    """Make a mesh into one closed, oriented solid.
+    """Turn a mesh into one closed, oriented solid.
 
     Parameters
     ----------
     mesh
-        What was loaded.
+        The loaded mesh.
     resolution
-        Cells along the longest side of the grid on which enclosed rooms are looked for.
+        Cells along the longest side of the grid on which enclosed rooms are searched.
     open_bodies
-        ``auto``: a body with openings is solid if nothing can get inside, or if the openings look like damage; else a
-        shell as thin as its faces. ``solid``: every body is filled that has an inside once its openings are closed.
-        ``thin``: what is open stays a shell.
+        ``auto``: a body with openings is solid if nothing can get inside, or if the openings look like damage; else it
+        is a shell as thin as its faces. ``solid``: every body is filled that has an inside once its openings are
+        closed. ``thin``: open bodies stay shells.
     threads
-        How many threads measure distances; all there are by default. The result does not depend on it.
+        Number of threads that measure distances; all cores by default. The result does not depend on it.
     keep_cavities
-        Leave sealed rooms open: what a union encloses, and closed bodies wound the other way round than what encloses
-        them. A closed sheet without thickness is a solid all the same.
+        Keep sealed rooms empty: those that a union encloses, and closed bodies wound opposite to the body around them.
+        A closed sheet without thickness still becomes a solid.
 
     Returns
     -------
@@ -108,9 +108,9 @@ def repair(
     Raises
     ------
     EmptyMeshError
-        There is no point.
+        There are no points.
     Stopped
-        There is no time left: `rlacd.solid.cover` is what needs next to none.
+        There is no time left: `rlacd.solid.cover` needs next to none.
     """
     poll_stop()
     warnings = list(mesh.warnings)
@@ -143,7 +143,7 @@ def repair(
             work, bend = other, 0.0
     doubted = work.doubted()
     if len(doubted):
-        # Faces of one body that cross each other can be joined wrongly into a skin: try them as sheets.
+        # If faces of one body cross each other, they may be joined into a wrong skin: try them as sheets.
         other = _Repair(query, frame, resolution, keep_cavities, open_bodies, doubted, bend)
         if other.deviation.max() < work.deviation.max():
             work = other
@@ -171,7 +171,7 @@ class _Repair:
         self.resolution = resolution
         self.keep_cavities = keep_cavities
         self.open_bodies = open_bodies
-        self.mouths: dict[int, FloatArray] = {}  # of hollow bodies, where their widest opening is
+        self.mouths: dict[int, FloatArray] = {}  # of hollow bodies, the centre of their widest opening
         self.bend = bend
         self.lost = 0.0  # how far what a capped body lost lies from the solid
         self.as_sheets = np.empty(0, dtype=np.int64) if as_sheets is None else as_sheets
@@ -220,17 +220,17 @@ class _Repair:
         self.warnings.append(sentence)
 
     def _place(self, point: FloatArray) -> str:
-        """A point of the frame, in the input's unit."""
+        """A point of the frame, formatted in the input's unit."""
         return "(" + ", ".join(f"{x:.4g}" for x in self.frame.to_input(point)) + ")"
 
     def report(self) -> tuple[BodyRepair, ...]:
-        """One record a body."""
+        """One record per body."""
         faces_in = np.bincount(self.body_of_input, minlength=self.bodies)
         rows = zip(self.step.tolist(), faces_in.tolist(), self.faces_out.tolist(), self.deviation.tolist(), strict=True)
         return tuple(BodyRepair(i, STEPS[s], a, b, d) for i, (s, a, b, d) in enumerate(rows))
 
     def doubted(self) -> IntArray:
-        """Bodies whose skin was chosen among faces that cross, and that leads away from them."""
+        """Bodies whose skin was chosen among crossing faces and leads away from them."""
         return np.flatnonzero((self.step == STEPS.index("outer skin")) & (self.deviation > GAP))
 
     def _note(self, bodies: IntArray, step: str) -> None:
@@ -254,7 +254,7 @@ class _Repair:
         return bool((np.abs(volume) > 2 * _FLAT * np.bincount(soup.body, soup.area)).all())
 
     def _as_they_are(self, soup: Soup) -> list[tuple[Manifold, int]]:
-        """Take closed, oriented bodies over; what `_build` would come to, without looking at every side."""
+        """Take closed, oriented bodies as they are: the result of `_build` without sorting all sides."""
         volume = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces))
         inward = volume < 0
         faces = np.where(inward[soup.body, None], soup.faces[:, ::-1], soup.faces)
@@ -264,10 +264,10 @@ class _Repair:
         return list(zip(solids, range(self.bodies), strict=True))
 
     def _drop_hidden(self, soup: Soup) -> Soup:
-        """Drop faces that lie inside their own body, where that is what keeps the body from having an inside.
+        """Drop faces that lie inside their own body, if they are what keeps the body from having an inside.
 
         Where parts meet in faces that overlap without matching, the order of faces around an edge is undecided, and one
-        wrong guess joins the inside with the outside. The winding number does not mind.
+        wrong guess joins the inside with the outside. The winding number is not affected.
         """
         crowded = np.zeros(self.bodies, dtype=bool)
         crowded[soup.body[soup.at_valence(soup.edges.valence > 2)]] = True
@@ -286,7 +286,7 @@ class _Repair:
         return soup.only(~hidden | ~better[soup.body])
 
     def _cap(self, soup: Soup) -> Soup:
-        """Cap the bodies all of whose holes can honestly be capped."""
+        """Cap the bodies all of whose holes may be capped."""
         free = int((soup.edges.valence == 1).sum())
         if free == 0 or free > MOST_FREE_EDGES or self.open_bodies == "thin":
             return soup
@@ -306,7 +306,7 @@ class _Repair:
         return closed.soup
 
     def _covers(self, points: FloatArray) -> BoolArray:
-        """Whether a ball can come to points; where cavities are kept, whatever leads there is open."""
+        """Whether a ball can reach points; if cavities are kept, everything connected to them is open."""
         return np.ones(len(points), dtype=bool) if self.keep_cavities else self.reach.covers(points)
 
     def _build(self, soup: Soup) -> list[tuple[Manifold, int]]:
@@ -315,8 +315,8 @@ class _Repair:
         front, back = sides.label[0::2], sides.label[1::2]
         none = _FLAT * sides.area
         sheet_area = np.bincount(front, soup.area * sides.sheet, len(none))
-        # A component that is mostly sheet yet has negative volume joins the inside with the outside: its body is not a
-        # solid anywhere, so all of it becomes slabs (whose cavities are filled later).
+        # A component that is mostly sheet yet has negative volume joins the inside with the outside: its body is
+        # nowhere solid, so all of it becomes slabs (whose cavities are filled later).
         leaky = soup.body_of_side()[(sides.volume < -none) & (4 * sheet_area > sides.area)]
         solid = sides.volume > none
         flat = np.abs(sides.volume) <= none
@@ -342,15 +342,15 @@ class _Repair:
         has_sheet, is_front = np.zeros((2, len(none)), dtype=bool)
         has_sheet[front[sides.sheet]] = True
         is_front[front] = True
-        # The two side components of a flat closed body are each other's mirror: build the fronts.
+        # The two side components of a flat closed body mirror each other: build the fronts.
         flat = (np.abs(sides.volume) <= none) & ~has_sheet & is_front
         keep = (sides.volume > none) | (has_sheet & (sides.volume >= -none)) | flat
         vertices, faces, label = self._skin(soup, keep, flat)
-        # Where parts touch along an edge, their common outer skin runs through the edge twice. Their insides are plain:
+        # Where parts touch along an edge, their common outer skin passes the edge twice. Their insides are simple:
         # build those, turned inside out, and let the union join them.
         pinched = np.zeros(self.bodies, dtype=bool)
         pinched[soup.body_of_side()[label[on_repeated_edge(faces, len(vertices))]]] = True
-        # Only where the skin is one piece: volumes of crossing pieces do not add up to those of the insides.
+        # Only if the skin is one piece: volumes of crossing pieces do not add up to those of the insides.
         pinched &= np.bincount(soup.body_of_side(), sides.volume > 0, self.bodies) == 1
         pinched[soup.body[sides.sheet]] = False
         pinched = pinched[soup.body_of_side()]
@@ -361,7 +361,7 @@ class _Repair:
         built, count = np.unique(label, return_counts=True)
         body = soup.body_of_side()[built]
         solids = [to_manifold(v, f) for v, f in split_labels(vertices, faces, label)]
-        # Sheets narrower than they shall be thick can cross themselves, and come out inside out.
+        # Sheets narrower than their intended thickness can cross themselves, and come out inside out.
         for i in np.flatnonzero(has_sheet[built] | flat[built]):
             poll_stop()
             if solids[i].volume() <= 0:
@@ -379,11 +379,11 @@ class _Repair:
         return skin(soup.vertices, soup.faces, soup.sides, keep, thin, HALF_THICKNESS)
 
     def _wrap(self, cells: BoolArray, error: float) -> Manifold:
-        """Return a solid of grid cells, drawn onto the input and simplified."""
+        """Return a solid of grid cells, projected onto the input and simplified."""
         return to_manifold(*self.reach.wrap(cells, self.input, HALF_THICKNESS)).simplify(error)
 
     def _wrap_crowds(self, soup: Soup, parts: list[tuple[Manifold, int]]) -> list[tuple[Manifold, int]]:
-        """Wrap sheets by the hundred (leaves, feathers) as one body: what no ball of radius `GAP` can tell apart."""
+        """Wrap crowds of sheets (leaves, feathers) as one body, where no ball of radius `GAP` can tell them apart."""
         is_slab = self.step == STEPS.index("slab")
         boxes = np.array([part.bounding_box() for part, body in parts if is_slab[body]]).reshape(-1, 2, 3)
         if is_slab.sum() <= _CROWD and _crossings(boxes) <= _CROSSINGS:
@@ -400,7 +400,7 @@ class _Repair:
         return [*((part, body) for part, body in parts if not is_slab[body]), (wrap, first)]
 
     def _wrap_rooms(self, soup: Soup, parts: list[tuple[Manifold, int]]) -> None:
-        """Close rooms that sheets enclose but for gaps no ball of radius `GAP` passes."""
+        """Close rooms that sheets enclose except for gaps too narrow for a ball of radius `GAP`."""
         is_slab = self.step == STEPS.index("slab")
         slabs = soup.only(is_slab[soup.body])
         around = soup.only((is_slab | self.by_room)[soup.body])
@@ -413,7 +413,7 @@ class _Repair:
         if len(rooms) == 0:
             return
         wrap = self._wrap(self.reach.around_rooms(rooms), _WRAP_ERROR)
-        # The wrap takes the place of the sheets that are nothing but walls of the rooms; the others stay slabs.
+        # The wrap replaces the sheets that are only walls of the rooms; the others stay slabs.
         points, on = spread_points(slabs.vertices, slabs.faces, GAP)
         wall = np.bincount(on, ~np.isin(self.reach.rooms_near(points), rooms), len(slabs.faces)) == 0
         before = self.faces_out.copy()
@@ -429,7 +429,7 @@ class _Repair:
         self.faces_out[wrapped.min(initial=self.bodies - 1)] += wrap.num_tri()
 
     def _measure(self) -> None:
-        """Record, for the bodies that were changed, how far the solid and the input lead from each other."""
+        """Record, for the changed bodies, how far the solid and the input deviate from each other."""
         if self.step.max() < STEPS.index("outer skin"):
             return
         solid = SurfaceQuery(*to_arrays(self.solid), self.input.threads)

@@ -1,12 +1,12 @@
-"""Where a surface is open: flaps told from the surface they stick on, and the loops of edges around its holes.
+"""Open boundaries of a surface: flaps, as opposed to the surface they stick to, and the loops of edges around holes.
 
-Input: a soup. Output: its flaps, and loops of vertices that run around holes; nothing is decided or changed here.
+Input: a soup. Output: its flaps, and loops of vertices around its holes; nothing is decided or changed here.
 
-Faces are mated across edges: two that share an edge, and of more than two those that continue each other best. Faces
-that mates connect are a patch, and all faces of a patch are wound alike, whatever the file says. A small patch that
-hangs on others by edges they mate without it is a flap: its free edges are no hole's. At a vertex where several holes
-meet, a loop turns from a free edge to the next one across the hole, so loops never run around faces that are there.
-An island that touches its hole's rim in a vertex becomes part of that hole's loop, which visits the vertex twice.
+Faces are mated across edges: if two share an edge, with each other; if more do, those that continue each other best.
+Faces connected by mates form a patch, and all faces of a patch are wound alike, whatever the file says. A small patch
+attached to others by edges that those mate without it is a flap: its free edges bound no hole. At a vertex where
+several holes meet, a loop turns from a free edge to the next one across the hole, so loops never run around existing
+faces. An island that touches its hole's rim at a vertex joins that hole's loop, which visits the vertex twice.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ class Rims:
     Attributes
     ----------
     loops
-        The vertices around each hole, in the order in which the faces beside it run.
+        The vertices around each hole, in the direction of the adjacent faces.
     beside
-        For each loop and each of its edges, which leads to the next vertex, the face that has it.
+        For each loop and each of its edges (from a vertex to the next), the adjacent face.
     normals
         ``[F, 3]``, unit normals with which all faces of a patch are wound alike.
     inverted
@@ -58,7 +58,7 @@ def rims_of(soup: Soup) -> Rims:
     label = _sides(soup, mate)
     one_sided = label[0::2] == label[1::2]
     if one_sided.any():
-        # Where faces are missing, two that are left can be mated wrongly: go by the windings of the file there.
+        # Where faces are missing, the remaining two can be mated wrongly: use the windings of the file there.
         forward = (soup.faces < soup.faces[:, _NEXT]).ravel()
         wrong = (mate >= 0) & np.repeat(one_sided, 3) & (forward == forward[mate])
         mate[wrong] = -1
@@ -83,7 +83,7 @@ def rims_of(soup: Soup) -> Rims:
     tail, head = np.where(swap, head, tail), np.where(swap, tail, head)
     tail_fan, head_fan = np.where(swap, head_fan, tail_fan), np.where(swap, tail_fan, head_fan)
     follower = _followers(soup.vertices, normal_of_vertex, tail, head, tail_fan, head_fan)
-    # What hangs between bodies is open where it is free; a hole is free all around, or nearly.
+    # Faces between bodies are open at free edges; a hole is free all around, or nearly.
     free = soup.edges.valence[soup.edges.of_halfedge[rim]] == 1
     loops = [loop for loop in _cycles(follower) if len(loop) > 2 and 2 * free[loop].sum() > len(loop)]
     normals = weighted / np.maximum(np.linalg.norm(weighted, axis=1, keepdims=True), np.finfo(float).tiny)
@@ -127,7 +127,7 @@ def _mates(soup: Soup) -> IntArray:
         around = order[valence == number].reshape(-1, number)
         away = across(soup.vertices, soup.faces, around.ravel()).reshape(-1, number, 3)
         folded = np.einsum("eik,ejk->eij", away, away)
-        # What hangs on the others has free edges.
+        # A flap attached to the others has free edges.
         hanging = 2 * free[around // 3]
         folded += hanging[:, :, None] + hanging[:, None, :]
         folded[:, np.arange(number), np.arange(number)] = np.inf
@@ -142,7 +142,7 @@ def _mates(soup: Soup) -> IntArray:
 
 
 def _flaps(soup: Soup, patch: IntArray) -> BoolArray:
-    """Return ``[F]`` whether a face belongs to a small patch with free edges that hangs on other patches."""
+    """Return ``[F]`` whether a face belongs to a small patch with free edges that is attached to other patches."""
     count = int(patch.max(initial=-1)) + 1
     hangs, free = (
         np.bincount(patch[soup.at_valence(some)], minlength=count) > 0
@@ -153,9 +153,9 @@ def _flaps(soup: Soup, patch: IntArray) -> BoolArray:
 
 
 def _against_main(soup: Soup, patch: IntArray, left_out: BoolArray, weighted: FloatArray) -> BoolArray:
-    """Return ``[F]`` which patches are wound against the largest one that they touch in a vertex; turns `weighted`.
+    """Return ``[F]`` which patches are wound against the largest one they touch at a vertex; flips `weighted`.
 
-    What lies inside has the greater winding number, so a patch is wound like the rest if its back has.
+    The inside has the greater winding number, so a patch is wound like the rest if the inside is at its back.
     """
     turned = np.zeros(len(soup.faces), dtype=bool)
     count = int(patch.max(initial=-1)) + 1
@@ -170,7 +170,7 @@ def _against_main(soup: Soup, patch: IntArray, left_out: BoolArray, weighted: Fl
     island = np.flatnonzero(~main[patch] & ~left_out)
     if len(island) == 0:
         return turned
-    # The largest face of each island stands for it.
+    # The largest face of each island represents it.
     island = island[np.lexsort((-soup.area[island], patch[island]))]
     island = island[np.unique(patch[island], return_index=True)[1]]
     there = main[patch] & ~left_out
@@ -192,7 +192,7 @@ def _followers(
 ) -> IntArray:
     """Return ``[N]`` the free edge that continues each at its head, -1 for none.
 
-    Seen from outside, what follows a fan counter-clockwise around a vertex is a hole, then the next fan.
+    Seen from outside, going counter-clockwise around a vertex, a fan is followed by a hole, then the next fan.
     """
     follower = np.full(len(tail), -1, dtype=np.int64)
     ends, begins = np.argsort(head, kind="stable"), np.argsort(tail, kind="stable")

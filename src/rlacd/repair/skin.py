@@ -1,9 +1,9 @@
 """From side components to closed triangle meshes: solids exactly as they are, sheets as thin slabs.
 
 Input: a soup, its `Sides`, and the components to build. Output: one closed, oriented 2-manifold whose edges all have
-exactly two faces. Every fan of corners that meets at a vertex within one region of space becomes a vertex of its own,
-so surfaces that merely touch in a vertex or an edge come apart. Fans that see a sheet are moved `half_thickness` away
-from it; the free edges of sheets get a rim.
+exactly two faces. Every fan of corners that meets at a vertex within one region of space becomes a separate vertex, so
+surfaces that merely touch at a vertex or an edge come apart. Fans on a sheet are moved `half_thickness` away from it;
+the free edges of sheets get a rim.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def skin(
     thin
         ``[F]``, the faces without an inside; their sides are moved outward.
     half_thickness
-        By how much, in the unit of the vertices.
+        Distance, in the unit of the vertices.
 
     Returns
     -------
@@ -109,7 +109,7 @@ def skin(
 def _fan_offsets(
     vertices: FloatArray, corners: IntArray, back: BoolArray, thin: BoolArray, fan: IntArray, number: int
 ) -> FloatArray:
-    """Direction ``[number, 3]`` that leaves every face of a fan at speed 1; zero for fans that see no sheet."""
+    """Direction ``[number, 3]`` that leaves every face of a fan at speed 1; zero for fans without a sheet."""
     a, b, c = (vertices[corners[:, i]] for i in range(3))
     normal = np.cross(b - a, c - a)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)

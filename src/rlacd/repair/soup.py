@@ -1,4 +1,4 @@
-"""The faces of an input on their way through repair, and what is asked of them."""
+"""The faces of an input during repair, and the properties derived from them."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from rlacd.solid.topology import (
 )
 
 NO_AREA = 1e-14
-"""Faces below this area, in the frame, have none."""
+"""Faces with less area than this, in the frame, are degenerate."""
 
-# Sheets of a body are thickened apart if they are at most this many, of at most this many faces in all.
+# Sheets of a body are separated before thickening if there are at most this many, with at most this many faces in all.
 _MOST_PATCHES, _MOST_PATCHED = 100, 4000
 # Cosine of the angle between two faces below which a sheet is folded onto itself (20 degrees).
 _FOLD = 0.94
-# How far beside a face the winding number is asked for.
+# Distance from a face at which the winding number is evaluated.
 _BESIDE = 2e-4
 
 
 @dataclass(frozen=True)
 class Soup:
-    """Faces on their way through the steps; `body` numbers the body of each, from the input to the end.
+    """Faces during the repair steps; `body` numbers the body of each, from the input to the end.
 
-    The windings of `trusted` faces have been looked into and put right.
+    The windings of `trusted` faces have been checked and corrected.
     """
 
     vertices: FloatArray
@@ -45,7 +45,7 @@ class Soup:
 
     @cached_property
     def edges(self) -> Edges:
-        """Which faces meet in which edge."""
+        """Which faces meet at which edge."""
         return Edges.of(self.faces, len(self.vertices))
 
     @cached_property
@@ -75,9 +75,9 @@ class Soup:
         return share
 
     def in_patches(self) -> Soup:
-        """The same faces, come apart along folds and along every edge that more than two of them share.
+        """The same faces, split along folds and along every edge that more than two of them share.
 
-        Sheets that meet in an edge are thickened one by one and united afterwards: where all corners of a sheet lie on
+        Sheets that meet at an edge are thickened one by one and united afterwards: if all corners of a sheet lie on
         others, or face both ways, no vertex would be left to give it thickness.
         """
         halfedge = np.argsort(self.edges.of_halfedge, kind="stable")
@@ -85,7 +85,7 @@ class Soup:
         away = [across(self.vertices, self.faces, some) for some in halfedge.T]
         halfedge = halfedge[np.einsum("ij,ij->i", *away) < _FOLD]
         count, patch = components(len(self.faces), halfedge[:, 0] // 3, halfedge[:, 1] // 3)
-        # Layers of thousands of faces on each other take minutes to unite: there, thin spots are the lesser evil.
+        # Layers of thousands of stacked faces take minutes to unite: there, thin spots are the lesser evil.
         patches = np.unique(np.stack([self.body, patch], axis=1), axis=0)[:, 0]
         tangled = (np.bincount(patches)[self.body] > _MOST_PATCHES) | (
             np.bincount(self.body)[self.body] > _MOST_PATCHED

@@ -12,23 +12,23 @@ from rlacd.solid.boolean_time import require_time_for
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.topology import IntArray, face_areas, signed_tetrahedra
 
-# Where manifold3d moves faces by more than `_MOVED` on average, corners are moved by less than `_HAIR` (frame units).
+# If manifold3d moves faces by more than `_MOVED` on average, corners are moved by less than `_HAIR` (frame units).
 _MOVED, _HAIR = 1e-5, 1e-9
-_HAIRS = 4  # one in a hundred leaves two faces so nearly in one plane that it does not help
+_HAIRS = 4  # about one in a hundred leaves two faces so nearly coplanar that it does not help
 
-# Uniting takes time per mesh even where nothing overlaps; above this many, meshes are put side by side instead.
+# Uniting takes time per mesh even without overlaps; above this number, disjoint meshes are composed instead.
 MOST_UNITED = 4000
 
-# So many triangles are united in one go; between two goes the work may be stopped.
+# Number of triangles united at once; the work may be stopped between batches.
 _AT_ONCE = 20_000
 
 
 def to_manifold(vertices: FloatArray, faces: IntArray) -> Manifold:
     """Return the solid a closed, oriented mesh bounds; the solid is empty if the mesh is not closed.
 
-    Where a face is folded back onto its neighbour, in one plane, manifold3d takes it for degenerate and flips its edges
-    and those around it: surfaces came back up to 0.1 away. Such a solid is built again, each corner moved by a hair, so
-    that no two faces lie in one plane.
+    manifold3d treats a face folded back onto its neighbour, in one plane, as degenerate and flips its edges and those
+    around it: surfaces came back up to 0.1 away. Such a solid is rebuilt with each corner moved by a hair, so that no
+    two faces are coplanar.
     """
     manifold = _taken_over(vertices, faces)
     if manifold.is_empty():
@@ -52,7 +52,7 @@ def _taken_over(vertices: FloatArray, faces: IntArray) -> Manifold:
 
 
 def _moved(manifold: Manifold, vertices: FloatArray, faces: IntArray) -> float:
-    """How far manifold3d moved the faces, on average, as far as the volume tells."""
+    """How far manifold3d moved the faces on average, estimated from the volume."""
     area = float(face_areas(vertices, faces).sum())
     return abs(manifold.volume() - float(signed_tetrahedra(vertices, faces).sum())) / area if area > 0 else 0.0
 
@@ -64,7 +64,7 @@ def to_arrays(manifold: Manifold) -> tuple[FloatArray, IntArray]:
 
 
 def split_labels(vertices: FloatArray, faces: IntArray, label: IntArray) -> list[tuple[FloatArray, IntArray]]:
-    """Take a mesh apart into the faces of each label, in ascending order of the labels."""
+    """Split a mesh into the faces of each label, in ascending order of the labels."""
     order = np.argsort(label, kind="stable")
     cuts = np.flatnonzero(np.diff(label[order])) + 1
     parts = []
@@ -83,20 +83,20 @@ def unite(solids: list[Manifold], *, keep_cavities: bool = False) -> Manifold:
     if len(solids) > MOST_UNITED:
         return Manifold.compose(solids)
     united = _united(solids)
-    # More cavities than solid are none: shells that came out inside out.
+    # More cavity than solid means shells that came out inside out, not cavities.
     return united if keep_cavities and united.volume() > 0 else _without_cavities(united)
 
 
 def unite_around_cavities(solids: list[Manifold], inward: list[bool]) -> Manifold:
-    """Unite solids but for the cavities that some of them bound, and keep what stands in a cavity.
+    """Unite solids except for the cavities that some of them bound, and keep what stands in a cavity.
 
     Parameters
     ----------
     solids : list of Manifold
         Each with positive volume.
     inward : list of bool
-        Which of them the input winds the other way round. A solid is a cavity if it is wound otherwise than the
-        outermost solid around it.
+        Which of them the input winds inside out. A solid is a cavity if it is wound opposite to the outermost solid
+        around it.
     """
     kept = [i for i, solid in enumerate(solids) if not solid.is_empty()]
     if len({inward[i] for i in kept}) < 2:
@@ -110,7 +110,7 @@ def unite_around_cavities(solids: list[Manifold], inward: list[bool]) -> Manifol
 
 
 def _around(solids: list[Manifold]) -> list[list[int]]:
-    """Which solids each solid lies in, if it crosses none."""
+    """The solids that contain each solid, if it crosses none."""
     boxes = np.reshape([solid.bounding_box() for solid in solids], (-1, 2, 3))
     around: list[list[int]] = [[] for _ in solids]
     for j, solid in enumerate(solids):
@@ -133,12 +133,12 @@ def _without_cavities(solid: Manifold) -> Manifold:
     outer = [s for s in shells if s.volume() > 0]
     if len(outer) == len(shells) or not outer:
         return solid
-    # What lay inside a cavity overlaps the filled solid now.
+    # Solids inside a cavity overlap the filled solid now.
     return _united(outer)
 
 
 def _united(solids: list[Manifold]) -> Manifold:
-    """Unite solids, neighbours in the list first, and what comes of them."""
+    """Unite solids pairwise, neighbours in the list first, then the results."""
     while len(solids) > 1:
         united, group, triangles = [], [solids[0]], solids[0].num_tri()
         for solid in solids[1:]:
@@ -159,7 +159,7 @@ def _united_at_once(solids: list[Manifold], triangles: int) -> Manifold:
 
 
 def hull_of_points(points: FloatArray, half_thickness: float) -> Manifold:
-    """Return the hull of points ``[N, 3]``, given thickness along the axes in which they have none."""
+    """Return the hull of points ``[N, 3]``, thickened along the axes in which they have no extent."""
     poll_stop()
     points = np.unique(points, axis=0)
     middle = points.mean(axis=0)
@@ -171,5 +171,5 @@ def hull_of_points(points: FloatArray, half_thickness: float) -> Manifold:
 
 
 def slab_of_faces(vertices: FloatArray, faces: IntArray, half_thickness: float) -> Manifold:
-    """Return the union of triangles that each are given thickness."""
+    """Return the union of triangles, each of them thickened."""
     return unite([hull_of_points(vertices[face], half_thickness) for face in faces])

@@ -1,4 +1,4 @@
-"""Which space a ball of given radius can reach from outside, on a voxel grid, and a closed wrap of what it cannot.
+"""The space that a ball of given radius can reach from outside, on a voxel grid, and a closed wrap of the rest.
 
 Input: a surface in the normalised frame. The reachable space is the union of all balls that touch no face and can roll
 in from infinity; the rest (the surface's closing) is what a collision with anything larger than the ball sees. Every
@@ -47,7 +47,7 @@ class Reach:
 
     @classmethod
     def of(cls, vertices: FloatArray, faces: IntArray, radius: float, resolution: int) -> Reach:
-        """Roll a ball around a surface; the longest side of the frame is `resolution` cells."""
+        """Roll a ball around a surface; the longest side of the frame has `resolution` cells."""
         pitch = 2.0 / resolution
         points, _ = spread_points(vertices, faces, pitch / 2)
         margin = int(np.ceil(radius / pitch)) + 3
@@ -66,7 +66,7 @@ class Reach:
         return cls(origin, pitch, radius, reached, depth, room)
 
     def covers(self, points: FloatArray) -> BoolArray:
-        """Return ``[N]`` whether the ball can come to each point; points off the grid it can."""
+        """Return ``[N]`` whether the ball can reach each point; it can reach all points off the grid."""
         cell = np.rint((points - self.origin) / self.pitch).astype(np.int64)
         inside = ((cell >= 0) & (cell < self.reached.shape)).all(axis=1)
         result = np.ones(len(points), dtype=bool)
@@ -84,7 +84,7 @@ class Reach:
         return labels[~solid.inside(centers)]
 
     def rooms_near(self, points: FloatArray) -> IntArray:
-        """Return ``[N]`` the label of a room whose walls each point may belong to, 0 for none."""
+        """Return ``[N]`` the label of a room whose walls may contain each point, 0 for none."""
         reach = self.radius + 2 * self.pitch
         away, index = ndimage.distance_transform_edt(self.room == 0, return_indices=True)
         cell = np.clip(np.rint((points - self.origin) / self.pitch).astype(np.int64), 0, np.array(self.room.shape) - 1)
@@ -107,10 +107,10 @@ class Reach:
         return cells
 
     def wrap(self, cells: BoolArray, surface: SurfaceQuery, thickness: float) -> tuple[FloatArray, IntArray]:
-        """Return the closed surface of a set of cells, drawn onto a surface where it is near.
+        """Return the closed surface of a set of cells, projected onto a surface where it is near.
 
-        Corners of cells move to `thickness` in front of the closest point of the surface, seen from where they were; so
-        a wrap around a single sheet keeps two sides. Corners farther than two cells away span a gap and are smoothed.
+        Corners of cells move to `thickness` in front of the closest point of the surface as seen from their place,
+        so a wrap of a single sheet keeps two sides. Corners farther than two cells away span a gap and are smoothed.
         """
         corners, quads = _boundary_squares(cells)
         points = self.origin + (corners - 0.5) * self.pitch

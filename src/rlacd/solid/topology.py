@@ -1,4 +1,4 @@
-"""What a soup of triangles is made of: shared vertices, edges, the two sides of every face, and how sides connect.
+"""The topology of a triangle soup: shared vertices, edges, the two sides of every face, and how sides connect.
 
 Input: vertices float64 ``[V, 3]`` and faces int64 ``[F, 3]`` in any order and orientation. Output: index arrays only;
 nothing here moves a vertex.
@@ -26,7 +26,7 @@ from rlacd.solid.frame import FloatArray
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
-# Faces closer in angle than this (radians) lie on each other as far as float32 files can tell.
+# Faces closer in angle than this (radians) coincide to the precision of float32 files.
 _SAME_ANGLE = 1e-4
 
 _NEXT = np.array([1, 2, 0])
@@ -158,7 +158,7 @@ def _angles_around(vertices: FloatArray, faces: IntArray, ends: IntArray, halfed
     axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), np.finfo(float).tiny)
     apex = vertices[_apex(faces, halfedges)]
     across = apex - tail
-    # Any direction that is not parallel to the axis will do as zero, as long as all faces of the edge share it.
+    # Any direction not parallel to the axis can serve as zero, as long as all faces of the edge share it.
     helper = np.eye(3)[np.abs(axis).argmin(axis=1)]
     zero = np.cross(axis, helper)
     zero /= np.maximum(np.linalg.norm(zero, axis=1, keepdims=True), np.finfo(float).tiny)
@@ -175,7 +175,7 @@ def _apex(faces: IntArray, halfedges: IntArray) -> IntArray:
 def wedges_of(vertices: FloatArray, faces: IntArray, edges: Edges, trusted: BoolArray | None = None) -> IntArray:
     """Return the wedges ``[3F, 2]`` around all edges (see `Sides`).
 
-    Around an edge with ``trusted`` ``[F]`` faces only, they alternate as their windings ask, whatever the angles.
+    Around an edge with ``trusted`` ``[F]`` faces only, wedges alternate as the windings require, whatever the angles.
     """
     poll_stop()
     angle = np.zeros(3 * len(faces))
@@ -198,9 +198,9 @@ def wedges_of(vertices: FloatArray, faces: IntArray, edges: Edges, trusted: Bool
 
 
 def _order_ties(order: IntArray, angle: FloatArray, edges: Edges, forward: BoolArray, trusted: BoolArray) -> None:
-    """Put faces that lie on each other around an edge into the order their windings ask for, in place.
+    """Put coincident faces around an edge into the order their windings require, in place.
 
-    Their angles cannot tell which comes first, and a wrong guess would join the inside with the outside. Where windings
+    Their angles cannot tell which comes first, and a wrong guess would join the inside with the outside. If windings
     are consistent, both sides of a wedge are fronts or both are backs. Around ``trusted`` ``[E]`` edges all angles
     count as equal.
     """
@@ -217,7 +217,7 @@ def _order_ties(order: IntArray, angle: FloatArray, edges: Edges, forward: BoolA
         here = slice(start[edge], start[edge + 1])
         ring, gaps = order[here], gap[here]
         alone = (gaps >= _SAME_ANGLE) & (np.roll(gaps, 1) >= _SAME_ANGLE)
-        # Begin with a face whose place is certain, else after the widest wedge: no tie crosses it.
+        # Begin with a face whose position is certain, else after the widest wedge: no tie crosses it.
         turn = int(alone.argmax()) if alone.any() else int(gaps.argmax()) + 1
         ring, gaps = np.roll(ring, -turn), np.roll(gaps, -turn)
         result: list[int] = []
