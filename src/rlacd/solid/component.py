@@ -262,7 +262,7 @@ class Component(Part):
 
     @cached_property
     def principal_axes(self) -> FloatArray:
-        """Principal axes of the surface [3, 3], one a row, the longest first, right-handed.
+        """Principal axes of the surface [3, 3], one per row, longest first, right-handed.
 
         Eigenvectors of the second moments of the surface (exact over its triangles). Their signs are fixed by making
         the largest entry positive.

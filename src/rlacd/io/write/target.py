@@ -67,7 +67,7 @@ def hull_target(path: str | os.PathLike[str], file_format: str | None = None, *,
     file_format : str, optional
         The format of the files in a folder.
     one_mesh : bool
-        Whether a model shall have all its hulls in one mesh file; only URDF supports that.
+        Whether a model has all its hulls in one mesh file; only URDF supports that.
 
     Raises
     ------
