@@ -1,13 +1,13 @@
-r"""Damage real files of every format and see that each gives hulls or one typed error: no crash, no hang, no flood.
+r"""Damage real files of every format and check that each gives hulls or one typed error: no crash, no hang, no flood.
 
     python -m fuzz.damaged MESHES --minutes 10 --out files.jsonl [--seed 0] [--formats obj,glb]
     python -m fuzz.damaged --table files.jsonl
     python -m fuzz.damaged MESHES --seed 0 --only 1234 --keep folder     # one input again, its file kept
     python -m fuzz.damaged --minimise finding.obj                        # cut what it does not need
 
-MESHES is the folder of real meshes: what lies in its ``raw/`` and small meshes of its index, written in every format,
-are the seeds. Every input is made from the seed and its own number alone, and decomposed within a small budget by the
-watched processes of a batch (`rlacd.batch`). What happened to those that did not end well is written to the output.
+MESHES is the folder of real meshes. The seeds are the files in its ``raw/`` and small meshes of its index, written in
+every format. Every input depends on the seed and its number alone, and is decomposed within a small budget by the
+watched processes of a batch (`rlacd.batch`). Inputs that ended badly are written to the output.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""Hand random shapes straight to the kernels, compare with brute force, and with themselves on other threads.
+"""Pass random shapes straight to the kernels; compare with brute force, and with other numbers of threads.
 
     python -m fuzz.kernels --seconds 600
     python -m fuzz.kernels --again 4711
 
-No repair stands between the shapes and the kernels: flat, doubled, crossing, needles and all. A decomposition takes
-seconds, this milliseconds, so it is what a sanitized build has most time for.
+The shapes are not repaired first: flat, repeated, crossing, needles and all. This takes milliseconds where a
+decomposition takes seconds, so it suits sanitized builds best.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
-"""Decompose random shapes under random options, and have independent judges look at what comes out.
+"""Decompose random shapes with random options, and check the results with independent judges.
 
     python -m fuzz.shapes --seconds 600              `make fuzz-shapes MINUTES=10`
     python -m fuzz.shapes --count 300 --first 5000
-    python -m fuzz.shapes --again 4711               one seed in this process, with all that is known of it
+        python -m fuzz.shapes --again 4711               one seed in this process, with full details
     python -m fuzz.shapes --totals fuzz.jsonl        sums over a log
 
-A seed decides the shape (`fuzz.recipes`), the options (`fuzz.choices`) and the format. It is decomposed in a process of
-its own that may take so many seconds and so much memory; every fourth is decomposed again on another number of threads
-and has to give the same bytes. Lines of the log are JSON, one a seed.
+A seed determines the shape (`fuzz.recipes`), the options (`fuzz.choices`) and the format. It is decomposed in its own
+process with limits on time and memory; every fourth is decomposed again with another number of threads and must give
+the same bytes. The log has one JSON line per seed.
 """
 
 from __future__ import annotations

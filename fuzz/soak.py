@@ -1,12 +1,13 @@
-"""Keep trying: damaged files, random shapes, real meshes, faults and options, each judged by others than the kernels.
+"""Long-running tests: damaged files, random shapes, real meshes, faults and options, judged without the kernels.
 
-    python -m fuzz.soak --hours 1                   `make soak HOURS=1`; goes on where it was
-    python -m fuzz.soak --totals                    what all runs have come to
-    python -m fuzz.soak --again soak/0-1234.json    a failure once more
-    python -m fuzz.soak --minimise CASE.json        options and triangles that it needs
+    python -m fuzz.soak --hours 1                   `make soak HOURS=1`; resumes where it stopped
+        python -m fuzz.soak --totals                    totals of all runs
+        python -m fuzz.soak --again soak/0-1234.json    rerun a failure
+        python -m fuzz.soak --minimise CASE.json        reduce it to the options and triangles it needs
 
-A trial is made of the seed and its number alone (`fuzz.trials`). What fails is written as a case, a small JSON file;
-put into ``tests/cases``, it is tried by every test run. Sums go to the ledger, a row for every `CHUNK` numbers.
+A trial is a function of the seed and its number alone (`fuzz.trials`). A failure is written as a case, a small JSON
+file; cases in ``tests/cases`` are rerun by every test run. The ledger holds the sums, one row for every `CHUNK`
+numbers.
 """
 
 from __future__ import annotations
