@@ -2,7 +2,7 @@
 
     python -m fuzz.shapes --seconds 600              `make fuzz-shapes MINUTES=10`
     python -m fuzz.shapes --count 300 --first 5000
-        python -m fuzz.shapes --again 4711               one seed in this process, with full details
+    python -m fuzz.shapes --again 4711               one seed in this process, with full details
     python -m fuzz.shapes --totals fuzz.jsonl        sums over a log
 
 A seed determines the shape (`fuzz.recipes`), the options (`fuzz.choices`) and the format. It is decomposed in its own

@@ -1,9 +1,9 @@
 """Long-running tests: damaged files, random shapes, real meshes, faults and options, judged without the kernels.
 
     python -m fuzz.soak --hours 1                   `make soak HOURS=1`; resumes where it stopped
-        python -m fuzz.soak --totals                    totals of all runs
-        python -m fuzz.soak --again soak/0-1234.json    rerun a failure
-        python -m fuzz.soak --minimise CASE.json        reduce it to the options and triangles it needs
+    python -m fuzz.soak --totals                    totals of all runs
+    python -m fuzz.soak --again soak/0-1234.json    rerun a failure
+    python -m fuzz.soak --minimise CASE.json        reduce it to the options and triangles it needs
 
 A trial is a function of the seed and its number alone (`fuzz.trials`). A failure is written as a case, a small JSON
 file; cases in ``tests/cases`` are rerun by every test run. The ledger holds the sums, one row for every `CHUNK`
