@@ -213,8 +213,8 @@ def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Cl
         return _Reached(solid, options, _unprepared(options, solid), parts)
     if options.max_hulls is None:  # otherwise the threshold may be exceeded anyway
         goal = with_limits(goal, options.max_vertices, options.max_faces)
-    views = SweepCache()
-    tree = CutTree(root, make_policy(options.policy, views, _scale(goal)), workers)
+    sweeps = SweepCache()
+    tree = CutTree(root, make_policy(options.policy, sweeps, _scale(goal)), workers)
     parts, goal = _parts(tree, goal, options, workers, clock)
     policy = options.policy if isinstance(options.policy, str) else ""
     may_be_divided = options.merge and goal.obstacles is not None and policy not in AS_PUBLISHED
@@ -233,7 +233,7 @@ def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Cl
                     goal,
                     options.quality,
                     bounds,
-                    views,
+                    sweeps,
                     workers,
                     clock,
                     options.seed,

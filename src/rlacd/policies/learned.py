@@ -147,8 +147,8 @@ class Learned:
         blend: float | None = None,
         sweeps: SweepCache | None = None,
     ) -> None:
-        self._guide = load_ranker(weights)
-        self._sweep_cache = sweeps or SweepCache(self._guide.about.per_axis, CONCAVE_EDGES)
+        self._ranker = load_ranker(weights)
+        self._sweep_cache = sweeps or SweepCache(self._ranker.about.per_axis, CONCAVE_EDGES)
         self._scale = USUAL_SCALE if scale is None else scale
         self._blend = blend
 
@@ -159,7 +159,7 @@ class Learned:
 
     def rank(self, component: Component, swept: Sweep) -> FloatArray:
         """Cost of every plane of a component's sweep over axes and concave edges; it may have any number per axis."""
-        return ranked_cost(self._guide, component, swept, self._scale, self._blend)
+        return ranked_cost(self._ranker, component, swept, self._scale, self._blend)
 
 
 @lru_cache(maxsize=4)

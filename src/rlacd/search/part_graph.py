@@ -100,8 +100,8 @@ class PartGraph:
     def draw_small(self, random: np.random.Generator) -> int:
         """Draw a part, favouring small hulls: the weights by rank are 1/2, 1/3, 1/4, ..."""
         by_size = sorted(self.parts, key=lambda i: (self.parts[i].hull.volume, i))
-        feasibilities = 1 / np.arange(2, len(by_size) + 2)
-        return by_size[int(random.choice(len(by_size), p=feasibilities / feasibilities.sum()))]
+        weights = 1 / np.arange(2, len(by_size) + 2)
+        return by_size[int(random.choice(len(by_size), p=weights / weights.sum()))]
 
     def draw(self, size: int, random: np.random.Generator) -> Cluster | None:
         """Draw a connected cluster: a pair with a small gap, extended by the neighbours with the smallest gaps.
