@@ -81,7 +81,7 @@ def _() -> bytes:
     return ply(f"element vertex {10**12}\n{XYZ}", b"0 0 0\n1 0 0\n0 1 0\n", "ascii")
 
 
-@refused("counts that add up by a negative one.ply", "negative")
+@refused("counts that add up by a negative one.ply", "where a count belongs|negative")
 def _() -> bytes:
     elements = f"element vertex {10**9}\n{XYZ}element face {-(10**9) + 50}\nproperty float a\n" + XYZ.replace("x", "b")
     return ply(elements.replace("property float b\n", "property int b\n"))

@@ -7,13 +7,16 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from rlacd.errors import OptionError
 from rlacd.fields import check_fields, custom, integer, number, one_of, option
 from rlacd.policy_names import POLICIES, policy_name, read_policy
 from rlacd.presets import PRESETS, PresetName, find_preset
 from rlacd.space_options import NAVIGABLE, SpaceOptions
+
+if TYPE_CHECKING:
+    from rlacd.policies import Policy
 
 DEFAULT_RESOLUTION = 100
 """Cells along the longest side of the grid on which repair looks for rooms that nothing can enter."""
@@ -121,7 +124,7 @@ class Options:
         usual="merge",
         flags=("--merge/--no-merge",),
     )
-    policy: Any = option(
+    policy: str | Policy = option(
         "greedy",
         "What chooses the next cut: navacd is the quickest, learned asks a network, FILE.onnx is one of yours "
         "(both: extra rlacd[learned]).",
