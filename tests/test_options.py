@@ -269,7 +269,7 @@ def test_a_length_may_be_a_share_or_in_metres() -> None:
 
 
 def test_every_option_of_names_has_a_literal_type() -> None:
-    hints = typing.get_type_hints(Options)
+    hints = typing.get_type_hints(Options, localns={"Policy": rlacd.Policy})
     for field in dataclasses.fields(Options):
         known = field.metadata["option"]
         if known.kind.rule.startswith("one of") and field.name != "policy":
