@@ -14,8 +14,8 @@ import rlacd
 from rlacd import _native
 from rlacd.clock import Clock
 from rlacd.criteria import Concavity
-from rlacd.criteria.criterion import Feasibility
 from rlacd.criteria.navigable import Navigable, NavigableSpace
+from rlacd.criteria.screen import Feasibility
 from rlacd.merge import merge_parts, merge_to_count
 from rlacd.solid.balls import Balls
 from rlacd.solid.component import ClippedPart, Component, Part, Plane
@@ -116,8 +116,8 @@ def test_what_is_united_with_a_share_is_a_share(workers: Workers) -> None:
 def test_balls_do_not_ask_what_is_inside_a_hull() -> None:
     component = Component(CROSS)
     space = Navigable(NavigableSpace(0.1, 0.05), 0.1, 0.05, Balls(np.zeros((0, 3)), np.zeros(0)))
-    assert space.feasibility(component.filling, component.hull) is Feasibility.NEVER
-    assert not space.forbids(component.filling, component.hull)
+    assert space.screen.feasibility(component.filling, component.hull) is Feasibility.NEVER
+    assert not space.screen.forbids(component.filling, component.hull)
 
 
 def heap_of_blocks(random: np.random.Generator) -> tuple[Component, list[Manifold]]:
@@ -148,14 +148,14 @@ def test_a_quick_no_is_never_wrong(seed: int, threshold: float) -> None:
     hull = Hull.of(random.permutation(solid.vertices)[: int(random.integers(4, 12))])
     assume(hull is not None and hull.volume >= 1e-4)
     fits = share_fits(solid, hull, threshold)
-    feasibility = Concavity(threshold).feasibility(solid.filling, hull)
+    feasibility = Concavity(threshold).screen.feasibility(solid.filling, hull)
     assume(fits is not None)
     assert not (fits and feasibility is not Feasibility.MAYBE)
     larger = Hull.of(np.concatenate([hull.vertices, random.uniform(-1, 1, (3, 3))]))
     assert larger is not None
-    assert Concavity(threshold).forbids(solid.filling, hull) == (feasibility is Feasibility.NEVER)
+    assert Concavity(threshold).screen.forbids(solid.filling, hull) == (feasibility is Feasibility.NEVER)
     if feasibility is Feasibility.NEVER:
-        assert Concavity(threshold * (1 - 1e-9)).feasibility(solid.filling, larger) is Feasibility.NEVER
+        assert Concavity(threshold * (1 - 1e-9)).screen.feasibility(solid.filling, larger) is Feasibility.NEVER
 
 
 @settings(deadline=None, max_examples=40)
@@ -165,10 +165,10 @@ def test_a_quick_no_about_a_pair_is_never_wrong(seed: int, threshold: float) -> 
     solid, blocks = heap_of_blocks(np.random.default_rng(seed))
     hulls = [hull for b in blocks if (hull := Hull.of(b.to_mesh64().vert_properties[:, :3].astype(float))) is not None]
     pairs = np.array([(i, j) for j in range(len(hulls)) for i in range(j)], dtype=np.int32)
-    _, feasibilities = Concavity(threshold).feasibilities(solid.filling, hulls, pairs, 1)
+    _, feasibilities = Concavity(threshold).screen.feasibilities(solid.filling, hulls, pairs, 1)
     for (i, j), feasibility in zip(pairs, feasibilities, strict=True):
         joint = Hull.around(hulls[i], hulls[j])
-        alone = Concavity(threshold).feasibility(solid.filling, joint)
+        alone = Concavity(threshold).screen.feasibility(solid.filling, joint)
         assert (feasibility == Feasibility.MAYBE) <= (alone is Feasibility.MAYBE)
         assert (feasibility == Feasibility.NEVER) <= (alone is Feasibility.NEVER)
         assert not (share_fits(solid, joint, threshold) and feasibility != Feasibility.MAYBE)
@@ -181,17 +181,17 @@ def test_all_pairs_in_one_go_are_the_pairs_one_by_one(workers: Workers) -> None:
     seen = set()
     for criterion in (Concavity(0.02), Concavity(0.2), Concavity(0.6)):
         for threads in (1, 3):
-            volumes, feasibilities = criterion.feasibilities(root.filling, hulls, pairs, threads)
+            volumes, feasibilities = criterion.screen.feasibilities(root.filling, hulls, pairs, threads)
             for (i, j), volume, feasibility in zip(pairs, volumes, feasibilities, strict=True):
                 joint = Hull.around(hulls[i], hulls[j])
                 assert feasibility == Feasibility.NEVER or volume == joint.volume
                 assert (feasibility == Feasibility.MAYBE) == (
-                    criterion.feasibility(root.filling, joint) is Feasibility.MAYBE
+                    criterion.screen.feasibility(root.filling, joint) is Feasibility.MAYBE
                 )
                 seen.add(int(feasibility))
     assert len(seen) > 1
     with pytest.raises(ValueError, match="out of range"):
-        TIGHT.feasibilities(root.filling, hulls, np.array([(0, len(hulls))], dtype=np.int32), 1)
+        TIGHT.screen.feasibilities(root.filling, hulls, np.array([(0, len(hulls))], dtype=np.int32), 1)
 
 
 def test_time_may_run_out_before_pairs_are_looked_at(workers: Workers) -> None:
@@ -208,15 +208,15 @@ def test_a_face_deep_in_a_hull_is_seen_without_its_corners() -> None:
     solid = Component(block(1, 1, 1, (0, -0.5, 0)) - groove)
     assert solid.volume == pytest.approx(1 - 0.5 * 0.08 * 0.3)
     for threshold in (0.05, 0.1, 0.29):
-        assert Concavity(threshold).feasibility(solid.filling, solid.hull) is Feasibility.NEVER
-    assert Concavity(0.31).feasibility(solid.filling, solid.hull) is Feasibility.MAYBE
+        assert Concavity(threshold).screen.feasibility(solid.filling, solid.hull) is Feasibility.NEVER
+    assert Concavity(0.31).screen.feasibility(solid.filling, solid.hull) is Feasibility.MAYBE
 
 
 def test_a_window_in_a_wall_is_seen_between_the_points_first_looked_at() -> None:
     wall = block(4, 4, 0.3) - block(0.3, 0.3, 1, (0.83, -1.41, 0))
     solid = Component(wall)
-    assert Concavity(0.1).feasibility(solid.filling, solid.hull) is not Feasibility.MAYBE
-    assert Concavity(0.2).feasibility(solid.filling, solid.hull) is Feasibility.MAYBE
+    assert Concavity(0.1).screen.feasibility(solid.filling, solid.hull) is not Feasibility.MAYBE
+    assert Concavity(0.2).screen.feasibility(solid.filling, solid.hull) is Feasibility.MAYBE
 
 
 def test_a_solid_that_overlaps_itself_can_be_reunited() -> None:

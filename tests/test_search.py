@@ -29,10 +29,10 @@ from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import make_policy
 from rlacd.repair.repair import repair
 from rlacd.search.budget import SearchBudget
+from rlacd.search.context import SearchContext, by_score
 from rlacd.search.levels import LEVELS, Level, cost, level, search
 from rlacd.search.neighbourhood import Neighbourhood
 from rlacd.search.part_graph import PartGraph
-from rlacd.search.rankings import by_score
 from rlacd.search.recut import Exchange, recut
 from rlacd.solid.component import Component, Part, Plane
 from rlacd.solid.reunite import reunite, touch
@@ -115,7 +115,7 @@ def test_most_neighbours_can_be_reunited_without_a_wall_between_them(real: Compo
 def test_a_search_only_improves_and_keeps_the_solid(real: Component) -> None:
     with Workers(1) as workers:
         parts = first_pass(real, workers)
-        found, account = search(real, parts, CRITERION, "best", Level(40, None), SweepCache(), workers, Clock(), seed=0)
+        found, account = search(SearchContext(real, CRITERION, workers), parts, Level("best", 40, None), Clock())
     assert cost(found) <= cost(parts)
     assert account.parts == len(found) <= account.portfolio <= account.first_pass == len(parts)
     assert account.steps == 40 or account.exhausted
@@ -129,9 +129,8 @@ def test_more_steps_are_never_worse(real: Component) -> None:
     with Workers(1) as workers:
         parts = first_pass(real, workers)
         for steps in (0, 8, 24):
-            found, _ = search(
-                real, parts, CRITERION, "best", Level(steps, None), SweepCache(), workers, Clock(), seed=3
-            )
+            context = SearchContext(real, CRITERION, workers, seed=3)
+            found, _ = search(context, parts, Level("best", steps, None), Clock())
             costs.append(cost(found))
     assert costs[0] >= costs[1] >= costs[2]
 
@@ -140,7 +139,10 @@ def test_the_state_of_a_search_is_always_feasible() -> None:
     root = Component(frame())
     with Workers(1) as workers:
         parts = first_pass(root, workers)
-        state = Neighbourhood(root, parts, CRITERION, [by_score("hull-sum")], SweepCache(12, 0), workers, 0)
+        state = Neighbourhood(
+            SearchContext(root, CRITERION, workers, rankings=[by_score("hull-sum")], near_sweeps=SweepCache(12, 0)),
+            parts,
+        )
         for _ in range(4):
             state.run(SearchBudget(Clock(), None, len(parts)), 3)
             assert all(CRITERION.is_met(part) for part in state.parts)
@@ -330,9 +332,9 @@ def test_a_convex_solid_needs_no_search() -> None:
 
 def test_bounds_of_levels() -> None:
     assert level("balanced", None, None) == LEVELS["balanced"]
-    assert level("best", 2.0, None) == Level(None, 2.0)
-    assert level("best", None, 7) == Level(7, None)
-    assert level("best", 2.0, 7) == Level(7, 2.0)
+    assert level("best", 2.0, None) == Level("best", None, 2.0)
+    assert level("best", None, 7) == Level("best", 7, None)
+    assert level("best", 2.0, 7) == Level("best", 7, 2.0)
 
 
 @pytest.mark.parametrize(

@@ -13,15 +13,23 @@ from rlacd.criteria import Concavity
 from rlacd.merge import merge_parts
 from rlacd.planes.sweep_cache import SweepCache
 from rlacd.search.budget import SearchBudget
+from rlacd.search.context import SearchContext, by_score
 from rlacd.search.neighbourhood import Neighbourhood, cost
 from rlacd.search.part_graph import PartGraph
-from rlacd.search.rankings import by_score
 from rlacd.search.transfer import transfer
 from rlacd.solid.component import Component, Part
 from rlacd.workers import Workers
 from tests.shapes import bent_bar, box, own_volume, together
 
 CRITERION = Concavity(0.05)
+
+
+def neighbourhood(solid: Component, parts: list[Part], workers: Workers, seed: int) -> Neighbourhood:
+    rankings, sweeps = [by_score("hull-sum")], SweepCache(12, 0)
+    return Neighbourhood(
+        SearchContext(solid, CRITERION, workers, seed, rankings=rankings, near_sweeps=sweeps),
+        parts,
+    )
 
 
 def test_what_nobody_can_take_whole_is_divided() -> None:
@@ -88,7 +96,7 @@ def test_nothing_is_lost(sizes: list[tuple[float, float, float]], seed: int) -> 
 def test_the_search_divides_the_bent_bar() -> None:
     parts = bent_bar()
     with Workers(1) as workers:
-        state = Neighbourhood(together(parts), parts, CRITERION, [by_score("hull-sum")], SweepCache(12, 0), workers, 0)
+        state = neighbourhood(together(parts), parts, workers, 0)
         outcome = state.run(SearchBudget(Clock(), None, 3), 60)
     assert len(outcome.parts) == 2
     assert all(CRITERION.is_met(part) for part in outcome.parts)
@@ -101,7 +109,7 @@ def test_a_search_gives_back_the_best_it_has_seen() -> None:
     solid = together(bars)
     with Workers(1) as workers:
         for seed in range(3):
-            state = Neighbourhood(solid, bars, CRITERION, [by_score("hull-sum")], SweepCache(12, 0), workers, seed)
+            state = neighbourhood(solid, bars, workers, seed)
             reached = cost(bars)
             for _ in range(3):
                 outcome = state.run(SearchBudget(Clock(), None, len(bars)), 8)
@@ -129,7 +137,7 @@ def test_a_search_in_vain_ends() -> None:
     solid = Component(cube.manifold + ball.manifold)
     parts: list[Part] = [cube, Component(solid.manifold - cube.manifold)]
     with Workers(1) as workers:
-        state = Neighbourhood(solid, parts, CRITERION, [by_score("hull-sum")], SweepCache(12, 0), workers, 0)
+        state = neighbourhood(solid, parts, workers, 0)
         outcome = state.run(SearchBudget(Clock(), None, 2), 1000)
     assert outcome.exhausted
     assert outcome.steps < 1000

@@ -28,7 +28,7 @@ from rlacd.progress import ProgressCallback
 from rlacd.renamed import with_former
 from rlacd.repair.repair import repair
 from rlacd.report import make_report
-from rlacd.search import eliminate_parts, level, search
+from rlacd.search import SearchContext, eliminate_parts, level, search
 from rlacd.search.levels import SearchSummary
 from rlacd.solid.component import Component, Part
 from rlacd.solid.cover import cover
@@ -218,28 +218,17 @@ def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Cl
     parts, goal = _parts(tree, goal, options, workers, clock)
     policy = options.policy if isinstance(options.policy, str) else ""
     may_be_divided = options.merge and goal.obstacles is not None and policy not in AS_PUBLISHED
+    context = SearchContext(root, goal, workers, options.seed, sweeps)
     found = None
     try:
         if may_be_divided and clock.stopped_by is None:
             with clock.stage("search"):
-                parts = eliminate_parts(root, parts, goal, workers, clock, options.seed)
+                parts = eliminate_parts(context, parts, clock)
         assert options.quality is not None
         if options.quality != "fast" and clock.stopped_by is None:
             bounds = level(options.quality, options.budget, options.search_steps)
             with clock.stage("search"):
-                parts, found = search(
-                    root,
-                    parts,
-                    goal,
-                    options.quality,
-                    bounds,
-                    sweeps,
-                    workers,
-                    clock,
-                    options.seed,
-                    options.max_hulls,
-                    first=policy,
-                )
+                parts, found = search(context, parts, bounds, clock, most_parts=options.max_hulls, first=policy)
     except Stopped:
         clock.note_stop()
     return _Reached(solid, options, goal, parts, found)

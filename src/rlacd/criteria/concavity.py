@@ -13,7 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rlacd import _native
-from rlacd.criteria.criterion import CriterionSummary, Feasibility, Part
+from rlacd.criteria.criterion import CriterionSummary
+from rlacd.criteria.screen import Feasibility, Part, Screen
 from rlacd.errors import OptionError
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.hull import Hull
@@ -52,6 +53,42 @@ class ConcavityValue:
 
 
 @dataclass(frozen=True)
+class ConcavityScreen(Screen):
+    """Necessary conditions for a concavity of at most `threshold`.
+
+    The reach is twice the threshold: if parts are farther apart, the middle of the joint hull is too far from both.
+    """
+
+    threshold: float
+
+    def filled(self, part: Part) -> float:
+        """The part's volume: the rest of the hull is the volume in ``R_v``."""
+        return part.volume
+
+    def least_error(self, volume: float, hull_volume: float) -> float:
+        """``0.3 R_v``, a lower bound of the concavity."""
+        return VOLUME_WEIGHT * volume_radius(volume, hull_volume)
+
+    def excludes(self, volume: float, hull_volume: float) -> bool:
+        """Whether ``0.3 R_v`` alone exceeds the threshold."""
+        return self.least_error(volume, hull_volume) > self.threshold
+
+    def feasibility(self, filling: _native.Filling, hull: Hull) -> Feasibility:
+        """Test the solid's corners and points of the hull."""
+        return Feasibility(filling.feasibility(hull.vertices, hull.faces, self.threshold))
+
+    def feasibilities(
+        self, filling: _native.Filling, hulls: Sequence[Hull], pairs: IntArray, threads: int
+    ) -> tuple[FloatArray, IntArray]:
+        """Test the solid's corners and points of the joint hulls."""
+        return filling.joint_feasibilities([hull.vertices for hull in hulls], pairs, self.threshold, threads)
+
+    def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
+        """Whether the solid's surface reaches deeper into the hull than the threshold."""
+        return filling.comes_deeper(hull.vertices, hull.faces, self.threshold)
+
+
+@dataclass(frozen=True)
 class Concavity:
     """The criterion "CoACD concavity at most ``threshold``".
 
@@ -83,40 +120,14 @@ class Concavity:
             raise OptionError(f"The concavity threshold must be positive, not {self.threshold}; 0.05 is usual.")
 
     @property
-    def reach(self) -> float:
-        """Twice the threshold: if parts are farther apart, the middle of the joint hull is too far from both."""
-        return 2 * self.threshold
-
-    @property
     def is_hereditary(self) -> bool:
         """No: another part may fill what is missing from a part's hull."""
         return False
 
-    def excludes(self, volume: float, hull_volume: float) -> bool:
-        """Whether ``0.3 R_v`` alone exceeds the threshold."""
-        return self.least_error(volume, hull_volume) > self.threshold
-
-    def least_error(self, volume: float, hull_volume: float) -> float:
-        """``0.3 R_v``, a lower bound of the concavity."""
-        return VOLUME_WEIGHT * volume_radius(volume, hull_volume)
-
-    def feasibility(self, filling: _native.Filling, hull: Hull) -> Feasibility:
-        """Test the solid's corners and points of the hull."""
-        return Feasibility(filling.feasibility(hull.vertices, hull.faces, self.threshold))
-
-    def feasibilities(
-        self, filling: _native.Filling, hulls: Sequence[Hull], pairs: IntArray, threads: int
-    ) -> tuple[FloatArray, IntArray]:
-        """Test the solid's corners and points of the joint hulls."""
-        return filling.joint_feasibilities([hull.vertices for hull in hulls], pairs, self.threshold, threads)
-
-    def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
-        """Whether the solid's surface reaches deeper into the hull than the threshold."""
-        return filling.comes_deeper(hull.vertices, hull.faces, self.threshold)
-
-    def filled(self, part: Part) -> float:
-        """The part's volume: the rest of the hull is the volume in ``R_v``."""
-        return part.volume
+    @property
+    def screen(self) -> ConcavityScreen:
+        """Tests of volumes and of the solid's corners."""
+        return ConcavityScreen(2 * self.threshold, self.threshold)
 
     def settled(self, parts: Sequence[Part]) -> Concavity:
         """Unchanged: parts that exceed the threshold are reported."""

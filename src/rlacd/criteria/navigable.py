@@ -25,7 +25,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rlacd import _native
-from rlacd.criteria.criterion import CriterionSummary, Feasibility, Part
+from rlacd.criteria.criterion import CriterionSummary
+from rlacd.criteria.screen import Part, Screen
 from rlacd.errors import OptionError
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.balls import Balls
@@ -214,36 +215,14 @@ class Navigable:
         return f"Navigable(radius {self.radius:.4g}, tolerance {self.tolerance:.4g}, {len(self.balls)} balls)"
 
     @property
-    def reach(self) -> float:
-        """Twice the sum of radius and tolerance: a ball can pass through a wider gap between two parts."""
-        return 2 * (self.radius + self.tolerance)
+    def screen(self) -> Screen:
+        """Reaches twice the sum of radius and tolerance: a ball can pass through a wider gap between two parts."""
+        return Screen(2 * (self.radius + self.tolerance))
 
     @property
     def is_hereditary(self) -> bool:
         """Yes: a larger hull touches every ball that a smaller one inside it touches."""
         return True
-
-    def excludes(self, volume: float, hull_volume: float) -> bool:
-        """False: volumes say nothing about balls."""
-        return False
-
-    def feasibility(self, filling: _native.Filling, hull: Hull) -> Feasibility:
-        """`NEVER`: only the hull counts, whatever fills it, and the glued union of the pair has been tried already."""
-        return Feasibility.NEVER
-
-    def feasibilities(
-        self, filling: _native.Filling, hulls: Sequence[Hull], pairs: IntArray, threads: int
-    ) -> tuple[FloatArray, IntArray]:
-        """`NEVER` for all pairs; the volumes are not needed."""
-        return np.zeros(len(pairs)), np.full(len(pairs), int(Feasibility.NEVER), dtype=np.int32)
-
-    def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
-        """False, meaning unknown: balls are tested against parts, not hulls."""
-        return False
-
-    def least_error(self, volume: float, hull_volume: float) -> float:
-        """0: volumes say nothing about balls."""
-        return 0.0
 
     @property
     def overhang(self) -> float:
@@ -280,10 +259,6 @@ class Navigable:
             "intrusion": {"per_part": errors and list(errors), "max": errors and max(errors)},
         }
         return CriterionSummary({"navigable": entries}, tuple(sentences))
-
-    def filled(self, part: Part) -> float:
-        """Total volume of the hulls of the pieces: what their hulls fill already is free."""
-        return part.piece_hulls
 
     def is_met(self, part: Part) -> bool:
         """Whether the hull reaches no deeper than the allowance into balls larger than that, or the part is small.

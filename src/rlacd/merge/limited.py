@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rlacd import _native
 from rlacd.criteria import Criterion
-from rlacd.criteria.criterion import CriterionSummary, Feasibility
-from rlacd.criteria.criterion import Part as PartLike
+from rlacd.criteria.criterion import CriterionSummary
+from rlacd.criteria.screen import Part as PartLike
+from rlacd.criteria.screen import Screen
 from rlacd.merge.in_input import plain_hull
 from rlacd.merge.limits import limit_hull
-from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.balls import Balls
 from rlacd.solid.component import Part
-from rlacd.solid.hull import Hull
 
 FEWEST_VERTICES, FEWEST_FACES = 24, 44
 """Lower limits are applied only at the end, with a warning if a hull then exceeds the threshold: to meet them, round
@@ -37,36 +35,14 @@ class LimitedCriterion:
     max_faces: int | None
 
     @property
-    def reach(self) -> float:
-        """That of the underlying criterion."""
-        return self.criterion.reach
-
-    @property
     def is_hereditary(self) -> bool:
         """No: limited hulls need not be nested even if the exact ones are."""
         return False
 
-    def excludes(self, volume: float, hull_volume: float) -> bool:
-        """Limiting a hull only adds volume, so the underlying bound holds."""
-        return self.criterion.excludes(volume, hull_volume)
-
-    def feasibility(self, filling: _native.Filling, hull: Hull) -> Feasibility:
-        """The underlying criterion's: limited hulls are larger."""
-        return self.criterion.feasibility(filling, hull)
-
-    def feasibilities(
-        self, filling: _native.Filling, hulls: Sequence[Hull], pairs: IntArray, threads: int
-    ) -> tuple[FloatArray, IntArray]:
-        """The underlying criterion's: limited hulls are larger."""
-        return self.criterion.feasibilities(filling, hulls, pairs, threads)
-
-    def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
-        """The underlying criterion's: limited hulls are larger."""
-        return self.criterion.forbids(filling, hull)
-
-    def least_error(self, volume: float, hull_volume: float) -> float:
-        """Limiting a hull only adds volume, so the underlying bound holds."""
-        return self.criterion.least_error(volume, hull_volume)
+    @property
+    def screen(self) -> Screen:
+        """That of the underlying criterion: limiting a hull only makes it larger."""
+        return self.criterion.screen
 
     def is_met(self, part: PartLike) -> bool:
         """Decide for the exact hull first, then for the limited one."""
@@ -75,10 +51,6 @@ class LimitedCriterion:
     def error(self, part: PartLike) -> float:
         """Measure the part against its limited hull."""
         return self.criterion.error(self._limited(part))
-
-    def filled(self, part: PartLike) -> float:
-        """That of the underlying criterion."""
-        return self.criterion.filled(part)
 
     def settled(self, parts: Sequence[PartLike]) -> LimitedCriterion:
         """Settle the underlying criterion with the limited hulls."""

@@ -12,7 +12,8 @@ import numpy as np
 from rlacd import _native, work
 from rlacd._native import Stopped
 from rlacd.clock import Clock
-from rlacd.criteria.criterion import Criterion, Feasibility
+from rlacd.criteria.criterion import Criterion
+from rlacd.criteria.screen import Feasibility
 from rlacd.merge.boxes import Boxes
 from rlacd.solid.arrays import IntArray
 from rlacd.solid.component import LOST, ClippedPart, Component, Part
@@ -171,14 +172,14 @@ class _Adjoining:
         self, alive: Mapping[int, Part], boxes: Boxes, new: Sequence[int]
     ) -> tuple[list[_Pair], list[tuple[int, int]]]:
         """Pairs that the volume bound allows."""
-        filled = self.criterion.filled
-        pairs = boxes.pairs(new, self.criterion.reach)
+        screen = self.criterion.screen
+        pairs = boxes.pairs(new, screen.reach)
         if not self.clock.work.pay(_sum_over(alive, pairs, work.joining)):
             return [], []
         found = [
-            _Pair(hull_volume - (filled(alive[first]) + filled(alive[second])), first, second)
+            _Pair(hull_volume - (screen.filled(alive[first]) + screen.filled(alive[second])), first, second)
             for first, second, volume, hull_volume in joint_volumes(alive, pairs, self.workers)
-            if not self.criterion.excludes(volume, hull_volume)
+            if not screen.excludes(volume, hull_volume)
         ]
         return found, []
 
@@ -205,8 +206,8 @@ class _Bridged:
         self, alive: Mapping[int, Part], boxes: Boxes, new: Sequence[int]
     ) -> tuple[list[_Pair], list[tuple[int, int]]]:
         """Pairs that may be feasible: how much of the joint hull the solid fills is not known yet."""
-        filled = self.criterion.filled
-        reach = np.inf if len(boxes.ids) <= FEW else self.criterion.reach
+        screen = self.criterion.screen
+        reach = np.inf if len(boxes.ids) <= FEW else screen.reach
         pairs = boxes.pairs(new, reach, across=True)
         found: list[_Pair] = []
         never: list[tuple[int, int]] = []
@@ -215,14 +216,13 @@ class _Bridged:
                 break
             used, places = _places(some)
             hulls = [alive[i].hull for i in used]
-            volumes, feasibilities = self.criterion.feasibilities(
-                self.solid.filling, hulls, places, self.workers.threads
-            )
+            volumes, feasibilities = screen.feasibilities(self.solid.filling, hulls, places, self.workers.threads)
             for (first, second), volume, feasibility in zip(
                 some.tolist(), volumes.tolist(), feasibilities.tolist(), strict=True
             ):
                 if feasibility == Feasibility.MAYBE:
-                    found.append(_Pair(volume - (filled(alive[first]) + filled(alive[second])), first, second))
+                    free = screen.filled(alive[first]) + screen.filled(alive[second])
+                    found.append(_Pair(volume - free, first, second))
                 elif feasibility == Feasibility.NEVER:
                     never.append((first, second))
         return found, never
@@ -236,34 +236,49 @@ class _Bridged:
         return _clipped(first, second, Hull.around(first.hull, second.hull), self.criterion, self.solid), False
 
 
-def unite(
-    first: Part,
-    second: Part,
-    criterion: Criterion,
-    solid: Component,
-    hull: Hull | None = None,
-    account: Work | None = None,
-) -> Part | None:
-    """Unite two parts of a solid, glued or across what lies between them; None if neither meets the criterion.
+@dataclass(frozen=True)
+class Uniter:
+    """Unites parts of a solid, two at a time, glued or across what lies between them.
 
-    `hull` is their joint hull, if already known. Also None if the account has too little work left.
+    Attributes
+    ----------
+    criterion : Criterion
+        Every union meets it.
+    solid : Component
+        The solid that was decomposed.
+    account : Work
+        Pays for the work; when too little is left, nothing is united any more.
     """
-    hull = hull or Hull.around(first.hull, second.hull)
-    account = account or Work()
-    if not account.pay(work.holding(len(hull.vertices))):
-        return None
-    feasibility = criterion.feasibility(solid.filling, hull)
-    if feasibility is Feasibility.NO:
-        return None
-    if is_alone(first) and is_alone(second):  # otherwise they may overlap
-        if not account.pay(price_of_gluing(first, second)):
+
+    criterion: Criterion
+    solid: Component
+    account: Work
+
+    def unite(self, first: Part, second: Part, hull: Hull | None = None) -> Part | None:
+        """Unite two parts; None if no union meets the criterion. `hull` is their joint hull, if already known."""
+        hull = hull or Hull.around(first.hull, second.hull)
+        if not self.account.pay(work.holding(len(hull.vertices))):
             return None
-        union = Part.glued(first, second, hull)
-        if not criterion.excludes(union.volume, hull.volume) and criterion.is_met(union):
-            return union
-    if feasibility is not Feasibility.MAYBE or not account.pay(price_of_share(first, second, solid)):
-        return None
-    return _clipped(first, second, hull, criterion, solid)
+        screen = self.criterion.screen
+        feasibility = screen.feasibility(self.solid.filling, hull)
+        if feasibility is Feasibility.NO:
+            return None
+        if is_alone(first) and is_alone(second):  # otherwise they may overlap
+            if not self.account.pay(price_of_gluing(first, second)):
+                return None
+            union = Part.glued(first, second, hull)
+            if not screen.excludes(union.volume, hull.volume) and self.criterion.is_met(union):
+                return union
+        if feasibility is not Feasibility.MAYBE or not self.account.pay(price_of_share(first, second, self.solid)):
+            return None
+        return _clipped(first, second, hull, self.criterion, self.solid)
+
+    def forbids(self, hull: Hull) -> bool:
+        """Whether no part with this hull, or with any hull that contains it, can meet the criterion; False if unknown.
+
+        Cheaper than `unite`; the caller pays.
+        """
+        return self.criterion.screen.forbids(self.solid.filling, hull)
 
 
 def price_of_gluing(first: Part, second: Part) -> float:
@@ -285,7 +300,7 @@ def is_alone(part: Part) -> bool:
 
 def _clipped(first: Part, second: Part, hull: Hull, criterion: Criterion, solid: Component) -> ClippedPart | None:
     share = ClippedPart(solid, first, second, hull)
-    fits = share.is_whole and not criterion.excludes(share.volume, hull.volume)
+    fits = share.is_whole and not criterion.screen.excludes(share.volume, hull.volume)
     return share if fits and criterion.is_met(share) else None
 
 
@@ -355,7 +370,7 @@ def merge_to_count(
     alive: dict[int, Part] = dict(enumerate(parts))
     origin = {i: i for i in alive}
     newest = len(parts)
-    reach = criterion.reach
+    reach = criterion.screen.reach
     try:
         queue = _bounded_pairs(alive, list(alive), reach, criterion, workers)
         while len(alive) > count and clock.step(len(parts) - len(alive), len(parts) - count, len(alive)):
@@ -391,8 +406,9 @@ class _BoundedPair:
 def _bounded_pairs(
     alive: dict[int, Part], new: Sequence[int], reach: float, criterion: Criterion, workers: Workers
 ) -> list[_BoundedPair]:
+    screen = criterion.screen
     queue = [
-        _BoundedPair(criterion.least_error(volume, hull_volume), first, second, False)
+        _BoundedPair(screen.least_error(volume, hull_volume), first, second, False)
         for first, second, volume, hull_volume in neighbours(alive, new, reach, workers)
     ]
     heapq.heapify(queue)

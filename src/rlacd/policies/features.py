@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd import _native
+from rlacd.criteria.concavity import VOLUME_WEIGHT
 from rlacd.planes.candidates import Candidates, axis_and_principal
 from rlacd.planes.concave_edges import concave_edge_planes
 from rlacd.planes.sweep import SLIVER, Sweep
+from rlacd.policies.greedy import EXPONENT
 from rlacd.solid.arrays import BoolArray, FloatArray
 from rlacd.solid.component import Component
 
@@ -49,7 +51,6 @@ COMPONENT_FEATURES = 10
 Features = NDArray[np.float32]
 
 _TINY = 1e-30
-_P = 1.3  # exponent of the greedy score among the inputs
 
 
 def candidates_of(component: Component, per_axis: int) -> Candidates:
@@ -127,7 +128,7 @@ def features(
     component = np.stack(
         [
             np.log(length / scale),
-            np.log(0.3 * np.cbrt(0.75 / np.pi * excess) / scale + 0.01),
+            np.log(VOLUME_WEIGHT * np.cbrt(0.75 / np.pi * excess) / scale + 0.01),
             solid / hull,
             np.log(area / length**2),
             np.log(hull_area / length**2),
@@ -158,7 +159,7 @@ def _greedy_costs(table: FloatArray, hull: FloatArray) -> tuple[FloatArray, Floa
     """Logarithms of three greedy scores: p-norm of the excesses, sum of the hull volumes, larger excess."""
     hb, ha, sb, sa = np.moveaxis(table[..., :4], -1, 0)
     below, above = np.maximum(hb - sb, 0), np.maximum(ha - sa, 0)
-    norm = np.log(below**_P + above**_P + (1e-6 * hull) ** _P) / _P
+    norm = np.log(below**EXPONENT + above**EXPONENT + (1e-6 * hull) ** EXPONENT) / EXPONENT
     return norm, np.log(hb + ha + _TINY), np.log(np.maximum(below, above) + 1e-6 * hull)
 
 
@@ -177,8 +178,8 @@ def _of_planes(table: FloatArray, of_component: Sequence[FloatArray]) -> FloatAr
             2 * np.clip(sa / hull, 0, 1),
             np.sqrt(below / hull),
             np.sqrt(above / hull),
-            _squash(0.3 * np.cbrt(0.75 / np.pi * below) / unit),
-            _squash(0.3 * np.cbrt(0.75 / np.pi * above) / unit),
+            _squash(VOLUME_WEIGHT * np.cbrt(0.75 / np.pi * below) / unit),
+            _squash(VOLUME_WEIGHT * np.cbrt(0.75 / np.pi * above) / unit),
             _squash(tb / unit / 4),
             _squash(ta / unit / 4),
             eb / extent,

@@ -20,7 +20,7 @@ from rlacd.io.read.open_file import read_file
 from rlacd.planes.sweep import Sweep
 from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies.features import CONCAVE_EDGES, DIRECTIONS, VERSION, features, measures, planes_per_axis, tables
-from rlacd.policies.greedy import cheapest, excess_norm
+from rlacd.policies.greedy import EXPONENT, cheapest, excess_norm
 from rlacd.policies.network_file import open_network
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
@@ -112,7 +112,7 @@ def ranked_cost(
     best of 150 predictions tends to be an optimistic error.
     """
     blend = ranker.about.blend if blend is None else blend
-    greedy = (excess_norm(swept) / component.hull.volume**1.3 + NOTHING) ** (1 / 1.3)
+    greedy = (excess_norm(swept) / component.hull.volume**EXPONENT + NOTHING) ** (1 / EXPONENT)
     log_parts = ranker.log_parts(component, swept, scale)
     log_parts[DIRECTIONS * planes_per_axis(swept) :] -= ranker.about.edge_bonus
     parts = np.exp(np.round(log_parts, DECIMALS))

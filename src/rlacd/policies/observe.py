@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd import _native
-from rlacd.criteria.concavity import volume_radius
+from rlacd.criteria.concavity import VOLUME_WEIGHT, volume_radius
 from rlacd.planes.candidates import Candidates, axis_and_principal
 from rlacd.planes.sweep import SLIVER
 from rlacd.solid.arrays import BoolArray
@@ -65,7 +65,7 @@ def observe(component: Component, candidates: Candidates, threshold: float, coun
             _native.sample_surface(hull.vertices, hull.faces, count, seed)[0],
         ]
     )
-    relative = 0.3 * volume_radius(component.volume, hull.volume) / threshold
+    relative = VOLUME_WEIGHT * volume_radius(component.volume, hull.volume) / threshold
     scale = np.array([np.log2(radius), relative, component.volume / hull.volume], dtype=np.float32)
     return Observation(
         ((points - (lower + upper) / 2) / radius).astype(np.float32),

@@ -5,28 +5,19 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from rlacd.clock import Clock
-from rlacd.criteria.criterion import Criterion
 from rlacd.cut import CutCache, CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.merge import drop_slivers
-from rlacd.planes.sweep_cache import SweepCache
-from rlacd.policies.greedy import SCORES
 from rlacd.search.budget import SearchBudget
+from rlacd.search.context import Ranking, SearchContext
 from rlacd.search.neighbourhood import Neighbourhood, SearchOutcome, cost
-from rlacd.search.rankings import Ranking, by_score
 from rlacd.search.tighten import tighten
-from rlacd.solid.component import Component, Part
+from rlacd.solid.component import Part
 from rlacd.work import Work
-from rlacd.workers import Workers
-
-PORTFOLIO = ("excess-norm", "hull-sum", "max-excess")
-"""Scores for further passes over the whole solid, best first."""
-
-assert set(PORTFOLIO) <= set(SCORES)
 
 SHARE = 2 / 5
 """Passes over the whole solid are made while one takes at most this share of the seconds left."""
@@ -52,12 +43,6 @@ ROUNDS = 3
 FURTHER = 1000
 """Added to the seed when the search continues after its opening."""
 
-PLANES_PER_AXIS = 12
-"""Neighbourhoods are small: half the planes give results as good in half the time."""
-
-CONCAVE_EDGES = 2
-"""Zero, two and four make little difference: 0.82, 0.81 and 0.81 of the parts after 4 s (nine meshes, one seed)."""
-
 
 @dataclass(frozen=True)
 class Level:
@@ -65,6 +50,7 @@ class Level:
 
     Attributes
     ----------
+    name : str
     steps : int or None
         Maximum number of steps of the neighbourhood search.
     seconds : float or None
@@ -74,15 +60,16 @@ class Level:
         completed even if it takes longer than `seconds`.
     """
 
+    name: str
     steps: int | None
     seconds: float | None
     bounded: bool = False
 
 
 LEVELS = {
-    "fast": Level(0, None),
-    "balanced": Level(None, None, bounded=True),
-    "best": Level(None, 5.0, bounded=True),
+    "fast": Level("fast", 0, None),
+    "balanced": Level("balanced", None, None, bounded=True),
+    "best": Level("best", None, 5.0, bounded=True),
 }
 """The levels when neither steps nor seconds are given. Each visits all states of the level below, so it is never
 worse."""
@@ -92,7 +79,7 @@ def level(quality: str, seconds: float | None, steps: int | None) -> Level:
     """Get the level called `quality`; for levels that search, given limits replace all of its own."""
     if quality == "fast" or (seconds is None and steps is None):
         return LEVELS[quality]
-    return Level(steps, seconds)
+    return Level(quality, steps, seconds)
 
 
 @dataclass
@@ -135,45 +122,28 @@ class SearchSummary:
 
 
 def search(
-    root: Component,
+    context: SearchContext,
     parts: Sequence[Part],
-    criterion: Criterion,
-    name: str,
-    bounds: Level,
-    sweeps: SweepCache,
-    workers: Workers,
+    level: Level,
     clock: Clock,
-    seed: int,
+    *,
     most_parts: int | None = None,
-    rankings: Sequence[Ranking] | None = None,
     first: str = "",
 ) -> tuple[list[Part], SearchSummary]:
     """Search for fewer parts, or for equally many with a smaller total hull volume.
 
     Parameters
     ----------
-    root : Component
-        The solid.
+    context : SearchContext
     parts : sequence of Part
         A decomposition of the solid.
-    criterion : Criterion
-        Every new part meets it.
-    name : str
-        Name of the level, for the summary.
-    bounds : Level
+    level : Level
         Limits of the search.
-    sweeps : SweepCache
-        Sweeps of the solid's components, including those of the first pass.
-    workers : Workers
     clock : Clock
         Its work so far is taken as the work of the first pass.
-    seed : int
     most_parts : int, optional
         Limit on the number of parts. If there are no more parts than this and some do not meet the criterion, search
         for parts that come closer to meeting it instead.
-    rankings : sequence of Ranking, optional
-        Used to cut neighbourhoods and, if time allows, for further passes over the whole solid; the scores of
-        `PORTFOLIO` by default.
     first : str
         The policy of the first pass, which is not repeated.
 
@@ -185,40 +155,36 @@ def search(
     summary : SearchSummary
     """
     start = time.perf_counter()
-    steps = math.inf if bounds.steps is None else bounds.steps
-    rankings = rankings or [by_score(score) for score in PORTFOLIO]
-    near_sweeps = SweepCache(PLANES_PER_AXIS, CONCAVE_EDGES)
+    steps = math.inf if level.steps is None else level.steps
     # Slivers would be dropped at the end anyway; if they counted here, a level could end with more hulls than the one
     # below it.
-    best = parts = drop_slivers(parts, workers)
-    at_a_limit = most_parts is not None and not all(workers.map(criterion.is_met, best))
+    parts = drop_slivers(parts, context.workers)
+    at_a_limit = most_parts is not None and not all(context.workers.map(context.criterion.is_met, parts))
     first_pass = clock.work.done
-    bounded = bounds.bounded and not (at_a_limit and bounds.seconds is not None)
+    bounded = level.bounded and not (at_a_limit and level.seconds is not None)
     allowed = min(TIMES_FIRST_PASS * first_pass, MOST_WORK) if bounded else math.inf
-    budget = SearchBudget(clock, bounds.seconds, len(parts), patient=bounded, work=Work(allowed))
+    budget = SearchBudget(clock, level.seconds, len(parts), patient=bounded, work=Work(allowed))
     if most_parts is not None and at_a_limit:
-        if len(best) <= most_parts:
-            outcome = tighten(
-                root, best, criterion, most_parts, rankings, sweeps, near_sweeps, workers, budget, steps, seed
-            )
+        if len(parts) <= most_parts:
+            outcome = tighten(context, parts, most_parts, budget, steps)
         else:  # merging could not reach the limit
-            outcome = SearchOutcome(best, 0, 0, True)
+            outcome = SearchOutcome(parts, 0, 0, True)
         from_portfolio = len(parts)
     else:
-        others = rankings[1:] if first == "greedy" else rankings  # greedy has already used the first score
-        opening = others if not bounded else others[:1] if len(best) <= FEW else []
+        # greedy has already used the first score
+        others = context.rankings[1:] if first == "greedy" else context.rankings
+        opening = others if not bounded else others[:1] if len(parts) <= FEW else []
         a_pass = _seconds_of_a_pass(clock)
-        starts = _portfolio(root, best, criterion, opening, sweeps, workers, budget, a_pass, ANOTHER_PASS * first_pass)
+        starts = _portfolio(context, parts, opening, budget, a_pass, ANOTHER_PASS * first_pass)
         from_portfolio = len(starts[0])
-        outcome = _from_all(root, starts, criterion, rankings, near_sweeps, workers, budget, steps, seed)
-        if bounded and bounds.seconds is not None:
+        outcome = _from_all(context, starts, budget, steps)
+        if bounded and level.seconds is not None:
             budget.hurry()
-            starts = _portfolio(root, outcome.parts, criterion, others[len(opening) :], sweeps, workers, budget, a_pass)
-            outcome = outcome.then(
-                _from_all(root, starts, criterion, rankings, near_sweeps, workers, budget, steps, seed + FURTHER)
-            )
+            starts = _portfolio(context, outcome.parts, others[len(opening) :], budget, a_pass)
+            further = replace(context, seed=context.seed + FURTHER)
+            outcome = outcome.then(_from_all(further, starts, budget, steps))
     summary = SearchSummary(
-        level=name,
+        level=level.name,
         seconds=time.perf_counter() - start,
         first_pass=len(parts),
         portfolio=from_portfolio,
@@ -232,14 +198,12 @@ def search(
     return outcome.parts, summary
 
 
-def eliminate_parts(
-    root: Component, parts: Sequence[Part], criterion: Criterion, workers: Workers, clock: Clock, seed: int
-) -> list[Part]:
+def eliminate_parts(context: SearchContext, parts: Sequence[Part], clock: Clock) -> list[Part]:
     """Try once to eliminate each part by redistributing it to the parts around it; parts that cannot go stay.
 
     This is the only search inside a pass, and only used where it is quick: where hulls are tested against balls.
     """
-    state = Neighbourhood(root, parts, criterion, (), SweepCache(), workers, seed)
+    state = Neighbourhood(replace(context, rankings=()), parts)
     state.redistribute_all(SearchBudget(clock, None, len(parts)))
     return state.parts
 
@@ -249,12 +213,9 @@ def _seconds_of_a_pass(clock: Clock) -> float:
 
 
 def _portfolio(
-    root: Component,
+    context: SearchContext,
     parts: list[Part],
-    criterion: Criterion,
     rankings: Sequence[Ranking],
-    sweeps: SweepCache,
-    workers: Workers,
     budget: SearchBudget,
     seconds: float,
     work: float = math.inf,
@@ -268,9 +229,10 @@ def _portfolio(
     for ranking in rankings:
         if budget.is_over or len(parts) == 1 or seconds > SHARE * budget.left:
             break
-        tree = CutTree(root, ranking(sweeps), workers, cache)
+        tree = CutTree(context.root, ranking(context.sweeps), context.workers, cache)
+        most = HOPELESS * len(parts)
         with budget.allowance(work):
-            other = cut_and_merge(tree, criterion, workers, budget, most=HOPELESS * len(parts), strict=True)
+            other = cut_and_merge(tree, context.criterion, context.workers, budget, most=most, strict=True)
             if other.unmet or budget.is_over:
                 continue
         if all(cost(other.parts) != cost(known) for known in found):
@@ -280,22 +242,14 @@ def _portfolio(
 
 
 def _from_all(
-    root: Component,
-    starts: Sequence[list[Part]],
-    criterion: Criterion,
-    rankings: Sequence[Ranking],
-    sweeps: SweepCache,
-    workers: Workers,
-    budget: SearchBudget,
-    steps: float,
-    seed: int,
+    context: SearchContext, starts: Sequence[list[Part]], budget: SearchBudget, steps: float
 ) -> SearchOutcome:
     """Search from the best start, then from the next whenever a search is exhausted, for `ROUNDS` rounds."""
     best = starts[0]
     total = accepted = 0
     exhausted = False
     for number in range(ROUNDS * len(starts)):
-        state = Neighbourhood(root, starts[number % len(starts)], criterion, rankings, sweeps, workers, seed + number)
+        state = Neighbourhood(replace(context, seed=context.seed + number), starts[number % len(starts)])
         outcome = state.run(budget, steps - total)
         total += outcome.steps
         accepted += outcome.accepted

@@ -26,17 +26,14 @@ import numpy as np
 
 from rlacd._native import Stopped
 from rlacd.clock import Clock
-from rlacd.criteria.criterion import Criterion
-from rlacd.planes.sweep_cache import SweepCache
 from rlacd.search.budget import SearchBudget
+from rlacd.search.context import SearchContext
 from rlacd.search.operators import BATCH, Operator, OperatorSampler, Trial, giving_away
 from rlacd.search.part_graph import PartGraph
-from rlacd.search.rankings import Ranking
 from rlacd.search.recut import Exchange, recut
 from rlacd.search.redistribute import redistribute
 from rlacd.search.transfer import transfer
-from rlacd.solid.component import Component, Part
-from rlacd.workers import Workers
+from rlacd.solid.component import Part
 
 DRY = 4
 """The search ends after this many batches in a row with nothing new to try."""
@@ -93,40 +90,20 @@ class Neighbourhood:
 
     Parameters
     ----------
-    root : Component
-        The solid.
+    context : SearchContext
     parts : sequence of Part
         Made of components with disjoint interiors.
-    criterion : Criterion
-        Every new part meets it.
-    rankings : sequence of Ranking
-        Rankings of planes for recuts; the more successful ones are used more often.
-    sweeps : SweepCache
-        Sweeps for the rankings.
-    workers : Workers
-    seed : int
     """
 
-    def __init__(
-        self,
-        root: Component,
-        parts: Sequence[Part],
-        criterion: Criterion,
-        rankings: Sequence[Ranking],
-        sweeps: SweepCache,
-        workers: Workers,
-        seed: int,
-    ) -> None:
-        self._root = root
-        self._criterion = criterion
-        self._policies = [ranking(sweeps) for ranking in rankings]
-        self._workers = workers
-        self._random = np.random.default_rng(seed)
-        self._graph = PartGraph(parts, criterion, workers)
-        self._operators = OperatorSampler(len(rankings))
+    def __init__(self, context: SearchContext, parts: Sequence[Part]) -> None:
+        self._context = context
+        self._policies = [ranking(context.near_sweeps) for ranking in context.rankings]
+        self._random = np.random.default_rng(context.seed)
+        self._graph = PartGraph(parts, context.criterion, context.workers)
+        self._operators = OperatorSampler(len(context.rankings))
         self._best = list(parts)
         self._steps = self._accepted = self._dry = self._vain = 0
-        self._near = min(criterion.reach, 2 * criterion.overhang)
+        self._near = min(context.criterion.screen.reach, 2 * context.criterion.overhang)
 
     @property
     def parts(self) -> list[Part]:
@@ -202,7 +179,7 @@ class Neighbourhood:
         if not trials:
             return
         clocks = [budget.trial(budget.work.share(len(trials))) for _ in trials]
-        found = self._workers.map(lambda pair: self._try(*pair), zip(trials, clocks, strict=True))
+        found = self._context.workers.map(lambda pair: self._try(*pair), zip(trials, clocks, strict=True))
         for trial, clock, exchange in zip(trials, clocks, found, strict=True):
             budget.work.pay(clock.work.done)
             taken = exchange is not None and self._graph.apply(exchange)
@@ -217,14 +194,15 @@ class Neighbourhood:
             budget.work.close()
 
     def _try(self, trial: Trial, clock: Clock) -> Exchange | None:
+        criterion, root = self._context.criterion, self._context.root
         parts = self._graph.parts
         cluster = [parts[i] for i in trial.cluster]
         if trial.policy is not None:
             around = [parts[i] for i in self._graph.around(trial.cluster)]
-            return recut(cluster, around, self._policies[trial.policy], self._criterion, clock, self._root)
+            return recut(cluster, around, self._policies[trial.policy], criterion, clock, root)
         give = redistribute if trial.move is Operator.REDISTRIBUTE else transfer
         around = [parts[i] for i in trial.around]
-        return give(cluster[0], around, self._criterion, np.random.default_rng(trial.seed), self._root, clock)
+        return give(cluster[0], around, criterion, np.random.default_rng(trial.seed), root, clock)
 
 
 def cost(parts: Sequence[Part]) -> tuple[int, float]:

@@ -39,7 +39,7 @@ class PartGraph:
 
     def __init__(self, parts: Sequence[Part], criterion: Criterion, workers: Workers) -> None:
         self.parts: dict[int, Part] = {}
-        self._criterion = criterion
+        self._screen = criterion.screen
         self._workers = workers
         self._gaps: dict[int, dict[int, float]] = {}
         self._next = 0
@@ -58,7 +58,7 @@ class PartGraph:
         self._next += len(new)
         self.parts.update(zip(ids, new, strict=True))
         self._gaps.update((i, {}) for i in ids)
-        filled = {i: self._criterion.filled(part) for i, part in self.parts.items()}
+        filled = {i: self._screen.filled(part) for i, part in self.parts.items()}
         near = neighbours(self.parts, ids, TOUCHING, self._workers)
         self._work += sum(
             work.joining(len(self.parts[i].hull.vertices) + len(self.parts[j].hull.vertices))

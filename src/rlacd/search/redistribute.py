@@ -1,7 +1,7 @@
 """The redistribute operator: a part is divided until the parts around have taken all of it, or some piece cannot go.
 
 Hulls may overlap, so a taker need not end where the part began: it takes a piece if the solid clipped to their joint
-hull meets the criterion (`rlacd.merge.merge.unite`). A piece that no part can take is halved, and the halves are
+hull meets the criterion (`rlacd.merge.merge.Uniter`). A piece that no part can take is halved, and the halves are
 offered again.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 from rlacd import work
 from rlacd.clock import Clock
 from rlacd.criteria.criterion import Criterion
-from rlacd.merge.merge import unite
+from rlacd.merge.merge import Uniter
 from rlacd.search.recut import Exchange
 from rlacd.search.transfer import exchange_of
 from rlacd.solid.arrays import FloatArray
@@ -62,13 +62,14 @@ def redistribute(
         An exchange that saves one part; None if some piece cannot be taken.
     """
     clock = clock or Clock()
-    if not _may_be_taken(part, around, criterion, solid, clock.work):
+    uniter = Uniter(criterion, solid, clock.work)
+    if not _may_be_taken(part, around, uniter):
         return None
     now = list(around)
 
     def take(piece: Component, halvings: int) -> bool:
-        for i, hull in _by_growth(now, piece, criterion.reach, clock.work):
-            union = unite(now[i], piece, criterion, solid, hull, clock.work)
+        for i, hull in _by_growth(now, piece, criterion.screen.reach, clock.work):
+            union = uniter.unite(now[i], piece, hull)
             if union is not None:
                 now[i] = union
                 return True
@@ -82,15 +83,17 @@ def redistribute(
     return exchange_of(part, around, now, criterion)
 
 
-def _may_be_taken(part: Part, around: Sequence[Part], criterion: Criterion, solid: Component, account: Work) -> bool:
+def _may_be_taken(part: Part, around: Sequence[Part], uniter: Uniter) -> bool:
     """Whether some other part could take each of the part's extreme vertices by itself: a quick necessary test."""
     corners = part.hull.vertices
     directions = np.concatenate([np.eye(3), -np.eye(3)])
     outermost = sorted(set(np.argmax(corners @ directions.T, axis=0).tolist()))
     return all(
         any(
-            account.pay(work.joining(len(around[i].hull.vertices)) + work.holding(len(around[i].hull.vertices)) / 2)
-            and not criterion.forbids(solid.filling, _with_point(around[i].hull, corners[k]))
+            uniter.account.pay(
+                work.joining(len(around[i].hull.vertices)) + work.holding(len(around[i].hull.vertices)) / 2
+            )
+            and not uniter.forbids(_with_point(around[i].hull, corners[k]))
             for i in np.argsort([_gap(other.box, corners[k]) for other in around], kind="stable").tolist()
         )
         for k in outermost

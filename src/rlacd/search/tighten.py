@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from rlacd.criteria.criterion import Criterion
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
-from rlacd.planes.sweep_cache import SweepCache
 from rlacd.search.budget import SearchBudget
+from rlacd.search.context import SearchContext
 from rlacd.search.neighbourhood import Neighbourhood, SearchOutcome
-from rlacd.search.rankings import Ranking
-from rlacd.solid.component import Component, Part
+from rlacd.solid.component import Part
 from rlacd.workers import Workers
 
 ROUNDS = 6
@@ -23,17 +23,7 @@ CLOSE = 1.02
 
 
 def tighten(
-    root: Component,
-    parts: Sequence[Part],
-    criterion: Criterion,
-    most_parts: int,
-    rankings: Sequence[Ranking],
-    sweeps: SweepCache,
-    near_sweeps: SweepCache,
-    workers: Workers,
-    budget: SearchBudget,
-    steps: float,
-    seed: int,
+    context: SearchContext, parts: Sequence[Part], most_parts: int, budget: SearchBudget, steps: float
 ) -> SearchOutcome:
     """Search for at most `most_parts` parts that meet a finer threshold than the given parts do.
 
@@ -42,12 +32,10 @@ def tighten(
 
     Parameters
     ----------
+    context : SearchContext
+        With the requested criterion.
     parts : sequence of Part
         At most `most_parts`.
-    criterion : Criterion
-        The requested criterion.
-    sweeps, near_sweeps : SweepCache
-        Sweeps of the solid's components, and of components in neighbourhoods.
     steps : float
         Maximum number of trials; every factor gets an equal share of them, and of the time.
 
@@ -56,7 +44,8 @@ def tighten(
     SearchOutcome
         Its parts exceed the threshold by no larger a factor than the given ones.
     """
-    tree = CutTree(root, rankings[0](sweeps), workers)
+    criterion, workers = context.criterion, context.workers
+    tree = CutTree(context.root, context.rankings[0](context.sweeps), workers)
     best = list(parts)
     total = accepted = 0
     least, reached = 1.0, _factor(best, criterion, workers)
@@ -70,7 +59,7 @@ def tighten(
             if fine.unmet or budget.is_over:
                 least = factor
                 continue
-            found = Neighbourhood(root, fine.parts, finer, rankings, near_sweeps, workers, seed).run(
+            found = Neighbourhood(replace(context, criterion=finer), fine.parts).run(
                 budget, math.floor((steps - total) / left) if math.isfinite(steps) else steps, most_parts
             )
         total += found.steps

@@ -15,13 +15,12 @@ import numpy as np
 from rlacd import work
 from rlacd.clock import Clock
 from rlacd.criteria.criterion import Criterion
-from rlacd.merge.merge import unite
+from rlacd.merge.merge import Uniter
 from rlacd.search.recut import Exchange
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part, Plane
 from rlacd.solid.hull import Hull
 from rlacd.solid.reunite import reunite
-from rlacd.work import Work
 
 TRIES = 16
 """Number of (taker, direction) pairs to draw: together they take about as long as a recut."""
@@ -75,6 +74,7 @@ def transfer(
         Equally many parts of less even sizes, or one fewer; None if no piece can be given.
     """
     clock = clock or Clock()
+    uniter = Uniter(criterion, solid, clock.work)
     now = list(around)
     takers = [i for i, other in enumerate(around) if other.hull.volume > SMALLER * part.hull.volume]
     rest = part
@@ -82,11 +82,11 @@ def transfer(
         if not clock.step(tried, TRIES, len(now) + 1):
             break
         i = takers[random.integers(len(takers))]
-        bite = _largest_bite(rest, now[i], _direction(rest, now[i], random), criterion, solid, clock.work)
+        bite = _largest_bite(rest, now[i], _direction(rest, now[i], random), uniter)
         if bite is None:
             continue
         now[i], left = bite
-        if left is None or _take_whole(left, now, criterion, solid, clock.work):
+        if left is None or _take_whole(left, now, uniter):
             return exchange_of(part, around, now, criterion)
         rest = left
     return None if rest is part else exchange_of(part, around, [*now, rest], criterion)
@@ -108,9 +108,7 @@ def _direction(part: Part, taker: Part, random: np.random.Generator) -> FloatArr
     return -axis if axis @ away < 0 else axis
 
 
-def _largest_bite(
-    part: Part, taker: Part, direction: FloatArray, criterion: Criterion, solid: Component, account: Work
-) -> tuple[Part, Part | None] | None:
+def _largest_bite(part: Part, taker: Part, direction: FloatArray, uniter: Uniter) -> tuple[Part, Part | None] | None:
     """Give the taker as much as it can have: the grown taker and the rest; None if that is at most `LEAST`."""
     corners = np.concatenate([member.hull.vertices for member in part.members])
     heights = corners @ direction
@@ -119,8 +117,8 @@ def _largest_bite(
     best = None
     for _ in range(1 + HALVINGS):
         bite = None
-        if not _is_too_much(corners[heights <= offset], taker, criterion, solid, account):
-            bite = _bite(part, taker, direction, offset, criterion, solid, account)
+        if not _is_too_much(corners[heights <= offset], taker, uniter):
+            bite = _bite(part, taker, direction, offset, uniter)
         if bite is not None:
             lower, best = offset, bite
         elif best is None:
@@ -134,54 +132,48 @@ def _largest_bite(
 
 
 def _bite(
-    part: Part,
-    taker: Part,
-    direction: FloatArray,
-    offset: float,
-    criterion: Criterion,
-    solid: Component,
-    account: Work,
+    part: Part, taker: Part, direction: FloatArray, offset: float, uniter: Uniter
 ) -> tuple[Part, Part | None, float] | None:
     """The taker with what lies below a plane, the rest, and the volume given; None if one fails the criterion."""
-    if not account.pay(sum(work.cutting(member.size) for member in part.members)):
+    if not uniter.account.pay(sum(work.cutting(member.size) for member in part.members)):
         return None
     below, above = _divided(part.members, direction, offset)
     if not below:
         return taker, part, 0.0
-    grown = unite(taker, _glued(below), criterion, solid, account=account)
-    left = _whole(above, criterion, solid, account) if grown is not None and above else None
+    grown = uniter.unite(taker, _glued(below))
+    left = _whole(above, uniter) if grown is not None and above else None
     if grown is None or (above and left is None):
         return None
     return grown, left, sum(piece.volume for piece in below)
 
 
-def _is_too_much(corners: FloatArray, taker: Part, criterion: Criterion, solid: Component, account: Work) -> bool:
+def _is_too_much(corners: FloatArray, taker: Part, uniter: Uniter) -> bool:
     """Whether the taker cannot even have the given corners [N, 3] of the piece: decided without cutting."""
     count = len(corners) + len(taker.hull.vertices)
-    if not account.pay(work.joining(count) + work.holding(count) / 2):
+    if not uniter.account.pay(work.joining(count) + work.holding(count) / 2):
         return True
     hull = Hull.of(np.concatenate([taker.hull.vertices, corners]))
-    return hull is not None and criterion.forbids(solid.filling, hull)
+    return hull is not None and uniter.forbids(hull)
 
 
-def _whole(pieces: Sequence[Component], criterion: Criterion, solid: Component, account: Work) -> Part | None:
+def _whole(pieces: Sequence[Component], uniter: Uniter) -> Part | None:
     """The pieces as one part; None if that fails the criterion."""
     if len(pieces) > 1:
-        return unite(_glued(pieces[:-1]), pieces[-1], criterion, solid, account=account)
-    if not account.pay(work.judging(pieces[0].size, len(pieces[0].hull.faces))):
+        return uniter.unite(_glued(pieces[:-1]), pieces[-1])
+    if not uniter.account.pay(work.judging(pieces[0].size, len(pieces[0].hull.faces))):
         return None
-    return pieces[0] if criterion.is_met(pieces[0]) else None
+    return pieces[0] if uniter.criterion.is_met(pieces[0]) else None
 
 
-def _take_whole(rest: Part, takers: list[Part], criterion: Criterion, solid: Component, account: Work) -> bool:
+def _take_whole(rest: Part, takers: list[Part], uniter: Uniter) -> bool:
     """Give all of the rest to one of the takers; False if none can have it."""
     corners = len(rest.hull.vertices)
-    if not account.pay(sum(work.joining(len(taker.hull.vertices) + corners) for taker in takers)):
+    if not uniter.account.pay(sum(work.joining(len(taker.hull.vertices) + corners) for taker in takers)):
         return False
     joint = [Hull.around(taker.hull, rest.hull) for taker in takers]
     added = [hull.volume - taker.hull.volume for hull, taker in zip(joint, takers, strict=True)]
     for i in np.argsort(added, kind="stable")[:WHOLE].tolist():
-        union = unite(takers[i], rest, criterion, solid, joint[i], account)
+        union = uniter.unite(takers[i], rest, joint[i])
         if union is not None:
             takers[i] = union
             return True
