@@ -13,7 +13,7 @@ import pytest
 import trimesh
 
 import rlacd
-from rlacd.view.viewer import Viewer, open_viewer
+from rlacd.viewer.viewer import Viewer, open_viewer
 from tests.browser import Watched, change, open_browser, open_driver, open_page, pixels
 
 pytest.importorskip("PIL", reason="the extra view is not installed")

@@ -12,6 +12,7 @@ from scipy.optimize import linprog
 import rlacd
 from rlacd.errors import OptionError
 from rlacd.presets import PRESETS, find_preset
+from rlacd.report import engine_shortcomings
 from rlacd.solid.hull import Hull
 
 
@@ -81,11 +82,11 @@ def test_a_sheet_that_a_gpu_refuses_is_said() -> None:
 def test_every_broken_limit_is_counted() -> None:
     hulls = [Hull.of(np.asarray(trimesh.creation.icosphere(subdivisions=level).vertices)) for level in (1, 2, 3)]
     known = [hull for hull in hulls if hull is not None]
-    assert find_preset("physx-gpu").shortcomings(known) == [
+    assert engine_shortcomings(find_preset("physx-gpu"), known) == [
         "2 hulls have up to 642 vertices, more than 64, the limit for PhysX on a GPU.",
         "3 hulls have up to 1280 triangles, more than 62, the limit for PhysX on a GPU.",
     ]
-    assert find_preset("mujoco").shortcomings(known[:1]) == []
+    assert engine_shortcomings(find_preset("mujoco"), known[:1]) == []
 
 
 def test_an_unknown_preset_lists_the_known_ones() -> None:

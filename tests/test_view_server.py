@@ -29,9 +29,9 @@ from rlacd.cli.main import app
 from rlacd.criteria import NavigableSpace
 from rlacd.errors import MeshFileError, OptionError
 from rlacd.options import Options
-from rlacd.view.downloads import offered
-from rlacd.view.viewer import Viewer, open_viewer, read_controls
-from rlacd.view.wishes import ViewerControls
+from rlacd.viewer.controls import ViewerControls
+from rlacd.viewer.downloads import offered
+from rlacd.viewer.viewer import Viewer, open_viewer, read_controls
 
 PATIENCE = 60.0
 NAME = "an elbow 'n ümläut"
@@ -501,8 +501,8 @@ def test_the_command_tells_its_address_and_ends_with_ctrl_c(mesh: Path) -> None:
 
 
 def test_the_controls_hold_the_defaults_of_the_command_line() -> None:
-    wishes, usual, space = ViewerControls(), Options(), NavigableSpace()
+    controls, usual, space = ViewerControls(), Options(), NavigableSpace()
     for name in ("criterion", "threshold", "quality", "max_hulls", "max_vertices"):
-        assert getattr(wishes, name) == getattr(usual, name)
-    assert (wishes.radius, wishes.tolerance) == (space.radius, space.tolerance)
-    assert read_controls({}) == wishes
+        assert getattr(controls, name) == getattr(usual, name)
+    assert (controls.radius, controls.tolerance) == (space.radius, space.tolerance)
+    assert read_controls({}) == controls

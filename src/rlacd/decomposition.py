@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, overload
 
 import trimesh
 
 from rlacd.errors import OutputError
 from rlacd.output_options import Axis
-from rlacd.solid.balls import Balls
+from rlacd.result import Result
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Decomposition:
+class Decomposition(Result):
     """A mesh as convex hulls.
 
     Iterating gives the hulls, ``len`` counts them, an index gets one. In a notebook it is shown in 3-D.
@@ -71,16 +69,6 @@ class Decomposition:
     balls : Balls or None
         With `NavigableSpace`, the balls that no hull touches, in the input's frame and unit.
     """
-
-    hulls: list[trimesh.Trimesh]
-    report: dict[str, Any]
-    source: trimesh.Trimesh
-    balls: Balls | None = None
-
-    @property
-    def name(self) -> str:
-        """What the input is called: ``report["name"]``."""
-        return str(self.report.get("name") or "mesh")
 
     def save(
         self,
@@ -258,28 +246,3 @@ class Decomposition:
 
         page = escape(report_page(self, picture=False))
         return f'<iframe srcdoc="{page}" style="width:100%;height:600px;border:0"></iframe>'
-
-    @overload
-    def __getitem__(self, index: int) -> trimesh.Trimesh: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[trimesh.Trimesh]: ...
-    def __getitem__(self, index: int | slice) -> trimesh.Trimesh | list[trimesh.Trimesh]:
-        return self.hulls[index]
-
-    def __len__(self) -> int:
-        return len(self.hulls)
-
-    def __iter__(self) -> Iterator[trimesh.Trimesh]:
-        return iter(self.hulls)
-
-    def __repr__(self) -> str:
-        faces = sum(len(hull.faces) for hull in self.hulls)
-        words = [f"{len(self)} hull{'s' * (len(self) != 1)} of {self.name}", f"{faces} faces"]
-        worst = self.report.get("concavity", {}).get("max")
-        if worst is not None:
-            words.append(f"max concavity {worst:.4f}")
-        if self.balls is not None:
-            words.append(f"{len(self.balls)} balls left free")
-        if not self.report.get("complete", True):
-            words.append(f"stopped by {self.report.get('stopped_by')}")
-        return f"<Decomposition: {', '.join(words)}>"

@@ -15,14 +15,10 @@ more.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from rlacd.fields import one_of, read
-
-if TYPE_CHECKING:
-    from rlacd.solid.hull import Hull
 
 PresetName = Literal["mujoco", "physx", "physx-gpu", "unity", "unreal", "newton", "bullet"]
 
@@ -52,29 +48,6 @@ class Preset:
     file_format: str | None = None
     slivers: bool = True
 
-    def shortcomings(self, hulls: Sequence[Hull]) -> list[str]:
-        """Check hulls against the limits: a sentence for each that is broken, none when all is well."""
-        from rlacd.merge.slivers import is_sliver  # not for --help, which only wants the names
-
-        said = []
-        for what, limit, counts in (
-            ("vertices", self.max_vertices, [len(hull.vertices) for hull in hulls]),
-            ("triangles", self.max_faces, [len(hull.faces) for hull in hulls]),
-        ):
-            over = [count for count in counts if limit is not None and count > limit]
-            if over:
-                said.append(
-                    f"{_hulls(len(over), 'has', 'have')} up to {max(over)} {what}, more than {limit}, the limit for "
-                    f"{self.engine}."
-                )
-        thin = 0 if self.slivers else sum(is_sliver(hull) for hull in hulls)
-        if thin:
-            said.append(
-                f"{_hulls(thin, 'is', 'are')} thinner than 1/100 of the largest extent, which {self.engine} refuses or "
-                "handles on the CPU: thicken the mesh there."
-            )
-        return said
-
 
 PRESETS: dict[str, Preset] = {
     "mujoco": Preset("MuJoCo", 64, None, ".xml"),
@@ -98,7 +71,3 @@ def find_preset(name: str) -> Preset:
     """
     known: str = read(one_of(tuple(PRESETS)), "preset", name)
     return PRESETS[known]
-
-
-def _hulls(count: int, one: str, many: str) -> str:
-    return f"1 hull {one}" if count == 1 else f"{count} hulls {many}"

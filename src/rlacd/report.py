@@ -13,8 +13,9 @@ import trimesh
 from rlacd._version import __version__
 from rlacd.clock import Clock
 from rlacd.criteria import Criterion
+from rlacd.merge.slivers import is_sliver
 from rlacd.options import Options
-from rlacd.presets import find_preset
+from rlacd.presets import Preset, find_preset
 from rlacd.solid.component import Part
 from rlacd.solid.distance import hull_distances
 from rlacd.solid.hull import Hull
@@ -154,7 +155,7 @@ def _cut_short(clock: Clock) -> list[str]:
 def _shortcomings(
     hulls: Sequence[Hull], over: float | None, under: float | None, options: Options, overhang: float
 ) -> list[str]:
-    sentences = [] if options.preset is None else find_preset(options.preset).shortcomings(hulls)
+    sentences = [] if options.preset is None else engine_shortcomings(find_preset(options.preset), hulls)
     if options.max_hulls is not None and len(hulls) > options.max_hulls:
         sentences.append(f"{len(hulls)} hulls are left, more than the {options.max_hulls} asked for.")
     if under is not None and under > HONEST_WITHIN:
@@ -168,3 +169,29 @@ def _shortcomings(
             "the repair closed what may be open in the input (see `repair`)."
         )
     return sentences
+
+
+def engine_shortcomings(engine: Preset, hulls: Sequence[Hull]) -> list[str]:
+    """One sentence for each limit of an engine that hulls exceed."""
+    sentences = []
+    for what, limit, counts in (
+        ("vertices", engine.max_vertices, [len(hull.vertices) for hull in hulls]),
+        ("triangles", engine.max_faces, [len(hull.faces) for hull in hulls]),
+    ):
+        over = [count for count in counts if limit is not None and count > limit]
+        if over:
+            sentences.append(
+                f"{_hulls(len(over), 'has', 'have')} up to {max(over)} {what}, more than {limit}, the limit for "
+                f"{engine.engine}."
+            )
+    thin = 0 if engine.slivers else sum(is_sliver(hull) for hull in hulls)
+    if thin:
+        sentences.append(
+            f"{_hulls(thin, 'is', 'are')} thinner than 1/100 of the largest extent, which {engine.engine} refuses or "
+            "handles on the CPU: thicken the mesh there."
+        )
+    return sentences
+
+
+def _hulls(count: int, one: str, many: str) -> str:
+    return f"1 hull {one}" if count == 1 else f"{count} hulls {many}"

@@ -149,13 +149,14 @@ def _vhacd(vertices: FloatArray, faces: IntArray, threads: int, **options: float
 
 def _rlacd(policy: str, quality: str, space: bool) -> Run:
     def run(vertices: FloatArray, faces: IntArray, number: float, threads: int) -> list[RawHull]:
-        import rlacd
+        from rlacd.criteria import NavigableSpace
+        from rlacd.decompose_mesh import decompose
 
         if space:
-            goal: dict[str, object] = {"criterion": rlacd.NavigableSpace(number / 4, number / 2)}  # shares of the side
+            goal: dict[str, object] = {"criterion": NavigableSpace(number / 4, number / 2)}  # shares of the side
         else:
             goal = {"threshold": number}
-        result = rlacd.decompose(
+        result = decompose(
             (vertices, faces),
             policy=policy,
             quality=quality,  # type: ignore[arg-type]

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from rlacd import __version__
+from rlacd._version import __version__
 from rlacd.cli.batch import BATCH_EPILOG, batch_command
 from rlacd.cli.bench import app as bench
 from rlacd.cli.decompose import decompose_command

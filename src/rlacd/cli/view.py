@@ -56,7 +56,7 @@ def view(
     with exit_codes():
         if mesh.suffix.lower() in ROBOTS:
             raise OptionError(f"{mesh} is a robot; view shows one mesh: give one of those that it names.")
-        from rlacd.view.viewer import open_viewer
+        from rlacd.viewer.viewer import open_viewer
 
         chosen = {"threshold": threshold, "criterion": criterion, "quality": quality, "max_hulls": max_hulls}
         given = {name: value for name, value in chosen.items() if value is not None}

@@ -16,7 +16,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
 from typing import Any
 
-from rlacd import __version__
+from rlacd._version import __version__
 from rlacd.errors import MissingExtraError, OptionError
 from rlacd.pool.request import Answer, MachineLostError, ProcessLimits, Request, Shared
 from rlacd.pool.worker import Worker

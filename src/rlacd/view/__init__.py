@@ -1,4 +1,4 @@
-"""Looking at a decomposition: pictures (extra ``view``), reports, and the viewer."""
+"""Looking at a decomposition: pictures (extra ``view``) and reports."""
 
 from rlacd.view.html_report import check_report_page, is_html, save_report_page
 from rlacd.view.picture import check_picture, check_up, draw_picture

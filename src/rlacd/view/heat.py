@@ -13,7 +13,7 @@ import numpy as np
 import trimesh
 
 from rlacd import _native
-from rlacd.decomposition import Decomposition
+from rlacd.result import Result
 from rlacd.solid.arrays import BoolArray, FloatArray, IntArray
 from rlacd.solid.frame import Frame
 
@@ -44,12 +44,12 @@ class HeatMesh:
     distance: FloatArray
 
 
-def heat_map(decomposition: Decomposition, *, triangles: int = 60_000, threads: int | None = None) -> list[HeatMesh]:
+def heat_map(decomposition: Result, *, triangles: int = 60_000, threads: int | None = None) -> list[HeatMesh]:
     """Measure the distance of the hulls' surface to the input's, point by point.
 
     Parameters
     ----------
-    decomposition : Decomposition
+    decomposition : Result
     triangles : int
         Approximate number of triangles for all hulls together; fewer if `FINEST` limits the subdivision.
     threads : int, optional
@@ -82,7 +82,7 @@ def heat_map(decomposition: Decomposition, *, triangles: int = 60_000, threads: 
     return result
 
 
-def frame_of(decomposition: Decomposition) -> Frame:
+def frame_of(decomposition: Result) -> Frame:
     """Return a frame in the scale of the report, centred on the bounding box of the input and the hulls."""
     corners = [np.asarray(hull.bounds, dtype=np.float64) for hull in decomposition]
     if len(decomposition.source.faces):

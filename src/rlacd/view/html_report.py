@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from rlacd._version import __version__
-from rlacd.decomposition import Decomposition
 from rlacd.errors import MissingExtraError, OutputError
 from rlacd.fields import about, path_like, read
 from rlacd.io.write import check_file, write_file
 from rlacd.output_options import OutputOptions
+from rlacd.result import Result
 from rlacd.view.heat import heat_map
 from rlacd.view.page import still_page
 from rlacd.view.picture import check_up, picture_bytes
@@ -48,7 +48,7 @@ def check_report_page(path: str | os.PathLike[str], up: str | None = None) -> Pa
 
 
 def save_report_page(
-    decomposition: Decomposition, path: str | os.PathLike[str], *, up: str = "z", picture: bool = True
+    decomposition: Result, path: str | os.PathLike[str], *, up: str = "z", picture: bool = True
 ) -> Path:
     """Write a report as one self-contained HTML file.
 
@@ -57,7 +57,7 @@ def save_report_page(
 
     Parameters
     ----------
-    decomposition : Decomposition
+    decomposition : Result
     path : path-like
         A ``.html`` file.
     up : {"x", "y", "z"}
@@ -81,7 +81,7 @@ def save_report_page(
     return place
 
 
-def report_page(decomposition: Decomposition, *, up: str = "z", picture: bool = True, unit: str = "") -> str:
+def report_page(decomposition: Result, *, up: str = "z", picture: bool = True, unit: str = "") -> str:
     """Build the text of the report; see `save_report_page`."""
     data: dict[str, Any] = {
         **scene(decomposition, up, unit=unit),
@@ -91,7 +91,7 @@ def report_page(decomposition: Decomposition, *, up: str = "z", picture: bool = 
     return still_page(f"{decomposition.name}: convex hulls", {"version": __version__}, data)
 
 
-def _picture(decomposition: Decomposition, up: str) -> dict[str, str]:
+def _picture(decomposition: Result, up: str) -> dict[str, str]:
     """The picture as a data URL, or a note that explains its absence."""
     try:
         png = picture_bytes(decomposition, width=PICTURE_WIDTH, up=up, clear=True)

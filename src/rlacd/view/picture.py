@@ -6,7 +6,7 @@ import io
 import math
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,12 +17,10 @@ from rlacd.fields import about, checked, integer, path_like, read
 from rlacd.io.write import check_file, write_file
 from rlacd.io.write.palette import linear_from_srgb
 from rlacd.output_options import OutputOptions
+from rlacd.result import Result
 from rlacd.solid.balls import Balls
 from rlacd.view.coloring import color_hulls
 from rlacd.view.render import Body, Spheres, render, require_extra
-
-if TYPE_CHECKING:
-    from rlacd.decomposition import Decomposition
 
 INPUT_COLOR = np.array([0.46, 0.47, 0.50])  # linear reflectance
 BALL_COLOR = np.array([0.10, 0.30, 0.75])
@@ -63,7 +61,7 @@ def check_up(up: str | None) -> None:
 
 
 def draw_picture(
-    decomposition: Decomposition,
+    decomposition: Result,
     path: str | os.PathLike[str],
     *,
     width: int = 1600,
@@ -74,7 +72,7 @@ def draw_picture(
 
     Parameters
     ----------
-    decomposition : Decomposition
+    decomposition : Result
         What to draw.
     path : path-like
         A ``.png`` file.
@@ -105,7 +103,7 @@ def draw_picture(
 
 
 def picture_bytes(
-    decomposition: Decomposition, *, width: int = 1600, samples: int = 16, up: str = "z", clear: bool = False
+    decomposition: Result, *, width: int = 1600, samples: int = 16, up: str = "z", clear: bool = False
 ) -> bytes:
     """Draw the picture as the bytes of a PNG file; see `draw_picture`.
 
@@ -152,7 +150,7 @@ def picture_bytes(
     return encoded.getvalue()
 
 
-def caption(decomposition: Decomposition) -> str:
+def caption(decomposition: Result) -> str:
     """One line of numbers: hulls, faces, concavity, seconds; omits what the report lacks."""
     report = decomposition.report
     count = len(decomposition)
@@ -186,7 +184,7 @@ def apart(balls: Balls) -> Balls:
     return Balls(balls.centres[shown], balls.radii[shown])
 
 
-def _hull_bodies(decomposition: Decomposition, up: str, *, pull: float) -> list[Body]:
+def _hull_bodies(decomposition: Result, up: str, *, pull: float) -> list[Body]:
     corners = np.concatenate([hull.bounds for hull in decomposition])
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
     colors = linear_from_srgb(color_hulls(decomposition.hulls).rgb)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rlacd.decomposition import Decomposition
+from rlacd.result import Result
 from rlacd.solid.frame import Frame
 from rlacd.view.coloring import color_hulls
 from rlacd.view.heat import HeatMesh, frame_of
@@ -21,12 +21,12 @@ SHOWN_BALLS = 4000
 """Maximum number of balls drawn."""
 
 
-def scene(decomposition: Decomposition, up: str = "z", *, unit: str = "") -> dict[str, Any]:
+def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, Any]:
     """Describe a decomposition for the page.
 
     Parameters
     ----------
-    decomposition : Decomposition
+    decomposition : Result
     up : {"x", "y", "z"}
         The axis of the input that points up.
     unit : str

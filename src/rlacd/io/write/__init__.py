@@ -6,7 +6,6 @@ import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import trimesh
 
@@ -23,9 +22,7 @@ from rlacd.io.write.target import FORMATS, MODELS, WITH_MESHES, Target, check_fi
 from rlacd.io.write.urdf import encode_urdf
 from rlacd.io.write.usd import encode_usd
 from rlacd.output_options import DENSITY
-
-if TYPE_CHECKING:
-    from rlacd.decomposition import Decomposition
+from rlacd.result import Result
 
 __all__ = [
     "DENSITY",
@@ -50,7 +47,7 @@ _ONE_FILE = {"usd": encode_usd, "unreal": encode_unreal, "godot": encode_godot}
 
 
 def save(
-    result: Decomposition,
+    result: Result,
     path: str | os.PathLike[str],
     *,
     file_format: str | None = None,

@@ -6,7 +6,6 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import trimesh
@@ -16,12 +15,10 @@ from rlacd.fields import about, read
 from rlacd.io.write.encode import encode_obj, encode_plain_obj, hull_name
 from rlacd.io.write.single_precision import placed_hull, placed_mesh
 from rlacd.output_options import DENSITY, OutputOptions
+from rlacd.result import Result
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import Frame
 from rlacd.solid.mass import Mass, mass_of_triangles
-
-if TYPE_CHECKING:
-    from rlacd.decomposition import Decomposition
 
 TO_Z_UP = {
     "x": (math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0),
@@ -75,7 +72,7 @@ class MeshFile:
     shift: FloatArray
 
 
-def model_of(result: Decomposition, *, density: float = DENSITY, up: str = "z") -> Model:
+def model_of(result: Result, *, density: float = DENSITY, up: str = "z") -> Model:
     """Collect everything to be written of a decomposition.
 
     Raises
@@ -158,7 +155,7 @@ def _one_file(model: Model, name: str, far: bool) -> MeshFile:
     return MeshFile(name, encode_obj(moved), shift)
 
 
-def _mass(result: Decomposition) -> Mass:
+def _mass(result: Result) -> Mass:
     said = result.report.get("mass")
     if said is None:  # a result from elsewhere: its hulls stand for the solid
         hulls = trimesh.util.concatenate(result.hulls)

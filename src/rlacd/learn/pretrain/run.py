@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from rlacd import __version__
+from rlacd._version import __version__
 from rlacd.errors import OptionError, TrainingError
 from rlacd.fields import require_same
 from rlacd.learn.checkpoint import Checkpoint, adam_state, load_checkpoint, restore_adam, save_checkpoint

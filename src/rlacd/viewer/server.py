@@ -13,7 +13,7 @@
 
 It listens on the loopback address alone. Pages of other sites are kept out: a request's Host header must name this
 server, which defeats DNS rebinding, and the request must not come from a page of another origin. Resources are bounded:
-connections and their time in `rlacd.view.connections`, one input of at most `LARGEST_MESH` bytes, one decomposition
+connections and their time in `rlacd.viewer.connections`, one input of at most `LARGEST_MESH` bytes, one decomposition
 with its scene and heat map, and `HEAVY` costly answers at a time.
 """
 
@@ -40,15 +40,15 @@ from rlacd.io.read.load import FORMATS as READ
 from rlacd.io.write import MODELS
 from rlacd.plain_json import to_json
 from rlacd.presets import PRESETS
-from rlacd.view.command import as_command
-from rlacd.view.connections import ANSWER_SECONDS, FOREVER, FULL, REQUEST_SECONDS, BoundedHandler, BoundedServer
-from rlacd.view.downloads import download, offered
 from rlacd.view.heat import heat_map
 from rlacd.view.page import live_page, module
 from rlacd.view.picture import check_up
 from rlacd.view.scene import heat_scene, input_scene, scene
-from rlacd.view.session import Session, SessionState
-from rlacd.view.wishes import Subject, ViewerControls
+from rlacd.viewer.command import as_command
+from rlacd.viewer.connections import ANSWER_SECONDS, FOREVER, FULL, REQUEST_SECONDS, BoundedHandler, BoundedServer
+from rlacd.viewer.controls import Subject, ViewerControls
+from rlacd.viewer.downloads import download, offered
+from rlacd.viewer.session import Session, SessionState
 
 ADDRESS = "127.0.0.1"
 USUAL_PORT = 8765
@@ -131,15 +131,15 @@ class ViewServer(BoundedServer):
         """Folder of an uploaded mesh; None if there is none."""
         return None if self._folder is None else Path(self._folder.name)
 
-    def decompose(self, wishes: ViewerControls, *, other_input: bool = False) -> None:
+    def decompose(self, controls: ViewerControls, *, other_input: bool = False) -> None:
         """Decompose the subject next: first a draft, then with the requested options."""
         mesh = {"mesh": self.subject.path}
-        draft = wishes.draft()
+        draft = controls.draft()
         self.session.decompose(
-            {**mesh, **wishes.options()}, None if draft is None else {**mesh, **draft}, other_input=other_input
+            {**mesh, **controls.options()}, None if draft is None else {**mesh, **draft}, other_input=other_input
         )
 
-    def open_mesh(self, name: str, content: bytes, wishes: ViewerControls) -> None:
+    def open_mesh(self, name: str, content: bytes, controls: ViewerControls) -> None:
         """Replace the subject by an uploaded file.
 
         Raises
@@ -156,7 +156,7 @@ class ViewServer(BoundedServer):
             except BaseException:
                 folder.cleanup()
                 raise
-            self.decompose(wishes, other_input=True)
+            self.decompose(controls, other_input=True)
             if self._folder is not None:
                 self._folder.cleanup()
             self._folder = folder
@@ -255,16 +255,16 @@ class _Handler(BoundedHandler):
     def _open(self, query: dict[str, list[str]]) -> None:
         if self.headers.get_content_type() != "application/octet-stream":
             raise _Refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "a mesh is sent as application/octet-stream.")
-        wishes = self.server.accept(_object(query.get("options", ["{}"])[0]))
-        wishes.options()
+        controls = self.server.accept(_object(query.get("options", ["{}"])[0]))
+        controls.options()
         with self.server.heavy:
             content = self._read(LARGEST_MESH, ANSWER_SECONDS)
-            self.server.open_mesh(query.get("name", [""])[0], content, wishes)
+            self.server.open_mesh(query.get("name", [""])[0], content, controls)
 
     def _command(self, given: dict[str, Any]) -> str:
-        wishes = self.server.accept(given)
-        wishes.options()
-        return as_command(self.server.subject.path, asdict(wishes), ViewerControls())
+        controls = self.server.accept(given)
+        controls.options()
+        return as_command(self.server.subject.path, asdict(controls), ViewerControls())
 
     @contextlib.contextmanager
     def _answered(self) -> Iterator[None]:

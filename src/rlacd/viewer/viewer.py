@@ -18,9 +18,9 @@ from rlacd.errors import OptionError
 from rlacd.io.read.load import load_mesh
 from rlacd.options import Options
 from rlacd.view.picture import check_up
-from rlacd.view.server import ViewServer
-from rlacd.view.session import AT_EXIT, Session
-from rlacd.view.wishes import Subject, ViewerControls
+from rlacd.viewer.controls import Subject, ViewerControls
+from rlacd.viewer.server import ViewServer
+from rlacd.viewer.session import AT_EXIT, Session
 
 LEAVING = 0.8  # seconds for current work to end when the viewer is closed
 
@@ -63,19 +63,19 @@ def open_viewer(
         An option is out of range, or the port is in use.
     """
     check_up(up)
-    wishes = read_controls(options or {})
-    wishes.options()
+    controls = read_controls(options or {})
+    controls.options()
     Options(threads=threads)
     subject = read_subject(mesh, up)
     session = Session(functools.partial(decompose, threads=threads))
     try:
-        server = ViewServer(session, subject, port=port, options=wishes, accept=read_controls, read=read_subject)
+        server = ViewServer(session, subject, port=port, options=controls, accept=read_controls, read=read_subject)
     except BaseException:
         session.close()
         raise
     thread = threading.Thread(target=server.serve_forever, args=(0.1,), name="rlacd-view-server", daemon=True)
     thread.start()
-    server.decompose(wishes)
+    server.decompose(controls)
     try:
         yield Viewer(session, server, thread)
     finally:

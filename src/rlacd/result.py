@@ -1,0 +1,51 @@
+"""The hulls of a mesh and their report, as plain data: what is written to files and drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, overload
+
+import trimesh
+
+from rlacd.solid.balls import Balls
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Result:
+    """A mesh as convex hulls; `rlacd.Decomposition` documents the attributes and adds saving and showing."""
+
+    hulls: list[trimesh.Trimesh]
+    report: dict[str, Any]
+    source: trimesh.Trimesh
+    balls: Balls | None = None
+
+    @property
+    def name(self) -> str:
+        """What the input is called: ``report["name"]``."""
+        return str(self.report.get("name") or "mesh")
+
+    @overload
+    def __getitem__(self, index: int) -> trimesh.Trimesh: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[trimesh.Trimesh]: ...
+    def __getitem__(self, index: int | slice) -> trimesh.Trimesh | list[trimesh.Trimesh]:
+        return self.hulls[index]
+
+    def __len__(self) -> int:
+        return len(self.hulls)
+
+    def __iter__(self) -> Iterator[trimesh.Trimesh]:
+        return iter(self.hulls)
+
+    def __repr__(self) -> str:
+        faces = sum(len(hull.faces) for hull in self.hulls)
+        words = [f"{len(self)} hull{'s' * (len(self) != 1)} of {self.name}", f"{faces} faces"]
+        worst = self.report.get("concavity", {}).get("max")
+        if worst is not None:
+            words.append(f"max concavity {worst:.4f}")
+        if self.balls is not None:
+            words.append(f"{len(self.balls)} balls left free")
+        if not self.report.get("complete", True):
+            words.append(f"stopped by {self.report.get('stopped_by')}")
+        return f"<{type(self).__name__}: {', '.join(words)}>"

@@ -1,0 +1,122 @@
+"""The rooms of the package, read from the table of docs/design.md, and the imports between them, read from the code.
+
+``python -m tests.rooms`` prints both: lines per room, and the rooms each one imports.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+DESIGN = ROOT / "docs" / "design.md"
+HEAD = "| room | contents | imports |"
+ANY = "any above"
+NATIVE, SHARED = "native", "shared"
+
+
+@dataclass(frozen=True)
+class Room:
+    """A row of the table: its name, the files and folders it consists of, and the rooms it imports."""
+
+    name: str
+    files: tuple[str, ...]
+    imports: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Import:
+    """An import statement, at the top of a module, inside a function, or for type checkers only."""
+
+    module: str
+    imported: str
+    line: int
+
+
+def table() -> list[Room]:
+    """The rows of the table, from the ground up."""
+    lines = DESIGN.read_text(encoding="utf-8").splitlines()
+    begin = lines.index(HEAD) + 2
+    end = next(i for i in range(begin, len(lines)) if not lines[i].startswith("|"))
+    return [_room(*(cell.strip() for cell in line.strip("| ").split(" | "))) for line in lines[begin:end]]
+
+
+def _room(title: str, _: str, imports: str) -> Room:
+    files = tuple(title.split("`")[1::2])
+    name = title.split(":")[0] if ":" in title else files[0].removesuffix("/").removesuffix(".py")
+    return Room(name, files, () if imports == "–" else tuple(imports.split(", ")))
+
+
+def modules(package: Path) -> dict[str, Path]:
+    """Every module of a package by its dotted name; packages by that of their folder."""
+    found = {}
+    for path in sorted(package.rglob("*.py")):
+        parts = path.relative_to(package.parent).with_suffix("").parts
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+def imports(package: Path) -> Iterator[Import]:
+    """All imports of one module of the package by another."""
+    known = modules(package)
+    for module, path in known.items():
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names: list[str] = []
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.module is not None and node.level == 0:
+                names = [f"{node.module}.{alias.name}" for alias in node.names]
+            for name in names:
+                if name.split(".")[0] == package.name:
+                    yield Import(module, _module_of(name, known), getattr(node, "lineno", 0))
+
+
+def _module_of(name: str, known: dict[str, Path]) -> str:
+    """The module that a dotted name refers to: a module, or an attribute of one."""
+    if name in known or name.endswith("._native"):
+        return name
+    return name.rpartition(".")[0]
+
+
+def room_of(path: Path, rooms: list[Room]) -> str | None:
+    """The room of a file, by its path in the package: that with the most specific file or folder."""
+    name = path.as_posix()
+    homes = [
+        (len(file), room.name)
+        for room in rooms
+        for file in room.files
+        if name == file or (file.endswith("/") and name.startswith(file))
+    ]
+    return max(homes)[1] if homes else None
+
+
+def homes(package: Path, rooms: list[Room]) -> dict[str, str | None]:
+    """The room of every module of the package."""
+    found = {module: room_of(path.relative_to(package), rooms) for module, path in modules(package).items()}
+    return {**found, f"{package.name}._native": NATIVE}
+
+
+def imported_rooms(package: Path, rooms: list[Room]) -> dict[str, dict[str, list[Import]]]:
+    """For each room, the other rooms it imports, with the statements that do it."""
+    home = homes(package, rooms)
+    found: dict[str, dict[str, list[Import]]] = defaultdict(lambda: defaultdict(list))
+    for each in imports(package):
+        here, there = home[each.module], home[each.imported]
+        if here is not None and there is not None and here != there:
+            found[here][there].append(each)
+    return found
+
+
+if __name__ == "__main__":
+    package = ROOT / "src" / "rlacd"
+    rows = table()
+    arrows = imported_rooms(package, rows)
+    lengths: dict[str | None, int] = defaultdict(int)
+    for module, path in modules(package).items():
+        lengths[homes(package, rows)[module]] += len(path.read_text(encoding="utf-8").splitlines())
+    for row in rows:
+        there = [other.name for other in rows if other.name in set(arrows[row.name]) - {NATIVE, SHARED}]
+        print(f"{row.name:16} {lengths[row.name]:6} lines; imports {', '.join(there) or '–'}")
