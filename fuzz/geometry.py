@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from typing import TypeAlias
 
 import numpy as np
@@ -133,20 +132,20 @@ def why_not_convex(vertices: Floats, faces: Ints) -> str | None:
 
 
 def _why_not_convex_exactly(vertices: Floats, faces: Ints) -> str | None:
-    points = [tuple(map(Fraction, vertex)) for vertex in vertices.tolist()]
-    for face in faces.tolist():
-        a, b, c = (points[corner] for corner in face)
-        u, v = _minus(b, a), _minus(c, a)
-        normal = (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
-        if not any(normal):
-            return "a face has no area"
-        heights = [sum(n * x for n, x in zip(normal, _minus(p, a), strict=True)) for p in points]
-        if max(heights) > 0:
-            return "a vertex lies above a face"
-        if min(heights) == 0:
-            return "it is flat"
-    return None
+    points = _as_integers(vertices)
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    u, v = b - a, c - a
+    normals = np.stack([u[:, i - 2] * v[:, i - 1] - u[:, i - 1] * v[:, i - 2] for i in range(3)], axis=1)
+    heights = normals @ points.T - (normals * a).sum(axis=1)[:, None]
+    if (normals == 0).all(axis=1).any():
+        return "a face has no area"
+    if (heights > 0).any():
+        return "a vertex lies above a face"
+    return "it is flat" if (heights == 0).all(axis=1).any() else None
 
 
-def _minus(p: tuple[Fraction, ...], q: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
-    return tuple(x - y for x, y in zip(p, q, strict=True))
+def _as_integers(points: Floats) -> npt.NDArray[np.object_]:
+    """Points as Python integers, multiplied by the least power of two that makes them so."""
+    ratios = [x.as_integer_ratio() for x in points.ravel().tolist()]
+    scale = max((below for _, below in ratios), default=1)
+    return np.array([above * (scale // below) for above, below in ratios], dtype=object).reshape(points.shape)

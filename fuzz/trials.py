@@ -32,7 +32,7 @@ from rlacd import NavigableSpace
 from rlacd.batch import JobSpec
 from rlacd.pool import ProcessLimits
 
-KINDS = {"file": 0.86, "shape": 0.115, "mesh": 0.012, "fault": 0.011, "batch": 0.002}
+KINDS = {"file": 0.93, "shape": 0.06, "mesh": 0.004, "fault": 0.005, "batch": 0.001}
 """Relative frequency of each kind of trial."""
 
 WELL = ("done", "loaded", "refused")

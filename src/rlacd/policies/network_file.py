@@ -33,4 +33,5 @@ def open_network(content: bytes, optimized: bool = True) -> onnxruntime.Inferenc
     settings.add_session_config_entry("session.model_external_initializers_file_folder_path", os.devnull)
     if not optimized:
         settings.graph_optimization_level = onnxruntime.GraphOptimizationLevel.ORT_DISABLE_ALL
-    return onnxruntime.InferenceSession(content, settings, providers=["CPUExecutionProvider"])
+    # Without the option a damaged file is opened twice, and the reason printed.
+    return onnxruntime.InferenceSession(content, settings, providers=["CPUExecutionProvider"], enable_fallback=0)
