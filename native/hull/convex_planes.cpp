@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "base/stop.hpp"
 #include "hull/wide.hpp"
 
 namespace rlacd {
@@ -59,8 +60,11 @@ ConvexPlanes::ConvexPlanes(const Mesh& hull) {
   std::vector<bool> is_corner(hull.vertices.size(), false);
   for (const Triangle& face : hull.faces)
     for (const std::int32_t corner : face) is_corner[corner] = true;
-  for (std::size_t v = 0; v < hull.vertices.size(); ++v)
-    if (is_corner[v]) push_out(h_.data(), x_.data(), y_.data(), z_.data(), padded, hull.vertices[v]);
+  for (std::size_t v = 0; v < hull.vertices.size(); ++v) {
+    if (!is_corner[v]) continue;
+    poll_stop();
+    push_out(h_.data(), x_.data(), y_.data(), z_.data(), padded, hull.vertices[v]);
+  }
   std::fill(h_.begin() + static_cast<std::ptrdiff_t>(count_), h_.end(), std::numeric_limits<double>::infinity());
 }
 

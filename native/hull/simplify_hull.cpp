@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "base/mesh_measures.hpp"
+#include "base/stop.hpp"
 #include "distance/bvh.hpp"
 #include "hull/convex_collapse.hpp"
 #include "hull/convex_planes.hpp"
@@ -159,6 +160,7 @@ double missing_scale(const Mesh& outer, const Mesh& inner) {
   };
   double scale = 1;
   for (const Triangle& face : outer.faces) {
+    poll_stop();
     const Vec3 a = outer.vertices[face[0]];
     const Vec3 normal = normalized(cross(outer.vertices[face[1]] - a, outer.vertices[face[2]] - a));
     const double own = reach(outer, normal);

@@ -55,6 +55,7 @@ class Clock:
         self._stage = ""
         self._done = self._parts = 0
         self._total: int | None = None
+        self._stopped_at = math.inf
         self._nothing_left_to_stop = False
         self._end = math.inf  # deadline for writing up, set once there is nothing left to stop
 
@@ -143,7 +144,7 @@ class Clock:
         self._nothing_left_to_stop = True
         self._end = math.inf if self._timeout is None else self._timeout * (1 + GRACE_SHARE) + GRACE
         if self.stopped_by == "cancel":
-            self._end = min(self._end, self.elapsed + GRACE)
+            self._end = min(self._end, self._stopped_at + GRACE)
         self.stop.arm(max(self._end - self.elapsed, LEAST_GRACE))
 
     def if_in_time(self, work: Callable[[], _T], otherwise: Callable[[], _T]) -> _T:
@@ -160,7 +161,7 @@ class Clock:
             self.stop.arm(GRACE)
 
     def _stop_by(self, reason: StoppedBy) -> None:
-        self.stopped_by, self.stopped_in = reason, self._stage
+        self.stopped_by, self.stopped_in, self._stopped_at = reason, self._stage, self.elapsed
         self.stop.trip()
 
     def _look(self) -> None:

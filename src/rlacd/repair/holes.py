@@ -48,6 +48,7 @@ def close_cracks(vertices: FloatArray, faces: IntArray, tolerances: Sequence[flo
         if free == 0 or free > MOST_FREE_EDGES:
             break
         split, parent = split_at_free_vertices(vertices, weld_free_vertices(vertices, faces, tolerance), tolerance)
+        poll_stop()
         keep = nondegenerate(split)
         keep[keep] = first_of_doubled(split[keep], len(vertices))
         left = len(free_edges(split[keep], len(vertices)))
@@ -85,6 +86,7 @@ def split_at_free_vertices(vertices: FloatArray, faces: IntArray, tolerance: flo
     # One edge per face and round, so that the pieces of a face do not depend on each other.
     _, first = np.unique(halfedge // 3, return_index=True)
     halfedge = halfedge[first]
+    poll_stop()
     free = np.unique(edges.vertices[edges.valence == 1])
     none = faces, np.arange(len(faces))
     if len(halfedge) == 0:
@@ -103,6 +105,7 @@ def split_at_free_vertices(vertices: FloatArray, faces: IntArray, tolerance: flo
     count = np.array([len(x) for x in found])
     if count.sum() > 50_000_000 or count.sum() == 0:
         return none
+    poll_stop()
     edge = np.repeat(np.arange(len(halfedge)), count)
     vertex = free[np.concatenate([np.asarray(x, dtype=np.int64) for x in found])]
     offset = vertices[vertex] - vertices[a[edge]]
@@ -113,6 +116,7 @@ def split_at_free_vertices(vertices: FloatArray, faces: IntArray, tolerance: flo
     edge, vertex, along = edge[on], vertex[on], along[on]
     if len(edge) == 0:
         return none
+    poll_stop()
     order = np.lexsort((vertex, along, edge))
     edge, vertex = edge[order], vertex[order]
     split = np.unique(edge)

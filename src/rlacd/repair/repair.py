@@ -117,9 +117,12 @@ def repair(
     points = mesh.vertices[np.unique(mesh.faces)] if len(mesh.faces) else mesh.vertices
     if len(points) == 0:
         raise EmptyMeshError("the mesh has no points, so there is nothing to decompose: check the file or its export")
+    poll_stop()
     frame = Frame.of(points)
     points = frame.to_frame(points)
+    poll_stop()
     used, corner = np.unique(mesh.faces, return_inverse=True)
+    poll_stop()
     vertices, index = merge_equal_vertices(frame.to_frame(mesh.vertices[used]))
     faces = index[corner.reshape(-1, 3)]
     poll_stop()

@@ -55,6 +55,7 @@ class Rims:
 def rims_of(soup: Soup) -> Rims:
     """Find the flaps of a soup and the loops around its holes."""
     mate = _mates(soup)
+    poll_stop()
     label = _sides(soup, mate)
     one_sided = label[0::2] == label[1::2]
     if one_sided.any():
@@ -63,12 +64,15 @@ def rims_of(soup: Soup) -> Rims:
         wrong = (mate >= 0) & np.repeat(one_sided, 3) & (forward == forward[mate])
         mate[wrong] = -1
         label = _sides(soup, mate)
+    poll_stop()
     low = np.minimum(label[0::2], label[1::2])
     _, patch = np.unique(low, return_inverse=True)
     flap = _flaps(soup, patch)
     inverted = label[0::2] > low
+    poll_stop()
     a, b, c = (soup.vertices[soup.faces[:, i]] for i in range(3))
     weighted = np.cross(b - a, c - a)
+    poll_stop()
     weighted[inverted] *= -1
     inverted ^= _against_main(soup, patch, flap, weighted)
     weighted[flap] = 0

@@ -48,8 +48,10 @@ def skin(
 
     first, second = sides.wedges.T
     side_first, side_second = facing_sides(faces, sides.wedges)
+    poll_stop()
     used = keep[sides.label[side_first]]
     first, second, side_first, side_second = first[used], second[used], side_first[used], side_second[used]
+    poll_stop()
     rim = first == second
 
     def corners_at(halfedge: IntArray, side: IntArray) -> tuple[IntArray, IntArray]:
@@ -63,6 +65,7 @@ def skin(
 
     low_first, high_first = corners_at(first, side_first)
     low_second, high_second = corners_at(second, side_second)
+    poll_stop()
     inner = ~rim
     number, fan = components(
         len(slots),
@@ -73,12 +76,14 @@ def skin(
     face_of_side = kept // 2
     back = kept % 2 == 1
     corner_vertex = faces[face_of_side].ravel()
+    poll_stop()
     base = np.empty(number, dtype=np.int64)
     base[fan] = corner_vertex
     positions = vertices[base].copy()
     poll_stop()
     positions += half_thickness * _fan_offsets(vertices, faces[face_of_side], back, thin[face_of_side], fan, number)
 
+    poll_stop()
     triangles = fan.reshape(-1, 3).copy()
     triangles[back] = triangles[back][:, ::-1]
     label = sides.label[kept]
@@ -92,6 +97,7 @@ def skin(
     caps, cap_label, centers = _rim_caps(
         np.concatenate([low_b, high_a]), np.concatenate([low_a, high_b]), np.tile(rim_label, 2), number
     )
+    poll_stop()
     rim_faces = np.concatenate([*quads, caps])
     rim_faces_label = np.concatenate([rim_label, rim_label, cap_label])
     real = (
@@ -114,18 +120,24 @@ def _fan_offsets(
     normal = np.cross(b - a, c - a)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
     normal[back] *= -1
+    poll_stop()
     weight = np.empty((len(corners), 3))
     for i, (p, q, r) in enumerate(((a, b, c), (b, c, a), (c, a, b))):
+        poll_stop()
         along, across = q - p, r - p
         weight[:, i] = np.arctan2(np.linalg.norm(np.cross(along, across), axis=1), np.einsum("ij,ij->i", along, across))
+    poll_stop()
     corner_normal = np.repeat(normal, 3, axis=0)
     total = np.stack([np.bincount(fan, weight.ravel() * corner_normal[:, k], number) for k in range(3)], axis=1)
+    poll_stop()
     length = np.linalg.norm(total, axis=1, keepdims=True)
     mean = np.where(length > 1e-6, total / np.maximum(length, np.finfo(float).tiny), 0.0)
     # The miter: far enough along the mean normal to be at distance 1 from the steepest face that has a direction.
     cosine = np.where(weight.ravel() > 0, np.einsum("ij,ij->i", corner_normal, mean[fan]), 1.0)
+    poll_stop()
     steepest = np.ones(number)
     np.minimum.at(steepest, fan, cosine)
+    poll_stop()
     sees_sheet = np.bincount(fan, np.repeat(thin, 3), number) > 0
     speed = np.where(sees_sheet, 1 / np.maximum(steepest, 1 / _LONGEST_MITER), 0.0)
     offsets: FloatArray = mean * speed[:, None]

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from rlacd._native import poll_stop
 from rlacd.repair.distance import SurfaceQuery
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.topology import (
@@ -83,16 +84,19 @@ class Soup:
         halfedge = np.argsort(self.edges.of_halfedge, kind="stable")
         halfedge = halfedge[self.edges.valence[self.edges.of_halfedge[halfedge]] == 2].reshape(-1, 2)
         away = [across(self.vertices, self.faces, some) for some in halfedge.T]
+        poll_stop()
         halfedge = halfedge[np.einsum("ij,ij->i", *away) < _FOLD]
         count, patch = components(len(self.faces), halfedge[:, 0] // 3, halfedge[:, 1] // 3)
         # Layers of thousands of stacked faces take minutes to unite: there, thin spots are the lesser evil.
-        patches = np.unique(np.stack([self.body, patch], axis=1), axis=0)[:, 0]
+        poll_stop()
+        patches = np.unique(self.body * count + patch) // max(count, 1)
         tangled = (np.bincount(patches)[self.body] > _MOST_PATCHES) | (
             np.bincount(self.body)[self.body] > _MOST_PATCHED
         )
         patch = np.where(tangled, count + self.body, patch)
         count += int(self.body.max(initial=0)) + 1
         key = self.faces * count + patch[:, None]
+        poll_stop()
         distinct, corner = np.unique(key, return_inverse=True)
         return Soup(self.vertices[distinct // max(count, 1)], corner.reshape(-1, 3), self.body)
 
@@ -106,6 +110,7 @@ def across(vertices: FloatArray, faces: IntArray, halfedges: IntArray) -> FloatA
     """Return the unit direction ``[N, 3]`` in which each halfedge's face leads away from it."""
     face, corner = halfedges // 3, halfedges % 3
     a, b, c = (vertices[faces[face, (corner + i) % 3]] for i in range(3))
+    poll_stop()
     along = (b - a) / np.maximum(np.linalg.norm(b - a, axis=1, keepdims=True), np.finfo(float).tiny)
     away = c - a - np.einsum("ij,ij->i", c - a, along)[:, None] * along
     return np.asarray(away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), np.finfo(float).tiny))
@@ -114,6 +119,7 @@ def across(vertices: FloatArray, faces: IntArray, halfedges: IntArray) -> FloatA
 def on_repeated_edge(faces: IntArray, count: int) -> BoolArray:
     """Return ``[F]`` which faces have a directed edge that another face has too."""
     key = (faces * count + np.roll(faces, -1, axis=1)).ravel()
+    poll_stop()
     _, inverse, number = np.unique(key, return_inverse=True, return_counts=True)
     result: BoolArray = (number[inverse.reshape(-1, 3)] > 1).any(axis=1)
     return result

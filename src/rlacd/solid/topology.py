@@ -13,6 +13,7 @@ volume, those of enclosed rooms negative; a face with both sides in one componen
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +29,9 @@ BoolArray = NDArray[np.bool_]
 
 # Faces closer in angle than this (radians) coincide to the precision of float32 files.
 _SAME_ANGLE = 1e-4
+
+# Faces processed between two polls of the stop.
+_AT_ONCE = 1 << 16
 
 _NEXT = np.array([1, 2, 0])
 
@@ -46,6 +50,7 @@ def merge_equal_vertices(vertices: FloatArray) -> tuple[FloatArray, IntArray]:
     _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
     if not np.array_equal(vertices[first[inverse]], vertices):  # two different vertices with the same word
         _, first, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
+    poll_stop()
     order = np.argsort(first, kind="stable")
     rank = np.empty(len(order), dtype=np.int64)
     rank[order] = np.arange(len(order))
@@ -82,7 +87,12 @@ def components(count: int, a: IntArray, b: IntArray) -> tuple[int, IntArray]:
     Labels are numbered by the first node of each component.
     """
     links = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(count, count))
+    poll_stop()
     number, label = connected_components(links, directed=False)
+    poll_stop()
+    highest = np.maximum.accumulate(label)
+    if len(label) and label[0] == 0 and (np.diff(highest) <= 1).all():  # numbered by the first node already
+        return int(number), label.astype(np.int64)
     _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
     rank = np.empty(number, dtype=np.int64)
     rank[np.argsort(first, kind="stable")] = np.arange(number)
@@ -114,6 +124,7 @@ class Edges:
         start, end = faces.ravel(), faces[:, _NEXT].ravel()
         key = np.minimum(start, end) * count + np.maximum(start, end)
         distinct, inverse, valence = np.unique(key, return_inverse=True, return_counts=True)
+        poll_stop()
         ends = np.stack([distinct // max(count, 1), distinct % max(count, 1)], axis=1)
         return cls(inverse.reshape(-1).astype(np.int64), ends, valence.astype(np.int64))
 
@@ -121,6 +132,7 @@ class Edges:
 def bodies_of(faces: IntArray, edges: Edges) -> tuple[int, IntArray]:
     """Group faces that share edges: the number of bodies, and ``[F]`` the body of each face."""
     halfedge = np.argsort(edges.of_halfedge, kind="stable")
+    poll_stop()
     same = edges.of_halfedge[halfedge[1:]] == edges.of_halfedge[halfedge[:-1]]
     return components(len(faces), halfedge[1:][same] // 3, halfedge[:-1][same] // 3)
 
@@ -156,12 +168,14 @@ def _angles_around(vertices: FloatArray, faces: IntArray, ends: IntArray, halfed
     tail = vertices[ends[:, 0]]
     axis = vertices[ends[:, 1]] - tail
     axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), np.finfo(float).tiny)
+    poll_stop()
     apex = vertices[_apex(faces, halfedges)]
     across = apex - tail
     # Any direction not parallel to the axis can serve as zero, as long as all faces of the edge share it.
     helper = np.eye(3)[np.abs(axis).argmin(axis=1)]
     zero = np.cross(axis, helper)
     zero /= np.maximum(np.linalg.norm(zero, axis=1, keepdims=True), np.finfo(float).tiny)
+    poll_stop()
     quarter = np.cross(axis, zero)
     angle: FloatArray = np.arctan2((across * quarter).sum(axis=1), (across * zero).sum(axis=1))
     return angle
@@ -183,6 +197,7 @@ def wedges_of(vertices: FloatArray, faces: IntArray, edges: Edges, trusted: Bool
     if len(crowded):
         ends = edges.vertices[edges.of_halfedge[crowded]]
         angle[crowded] = _angles_around(vertices, faces, ends, crowded)
+        poll_stop()
         order = np.lexsort((angle, edges.of_halfedge))
         doubted = np.ones(len(edges.valence), dtype=bool)
         if trusted is not None:
@@ -192,6 +207,7 @@ def wedges_of(vertices: FloatArray, faces: IntArray, edges: Edges, trusted: Bool
     else:
         order = np.argsort(edges.of_halfedge, kind="stable")
     start = np.concatenate([[0], np.cumsum(edges.valence)])
+    poll_stop()
     follower = np.arange(1, len(order) + 1)
     follower[start[1:] - 1] = start[:-1]  # the last face around an edge is followed by the first
     return np.stack([order, order[follower]], axis=1)
@@ -205,6 +221,7 @@ def _order_ties(order: IntArray, angle: FloatArray, edges: Edges, forward: BoolA
     count as equal.
     """
     start = np.concatenate([[0], np.cumsum(edges.valence)])
+    poll_stop()
     sorted_angle = angle[order]
     gap = np.empty(len(order))
     gap[:-1] = np.diff(sorted_angle)
@@ -234,6 +251,7 @@ def _order_ties(order: IntArray, angle: FloatArray, edges: Edges, forward: BoolA
 def facing_sides(faces: IntArray, wedges: IntArray) -> tuple[IntArray, IntArray]:
     """Return the sides ``[W]`` that bound each wedge, on its first and on its second halfedge."""
     forward = (faces < faces[:, _NEXT]).ravel()
+    poll_stop()
     first, second = wedges.T
     # Seen along the edge, a face that runs with it shows its front to what follows counter-clockwise.
     return 2 * (first // 3) + ~forward[first], 2 * (second // 3) + forward[second]
@@ -241,16 +259,27 @@ def facing_sides(faces: IntArray, wedges: IntArray) -> tuple[IntArray, IntArray]
 
 def signed_tetrahedra(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return ``[F]`` the signed volume between the origin and each face."""
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    volume: FloatArray = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
+    volume = np.empty(len(faces))
+    for some in _pieces(len(faces)):
+        a, b, c = (vertices[faces[some, i]] for i in range(3))
+        volume[some] = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
     return volume
 
 
 def face_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return ``[F]`` the area of each face."""
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    area: FloatArray = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    area = np.empty(len(faces))
+    for some in _pieces(len(faces)):
+        a, b, c = (vertices[faces[some, i]] for i in range(3))
+        area[some] = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
     return area
+
+
+def _pieces(count: int) -> Iterator[slice]:
+    """The slices of an array that are worked on between two polls of the stop."""
+    for first in range(0, count, _AT_ONCE):
+        poll_stop()
+        yield slice(first, first + _AT_ONCE)
 
 
 def _sums(group: IntArray, values: FloatArray, number: int) -> FloatArray:

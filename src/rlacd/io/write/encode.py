@@ -14,6 +14,7 @@ import numpy as np
 import trimesh
 
 from rlacd.errors import OutputError
+from rlacd.io.write.glb import Placed, glb
 from rlacd.io.write.palette import hull_colors, linear_from_srgb
 from rlacd.io.write.single_precision import placed_hull, placed_mesh, rounded_hull
 
@@ -46,28 +47,17 @@ def encode_glb(
     OutputError
         A hull is too thin for its size for float32 even about its own centre.
     """
-    scene = trimesh.Scene()
-
-    def add(name: str, mesh: trimesh.Trimesh, shift: FloatArray, color: Color) -> None:
-        material = trimesh.visual.material.PBRMaterial(
-            name=name, baseColorFactor=_gltf_color(color), metallicFactor=0.0, roughnessFactor=0.8
-        )
-        mesh.visual = trimesh.visual.TextureVisuals(material=material)
-        placement = trimesh.transformations.translation_matrix(shift)
-        scene.add_geometry(mesh, node_name=name, geom_name=name, transform=placement)
-
-    if visual is not None:
-        add(visual[0], *placed_mesh(visual[1]), VISUAL_COLOR)
+    solids = [] if visual is None else [Placed(visual[0], *placed_mesh(visual[1]), linear_from_srgb(VISUAL_COLOR))]
     names = names or [hull_name(index) for index in range(len(hulls))]
-    for name, hull, color in zip(names, hulls, hull_colors(len(hulls)), strict=True):
+    for name, hull, color in zip(names, hulls, linear_from_srgb(hull_colors(len(hulls))), strict=True):
         placed = placed_hull(hull)
         if placed is None:
             raise OutputError(
                 f"cannot write {name} as GLB: it is too thin for single precision; "
                 "write .obj, .ply or .stl, which keep double precision."
             )
-        add(name, *placed, color)
-    return bytes(scene.export(file_type="glb"))
+        solids.append(Placed(name, *placed, color))
+    return glb(solids, GENERATOR)
 
 
 def encode_obj(
@@ -155,8 +145,3 @@ ENCODERS: dict[str, Callable[[Sequence[trimesh.Trimesh]], bytes]] = {
     "ply": encode_ply,
     "stl": encode_stl,
 }
-
-
-def _gltf_color(srgb: Color) -> list[float]:
-    # glTF expects base colours in linear light.
-    return [*linear_from_srgb(srgb).tolist(), 1.0]

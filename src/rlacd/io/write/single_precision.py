@@ -35,15 +35,17 @@ def rounded_hull(hull: trimesh.Trimesh, shift: npt.ArrayLike = (0.0, 0.0, 0.0)) 
         Vertices are float64 numbers that float32 holds exactly. None if float32 cannot hold the shape here.
     """
     with np.errstate(over="ignore"):
-        points = (hull.vertices - np.asarray(shift, dtype=np.float64)).astype(np.float32).astype(np.float64)
+        points = (np.asarray(hull.vertices) - np.asarray(shift)).astype(np.float32).astype(np.float64)
     if not np.isfinite(points).all():
         return None
     indices, faces, rank = convex_hull(np.ascontiguousarray(points))
     if rank < 3:
         return None
-    rounded = trimesh.Trimesh(points[indices], faces, process=False, validate=False)
-    before, after = (_volume(mesh) for mesh in (hull, rounded))
-    return rounded if abs(after - before) <= VOLUME_TOLERANCE * before else None
+    vertices = points[indices]
+    before, after = _volume(hull.vertices, hull.faces), _volume(vertices, faces)
+    if abs(after - before) > VOLUME_TOLERANCE * before:
+        return None
+    return trimesh.Trimesh(vertices, faces, process=False, validate=False)
 
 
 def placed_hull(hull: trimesh.Trimesh) -> tuple[trimesh.Trimesh, npt.NDArray[np.float64]] | None:
@@ -72,7 +74,7 @@ def placed_mesh(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, npt.NDArray[np.
     return trimesh.Trimesh(mesh.vertices - shift, mesh.faces, process=False), shift
 
 
-def _volume(mesh: trimesh.Trimesh) -> float:
+def _volume(vertices: npt.NDArray[np.float64], faces: npt.NDArray[np.integer]) -> float:
     # About a point of the mesh: far from the origin the signed tetrahedra would cancel to noise.
-    vertices = np.ascontiguousarray(mesh.vertices - mesh.vertices[0], dtype=np.float64)
-    return float(mesh_volume(vertices, np.ascontiguousarray(mesh.faces, dtype=np.int32)))
+    about = np.asarray(vertices) - np.asarray(vertices)[0]
+    return float(mesh_volume(about, np.ascontiguousarray(faces, dtype=np.int32)))
