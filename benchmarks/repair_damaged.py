@@ -67,23 +67,23 @@ def measure(vertices: Any, faces: Any, family: str, share: float) -> dict[str, A
         "hulls": len(hulls),
         "under": float(under),
         "over": over,
-        "told": any(" at (" in warning for warning in result.report["warnings"]),
+        "located": any(" at (" in warning for warning in result.report["warnings"]),
         "seconds": seconds,
     }
 
 
 def table(rows: list[dict[str, Any]]) -> str:
     """One line per family and share."""
-    lines = ["| family | share | hulls | under mean | worst | over mean | worst | outside the bars | and untold |"]
+    lines = ["| family | share | hulls | under mean | worst | over mean | worst | outside the bars | no place named |"]
     lines += ["|---|---|---|---|---|---|---|---|---|"]
     for family, share in dict.fromkeys((row["family"], row["share"]) for row in rows):
         some = [row for row in rows if (row["family"], row["share"]) == (family, share)]
         under, over = (np.array([row[key] for row in some]) for key in ("under", "over"))
         missed = (under > UNDER) | (over > OVER)
-        untold = missed & ~np.array([row["told"] for row in some])
+        unlocated = missed & ~np.array([row["located"] for row in some])
         lines.append(
             f"| {family} | {share:.0%} | {sum(row['hulls'] for row in some)} | {under.mean():.4f} | {under.max():.4f} "
-            f"| {over.mean():.4f} | {over.max():.4f} | {missed.sum()} of {len(some)} | {untold.sum()} |"
+            f"| {over.mean():.4f} | {over.max():.4f} | {missed.sum()} of {len(some)} | {unlocated.sum()} |"
         )
     return "\n".join(lines)
 

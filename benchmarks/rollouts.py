@@ -40,7 +40,7 @@ class Used:
     def __init__(self) -> None:
         self._start, self._own, self._others = time.perf_counter(), self._seconds(), self._family()
 
-    def told(self) -> dict[str, float]:
+    def spent(self) -> dict[str, float]:
         """Seconds: ``wall``; ``own``, of this process; ``workers``, and ``servers``, Ray's."""
         now = self._family()
         spent = {kind: now[kind] - self._others[kind] for kind in now}
@@ -93,13 +93,13 @@ def train(
                 link.parent.mkdir(parents=True, exist_ok=True)
                 link.symlink_to(asset.path.resolve())
             with open_pool(number if ray is None else None, ray) as pool:
-                used = Used()
+                usage = Used()
                 module.train(links, Path(folder, "run"), options, say=lambda _: None, pool=pool)
-                told = used.told()
+                spent = usage.spent()
             made = json.loads(Path(folder, "run", "checkpoint", "state.json").read_text())["cuts"]
-        slowest = told["own"] if number == 0 else max(told["own"], told["workers"] / number)
+        slowest = spent["own"] if number == 0 else max(spent["own"], spent["workers"] / number)
         print(
-            f"| {number} | {made} | {told['wall']:.0f} | {told['own']:.1f} | {told['workers']:.1f} "
+            f"| {number} | {made} | {spent['wall']:.0f} | {spent['own']:.1f} | {spent['workers']:.1f} "
             f"| {made / slowest:.0f} |"
         )
 
@@ -135,13 +135,13 @@ def overhead(count: int = 300, jobs: int = 2, ray: Ray = None) -> None:
 
 
 def _ask(pool: Pool, requests: Any, count: int, what: str = "") -> None:
-    used = Used()
+    usage = Used()
     for _, answer in answers(pool, requests):
         if isinstance(answer, Exception):
             raise answer
     if count:
-        told = {name: f"{1000 * seconds / count:.2f}" for name, seconds in used.told().items()}
-        print(f"{what}: " + ", ".join(f"{name} {value} ms" for name, value in told.items()) + " a request")
+        spent = {name: f"{1000 * seconds / count:.2f}" for name, seconds in usage.spent().items()}
+        print(f"{what}: " + ", ".join(f"{name} {value} ms" for name, value in spent.items()) + " a request")
 
 
 class _Nothing:
@@ -162,13 +162,13 @@ def boxes(count: int = 300, jobs: int = 2, ray: Ray = None) -> None:
                 path.parent.mkdir(exist_ok=True)
                 trimesh.creation.box((1, 2, 3 + number / count)).export(path)
         for part in ("warm", "boxes"):
-            used, out = Used(), Path(folder, f"out-{part}")
+            usage, out = Used(), Path(folder, f"out-{part}")
             Batch(Path(folder, part), str(out), JobSpec.of({"quality": "fast"})).run(pool, _Nothing())
-            told = used.told()
+            spent = usage.spent()
         rows = [json.loads(line) for line in (out / "timings.jsonl").read_text().splitlines()]
         mesh = sum(row["cpu"] for row in rows)
-    told["workers"] -= mesh
-    each = {name: f"{1000 * seconds / count:.2f} ms" for name, seconds in told.items()}
+    spent["workers"] -= mesh
+    each = {name: f"{1000 * seconds / count:.2f} ms" for name, seconds in spent.items()}
     beside = ", ".join(f"{name} {spent}" for name, spent in each.items())
     print(f"{count} boxes, {1000 * mesh / count:.2f} ms each; beside it: {beside}")
 

@@ -77,10 +77,10 @@ def timeout(shape: str, seconds: float) -> str:
         return f"more than {GIVE_UP:.0f} | | | |"
     if run.returncode:
         return f"failed: {run.stderr.strip().splitlines()[-1:]} | | |"
-    told = json.loads(run.stdout)
-    late = ", ".join(f"{stage} {more}" for more, stage in told["stages"] if more >= 0.05)
-    under = "–" if told["under"] is None else f"{told['under']:.3f}"
-    return f"{told['late']:.2f} | {told['cpu']:.2f} | {late} | {told['parts']} | {under}"
+    result = json.loads(run.stdout)
+    late = ", ".join(f"{stage} {more}" for more, stage in result["stages"] if more >= 0.05)
+    under = "–" if result["under"] is None else f"{result['under']:.3f}"
+    return f"{result['late']:.2f} | {result['cpu']:.2f} | {late} | {result['parts']} | {under}"
 
 
 def _ignore_interrupts() -> None:
@@ -103,8 +103,8 @@ def interrupt(shape: str, seconds: float) -> str:
             trimesh.Trimesh(*mesh_of(shape), process=False).export(path)
         command = [sys.executable, "-c", "from rlacd.cli.main import main; main()", "decompose", str(path)]
         command += ["-o", str(Path(folder) / "hulls.glb"), "--report", "-"]
-        told = Path(folder) / "report.json"
-        with told.open("w") as out:
+        report_file = Path(folder) / "report.json"
+        with report_file.open("w") as out:
             run = subprocess.Popen(command, stdout=out, stderr=subprocess.DEVNULL, preexec_fn=_ignore_interrupts)
             while run.poll() is None and _ignores_interrupts(run.pid):
                 time.sleep(0.01)
@@ -121,7 +121,7 @@ def interrupt(shape: str, seconds: float) -> str:
             late = time.perf_counter() - start
         if before is not None or code not in (0, 4):
             return f"exit code {code} | | |"
-        report = json.loads(told.read_text())
+        report = json.loads(report_file.read_text())
         stages = ", ".join(f"{k} {v:.1f}" for k, v in report["seconds"].items() if k != "total")
         return f"{late:.2f} | {stages} | {report['parts']} | {code}"
 
@@ -142,8 +142,8 @@ def main() -> None:
     print(f"| shape | seconds late | {own} | load |")
     print("|---|--:|--:|---|--:|--:|--:|" if given.what == "timeout" else "|---|--:|---|--:|--:|--:|")
     for shape in given.shapes or LARGE:
-        told = measure(shape, given.seconds)
-        print(f"| {Path(shape).stem} | {told} | {os.getloadavg()[0]:.0f} |", flush=True)
+        row = measure(shape, given.seconds)
+        print(f"| {Path(shape).stem} | {row} | {os.getloadavg()[0]:.0f} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -110,10 +110,10 @@ def coverage(
 ) -> list[str]:
     """Every point of the input lies in a hull or as near as the report says; it must warn of large distances."""
     missed = seen_under(hulls, where, faces, samples, random)
-    said = case.report["hausdorff"]["under"]
+    reported = case.report["hausdorff"]["under"]
     found = []
-    if said is not None and missed.distance > said + ROUNDING:
-        found.append(f"the input leads {missed.distance:.6g} out of the hulls, the report says {said:.6g}")
+    if reported is not None and missed.distance > reported + ROUNDING:
+        found.append(f"the input leads {missed.distance:.6g} out of the hulls, the report says {reported:.6g}")
     if missed.distance > HONEST_WITHIN + ROUNDING and "from the hulls" not in case.warned:
         found.append(f"the input leads {missed.distance:.6g} out of the hulls, and no word of it")
     return found
@@ -127,13 +127,13 @@ def overhang(
     Faces without area need not be covered, but hulls may extend to them.
     """
     reached = seen_over(hulls, corners, samples, random)
-    said = case.report["hausdorff"]["over"]
+    reported = case.report["hausdorff"]["over"]
     found = []
-    if said is not None and reached.distance > said + 2 * ROUNDING:
-        found.append(f"the hulls reach {reached.distance:.6g} beyond the input, the report says {said:.6g}")
+    if reported is not None and reached.distance > reported + 2 * ROUNDING:
+        found.append(f"the hulls reach {reached.distance:.6g} beyond the input, the report says {reported:.6g}")
     allowed = case.options.get("threshold", math.inf) + HONEST_WITHIN + ROUNDING
-    is_said = any(word in case.warned for word in ("exceed", "beyond the input", "Incomplete"))
-    if reached.distance > allowed and not is_said:
+    is_warned_of = any(word in case.warned for word in ("exceed", "beyond the input", "Incomplete"))
+    if reached.distance > allowed and not is_warned_of:
         found.append(f"the hulls reach {reached.distance:.6g} beyond the input, and no word of it")
     return found
 
@@ -161,13 +161,13 @@ def concavity(
     The part lies in that intersection, which therefore leaves no more of the hull empty than the part does, and no
     point of the hull's surface is farther from the intersection than from the part.
     """
-    told = case.report.get("concavity")
-    if told is None:
+    reported = case.report.get("concavity")
+    if reported is None:
         return []
     found = []
     threshold = case.options["threshold"]
-    if told > threshold * (1 + 1e-9) and "exceed" not in case.warned:
-        found.append(f"the concavity is {told:.6g}, more than {threshold:g}, and no word of it")
+    if reported > threshold * (1 + 1e-9) and "exceed" not in case.warned:
+        found.append(f"the concavity is {reported:.6g}, more than {threshold:g}, and no word of it")
     if "finite" in " ".join(case.shape.steps):
         return found
     for i, hull in enumerate(hulls):
@@ -178,8 +178,8 @@ def concavity(
             continue  # too thin for booleans
         points = sampled(hull.vertices, hull.faces, max(LEAST_A_HULL, samples // len(hulls)), random)
         least = min(_least_concavity(body, share, points, random) for share in shares)
-        if least > told + 1e-3:
-            found.append(f"hull {i} is {least:.6g} concave, the report says {told:.6g} at most")
+        if least > reported + 1e-3:
+            found.append(f"hull {i} is {least:.6g} concave, the report says {reported:.6g} at most")
     return found
 
 

@@ -29,7 +29,7 @@ from fuzz.choices import draw_options
 from fuzz.files import read_hulls, write_mesh
 from fuzz.judges import Case, finite_faces, judge
 from fuzz.recipes import Shape, make_shape
-from fuzz.worker import Here, Watched
+from fuzz.worker import InProcess, Watched
 from rlacd.batch import JobSpec
 from rlacd.pool import ProcessLimits, WorkerDiedError
 
@@ -72,7 +72,7 @@ class Row:
     twice: bool = False
 
 
-def run_seed(seed: int, worker: Watched | Here, folder: Path) -> Row:
+def run_seed(seed: int, worker: Watched | InProcess, folder: Path) -> Row:
     """Decompose and judge the shape of a seed."""
     random = np.random.default_rng([seed, 3])
     ending, twice = str(random.choice(FORMATS)), bool(random.random() < 1 / AGAIN)
@@ -85,22 +85,22 @@ def judged(
     options: dict[str, Any],
     ending: str,
     twice: bool,
-    worker: Watched | Here,
+    worker: Watched | InProcess,
     folder: Path,
 ) -> Row:
     """Decompose a shape, possibly again with another number of threads, and fill in its row."""
-    order = JobSpec.of(options, file_format=ending)
-    row = replace(row, steps=list(shape.steps), options=order.as_plain()["options"], faces=len(shape.faces))
+    spec = JobSpec.of(options, file_format=ending)
+    row = replace(row, steps=list(shape.steps), options=spec.as_plain()["options"], faces=len(shape.faces))
     mesh = write_mesh(folder / f"{row.seed}.ply", shape.vertices, shape.faces)
     start = time.perf_counter()
     try:
-        said, files = worker.run(order, mesh, mesh.name, "out")
-        row.seconds, row.cpu = round(time.perf_counter() - start, 3), said["cpu"]
-        if "error" in said:
-            row.status, row.said = _refusal(shape, ending, said)
+        answer, files = worker.run(spec, mesh, mesh.name, "out")
+        row.seconds, row.cpu = round(time.perf_counter() - start, 3), answer["cpu"]
+        if "error" in answer:
+            row.status, row.said = _refusal(shape, ending, answer)
             return row
-        row.parts = said["report"]["parts"]
-        if twice and said["report"]["complete"]:
+        row.parts = answer["report"]["parts"]
+        if twice and answer["report"]["complete"]:
             other = JobSpec.of({**options, "threads": options["threads"] % 3 + 1}, file_format=ending)
             again, same = worker.run(other, mesh, mesh.name, "out")
             row.cpu += again["cpu"]
@@ -114,17 +114,17 @@ def judged(
     finally:
         mesh.unlink()
     if ending in ("obj", "ply"):
-        row.said = judge(Case(shape, options, read_hulls(files[f"out.{ending}"], ending), said["report"]))
+        row.said = judge(Case(shape, options, read_hulls(files[f"out.{ending}"], ending), answer["report"]))
         row.status = "wrong" if row.said else "done"
     return row
 
 
-def _refusal(shape: Shape, ending: str, said: dict[str, Any]) -> tuple[str, list[str]]:
+def _refusal(shape: Shape, ending: str, answer: dict[str, Any]) -> tuple[str, list[str]]:
     """Tell whether an error is the right one for this input."""
-    error = said["error"]
+    error = answer["error"]
     if error.startswith("a bug in rlacd") or "memory" in error:
         return "bug", [error]
-    if said.get("unusable"):
+    if answer.get("unusable"):
         return ("refused" if len(finite_faces(shape)) == 0 else "wrong"), [error]
     # Single precision cannot hold every hull.
     return ("refused" if ending in ("glb", "urdf") and "precision" in error else "wrong"), [error]
@@ -188,7 +188,7 @@ def main() -> None:
         print(totals([json.loads(line) for line in args.totals.read_text().splitlines()]))
         return
     rows: list[dict[str, Any]] = []
-    worker = Here() if args.here else Watched(ProcessLimits(seconds=args.limit, memory=int(args.memory * 2**30)))
+    worker = InProcess() if args.here else Watched(ProcessLimits(seconds=args.limit, memory=int(args.memory * 2**30)))
     until = time.monotonic() + args.seconds
     with tempfile.TemporaryDirectory() as folder, args.log.open("a") as log:
         for seed in range(args.first, args.first + args.count):

@@ -180,13 +180,13 @@ class Laboratory:
         space = options.get("criterion")
         if isinstance(space, NavigableSpace) and space.radius is not None and space.radius < 0.05:
             del options["criterion"]  # would give tens of thousands of parts
-        order = JobSpec.of(options, file_format=None if ending == "folder" else ending, folders=ending == "folder")
+        spec = JobSpec.of(options, file_format=None if ending == "folder" else ending, folders=ending == "folder")
         trial = replace(trial, story=[*shape.steps, ending], options=options)
         with TemporaryDirectory(dir=self.folder) as place:
             mesh = write_mesh(Path(place) / "mesh.ply", shape.vertices, shape.faces)
             out = Path(place) / "out"
             out.mkdir()
-            said, whole = self._shapes.run(order, mesh, mesh.name, "out")
+            said, whole = self._shapes.run(spec, mesh, mesh.name, "out")
             trial.cpu += said["cpu"]
             if "error" in said:
                 return replace(trial, end="refused", counts=Counter(faults=1))

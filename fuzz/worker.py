@@ -16,7 +16,7 @@ from rlacd.batch.server import SERVER, MeshServer
 from rlacd.pool import ProcessLimits, Request, WorkerDiedError
 from rlacd.pool.worker import Worker
 
-Said = tuple[dict[str, Any], dict[str, bytes]]
+Answered = tuple[dict[str, Any], dict[str, bytes]]
 """The answer of `rlacd.batch.server.MeshServer`."""
 
 
@@ -40,7 +40,7 @@ class Watched:
         """Process id; 0 if there is no process."""
         return int(self._worker.name.partition("@")[0].replace("-", "0"))
 
-    def run(self, order: JobSpec, mesh: Path, name: str, stem: str) -> Said:
+    def run(self, spec: JobSpec, mesh: Path, name: str, stem: str) -> Answered:
         """Decompose a mesh.
 
         Raises
@@ -50,7 +50,7 @@ class Watched:
         """
         watch = _Watch(self)
         try:
-            answer = self._worker.ask(Request(SERVER, _values(order, mesh, name, stem), limits=self.limits))
+            answer = self._worker.ask(Request(SERVER, _values(spec, mesh, name, stem), limits=self.limits))
         except WorkerDiedError as error:
             self._worker.close()
             if watch.too_long:
@@ -95,19 +95,19 @@ class _Watch:
         return float(times.user + times.system) if times else 0.0
 
 
-class Here:
+class InProcess:
     """Does the same in this process, so that sanitizer output stays readable; a crash ends everything."""
 
-    def run(self, order: JobSpec, mesh: Path, name: str, stem: str) -> Said:
+    def run(self, spec: JobSpec, mesh: Path, name: str, stem: str) -> Answered:
         """Decompose a mesh."""
         print(f"seed {mesh.stem}", file=sys.stderr, flush=True)
         with TemporaryDirectory() as staging:
-            return MeshServer(Path(staging))(_values(order, mesh, name, stem), {}, {})
+            return MeshServer(Path(staging))(_values(spec, mesh, name, stem), {}, {})
 
     def close(self) -> None:
         """Do nothing."""
 
 
-def _values(order: JobSpec, mesh: Path, name: str, stem: str) -> dict[str, Any]:
-    values = {"order": order.as_plain(), "path": str(mesh), "name": name, "stem": stem}
+def _values(spec: JobSpec, mesh: Path, name: str, stem: str) -> dict[str, Any]:
+    values = {"spec": spec.as_plain(), "path": str(mesh), "name": name, "stem": stem}
     return {**values, "hull_only": False, "out": None, "parent": ""}

@@ -61,11 +61,11 @@ def main() -> None:
         name, options = next(ways)
         start = time.perf_counter()
         try:
-            said = f"{len(rlacd.decompose(path, threads=THREADS, **options))} hulls"
+            outcome = f"{len(rlacd.decompose(path, threads=THREADS, **options))} hulls"
         except rlacd.RlacdError as error:
-            said = str(error)
+            outcome = str(error)
         done[name] += 1
-        print(f"{path.name:40.40} {name:24} {time.perf_counter() - start:6.1f} s  {said}", flush=True)
+        print(f"{path.name:40.40} {name:24} {time.perf_counter() - start:6.1f} s  {outcome}", flush=True)
     print(f"{done.total()} decompositions: {dict(done)}")
 
 

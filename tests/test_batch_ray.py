@@ -81,23 +81,23 @@ def test_a_node_dies_half_way_and_the_results_are_those_of_one_machine(cluster: 
     (assets / "bad.obj").write_text("no mesh")
     doomed = cluster.add_node(num_cpus=1)
     cluster.wait_for_nodes()
-    order, limits = JobSpec.of({}, file_format="urdf"), ProcessLimits(seconds=120)
+    spec, limits = JobSpec.of({}, file_format="urdf"), ProcessLimits(seconds=120)
 
     killing = threading.Thread(target=lambda: cluster.remove_node(doomed, allow_graceful=False))
     counter = Counter(at=3, then=killing.start)
-    over_ray = Batch(assets, str(tmp_path / "ray"), order, limits).run(RayPool("auto"), counter)
+    over_ray = Batch(assets, str(tmp_path / "ray"), spec, limits).run(RayPool("auto"), counter)
     killing.join()
     assert over_ray.status == {"done": 8, "fallback": 1, "failed": 1}
     assert _dies(doomed), "the node outlived the batch"
 
     with LocalPool(1) as pool:
-        here = Batch(assets, str(tmp_path / "here"), order, limits).run(pool, Counter())
+        here = Batch(assets, str(tmp_path / "here"), spec, limits).run(pool, Counter())
     assert here.status == over_ray.status
     assert tree(tmp_path / "ray", TIMES) == tree(tmp_path / "here", TIMES)
     assert rows(tmp_path / "ray", TIMES)["deep/dies.obj"]["attempts"] == 2
 
     again = Counter()
-    assert Batch(assets, str(tmp_path / "ray"), order, limits).run(RayPool("auto"), again).passed_over == 10
+    assert Batch(assets, str(tmp_path / "ray"), spec, limits).run(RayPool("auto"), again).passed_over == 10
     assert again.rows == []
 
 
@@ -108,10 +108,10 @@ def test_a_network_of_ones_own_and_a_shared_address_reach_the_nodes(cluster: Clu
     write_ell(tmp_path / "assets" / "a.obj")
     policy = tmp_path / "own.onnx"
     policy.write_bytes(files("rlacd.weights").joinpath("ranker.onnx").read_bytes())
-    order = JobSpec.of({"policy": str(policy), "threshold": 0.1})
+    spec = JobSpec.of({"policy": str(policy), "threshold": 0.1})
     # "local:" is fsspec's own word for files; unlike a plain folder it is taken for an address that all nodes reach.
     out = f"local://{tmp_path}/shared"
-    summary = Batch(tmp_path / "assets", out, order).run(RayPool("auto"), Counter())
+    summary = Batch(tmp_path / "assets", out, spec).run(RayPool("auto"), Counter())
     assert summary.status == {"done": 1}
     here = Batch(tmp_path / "assets", str(tmp_path / "here"), JobSpec.of({"policy": "learned", "threshold": 0.1}))
     with LocalPool(1) as pool:

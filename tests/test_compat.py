@@ -23,7 +23,7 @@ from tests.models import table
 
 @pytest.fixture(autouse=True)
 def nothing_said_yet(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(unused, "_SAID", set())
+    monkeypatch.setattr(unused, "_WARNED", set())
 
 
 def triangles_with_threes(mesh: trimesh.Trimesh) -> np.ndarray:

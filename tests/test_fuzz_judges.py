@@ -19,7 +19,7 @@ from fuzz.judges import Case, judge
 from fuzz.kernels import try_seed
 from fuzz.recipes import Shape, make_shape
 from fuzz.shapes import run_seed
-from fuzz.worker import Here, Watched
+from fuzz.worker import InProcess, Watched
 from rlacd.options import Options
 from rlacd.pool import ProcessLimits
 from tests.shapes import Closed, box, from_manifold, point_to_triangles
@@ -194,7 +194,7 @@ def test_kernels_agree_with_brute_force_on_any_soup(seed: int) -> None:
 @pytest.mark.nightly
 @pytest.mark.parametrize("seed", range(3, 10))
 def test_whole_decompositions_pass_the_judges(seed: int, tmp_path: Path) -> None:
-    row = run_seed(seed, Here(), tmp_path)
+    row = run_seed(seed, InProcess(), tmp_path)
     assert row.status in ("done", "refused"), row.said
 
 

@@ -7,6 +7,7 @@
 #include <queue>
 #include <stdexcept>
 
+#include "base/invariant.hpp"
 #include "base/parallel.hpp"
 #include "cut/sections.hpp"
 #include "hull/hull.hpp"
@@ -89,8 +90,13 @@ class Direction {
   Direction(const SolidMesh& mesh, const Bundle& bundle, const std::vector<std::ptrdiff_t>& numbers, double slack)
       : sections_(mesh, bundle.normal, section_offsets(mesh, bundle)), slack_(slack) {
     sections_.drop_heights();
-    for (std::size_t j = 0, i = 0; j < planes(); ++j)
-      numbers_.push_back(i < numbers.size() && bundle.offsets[i] == sections_.offset(j) ? numbers[i++] : -1);
+    std::size_t placed = 0;
+    for (std::size_t j = 0; j < planes(); ++j) {
+      RLACD_ASSERT(j == 0 || sections_.offset(j - 1) < sections_.offset(j));
+      const bool is_candidate = placed < numbers.size() && bundle.offsets[placed] == sections_.offset(j);
+      numbers_.push_back(is_candidate ? numbers[placed++] : -1);
+    }
+    RLACD_ASSERT(placed == numbers.size());
     std::vector<double> roots;
     for (std::size_t j = 0; j < planes(); ++j)
       roots.push_back(std::sqrt(outline_area(sections_.outline(j), sections_.normal())));
@@ -142,6 +148,7 @@ class Direction {
     hull->add(points);
     hull->drop_inner_points();
     const double excess = std::max(hull->volume() - solid(side, j), 0.0);
+    RLACD_ASSERT(excess >= least_[side][j] - slack_);  // what was known before was a lower bound
     hulls_[side][j] = std::move(hull);
     raise(side, j, excess - slack_);
     return excess;
@@ -159,6 +166,7 @@ class Direction {
   // likewise the excess above a plane bounds those above all lower ones.
   void raise(Side side, std::size_t j, double excess) {
     while (least_[side][j] < excess) {
+      RLACD_ASSERT(j < planes());
       least_[side][j] = excess;
       const std::size_t slab = side == kBelow ? j : j - 1;
       if (slab >= between_.size()) return;
@@ -273,6 +281,7 @@ class Search {
       const std::vector<std::size_t> open = open_planes(here, sliver);
       if (open.empty()) continue;
       const std::size_t j = open[open.size() / 2];
+      RLACD_ASSERT(here.bound <= bound(*directions_[here.direction], j));  // bounds only rise
       measured.push_back({measure(*directions_[here.direction], j), directions_[here.direction]->number(j)});
       least_cost_ = std::min(least_cost_, measured.back().cost);
       put(here.direction, here.first, j, sliver);

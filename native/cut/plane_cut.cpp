@@ -5,6 +5,7 @@
 #include <cmath>
 #include <unordered_map>
 
+#include "base/invariant.hpp"
 #include "base/stop.hpp"
 
 namespace rlacd {
@@ -50,6 +51,7 @@ class Cutter {
         if (s[e] >= 0) polygon[count++] = a;
         if (s[e] * s[(e + 1) % 3] < 0) polygon[count++] = crossing(a, b);
       }
+      RLACD_ASSERT(count == 3 || count == 4);
       for (int k = 0; k < count; ++k)
         if (const std::int32_t a = polygon[k], b = polygon[(k + 1) % count]; is_on_plane(a) && is_on_plane(b))
           in_plane.push_back({a, b});
@@ -87,6 +89,7 @@ class Cutter {
     const auto [known, is_new] = crossings_.try_emplace(key, static_cast<std::int32_t>(points_.size()));
     if (is_new) {
       const double t = heights_[a] / (heights_[a] - heights_[b]);
+      RLACD_ASSERT(sides_[a] * sides_[b] < 0 && t > 0 && t < 1);
       Vec3 p = points_[a] + t * (points_[b] - points_[a]);
       if (std::fabs(normal_[axis_]) == 1) p[axis_] = offset_ * normal_[axis_];
       points_.push_back(p);
@@ -148,6 +151,7 @@ class Cutter {
       if (is_used[i]) continue;
       if (const double angle = angle_inside(edge, *e, up); angle < least) least = angle, best = i;
     }
+    RLACD_ASSERT(std::isfinite(least));  // the boundary of a closed surface's side: as many edges leave as arrive
     return best;
   }
 
@@ -171,6 +175,7 @@ class Cutter {
         if (times[corner] > 0) around[corner].push_back(f);
     std::vector<char> is_gone(faces.size(), 0);
     for (std::vector<std::int32_t>& loop : loops) {
+      RLACD_ASSERT(loop.size() >= 3);
       std::vector<std::int32_t> kept;
       for (std::size_t i = 0; i < loop.size(); ++i) {
         const std::int32_t v = loop[i], before = kept.empty() ? loop.back() : kept.back();
@@ -181,6 +186,7 @@ class Cutter {
           continue;
         kept.push_back(v);
       }
+      RLACD_ASSERT(kept.size() >= 3);
       loop = std::move(kept);
     }
     std::size_t kept = 0;
@@ -209,6 +215,7 @@ class Cutter {
     int shared = 0;
     for (const std::size_t f : own) {
       if (is_gone[f]) continue;
+      RLACD_ASSERT(std::find(faces[f].begin(), faces[f].end(), v) != faces[f].end());
       for (const std::int32_t corner : faces[f])
         if (std::fabs(dot(normal, points_[corner] - points_[v])) > kFlat * farthest_) return false;
       Triangle moved = faces[f];

@@ -104,21 +104,21 @@ class Clock:
         """Report a step of the current stage; True if the work may continue."""
         self._done, self._total, self._parts = done, total, parts
         if self.stopped_by is None:
-            told_to_stop = (
+            cancelled = (
                 self._progress is not None
                 and self._progress(Progress(self._stage, done, total, parts, self.elapsed)) is False
             )
             if self._nothing_left_to_stop:
-                if told_to_stop:
+                if cancelled:
                     self._hurry()
                 return True
             if (self._timeout is not None and self.elapsed > self._timeout) or self.stop.is_tripped:
                 self._stop_by("timeout")
-            elif told_to_stop:
+            elif cancelled:
                 self._stop_by("cancel")
         return self._nothing_left_to_stop or (self.stopped_by is None and not self.work.is_spent)
 
-    def goes_on(self) -> bool:
+    def may_continue(self) -> bool:
         """Report the last step again; True if the work may continue."""
         return self.step(self._done, self._total, self._parts)
 
@@ -165,4 +165,4 @@ class Clock:
         self.stop.trip()
 
     def _look(self) -> None:
-        self.goes_on()
+        self.may_continue()

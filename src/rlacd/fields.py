@@ -82,8 +82,8 @@ def integer(least: int | None = None, most: int | None = None, *, rule: str | No
             raise ValueError
         return plain
 
-    said = math.inf if most is None else most
-    return Kind(rule or _interval("an integer", None, low, said), _interval("", None, low, said), read, int)
+    greatest = math.inf if most is None else most
+    return Kind(rule or _interval("an integer", None, low, greatest), _interval("", None, low, greatest), read, int)
 
 
 def _interval(what: str, positive: str | None, least: float, most: float) -> str:

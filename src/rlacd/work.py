@@ -78,7 +78,7 @@ def screening(vertices: int) -> float:
     return 80 + 0.3 * vertices
 
 
-def holding(vertices: int) -> float:
+def testing(vertices: int) -> float:
     """Test a hull against the solid."""
     return 150 + 1.4 * vertices
 

@@ -84,7 +84,7 @@ class Batch:
         Folder of the meshes.
     out
         Folder or address of the results.
-    order
+    spec
         What is done to each mesh.
     limits
         Limits for each mesh.
@@ -98,7 +98,7 @@ class Batch:
 
     assets: Path
     out: str
-    order: JobSpec
+    spec: JobSpec
     limits: ProcessLimits = field(default_factory=ProcessLimits)
     fallback: bool = True
     glob: str = EVERYTHING
@@ -154,9 +154,9 @@ class Batch:
         assets, store = self._find(), open_store(self.out)
         store.open()
         try:
-            shared = self.order.shared()
+            shared = self.spec.shared()
             work = BatchContext(
-                self.order, self.limits, self.fallback, self.out, store, stop or threading.Event(), shared
+                self.spec, self.limits, self.fallback, self.out, store, stop or threading.Event(), shared
             )
             return self._run(assets, work, pool, watcher)
         finally:
@@ -222,7 +222,7 @@ class Batch:
             content = content_hash(asset.files())
         except MeshFileError as error:  # loading the mesh reports what is wrong with the file
             content = str(error)
-        task = MeshTask(asset, self.order.key(content, asset.name))
+        task = MeshTask(asset, self.spec.key(content, asset.name))
         return task, self.redo != "all" and self._is_finished(task, manifest.get(asset.name), store)
 
     def _is_finished(self, task: MeshTask, row: Row | None, store: ResultStore) -> bool:

@@ -16,7 +16,7 @@ class BatchContext:
 
     Attributes
     ----------
-    order
+    spec
         What is done to a mesh.
     limits
         Limits for each mesh.
@@ -32,7 +32,7 @@ class BatchContext:
         What all processes need: the network, if the policy is a file.
     """
 
-    order: JobSpec
+    spec: JobSpec
     limits: ProcessLimits
     fallback: bool
     out: str

@@ -11,13 +11,13 @@ from rlacd.batch.context import BatchContext
 from rlacd.batch.pipeline import MeshOutcome, MeshTask, Pipeline, pipeline
 from rlacd.pool import Answer, Pool, Request, WorkerDiedError
 
-LOOK = 1.0
+POLL_SECONDS = 1.0
 """Seconds between checks for free room in the pool."""
 
 WRITERS = 4
 """Results written concurrently; each waits for the disk, not for a processor."""
 
-_Going: TypeAlias = tuple[MeshTask, Pipeline]
+_Running: TypeAlias = tuple[MeshTask, Pipeline]
 
 
 class Engine:
@@ -31,9 +31,9 @@ class Engine:
 
     def __init__(self, pool: Pool, work: BatchContext) -> None:
         self._pool, self._work = pool, work
-        self._asked: dict[Future[Answer], _Going] = {}
+        self._submitted: dict[Future[Answer], _Running] = {}
         self._writing: dict[Future[MeshOutcome], MeshTask] = {}
-        self._last: deque[tuple[_Going, Request]] = deque()
+        self._last: deque[tuple[_Running, Request]] = deque()
         self._writers = ThreadPoolExecutor(WRITERS)
 
     def run(self, tasks: Iterator[MeshTask]) -> Iterator[tuple[MeshTask, MeshOutcome]]:
@@ -49,42 +49,42 @@ class Engine:
         with self._writers:
             while True:
                 self._begin(tasks)
-                if not (self._asked or self._writing or self._begin_last()):
+                if not (self._submitted or self._writing or self._begin_last()):
                     return
-                going_on: list[Future[Any]] = [*self._asked, *self._writing]
-                wait(going_on, LOOK, FIRST_COMPLETED)
+                waiting: list[Future[Any]] = [*self._submitted, *self._writing]
+                wait(waiting, POLL_SECONDS, FIRST_COMPLETED)
                 for written in [future for future in self._writing if future.done()]:
                     yield self._writing.pop(written), written.result()
-                for asked in [future for future in self._asked if future.done()]:
-                    self._go_on(self._asked.pop(asked), _answer(asked))
+                for future in [future for future in self._submitted if future.done()]:
+                    self._advance(self._submitted.pop(future), _answer(future))
 
     def _begin(self, tasks: Iterator[MeshTask]) -> None:
-        room = max(1, self._pool.room // self._work.order.threads)
-        while len(self._asked) < room and len(self._writing) < WRITERS + room:
+        room = max(1, self._pool.room // self._work.spec.threads)
+        while len(self._submitted) < room and len(self._writing) < WRITERS + room:
             if (task := next(tasks, None)) is None:
                 return
-            self._go_on((task, pipeline(task, self._work, brought=self._pool.many_machines)), None)
+            self._advance((task, pipeline(task, self._work, brought=self._pool.many_machines)), None)
 
     def _begin_last(self) -> bool:
         """Start one of the deferred meshes, which run alone; call only when nothing else is running."""
         if not self._last or self._work.stop.is_set():
             return False
-        going, request = self._last.popleft()
-        self._asked[self._pool.submit(request)] = going
+        running, request = self._last.popleft()
+        self._submitted[self._pool.submit(request)] = running
         return True
 
-    def _go_on(self, going: _Going, answer: Answer | WorkerDiedError | None) -> None:
-        task, steps = going
+    def _advance(self, running: _Running, answer: Answer | WorkerDiedError | None) -> None:
+        task, steps = running
         try:
-            wish = next(steps) if answer is None else steps.send(answer)
+            step = next(steps) if answer is None else steps.send(answer)
         except StopIteration as end:
             outcome: MeshOutcome = end.value
             self._writing[self._writers.submit(outcome.put, self._work)] = task
             return
-        if wish.last and not self._pool.many_machines:
-            self._last.append((going, wish.request))
+        if step.last and not self._pool.many_machines:
+            self._last.append((running, step.request))
         else:
-            self._asked[self._pool.submit(wish.request)] = going
+            self._submitted[self._pool.submit(step.request)] = running
 
 
 def _answer(done: Future[Answer]) -> Answer | WorkerDiedError:

@@ -138,7 +138,7 @@ def pipeline(task: MeshTask, work: BatchContext, *, brought: bool) -> Pipeline:
 
 def _request(task: MeshTask, work: BatchContext, brought: bool) -> Request:
     values = {
-        "order": work.order.as_plain(),
+        "spec": work.spec.as_plain(),
         "path": None if brought else str(task.asset.path),
         "name": task.asset.name,
         "stem": task.stem,
@@ -147,15 +147,15 @@ def _request(task: MeshTask, work: BatchContext, brought: bool) -> Request:
         "out": work.out if brought and work.store.shared else None,
     }
     files = task.asset.files() if brought else {}
-    return Request(SERVER, values, files, work.shared, work.limits, work.order.threads)
+    return Request(SERVER, values, files, work.shared, work.limits, work.spec.threads)
 
 
 def _outcome(answer: Answer | WorkerDiedError, task: MeshTask) -> MeshOutcome:
     if isinstance(answer, WorkerDiedError):
         return MeshOutcome("failed", error=answer.reason)
-    said = answer.values
-    timing = {**{what: said[what] for what in ("seconds", "cpu", "peak_mb")}, "worker": answer.worker}
-    if "error" in said:
-        return MeshOutcome("failed", error=said["error"], unusable=said.get("unusable", False), timing=timing)
+    values = answer.values
+    timing = {**{what: values[what] for what in ("seconds", "cpu", "peak_mb")}, "worker": answer.worker}
+    if "error" in values:
+        return MeshOutcome("failed", error=values["error"], unusable=values.get("unusable", False), timing=timing)
     files = under(task.parent, answer.blobs)
-    return MeshOutcome("done", said["report"], files=files, outputs=said.get("outputs", {}), timing=timing)
+    return MeshOutcome("done", values["report"], files=files, outputs=values.get("outputs", {}), timing=timing)

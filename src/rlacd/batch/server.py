@@ -28,13 +28,13 @@ STAND_IN = "The convex hull of the whole mesh stands in for its decomposition."
 
 
 def make(
-    order: JobSpec, mesh: Path, stem: str, staging: Path, hull_only: bool
+    spec: JobSpec, mesh: Path, stem: str, staging: Path, hull_only: bool
 ) -> tuple[dict[str, Any], dict[str, bytes]]:
     """Decompose a mesh file and write the requested files into a new folder.
 
     Parameters
     ----------
-    order : JobSpec
+    spec : JobSpec
     mesh : Path
     stem : str
         Name of the output file or folder.
@@ -55,28 +55,28 @@ def make(
     RlacdError
         The mesh cannot be used, or its hulls cannot be written.
     """
-    result = _hull(order, mesh) if hull_only else decompose(mesh, **order.arguments())
+    result = _hull(spec, mesh) if hull_only else decompose(mesh, **spec.arguments())
     with TemporaryDirectory(dir=staging) as folder:
-        place = f"{folder}/{stem}{order.ending or '/'}"
-        written: dict[str, Any] = {"density": order.density, "up": order.up_of(mesh.name), "one_mesh": order.one_mesh}
-        result.save(place, file_format=order.file_format, **written)
+        place = f"{folder}/{stem}{spec.ending or '/'}"
+        written: dict[str, Any] = {"density": spec.density, "up": spec.up_of(mesh.name), "one_mesh": spec.one_mesh}
+        result.save(place, file_format=spec.file_format, **written)
         paths = sorted(path for path in Path(folder).rglob("*") if path.is_file())
         paths.sort(key=lambda path: -len(path.relative_to(folder).parts))
         files = {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
     return _summary(result.report), files
 
 
-def _hull(order: JobSpec, mesh: Path) -> Decomposition:
+def _hull(spec: JobSpec, mesh: Path) -> Decomposition:
     """Make a single hull of all points, which works for point clouds too."""
     source = load_mesh(mesh)
     used = source.vertices[np.unique(source.faces)] if len(source.faces) else source.vertices
     limits: dict[str, Any] = {
-        name: order.options.get(name) for name in ("max_vertices", "max_faces", "preset", "threads")
+        name: spec.options.get(name) for name in ("max_vertices", "max_faces", "preset", "threads")
     }
     around = decompose((used, np.empty((0, 3), dtype=np.int64)), max_hulls=1, quality="fast", **limits)
-    told = {what: around.report[what] for what in ("parts", "faces", "vertices")}
-    told |= {"name": mesh.stem, "complete": False, "warnings": [STAND_IN]}
-    return Decomposition(around.hulls, told, trimesh.Trimesh(source.vertices, source.faces, process=False))
+    report = {what: around.report[what] for what in ("parts", "faces", "vertices")}
+    report |= {"name": mesh.stem, "complete": False, "warnings": [STAND_IN]}
+    return Decomposition(around.hulls, report, trimesh.Trimesh(source.vertices, source.faces, process=False))
 
 
 def _summary(report: dict[str, Any]) -> dict[str, Any]:
@@ -110,7 +110,7 @@ class MeshServer:
         Parameters
         ----------
         values : dict
-            ``order``, as plain values; the mesh's ``path`` if it can be read from this machine; its ``name``, for
+            ``spec``, as plain values; the mesh's ``path`` if it can be read from this machine; its ``name``, for
             messages; the ``stem`` of its result, and ``hull_only``: see `make`; ``out``, an address to write the files
             to from this process, with the result's ``parent`` folder in it.
         blobs : dict of bytes
@@ -136,35 +136,35 @@ class MeshServer:
         with TemporaryDirectory(dir=self._staging) as folder:
             path = lay_out(blobs, Path(folder)) if blobs else Path(values["path"])
             try:
-                order = self._order(values["order"], shared)
-                report, files = make(order, path, values["stem"], self._staging, values["hull_only"])
-                said: dict[str, Any] = {"report": report}
+                spec = self._spec(values["spec"], shared)
+                report, files = make(spec, path, values["stem"], self._staging, values["hull_only"])
+                answer: dict[str, Any] = {"report": report}
             except MeshError as error:
-                said = {"error": self._sentence(error, path, values["name"]), "unusable": True}
+                answer = {"error": self._sentence(error, path, values["name"]), "unusable": True}
             except RlacdError as error:
-                said = {"error": self._sentence(error, path, values["name"])}
+                answer = {"error": self._sentence(error, path, values["name"])}
             except MemoryError:
-                said = {"error": "there is not enough memory for it"}
+                answer = {"error": "there is not enough memory for it"}
             except Exception as error:
                 sentence = self._sentence(error, path, values["name"])
-                said = {"error": f"a bug in rlacd ({type(error).__name__}: {sentence})"}
+                answer = {"error": f"a bug in rlacd ({type(error).__name__}: {sentence})"}
         if values["out"] is not None:
-            said["outputs"], files = put_files(open_store(values["out"]), under(values["parent"], files)), {}
-        said["seconds"] = round(time.perf_counter() - wall, 4)
-        said["cpu"] = round(time.process_time() - cpu, 4)
-        said["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // (
+            answer["outputs"], files = put_files(open_store(values["out"]), under(values["parent"], files)), {}
+        answer["seconds"] = round(time.perf_counter() - wall, 4)
+        answer["cpu"] = round(time.process_time() - cpu, 4)
+        answer["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // (
             2**20 if sys.platform == "darwin" else 2**10
         )
-        return said, files
+        return answer, files
 
-    def _order(self, plain: dict[str, Any], shared: Mapping[str, Shared]) -> JobSpec:
-        order = JobSpec(**plain)
+    def _spec(self, plain: dict[str, Any], shared: Mapping[str, Shared]) -> JobSpec:
+        spec = JobSpec(**plain)
         if POLICY not in shared:
-            return order
+            return spec
         network = self._staging / f"{shared[POLICY].key}.onnx"  # kept, so that it is read only once
         if not network.exists():
             network.write_bytes(shared[POLICY].blobs["onnx"])
-        return order.with_policy(network)
+        return spec.with_policy(network)
 
     def _sentence(self, error: Exception, path: Path, name: str) -> str:
         """First line of a message, with this machine's path replaced by the mesh's name."""

@@ -113,7 +113,7 @@ class Bench:
 
     def _child(self, task: BenchTask, hulls: Path, answer: Path) -> str | None:
         """Run one process, which reuses hulls that exist; returns None, or a description of its failure."""
-        order = {
+        job = {
             "mesh": str(self.meshes / task.mesh),
             "method": task.method,
             "setting": task.setting,
@@ -123,7 +123,7 @@ class Bench:
             "answer": str(answer),
         }
         environment = {**os.environ, "OMP_NUM_THREADS": str(self.limits.threads)}
-        command = [sys.executable, "-m", "rlacd.bench.child", json.dumps(order)]
+        command = [sys.executable, "-m", "rlacd.bench.child", json.dumps(job)]
         # The child reads a pipe that is never written to: when this process dies, the pipe closes and the child exits.
         read_end, write_end = os.pipe()
         try:

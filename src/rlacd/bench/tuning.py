@@ -124,9 +124,9 @@ def next_setting(tool: Method, known: Sequence[tuple[float, float]], target: flo
     step = math.log(STRIDE) * (sign if tighter else -sign)
     if len(ordered) > 1 and ordered[0][1] != ordered[1][1] and ordered[0][0] != ordered[1][0]:
         (a, da), (b, db) = ordered[:2]
-        wished = math.log(a / b) * (target - da) / (da - db)
-        if wished * step > 0:
-            step = math.copysign(min(abs(wished), abs(step)), step)
+        proposed = math.log(a / b) * (target - da) / (da - db)
+        if proposed * step > 0:
+            step = math.copysign(min(abs(proposed), abs(step)), step)
     wanted = min(max(outermost * math.exp(step), lowest), highest)
     return None if wanted == outermost else _rounded(tool, wanted)
 

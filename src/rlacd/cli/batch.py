@@ -110,9 +110,9 @@ def batch_command() -> Callable[..., None]:
             quiet = bool(given.pop("quiet"))
             work = _batch(own, given)
             if not quiet:
-                _tell_large(work)
+                _print_large(work)
             if own["dry_run"]:
-                _tell_plan(work)
+                _print_plan(work)
             else:
                 _run(work, own, quiet=quiet)
 
@@ -132,7 +132,7 @@ def _batch(own: dict[str, Any], given: dict[str, Any]) -> Batch:
 
     written = OutputOptions(**{name: given.pop(name) for name in WRITTEN})
     options = decompose_options({**given, "threads": own["threads"], "timeout": own["timeout"]}, warn=say)
-    order = JobSpec.of(
+    spec = JobSpec.of(
         options,
         file_format=own["folder_format"],
         folders=own["folders"],
@@ -141,7 +141,7 @@ def _batch(own: dict[str, Any], given: dict[str, Any]) -> Batch:
         one_mesh=bool(written.one_mesh),
     )
     limits = ProcessLimits(own["limit"], int(own["memory"] * 2**30))
-    return Batch(own["assets"], own["out"], order, limits, own["fallback"], own["glob"], own["redo"])
+    return Batch(own["assets"], own["out"], spec, limits, own["fallback"], own["glob"], own["redo"])
 
 
 def _pool(own: dict[str, Any]) -> Pool:
@@ -154,7 +154,7 @@ NAMED = 5
 """Maximum number of large meshes listed by name."""
 
 
-def _tell_large(batch: Batch) -> None:
+def _print_large(batch: Batch) -> None:
     """Print one line that lists the large meshes, before any work."""
     from rlacd.cli.terminal import say
     from rlacd.plain_json import printable
@@ -167,14 +167,14 @@ def _tell_large(batch: Batch) -> None:
         say(f"{count} large and may take minutes and gigabytes each: {', '.join([*named, *more])}")
 
 
-def _tell_plan(batch: Batch) -> None:
+def _print_plan(batch: Batch) -> None:
     from rlacd.cli.terminal import counted, say
     from rlacd.plain_json import printable
 
     plan = batch.plan()
     for asset, finished in plan:
         if not finished:
-            typer.echo(printable(f"{asset.name} -> {asset.place}{batch.order.ending or '/'}"))
+            typer.echo(printable(f"{asset.name} -> {asset.place}{batch.spec.ending or '/'}"))
     done = sum(finished for _, finished in plan)
     say(f"{counted(len(plan), 'mesh', 'meshes')}: {done} done, {len(plan) - done} to do; nothing was written")
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rlacd.batch import Asset, Summary
     from rlacd.batch.ledger import Row
 
-TELL_EVERY = 30.0
+REPORT_EVERY = 30.0
 """Seconds between progress lines if stderr is not a terminal."""
 
 SHOWN = 10
@@ -47,7 +47,7 @@ class Screen:
             disable=not self._draws,
         )
         self._bar = self._bars.add_task("meshes", total=None, state="")
-        self._start = self._told = time.monotonic()
+        self._start = self._reported = time.monotonic()
         self._total = self._passed_over = self._made = 0
         self._status: Counter[str] = Counter()
 
@@ -76,8 +76,8 @@ class Screen:
         if row["status"] != "done":
             line = printable(failure_line(row))
             self._bars.console.print(line, markup=False, highlight=False) if self._draws else say(line)
-        elif not self._draws and not self._quiet and time.monotonic() - self._told > TELL_EVERY:
-            self._told = time.monotonic()
+        elif not self._draws and not self._quiet and time.monotonic() - self._reported > REPORT_EVERY:
+            self._reported = time.monotonic()
             say(f"{self._made + self._passed_over}/{self._total}  {self._state()}")
 
     def _state(self) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rlacd.compat.unused import say_unused
+from rlacd.compat.unused import warn_unused
 from rlacd.decompose_mesh import decompose
 from rlacd.fields import flag, integer, number, one_of, read
 from rlacd.options import DEFAULT_THRESHOLD, MIN_THRESHOLD
@@ -96,7 +96,7 @@ extrude_margin
         An option is out of range.
     """
     given = locals()
-    say_unused("run_coacd", given, _defaults(), _UNUSED)
+    warn_unused("run_coacd", given, _defaults(), _UNUSED)
     apx_mode = read(one_of(("ch", "box")), "apx_mode", apx_mode)
     threshold = read(number(above=0), "threshold", threshold)
     most_hulls = read(integer(-(2**31)), "max_convex_hull", max_convex_hull)

@@ -6,20 +6,20 @@ import warnings
 from collections.abc import Mapping
 from typing import Any
 
-_SAID: set[tuple[str, str]] = set()
+_WARNED: set[tuple[str, str]] = set()
 
 
 class UnusedOptionWarning(UserWarning):
     """An option of the other tool that has no meaning in rlacd."""
 
 
-def say_unused(
+def warn_unused(
     function: str, given: Mapping[str, Any], defaults: Mapping[str, Any], reasons: Mapping[str, str]
 ) -> None:
     """Warn about the options in `reasons` that differ from their default, each once per process."""
     for name, reason in reasons.items():
-        if not _same(given[name], defaults[name]) and (function, name) not in _SAID:
-            _SAID.add((function, name))
+        if not _same(given[name], defaults[name]) and (function, name) not in _WARNED:
+            _WARNED.add((function, name))
             warnings.warn(f"{function}: {name} does nothing in rlacd: {reason}.", UnusedOptionWarning, stacklevel=3)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rlacd.compat.unused import say_unused
+from rlacd.compat.unused import warn_unused
 from rlacd.decompose_mesh import decompose
 from rlacd.errors import MeshDataError
 from rlacd.fields import flag, integer, read
@@ -74,7 +74,7 @@ def compute_vhacd(
     """
     given = locals()
     defaults = {name: parameter.default for name, parameter in inspect.signature(compute_vhacd).parameters.items()}
-    say_unused("compute_vhacd", given, defaults, _UNUSED)
+    warn_unused("compute_vhacd", given, defaults, _UNUSED)
     result = decompose(
         (np.asarray(points, dtype=np.float64), _triangles(faces)),
         max_hulls=read(integer(1), "maxConvexHulls", maxConvexHulls),

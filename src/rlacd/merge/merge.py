@@ -212,7 +212,7 @@ class _Bridged:
         found: list[_Pair] = []
         never: list[tuple[int, int]] = []
         for some in np.split(pairs, range(AT_ONCE, len(pairs), AT_ONCE)):
-            if not self.clock.goes_on() or not self.clock.work.pay(_sum_over(alive, some, work.screening)):
+            if not self.clock.may_continue() or not self.clock.work.pay(_sum_over(alive, some, work.screening)):
                 break
             used, places = _places(some)
             hulls = [alive[i].hull for i in used]
@@ -229,7 +229,7 @@ class _Bridged:
 
     def price(self, first: Part, second: Part) -> float:
         """The work of clipping the solid and judging."""
-        return price_of_share(first, second, self.solid)
+        return price_of_clipping(first, second, self.solid)
 
     def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
         """Clip the solid to the joint hull."""
@@ -257,7 +257,7 @@ class Uniter:
     def unite(self, first: Part, second: Part, hull: Hull | None = None) -> Part | None:
         """Unite two parts; None if no union meets the criterion. `hull` is their joint hull, if already known."""
         hull = hull or Hull.around(first.hull, second.hull)
-        if not self.account.pay(work.holding(len(hull.vertices))):
+        if not self.account.pay(work.testing(len(hull.vertices))):
             return None
         screen = self.criterion.screen
         feasibility = screen.feasibility(self.solid.filling, hull)
@@ -269,7 +269,7 @@ class Uniter:
             union = Part.glued(first, second, hull)
             if not screen.excludes(union.volume, hull.volume) and self.criterion.is_met(union):
                 return union
-        if feasibility is not Feasibility.MAYBE or not self.account.pay(price_of_share(first, second, self.solid)):
+        if feasibility is not Feasibility.MAYBE or not self.account.pay(price_of_clipping(first, second, self.solid)):
             return None
         return _clipped(first, second, hull, self.criterion, self.solid)
 
@@ -287,7 +287,7 @@ def price_of_gluing(first: Part, second: Part) -> float:
     return work.gluing(faces) + work.judging(faces, hull_faces)
 
 
-def price_of_share(first: Part, second: Part, solid: Component) -> float:
+def price_of_clipping(first: Part, second: Part, solid: Component) -> float:
     """The work of clipping the solid to the joint hull of two parts, and judging the result."""
     faces, hull_faces = first.size + second.size, len(first.hull.faces) + len(second.hull.faces)
     return work.filling(solid.size, faces, hull_faces) + work.judging(faces, hull_faces)
@@ -299,9 +299,9 @@ def is_alone(part: Part) -> bool:
 
 
 def _clipped(first: Part, second: Part, hull: Hull, criterion: Criterion, solid: Component) -> ClippedPart | None:
-    share = ClippedPart(solid, first, second, hull)
-    fits = share.is_whole and not criterion.screen.excludes(share.volume, hull.volume)
-    return share if fits and criterion.is_met(share) else None
+    clipped = ClippedPart(solid, first, second, hull)
+    fits = clipped.is_whole and not criterion.screen.excludes(clipped.volume, hull.volume)
+    return clipped if fits and criterion.is_met(clipped) else None
 
 
 def neighbours(

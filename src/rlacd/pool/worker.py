@@ -24,7 +24,7 @@ from rlacd.pool.message import receive, send
 from rlacd.pool.process import end, kill_group, why_it_ended
 from rlacd.pool.request import Answer, Request, WorkerDiedError
 
-LOOK = 0.05
+POLL_SECONDS = 0.05
 """Seconds between checks of a busy process."""
 
 START = 300.0
@@ -61,8 +61,8 @@ class Worker:
         if self._process is None:
             self._start(request.server)
         limits = request.limits
-        self._said.seek(0)
-        self._said.truncate()
+        self._stderr.seek(0)
+        self._stderr.truncate()
         try:
             self._send(request)
             self._await(time.monotonic() + limits.seconds, f"it took more than {limits.seconds:g} s", limits.memory)
@@ -76,8 +76,8 @@ class Worker:
         if limits.memory and self._memory() > limits.memory // 2:
             self.close()  # memory left over from earlier requests must not count against the next one
         if "error" in header:
-            kind, said = header["error"]
-            raise getattr(errors, kind, errors.RlacdError)(said)
+            kind, sentence = header["error"]
+            raise getattr(errors, kind, errors.RlacdError)(sentence)
         return Answer(header["values"], blobs, name)
 
     def close(self) -> None:
@@ -88,7 +88,7 @@ class Worker:
         end(process)
         self._given = {}
         self._pipe.close()
-        self._said.close()
+        self._stderr.close()
         self._folder.cleanup()
 
     def kill(self) -> None:
@@ -102,7 +102,7 @@ class Worker:
         self._server = server
         self._pipe, there = multiprocessing.Pipe()
         self._folder = tempfile.TemporaryDirectory(prefix="rlacd-")
-        self._said = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process
+        self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process
         with self._starting:
             if self._killed:
                 raise WorkerDiedError("its pool was closed")
@@ -111,7 +111,7 @@ class Worker:
                 pass_fds=[there.fileno()],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
-                stderr=self._said,
+                stderr=self._stderr,
                 env={**os.environ, "OMP_NUM_THREADS": "1"},
                 start_new_session=True,
             )
@@ -135,7 +135,7 @@ class Worker:
 
     def _await(self, until: float, too_late: str, memory: int) -> None:
         """Wait until there is something to read or the process has ended."""
-        while not self._pipe.poll(LOOK):
+        while not self._pipe.poll(POLL_SECONDS):
             if time.monotonic() > until:
                 raise WorkerDiedError(too_late)
             if memory and self._memory() > memory:
@@ -154,7 +154,7 @@ class Worker:
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(timeout=10)  # the pipe closes a moment before the process exits
         code = self._process.poll()
-        self._said.seek(0)
-        last_words = self._said.read().decode(errors="replace")[-500:].strip()
+        self._stderr.seek(0)
+        last_words = self._stderr.read().decode(errors="replace")[-500:].strip()
         self.close()
         return WorkerDiedError(f"its process {why_it_ended(code)}", last_words)

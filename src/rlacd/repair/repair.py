@@ -208,10 +208,10 @@ class _Repair:
             self.warnings.append("the surface could not be closed: the hull of its points stands in for the solid")
             self.step[:] = STEPS.index("hull")
             self.solid = hull_of_points(surface.vertices, HALF_THICKNESS)
-        self._tell_of_shells()
+        self._warn_of_shells()
         self._measure()
 
-    def _tell_of_shells(self) -> None:
+    def _warn_of_shells(self) -> None:
         shells = [body for body in self.mouths if self.step[body] == STEPS.index("slab")]
         if not shells:
             return

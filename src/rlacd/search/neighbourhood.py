@@ -102,7 +102,7 @@ class Neighbourhood:
         self._graph = PartGraph(parts, context.criterion, context.workers)
         self._operators = OperatorSampler(len(context.rankings))
         self._best = list(parts)
-        self._steps = self._accepted = self._dry = self._vain = 0
+        self._steps = self._accepted = self._dry = self._without_gain = 0
         self._near = min(context.criterion.screen.reach, 2 * context.criterion.overhang)
 
     @property
@@ -133,7 +133,7 @@ class Neighbourhood:
     def _walk(self, budget: SearchBudget, most: float, enough: int) -> bool:
         """Make random trials until `most` steps are made in total; whether the search is exhausted."""
         graph = self._graph
-        while self._dry < DRY and self._vain < PATIENCE * len(graph.parts) and len(graph.parts) > 1:
+        while self._dry < DRY and self._without_gain < PATIENCE * len(graph.parts) and len(graph.parts) > 1:
             if (
                 not budget.step(self._steps, None, len(graph.parts))
                 or self._steps >= most
@@ -186,7 +186,7 @@ class Neighbourhood:
             gain = exchange.gain if exchange is not None and taken else 0
             self._operators.count(trial, gain, clock.work.done)
             self._accepted += taken
-            self._vain = 0 if gain > 0 else self._vain + 1
+            self._without_gain = 0 if gain > 0 else self._without_gain + 1
             self._best = min(self._best, self.parts, key=cost)
         budget.parts = min(budget.parts, len(self._graph.parts))
         budget.work.pay(self._graph.collect())

@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 import trimesh
 
-from rlacd.io.write.palette import TELLABLE, hull_colors
+from rlacd.io.write.palette import DISTINCT, hull_colors
 from rlacd.solid.arrays import FloatArray
 
-HUES = len(TELLABLE) // 3
+HUES = len(DISTINCT) // 3
 """Colours that are easy to tell apart, also for the colour-blind; see `rlacd.io.write.palette`."""
 
 NEAR = 2e-3

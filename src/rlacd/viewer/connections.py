@@ -208,8 +208,8 @@ def _turn_away(connection: socket.socket) -> None:
         _send_refusal(connection, 503, "Service Unavailable", FULL)
 
 
-def _send_refusal(connection: socket.socket, code: int, reason: str, said: str) -> None:
-    body = json.dumps({"error": said}).encode()
+def _send_refusal(connection: socket.socket, code: int, reason: str, sentence: str) -> None:
+    body = json.dumps({"error": sentence}).encode()
     head = (
         f"HTTP/1.1 {code} {reason}\r\nContent-Type: application/json\r\nContent-Length: {len(body)}\r\n"
         "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nRetry-After: 5\r\nConnection: close\r\n\r\n"

@@ -280,8 +280,8 @@ class _Handler(BoundedHandler):
         except RlacdError as error:
             self._send_json({"error": str(error)}, HTTPStatus.BAD_REQUEST)
         except Exception as error:
-            said = f"a bug in rlacd ({type(error).__name__}: {error}); please report it."
-            self._send_json({"error": said}, HTTPStatus.INTERNAL_SERVER_ERROR)
+            sentence = f"a bug in rlacd ({type(error).__name__}: {error}); please report it."
+            self._send_json({"error": sentence}, HTTPStatus.INTERNAL_SERVER_ERROR)
 
     def _check_sender(self) -> None:
         """Refuse requests for another host, and those from pages of other origins."""
@@ -301,15 +301,15 @@ class _Handler(BoundedHandler):
         return _object(self._read(LONGEST_REQUEST, REQUEST_SECONDS))
 
     def _read(self, longest: int, seconds: float) -> bytes:
-        told = self.headers.get("Content-Length", "0")
-        if "Transfer-Encoding" in self.headers or not (told.isascii() and told.isdigit()):
+        length = self.headers.get("Content-Length", "0")
+        if "Transfer-Encoding" in self.headers or not (length.isascii() and length.isdigit()):
             raise _Refused(HTTPStatus.LENGTH_REQUIRED, "the request does not say how long it is (Content-Length).")
-        if len(told) > len(str(longest)) or int(told) > longest:
+        if len(length) > len(str(longest)) or int(length) > longest:
             raise _Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"the request is longer than {longest:,} bytes.")
         self.server.expect(self.connection, seconds)
-        content = self.read_body(int(told))
+        content = self.read_body(int(length))
         self.server.expect(self.connection, FOREVER)
-        if len(content) != int(told):
+        if len(content) != int(length):
             raise ConnectionError("the request ended early")
         return content
 
@@ -325,9 +325,9 @@ class _Handler(BoundedHandler):
         try:
             self.close_connection = True
             self._send_head(HTTPStatus.OK, "text/event-stream", {"Connection": "close"})
-            for state in _calmly(self.server.session.changes(HEARTBEAT)):
-                told = ": still here" if state is None else f"data: {json.dumps(asdict(state))}"
-                self.wfile.write(f"{told}\n\n".encode())
+            for state in _throttled(self.server.session.changes(HEARTBEAT)):
+                event = ": still here" if state is None else f"data: {json.dumps(asdict(state))}"
+                self.wfile.write(f"{event}\n\n".encode())
                 self.wfile.flush()
         finally:
             self.server.streams.release()
@@ -365,8 +365,8 @@ class _Handler(BoundedHandler):
 class _Refused(Exception):
     """A request that the server refuses."""
 
-    def __init__(self, status: HTTPStatus, said: str) -> None:
-        super().__init__(said)
+    def __init__(self, status: HTTPStatus, sentence: str) -> None:
+        super().__init__(sentence)
         self.status = status
 
 
@@ -400,7 +400,7 @@ def preset_words(name: str) -> dict[str, Any]:
     return {"engine": preset.engine, "format": preset.file_format or model, "limits": " and ".join(limits)}
 
 
-def _calmly(changes: Iterator[SessionState | None]) -> Iterator[SessionState | None]:
+def _throttled(changes: Iterator[SessionState | None]) -> Iterator[SessionState | None]:
     """Limit the rate of progress to what the eye can follow; the last state of every kind is always sent."""
     for state in changes:
         yield state

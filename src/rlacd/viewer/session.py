@@ -121,7 +121,7 @@ class Session:
             if other_input:
                 self._result = None
                 now = replace(now, version=now.version + 1, draft=False)
-            self._tell(now)
+            self._publish(now)
 
     def stop(self) -> None:
         """End the current work and keep its result so far."""
@@ -136,7 +136,7 @@ class Session:
         """
         with self._changed:
             if self._state.state != "closed":
-                self._tell(replace(self._state, state="closed"))
+                self._publish(replace(self._state, state="closed"))
         self._thread.join(timeout=patience)
         return self.ended
 
@@ -178,7 +178,7 @@ class Session:
                 if is_last:
                     done = result is not None or (number > 1 and error is None)
                     state = replace(state, state="idle", run=(state.run or 0) + 1 if done else state.run, error=error)
-                self._tell(state)
+                self._publish(state)
                 if is_last:
                     return
 
@@ -196,11 +196,11 @@ class Session:
         with self._changed:
             if self._wanted is not None or self._stopped or self._state.state == "closed":
                 return False
-            told = {name: getattr(progress, name) for name in ("stage", "done", "total", "parts", "seconds")}
-            self._tell(replace(self._state, **told))
+            now = {name: getattr(progress, name) for name in ("stage", "done", "total", "parts", "seconds")}
+            self._publish(replace(self._state, **now))
             return True
 
-    def _tell(self, state: SessionState) -> None:
+    def _publish(self, state: SessionState) -> None:
         self._state = state
         self._count += 1
         self._changed.notify_all()

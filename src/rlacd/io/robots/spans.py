@@ -102,13 +102,13 @@ def parse(path: Path, data: bytes) -> Document:
     parser = expat.ParserCreate()
     top: list[Element] = []
     open_elements: list[Element] = []
-    said, count = ["utf-8"], [0]
+    encodings, count = ["utf-8"], [0]
 
     def refuse(*_: object) -> None:
         raise MeshFileError(f"{path} has a document type (<!DOCTYPE>), which may hide anything: remove it.")
 
     def declared(version: str, encoding: str | None, standalone: int) -> None:
-        said[0] = encoding or "utf-8"
+        encodings[0] = encoding or "utf-8"
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         at = parser.CurrentByteIndex
@@ -139,7 +139,7 @@ def parse(path: Path, data: bytes) -> Document:
         raise MeshFileError(f"{path} is not well-formed XML ({error}): mend it first.") from error
     except (LookupError, ValueError) as error:
         raise MeshFileError(f"{path} is in an encoding that is not known here ({error}): save it as UTF-8.") from error
-    return Document(path, data, top[0], said[0])
+    return Document(path, data, top[0], encodings[0])
 
 
 def replaced(data: bytes, edits: Sequence[tuple[int, int, bytes]]) -> bytes:

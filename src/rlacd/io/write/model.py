@@ -156,8 +156,8 @@ def _one_file(model: Model, name: str, far: bool) -> MeshFile:
 
 
 def _mass(result: Result) -> Mass:
-    said = result.report.get("mass")
-    if said is None:  # a result from elsewhere: its hulls stand for the solid
+    mass = result.report.get("mass")
+    if mass is None:  # a result from elsewhere: its hulls stand for the solid
         hulls = trimesh.util.concatenate(result.hulls)
         return mass_of_triangles(hulls.triangles, Frame(np.zeros(3), 1.0))
-    return Mass(float(said["volume_abs"]), np.array(said["centre_abs"]), np.array(said["inertia_abs"]))
+    return Mass(float(mass["volume_abs"]), np.array(mass["centre_abs"]), np.array(mass["inertia_abs"]))

@@ -8,7 +8,7 @@ import numpy.typing as npt
 # Found by a greedy search in Oklab (Ottosson 2020, https://bottosson.github.io/posts/oklab/): each colour is the
 # farthest from all before it, as seen by whoever distinguishes it least among normal sight, protanopia, deuteranopia
 # and tritanopia (Machado et al. 2009, https://doi.org/10.1109/TVCG.2009.113); tests/test_palette.py.
-TELLABLE = bytes.fromhex("5899e0f8d05cb05315ec8781abd2fe8a5e97ad8b1c65f2c353c1c54b7f5fbdba42d26ea4")
+DISTINCT = bytes.fromhex("5899e0f8d05cb05315ec8781abd2fe8a5e97ad8b1c65f2c353c1c54b7f5fbdba42d26ea4")
 
 SHADES = 0.08  # how far the lightness of repeated colours is spread
 
@@ -19,7 +19,7 @@ def hull_colors(count: int) -> npt.NDArray[np.uint8]:
     Twelve colours that colour-blind people can tell apart too, then the same colours slightly lighter or darker, and so
     on: the first two hundred all differ. The first colours do not depend on `count`.
     """
-    twelve = oklab_from_linear(linear_from_srgb(np.frombuffer(TELLABLE, dtype=np.uint8).reshape(-1, 3)))
+    twelve = oklab_from_linear(linear_from_srgb(np.frombuffer(DISTINCT, dtype=np.uint8).reshape(-1, 3)))
     index = np.arange(count)
     oklab = twelve[index % len(twelve)]
     oklab[:, 0] += SHADES * _spread(index // len(twelve))

@@ -84,7 +84,7 @@ class Rollouts:
         self._setting = Shared(setting)
         self._ahead: deque[_Episode | Record] = deque()
         self._begun = 0
-        self._in_vain = 0
+        self._without_cuts = 0
         self._lost = 0
 
     def begin(self, acting: Acting) -> None:
@@ -104,21 +104,21 @@ class Rollouts:
             The error of all of them, such as a missing GPU.
         """
         record = self._record(self._ahead.popleft())
-        self._in_vain = 0 if record.cuts else self._in_vain + 1
+        self._without_cuts = 0 if record.cuts else self._without_cuts + 1
         self._lost = self._lost + 1 if record.how == "lost" else 0
         if self._lost == LOST:
             raise TrainingError(
                 f"{LOST} episodes in a row were lost with their processes; give more --memory or a longer --limit, or "
                 "fewer --jobs, and use --resume."
             )
-        if self._in_vain == TRIES:
+        if self._without_cuts == TRIES:
             raise nothing_to_cut(TRIES, len(self._names))
         return record
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Wait for all episodes ahead, and return everything as arrays."""
         self._ahead = deque(self._record(episode) for episode in self._ahead)
-        arrays: dict[str, NDArray[Any]] = {"counts": np.array([self._begun, len(self._ahead), self._in_vain])}
+        arrays: dict[str, NDArray[Any]] = {"counts": np.array([self._begun, len(self._ahead), self._without_cuts])}
         for i, record in enumerate(self._ahead):
             assert isinstance(record, Record)
             arrays |= {f"{i}.{name}": array for name, array in record.arrays().items()}
@@ -126,7 +126,7 @@ class Rollouts:
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Restore the result of `state`."""
-        self._begun, ahead, self._in_vain = (int(count) for count in arrays["counts"])
+        self._begun, ahead, self._without_cuts = (int(count) for count in arrays["counts"])
         fields = [field.name for field in dataclasses.fields(Record)]
         self._ahead = deque(Record.of({name: arrays[f"{i}.{name}"] for name in fields}) for i in range(ahead))
 
