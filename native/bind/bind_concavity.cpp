@@ -3,6 +3,7 @@
 
 #include "base/arrays.hpp"
 #include "base/parallel.hpp"
+#include "cut/plane_cut.hpp"
 #include "distance/concavity.hpp"
 #include "distance/filling.hpp"
 
@@ -100,7 +101,60 @@ void bind_concavity(nb::module_& m) {
             return self.comes_deeper(hull, threshold);
           },
           nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("threshold"),
-          "Whether the solid's surface comes deeper than the threshold inside a hull: `chance` is 2.");
+          "Whether the solid's surface comes deeper than the threshold inside a hull: `chance` is 2.")
+      .def(
+          "clipped",
+          [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces) -> nb::object {
+            const Mesh hull = to_finite_mesh(hull_vertices, hull_faces);
+            std::optional<ConvexClip> clip;
+            {
+              nb::gil_scoped_release release;
+              clip = self.clipped(hull);
+            }
+            if (!clip) return nb::none();
+            nb::list sections;
+            for (ConvexClip::Section& section : clip->sections) {
+              nb::list rims, outlines;
+              for (std::vector<std::int32_t>& rim : section.rims) {
+                std::vector<Vec3> points;
+                for (const std::int32_t i : rim) points.push_back(clip->mesh.vertices[i]);
+                outlines.append(to_array<double>(on_plane(points, section.normal)));
+                rims.append(to_array<std::int32_t>(std::move(rim)));
+              }
+              sections.append(nb::make_tuple(rims, outlines));
+            }
+            return nb::make_tuple(to_array<double>(std::move(clip->mesh.vertices)),
+                                  to_array<std::int32_t>(std::move(clip->mesh.faces)), sections);
+          },
+          nb::arg("hull_vertices"), nb::arg("hull_faces"),
+          "The solid clipped to a convex hull, without the caps on the hull's facets: vertices [V, 3], faces [F, 3] "
+          "and\n"
+          "for each facet that cuts the solid the rims as loops of vertices, a list of [R], and as points [R, 2] of "
+          "the\n"
+          "plane, counter-clockwise from outside. None where rounding makes the result uncertain.")
+      .def(
+          "uncovered",
+          [](const Filling& self, const std::vector<PointsIn>& vertices, const std::vector<FacesIn>& faces,
+             double reach, double grain) {
+            if (vertices.empty() || vertices.size() != faces.size())
+              throw std::invalid_argument("there must be one array of faces for each array of vertices");
+            if (!(grain > 0)) throw std::invalid_argument("the grain must be positive");
+            std::vector<Mesh> hulls;
+            for (std::size_t i = 0; i < vertices.size(); ++i) hulls.push_back(to_finite_mesh(vertices[i], faces[i]));
+            std::vector<std::vector<Vec3>> points;
+            {
+              nb::gil_scoped_release release;
+              points = self.uncovered(hulls, reach, grain);
+            }
+            nb::list result;
+            for (std::vector<Vec3>& own : points) result.append(to_array<double>(std::move(own)));
+            return result;
+          },
+          nb::arg("vertices"), nb::arg("faces"), nb::arg("reach"), nb::arg("grain"),
+          "Points [N, 3] that each convex hull has to take in, so that together they cover the solid's surface.\n\n"
+          "Hulls grow by at most `grain` more than they must. Hulls farther than `reach` from a face are only looked "
+          "at\n"
+          "if all are.");
 }
 
 }  // namespace rlacd

@@ -10,7 +10,9 @@
 //      solid comes too deep, and facets it shares with one of them need not be examined.
 #pragma once
 
+#include "distance/convex_clip.hpp"
 #include "distance/surface.hpp"
+#include "distance/uncovered.hpp"
 #include "hull/convex_planes.hpp"
 
 namespace rlacd {
@@ -42,6 +44,11 @@ class Filling {
   Joint joint_chance(const HullCorners& first, const HullCorners& second, double threshold) const;
   // Whether the verdict is kNever: much faster than the full verdict.
   bool comes_deeper(const Mesh& hull, double threshold) const;
+
+  std::optional<ConvexClip> clipped(const Mesh& hull) const { return clip_to_convex(solid_, surface_, hull); }
+  std::vector<std::vector<Vec3>> uncovered(const std::vector<Mesh>& hulls, double reach, double grain) const {
+    return rlacd::uncovered(solid_, surface_.bvh(), hulls, reach, grain);
+  }
 
  private:
   // Examines at most this many cells besides the facets themselves.

@@ -203,9 +203,7 @@ class ClippedPart(Part):
     """
 
     def __init__(self, solid: Component, first: Part, second: Part, hull: Hull) -> None:
-        require_time_for(len(solid.faces))
-        body = Manifold(Mesh64(hull.vertices, hull.faces.astype(np.uint64)))
-        vertices, faces = _surface_of(solid.around(hull.box) ^ body)
+        vertices, faces = solid.clipped(hull)
         volume = _native.mesh_volume(vertices, faces) if len(faces) else 0.0
         super().__init__(vertices, faces, volume, hull, first.piece_hulls + second.piece_hulls)
         self.solid = solid
@@ -283,6 +281,18 @@ class Component(Part):
             upper, lower = self.manifold.split_by_plane(plane.normal, plane.offset)
             return _component(lower, self), _component(upper, self)
         return _component(below, self), _component(above, self)
+
+    def clipped(self, hull: Hull) -> tuple[FloatArray, IntArray]:
+        """Return the surface of the solid inside a hull, closed by caps on the hull's facets; empty if none is."""
+        found = self.filling.clipped(hull.vertices, hull.faces)
+        if found is not None:
+            vertices, faces, sections = found
+            caps = [(np.concatenate(rims), *_triangulated(outlines)) for rims, outlines in sections]
+            if all(folded <= NEGLIGIBLE_FOLD for _, _, folded in caps):
+                surface = [faces, *(corners[triangles] for corners, triangles, _ in caps)]
+                return vertices, np.ascontiguousarray(np.concatenate(surface), dtype=np.int32)
+        require_time_for(len(self.faces))
+        return _surface_of(self.around(hull.box) ^ Manifold(Mesh64(hull.vertices, hull.faces.astype(np.uint64))))
 
     def around(self, box: FloatArray) -> Manifold:
         """Return the solid cropped to a box [2, 3] and a margin around it, for booleans with what lies in the box.

@@ -1,0 +1,365 @@
+#include "distance/convex_clip.hpp"
+
+#include <algorithm>
+#include <map>
+#include <tuple>
+#include <unordered_map>
+
+#include "base/stop.hpp"
+#include "hull/convex_planes.hpp"
+#include "hull/hull.hpp"
+
+namespace rlacd {
+namespace {
+
+// Planes are moved out by one to two times this: far above rounding, far below any distance that matters.
+constexpr double kNudge = 1e-8;
+constexpr double kInside = 0.5, kAccuracy = 4;
+
+struct HalfSpace {
+  Vec3 normal;
+  double offset;
+  double depth(Vec3 p) const { return offset - dot(normal, p); }
+};
+
+// A polytope in general position: three facets meet in every corner.
+struct Polytope {
+  struct Edge {
+    std::int32_t left, right;  // facets, left < right
+    std::int32_t from, to;     // corners, counter-clockwise around the left facet
+  };
+  std::vector<HalfSpace> facets;
+  std::vector<Vec3> corners;
+  std::vector<Edge> edges;
+  std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> edge_between;
+};
+
+// The corners of the polytope are the facets of the hull of its planes' dual points.
+std::optional<Polytope> nudged(const Mesh& hull) {
+  const ConvexPlanes planes(hull);
+  Vec3 middle{0, 0, 0};
+  for (const Vec3 p : hull.vertices) middle = middle + (1.0 / static_cast<double>(hull.vertices.size())) * p;
+  std::vector<HalfSpace> all;
+  std::vector<Vec3> duals;
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    const auto plane = static_cast<std::int32_t>(i);
+    const double golden = 0.6180339887498949 * static_cast<double>(i + 1);
+    all.push_back({planes.normal(plane), planes.offset(plane) + kNudge * (1 + golden - std::floor(golden))});
+    const double height = all.back().depth(middle);
+    if (!(height > 0)) return std::nullopt;
+    duals.push_back((1 / height) * all.back().normal);
+  }
+  const Hull dual = convex_hull(duals);
+  if (dual.rank < 3) return std::nullopt;
+
+  Polytope result;
+  for (const std::int32_t i : dual.indices) result.facets.push_back(all[i]);
+  std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> corner_left_of;
+  for (std::size_t t = 0; t < dual.faces.size(); ++t) {
+    const Triangle& face = dual.faces[t];
+    const Vec3 a = duals[dual.indices[face[0]]], b = duals[dual.indices[face[1]]], c = duals[dual.indices[face[2]]];
+    const Vec3 normal = cross(b - a, c - a);
+    const double height = dot(normal, a);
+    if (!(height > 0)) return std::nullopt;
+    result.corners.push_back(middle + (1 / height) * normal);
+    for (int k = 0; k < 3; ++k) corner_left_of[{face[k], face[(k + 1) % 3]}] = static_cast<std::int32_t>(t);
+  }
+  // Around facet i (seen from outside) the corners follow each other as the dual's faces do around point i: the corner
+  // left of the dual edge i -> j comes after the one right of it.
+  for (const auto& [pair, left] : corner_left_of) {
+    const auto [i, j] = pair;
+    if (i > j) continue;
+    const auto right = corner_left_of.find({j, i});
+    if (right == corner_left_of.end()) return std::nullopt;
+    result.edge_between[pair] = static_cast<std::int32_t>(result.edges.size());
+    result.edges.push_back({i, j, right->second, left});
+  }
+  return result;
+}
+
+// What made a corner: a vertex of the solid (v, -1, -1), an edge of it and a facet (v, w, facet) with v < w, a face of
+// it and two facets (~face, facet, facet), or a corner of the polytope (kOwn, corner, 0).
+using Key = std::tuple<std::int32_t, std::int32_t, std::int32_t>;
+constexpr std::int32_t kOwn = std::numeric_limits<std::int32_t>::min();
+
+struct KeyHash {
+  std::size_t operator()(const Key& key) const {
+    std::uint64_t h = static_cast<std::uint32_t>(std::get<0>(key));
+    h = (h ^ (static_cast<std::uint64_t>(static_cast<std::uint32_t>(std::get<1>(key))) << 32)) * 0x9E3779B97F4A7C15u;
+    h = (h ^ (h >> 29) ^ static_cast<std::uint32_t>(std::get<2>(key))) * 0xBF58476D1CE4E5B9u;
+    return static_cast<std::size_t>(h ^ (h >> 32));
+  }
+};
+
+using Group = std::vector<std::int32_t>;
+constexpr std::int32_t kNone = -1;
+
+class Clip {
+ public:
+  Clip(const Mesh& solid, const Surface& surface, Polytope polytope)
+      : solid_(solid), surface_(surface), polytope_(std::move(polytope)) {
+    crossings_.resize(polytope_.edges.size());
+    paths_.resize(polytope_.facets.size());
+  }
+
+  std::optional<ConvexClip> run() {
+    Group all(polytope_.facets.size());
+    for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<std::int32_t>(i);
+    visit(0, all);
+    if (is_contradictory_ || !find_states() || !add_edges() || !link()) return std::nullopt;
+    return std::move(result_);
+  }
+
+ private:
+  struct Crossing {
+    double at;  // along the edge
+    std::int32_t vertex;
+  };
+  struct Crossings {
+    std::vector<Crossing> entries, exits;  // into and out of the solid, along the edge
+  };
+  // A corner of the polygon that is left of a face; `side` is what the polygon's side to the next corner lies on: a
+  // facet, or side ~side of the face.
+  struct Corner {
+    Vec3 point;
+    Key key;
+    std::int32_t side;
+  };
+
+  void visit(std::int32_t at, const Group& crossing) {
+    poll_stop();
+    const Bvh::Node& node = surface_.bvh().nodes()[at];
+    for (int side = 0; side < 2; ++side) {
+      const Box& box = node.box[side];
+      if (box.is_empty()) continue;
+      const Vec3 middle = 0.5 * (box.lower + box.upper), half = 0.5 * (box.upper - box.lower);
+      Group left;
+      bool is_outside = false;
+      for (const std::int32_t facet : crossing) {
+        const Vec3 n = polytope_.facets[facet].normal;
+        const double depth = polytope_.facets[facet].depth(middle);
+        // Rounding may only make a box cross.
+        const double reach = std::fabs(n.x) * half.x + std::fabs(n.y) * half.y + std::fabs(n.z) * half.z + 1e-12;
+        if ((is_outside = depth < -reach)) break;
+        if (depth < reach) left.push_back(facet);
+      }
+      if (is_outside) continue;
+      if (node.child[side] >= 0) {
+        visit(node.child[side], left);
+      } else {
+        for (std::int32_t k = 0; k < node.leaf_size[side]; ++k) clip(surface_.bvh().face(~node.child[side] + k), left);
+      }
+    }
+  }
+
+  void clip(std::int32_t f, const Group& crossing) {
+    const Triangle& face = solid_.faces[f];
+    polygon_.clear();
+    for (int k = 0; k < 3; ++k) polygon_.push_back({solid_.vertices[face[k]], {face[k], kNone, kNone}, ~k});
+    for (const std::int32_t facet : crossing) {
+      depths_.clear();
+      for (const Corner& corner : polygon_) depths_.push_back(polytope_.facets[facet].depth(corner.point));
+      if (std::all_of(depths_.begin(), depths_.end(), [](double depth) { return depth >= 0; })) continue;
+      kept_.clear();
+      for (std::size_t k = 0; k < polygon_.size(); ++k) {
+        const std::size_t next = (k + 1) % polygon_.size();
+        if (depths_[k] >= 0) kept_.push_back(polygon_[k]);
+        if ((depths_[k] >= 0) == (depths_[next] >= 0)) continue;
+        Corner made = meet(f, polygon_[k], polygon_[next], depths_[k], depths_[next], facet);
+        made.side = depths_[k] >= 0 ? facet : polygon_[k].side;
+        kept_.push_back(made);
+      }
+      if (kept_.size() < 3) return;
+      polygon_.swap(kept_);
+    }
+    emit(f);
+  }
+
+  // Where a facet crosses a side of the polygon.
+  Corner meet(std::int32_t f, const Corner& from, const Corner& to, double at_from, double at_to, std::int32_t facet) {
+    if (from.side >= 0) {
+      const auto [low, high] = std::minmax(from.side, facet);
+      const Vec3 point = from.point + (at_from / (at_from - at_to)) * (to.point - from.point);
+      return {point, {~f, low, high}, kNone};
+    }
+    // From the whole edge and always in the same direction: the face on the other side has to find the same bits.
+    const Triangle& face = solid_.faces[f];
+    auto [v, w] = std::minmax(face[~from.side], face[(~from.side + 1) % 3]);
+    const Vec3 p = solid_.vertices[v], q = solid_.vertices[w];
+    const double at_p = polytope_.facets[facet].depth(p), at_q = polytope_.facets[facet].depth(q);
+    return {p + (at_p / (at_p - at_q)) * (q - p), {v, w, facet}, kNone};
+  }
+
+  void emit(std::int32_t f) {
+    numbers_.clear();
+    for (const Corner& corner : polygon_) numbers_.push_back(number_of(corner.key, corner.point));
+    for (std::size_t k = 2; k < polygon_.size(); ++k)
+      if (numbers_[0] != numbers_[k - 1] && numbers_[k - 1] != numbers_[k] && numbers_[k] != numbers_[0])
+        result_.mesh.faces.push_back({numbers_[0], numbers_[k - 1], numbers_[k]});
+    for (std::size_t k = 0; k < polygon_.size(); ++k) {
+      const std::size_t before = (k + polygon_.size() - 1) % polygon_.size(), next = (k + 1) % polygon_.size();
+      const std::int32_t facet = polygon_[k].side, last = polygon_[before].side;
+      if (facet < 0) continue;
+      paths_[facet].emplace_back(numbers_[next], numbers_[k]);  // the cap lies on the other side
+      if (last < 0) continue;
+      // The face leaves the facet `last` here. Its cap's rim comes along the edge between the two to this corner, where
+      // it enters the face's path: what is inside the solid ends here for who goes around `last`.
+      const auto found = polytope_.edge_between.find(std::minmax(last, facet));
+      if (found == polytope_.edge_between.end()) {
+        is_contradictory_ = true;
+        continue;
+      }
+      const Polytope::Edge& edge = polytope_.edges[found->second];
+      const Vec3 from = polytope_.corners[edge.from], to = polytope_.corners[edge.to];
+      Crossings& own = crossings_[found->second];
+      (last == edge.left ? own.exits : own.entries).push_back({dot(polygon_[k].point - from, to - from), numbers_[k]});
+    }
+    static_cast<void>(f);
+  }
+
+  std::int32_t number_of(const Key& key, Vec3 point) {
+    const auto [at, is_new] = numbers_by_key_.try_emplace(key, static_cast<std::int32_t>(result_.mesh.vertices.size()));
+    if (is_new) result_.mesh.vertices.push_back(point);
+    return at->second;
+  }
+
+  // Decides which corners of the polytope are inside the solid: along an edge, every entry and exit changes sides.
+  bool find_states() {
+    const std::size_t count = polytope_.corners.size();
+    std::vector<std::vector<std::pair<std::int32_t, std::int32_t>>> around(count);  // (other corner, change)
+    for (std::size_t e = 0; e < crossings_.size(); ++e) {
+      const Polytope::Edge& edge = polytope_.edges[e];
+      const auto change = static_cast<std::int32_t>(crossings_[e].entries.size()) -
+                          static_cast<std::int32_t>(crossings_[e].exits.size());
+      around[edge.from].emplace_back(edge.to, change);
+      around[edge.to].emplace_back(edge.from, -change);
+    }
+    constexpr std::int32_t kUnknown = std::numeric_limits<std::int32_t>::max();
+    states_.assign(count, kUnknown);
+    states_[0] = 0;
+    Group waiting = {0};
+    while (!waiting.empty()) {
+      const std::int32_t at = waiting.back();
+      waiting.pop_back();
+      for (const auto& [other, change] : around[at]) {
+        if (states_[other] == kUnknown) {
+          states_[other] = states_[at] + change;
+          waiting.push_back(other);
+        } else if (states_[other] != states_[at] + change) {
+          return false;
+        }
+      }
+    }
+    const auto [least, most] = std::minmax_element(states_.begin(), states_.end());
+    if (*most == kUnknown || *most - *least > 1) return false;
+    const std::int32_t first = *most > *least ? -*least : (first_is_inside() ? 1 : 0) - *least;
+    for (std::int32_t& state : states_) state += first;
+    return true;
+  }
+
+  // Whether the polytope's corners are inside, if all are on the same side.
+  bool first_is_inside() const {
+    double widest = 0;
+    bool is_inside = false;
+    for (const Crossings& own : crossings_) {
+      if (own.entries.empty()) continue;
+      const auto before = [](const Crossing& a, const Crossing& b) { return a.at < b.at; };
+      const double entry = std::min_element(own.entries.begin(), own.entries.end(), before)->at;
+      const double exit = std::min_element(own.exits.begin(), own.exits.end(), before)->at;
+      if (std::fabs(entry - exit) <= widest) continue;
+      widest = std::fabs(entry - exit);
+      is_inside = exit < entry;
+    }
+    if (widest > 0) return is_inside;
+    // No edge crosses the solid: any point of one will do, the farthest from the surface best.
+    double farthest = -1;
+    Vec3 best = polytope_.corners[0];
+    for (const Polytope::Edge& edge : polytope_.edges) {
+      const Vec3 middle = 0.5 * (polytope_.corners[edge.from] + polytope_.corners[edge.to]);
+      const double distance = surface_.bvh().closest(middle).distance2;
+      if (distance > farthest) farthest = distance, best = middle;
+    }
+    return surface_.winding().at(best, kAccuracy) > kInside;
+  }
+
+  // Adds the parts of the polytope's edges that are inside the solid to the rims on both sides.
+  bool add_edges() {
+    for (std::size_t e = 0; e < crossings_.size(); ++e) {
+      const Polytope::Edge& edge = polytope_.edges[e];
+      Crossings& own = crossings_[e];
+      const auto corner = [&](std::int32_t c) { return number_of({kOwn, c, 0}, polytope_.corners[c]); };
+      constexpr double kFar = std::numeric_limits<double>::infinity();
+      if (states_[edge.from] == 1) own.entries.push_back({-kFar, corner(edge.from)});
+      if (states_[edge.to] == 1) own.exits.push_back({kFar, corner(edge.to)});
+      if (own.entries.size() != own.exits.size()) return false;
+      const auto before = [](const Crossing& a, const Crossing& b) {
+        return std::tie(a.at, a.vertex) < std::tie(b.at, b.vertex);
+      };
+      std::sort(own.entries.begin(), own.entries.end(), before);
+      std::sort(own.exits.begin(), own.exits.end(), before);
+      for (std::size_t k = 0; k < own.entries.size(); ++k) {
+        paths_[edge.left].emplace_back(own.entries[k].vertex, own.exits[k].vertex);
+        paths_[edge.right].emplace_back(own.exits[k].vertex, own.entries[k].vertex);
+      }
+    }
+    return true;
+  }
+
+  // Joins the paths on every facet to loops.
+  bool link() {
+    for (std::size_t i = 0; i < paths_.size(); ++i) {
+      auto& paths = paths_[i];
+      paths.erase(
+          std::remove_if(paths.begin(), paths.end(), [](const auto& path) { return path.first == path.second; }),
+          paths.end());
+      if (paths.empty()) continue;
+      poll_stop();
+      std::sort(paths.begin(), paths.end());
+      ConvexClip::Section section{polytope_.facets[i].normal, {}};
+      std::vector<char> is_used(paths.size(), 0);
+      const auto leave = [&](std::int32_t vertex) {  // an unused path from a vertex
+        auto at = std::lower_bound(paths.begin(), paths.end(), std::pair(vertex, kOwn));
+        while (at != paths.end() && at->first == vertex && is_used[static_cast<std::size_t>(at - paths.begin())]) ++at;
+        return at != paths.end() && at->first == vertex ? at - paths.begin() : -1;
+      };
+      for (std::size_t start = 0; start < paths.size(); ++start) {
+        if (is_used[start]) continue;
+        std::vector<std::int32_t> loop;
+        auto at = static_cast<std::ptrdiff_t>(start);
+        do {
+          is_used[static_cast<std::size_t>(at)] = 1;
+          loop.push_back(paths[static_cast<std::size_t>(at)].first);
+          const std::int32_t end = paths[static_cast<std::size_t>(at)].second;
+          if (end == loop.front()) break;
+          at = leave(end);
+        } while (at >= 0);
+        if (at < 0) return false;
+        if (loop.size() > 2) section.rims.push_back(std::move(loop));
+      }
+      if (!section.rims.empty()) result_.sections.push_back(std::move(section));
+    }
+    return true;
+  }
+
+  const Mesh& solid_;
+  const Surface& surface_;
+  const Polytope polytope_;
+  std::vector<Crossings> crossings_;                                       // of the polytope's edges
+  std::vector<std::vector<std::pair<std::int32_t, std::int32_t>>> paths_;  // on its facets
+  std::vector<std::int32_t> states_;                                       // 1 for its corners inside the solid
+  bool is_contradictory_ = false;
+  std::vector<Corner> polygon_, kept_;
+  std::vector<double> depths_;
+  std::vector<std::int32_t> numbers_;
+  std::unordered_map<Key, std::int32_t, KeyHash> numbers_by_key_;
+  ConvexClip result_;
+};
+
+}  // namespace
+
+std::optional<ConvexClip> clip_to_convex(const Mesh& solid, const Surface& surface, const Mesh& hull) {
+  std::optional<Polytope> polytope = nudged(hull);
+  return polytope ? Clip(solid, surface, std::move(*polytope)).run() : std::nullopt;
+}
+
+}  // namespace rlacd

@@ -1,0 +1,123 @@
+"""Clipping a solid to a convex hull without a boolean, and which hulls take in what of a surface others miss."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from manifold3d import Manifold, Mesh64
+
+from rlacd import _native
+from rlacd.solid.component import Component
+from rlacd.solid.distance import hull_union
+from rlacd.solid.hull import Hull
+
+
+def solids() -> dict[str, trimesh.Trimesh]:
+    bumpy = trimesh.creation.icosphere(subdivisions=4)
+    bumpy.vertices *= 1 + 0.1 * np.random.default_rng(0).normal(size=(len(bumpy.vertices), 1))
+    return {
+        "box": trimesh.creation.box((1, 2, 3)),
+        "ring": trimesh.creation.torus(1.0, 0.3, 64, 32),
+        "bumpy ball": bumpy,
+        "hollow box": trimesh.creation.box((2, 2, 2)) + inverted(trimesh.creation.box((1.5, 1.5, 1.5))),
+        "two boxes": trimesh.creation.box((1, 1, 1)) + trimesh.creation.box((1, 1, 1)).apply_translation((2, 0, 0)),
+    }
+
+
+def inverted(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    mesh.invert()
+    return mesh
+
+
+def component(mesh: trimesh.Trimesh) -> Component:
+    return Component((np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int32)))
+
+
+def hulls(mesh: trimesh.Trimesh, count: int = 30) -> list[Hull]:
+    """Hulls of corners of the solid (its faces touch the facets), of grid points (coplanar faces), and of any points."""
+    rng = np.random.default_rng(1)
+    found = []
+    for size in rng.integers(4, 40, size=count).tolist():
+        near = mesh.vertices[rng.integers(len(mesh.vertices))]
+        for points in (
+            mesh.vertices[rng.integers(len(mesh.vertices), size=size)],
+            rng.integers(-4, 5, size=(size, 3)) / 2,
+            near + 0.3 * rng.normal(size=(size, 3)),
+        ):
+            hull = Hull.of(np.array(points, dtype=np.float64))
+            if hull is not None:
+                found.append(hull)
+    return found
+
+
+def is_closed(faces: np.ndarray) -> bool:
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    there, back = (np.unique(e, axis=0, return_counts=True) for e in (edges, edges[:, ::-1]))
+    return len(there[0]) == len(back[0]) and all((a == b).all() for a, b in zip(there, back, strict=True))
+
+
+@pytest.mark.parametrize("name", solids())
+def test_clipping_agrees_with_a_boolean(name: str) -> None:
+    mesh = solids()[name]
+    solid = component(mesh)
+    undecided = 0
+    for hull in hulls(mesh):
+        undecided += solid.filling.clipped(hull.vertices, hull.faces) is None
+        vertices, faces = solid.clipped(hull)
+        assert is_closed(faces)
+        boolean = solid.manifold ^ Manifold(Mesh64(hull.vertices, hull.faces.astype(np.uint64)))
+        assert _native.mesh_volume(vertices, faces) == pytest.approx(boolean.volume(), abs=1e-6)
+        if len(faces):
+            planes = hull.vertices[hull.faces]
+            normals = np.cross(planes[:, 1] - planes[:, 0], planes[:, 2] - planes[:, 0])
+            large = np.linalg.norm(normals, axis=1) > 1e-6
+            normals = normals[large] / np.linalg.norm(normals[large], axis=1)[:, None]
+            heights = np.einsum("vfk,fk->vf", vertices[:, None] - planes[None, large, 0], normals)
+            assert heights[np.unique(faces)].max() < 1e-6
+    assert undecided <= 2  # a boolean decides
+
+
+def test_the_result_does_not_depend_on_threads_or_on_earlier_calls() -> None:
+    mesh = solids()["bumpy ball"]
+    first, second = component(mesh), component(mesh)
+    some = hulls(mesh, 5)
+    for hull in some:
+        second.clipped(hull)
+    for hull in some:
+        for a, b in zip(first.clipped(hull), second.clipped(hull), strict=True):
+            assert a.tobytes() == b.tobytes()
+
+
+def test_a_hull_around_everything_changes_nothing_and_one_inside_is_filled() -> None:
+    ball = component(solids()["bumpy ball"])
+    around = Hull.of(3 * np.array(trimesh.creation.box((1, 1, 1)).vertices))
+    inside = Hull.of(0.5 * np.array(trimesh.creation.box((1, 1, 1)).vertices))
+    assert around is not None
+    assert inside is not None
+    assert len(ball.clipped(around)[1]) == len(ball.faces)
+    assert _native.mesh_volume(*ball.clipped(inside)) == pytest.approx(inside.volume, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["ring", "bumpy ball", "two boxes"])
+def test_hulls_that_take_in_what_is_uncovered_cover_the_surface(name: str) -> None:
+    """Hulls of pieces of a shrunk copy miss the surface everywhere; each then takes in its share, and little more."""
+    mesh = solids()[name]
+    shrunk = component(mesh.copy().apply_scale(0.97))
+    x = np.linspace(*shrunk.box[:, 0], 6)[1:-1]
+    pieces, rest = [], shrunk.manifold
+    for offset in x:
+        beyond, below = rest.split_by_plane((1, 0, 0), float(offset))
+        pieces.append(below)
+        rest = beyond
+    pieces.append(rest)
+    small = [hull for piece in pieces if (hull := Hull.of(np.array(piece.to_mesh64().vert_properties[:, :3]))) is not None]
+    solid = component(mesh)
+    points = solid.filling.uncovered([h.vertices for h in small], [h.faces for h in small], 0.1, 1e-3)
+    grown = [Hull.of(np.concatenate([h.vertices, p])) for h, p in zip(small, points, strict=True)]
+    assert all(hull is not None for hull in grown)
+    covering = [hull for hull in grown if hull is not None]
+    assert hull_union(covering, 1).under(solid.vertices, solid.faces, 1e-5, 1)[1] <= 2e-5
+    need = hull_union(small, 1).under(solid.vertices, solid.faces, 1e-4, 1)[1]
+    for before, after in zip(small, covering, strict=True):
+        assert hull_union([before], 1).distance(after.vertices, 1).max() < 6 * need + 1e-2
