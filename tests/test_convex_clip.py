@@ -35,7 +35,7 @@ def component(mesh: trimesh.Trimesh) -> Component:
 
 
 def hulls(mesh: trimesh.Trimesh, count: int = 30) -> list[Hull]:
-    """Hulls of corners of the solid (its faces touch the facets), of grid points (coplanar faces), and of any points."""
+    """Hulls of corners of the solid, whose faces touch the facets, of grid points, and of any points."""
     rng = np.random.default_rng(1)
     found = []
     for size in rng.integers(4, 40, size=count).tolist():
@@ -111,10 +111,11 @@ def test_hulls_that_take_in_what_is_uncovered_cover_the_surface(name: str) -> No
         pieces.append(below)
         rest = beyond
     pieces.append(rest)
-    small = [hull for piece in pieces if (hull := Hull.of(np.array(piece.to_mesh64().vert_properties[:, :3]))) is not None]
+    corners = [np.array(piece.to_mesh64().vert_properties[:, :3]) for piece in pieces]
+    small = [hull for points in corners if (hull := Hull.of(points)) is not None]
     solid = component(mesh)
-    points = solid.filling.uncovered([h.vertices for h in small], [h.faces for h in small], 0.1, 1e-3)
-    grown = [Hull.of(np.concatenate([h.vertices, p])) for h, p in zip(small, points, strict=True)]
+    missed = solid.filling.uncovered([h.vertices for h in small], [h.faces for h in small], 0.1, 1e-3)
+    grown = [Hull.of(np.concatenate([h.vertices, p])) for h, p in zip(small, missed, strict=True)]
     assert all(hull is not None for hull in grown)
     covering = [hull for hull in grown if hull is not None]
     assert hull_union(covering, 1).under(solid.vertices, solid.faces, 1e-5, 1)[1] <= 2e-5
