@@ -1,6 +1,5 @@
-// Python bindings of plane cuts and of connected components.
+// Python bindings of plane cuts and of the pieces they leave.
 #include "base/arrays.hpp"
-#include "base/point_bodies.hpp"
 #include "cut/bodies.hpp"
 #include "cut/plane_cut.hpp"
 
@@ -59,21 +58,6 @@ void bind_plane_cut(nb::module_& m) {
       },
       nb::arg("vertices"), nb::arg("faces"),
       "The pieces of a mesh that hang together by edges, each with its own vertices: a list of (vertices, faces).");
-  m.def(
-      "point_bodies",
-      [](const PointsIn& vertices, const FacesIn& faces) {
-        const Mesh mesh = to_mesh(vertices, faces);
-        std::vector<std::int32_t> body;
-        {
-          nb::gil_scoped_release release;
-          body = point_bodies(mesh);
-        }
-        return to_array<std::int32_t>(std::move(body));
-      },
-      nb::arg("vertices"), nb::arg("faces"),
-      "The body [V] of each vertex of a mesh of any quality, numbered from 0 by their first faces, -1 for those of "
-      "none:\n"
-      "faces hang together where they share a corner, or have corners in one place.");
 }
 
 }  // namespace rlacd

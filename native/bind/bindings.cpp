@@ -7,6 +7,7 @@ void bind_concavity(nanobind::module_& m);
 void bind_distance(nanobind::module_& m);
 void bind_glue(nanobind::module_& m);
 void bind_hull(nanobind::module_& m);
+void bind_mesh(nanobind::module_& m);
 void bind_navigable(nanobind::module_& m);
 void bind_plane_cut(nanobind::module_& m);
 void bind_simplify(nanobind::module_& m);
@@ -27,6 +28,7 @@ NB_MODULE(_native, m) {
   rlacd::bind_distance(m);
   rlacd::bind_glue(m);
   rlacd::bind_hull(m);
+  rlacd::bind_mesh(m);
   rlacd::bind_navigable(m);
   rlacd::bind_plane_cut(m);
   rlacd::bind_simplify(m);

@@ -2,6 +2,9 @@
 
 from collections.abc import Callable, Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rlacd.solid.arrays import FloatArray, IntArray
 
 Interval = tuple[float, float]
@@ -59,6 +62,20 @@ def outward_where_touching(
 def cut_by_plane(
     vertices: FloatArray, faces: IntArray, x: float, y: float, z: float, offset: float
 ) -> tuple[_OpenSide, _OpenSide]: ...
+def weld(vertices: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray, IntArray]: ...
+def edges(
+    faces: NDArray[np.int64], count: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]: ...  # [3F], [E, 2], [E]
+def components(count: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> tuple[int, NDArray[np.int64]]: ...
+def face_areas(vertices: FloatArray, faces: NDArray[np.int64]) -> FloatArray: ...  # [F]
+def signed_tetrahedra(vertices: FloatArray, faces: NDArray[np.int64]) -> FloatArray: ...  # [F]
+def closed_bodies(
+    vertices: FloatArray, faces: IntArray
+) -> (
+    tuple[NDArray[np.int64], FloatArray, FloatArray, FloatArray, bool, float, float] | None
+): ...  # [F], [B], [B], [B, 6], no pinch, least height, sharpest
+def separate_fans(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]: ...
+def along_a_curve(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]: ...
 def point_bodies(vertices: FloatArray, faces: IntArray) -> IntArray: ...  # [V]
 def bodies(vertices: FloatArray, faces: IntArray) -> list[tuple[FloatArray, IntArray]]: ...
 

@@ -205,7 +205,7 @@ def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Cl
             )
         options = options.at_scale(solid.frame.scale)
         goal = _prepared(options, solid, workers, clock)
-        root = Component(solid.manifold)
+        root = Component(solid.shape)
     except Stopped:
         clock.note_stop()
         solid, parts = cover(source, clock)

@@ -41,7 +41,7 @@ def make_report(
 
     Values that there was no time to measure are None.
     """
-    is_cover = solid.manifold.is_empty()  # hulls of an input that was not repaired: the parts in them are unknown
+    is_cover = len(solid.faces) == 0  # hulls of an input that was not repaired: the parts in them are unknown
     errors = None if is_cover else clock.if_in_time(lambda: workers.map(criterion.error, parts), lambda: None)
     summary = criterion.summary(errors)
     over = under = None
@@ -124,7 +124,7 @@ def _coarse(solid: Solid) -> list[str]:
 
 def _out_of_the_box(hulls: Sequence[Hull], solid: Solid) -> list[str]:
     """Warn of limits that no tight hull can meet: the criterion cannot see it, as there are no balls so far out."""
-    lower, upper = np.array(solid.manifold.bounding_box()).reshape(2, 3)
+    lower, upper = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
     beyond = max(float(max((lower - hull.box[0]).max(), (hull.box[1] - upper).max())) for hull in hulls)
     if beyond <= HONEST_WITHIN:
         return []

@@ -138,7 +138,7 @@ def decompose_as_deployed(
     """
     solid = repair(load_mesh((vertices, faces)), threads=threads)
     with Workers(threads) as workers:
-        tree = CutTree(Component(solid.manifold), Deployed(deployment, threshold), workers)
+        tree = CutTree(Component(solid.shape), Deployed(deployment, threshold), workers)
         parts = cut_and_merge(tree, Concavity(threshold), workers, Clock()).parts
     there = [Hull.of(solid.frame.to_input(limit_part(part, None, None).hull.vertices)) for part in parts]
     return [(hull.vertices, hull.faces) for hull in there if hull is not None]

@@ -94,7 +94,7 @@ def _trees(meshes: Path, names: list[str], count: int, depth: int) -> list[Node]
     small = [name for name in sorted(names) if (meshes / name).stat().st_size < SMALL_FILE]
     for name in [small[i] for i in np.random.default_rng(0).permutation(len(small))]:
         try:
-            solid = Component(repair(load_mesh(meshes / name)).manifold)
+            solid = Component(repair(load_mesh(meshes / name)).shape)
             found = grow(solid, Concavity(THRESHOLD), middle_planes(), depth)
         except (RlacdError, ValueError):
             continue

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rlacd._native import mesh_volume
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
 
@@ -53,8 +54,8 @@ def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
             for body in solid.bodies
         ],
         "solid": {
-            "faces": int(solid.manifold.num_tri()),
-            "volume": float(solid.manifold.volume()) / float(solid.frame.scale) ** 3,
+            "faces": len(solid.faces),
+            "volume": mesh_volume(solid.vertices, solid.faces) / float(solid.frame.scale) ** 3,
         },
         "warnings": list(solid.warnings),
     }

@@ -105,7 +105,7 @@ class NavigableSpace(SpaceOptions):
         scale = solid.frame.scale
         radius, tolerance = self.in_frame(scale)
         warnings = list(_warnings(solid))
-        vertices, faces = _surface_of(solid)
+        vertices, faces = solid.vertices, solid.faces
         surface = _native.Surface(vertices, faces)
         planes = _planes_in_frame(self.closed_planes, solid.frame)
         seeds = None
@@ -356,14 +356,6 @@ class _Intrusions:
     def _recall(self, part: Part) -> tuple[IntArray, FloatArray] | None:
         with self._lock:
             return self._known.get(part)
-
-
-def _surface_of(solid: Solid) -> tuple[FloatArray, IntArray]:
-    mesh = solid.manifold.to_mesh64()
-    return (
-        np.ascontiguousarray(mesh.vert_properties[:, :3], dtype=np.float64),
-        np.ascontiguousarray(mesh.tri_verts, dtype=np.int32),
-    )
 
 
 def _planes_in_frame(planes: Sequence[tuple[Point, float]], frame: Frame) -> FloatArray:

@@ -130,12 +130,11 @@ SOLID = "solid.npz"
 def repaired(path: Path) -> bytes:
     """Repair a mesh and pack it for `unpack_solid`."""
     try:
-        solid = repair(load_mesh(path), threads=1).manifold
-        Component(solid)
+        solid = repair(load_mesh(path), threads=1)
+        Component(solid.shape)
     except (RlacdError, ValueError):  # flat or empty: nothing to cut
         return pack_solid(*NOTHING)
-    mesh = solid.to_mesh64()
-    return pack_solid(np.asarray(mesh.vert_properties[:, :3]), np.asarray(mesh.tri_verts, dtype=np.uint64))
+    return pack_solid(solid.vertices, solid.faces.astype(np.uint64))
 
 
 def pack_solid(vertices: FloatArray, faces: NDArray[np.uint64]) -> bytes:

@@ -22,6 +22,7 @@ from functools import cached_property
 import numpy as np
 from manifold3d import Manifold
 
+from rlacd import _native
 from rlacd._native import poll_stop
 from rlacd.errors import EmptyMeshError
 from rlacd.repair.caps import FLAPS, close_holes
@@ -39,6 +40,7 @@ from rlacd.repair.union import (
     unite_around_cavities,
 )
 from rlacd.repair.voxels import Reach
+from rlacd.solid.arrays import IntArray as Indices
 from rlacd.solid.frame import FloatArray, Frame
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import BodyRepair, Solid
@@ -48,9 +50,6 @@ from rlacd.solid.topology import (
     IntArray,
     bodies_of,
     face_areas,
-    first_of_doubled,
-    merge_equal_vertices,
-    nondegenerate,
     signed_tetrahedra,
 )
 
@@ -72,6 +71,8 @@ _LOST = 5e-3
 _CROWD, _CROSSINGS = 300, 1000
 # A closed body with less volume per area is flat: there is nothing to cut.
 _FLAT = 1e-6
+# manifold3d collapses edges shorter than 1e-12, and swaps those of faces that are no higher or folded back in a plane.
+_THIN, _FOLDED = 1e-8, -1 + 1e-6
 
 
 def repair(
@@ -114,21 +115,18 @@ def repair(
     """
     poll_stop()
     warnings = list(mesh.warnings)
-    points = mesh.vertices[np.unique(mesh.faces)] if len(mesh.faces) else mesh.vertices
+    points, corners = _used(mesh)
     if len(points) == 0:
         raise EmptyMeshError("the mesh has no points, so there is nothing to decompose: check the file or its export")
     poll_stop()
     frame = Frame.of(points)
     points = frame.to_frame(points)
     poll_stop()
-    used, corner = np.unique(mesh.faces, return_inverse=True)
-    poll_stop()
-    vertices, index = merge_equal_vertices(frame.to_frame(mesh.vertices[used]))
-    faces = index[corner.reshape(-1, 3)]
-    poll_stop()
-    faces = faces[nondegenerate(faces)]
-    faces = faces[first_of_doubled(faces, len(vertices))]
-    surface = (vertices, np.ascontiguousarray(faces, dtype=np.int32))
+    surface = vertices, _ = _native.weld(points, corners)
+    taken = _taken_as_it_is(*surface)
+    if taken is not None:
+        return Solid(taken[0], surface, frame, (taken[1],), tuple(warnings))
+    faces = surface[1].astype(np.int64)
 
     if len(faces) == 0 or face_areas(vertices, faces).max() < NO_AREA:
         warnings.append("no face has an area: the hull of the points stands in for the solid")
@@ -151,6 +149,33 @@ def repair(
         if other.deviation.max() < work.deviation.max():
             work = other
     return Solid(work.solid, surface, frame, work.report(), tuple(warnings + work.warnings))
+
+
+def _used(mesh: InputMesh) -> tuple[FloatArray, IntArray]:
+    """The points that faces use and the faces by these; all points if there are no faces."""
+    used = np.zeros(len(mesh.vertices), dtype=bool)
+    used[mesh.faces] = True
+    if used.all() or len(mesh.faces) == 0:
+        return mesh.vertices, mesh.faces
+    return mesh.vertices[used], (np.cumsum(used) - 1)[mesh.faces]
+
+
+def _taken_as_it_is(vertices: FloatArray, faces: Indices) -> tuple[tuple[FloatArray, Indices], BodyRepair] | None:
+    """One closed and oriented body, as it is; None for anything else.
+
+    The vertices and faces are those that manifold3d would make of it, in its order, as long as it would leave all edges
+    alone; it takes twenty times as long.
+    """
+    found = _native.closed_bodies(vertices, faces)
+    if found is None or len(found[1]) > 1:
+        return None
+    _, (volume,), (area,), _, has_no_pinch, least_height, sharpest = found
+    if abs(volume) <= 2 * _FLAT * area or least_height <= _THIN or sharpest <= _FOLDED:
+        return None
+    outward = faces if volume > 0 else np.ascontiguousarray(faces[:, ::-1])
+    separate = (vertices, outward) if has_no_pinch else _native.separate_fans(vertices, outward)
+    step = "closed" if volume > 0 else "reoriented"
+    return _native.along_a_curve(*separate), BodyRepair(0, step, len(faces), len(faces), 0.0)
 
 
 class _Repair:

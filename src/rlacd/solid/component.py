@@ -16,6 +16,7 @@ from rlacd import _native
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.boolean_time import require_time_for
 from rlacd.solid.hull import Hull
+from rlacd.solid.solid import surface_of
 
 NEGLIGIBLE_VOLUME = 1e-12
 """Solids below this volume (the frame's box has 8) are rounding left over by a cut."""
@@ -235,7 +236,7 @@ class Component(Part):
     """
 
     def __init__(self, solid: Manifold | tuple[FloatArray, IntArray]) -> None:
-        vertices, faces = solid if isinstance(solid, tuple) else _surface_of(solid)
+        vertices, faces = solid if isinstance(solid, tuple) else surface_of(solid)
         hull = Hull.of(vertices)
         if hull is None:
             raise ValueError("a component has to have a volume")
@@ -292,7 +293,7 @@ class Component(Part):
                 surface = [faces, *(corners[triangles] for corners, triangles, _ in caps)]
                 return vertices, np.ascontiguousarray(np.concatenate(surface), dtype=np.int32)
         require_time_for(len(self.faces))
-        return _surface_of(self.around(hull.box) ^ Manifold(Mesh64(hull.vertices, hull.faces.astype(np.uint64))))
+        return surface_of(self.around(hull.box) ^ Manifold(Mesh64(hull.vertices, hull.faces.astype(np.uint64))))
 
     def around(self, box: FloatArray) -> Manifold:
         """Return the solid cropped to a box [2, 3] and a margin around it, for booleans with what lies in the box.
@@ -355,12 +356,6 @@ class Component(Part):
         cavities = [body for volume, body in zip(volumes, bodies, strict=True) if volume < 0]
         surfaces = _enclose(shells, cavities) if cavities else [body for _, body in shells]
         return [piece for surface in surfaces if (piece := _component(surface, self)) is not None]
-
-
-def _surface_of(manifold: Manifold) -> tuple[FloatArray, IntArray]:
-    mesh = manifold.to_mesh64()
-    vertices = np.ascontiguousarray(mesh.vert_properties[:, :3], dtype=np.float64)
-    return vertices, np.ascontiguousarray(mesh.tri_verts, dtype=np.int32)
 
 
 def _halves(

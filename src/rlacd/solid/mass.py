@@ -40,8 +40,7 @@ class Mass:
 
 def mass_of(solid: Solid) -> Mass:
     """Integrate over a repaired input, which is closed whatever the input was."""
-    mesh = solid.manifold.to_mesh64()
-    return mass_of_triangles(mesh.vert_properties[:, :3][mesh.tri_verts], solid.frame)
+    return mass_of_triangles(solid.vertices[solid.faces], solid.frame)
 
 
 def mass_of_triangles(triangles: FloatArray, frame: Frame) -> Mass:

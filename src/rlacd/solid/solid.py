@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
-import manifold3d
 import numpy as np
+from manifold3d import Manifold, Mesh64
 from numpy.typing import NDArray
 
 from rlacd.solid.frame import FloatArray, Frame
@@ -41,8 +42,9 @@ class Solid:
 
     Attributes
     ----------
-    manifold
-        The union of all repaired bodies, without inner cavities.
+    shape
+        The union of all repaired bodies, without inner cavities: a manifold, or its vertices float64 ``[V, 3]`` and
+        faces int32 ``[F, 3]`` in the order that manifold3d would give them.
     surface
         Vertices float64 ``[V, 3]`` and faces int32 ``[F, 3]`` of the input, duplicates dropped, nothing else changed.
     frame
@@ -53,8 +55,38 @@ class Solid:
         One sentence for each thing the user should know.
     """
 
-    manifold: manifold3d.Manifold
+    shape: Manifold | tuple[FloatArray, NDArray[np.int32]]
     surface: tuple[FloatArray, NDArray[np.int32]]
     frame: Frame
     bodies: tuple[BodyRepair, ...]
     warnings: tuple[str, ...]
+
+    @property
+    def vertices(self) -> FloatArray:
+        """Of the shape ``[V, 3]``."""
+        return self._mesh[0]
+
+    @property
+    def faces(self) -> NDArray[np.int32]:
+        """Of the shape ``[F, 3]``, outward."""
+        return self._mesh[1]
+
+    @cached_property
+    def manifold(self) -> Manifold:
+        """The shape, ready for booleans; made when first needed, which takes longer than all of repair."""
+        return (
+            self.shape
+            if isinstance(self.shape, Manifold)
+            else Manifold(Mesh64(self.vertices, self.faces.astype(np.uint64)))
+        )
+
+    @cached_property
+    def _mesh(self) -> tuple[FloatArray, NDArray[np.int32]]:
+        return surface_of(self.shape) if isinstance(self.shape, Manifold) else self.shape
+
+
+def surface_of(manifold: Manifold) -> tuple[FloatArray, NDArray[np.int32]]:
+    """Return the vertices ``[V, 3]`` and faces ``[F, 3]`` of a manifold."""
+    mesh = manifold.to_mesh64()
+    vertices = np.ascontiguousarray(mesh.vert_properties[:, :3], dtype=np.float64)
+    return vertices, np.ascontiguousarray(mesh.tri_verts, dtype=np.int32)

@@ -13,14 +13,12 @@ volume, those of enclosed rooms negative; a face with both sides in one componen
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
+from rlacd import _native
 from rlacd._native import poll_stop
 from rlacd.solid.frame import FloatArray
 
@@ -30,31 +28,7 @@ BoolArray = NDArray[np.bool_]
 # Faces closer in angle than this (radians) coincide to the precision of float32 files.
 _SAME_ANGLE = 1e-4
 
-# Faces processed between two polls of the stop.
-_AT_ONCE = 1 << 16
-
 _NEXT = np.array([1, 2, 0])
-
-
-def merge_equal_vertices(vertices: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return the distinct vertices ``[U, 3]``, in order of first appearance, and ``[V]`` the new index of each."""
-    vertices = np.ascontiguousarray(vertices + 0.0)  # turns -0.0 into 0.0: they are equal but differ in their bits
-    if len(vertices) == 0:
-        return vertices, np.empty(0, dtype=np.int64)
-    bits = vertices.view(np.uint64).reshape(-1, 3)
-    key = np.zeros(len(bits), dtype=np.uint64)
-    poll_stop()
-    for axis in range(3):  # one 64-bit word per vertex sorts several times faster than rows do
-        key = (key ^ (bits[:, axis] >> np.uint64(29)) ^ bits[:, axis]) * np.uint64(0x9E3779B97F4A7C15)
-        key ^= key >> np.uint64(32)
-    _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
-    if not np.array_equal(vertices[first[inverse]], vertices):  # two different vertices with the same word
-        _, first, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
-    poll_stop()
-    order = np.argsort(first, kind="stable")
-    rank = np.empty(len(order), dtype=np.int64)
-    rank[order] = np.arange(len(order))
-    return vertices[first[order]], rank[inverse.reshape(-1)]
 
 
 def nondegenerate(faces: IntArray) -> BoolArray:
@@ -86,17 +60,7 @@ def components(count: int, a: IntArray, b: IntArray) -> tuple[int, IntArray]:
 
     Labels are numbered by the first node of each component.
     """
-    links = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(count, count))
-    poll_stop()
-    number, label = connected_components(links, directed=False)
-    poll_stop()
-    highest = np.maximum.accumulate(label)
-    if len(label) and label[0] == 0 and (np.diff(highest) <= 1).all():  # numbered by the first node already
-        return int(number), label.astype(np.int64)
-    _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
-    rank = np.empty(number, dtype=np.int64)
-    rank[np.argsort(first, kind="stable")] = np.arange(number)
-    return int(number), rank[inverse.reshape(-1)]
+    return _native.components(count, a, b)
 
 
 @dataclass(frozen=True)
@@ -120,21 +84,15 @@ class Edges:
     @classmethod
     def of(cls, faces: IntArray, count: int) -> Edges:
         """Collect the edges of faces ``[F, 3]`` over ``count`` vertices."""
-        poll_stop()
-        start, end = faces.ravel(), faces[:, _NEXT].ravel()
-        key = np.minimum(start, end) * count + np.maximum(start, end)
-        distinct, inverse, valence = np.unique(key, return_inverse=True, return_counts=True)
-        poll_stop()
-        ends = np.stack([distinct // max(count, 1), distinct % max(count, 1)], axis=1)
-        return cls(inverse.reshape(-1).astype(np.int64), ends, valence.astype(np.int64))
+        return cls(*_native.edges(faces, count))
 
 
 def bodies_of(faces: IntArray, edges: Edges) -> tuple[int, IntArray]:
     """Group faces that share edges: the number of bodies, and ``[F]`` the body of each face."""
-    halfedge = np.argsort(edges.of_halfedge, kind="stable")
-    poll_stop()
-    same = edges.of_halfedge[halfedge[1:]] == edges.of_halfedge[halfedge[:-1]]
-    return components(len(faces), halfedge[1:][same] // 3, halfedge[:-1][same] // 3)
+    face = np.repeat(np.arange(len(faces)), 3)
+    first = np.empty(len(edges.valence), dtype=np.int64)
+    first[edges.of_halfedge[::-1]] = face[::-1]
+    return components(len(faces), face, first[edges.of_halfedge])
 
 
 @dataclass(frozen=True)
@@ -259,27 +217,12 @@ def facing_sides(faces: IntArray, wedges: IntArray) -> tuple[IntArray, IntArray]
 
 def signed_tetrahedra(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return ``[F]`` the signed volume between the origin and each face."""
-    volume = np.empty(len(faces))
-    for some in _pieces(len(faces)):
-        a, b, c = (vertices[faces[some, i]] for i in range(3))
-        volume[some] = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
-    return volume
+    return _native.signed_tetrahedra(vertices, faces)
 
 
 def face_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return ``[F]`` the area of each face."""
-    area = np.empty(len(faces))
-    for some in _pieces(len(faces)):
-        a, b, c = (vertices[faces[some, i]] for i in range(3))
-        area[some] = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
-    return area
-
-
-def _pieces(count: int) -> Iterator[slice]:
-    """The slices of an array that are worked on between two polls of the stop."""
-    for first in range(0, count, _AT_ONCE):
-        poll_stop()
-        yield slice(first, first + _AT_ONCE)
+    return _native.face_areas(vertices, faces)
 
 
 def _sums(group: IntArray, values: FloatArray, number: int) -> FloatArray:

@@ -1,0 +1,194 @@
+// Python bindings of welding, of the topology of soups and of closed meshes.
+#include <cmath>
+
+#include "base/arrays.hpp"
+#include "base/stop.hpp"
+#include "mesh/edges.hpp"
+#include "mesh/point_bodies.hpp"
+#include "mesh/weld.hpp"
+
+namespace rlacd {
+
+namespace {
+
+constexpr std::size_t kBetweenPolls = 4096;
+
+using IndicesIn = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using WideFacesIn = nb::ndarray<const std::int64_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+
+// Copies faces in and checks their indices.
+std::vector<Triangle> to_faces(const WideFacesIn& array, std::int64_t vertices) {
+  if (vertices < 0 || vertices > std::numeric_limits<std::int32_t>::max() ||
+      array.shape(0) > std::numeric_limits<std::int32_t>::max() / 3)
+    throw std::invalid_argument("a mesh has at most 2^31 vertices and halfedges");
+  std::vector<Triangle> faces(array.shape(0));
+  const std::int64_t* corner = array.data();
+  for (Triangle& face : faces)
+    for (std::int32_t& own : face) {
+      if (*corner < 0 || *corner >= vertices) throw std::invalid_argument("face index out of range");
+      own = static_cast<std::int32_t>(*corner++);
+    }
+  return faces;
+}
+
+// The same for a mesh whose vertices are only read.
+Mesh to_wide_mesh(const PointsIn& vertices, const WideFacesIn& faces) {
+  return {to_points(vertices), to_faces(faces, static_cast<std::int64_t>(vertices.shape(0)))};
+}
+
+nb::tuple as_tuple(Mesh&& mesh) {
+  return nb::make_tuple(to_array<double>(std::move(mesh.vertices)), to_array<std::int32_t>(std::move(mesh.faces)));
+}
+
+}  // namespace
+
+void bind_mesh(nb::module_& m) {
+  m.def(
+      "weld",
+      [](const PointsIn& vertices, const WideFacesIn& faces) {
+        Mesh mesh = to_wide_mesh(vertices, faces);
+        {
+          nb::gil_scoped_release release;
+          mesh = weld(mesh);
+        }
+        return as_tuple(std::move(mesh));
+      },
+      nb::arg("vertices"), nb::arg("faces"),
+      "The distinct places of the used vertices, in order of first appearance [U, 3]; the faces [G, 3] with three "
+      "different\n"
+      "corners, the first of those with the same three.");
+  m.def(
+      "edges",
+      [](const WideFacesIn& array, std::int64_t vertices) {
+        const std::vector<Triangle> faces = to_faces(array, vertices);
+        Edges found;
+        {
+          nb::gil_scoped_release release;
+          found = edges_of(faces, static_cast<std::size_t>(vertices));
+        }
+        return nb::make_tuple(to_array<std::int64_t>(std::move(found.of_halfedge)),
+                              to_array<std::int64_t>(std::move(found.vertices)),
+                              to_array<std::int64_t>(std::move(found.valence)));
+      },
+      nb::arg("faces"), nb::arg("count"),
+      "The undirected edges of faces [F, 3]: the edge [3F] of each halfedge, the edges' vertices [E, 2], ascending, "
+      "and how\n"
+      "many halfedges each has [E].");
+  m.def(
+      "components",
+      [](std::int64_t count, const IndicesIn& a, const IndicesIn& b) {
+        if (a.shape(0) != b.shape(0)) throw std::invalid_argument("a link has two ends");
+        for (const IndicesIn* ends : {&a, &b})
+          for (std::size_t i = 0; i < ends->shape(0); ++i)
+            if ((*ends)(i) < 0 || (*ends)(i) >= count) throw std::invalid_argument("node out of range");
+        std::pair<std::int64_t, std::vector<std::int64_t>> found;
+        {
+          nb::gil_scoped_release release;
+          Groups groups(static_cast<std::size_t>(count));
+          for (std::size_t i = 0; i < a.shape(0); ++i) {
+            if (i % kBetweenPolls == 0) poll_stop();
+            groups.join(a(i), b(i));
+          }
+          found = groups.labels();
+        }
+        return nb::make_tuple(found.first, to_array<std::int64_t>(std::move(found.second)));
+      },
+      nb::arg("count"), nb::arg("a"), nb::arg("b"),
+      "Connected components under links a[i] - b[i]: their number, and the label [count] of each node, by first "
+      "nodes.");
+  m.def(
+      "face_areas",
+      [](const PointsIn& vertices, const WideFacesIn& faces) {
+        const Mesh mesh = to_wide_mesh(vertices, faces);
+        std::vector<double> area(mesh.faces.size());
+        {
+          nb::gil_scoped_release release;
+          for (std::size_t f = 0; f < area.size(); ++f) {
+            if (f % kBetweenPolls == 0) poll_stop();
+            const auto [a, b, c] = mesh.faces[f];
+            area[f] = norm(cross(mesh.vertices[b] - mesh.vertices[a], mesh.vertices[c] - mesh.vertices[a])) / 2;
+          }
+        }
+        return to_array<double>(std::move(area));
+      },
+      nb::arg("vertices"), nb::arg("faces"), "The area [F] of each face.");
+  m.def(
+      "signed_tetrahedra",
+      [](const PointsIn& vertices, const WideFacesIn& faces) {
+        const Mesh mesh = to_wide_mesh(vertices, faces);
+        std::vector<double> volume(mesh.faces.size());
+        {
+          nb::gil_scoped_release release;
+          for (std::size_t f = 0; f < volume.size(); ++f) {
+            if (f % kBetweenPolls == 0) poll_stop();
+            const auto [a, b, c] = mesh.faces[f];
+            volume[f] = dot(mesh.vertices[a], cross(mesh.vertices[b], mesh.vertices[c])) / 6;
+          }
+        }
+        return to_array<double>(std::move(volume));
+      },
+      nb::arg("vertices"), nb::arg("faces"), "The signed volume [F] between the origin and each face.");
+  m.def(
+      "closed_bodies",
+      [](const PointsIn& vertices, const FacesIn& faces) -> nb::object {
+        const Mesh mesh = to_mesh(vertices, faces);
+        ClosedBodies found;
+        {
+          nb::gil_scoped_release release;
+          found = closed_bodies(mesh);
+        }
+        if (found.count == 0) return nb::none();
+        return nb::make_tuple(to_array<std::int64_t>(std::move(found.body)), to_array<double>(std::move(found.volume)),
+                              to_array<double>(std::move(found.area)), to_array<double>(std::move(found.box)),
+                              found.has_no_pinch, found.least_height, found.sharpest);
+      },
+      nb::arg("vertices"), nb::arg("faces"),
+      "The bodies of a mesh all of whose edges join two faces that run along them in opposite directions, else None:\n"
+      "the body [F] of each face; signed volume [B], area [B] and box [B, 6] of each body; whether the faces around "
+      "each\n"
+      "vertex are all neighbours; the least height of a face, and the least cosine between the normals of "
+      "neighbours.");
+  m.def(
+      "separate_fans",
+      [](const PointsIn& vertices, const FacesIn& faces) {
+        Mesh mesh = to_mesh(vertices, faces);
+        {
+          nb::gil_scoped_release release;
+          mesh = separate_fans(mesh);
+        }
+        return as_tuple(std::move(mesh));
+      },
+      nb::arg("vertices"), nb::arg("faces"),
+      "A closed mesh in which faces that meet at a vertex only have a vertex each: copies [V', 3] follow the others.");
+  m.def(
+      "along_a_curve",
+      [](const PointsIn& vertices, const FacesIn& faces) {
+        Mesh mesh = to_mesh(vertices, faces);
+        {
+          nb::gil_scoped_release release;
+          mesh = along_a_curve(mesh);
+        }
+        return as_tuple(std::move(mesh));
+      },
+      nb::arg("vertices"), nb::arg("faces"),
+      "The same mesh with vertices [V, 3] and faces [F, 3] along a space-filling curve: neighbours in space are near "
+      "in\n"
+      "memory.");
+  m.def(
+      "point_bodies",
+      [](const PointsIn& vertices, const FacesIn& faces) {
+        const Mesh mesh = to_mesh(vertices, faces);
+        std::vector<std::int32_t> body;
+        {
+          nb::gil_scoped_release release;
+          body = point_bodies(mesh);
+        }
+        return to_array<std::int32_t>(std::move(body));
+      },
+      nb::arg("vertices"), nb::arg("faces"),
+      "The body [V] of each vertex of a mesh of any quality, numbered from 0 by their first faces, -1 for those of "
+      "none:\n"
+      "faces hang together where they share a corner, or have corners in one place.");
+}
+
+}  // namespace rlacd

@@ -1,0 +1,77 @@
+// The edges of a triangle soup, and what its faces form by sharing them. Linear time.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "base/geometry.hpp"
+
+namespace rlacd {
+
+// Items grouped by a key below `keys`, in the order in which they are added: count them all, allocate, add them all.
+template <class Item>
+class Buckets {
+ public:
+  explicit Buckets(std::size_t keys) : begin_(keys + 1, 0) {}
+  void count(std::size_t key) { ++begin_[key + 1]; }
+  void allocate() {
+    for (std::size_t k = 1; k < begin_.size(); ++k) begin_[k] += begin_[k - 1];
+    items_.resize(begin_.back());
+    next_.assign(begin_.begin(), begin_.end() - 1);
+  }
+  void add(std::size_t key, const Item& item) { items_[next_[key]++] = item; }
+  std::pair<Item*, Item*> range(std::size_t key) {
+    return {items_.data() + begin_[key], items_.data() + begin_[key + 1]};
+  }
+
+ private:
+  std::vector<std::size_t> begin_, next_;
+  std::vector<Item> items_;
+};
+
+// Halfedge 3 f + c runs from corner c of face f to its next corner.
+struct Edges {
+  std::vector<std::int64_t> of_halfedge;              // [3F]
+  std::vector<std::array<std::int64_t, 2>> vertices;  // [E], the smaller first, in ascending order
+  std::vector<std::int64_t> valence;                  // [E], how many halfedges run along the edge
+};
+Edges edges_of(const std::vector<Triangle>& faces, std::size_t vertices);
+
+// Groups of nodes, given by links between them; a group has the number of its first node's rank among those.
+class Groups {
+ public:
+  explicit Groups(std::size_t nodes);
+  void join(std::int64_t a, std::int64_t b);
+  // The number of groups, and the group of each node.
+  std::pair<std::int64_t, std::vector<std::int64_t>> labels();
+
+ private:
+  std::int64_t root(std::int64_t node);
+  std::vector<std::int64_t> parent_;  // never larger than the node
+};
+
+// A mesh all of whose edges join two faces that run along them in opposite directions.
+struct ClosedBodies {
+  std::int64_t count = 0;          // of sets of faces that share edges, numbered by their first faces
+  std::vector<std::int64_t> body;  // [F]
+  std::vector<double> volume, area;
+  std::vector<Box> box;
+  // No vertex at which faces meet that are not neighbours around it.
+  bool has_no_pinch = false;
+  double least_height = 0;  // of a face
+  double sharpest = 1;  // the least cosine between the normals of faces that share an edge; -1 where one is folded back
+};
+// No count if there are other edges.
+ClosedBodies closed_bodies(const Mesh& mesh);
+
+// A closed mesh in which faces that meet at a vertex only have a vertex each: all but the first fan of faces around a
+// vertex get a copy of it, after all others.
+Mesh separate_fans(const Mesh& mesh);
+
+// The same mesh with its vertices and its faces along a space-filling curve (Morton's) of 2^10 cells along each axis of
+// its box, otherwise in their order: neighbours in space become neighbours in memory. All vertices must be used.
+Mesh along_a_curve(const Mesh& mesh);
+
+}  // namespace rlacd

@@ -1,0 +1,103 @@
+#include "mesh/weld.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+#include "base/stop.hpp"
+#include "mesh/edges.hpp"
+
+namespace rlacd {
+
+namespace {
+
+constexpr std::size_t kBetweenPolls = 4096;
+
+std::uint64_t hash_of(Vec3 p) {
+  std::uint64_t hash = 0;
+  for (const double x : {p.x, p.y, p.z}) {
+    const double plain = x + 0.0;  // -0.0 is equal to 0.0
+    std::uint64_t bits;
+    std::memcpy(&bits, &plain, sizeof bits);
+    hash = (hash ^ (bits >> 29) ^ bits) * 0x9e3779b97f4a7c15u;
+    hash ^= hash >> 32;
+  }
+  return hash;
+}
+
+// Marks the faces that have three different corners and are the first with them.
+std::vector<char> worth_keeping(const std::vector<Triangle>& faces, std::size_t vertices) {
+  struct Rest {
+    std::int32_t middle, high, face;
+    bool operator<(const Rest& o) const {
+      return middle != o.middle ? middle < o.middle : high != o.high ? high < o.high : face < o.face;
+    }
+  };
+  std::vector<char> keep(faces.size(), 0);
+  std::vector<Triangle> sorted(faces);
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    if (f % kBetweenPolls == 0) poll_stop();
+    Triangle& s = sorted[f];
+    if (s[0] > s[1]) std::swap(s[0], s[1]);
+    if (s[1] > s[2]) std::swap(s[1], s[2]);
+    if (s[0] > s[1]) std::swap(s[0], s[1]);
+    keep[f] = s[0] != s[1] && s[1] != s[2];
+  }
+  Buckets<Rest> by_low(vertices);
+  for (std::size_t f = 0; f < faces.size(); ++f)
+    if (keep[f]) by_low.count(sorted[f][0]);
+  by_low.allocate();
+  for (std::size_t f = 0; f < faces.size(); ++f)
+    if (keep[f]) by_low.add(sorted[f][0], {sorted[f][1], sorted[f][2], static_cast<std::int32_t>(f)});
+  for (std::size_t v = 0; v < vertices; ++v) {
+    if (v % kBetweenPolls == 0) poll_stop();
+    const auto [begin, end] = by_low.range(v);
+    if (end - begin < 2) continue;
+    std::sort(begin, end);
+    for (Rest* r = begin + 1; r < end; ++r)
+      if (r->middle == r[-1].middle && r->high == r[-1].high) keep[r->face] = 0;
+  }
+  return keep;
+}
+
+}  // namespace
+
+std::vector<std::int32_t> first_in_place(const std::vector<Vec3>& points) {
+  std::size_t size = 16;
+  while (size < 2 * points.size()) size *= 2;
+  std::vector<std::int32_t> table(size, -1), first(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (i % kBetweenPolls == 0) poll_stop();
+    const Vec3 p = points[i];
+    std::size_t slot = hash_of(p) & (size - 1);
+    for (; table[slot] >= 0; slot = (slot + 1) & (size - 1)) {
+      if (points[table[slot]] == p) break;
+    }
+    if (table[slot] < 0) table[slot] = static_cast<std::int32_t>(i);
+    first[i] = table[slot];
+  }
+  return first;
+}
+
+Mesh weld(const Mesh& mesh) {
+  const std::vector<std::int32_t> first = first_in_place(mesh.vertices);
+  std::vector<std::int32_t> number(mesh.vertices.size(), -1);
+  for (const Triangle& face : mesh.faces)
+    for (const std::int32_t corner : face) number[first[corner]] = 0;
+  Mesh welded;
+  for (std::size_t v = 0; v < number.size(); ++v) {
+    if (number[v] < 0) continue;
+    const Vec3 p = mesh.vertices[v];
+    number[v] = static_cast<std::int32_t>(welded.vertices.size());
+    welded.vertices.push_back({p.x + 0.0, p.y + 0.0, p.z + 0.0});
+  }
+  std::vector<Triangle> faces(mesh.faces.size());
+  for (std::size_t f = 0; f < faces.size(); ++f)
+    for (int c = 0; c < 3; ++c) faces[f][c] = number[first[mesh.faces[f][c]]];
+  const std::vector<char> keep = worth_keeping(faces, welded.vertices.size());
+  welded.faces.reserve(faces.size());
+  for (std::size_t f = 0; f < faces.size(); ++f)
+    if (keep[f]) welded.faces.push_back(faces[f]);
+  return welded;
+}
+
+}  // namespace rlacd

@@ -1,0 +1,19 @@
+// From triangles with repeated corners to an indexed mesh.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "base/geometry.hpp"
+
+namespace rlacd {
+
+// For each point, the first point at the same place, by hashing with open addressing. Zeros of either sign are equal.
+std::vector<std::int32_t> first_in_place(const std::vector<Vec3>& points);
+
+// The distinct places of the vertices that faces use, in the order in which any vertex first has them, without zeros of
+// negative sign; and the faces that have three different corners, the first of those with the same corners in any
+// order. Linear time.
+Mesh weld(const Mesh& mesh);
+
+}  // namespace rlacd

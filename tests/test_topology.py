@@ -1,0 +1,195 @@
+"""Welding, edges, components and closed meshes, against numpy, scipy, trimesh and manifold3d."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from manifold3d import Manifold, Mesh64
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from rlacd import _native
+from rlacd.io.read.load import load_mesh
+from rlacd.repair.repair import repair
+from rlacd.repair.union import to_arrays, to_manifold
+from rlacd.solid.input_mesh import InputMesh
+from rlacd.solid.topology import Edges, bodies_of, components, face_areas, signed_tetrahedra
+
+
+def soup(seed: int, count: int, faces: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points, many of them equal, with zeros of both signs; faces, many of them equal or degenerate."""
+    rng = np.random.default_rng(seed)
+    vertices = rng.integers(-1, 2, (count, 3)) * rng.choice([1.0, -1.0], (count, 3))
+    return vertices, rng.integers(0, count, (faces, 3))
+
+
+soups = given(st.integers(0, 2**32), st.integers(3, 40), st.integers(0, 80))
+
+
+@settings(max_examples=200, deadline=None)
+@soups
+def test_welding_keeps_first_places_and_first_faces(seed: int, count: int, faces: int) -> None:
+    vertices, triangles = soup(seed, count, faces)
+    _, first, inverse = np.unique(vertices + 0.0, axis=0, return_index=True, return_inverse=True)
+    place = first[inverse.reshape(-1)]  # of each vertex, the first vertex there
+    used = np.unique(place[triangles])
+    number = np.searchsorted(used, place)
+    kept, seen = [], set()
+    for face in number[triangles].tolist():
+        if len(set(face)) == 3 and frozenset(face) not in seen:
+            kept.append(face)
+            seen.add(frozenset(face))
+    found, faces_found = _native.weld(vertices, triangles)
+    assert np.array_equal(found, vertices[used])
+    assert not np.signbit(found[found == 0]).any()
+    assert faces_found.tolist() == kept
+
+
+@settings(max_examples=200, deadline=None)
+@soups
+def test_edges_are_the_distinct_pairs_in_ascending_order(seed: int, count: int, faces: int) -> None:
+    _, triangles = soup(seed, count, faces)
+    pairs = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    distinct, inverse, valence = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
+    edges = Edges.of(triangles, count)
+    assert np.array_equal(edges.vertices, distinct)
+    assert np.array_equal(edges.of_halfedge, inverse.reshape(-1))
+    assert np.array_equal(edges.valence, valence)
+
+
+@settings(max_examples=200, deadline=None)
+@soups
+def test_components_are_numbered_by_their_first_nodes(seed: int, count: int, faces: int) -> None:
+    a, b, _ = soup(seed, count, faces)[1].T
+    number, label = components(count, a, b)
+    expected, same = connected_components(coo_array((np.ones(len(a)), (a, b)), shape=(count, count)), directed=False)
+    assert number == expected
+    assert len(np.unique(np.stack([label, same]), axis=1).T) == number
+    assert np.array_equal(np.unique(label), np.arange(number))
+    assert (np.diff(np.unique(label, return_index=True)[1]) > 0).all()
+
+
+@settings(max_examples=50, deadline=None)
+@soups
+def test_bodies_areas_and_volumes_of_soups(seed: int, count: int, faces: int) -> None:
+    _, triangles = soup(seed, count, faces)
+    vertices = np.random.default_rng(seed).normal(size=(count, 3))
+    number, body = bodies_of(triangles, Edges.of(triangles, count))
+    edge = Edges.of(triangles, count).of_halfedge.reshape(-1, 3)
+    shares = (edge[:, None, :, None] == edge[None, :, None, :]).any(axis=(2, 3))
+    expected, same = connected_components(shares, directed=False)
+    assert number == expected
+    assert len(np.unique(np.stack([body, same]), axis=1).T) == number
+    corners = vertices[triangles]
+    np.testing.assert_allclose(face_areas(vertices, triangles), trimesh.triangles.area(corners), atol=1e-14)
+    np.testing.assert_allclose(signed_tetrahedra(vertices, triangles), np.linalg.det(corners) / 6, atol=1e-14)
+
+
+def test_indices_out_of_range_are_refused() -> None:
+    with pytest.raises(ValueError, match="out of range"):
+        _native.weld(np.zeros((3, 3)), np.array([[0, 1, 3]]))
+    with pytest.raises(ValueError, match="out of range"):
+        _native.edges(np.array([[0, 1, -1]]), 3)
+    with pytest.raises(ValueError, match="out of range"):
+        _native.components(2, np.array([0]), np.array([2]))
+
+
+def shapes() -> dict[str, trimesh.Trimesh]:
+    box = trimesh.creation.box()
+    there = box.copy().apply_translation([3, 0, 0])
+    touching = trimesh.Trimesh(box.vertices, box.faces)
+    touching = trimesh.util.concatenate([touching, box.copy().apply_translation([1, 1, 1])])
+    touching.merge_vertices()  # two boxes that share a corner
+    return {
+        "box": box,
+        "ball": trimesh.creation.icosphere(3),
+        "torus": trimesh.creation.torus(1, 0.3),
+        "two": trimesh.util.concatenate([box, there]),
+        "open": trimesh.Trimesh(box.vertices, box.faces[1:]),
+        "one turned": trimesh.Trimesh(box.vertices, np.concatenate([box.faces[:1, ::-1], box.faces[1:]])),
+        "touching": touching,
+        "inside out": trimesh.Trimesh(box.vertices, box.faces[:, ::-1]),
+    }
+
+
+@pytest.mark.parametrize("name", shapes())
+def test_closed_bodies_of_shapes(name: str) -> None:
+    mesh = shapes()[name]
+    vertices, faces = _native.weld(np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces))
+    found = _native.closed_bodies(vertices, faces)
+    if name in ("open", "one turned"):
+        assert found is None
+        return
+    assert found is not None
+    body, volume, area, box, has_no_pinch, least_height, sharpest = found
+    parts = mesh.split(only_watertight=False) if name in ("two", "touching") else [mesh]
+    assert len(volume) == len(parts) == body.max() + 1
+    for i, part in enumerate(parts):
+        assert volume[i] == pytest.approx(part.volume)
+        assert area[i] == pytest.approx(part.area)
+        np.testing.assert_allclose(box[i].reshape(2, 3), part.bounds)
+        assert (body == i).sum() == len(part.faces)
+    assert has_no_pinch == (name != "touching")
+    assert sharpest == pytest.approx(np.cos(mesh.face_adjacency_angles).min())
+    sides = np.linalg.norm(np.diff(mesh.triangles[:, [0, 1, 2, 0]], axis=1), axis=2)
+    assert least_height == pytest.approx((2 * mesh.area_faces / sides.max(axis=1)).min())
+
+
+def test_separate_fans_have_a_vertex_each() -> None:
+    mesh = shapes()["touching"]
+    vertices, faces = _native.weld(np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces))
+    more, separate = _native.separate_fans(vertices, faces)
+    assert len(vertices) == 15
+    assert len(more) == 16
+    assert np.array_equal(more[separate], vertices[faces])
+    assert np.array_equal(more[15], [0.5, 0.5, 0.5])
+    found = _native.closed_bodies(more, separate)
+    assert found is not None
+    assert found[4]
+
+
+def test_a_closed_body_is_taken_as_manifold3d_would_take_it(corpus: Path) -> None:
+    taken = 0
+    for name in (corpus / "quick.txt").read_text().split():
+        source = load_mesh(corpus / name)
+        solid = repair(source, threads=1)
+        if isinstance(solid.shape, Manifold):
+            continue
+        vertices, faces = solid.surface
+        outward = faces[:, ::-1] if solid.bodies[0].step == "reoriented" else faces
+        expected = to_arrays(to_manifold(vertices, outward.astype(np.int64)))
+        assert np.array_equal(solid.vertices, expected[0])
+        assert np.array_equal(solid.faces, expected[1])
+        there = to_arrays(solid.manifold)
+        assert np.array_equal(there[0], solid.vertices)
+        assert np.array_equal(there[1], solid.faces)
+        taken += 1
+    assert taken >= 5
+
+
+@pytest.mark.parametrize("sliver", [1e-13, 1e-9])
+def test_a_mesh_that_manifold3d_would_change_is_left_to_it(sliver: float) -> None:
+    ball = trimesh.creation.icosphere(2)
+    vertices = np.asarray(ball.vertices).copy()
+    a, b = ball.edges_unique[0]
+    vertices[b] = vertices[a] + [sliver, 0, 0]
+    solid = repair(InputMesh(vertices, np.asarray(ball.faces, dtype=np.int64), "ball", ()))
+    assert isinstance(solid.shape, Manifold)
+    assert solid.manifold.volume() == pytest.approx(_native.mesh_volume(vertices, np.asarray(ball.faces, np.int32)))
+
+
+def test_a_closed_mesh_is_sorted_along_a_curve_as_manifold3d_sorts() -> None:
+    rng = np.random.default_rng(0)
+    ball = trimesh.creation.icosphere(4)
+    place = rng.permutation(len(ball.vertices))
+    vertices = np.asarray(ball.vertices)[place] * [1.0, 0.7, 0.4]
+    faces = rng.permutation(np.argsort(place)[ball.faces]).astype(np.int32)
+    expected = Manifold(Mesh64(vertices, faces.astype(np.uint64))).to_mesh64()
+    sorted_vertices, sorted_faces = _native.along_a_curve(vertices, faces)
+    assert np.array_equal(sorted_vertices, expected.vert_properties[:, :3])
+    assert np.array_equal(sorted_faces, expected.tri_verts)
