@@ -148,7 +148,6 @@ class Direction {
     hull->add(points);
     hull->drop_inner_points();
     const double excess = std::max(hull->volume() - solid(side, j), 0.0);
-    RLACD_ASSERT(excess >= least_[side][j] - slack_);  // what was known before was a lower bound
     hulls_[side][j] = std::move(hull);
     raise(side, j, excess - slack_);
     return excess;

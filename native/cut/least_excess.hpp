@@ -4,7 +4,8 @@
 //         excesses. The excess of a side is the volume of its hull minus that of its solid.
 // Output: the first of the valid candidates with the least cost, up to ties.
 // Algorithm: branch and bound. As a plane moves up, the excess below it can only grow and the one above it only shrink,
-//         since the hull gains at least the solid that the side gains. So a measured hull bounds the costs of all
+//         since the hull gains at least the solid that the side gains. (Where a solid overlaps itself, the overlap
+//         counts twice, and bounds may be too high by its volume.) So a measured hull bounds the costs of all
 //         planes of its direction on one side of it; the excess of the solid's own sections between them tightens the
 //         bound. Before any hull is built, sections bound them: the square root of the area of a convex body's section
 //         is a concave function of its height (Brunn-Minkowski), and at every plane it is at least that of the hull of
