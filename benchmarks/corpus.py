@@ -148,12 +148,14 @@ class Worker:
 
 
 def run(folder: Path, out: Path, jobs: int, limit: float, options: dict[str, Any]) -> None:
-    finished = {json.loads(line)["file"] for line in out.read_text().splitlines()} if out.exists() else set()
+    finished = (
+        {json.loads(line)["file"] for line in out.read_text(encoding="utf-8").splitlines()} if out.exists() else set()
+    )
     paths = [p for p in sorted(folder.rglob("*")) if p.suffix.lower() in ENDINGS]
     waiting = [p for p in paths if str(p.relative_to(folder)) not in finished][::-1]
     total, workers = len(waiting), [Worker(options) for _ in range(min(jobs, max(1, len(waiting))))]
     done = 0
-    with out.open("a") as file:
+    with out.open("a", encoding="utf-8") as file:
         while waiting or any(w.path for w in workers):
             for worker in workers:
                 if worker.path is None and waiting:
@@ -183,7 +185,7 @@ def run(folder: Path, out: Path, jobs: int, limit: float, options: dict[str, Any
 
 
 def table(out: Path) -> None:
-    rows = [json.loads(line) for line in out.read_text().splitlines()]
+    rows = [json.loads(line) for line in out.read_text(encoding="utf-8").splitlines()]
     good = [r for r in rows if "parts" in r]
     print(f"meshes {len(rows)}, decomposed {len(good)}")
     for kind in ("bug", "error"):

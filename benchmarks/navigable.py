@@ -99,10 +99,10 @@ def one(path: Path, method: str, setting: str, cores: list[int]) -> None:
 
 
 def everything(folder: Path, names: list[str], methods: list[str], out: Path, cores: str, limit: float) -> None:
-    rows = [json.loads(line) for line in out.read_text().splitlines()] if out.exists() else []
+    rows = [json.loads(line) for line in out.read_text(encoding="utf-8").splitlines()] if out.exists() else []
     finished = {(row["file"], row["method"], row["setting"]) for row in rows}
     jobs = [(n, m, s) for n in names for m in methods for s in (SETTINGS if m != "coacd" else ["-"])]
-    with out.open("a") as file:
+    with out.open("a", encoding="utf-8") as file:
         for name, method, setting in jobs:
             if (name, method, setting) in finished:
                 continue
@@ -118,7 +118,7 @@ def everything(folder: Path, names: list[str], methods: list[str], out: Path, co
 
 
 def table(out: Path) -> None:
-    rows = [json.loads(line) for line in out.read_text().splitlines()]
+    rows = [json.loads(line) for line in out.read_text(encoding="utf-8").splitlines()]
     groups = sorted(
         {(row["setting"], row["method"]) for row in rows},
         key=lambda g: (g[0], list(METHODS).index(g[1]) if g[1] in METHODS else 9),

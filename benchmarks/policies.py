@@ -46,8 +46,12 @@ def decompose_one(path: Path, policy: str, turned: bool) -> dict[str, Any]:
 
 
 def run(folder: Path, files: list[str], policies: list[str], turned: bool, out: Path) -> None:
-    finished = {(r["file"], r["policy"]) for r in map(json.loads, out.read_text().splitlines())} if out.exists() else ()
-    with out.open("a") as sink:
+    finished = (
+        {(r["file"], r["policy"]) for r in map(json.loads, out.read_text(encoding="utf-8").splitlines())}
+        if out.exists()
+        else ()
+    )
+    with out.open("a", encoding="utf-8") as sink:
         for file in files:
             for policy in policies:
                 if (file, policy) not in finished:
@@ -58,7 +62,7 @@ def run(folder: Path, files: list[str], policies: list[str], turned: bool, out: 
 def table(out: Path) -> None:
     results: dict[str, dict[str, dict[str, Any]]] = defaultdict(dict)
     policies: dict[str, None] = {}
-    for result in map(json.loads, out.read_text().splitlines()):
+    for result in map(json.loads, out.read_text(encoding="utf-8").splitlines()):
         results[result["file"]][result["policy"]] = result
         policies[result["policy"]] = None
     whole = [r for r in results.values() if len(r) == len(policies)]

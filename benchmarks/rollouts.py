@@ -96,7 +96,7 @@ def train(
                 usage = Used()
                 module.train(links, Path(folder, "run"), options, say=lambda _: None, pool=pool)
                 spent = usage.spent()
-            made = json.loads(Path(folder, "run", "checkpoint", "state.json").read_text())["cuts"]
+            made = json.loads(Path(folder, "run", "checkpoint", "state.json").read_text(encoding="utf-8"))["cuts"]
         slowest = spent["own"] if number == 0 else max(spent["own"], spent["workers"] / number)
         print(
             f"| {number} | {made} | {spent['wall']:.0f} | {spent['own']:.1f} | {spent['workers']:.1f} "

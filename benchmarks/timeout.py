@@ -89,7 +89,9 @@ def _ignore_interrupts() -> None:
 
 def _ignores_interrupts(process: int) -> bool:
     """Tell whether the command still ignores SIGINT because it has not started its work (Linux)."""
-    ignored = next(line for line in Path(f"/proc/{process}/status").read_text().splitlines() if "SigIgn" in line)
+    ignored = next(
+        line for line in Path(f"/proc/{process}/status").read_text(encoding="utf-8").splitlines() if "SigIgn" in line
+    )
     return bool(int(ignored.split()[1], 16) >> (signal.SIGINT - 1) & 1)
 
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import csv
 import json
+import os
 import re
 import shutil
 import sys
@@ -69,7 +70,7 @@ def seeds_of(meshes: Path) -> dict[str, list[Seed]]:
     for path in sorted((meshes / "raw").iterdir()):
         if path.stat().st_size < LARGEST_SEED:
             found.setdefault(path.suffix[1:], []).append(Seed(path.read_bytes()))
-    with open(meshes / "index.csv", newline="") as listing:
+    with open(meshes / "index.csv", encoding="utf-8", newline="") as listing:
         small = [row["file"] for row in csv.DictReader(listing) if 8 < int(row["faces"]) < 150]
     for name in small[:: max(1, len(small) // SMALL_MESHES)][:SMALL_MESHES]:
         for kind, seed in written(trimesh.load_mesh(meshes / name, process=False)):
@@ -165,7 +166,10 @@ def run(args: argparse.Namespace) -> int:
     numbers = [args.only] if args.only is not None else count(args.start)
     end = time.monotonic() + 60 * args.minutes
     keep = Path(args.keep) if args.keep else None
-    with TemporaryDirectory(prefix="rlacd-fuzz-") as scratch, open(args.out or "/dev/null", "a") as out:
+    with (
+        TemporaryDirectory(prefix="rlacd-fuzz-") as scratch,
+        open(args.out or os.devnull, "a", encoding="utf-8") as out,
+    ):
         fuzzer = Fuzzer(chosen, args.seed, Path(scratch))
         try:
             for number in numbers:

@@ -47,7 +47,7 @@ class Ledger:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._lock = threading.Lock()
-        lines = path.read_text().splitlines() if path.exists() else []
+        lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
         self.rows: list[Row] = [json.loads(line) for line in lines if line.endswith("}")]
 
     def done(self, seed: int) -> set[int]:
@@ -93,7 +93,7 @@ def report(laboratory: Laboratory, trial: Trial, folder: Path) -> None:
 
 
 def write_case(place: Path, case: Row) -> None:
-    place.write_text(json.dumps(case, indent=1) + "\n")
+    place.write_text(json.dumps(case, indent=1) + "\n", encoding="utf-8")
 
 
 def soak(args: argparse.Namespace) -> int:

@@ -275,7 +275,7 @@ def _lateness(cpu: float, timeout: float, threads: int) -> list[str]:
 
 
 def _small_meshes(meshes: Path) -> list[Path]:
-    with open(meshes / "index.csv", newline="") as listing:
+    with open(meshes / "index.csv", encoding="utf-8", newline="") as listing:
         return [meshes / row["file"] for row in csv.DictReader(listing) if 4 <= int(row["faces"]) <= LARGEST_MESH]
 
 

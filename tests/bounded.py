@@ -70,7 +70,7 @@ def _answer(
 ) -> None:
     if needs is not None:
         importlib.import_module(needs)
-    held = int(re.search(r"VmSize:\s+(\d+)", Path("/proc/self/status").read_text())[1]) * 1024  # type: ignore[index]
+    held = int(re.search(r"VmSize:\s+(\d+)", Path("/proc/self/status").read_text(encoding="utf-8"))[1]) * 1024  # type: ignore[index]
     resource.setrlimit(resource.RLIMIT_AS, (held + memory, held + memory))
     spent = math.ceil(time.process_time())
     resource.setrlimit(resource.RLIMIT_CPU, (spent + seconds, spent + seconds))

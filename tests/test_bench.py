@@ -66,7 +66,7 @@ def wait_for_child(parent: int) -> int:
 def wait_for_end(process: int) -> bool:
     for _ in range(300):
         try:
-            state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+            state = Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0]
         except OSError:
             return True
         if state == "Z":
@@ -256,10 +256,10 @@ class TestRunner:
         for name in ("a.ply", "b.ply"):
             trimesh.util.concatenate([sphere, sphere.copy().apply_translation((1.5, 0, 0))]).export(folder / name)
         program = (
-            "import signal, sys; from pathlib import Path; from rlacd.bench import Bench, Store, find_meshes;"
+            "import signal, sys; from pathlib import Path; from rlacd.bench import Bench, BenchStore, find_meshes;"
             "signal.signal(signal.SIGINT, signal.default_int_handler);"  # ignored by what runs in a shell's background
             "m, o = map(Path, sys.argv[1:]);"
-            "Bench(m, find_meshes(m), Store(o)).run('greedy', 0.002)"
+            "Bench(m, find_meshes(m), BenchStore(o)).run('greedy', 0.002)"
         )
         for number in (signal.SIGINT, signal.SIGKILL):
             out = tmp_path / f"run-{number}"

@@ -41,7 +41,7 @@ def meshes(tmp_path: Path) -> Path:
 
 
 def real_solids(corpus: Path, count: int) -> list[Component]:
-    with open(corpus / "index.csv") as file:
+    with open(corpus / "index.csv", encoding="utf-8") as file:
         small = [r["file"] for r in csv.DictReader(file) if r["split"] == "train" and 60 < int(r["faces"]) < 250]
     return [Component(repair(load_mesh(corpus / name)).manifold) for name in small[:: len(small) // count][:count]]
 

@@ -358,7 +358,7 @@ def test_an_mjcf_keeps_every_byte_but_meshes_and_their_geoms(arm: Path) -> None:
 
 
 def test_what_is_included_is_said_to_be_left(arm: Path) -> None:
-    arm.write_text(ARM.replace("<worldbody>", '<include file="more.xml"/>\n  <worldbody>'))
+    arm.write_text(ARM.replace("<worldbody>", '<include file="more.xml"/>\n  <worldbody>'), encoding="utf-8")
     done = rlacd.rewrite_robot(arm, arm.with_name("out.xml"), threads=1)
     assert any("<include>" in warning for warning in done.warnings)
 
@@ -428,7 +428,7 @@ def test_a_robot_cannot_name_what_lies_outside_its_package(tmp_path: Path, refer
 
 @pytest.mark.parametrize("scale", ["0 1 1", "a b c", "1 1", "nan nan nan", "inf 1 1"])
 def test_scales_that_are_none_are_refused(ear: Path, scale: str) -> None:
-    ear.write_text(EAR.replace("-1 1 1", scale))
+    ear.write_text(EAR.replace("-1 1 1", scale), encoding="utf-8")
     with pytest.raises(MeshFileError, match="not three numbers other than zero"):
         rlacd.rewrite_robot(ear, ear.with_name("out.urdf"))
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import resource
-import sys
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -21,6 +19,7 @@ from rlacd.errors import MeshError, RlacdError
 from rlacd.io.read.companions import lay_out
 from rlacd.io.read.load import load_mesh
 from rlacd.pool import Blobs, Shared
+from rlacd.pool.process import peak_memory
 
 SERVER = "rlacd.batch.server:MeshServer"
 
@@ -152,9 +151,7 @@ class MeshServer:
             answer["outputs"], files = put_files(open_store(values["out"]), under(values["parent"], files)), {}
         answer["seconds"] = round(time.perf_counter() - wall, 4)
         answer["cpu"] = round(time.process_time() - cpu, 4)
-        answer["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // (
-            2**20 if sys.platform == "darwin" else 2**10
-        )
+        answer["peak_mb"] = peak_memory() // 2**20
         return answer, files
 
     def _spec(self, plain: dict[str, Any], shared: Mapping[str, Shared]) -> JobSpec:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import io
 import os
 import sys
@@ -12,9 +11,12 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any, Protocol
 
+from filelock import FileLock
+
 from rlacd.errors import MissingExtraError, OptionError, OutputError
 from rlacd.io.read.open_file import read_file
 from rlacd.io.write.atomic import output_errors, write_file
+from rlacd.io.write.lock import lock_folder
 
 PRIVATE = ".rlacd"
 """Folder inside the results for files that only the next run needs."""
@@ -108,7 +110,7 @@ class FolderStore:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._lock: io.TextIOWrapper | None = None
+        self._lock: FileLock | None = None
 
     def write(self, name: str, data: bytes) -> None:
         """See `ResultStore`."""
@@ -160,13 +162,7 @@ class FolderStore:
         lock = self.folder / PRIVATE / "lock"
         with output_errors(self.folder):
             lock.parent.mkdir(parents=True, exist_ok=True)
-            self._lock = lock.open("a")
-            try:
-                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as error:
-                raise OutputError(
-                    f"another run is writing to {self.folder}; wait for it or choose another folder."
-                ) from error
+            self._lock = lock_folder(self.folder, lock)
         for at, _, files in os.walk(self.folder):
             for file in files:
                 if file.startswith(".rlacd-") and file.endswith(".tmp"):
@@ -175,7 +171,7 @@ class FolderStore:
     def close(self) -> None:
         """See `ResultStore`."""
         if self._lock is not None:
-            self._lock.close()
+            self._lock.release()
 
 
 class _FileJournal:

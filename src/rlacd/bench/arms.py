@@ -142,7 +142,7 @@ def _train(meshes: Path, run: Path, options: TrainOptions, say: Callable[[str], 
     finished = run / "policy.onnx"
     if not finished.exists():
         train(meshes, run, options, resume=(run / "checkpoint").exists(), say=say)
-    return [json.loads(line) for line in (run / "curves.jsonl").read_text().splitlines()]
+    return [json.loads(line) for line in (run / "curves.jsonl").read_text(encoding="utf-8").splitlines()]
 
 
 def _last_validations(curves: Mapping[str, list[dict[str, float]]]) -> Table:

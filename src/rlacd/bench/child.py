@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import sys
 import threading
 import time
@@ -19,6 +18,7 @@ from rlacd.bench.methods import make_method
 from rlacd.bench.metrics import measure
 from rlacd.bench.store import Row, load_hulls, save_hulls
 from rlacd.io.read.load import load_mesh
+from rlacd.pool.process import peak_memory
 from rlacd.repair.repair import repair
 
 _CUBE = np.array([(x, y, z) for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
@@ -39,7 +39,7 @@ def run_method(mesh: Path, name: str, setting: float, threads: int, hulls: Path)
     method = make_method(name)
     source = load_mesh(mesh)
     method.run(_CUBE, _CUBE_FACES, setting, threads)
-    before = _peak_mb()
+    before = peak_memory() / 2**20
     wall, cpu = time.perf_counter(), time.process_time()
     found = method.run(source.vertices, source.faces.astype(np.int32), setting, threads)
     seconds, cpu_seconds = time.perf_counter() - wall, time.process_time() - cpu
@@ -49,7 +49,7 @@ def run_method(mesh: Path, name: str, setting: float, threads: int, hulls: Path)
         "threads": threads,
         "wall": seconds,
         "cpu": cpu_seconds,
-        "peak_mb": _peak_mb(),
+        "peak_mb": peak_memory() / 2**20,
         "loaded_mb": before,
     }
     save_hulls(hulls, found, account)
@@ -65,11 +65,6 @@ def measure_hulls(mesh: Path, name: str, setting: float, threads: int, hulls: Pa
     return {**account, **measure(solid, found, promised, threads).as_plain()}
 
 
-def _peak_mb() -> float:
-    unit = 2**20 if sys.platform == "darwin" else 2**10
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
-
-
 def _end_with_parent() -> None:
     """Exit when stdin ends: it is a pipe that closes when the parent dies, for whatever reason."""
     while os.read(0, 1):
@@ -82,12 +77,14 @@ def main() -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     task = json.loads(sys.argv[1])
     if task["memory"] and sys.platform == "linux":
+        import resource  # does not exist on Windows
+
         resource.setrlimit(resource.RLIMIT_AS, (task["memory"], task["memory"]))
     place = (Path(task["mesh"]), task["method"], task["setting"], task["threads"], Path(task["hulls"]))
     try:
         if not place[-1].exists():
             run_method(*place)
-        Path(task["answer"]).write_text(json.dumps(measure_hulls(*place)))
+        Path(task["answer"]).write_text(json.dumps(measure_hulls(*place)), encoding="utf-8")
     except MemoryError:
         sys.exit("out of memory")
     except Exception as error:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from rlacd.bench.methods import make_method
 from rlacd.bench.store import BenchStore, BenchTask, Row
-from rlacd.pool.process import kill_group, why_it_ended
+from rlacd.pool.process import kill_group, start, why_it_ended
 
 Say = Callable[[str], None]
 
@@ -106,7 +106,7 @@ class Bench:
             if failure is not None and hulls.exists():  # the tool has finished; measuring gets its own limits
                 failure = self._child(task, hulls, answer)
                 failure = failure and f"measuring: {failure}"
-            row |= {"error": failure} if failure else json.loads(answer.read_text())
+            row |= {"error": failure} if failure else json.loads(answer.read_text(encoding="utf-8"))
         if not self._stopping:
             self.store.add(row)
         return row
@@ -122,19 +122,12 @@ class Bench:
             "hulls": str(hulls),
             "answer": str(answer),
         }
-        environment = {**os.environ, "OMP_NUM_THREADS": str(self.limits.threads)}
         command = [sys.executable, "-m", "rlacd.bench.child", json.dumps(job)]
         # The child reads a pipe that is never written to: when this process dies, the pipe closes and the child exits.
         read_end, write_end = os.pipe()
         try:
-            process = subprocess.Popen(
-                command,
-                env=environment,
-                stdin=read_end,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.PIPE,
-                start_new_session=True,
-            )
+            environment = {"OMP_NUM_THREADS": str(self.limits.threads)}
+            process = start(command, read_end, subprocess.DEVNULL, subprocess.PIPE, environment)
             os.close(read_end)
             self._running.add(process)
             try:
@@ -165,6 +158,10 @@ def find_meshes(folder: Path, listed: Path | None = None) -> list[str]:
     labels between the meshes.
     """
     if listed is not None:
-        return [line for line in listed.read_text().splitlines() if line.strip() and not line.startswith("#")]
+        return [
+            line
+            for line in listed.read_text(encoding="utf-8").splitlines()
+            if line.strip() and not line.startswith("#")
+        ]
     endings = {".ply", ".obj", ".stl", ".off", ".glb", ".gltf", ".dae", ".3mf"}
-    return sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.suffix.lower() in endings)
+    return sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.suffix.lower() in endings)

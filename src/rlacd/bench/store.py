@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
 import os
@@ -16,6 +15,8 @@ import numpy as np
 
 from rlacd.bench.methods import RawHull
 from rlacd.errors import OutputError
+from rlacd.io.write.atomic import output_errors
+from rlacd.io.write.lock import lock_folder
 
 Row: TypeAlias = dict[str, Any]
 """A finished task: ``mesh``, ``method``, ``setting``, and either ``error`` or the metrics."""
@@ -69,17 +70,19 @@ class BenchStore:
         self.folder = folder
         self._lines = folder / "results.jsonl"
         self._lock = threading.Lock()
-        try:
+        with output_errors(folder):
             (folder / "hulls").mkdir(parents=True, exist_ok=True)
-            self._held = self._lines.open("a")
-        except OSError as error:
-            raise OutputError(f"cannot write results to {folder} ({error.strerror}); choose another folder.") from error
+            self._run = lock_folder(folder, folder / ".lock")
+            try:
+                self._held = self._lines.open("a", encoding="utf-8")
+            except OSError:
+                self._run.release()
+                raise
         try:
-            fcntl.flock(self._held, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            self._held.close()
-            raise OutputError(f"another run is writing to {folder}; wait for it or choose another folder.") from error
-        self._rows = {_key(row): row for row in _whole_lines(self._lines)}
+            self._rows = {_key(row): row for row in _whole_lines(self._lines)}
+        except BaseException:
+            self.close()
+            raise
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -104,6 +107,7 @@ class BenchStore:
     def close(self) -> None:
         """Release the folder to other runs."""
         self._held.close()
+        self._run.release()
 
     def hulls_of(self, task: BenchTask) -> Path:
         """Path of the hulls of a task, whether they exist yet or not."""

@@ -54,7 +54,7 @@ def exit_codes() -> Iterator[None]:
         _fail("interrupted; no file is left half-written.", ExitCode.INTERRUPTED)
     except BrokenPipeError:
         # The reader of stdout (head, jq) has closed it; print nothing more, not even when Python flushes at exit.
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
         raise typer.Exit(ExitCode.CANNOT_WRITE) from None
     except OutputError as error:
         _fail(error, ExitCode.CANNOT_WRITE)

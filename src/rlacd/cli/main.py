@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import os
 import shlex
+import sys
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -47,8 +49,10 @@ app = typer.Typer(
 
 
 def main() -> None:
-    """Run the command line: the entry point of the ``rlacd`` script."""
-    app()
+    """Run the command line: the entry point of the ``rlacd`` script and of ``python -m rlacd``."""
+    if isinstance(sys.stdout, io.TextIOWrapper):  # JSON is UTF-8, and file names hold more than a code page of Windows
+        sys.stdout.reconfigure(encoding="utf-8")
+    app(prog_name="rlacd")
 
 
 def _print_version(wanted: bool) -> None:

@@ -68,7 +68,7 @@ def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
         )
         np.savez(fresh / "replay.npz", allow_pickle=False, **checkpoint.replay)
         np.savez(fresh / "rollouts.npz", allow_pickle=False, **checkpoint.rollouts)
-        (fresh / "state.json").write_text(json.dumps({"format": FORMAT, **checkpoint.state}))
+        (fresh / "state.json").write_text(json.dumps({"format": FORMAT, **checkpoint.state}), encoding="utf-8")
         for path in fresh.iterdir():
             with open(path, "rb") as file:
                 os.fsync(file.fileno())

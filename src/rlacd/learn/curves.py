@@ -30,16 +30,16 @@ class Curves:
         """Drop the points after `count`: they will be recomputed."""
         kept = []
         if self._path.exists():
-            lines = self._path.read_text().splitlines(keepends=True)
+            lines = self._path.read_text(encoding="utf-8").splitlines(keepends=True)
             kept = [line for line in lines if line.endswith("\n") and json.loads(line)[self._counted] <= count]
         if count == 0:
             kept = []
-        self._path.write_text("".join(kept))
+        self._path.write_text("".join(kept), encoding="utf-8")
         self._board = SummaryWriter(str(self._folder / "tensorboard"), purge_step=count + 1)
 
     def add(self, count: int, values: Mapping[str, float], seconds: float) -> None:
         """Append a point to several curves."""
-        with open(self._path, "a") as file:
+        with open(self._path, "a", encoding="utf-8") as file:
             file.write(json.dumps({self._counted: count, **values, "seconds": round(seconds, 3)}) + "\n")
         if self._board is not None:
             for name, value in {**values, "seconds": seconds}.items():

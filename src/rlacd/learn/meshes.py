@@ -94,13 +94,13 @@ def list_once(meshes: Path, run: Path, max_faces: int, validation: int, seed: in
     """
     kept = run / "meshes.json"
     if kept.exists():
-        listed = json.loads(kept.read_text())
+        listed = json.loads(kept.read_text(encoding="utf-8"))
         return MeshList(tuple(listed.pop("training")), tuple(listed.pop("validation")), **listed)
     if not meshes.is_dir():
         raise TrainingError(f"there is no folder {meshes}; give one that holds meshes.")
     found = list_meshes(meshes, max_faces, validation, seed)
     run.mkdir(parents=True, exist_ok=True)
-    kept.write_text(json.dumps(dataclasses.asdict(found), indent=1))
+    kept.write_text(json.dumps(dataclasses.asdict(found), indent=1), encoding="utf-8")
     return found
 
 

@@ -1,6 +1,7 @@
-"""The process that answers requests, one at a time: ``python -m rlacd.pool.child SOCKET SERVER FOLDER``.
+"""The process that answers requests, one at a time: ``python -m rlacd.pool.child SERVER FOLDER``.
 
-A request that crashes, hangs, exhausts memory or makes a library print does so here. The process exits when its parent
+Requests come through stdin and answers leave through what stdout was at the start: pipes that every system has. A
+request that crashes, hangs, exhausts memory or makes a library print does so here. The process exits when its parent
 does.
 """
 
@@ -11,33 +12,35 @@ import queue
 import signal
 import sys
 import threading
-from multiprocessing.connection import Connection
 from pathlib import Path
 
 from rlacd.errors import RlacdError
 from rlacd.pool.message import find_server, receive, send
 from rlacd.pool.request import Shared, Values
 
-READY = b"ready"
+READY = {"ready": True}
+"""Header of the first message, sent when requests may come."""
 
 
 def main() -> None:
     """Answer requests until the other end is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C stops
-    os.dup2(2, 1)
-    connection = Connection(int(sys.argv[1]))
+    requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what libraries print is no answer
+    with open(os.devnull, "rb") as nothing:
+        os.dup2(nothing.fileno(), 0)
     messages: queue.SimpleQueue[tuple[Values, dict[str, bytes]]] = queue.SimpleQueue()
 
     def listen() -> None:
         try:
             while True:
-                messages.put(receive(connection))
+                messages.put(receive(requests))
         except (EOFError, OSError):
             os._exit(0)  # even in the middle of a request: its answer is no longer needed
 
     threading.Thread(target=listen, daemon=True).start()
-    serve = find_server(sys.argv[2])(Path(sys.argv[3]))
-    connection.send_bytes(READY)
+    serve = find_server(sys.argv[1])(Path(sys.argv[2]))
+    send(answers, READY, {})
     shared: dict[str, Shared] = {}
     while True:
         header, blobs = messages.get()
@@ -48,9 +51,9 @@ def main() -> None:
         try:
             values, files = serve(header["values"], blobs, shared)
         except RlacdError as error:
-            send(connection, {"error": [type(error).__name__, str(error)]}, {})
+            send(answers, {"error": [type(error).__name__, str(error)]}, {})
         else:
-            send(connection, {"values": values}, files)
+            send(answers, {"values": values}, files)
 
 
 if __name__ == "__main__":

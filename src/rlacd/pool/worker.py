@@ -7,22 +7,22 @@ holds it stops the whole pool. Here every process has its own pipe, so that its 
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
-import os
+import queue
 import socket
 import subprocess
 import sys
 import tempfile
 import threading
 import time
+from typing import IO
 
 import psutil
 
 from rlacd import errors
 from rlacd.pool.child import READY
 from rlacd.pool.message import receive, send
-from rlacd.pool.process import end, kill_group, why_it_ended
-from rlacd.pool.request import Answer, Request, WorkerDiedError
+from rlacd.pool.process import end, kill_group, start, why_it_ended
+from rlacd.pool.request import Answer, Request, Values, WorkerDiedError
 
 POLL_SECONDS = 0.05
 """Seconds between checks of a busy process."""
@@ -65,8 +65,8 @@ class Worker:
         self._stderr.truncate()
         try:
             self._send(request)
-            self._await(time.monotonic() + limits.seconds, f"it took more than {limits.seconds:g} s", limits.memory)
-            header, blobs = receive(self._pipe)
+            too_late = f"it took more than {limits.seconds:g} s"
+            header, blobs = self._receive(time.monotonic() + limits.seconds, too_late, limits.memory)
         except (EOFError, OSError) as error:
             raise self._death() from error
         except BaseException:
@@ -87,7 +87,9 @@ class Worker:
         process, self._process = self._process, None
         end(process)
         self._given = {}
-        self._pipe.close()
+        self._reader.join()
+        with contextlib.suppress(OSError):  # what it did not read in time is lost
+            self._requests.close()
         self._stderr.close()
         self._folder.cleanup()
 
@@ -100,25 +102,22 @@ class Worker:
 
     def _start(self, server: str) -> None:
         self._server = server
-        self._pipe, there = multiprocessing.Pipe()
         self._folder = tempfile.TemporaryDirectory(prefix="rlacd-")
         self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process
         with self._starting:
             if self._killed:
                 raise WorkerDiedError("its pool was closed")
-            self._process = subprocess.Popen(
-                [sys.executable, "-m", "rlacd.pool.child", str(there.fileno()), server, self._folder.name],
-                pass_fds=[there.fileno()],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=self._stderr,
-                env={**os.environ, "OMP_NUM_THREADS": "1"},
-                start_new_session=True,
-            )
-        there.close()
+            command = [sys.executable, "-m", "rlacd.pool.child", server, self._folder.name]
+            self._process = start(command, subprocess.PIPE, subprocess.PIPE, self._stderr, {"OMP_NUM_THREADS": "1"})
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._requests = self._process.stdin
+        self._answers: queue.SimpleQueue[tuple[Values, dict[str, bytes]] | None] = queue.SimpleQueue()
+        self._reader = threading.Thread(target=_read, args=(self._process.stdout, self._answers), daemon=True)
+        self._reader.start()
         try:
-            self._await(time.monotonic() + START, f"its process did not start within {START:g} s", 0)
-            if self._pipe.recv_bytes() != READY:
+            header, _ = self._receive(time.monotonic() + START, f"its process did not start within {START:g} s", 0)
+            if header != READY:
                 raise EOFError
         except (EOFError, OSError) as error:
             raise self._death() from error
@@ -129,13 +128,18 @@ class Worker:
     def _send(self, request: Request) -> None:
         for name, shared in request.shared.items():
             if self._given.get(name) != shared.key:
-                send(self._pipe, {"shares": name, "key": shared.key}, shared.blobs)
+                send(self._requests, {"shares": name, "key": shared.key}, shared.blobs)
         self._given = {name: shared.key for name, shared in request.shared.items()}
-        send(self._pipe, {"shares": "", "values": request.values, "shared": list(request.shared)}, request.blobs)
+        send(self._requests, {"shares": "", "values": request.values, "shared": list(request.shared)}, request.blobs)
 
-    def _await(self, until: float, too_late: str, memory: int) -> None:
-        """Wait until there is something to read or the process has ended."""
-        while not self._pipe.poll(POLL_SECONDS):
+    def _receive(self, until: float, too_late: str, memory: int) -> tuple[Values, dict[str, bytes]]:
+        """Wait for a message; raise EOFError if the process has ended instead."""
+        while True:
+            with contextlib.suppress(queue.Empty):
+                message = self._answers.get(timeout=POLL_SECONDS)
+                if message is None:
+                    raise EOFError
+                return message
             if time.monotonic() > until:
                 raise WorkerDiedError(too_late)
             if memory and self._memory() > memory:
@@ -158,3 +162,13 @@ class Worker:
         last_words = self._stderr.read().decode(errors="replace")[-500:].strip()
         self.close()
         return WorkerDiedError(f"its process {why_it_ended(code)}", last_words)
+
+
+def _read(pipe: IO[bytes], answers: queue.SimpleQueue[tuple[Values, dict[str, bytes]] | None]) -> None:
+    """Pass on what a process answers, then None; a thread, since not every system can wait for a pipe for a while."""
+    try:
+        with pipe, contextlib.suppress(EOFError, OSError, ValueError):
+            while True:
+                answers.put(receive(pipe))
+    finally:
+        answers.put(None)

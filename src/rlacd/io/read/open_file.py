@@ -9,6 +9,9 @@ import stat
 LARGEST = 2**30
 """Bytes of the largest file that is read. A binary STL of this length has 21 million triangles."""
 
+# Opening a pipe would wait for a writer; Windows has no such files, and would translate line ends.
+_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+
 
 def read_file(path: str | os.PathLike[str], most: int = LARGEST) -> bytes:
     """Read the content of a file as of opening it, even if it grows meanwhile.
@@ -27,7 +30,7 @@ def read_file(path: str | os.PathLike[str], most: int = LARGEST) -> bytes:
         says which.
     """
     _check(os.stat(path), path, most)  # opening a device may have side effects
-    handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)  # opening a pipe would wait for a writer
+    handle = os.open(path, _FLAGS)
     try:
         opened = os.fstat(handle)  # the name may refer to another file by now
         _check(opened, path, most)

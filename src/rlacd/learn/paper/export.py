@@ -69,5 +69,5 @@ def export_policy(path: Path, encoder: AnyEncoder, network: QNetwork, options: T
         )
     save_file({k: v.contiguous() for k, v in network.state_dict().items()}, path.with_suffix(".safetensors"))
     described = {"inputs": list(INPUTS), "unit": network.unit, "options": dataclasses.asdict(options)}
-    path.with_suffix(".json").write_text(json.dumps(described, indent=1))
+    path.with_suffix(".json").write_text(json.dumps(described, indent=1), encoding="utf-8")
     return path

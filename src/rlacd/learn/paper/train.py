@@ -95,7 +95,7 @@ def train(
     encoder = _encoder(options)
     listed = list_once(meshes, run, options.max_faces, options.validation, options.seed)
     if not (run / "options.json").exists():
-        (run / "options.json").write_text(json.dumps(dataclasses.asdict(options), indent=1))
+        (run / "options.json").write_text(json.dumps(dataclasses.asdict(options), indent=1), encoding="utf-8")
     say(
         f"{len(listed.training)} meshes to learn on, {len(listed.validation)} to validate with; "
         f"{listed.unreadable} cannot be read, {listed.too_large} are too large"

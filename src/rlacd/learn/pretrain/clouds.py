@@ -41,7 +41,7 @@ class Clouds:
         listing = kept.with_suffix(".json")
         if not listing.exists():
             _write(folder, names, kept, listing)
-        self.names: tuple[str, ...] = tuple(json.loads(listing.read_text()))
+        self.names: tuple[str, ...] = tuple(json.loads(listing.read_text(encoding="utf-8")))
         if names and not self.names:
             raise TrainingError(f"no mesh in {folder} has a surface to take points of; give other meshes.")
         self._points: Float32Array = np.load(kept, mmap_mode="r", allow_pickle=False)
@@ -93,7 +93,7 @@ def _write(folder: Path, names: Sequence[str], kept: Path, listing: Path) -> Non
     partial = kept.with_suffix(".new.npy")
     np.save(partial, np.array(clouds, dtype=np.float32).reshape(-1, KEPT, 3))
     os.replace(partial, kept)
-    listing.write_text(json.dumps(held))
+    listing.write_text(json.dumps(held), encoding="utf-8")
 
 
 def _turn(axis: int, degrees: float) -> np.ndarray:

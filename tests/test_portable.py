@@ -1,0 +1,144 @@
+"""rlacd needs nothing that only Linux has: its core runs where that is hidden, in all its processes."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import trimesh
+
+ROOT = Path(__file__).resolve().parents[1]
+CODE_PAGE = "cp1252"
+"""What Windows in western countries uses for pipes; most of the characters below are not in it."""
+
+
+def elsewhere(*arguments: object, encoding: str = CODE_PAGE) -> subprocess.CompletedProcess[str]:
+    """Run Python with the functions, flags, signals and modules of `tests/elsewhere/sitecustomize.py` hidden."""
+    variables = {
+        "PYTHONPATH": os.pathsep.join([str(ROOT / "tests" / "elsewhere"), str(ROOT)]),
+        "PYTHONWARNDEFAULTENCODING": "1",
+        "PYTHONIOENCODING": encoding,
+        "PYTHONUTF8": "0",
+    }
+    command = [sys.executable, *map(str, arguments)]
+    return subprocess.run(
+        command,
+        capture_output=True,
+        encoding="utf-8",
+        errors="replace",  # messages on stderr keep to the code page
+        timeout=600,
+        env={**os.environ, **variables},
+    )
+
+
+@pytest.fixture
+def ring(tmp_path: Path) -> Path:
+    mesh = tmp_path / "meshes" / "指輪 – ring.stl"
+    mesh.parent.mkdir()
+    trimesh.creation.annulus(0.5, 1, 0.3).export(mesh)
+    return mesh
+
+
+def test_what_linux_has_is_hidden_from_rlacd_alone() -> None:
+    program = """
+import os, sys
+print(hasattr(os, "killpg"), end=" ")
+import fcntl
+exec("import os; print(hasattr(os, 'killpg'), hasattr(os, 'replace')); import fcntl", {"__name__": "rlacd.x"})
+"""
+    run = elsewhere("-c", program)
+    assert run.stdout.split() == ["True", "False", "True"]
+    assert "ModuleNotFoundError" in run.stderr
+
+
+def test_every_module_is_imported() -> None:
+    """But those of training, which import what their extras install."""
+    program = """
+import importlib, pkgutil, rlacd
+for module in pkgutil.walk_packages(rlacd.__path__, "rlacd."):
+    if not module.name.startswith("rlacd.learn") and not module.name.endswith("__main__"):
+        importlib.import_module(module.name)
+        print(module.name)
+"""
+    run = elsewhere("-c", program)
+    assert run.returncode == 0, run.stderr
+    assert len(run.stdout.split()) > 100
+
+
+@pytest.mark.parametrize("ending", ["glb", "obj", "xml"])
+def test_a_mesh_is_decomposed_and_written(ring: Path, ending: str) -> None:
+    out = ring.with_name(f"結果.{ending}")
+    run = elsewhere("-m", "rlacd", "decompose", ring, "-o", out, "--report", "-")
+    assert run.returncode == 0, run.stderr
+    assert json.loads(run.stdout)["parts"] > 2
+    assert out.exists()
+
+
+def test_a_folder_is_written_twice(ring: Path) -> None:
+    for _ in range(2):
+        run = elsewhere("-m", "rlacd", "decompose", ring, "-o", f"{ring.parent / 'hulls'}/", "--quiet")
+        assert run.returncode == 0, run.stderr
+    assert len(list((ring.parent / "hulls").glob("*.obj"))) > 2
+
+
+def test_facts_about_a_file_are_printed_in_utf_8(ring: Path) -> None:
+    run = elsewhere("-m", "rlacd", "info", ring)
+    assert run.returncode == 0, run.stderr
+    assert ring.name in run.stdout
+    run = elsewhere("-m", "rlacd", "info", ring, "--json")
+    assert json.loads(run.stdout)
+
+
+def test_a_batch_runs_in_processes_and_passes_over_what_is_done(ring: Path) -> None:
+    out = ring.parents[1] / "out"
+    first = elsewhere("-m", "rlacd", "batch", ring.parent, "-o", out, "--jobs", 2)
+    assert first.returncode == 0, first.stderr
+    assert (out / f"{ring.stem}.glb").exists() or list(out.rglob("*ring*")), list(out.rglob("*"))
+    second = elsewhere("-m", "rlacd", "batch", ring.parent, "-o", out, "--jobs", 2)
+    assert second.returncode == 0, second.stderr
+
+
+def test_a_worker_is_ended_with_its_children() -> None:
+    program = """
+import subprocess, sys
+from rlacd.pool.process import end, peak_memory, start
+child = "import subprocess, sys, time; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)']);" \
+        "print('up', flush=True); time.sleep(600)"
+process = start([sys.executable, "-c", child], subprocess.DEVNULL, subprocess.PIPE, subprocess.DEVNULL, {})
+assert process.stdout.readline().strip() == b"up"
+import psutil
+grandchildren = psutil.Process(process.pid).children()
+assert len(grandchildren) == 1
+end(process)
+assert not psutil.wait_procs(grandchildren, timeout=30)[1]
+assert 2**23 < peak_memory() < 2**33
+"""
+    run = elsewhere("-c", program)
+    assert run.returncode == 0, run.stderr
+
+
+@pytest.mark.slow
+def test_meshes_are_compared_in_processes(ring: Path) -> None:
+    out = ring.parents[1] / "run"
+    program = """
+import sys; from pathlib import Path; from rlacd.bench import Bench, BenchStore, find_meshes
+meshes, out = map(Path, sys.argv[1:])
+print(Bench(meshes, find_meshes(meshes), BenchStore(out), say=lambda _: None).run("greedy", 0.05)[0]["parts"])
+"""
+    run = elsewhere("-c", program, ring.parent, out)
+    assert run.returncode == 0, run.stderr
+    assert int(run.stdout) > 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "file", ["test_load.py", "test_formats.py", "test_options.py", "test_decomposition.py", "test_pool.py"]
+)
+def test_the_tests_of_the_core_pass(file: str) -> None:
+    tests = ROOT / "tests" / file
+    run = elsewhere("-m", "pytest", "-x", "-q", "-n0", "-p", "no:cacheprovider", tests, encoding="utf-8")
+    assert run.returncode == 0, run.stdout[-3000:]
