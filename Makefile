@@ -20,7 +20,7 @@ SEED    ?= 0
 MESHES  ?= ../shared/meshes
 SECONDS_TO_FUZZ = $(shell expr 60 \* $(MINUTES))
 
-.PHONY: install demo test test-fast test-all nightly lint soak soak-totals fuzz-files fuzz-shapes sanitize sanitize-address sanitize-thread format clean
+.PHONY: install demo docs test test-fast test-all nightly lint soak soak-totals fuzz-files fuzz-shapes sanitize sanitize-address sanitize-thread format clean
 
 install: $(VENV)/installed
 
@@ -40,6 +40,14 @@ $(VENV)/test-extras: $(VENV)/installed
 
 demo: install
 	$(BIN)/python examples/demo.py
+
+# The site, in build/site; a broken link or reference is an error.
+docs: $(VENV)/docs
+	$(BIN)/mkdocs build --strict --quiet
+
+$(VENV)/docs: $(VENV)/installed
+	$(BIN)/pip install --quiet --constraint constraints-dev.txt --group docs
+	touch $@
 
 lint: $(VENV)/test-extras
 	$(BIN)/ruff check .

@@ -26,6 +26,8 @@ def write_file(path: Path, data: bytes) -> None:
     """
     with output_errors(path):
         final = path.resolve()
+        if final.is_symlink():  # still: it leads to itself, which Python reports only up to version 3.12
+            raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
         # Not derived from the final name, which may already have the maximum length.
         temporary = final.with_name(f".rlacd-{secrets.token_hex(8)}.tmp")
         final.parent.mkdir(parents=True, exist_ok=True)
