@@ -44,4 +44,33 @@ std::array<Vec3, 3> mesh_moments(const std::vector<Vec3>& vertices, const std::v
   return moments;
 }
 
+// Sums over the tetrahedra between the faces and an apex, all relative to the apex: with corners 0, a, b, c, s = a + b
+// + c and volume v, the integral of x is v s / 4, and that of x x^T is v (a a^T + b b^T + c c^T + s s^T) / 20.
+Mass mesh_mass(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
+  Mass mass;
+  if (faces.empty()) return mass;
+  const Vec3 apex = vertices[faces[0][0]];
+  double sixfold = 0;
+  Vec3 first;
+  std::array<Vec3, 3> second{};
+  for (const Triangle& f : faces) {
+    const Vec3 a = vertices[f[0]] - apex, b = vertices[f[1]] - apex, c = vertices[f[2]] - apex, s = a + b + c;
+    const double v = dot(a, cross(b, c));
+    sixfold += v;
+    first = first + v * s;
+    for (const Vec3 p : {a, b, c, s})
+      for (int i = 0; i < 3; ++i) second[i] = second[i] + v * p[i] * p;
+  }
+  mass.volume = sixfold / 6;
+  const Vec3 centre = sixfold != 0 ? 1 / (4 * sixfold) * first : Vec3{};
+  mass.centre = apex + centre;
+  for (int i = 0; i < 3; ++i) second[i] = 1.0 / 120 * second[i] - mass.volume * centre[i] * centre;
+  const double trace = second[0].x + second[1].y + second[2].z;
+  for (int i = 0; i < 3; ++i) {
+    mass.inertia[i] = -second[i];
+    mass.inertia[i][i] += trace;
+  }
+  return mass;
+}
+
 }  // namespace rlacd

@@ -1,7 +1,7 @@
 // Volume, area and moments of triangle meshes, summed face by face: the same bits on every machine.
 //
 // Input:  vertices and faces; for the volume, of a closed oriented mesh.
-// Output: the enclosed volume, the surface area, and the second moments of the surface.
+// Output: the enclosed volume, the surface area, the second moments of the surface, and the mass of the solid.
 #pragma once
 
 #include <array>
@@ -16,5 +16,13 @@ double mesh_area(const std::vector<Vec3>& vertices, const std::vector<Triangle>&
 
 // Second moments of the surface about its centroid, row-major, up to a positive factor.
 std::array<Vec3, 3> mesh_moments(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces);
+
+// Volume, centre of mass, and inertia about it, row-major, of the solid of density one in a closed mesh.
+struct Mass {
+  double volume = 0;
+  Vec3 centre;
+  std::array<Vec3, 3> inertia{};
+};
+Mass mesh_mass(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces);
 
 }  // namespace rlacd

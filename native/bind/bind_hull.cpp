@@ -78,6 +78,18 @@ void bind_hull(nb::module_& m) {
       nb::arg("vertices"), nb::arg("faces"),
       "Second moments [3, 3] of a surface around its centroid, exact over its triangles but for a positive factor.");
   m.def(
+      "mesh_mass",
+      [](const PointsIn& vertices, const FacesIn& faces) {
+        const Mesh mesh = to_mesh(vertices, faces);
+        const Mass mass = mesh_mass(mesh.vertices, mesh.faces);
+        const auto& rows = mass.inertia;
+        return nb::make_tuple(mass.volume,
+                              to_array<double>(std::vector<double>{mass.centre.x, mass.centre.y, mass.centre.z}),
+                              to_array<double>(std::vector<Vec3>(rows.begin(), rows.end())));
+      },
+      nb::arg("vertices"), nb::arg("faces"),
+      "Volume, centre of mass [3], and inertia about it [3, 3] of the solid of density one in a closed mesh.");
+  m.def(
       "mesh_area",
       [](const PointsIn& v, const FacesIn& f) {
         const Mesh mesh = to_mesh(v, f);

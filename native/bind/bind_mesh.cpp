@@ -3,6 +3,7 @@
 
 #include "base/arrays.hpp"
 #include "base/stop.hpp"
+#include "mesh/curve.hpp"
 #include "mesh/edges.hpp"
 #include "mesh/point_bodies.hpp"
 #include "mesh/weld.hpp"
@@ -140,14 +141,14 @@ void bind_mesh(nb::module_& m) {
         if (found.count == 0) return nb::none();
         return nb::make_tuple(to_array<std::int64_t>(std::move(found.body)), to_array<double>(std::move(found.volume)),
                               to_array<double>(std::move(found.area)), to_array<double>(std::move(found.box)),
-                              found.has_no_pinch, found.least_height, found.sharpest);
+                              found.has_no_pinch, found.least_height, found.least_fold);
       },
       nb::arg("vertices"), nb::arg("faces"),
       "The bodies of a mesh all of whose edges join two faces that run along them in opposite directions, else None:\n"
       "the body [F] of each face; signed volume [B], area [B] and box [B, 6] of each body; whether the faces around "
       "each\n"
-      "vertex are all neighbours; the least height of a face, and the least cosine between the normals of "
-      "neighbours.");
+      "vertex are all neighbours; the least height of a face, and the least length of the sum of the unit normals "
+      "of neighbours.");
   m.def(
       "separate_fans",
       [](const PointsIn& vertices, const FacesIn& faces) {

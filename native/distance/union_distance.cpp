@@ -5,6 +5,7 @@
 #include "base/stop.hpp"
 #include "cut/clip.hpp"
 #include "distance/surface_field.hpp"
+#include "mesh/curve.hpp"
 
 namespace rlacd {
 namespace {
@@ -73,14 +74,6 @@ class Gathering {
   std::unordered_map<Key, std::int32_t, Hash> number_;
   std::vector<std::int32_t> corner_;
 };
-
-// Whether three ascending lists have a number in common.
-bool have_common(const std::vector<std::int32_t>& a, const std::vector<std::int32_t>& b,
-                 const std::vector<std::int32_t>& c) {
-  return std::any_of(a.begin(), a.end(), [&](std::int32_t i) {
-    return std::binary_search(b.begin(), b.end(), i) && std::binary_search(c.begin(), c.end(), i);
-  });
-}
 
 // Whether a triangle lies farther than `gap` beyond a plane.
 bool is_beyond(const ConvexPlanes& planes, std::int32_t plane, const Corners& corner, double gap) {
@@ -202,6 +195,36 @@ Interval HullUnion::over(const Bvh& surface, double tolerance, double gap, int t
   return over;
 }
 
+std::vector<char> HullUnion::held_faces(const Mesh& surface, int threads) const {
+  constexpr std::size_t kBlock = 32;  // faces that lie close together, and share what is near them
+  const std::vector<std::int32_t> order = order_of_faces(surface);
+  std::vector<char> is_held(order.size(), 0);
+  parallel_for((order.size() + kBlock - 1) / kBlock, threads, [&](std::size_t block) {
+    const std::size_t begin = block * kBlock, end = std::min(order.size(), begin + kBlock);
+    Box box;
+    for (std::size_t i = begin; i < end; ++i)
+      for (const std::int32_t corner : surface.faces[order[i]]) box.extend(surface.vertices[corner]);
+    std::vector<std::int32_t> near;
+    std::size_t left = end - begin;
+    for (std::size_t m = 0; m < members_.size() && left > 0; ++m) {
+      const ConvexPlanes& planes = members_[m]->planes;
+      if (!overlap(box, members_[m]->box, kInsideSlack) || !planes.that_meet(box, kInsideSlack, near)) continue;
+      const auto holds = [&](std::int32_t vertex) {
+        return std::all_of(near.begin(), near.end(), [&](std::int32_t plane) {
+          return planes.depth(plane, surface.vertices[vertex]) >= -kInsideSlack;
+        });
+      };
+      for (std::size_t i = begin; i < end; ++i) {
+        const Triangle& face = surface.faces[order[i]];
+        if (is_held[order[i]] || !std::all_of(face.begin(), face.end(), holds)) continue;
+        is_held[order[i]] = 1;
+        --left;
+      }
+    }
+  });
+  return is_held;
+}
+
 Interval HullUnion::under(const Mesh& surface, double tolerance, int threads) const {
   if (members_.empty()) return {kInfinity, kInfinity};
   std::vector<HalfSpaces> grown;
@@ -216,18 +239,11 @@ Interval HullUnion::under(const Mesh& surface, double tolerance, int threads) co
       for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) task(i, clipper);
     });
   };
-  std::vector<std::vector<std::int32_t>> holders(surface.vertices.size());  // the hulls that contain a corner
-  for_each(holders.size(), [&](std::size_t v, Clipper&) {
-    const Vec3 p = surface.vertices[v];
-    for (std::size_t m = 0; m < members_.size(); ++m)
-      if (overlap({p, p}, members_[m]->box, kInsideSlack) && members_[m]->planes.nearest(p).depth >= -kInsideSlack)
-        holders[v].push_back(static_cast<std::int32_t>(m));
-  });
+  const std::vector<char> is_held = held_faces(surface, threads);
   std::vector<std::vector<Polygon>> outside(surface.faces.size());
   for_each(outside.size(), [&](std::size_t f, Clipper& clipper) {
     poll_stop();
-    const auto [a, b, c] = surface.faces[f];
-    if (have_common(holders[a], holders[b], holders[c])) return;
+    if (is_held[f]) return;
     const Corners corner = corners_of(surface, surface.faces[f]);
     const Box box = box_of(corner);
     outside[f] = {{corner.begin(), corner.end()}};

@@ -56,6 +56,9 @@ class HullUnion {
   };
   friend class HullField;
 
+  // Which faces have all their corners in one of the hulls.
+  std::vector<char> held_faces(const Mesh& surface, int threads) const;
+
   std::vector<std::unique_ptr<Member>> members_;
 };
 

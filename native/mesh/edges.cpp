@@ -85,47 +85,6 @@ bool are_fans(const std::vector<Triangle>& faces, const std::vector<std::uint32_
   return true;
 }
 
-// Spreads 10 bits to every third of 30.
-std::uint32_t spread(std::uint32_t v) {
-  v = 0xFF0000FFu & (v * 0x00010001u);
-  v = 0x0F00F00Fu & (v * 0x00000101u);
-  v = 0xC30C30C3u & (v * 0x00000011u);
-  v = 0x49249249u & (v * 0x00000005u);
-  return v;
-}
-
-std::uint32_t place_on_curve(Vec3 p, const Box& box) {
-  std::uint32_t place = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double share = (p[axis] - box.lower[axis]) / (box.upper[axis] - box.lower[axis]);
-    const double cell = std::min(1023.0, std::max(0.0, 1024.0 * share));
-    place |= spread(static_cast<std::uint32_t>(cell)) << (2 - axis);
-  }
-  return place;
-}
-
-// The order of items by their place, stable: a radix sort.
-std::vector<std::int32_t> order_of(std::vector<std::uint32_t> place) {
-  constexpr int kBits = 10;
-  std::vector<std::int32_t> order(place.size()), other(place.size());
-  std::vector<std::uint32_t> moved(place.size());
-  std::iota(order.begin(), order.end(), 0);
-  for (int shift = 0; shift < 30; shift += kBits) {
-    poll_stop();
-    std::array<std::size_t, (1 << kBits) + 1> begin{};
-    for (const std::uint32_t p : place) ++begin[(p >> shift & ((1 << kBits) - 1)) + 1];
-    for (std::size_t d = 1; d < begin.size(); ++d) begin[d] += begin[d - 1];
-    for (std::size_t i = 0; i < place.size(); ++i) {
-      const std::size_t slot = begin[place[i] >> shift & ((1 << kBits) - 1)]++;
-      other[slot] = order[i];
-      moved[slot] = place[i];
-    }
-    order.swap(other);
-    place.swap(moved);
-  }
-  return order;
-}
-
 }  // namespace
 
 Edges edges_of(const std::vector<Triangle>& faces, std::size_t vertices) {
@@ -197,7 +156,7 @@ ClosedBodies closed_bodies(const Mesh& mesh) {
   }
   found.least_height = std::sqrt(height2);
   for (std::size_t h = 0; h < mate.size(); ++h)
-    if (mate[h] < h) found.sharpest = std::min(found.sharpest, dot(normals[h / 3], normals[mate[h] / 3]));
+    if (mate[h] < h) found.least_fold = std::min(found.least_fold, norm(normals[h / 3] + normals[mate[h] / 3]));
   return found;
 }
 
@@ -222,34 +181,6 @@ Mesh separate_fans(const Mesh& mesh) {
     }
   }
   return separate;
-}
-
-Mesh along_a_curve(const Mesh& mesh) {
-  Box box;
-  for (const Vec3 p : mesh.vertices) box.extend(p);
-  std::vector<std::uint32_t> place(mesh.vertices.size());
-  for (std::size_t v = 0; v < place.size(); ++v) place[v] = place_on_curve(mesh.vertices[v], box);
-  const std::vector<std::int32_t> vertex_order = order_of(std::move(place));
-  Mesh sorted;
-  sorted.vertices.reserve(vertex_order.size());
-  std::vector<std::int32_t> number(vertex_order.size());
-  for (const std::int32_t v : vertex_order) {
-    number[v] = static_cast<std::int32_t>(sorted.vertices.size());
-    sorted.vertices.push_back(mesh.vertices[v]);
-  }
-  place.assign(mesh.faces.size(), 0);
-  for (std::size_t f = 0; f < place.size(); ++f) {
-    if (f % kBetweenPolls == 0) poll_stop();
-    const auto [a, b, c] = mesh.faces[f];
-    const Vec3 sum = mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c];
-    place[f] = place_on_curve({sum.x / 3, sum.y / 3, sum.z / 3}, box);
-  }
-  sorted.faces.reserve(mesh.faces.size());
-  for (const std::int32_t f : order_of(std::move(place))) {
-    const auto [a, b, c] = mesh.faces[f];
-    sorted.faces.push_back({number[a], number[b], number[c]});
-  }
-  return sorted;
 }
 
 }  // namespace rlacd

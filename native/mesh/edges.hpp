@@ -61,7 +61,7 @@ struct ClosedBodies {
   // No vertex at which faces meet that are not neighbours around it.
   bool has_no_pinch = false;
   double least_height = 0;  // of a face
-  double sharpest = 1;  // the least cosine between the normals of faces that share an edge; -1 where one is folded back
+  double least_fold = 2;    // the least length of the sum of two neighbours' unit normals; 0 if one is folded back
 };
 // No count if there are other edges.
 ClosedBodies closed_bodies(const Mesh& mesh);
@@ -69,9 +69,5 @@ ClosedBodies closed_bodies(const Mesh& mesh);
 // A closed mesh in which faces that meet at a vertex only have a vertex each: all but the first fan of faces around a
 // vertex get a copy of it, after all others.
 Mesh separate_fans(const Mesh& mesh);
-
-// The same mesh with its vertices and its faces along a space-filling curve (Morton's) of 2^10 cells along each axis of
-// its box, otherwise in their order: neighbours in space become neighbours in memory. All vertices must be used.
-Mesh along_a_curve(const Mesh& mesh);
 
 }  // namespace rlacd

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-import numpy as np
 import trimesh
 
 from rlacd._version import __version__
@@ -16,10 +15,10 @@ from rlacd.criteria import Criterion
 from rlacd.merge.slivers import is_sliver
 from rlacd.options import Options
 from rlacd.presets import Preset, find_preset
-from rlacd.solid.component import Part
+from rlacd.solid.component import Part, concatenated
 from rlacd.solid.distance import hull_distances
 from rlacd.solid.hull import Hull
-from rlacd.solid.mass import Mass, mass_of, mass_of_triangles
+from rlacd.solid.mass import Mass, mass_of
 from rlacd.solid.solid import Solid
 from rlacd.workers import Workers
 
@@ -48,11 +47,8 @@ def make_report(
     has_surface = len(solid.surface[1]) > 0  # a cloud of points has none
     if has_surface:
         over, under = clock.if_in_time(lambda: _distances(solid, parts, workers), lambda: (None, None))
-    mass = (
-        mass_of_triangles(np.concatenate([part.hull.vertices[part.hull.faces] for part in parts]), solid.frame)
-        if is_cover
-        else mass_of(solid)
-    )
+    stands_for_mass = [(part.hull.vertices, part.hull.faces) for part in parts] if is_cover else [solid.mesh]
+    mass = mass_of(*concatenated(stands_for_mass), solid.frame)
     return {
         "version": __version__,
         "options": _options(options),

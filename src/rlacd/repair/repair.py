@@ -71,8 +71,9 @@ _LOST = 5e-3
 _CROWD, _CROSSINGS = 300, 1000
 # A closed body with less volume per area is flat: there is nothing to cut.
 _FLAT = 1e-6
-# manifold3d collapses edges shorter than 1e-12, and swaps those of faces that are no higher or folded back in a plane.
-_THIN, _FOLDED = 1e-8, -1 + 1e-6
+# manifold3d collapses edges shorter than 1e-12, and swaps those of faces that are no higher, or folded back onto a
+# neighbour in a plane within 1e-12.
+_THIN = 1e-11
 
 
 def repair(
@@ -169,8 +170,8 @@ def _taken_as_it_is(vertices: FloatArray, faces: Indices) -> tuple[tuple[FloatAr
     found = _native.closed_bodies(vertices, faces)
     if found is None or len(found[1]) > 1:
         return None
-    _, (volume,), (area,), _, has_no_pinch, least_height, sharpest = found
-    if abs(volume) <= 2 * _FLAT * area or least_height <= _THIN or sharpest <= _FOLDED:
+    _, (volume,), (area,), _, has_no_pinch, least_height, least_fold = found
+    if abs(volume) <= 2 * _FLAT * area or least_height * min(least_fold, 1.0) <= _THIN:
         return None
     outward = faces if volume > 0 else np.ascontiguousarray(faces[:, ::-1])
     separate = (vertices, outward) if has_no_pinch else _native.separate_fans(vertices, outward)

@@ -430,10 +430,11 @@ def _enclose(
             if _native.Surface(*shells[i][1]).winding(point)[0] > 0.5:
                 by_shell[i].append(cavity)
                 break
-    return [group[0] if len(group) == 1 else _concatenated(group) for group in by_shell]
+    return [group[0] if len(group) == 1 else concatenated(group) for group in by_shell]
 
 
-def _concatenated(surfaces: list[tuple[FloatArray, IntArray]]) -> tuple[FloatArray, IntArray]:
+def concatenated(surfaces: list[tuple[FloatArray, IntArray]]) -> tuple[FloatArray, IntArray]:
+    """Return all surfaces [V, 3], [F, 3] as one."""
     firsts = np.cumsum([0, *(len(vertices) for vertices, _ in surfaces[:-1])])
     faces = [own + first for (_, own), first in zip(surfaces, firsts, strict=True)]
     return np.concatenate([vertices for vertices, _ in surfaces]), np.concatenate(faces).astype(np.int32)

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from trimesh.triangles import mass_properties
 
-from rlacd.solid.arrays import FloatArray
+from rlacd import _native
+from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.frame import Frame
-from rlacd.solid.solid import Solid
 
 _GREATEST = np.finfo(np.float64).max
 
@@ -38,20 +37,15 @@ class Mass:
         return Mass(self.volume_abs * density, self.centre_abs, self.inertia_abs * density)
 
 
-def mass_of(solid: Solid) -> Mass:
-    """Integrate over a repaired input, which is closed whatever the input was."""
-    return mass_of_triangles(solid.vertices[solid.faces], solid.frame)
-
-
-def mass_of_triangles(triangles: FloatArray, frame: Frame) -> Mass:
-    """Integrate over closed, outward triangles ``[F, 3, 3]`` in the frame."""
-    found = mass_properties(triangles)
+def mass_of(vertices: FloatArray, faces: IntArray, frame: Frame) -> Mass:
+    """Integrate over a closed, outward mesh ``[V, 3]``, ``[F, 3]`` in the frame."""
+    volume, centre, inertia = _native.mesh_mass(vertices, faces)
     with np.errstate(over="ignore", under="ignore"):  # at the ends of float64's range, volumes overflow or underflow
         unit = np.minimum(np.float64(1.0) / frame.scale, _GREATEST)
         return Mass(
-            float(_times(found["volume"], unit, 3)),
-            frame.to_input(found["center_mass"][None])[0],
-            _times(found["inertia"], unit, 5),
+            float(_times(volume, unit, 3)),
+            frame.to_input(centre[None])[0],
+            _times(inertia, unit, 5),
         )
 
 

@@ -64,12 +64,12 @@ class Solid:
     @property
     def vertices(self) -> FloatArray:
         """Of the shape ``[V, 3]``."""
-        return self._mesh[0]
+        return self.mesh[0]
 
     @property
     def faces(self) -> NDArray[np.int32]:
         """Of the shape ``[F, 3]``, outward."""
-        return self._mesh[1]
+        return self.mesh[1]
 
     @cached_property
     def manifold(self) -> Manifold:
@@ -81,7 +81,8 @@ class Solid:
         )
 
     @cached_property
-    def _mesh(self) -> tuple[FloatArray, NDArray[np.int32]]:
+    def mesh(self) -> tuple[FloatArray, NDArray[np.int32]]:
+        """Vertices and faces of the shape."""
         return surface_of(self.shape) if isinstance(self.shape, Manifold) else self.shape
 
 

@@ -18,7 +18,7 @@ from rlacd.output_options import DENSITY, OutputOptions
 from rlacd.result import Result
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import Frame
-from rlacd.solid.mass import Mass, mass_of_triangles
+from rlacd.solid.mass import Mass, mass_of
 
 TO_Z_UP = {
     "x": (math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0),
@@ -159,5 +159,5 @@ def _mass(result: Result) -> Mass:
     mass = result.report.get("mass")
     if mass is None:  # a result from elsewhere: its hulls stand for the solid
         hulls = trimesh.util.concatenate(result.hulls)
-        return mass_of_triangles(hulls.triangles, Frame(np.zeros(3), 1.0))
+        return mass_of(hulls.vertices, hulls.faces, Frame(np.zeros(3), 1.0))
     return Mass(float(mass["volume_abs"]), np.array(mass["centre_abs"]), np.array(mass["inertia_abs"]))
