@@ -28,8 +28,10 @@ from rlacd.io.read.open_file import LARGEST
 from rlacd.io.robots import rewrite_robot
 from rlacd.policies.learned import PlaneRanker
 from rlacd.policies.q_network import OnnxQ
-from tests import hostile
 from tests.bounded import bounded
+from tests.hostile import HARMLESS, REFUSED
+from tests.hostile.gltf import gltf, named_often, reference
+from tests.hostile.xml import EXTERNAL, LAUGHS, OUTSIDE, PARAMETER, QUADRATIC
 
 
 def load(path: Path) -> tuple[int, float]:
@@ -51,23 +53,23 @@ def check_refused(error: type[RlacdError], says: str, function: Callable[..., An
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", hostile.REFUSED)
+@pytest.mark.parametrize("name", REFUSED)
 def test_a_hostile_mesh_is_refused_with_its_reason(name: str, tmp_path: Path) -> None:
-    build, says = hostile.REFUSED[name]
+    build, says = REFUSED[name]
     path = build(tmp_path)
     check_refused(RlacdError, f"{re.escape(path.name)}.*({says})", load, path)
 
 
-@pytest.mark.parametrize("name", hostile.HARMLESS)
+@pytest.mark.parametrize("name", HARMLESS)
 def test_what_only_looks_hostile_is_read(name: str, tmp_path: Path) -> None:
-    faces, extent = bounded(load, hostile.HARMLESS[name](tmp_path))
+    faces, extent = bounded(load, HARMLESS[name](tmp_path))
     assert faces >= 12
     assert extent == 0.5
 
 
 def test_a_file_that_is_named_ten_thousand_times_is_read_once(tmp_path: Path) -> None:
     """Ten thousand times a megabyte would not fit."""
-    assert bounded(load, hostile.named_often(tmp_path)) == (12, 0.0)
+    assert bounded(load, named_often(tmp_path)) == (12, 0.0)
 
 
 # --- what is no ordinary file -----------------------------------------------------------------------------------------
@@ -134,11 +136,11 @@ def robot(folder: Path, text: str, ending: str = ".urdf") -> Path:
 @pytest.mark.parametrize(
     ("doctype", "used"),
     [
-        (hostile.LAUGHS, "&a12;"),
-        (hostile.QUADRATIC, "&a;" * 100_000),
-        (hostile.EXTERNAL, "&a;"),
-        (hostile.OUTSIDE, ""),
-        (hostile.PARAMETER, ""),
+        (LAUGHS, "&a12;"),
+        (QUADRATIC, "&a;" * 100_000),
+        (EXTERNAL, "&a;"),
+        (OUTSIDE, ""),
+        (PARAMETER, ""),
     ],
     ids=["laughs", "quadratic", "external", "outside", "parameter"],
 )
@@ -209,7 +211,7 @@ def test_a_batch_passes_by_what_is_no_file(tmp_path: Path) -> None:
     os.mkfifo(assets / "pipe.stl")
     os.mkfifo(assets / "pipe.bin")
     (assets / "device.ply").symlink_to("/dev/zero")
-    (assets / "piped.gltf").write_bytes(hostile.reference("pipe.bin"))
+    (assets / "piped.gltf").write_bytes(reference("pipe.bin"))
     code, said = bounded(batch, str(assets), "-o", str(out), "--jobs", "1", memory=2**34)
     assert code != 0, said
     rows = [json.loads(line) for line in (out / "manifest.jsonl").read_text().splitlines()]
@@ -233,7 +235,7 @@ def test_files_beside_an_asset_are_read_once_around(tmp_path: Path) -> None:
     (tmp_path / "much.bin").write_bytes(bytes(2**20))
     spelled = [{"byteLength": 1, "uri": "./" * i + "much.bin"} for i in range(1500)]
     path = tmp_path / "mesh.gltf"
-    path.write_bytes(hostile.gltf(buffers=spelled))
+    path.write_bytes(gltf(buffers=spelled))
     files = bounded(Asset("mesh.gltf", path, "mesh").files, memory=2**32)
     assert sum(map(len, files.values())) <= LARGEST + len(path.read_bytes())
 

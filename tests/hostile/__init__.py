@@ -1,0 +1,6 @@
+"""Mesh files made to harm whoever opens them, and words of the sentence that refuses each."""
+
+from tests.hostile import archives, counts, gltf, others, xml  # noqa: F401  # they fill the list
+from tests.hostile.registry import HARMLESS, REFUSED
+
+__all__ = ["HARMLESS", "REFUSED"]

@@ -1,0 +1,19 @@
+"""Formats whose parsers are not trusted, and what fuzz/damaged.py found."""
+
+from __future__ import annotations
+
+from tests.hostile.gltf import gltf
+from tests.hostile.registry import refused
+
+for ending in ("xaml", "3dxml", "step", "stp", "xdmf", "h5", "vtk", "msh", "binvox", "zip", "dxf"):
+    refused(f"another format.{ending}", "convert it")(lambda: b"anything")
+
+
+@refused("a node below one whose mesh there is not.gltf", "placed nowhere")
+def _() -> bytes:
+    return gltf(nodes=[{"mesh": -3, "children": [1]}, {"mesh": 0}])
+
+
+@refused("a node that is the parent of the scene.gltf", "itself")
+def _() -> bytes:
+    return gltf(nodes=[{"name": "world", "children": [1]}, {"mesh": 0, "children": [0]}])

@@ -1,0 +1,184 @@
+"""Holes, cavities and damage: what is closed, what is filled, and what stays open."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from fuzz.flaws import FAMILIES
+from rlacd.repair.caps import HOLE
+from rlacd.repair.distance import SurfaceQuery
+from rlacd.repair.repair import GAP, HALF_THICKNESS
+from rlacd.repair.union import to_arrays
+from tests.repaired import BOX, join, moved, solid_of, steps, volume, with_hole, without
+
+
+def test_a_cavity_is_filled():
+    inner = trimesh.creation.icosphere(radius=0.5)
+    inner.invert()
+    assert volume(solid_of(join(BOX, inner))) == pytest.approx(8)
+
+
+def test_a_box_with_a_missing_side_is_a_thin_walled_box():
+    solid = solid_of(without(BOX, *np.flatnonzero(BOX.face_normals[:, 2] > 0.9)))
+    assert steps(solid) == ["slab"]
+    walls = 5 * 4 * 2 * HALF_THICKNESS
+    assert solid.manifold.volume() == pytest.approx(walls, rel=0.02)
+    assert solid.bodies[0].deviation <= 2 * HALF_THICKNESS + 1e-9
+
+
+def test_a_pinhole_is_closed_without_a_word():
+    mesh, full = with_hole(GAP / 2, subdivisions=6)
+    solid = solid_of(mesh)
+    assert steps(solid) == ["capped"]
+    assert solid.bodies[0].deviation <= GAP
+    assert volume(solid) == pytest.approx(full, rel=1e-3)
+    assert not solid.warnings
+
+
+def test_a_small_hole_in_a_scan_is_closed_and_told():
+    mesh, full = with_hole(0.08)
+    solid = solid_of(mesh)
+    assert steps(solid) == ["capped"]
+    assert GAP < solid.bodies[0].deviation <= HOLE
+    assert volume(solid) == pytest.approx(full, rel=1e-2)
+    assert "Holes were closed" in solid.warnings[0]
+
+
+def test_a_wide_mouth_stays_open():
+    mesh, full = with_hole(0.4)
+    solid = solid_of(mesh)
+    assert steps(solid) == ["slab"]
+    assert volume(solid) < 0.01 * full
+
+
+def inverted(mesh):
+    return trimesh.Trimesh(mesh.vertices, mesh.faces[:, ::-1], process=False)
+
+
+def sealed_rooms():
+    """A room with a stool in it, walls 0.2 thick: as two shells, the same turned inside out, and as six slabs."""
+    outer, inner = BOX, trimesh.creation.box(extents=(1.6, 1.6, 1.6))
+    stool = trimesh.creation.box(extents=(0.4, 0.4, 0.4))
+    shells = join(outer, inverted(inner), stool)
+    sizes = {2: (2.0, 2.0, 0.2), 0: (0.2, 2.0, 1.7), 1: (1.7, 0.2, 1.7)}
+    slabs = [
+        moved(trimesh.creation.box(extents=size), *(side * np.eye(3)[axis]))
+        for axis, size in sizes.items()
+        for side in (-0.9, 0.9)
+    ]
+    return {"shells": shells, "inside out": inverted(shells), "slabs": join(*slabs, stool)}
+
+
+@pytest.mark.parametrize("name", sealed_rooms())
+def test_sealed_rooms_are_filled_or_kept(name):
+    mesh = sealed_rooms()[name]
+    assert volume(solid_of(mesh)) == pytest.approx(8)
+    assert volume(solid_of(mesh, keep_cavities=True)) == pytest.approx(8 - 1.6**3 + 0.4**3)
+
+
+def test_a_cavity_in_what_stands_in_a_cavity():
+    nested = [trimesh.creation.box(extents=(side,) * 3) for side in (2.0, 1.6, 1.0, 0.6)]
+    mesh = join(nested[0], inverted(nested[1]), nested[2], inverted(nested[3]))
+    assert volume(solid_of(mesh, keep_cavities=True)) == pytest.approx(8 - 1.6**3 + 1 - 0.6**3)
+
+
+def test_bodies_side_by_side_are_no_cavities_whatever_their_windings():
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    mesh = join(moved(ball, -2, 0, 0), inverted(moved(ball, 2, 0, 0)))
+    assert volume(solid_of(mesh, keep_cavities=True)) == pytest.approx(2 * ball.volume)
+
+
+def revolved(*profile, sections=24):
+    mesh = trimesh.creation.revolve(np.array(profile), sections=sections)
+    return trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+
+
+BOTTLE = ((0, 0), (0.35, 0), (0.35, 1.4), (0.12, 1.7), (0.12, 2))
+
+
+WINE_BOTTLE = ((0, 0), (0.3, 0), (0.3, 1.3), (0.06, 1.6), (0.06, 2))
+
+
+CUP = ((0, 0), (0.4, 0), (0.5, 1))
+
+
+@pytest.mark.parametrize(("profile", "sections"), [(BOTTLE, 24), (BOTTLE, 8), (WINE_BOTTLE, 24), (CUP, 24), (CUP, 8)])
+def test_a_bottle_and_a_cup_stay_hollow_unless_they_shall_be_solid(profile, sections):
+    mesh = revolved(*profile, sections=sections)
+    hollow = solid_of(mesh)
+    assert steps(hollow) == ["slab"]
+    assert "--open solid fills it" in hollow.warnings[0]
+    full = solid_of(mesh, open_bodies="solid")
+    assert steps(full) == ["capped"]
+    assert volume(full) == pytest.approx(trimesh.convex.convex_hull(mesh).volume, rel=0.35)
+    thin = solid_of(mesh, open_bodies="thin")
+    assert thin.manifold.volume() == hollow.manifold.volume()
+    assert not thin.warnings
+
+
+def test_a_neck_that_no_ball_passes_is_no_opening():
+    mesh = revolved((0, 0), (0.3, 0), (0.3, 1.3), (0.02, 1.6), (0.02, 2))
+    assert steps(solid_of(mesh)) == ["capped"]
+    assert steps(solid_of(mesh, open_bodies="thin")) == ["slab"]
+
+
+def test_a_box_whose_lid_misses_by_a_hair_is_solid():
+    top = np.flatnonzero(BOX.face_normals[:, 2] > 0.9)
+    lid = moved(BOX.submesh([top], append=True), 0, 0, 0.004)
+    solid = solid_of(join(without(BOX, *top), lid))
+    assert volume(solid) == pytest.approx(8, rel=0.01)
+
+
+@pytest.mark.parametrize("missing", [1, 5, 10])
+def test_a_knob_with_doubled_faces_a_few_missing_and_a_fin_is_a_ball(missing):
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    faces = np.delete(ball.faces, np.random.default_rng(1).permutation(len(ball.faces))[:missing], axis=0)
+    a, b = faces[0][:2]
+    tip = ball.vertices[[a, b]].mean(axis=0) * 1.2
+    vertices = np.concatenate([ball.vertices, [tip, tip + 0.05]])
+    n = len(ball.vertices)
+    fin = [[a, b, n], [b, n + 1, n]]
+    solid = solid_of(trimesh.Trimesh(vertices, np.concatenate([faces, faces[:, ::-1], fin]), process=False))
+    assert volume(solid) == pytest.approx(ball.volume, rel=0.01)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.1, 0.2])
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("name", ["ball", "torus"])
+def test_a_damaged_solid_stays_the_solid_it_was(name, family, share):
+    """Where whole patches are gone, it may not; then a warning says where."""
+    mesh = {
+        "ball": trimesh.creation.icosphere(subdivisions=2),
+        "torus": trimesh.creation.torus(1, 0.35, major_sections=20, minor_sections=10),
+    }[name]
+    damaged = FAMILIES[family](np.array(mesh.vertices), np.array(mesh.faces), share, np.random.default_rng(5))
+    solid = solid_of(trimesh.Trimesh(*damaged, process=False))
+    repaired = SurfaceQuery(*to_arrays(solid.manifold))
+    points = solid.frame.to_frame(mesh.vertices)
+    missed = np.where(repaired.inside(points), 0, repaired.distance(points)).max()
+    kept = volume(solid) == pytest.approx(mesh.volume, rel=0.03) and missed <= 0.03
+    assert kept or (family in ("missing patches", "mixture") and " at (" in " ".join(solid.warnings))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_faces_missing_from_flat_sides_come_back_exactly(seed):
+    """A cap bends as little as it can, so what is missing of a box is a box again."""
+    mesh = BOX.subdivide().subdivide()
+    rest = without(mesh, *np.random.default_rng(seed).permutation(len(mesh.faces))[: len(mesh.faces) // 20])
+    solid = solid_of(rest)
+    assert volume(solid) == pytest.approx(8, rel=1e-9)
+
+
+def test_a_loop_around_an_island_keeps_the_island():
+    """A face that touches the rim of its hole in one vertex is in the cap, whichever way it is wound."""
+    flat = trimesh.creation.box(extents=(4, 4, 1)).subdivide().subdivide().subdivide()
+    top = np.flatnonzero(flat.triangles_center[:, 2] > 0.499)
+    patch = top[np.abs(flat.triangles_center[top][:, :2]).max(axis=1) < 1]
+    on_rim = np.isin(flat.faces, np.delete(flat.faces, patch, axis=0))
+    touching = next(face for face in patch if on_rim[face].sum() == 1)
+    for turn in (1, -1):
+        faces = flat.faces.copy()
+        faces[touching] = faces[touching][::turn]
+        mesh = trimesh.Trimesh(flat.vertices, np.delete(faces, np.setdiff1d(patch, touching), axis=0), process=False)
+        solid = solid_of(mesh, open_bodies="solid")
+        assert volume(solid) == pytest.approx(16, rel=1e-9)
