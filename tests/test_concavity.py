@@ -188,6 +188,7 @@ def test_real_parts_against_dense_sampling(corpus: Path) -> None:
         check(part)
 
 
+@pytest.mark.slow
 def test_yes_is_never_contradicted_by_samples(corpus: Path) -> None:
     met = 0
     for part in cut_meshes(corpus, 40, seed=1):

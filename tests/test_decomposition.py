@@ -60,6 +60,7 @@ def test_a_notebook_shows_the_view_in_a_frame(real: Decomposition) -> None:
     assert "&lt;script" in page
 
 
+@pytest.mark.slow
 def test_show_opens_a_page_in_the_browser(real: Decomposition, monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[str] = []
     monkeypatch.setattr(webbrowser, "open", opened.append)

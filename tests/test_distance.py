@@ -123,6 +123,7 @@ unit = st.floats(-1, 1, width=32)
 clouds = st.lists(st.tuples(unit, unit, unit), min_size=4, max_size=8)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=80)
 @given(st.lists(clouds, min_size=1, max_size=5), st.integers(0, 3))
 def test_unions_against_dense_sampling(points: list[list[tuple[float, float, float]]], levels: int) -> None:
@@ -158,7 +159,8 @@ def of_facets(hull: Hull, others: list[Hull]) -> Floats:
     return points
 
 
-@settings(deadline=None, max_examples=25)
+@pytest.mark.slow
+@settings(deadline=None, max_examples=10)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 7), st.sampled_from([np.float32, np.float64]))
 def test_seams_between_hulls_are_no_surface_of_the_union(seed: int, cuts: int, precision: type) -> None:
     """Pieces of a cut ball, rounded as a file rounds them: what is outer is what leads out of all pieces.

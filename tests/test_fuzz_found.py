@@ -82,6 +82,7 @@ def test_limits_hold_where_coordinates_cannot_tell_corners_apart(
     assert (Hull.of(np.vstack([hull.vertices, where])).vertices == hull.vertices).all()
 
 
+@pytest.mark.slow
 def test_reuniting_layers_that_nearly_touch_piles_up_no_faces() -> None:
     """A search around two skins 1e-6 apart went from 1,070 triangles a part to 29,000, and from 0.1 to 55 s a trial."""
     shape = make_shape(50089)

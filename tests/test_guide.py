@@ -163,6 +163,7 @@ def dataset(states: int = 24) -> Dataset:
     return Dataset(planes, edges, component, index, parts, known, torch.zeros(states, 4, dtype=torch.bool))
 
 
+@pytest.mark.slow
 def test_fitting_learns_which_plane_is_best() -> None:
     data = dataset()
     before, after = RankerNetwork(8), fit(data, seed=0, epochs=100, batch=24, width=8)

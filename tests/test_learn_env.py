@@ -105,6 +105,7 @@ def test_terminal_reward_falls_with_the_number_of_parts() -> None:
     assert terminal_reward(11) == pytest.approx(1 / (1 + math.log(10)))
 
 
+@pytest.mark.slow
 def test_discounts_are_shares_of_the_hull_and_never_exceed_one() -> None:
     cutting = CutProcess(Component(small_solids()["table"]), CRITERION)
     while not cutting.over:

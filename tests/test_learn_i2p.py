@@ -159,6 +159,7 @@ def check_that_damage_is_said(path: Path) -> None:
         OnnxQ(path.with_name("nowhere.onnx"))
 
 
+@pytest.mark.slow
 def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, weights: Path, tmp_path: Path) -> None:
     run(meshes, tmp_path / "whole", weights)
     run(meshes, tmp_path / "halves", weights, iterations=34)

@@ -248,11 +248,14 @@ def test_when_no_process_can_play_that_is_one_clear_error(meshes: Path, tmp_path
         run(meshes, tmp_path / "run", pool=Doomed(range(5, 10**6)), validation=0)
 
 
-def test_solids_without_anything_to_cut_are_one_clear_error(meshes: Path, tmp_path: Path) -> None:
+def test_solids_without_anything_to_cut_are_one_clear_error(
+    meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rlacd.learn.paper.rollouts.TRIES", 100)
     for path in meshes.rglob("*.ply"):
         if path.stem not in ("box", "broken"):
             path.unlink()
-    with pytest.raises(TrainingError, match="none of 1000 solids drawn from 1 meshes needs a cut"):
+    with pytest.raises(TrainingError, match="none of 100 solids drawn from 1 meshes needs a cut"):
         run(meshes, tmp_path / "run", validation=0)
 
 
@@ -331,6 +334,7 @@ def test_damaged_checkpoints_and_folders_without_meshes_are_said(meshes: Path, t
         run(tmp_path / "nowhere", tmp_path / "another")
 
 
+@pytest.mark.slow
 def test_a_checkpoint_half_written_leaves_the_one_before(meshes: Path, tmp_path: Path) -> None:
     run(meshes, tmp_path / "whole", validation=0)
     cut_short = tmp_path / "short"

@@ -67,6 +67,7 @@ def check(hull: Hull, max_vertices: int | None = None, max_faces: int | None = N
 points = hnp.arrays(np.float64, st.tuples(st.integers(5, 40), st.just(3)), elements=st.floats(-1, 1, width=32))
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=300)
 @given(points, st.integers(4, 20))
 def test_any_hull_within_any_limit(cloud: np.ndarray, most: int) -> None:

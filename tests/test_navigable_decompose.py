@@ -147,6 +147,7 @@ def test_lengths_in_the_meshs_own_unit() -> None:
     assert np.allclose(by_share.balls.centres * 1000, by_length.balls.centres, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_max_hulls_gives_way_by_as_little_as_it_can() -> None:
     result = rlacd.decompose(house(door=0.5), criterion=rlacd.NavigableSpace(0.05, 0.01), max_hulls=4)
     assert len(result) <= 4

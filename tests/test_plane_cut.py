@@ -181,6 +181,7 @@ def test_caps_stay_inside_solids_that_overlap_themselves(seed: int) -> None:
                 assert farthest_outside(side, surface) < 1e-6
 
 
+@pytest.mark.slow
 def test_caps_stay_inside_a_real_solid_that_overlaps_itself_by_a_hair(corpus: Path) -> None:
     """Triangles between rims that cross would lie 0.18 outside of it."""
     path = corpus / "test/ikea_assembled/bookcase_besta_0172.ply"

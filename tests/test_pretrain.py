@@ -151,6 +151,7 @@ def test_the_rate_rises_and_falls() -> None:
     assert learning_rate(PretrainOptions(steps=1, rise=1.0), 0) <= 1e-3
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_weights_and_another_does_not(meshes: Path, tmp_path: Path) -> None:
     a, b = run(meshes, tmp_path / "a.safetensors"), run(meshes, tmp_path / "b.safetensors")
     assert a.read_bytes() == b.read_bytes()

@@ -154,6 +154,7 @@ def test_a_cloud_of_points_and_balls_can_be_shown() -> None:
     assert len(points(balls["centres"])) == balls["shown"]
 
 
+@pytest.mark.slow
 def test_the_picture_is_inside_and_its_absence_is_said(
     result: Decomposition, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -167,7 +168,7 @@ def test_the_picture_is_inside_and_its_absence_is_said(
 
 
 @pytest.mark.parametrize(
-    ("name", "starts"), [("r.html", "<!doctype html>"), ("r.HTM", "<!doctype html>"), ("r.json", "{")]
+    ("name", "starts"), [pytest.param("r.HTM", "<!doctype html>", marks=pytest.mark.slow), ("r.json", "{")]
 )
 def test_the_ending_tells_the_command_what_kind_of_report_is_meant(tmp_path: Path, name: str, starts: str) -> None:
     elbow().export(tmp_path / "elbow.stl")

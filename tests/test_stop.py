@@ -37,6 +37,9 @@ SMALL: dict[str, Mesh] = {
     "ball": noisy_ball(300, 0.05),
 }
 
+LONG = {"ball", "sheet", "terrain", "screws"}
+"""Those of them that take more than a second to stop at every poll tried."""
+
 PATIENCE = 30.0
 """Seconds beyond the promise that a busy machine may take."""
 
@@ -78,15 +81,18 @@ def polls(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return wanted
 
 
-def stops(most: int) -> list[int]:
+def stops(most: int, ratio: float = 1.7) -> list[int]:
     """Polls to stop at: close together in the beginning, where the stages change quickly."""
-    return [round(1.7**k) for k in range(60) if 1.7**k < most]
+    return [round(ratio**k) for k in range(60) if ratio**k < most]
 
 
-@pytest.mark.parametrize("name", SMALL)
-def test_stopped_at_any_poll_the_hulls_cover_the_input(polls: list[int], name: str) -> None:
+@pytest.mark.parametrize("ratio", [2.5, pytest.param(1.7, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in LONG else name for name in SMALL]
+)
+def test_stopped_at_any_poll_the_hulls_cover_the_input(polls: list[int], name: str, ratio: float) -> None:
     stages = set()
-    for number in stops(10**7):
+    for number in stops(10**7, ratio):
         polls[:] = [number]
         result = rlacd.decompose(SMALL[name], threads=1, quality="balanced", search_steps=4)
         if result.report["stopped_by"] is None:
@@ -100,6 +106,7 @@ def test_stopped_at_any_poll_the_hulls_cover_the_input(polls: list[int], name: s
     assert {"repair", "cut"} <= stages
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [
@@ -209,13 +216,14 @@ def test_a_timeout_is_kept_however_large_the_input(name: str) -> None:
     assert not left.any()
 
 
+@pytest.mark.slow
 def test_a_long_kernel_calls_progress_in_the_thread_of_the_caller() -> None:
     threads = set()
 
     def note(progress: rlacd.Progress) -> None:
         threads.add(threading.get_ident())
 
-    rlacd.decompose(noisy_ball(2000, 0.05), progress=note, threads=2, quality="fast")
+    rlacd.decompose(noisy_ball(600, 0.05), progress=note, threads=2, quality="fast")
     assert threads == {threading.get_ident()}
 
 
