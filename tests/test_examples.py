@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import importlib.util
 import inspect
+import re
 from pathlib import Path
 from types import ModuleType
 
@@ -14,7 +15,7 @@ import typer
 import rlacd
 from rlacd.cli.main import app
 from rlacd.options import Options
-from tests.readme_table import options_table
+from tests.option_table import PAGE, options_table
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -44,9 +45,26 @@ def test_the_sample_is_the_same_every_time() -> None:
     assert script.sample().export(file_type="glb") == script.sample().export(file_type="glb")
 
 
-def test_the_readme_holds_the_table_of_options() -> None:
+def test_the_documentation_holds_the_table_of_options() -> None:
+    assert options_table() in PAGE.read_text(encoding="utf-8"), "run  python -m tests.option_table"
+
+
+def test_the_readme_works_outside_the_repository() -> None:
+    """On a package index and in the sdist: pictures and links have addresses, and lead to files that exist."""
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert options_table() in readme, "run  python -m tests.readme_table"
+    targets = re.findall(r"\]\(([^)]+)\)", readme)
+    assert len(targets) > 10
+    for target in targets:
+        assert target.startswith("https://"), target
+        for place in (
+            "https://raw.githubusercontent.com/rlacd/rlacd/main/",
+            "https://github.com/rlacd/rlacd/blob/main/",
+        ):
+            if target.startswith(place):
+                assert (ROOT / target.removeprefix(place)).is_file(), target
+        if target.startswith(site := "https://rlacd.github.io/rlacd/"):
+            page = target.removeprefix(site).partition("#")[0].rstrip("/")
+            assert any((ROOT / "docs" / f"{page}{end}").is_file() for end in (".md", "/index.md")), target
 
 
 def test_the_table_names_every_option() -> None:

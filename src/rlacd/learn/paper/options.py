@@ -161,4 +161,4 @@ PRESETS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
     }
 )
 """Changes to the defaults: the paper's run; the same scaled to two cores; the same method with the number of cuts as
-its objective, as the first runs suggested (docs/experiments.md); and a run of a few minutes to try everything out."""
+its objective, as the first runs suggested (docs/research/experiments.md); and a run of a few minutes to try it."""

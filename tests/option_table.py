@@ -1,4 +1,4 @@
-"""The README's table of options, made from where they are stated: ``python -m tests.readme_table`` writes it there."""
+"""The documentation's table of options, made from where they are stated: ``python -m tests.option_table`` writes it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rlacd.options import Options
 from rlacd.output_options import OutputOptions
 from rlacd.space_options import SpaceOptions
 
-README = Path(__file__).parents[1] / "README.md"
+PAGE = Path(__file__).parents[1] / "docs" / "reference" / "options.md"
 
 HEAD = ["| command line | Python | default | values | meaning |", "|---|---|---|---|---|"]
 
@@ -37,13 +37,13 @@ def _rows(options: type[Any]) -> Iterator[str]:
         yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
-def written(readme: str) -> str:
-    """The README with the table in place of the one it has."""
-    lines = readme.splitlines()
+def written(page: str) -> str:
+    """The page with the table in place of the one it has."""
+    lines = page.splitlines()
     begin = next(i for i, line in enumerate(lines) if line.startswith("| command line | Python |"))
     end = next(i for i in range(begin, len(lines)) if not lines[i].startswith("|"))
     return "\n".join([*lines[:begin], *options_table().splitlines(), *lines[end:], ""])
 
 
 if __name__ == "__main__":
-    README.write_text(written(README.read_text(encoding="utf-8")), encoding="utf-8")
+    PAGE.write_text(written(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

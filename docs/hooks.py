@@ -1,0 +1,63 @@
+"""What the site is generated from at each build: the command line's own help, and a decomposition to turn."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
+    """Put every command, its arguments and options where the page asks for them."""
+    return (
+        markdown.replace("<!-- commands -->", _commands()) if page.file.src_uri == "reference/commands.md" else markdown
+    )
+
+
+def on_post_build(config: Any) -> None:
+    """Decompose the sample, and put its report beside the gallery: a page of its own that turns."""
+    sys.path.insert(0, str(ROOT / "examples"))
+    from sample import sample
+
+    import rlacd
+
+    mesh = Path(config.site_dir) / "gallery" / "chair.glb"
+    sample().export(mesh)
+    rlacd.decompose(mesh).save_report(mesh.with_suffix(".html"), up="y")
+
+
+def _commands() -> str:
+    import typer
+
+    from rlacd.cli.main import app
+
+    group: Any = typer.main.get_command(app)
+    parts = []
+    for path, command in _leaves(group, ("rlacd",)):
+        lines = [f"## {' '.join(path)}", "", _plain(command.help or "").partition("Examples")[0].strip(), ""]
+        arguments = [p for p in command.params if p.param_type_name == "argument"]
+        usage = " ".join([*path, *(f"{p.metavar or p.name.upper()}" for p in arguments), "[OPTIONS]"])
+        lines += ["```sh", usage, "```", "", "| option | meaning |", "|---|---|"]
+        for parameter in command.params:
+            if parameter.param_type_name == "argument" or parameter.hidden or "--help" in parameter.opts:
+                continue
+            names = ", ".join(f"`{name}`" for name in [*parameter.opts, *parameter.secondary_opts])
+            lines.append(f"| {names} | {_plain(parameter.help or '').replace('|', chr(92) + '|')} |")
+        parts.append("\n".join([*lines, ""]))
+    return "\n".join(parts)
+
+
+def _leaves(command: Any, path: tuple[str, ...]) -> list[tuple[tuple[str, ...], Any]]:
+    inner = getattr(command, "commands", None)
+    if inner is None:
+        return [(path, command)]
+    return [leaf for name, below in inner.items() for leaf in _leaves(below, (*path, name))]
+
+
+def _plain(text: str) -> str:
+    """Help without rich's marks, on one line a paragraph."""
+    text = re.sub(r"\[/?(bold|italic|dim)\]", "", text).replace("\b", "")
+    return re.sub(r"\s+", " ", text).replace("<", "&lt;").strip()
