@@ -1,6 +1,6 @@
 """The rooms of the package, read from the table of docs/design.md, and the imports between them, read from the code.
 
-``python -m tests.rooms`` prints both: lines per room, and the rooms each one imports.
+``python -m tests.rooms`` prints both, with the lines of each room, and draws docs/rooms.svg.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 DESIGN = ROOT / "docs" / "design.md"
+PICTURE = ROOT / "docs" / "rooms.svg"
 HEAD = "| room | contents | imports |"
 ANY = "any above"
 NATIVE, SHARED = "native", "shared"
@@ -110,13 +111,63 @@ def imported_rooms(package: Path, rooms: list[Room]) -> dict[str, dict[str, list
     return found
 
 
+def walk(package: Path, rooms: list[Room], start: str) -> tuple[int, int, int]:
+    """The way of a mesh through the package: files that `start` imports, directly or not, their rooms, and climbs.
+
+    A climb is an import of a room further down the table. Imports inside functions and for type checkers count too.
+    """
+    home, order = homes(package, rooms), [room.name for room in rooms]
+    after: dict[str, set[str]] = defaultdict(set)
+    for each in imports(package):
+        after[each.module].add(each.imported)
+    seen, waiting = {start}, [start]
+    while waiting:
+        new = after[waiting.pop()] - seen
+        seen |= new
+        waiting += new
+    ways = {(home[here], home[there]) for here in seen for there in after[here] & seen}
+    climbs = sum(order.index(here) < order.index(there) for here, there in ways if here and there)
+    return len(seen), len({home[module] for module in seen}), climbs
+
+
+def picture(package: Path, rooms: list[Room]) -> str:
+    """The rooms as an SVG, the ground at the bottom: imports of lower rooms to the right, climbs to the left in red."""
+    arrows = imported_rooms(package, rooms)
+    names = [room.name for room in rooms if room.name != NATIVE]
+    step, width, left, right = 24, 150, 110, 270
+    high = step * len(names) + 20
+    y = {name: high - 10 - step * (i + 0.5) for i, name in enumerate(names)}
+    lines = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{left + width + right}" height="{high}" '
+        'font-family="sans-serif" font-size="12" fill="none">',
+        f'<rect width="100%" height="{high}" fill="#fff"/>',
+    ]
+    for here in names:
+        for there in (name for name in names if name in arrows[here] and name != SHARED):
+            climbs = y[there] < y[here]
+            x, way = (left, -1) if climbs else (left + width, 1)
+            bend = x + way * (20 + 0.42 * abs(y[here] - y[there]))
+            stroke = 'stroke="#c22" stroke-width="1.5"' if climbs else 'stroke="#357" stroke-opacity="0.35"'
+            lines.append(
+                f'<path d="M{x} {y[here]:g}C{bend:g} {y[here]:g} {bend:g} {y[there]:g} {x} {y[there]:g}" {stroke}/>'
+            )
+    for name in names:
+        lines.append(
+            f'<rect x="{left}" y="{y[name] - 10:g}" width="{width}" height="20" rx="3" fill="#eef3f8" stroke="#357"/>'
+            f'<text x="{left + width // 2}" y="{y[name] + 4:g}" text-anchor="middle" fill="#123">{name}</text>'
+        )
+    return "\n".join([*lines, "</svg>", ""])
+
+
 if __name__ == "__main__":
     package = ROOT / "src" / "rlacd"
     rows = table()
-    arrows = imported_rooms(package, rows)
+    PICTURE.write_text(picture(package, rows), encoding="utf-8")
+    home, arrows = homes(package, rows), imported_rooms(package, rows)
     lengths: dict[str | None, int] = defaultdict(int)
     for module, path in modules(package).items():
-        lengths[homes(package, rows)[module]] += len(path.read_text(encoding="utf-8").splitlines())
+        lengths[home[module]] += len(path.read_text(encoding="utf-8").splitlines())
     for row in rows:
         there = [other.name for other in rows if other.name in set(arrows[row.name]) - {NATIVE, SHARED}]
         print(f"{row.name:16} {lengths[row.name]:6} lines; imports {', '.join(there) or '–'}")
+    print("from decompose: {} files in {} rooms, {} climbs".format(*walk(package, rows, "rlacd.decompose_mesh")))
