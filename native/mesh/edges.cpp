@@ -139,7 +139,7 @@ ClosedBodies closed_bodies(const Mesh& mesh) {
   found.volume.resize(found.count);
   found.area.resize(found.count);
   found.box.resize(found.count);
-  std::vector<Vec3> normals(mesh.faces.size());
+  std::vector<Vec3> normals(mesh.faces.size()), apex(found.count);
   double height2 = std::numeric_limits<double>::infinity();
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
     if (f % kBetweenPolls == 0) poll_stop();
@@ -150,7 +150,8 @@ ClosedBodies closed_bodies(const Mesh& mesh) {
     height2 = std::min(height2, longest2 > 0 ? norm2(normal) / longest2 : 0.0);
     normals[f] = normalized(normal);
     const std::int64_t body = found.body[f];
-    found.volume[body] += dot(p, cross(q, r)) / 6;
+    if (found.box[body].is_empty()) apex[body] = p;
+    found.volume[body] += dot(p - apex[body], cross(q - apex[body], r - apex[body])) / 6;
     found.area[body] += norm(normal) / 2;
     for (const Vec3 corner : {p, q, r}) found.box[body].extend(corner);
   }

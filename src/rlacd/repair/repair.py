@@ -31,6 +31,7 @@ from rlacd.repair.holes import MOST_FREE_EDGES, close_cracks
 from rlacd.repair.skin import skin
 from rlacd.repair.soup import NO_AREA, Soup, hidden_faces, on_repeated_edge
 from rlacd.repair.union import (
+    Shape,
     hull_of_points,
     slab_of_faces,
     split_labels,
@@ -38,6 +39,7 @@ from rlacd.repair.union import (
     to_manifold,
     unite,
     unite_around_cavities,
+    volume_of,
 )
 from rlacd.repair.voxels import Reach
 from rlacd.solid.arrays import IntArray as Indices
@@ -225,12 +227,14 @@ class _Repair:
             parts = self._wrap_crowds(soup, self._build(soup))
         if keep_cavities:
             inward = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces), self.bodies) < 0
-            self.solid = unite_around_cavities([part for part, _ in parts], [bool(inward[body]) for _, body in parts])
+            self.solid: Shape = unite_around_cavities(
+                [part for part, _ in parts], [bool(inward[body]) for _, body in parts]
+            )
         else:
             self.solid = unite([part for part, _ in parts])
             if open_bodies != "thin":
                 self._wrap_rooms(soup, parts)
-        if self.solid.is_empty():
+        if volume_of(self.solid) == 0:
             self.warnings.append("the surface could not be closed: the hull of its points stands in for the solid")
             self.step[:] = STEPS.index("hull")
             self.solid = hull_of_points(surface.vertices, HALF_THICKNESS)
@@ -433,7 +437,7 @@ class _Repair:
         is_slab = self.step == STEPS.index("slab")
         slabs = soup.only(is_slab[soup.body])
         around = soup.only((is_slab | self.by_room)[soup.body])
-        if around.area.sum() < 4 * np.pi * GAP**2 or self.solid.is_empty():
+        if around.area.sum() < 4 * np.pi * GAP**2 or volume_of(self.solid) == 0:
             return
         rooms = self.reach.rooms_outside(SurfaceQuery(*to_arrays(self.solid)))
         if len(rooms) == 0:
@@ -449,7 +453,7 @@ class _Repair:
         self.faces_out[is_slab] = 0
         others = [part for part, body in parts if not is_slab[body]]
         united = unite([*others, *(part for part, _ in self._build(slabs.only(~wall))), wrap])
-        if united.volume() <= self.solid.volume():
+        if volume_of(united) <= volume_of(self.solid):
             self.faces_out = before
             return
         self.solid = united

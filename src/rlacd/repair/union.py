@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import manifold3d
 import numpy as np
 from manifold3d import Error, Manifold, Mesh64, OpType
 
 from rlacd import _native
 from rlacd._native import poll_stop
+from rlacd.solid.arrays import IntArray as Indices
 from rlacd.solid.boolean_time import require_time_for
 from rlacd.solid.frame import FloatArray
+from rlacd.solid.solid import surface_of
 from rlacd.solid.topology import IntArray, face_areas, signed_tetrahedra
+
+Shape: TypeAlias = Manifold | tuple[FloatArray, Indices]
+"""A closed solid: a manifold, or vertices float64 [V, 3] and faces int32 [F, 3]."""
 
 # If manifold3d moves faces by more than `_MOVED` on average, corners are moved by less than `_HAIR` (frame units).
 _MOVED, _HAIR = 1e-5, 1e-9
@@ -57,10 +64,20 @@ def _moved(manifold: Manifold, vertices: FloatArray, faces: IntArray) -> float:
     return abs(manifold.volume() - float(signed_tetrahedra(vertices, faces).sum())) / area if area > 0 else 0.0
 
 
-def to_arrays(manifold: Manifold) -> tuple[FloatArray, IntArray]:
+def to_arrays(solid: Shape) -> tuple[FloatArray, IntArray]:
     """Return vertices float64 ``[V, 3]`` and faces int64 ``[F, 3]`` of a solid."""
-    mesh = manifold.to_mesh64()
-    return np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64)
+    vertices, faces = surface_of(solid) if isinstance(solid, Manifold) else solid
+    return vertices, faces.astype(np.int64)
+
+
+def as_manifold(solid: Shape) -> Manifold:
+    """Return a solid in the form that booleans take."""
+    return solid if isinstance(solid, Manifold) else Manifold(Mesh64(solid[0], solid[1].astype(np.uint64)))
+
+
+def volume_of(solid: Shape) -> float:
+    """Return the volume of a solid."""
+    return solid.volume() if isinstance(solid, Manifold) else _native.mesh_volume(*solid)
 
 
 def split_labels(vertices: FloatArray, faces: IntArray, label: IntArray) -> list[tuple[FloatArray, IntArray]]:
@@ -75,7 +92,7 @@ def split_labels(vertices: FloatArray, faces: IntArray, label: IntArray) -> list
     return parts
 
 
-def unite(solids: list[Manifold], *, keep_cavities: bool = False) -> Manifold:
+def unite(solids: list[Manifold], *, keep_cavities: bool = False) -> Shape:
     """Unite solids and fill the cavities nothing can reach."""
     solids = [s for s in solids if not s.is_empty()]
     if not solids:
@@ -87,7 +104,7 @@ def unite(solids: list[Manifold], *, keep_cavities: bool = False) -> Manifold:
     return united if keep_cavities and united.volume() > 0 else _without_cavities(united)
 
 
-def unite_around_cavities(solids: list[Manifold], inward: list[bool]) -> Manifold:
+def unite_around_cavities(solids: list[Manifold], inward: list[bool]) -> Shape:
     """Unite solids except for the cavities that some of them bound, and keep what stands in a cavity.
 
     Parameters
@@ -105,7 +122,7 @@ def unite_around_cavities(solids: list[Manifold], inward: list[bool]) -> Manifol
     outermost = {i: max(around[i], key=lambda j: solids[j].volume(), default=i) for i in kept}
     cavities = {i for i in kept if inward[i] != inward[outermost[i]]}
     inside: dict[int, list[Manifold]] = {j: [solids[i] for i in sorted(cavities) if j in around[i]] for j in kept}
-    hollow = [solids[j] - unite(inside[j]) if inside[j] else solids[j] for j in kept if j not in cavities]
+    hollow = [solids[j] - as_manifold(unite(inside[j])) if inside[j] else solids[j] for j in kept if j not in cavities]
     return unite(hollow, keep_cavities=True)
 
 
@@ -128,13 +145,49 @@ def _around(solids: list[Manifold]) -> list[list[int]]:
     return around
 
 
-def _without_cavities(solid: Manifold) -> Manifold:
+def _without_cavities(solid: Manifold) -> Shape:
+    """Fill the cavities: drop the shells that bound them, and what stands in them.
+
+    manifold3d's own decomposition takes time in proportion to the number of shells times that of the faces, and noise
+    between overlapping walls leaves hundreds of tiny cavities.
+    """
+    vertices, faces = surface_of(solid)
+    shells = _native.closed_bodies(vertices, faces)
+    if shells is None:  # more than two faces share an edge
+        return _outer_united(solid)
+    shell, volume, _, boxes = shells[:4]
+    is_cavity = volume <= 0
+    if not is_cavity.any() or is_cavity.all():
+        return solid
+    kept = ~is_cavity
+    first = np.unique(shell, return_index=True)[1]  # a face of each shell
+    for cavity in np.flatnonzero(is_cavity):
+        poll_stop()
+        within = (
+            kept & (boxes[:, :3] >= boxes[cavity, :3]).all(axis=1) & (boxes[:, 3:] <= boxes[cavity, 3:]).all(axis=1)
+        )
+        if not within.any():
+            continue
+        around = _native.Surface(vertices, np.ascontiguousarray(faces[shell == cavity]))
+        some = np.flatnonzero(within)
+        kept[some[around.winding(vertices[faces[first[some], 0]]) < -0.5]] = False
+    return _of_faces(vertices, faces[kept[shell]])
+
+
+def _outer_united(solid: Manifold) -> Manifold:
     shells = solid.decompose()
     outer = [s for s in shells if s.volume() > 0]
     if len(outer) == len(shells) or not outer:
         return solid
     # Solids inside a cavity overlap the filled solid now.
     return _united(outer)
+
+
+def _of_faces(vertices: FloatArray, faces: Indices) -> tuple[FloatArray, Indices]:
+    """Some faces and the vertices that they use, in the same order."""
+    used = np.zeros(len(vertices), dtype=bool)
+    used[faces] = True
+    return vertices[used], (np.cumsum(used, dtype=np.int32) - np.int32(1))[faces]
 
 
 def _united(solids: list[Manifold]) -> Manifold:
@@ -172,4 +225,4 @@ def hull_of_points(points: FloatArray, half_thickness: float) -> Manifold:
 
 def slab_of_faces(vertices: FloatArray, faces: IntArray, half_thickness: float) -> Manifold:
     """Return the union of triangles, each of them thickened."""
-    return unite([hull_of_points(vertices[face], half_thickness) for face in faces])
+    return as_manifold(unite([hull_of_points(vertices[face], half_thickness) for face in faces]))
