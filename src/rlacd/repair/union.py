@@ -160,17 +160,16 @@ def _without_cavities(solid: Manifold) -> Shape:
     if not is_cavity.any() or is_cavity.all():
         return solid
     kept = ~is_cavity
-    first = np.unique(shell, return_index=True)[1]  # a face of each shell
+    order = np.argsort(shell, kind="stable")
+    begin = np.searchsorted(shell[order], np.arange(len(volume) + 1))  # where the faces of each shell begin
     for cavity in np.flatnonzero(is_cavity):
         poll_stop()
-        within = (
-            kept & (boxes[:, :3] >= boxes[cavity, :3]).all(axis=1) & (boxes[:, 3:] <= boxes[cavity, 3:]).all(axis=1)
-        )
-        if not within.any():
+        inner = (boxes[:, :3] >= boxes[cavity, :3]).all(axis=1) & (boxes[:, 3:] <= boxes[cavity, 3:]).all(axis=1)
+        some = np.flatnonzero(kept & inner)
+        if len(some) == 0:
             continue
-        around = _native.Surface(vertices, np.ascontiguousarray(faces[shell == cavity]))
-        some = np.flatnonzero(within)
-        kept[some[around.winding(vertices[faces[first[some], 0]]) < -0.5]] = False
+        around = _native.Surface(vertices, np.ascontiguousarray(faces[order[begin[cavity] : begin[cavity + 1]]]))
+        kept[some[around.winding(vertices[faces[order[begin[some]], 0]]) < -0.5]] = False
     return _of_faces(vertices, faces[kept[shell]])
 
 
