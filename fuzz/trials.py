@@ -211,8 +211,11 @@ class Laboratory:
             if fault.name == "timeout":
                 found += _lateness(first.cpu, float(fault.words[1]), options["threads"])
             again = faults.command(words)
-            if again.code != 0 or any(faults.tree(out).get(name) != content for name, content in whole.items()):
+            now = faults.tree(out)
+            if again.code != 0 or any(now.get(name) != content for name, content in whole.items()):
                 found.append(f"the command again ends with {again.code} and other files: {again.said[-300:]}")
+            if not fault.kills and (strays := now.keys() - whole.keys() - old.keys()):
+                found.append(f"the command again leaves {', '.join(sorted(strays))}")
         counts = Counter(decompositions=3, faults=1, hulls=said["report"]["parts"])
         counts[fault.name] += 1
         return replace(

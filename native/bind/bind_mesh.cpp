@@ -47,17 +47,21 @@ void bind_mesh(nb::module_& m) {
   m.def(
       "weld",
       [](const PointsIn& vertices, const WideFacesIn& faces) {
-        Mesh mesh = to_wide_mesh(vertices, faces);
+        const Mesh mesh = to_wide_mesh(vertices, faces);
+        Welded welded;
         {
           nb::gil_scoped_release release;
-          mesh = weld(mesh);
+          welded = weld(mesh);
         }
-        return as_tuple(std::move(mesh));
+        return nb::make_tuple(to_array<double>(std::move(welded.mesh.vertices)),
+                              to_array<std::int32_t>(std::move(welded.mesh.faces)),
+                              to_array<bool>(std::move(welded.is_film)));
       },
       nb::arg("vertices"), nb::arg("faces"),
-      "The distinct places of the used vertices, in order of first appearance [U, 3]; the faces [G, 3] with three "
-      "different\n"
-      "corners, the first of those with the same three.");
+      "The distinct places of the used vertices, in order of first appearance [U, 3]; the faces [G, 3] with three\n"
+      "different corners, and whether they are films [G]. Of faces with the same corners, the first that is wound "
+      "like\n"
+      "most of them stays; it is a film if as many are wound in either way.");
   m.def(
       "edges",
       [](const WideFacesIn& array, std::int64_t vertices) {

@@ -24,7 +24,13 @@ std::uint64_t hash_of(Vec3 p) {
   return hash;
 }
 
-// Marks the faces that have three different corners and are the first with them.
+enum Worth : char { kDropped, kFace, kFilm };
+
+// Whether a face with these corners is an even permutation of them in ascending order.
+bool is_even(const Triangle& f) { return (f[0] < f[1]) + (f[1] < f[2]) + (f[2] < f[0]) == 2; }
+
+// Of the faces with the same three different corners, the first that is wound like most of them; it is a film if as
+// many are wound in either way.
 std::vector<char> worth_keeping(const std::vector<Triangle>& faces, std::size_t vertices) {
   struct Rest {
     std::int32_t middle, high, face;
@@ -32,7 +38,7 @@ std::vector<char> worth_keeping(const std::vector<Triangle>& faces, std::size_t 
       return middle != o.middle ? middle < o.middle : high != o.high ? high < o.high : face < o.face;
     }
   };
-  std::vector<char> keep(faces.size(), 0);
+  std::vector<char> keep(faces.size(), kDropped);
   std::vector<Triangle> sorted(faces);
   for (std::size_t f = 0; f < faces.size(); ++f) {
     if (f % kBetweenPolls == 0) poll_stop();
@@ -40,7 +46,7 @@ std::vector<char> worth_keeping(const std::vector<Triangle>& faces, std::size_t 
     if (s[0] > s[1]) std::swap(s[0], s[1]);
     if (s[1] > s[2]) std::swap(s[1], s[2]);
     if (s[0] > s[1]) std::swap(s[0], s[1]);
-    keep[f] = s[0] != s[1] && s[1] != s[2];
+    keep[f] = s[0] != s[1] && s[1] != s[2] ? kFace : kDropped;
   }
   Buckets<Rest> by_low(vertices);
   for (std::size_t f = 0; f < faces.size(); ++f)
@@ -53,8 +59,16 @@ std::vector<char> worth_keeping(const std::vector<Triangle>& faces, std::size_t 
     const auto [begin, end] = by_low.range(v);
     if (end - begin < 2) continue;
     std::sort(begin, end);
-    for (Rest* r = begin + 1; r < end; ++r)
-      if (r->middle == r[-1].middle && r->high == r[-1].high) keep[r->face] = 0;
+    for (Rest *same = begin, *next; same < end; same = next) {
+      int net = 0;
+      for (next = same; next < end && next->middle == same->middle && next->high == same->high; ++next)
+        net += is_even(faces[next->face]) ? 1 : -1;
+      if (next - same < 2) continue;
+      const Rest* kept = same;
+      while (net != 0 && is_even(faces[kept->face]) != (net > 0)) ++kept;
+      for (const Rest* r = same; r < next; ++r) keep[r->face] = kDropped;
+      keep[kept->face] = net == 0 ? kFilm : kFace;
+    }
   }
   return keep;
 }
@@ -78,12 +92,13 @@ std::vector<std::int32_t> first_in_place(const std::vector<Vec3>& points) {
   return first;
 }
 
-Mesh weld(const Mesh& mesh) {
+Welded weld(const Mesh& mesh) {
   const std::vector<std::int32_t> first = first_in_place(mesh.vertices);
   std::vector<std::int32_t> number(mesh.vertices.size(), -1);
   for (const Triangle& face : mesh.faces)
     for (const std::int32_t corner : face) number[first[corner]] = 0;
-  Mesh welded;
+  Welded result;
+  Mesh& welded = result.mesh;
   for (std::size_t v = 0; v < number.size(); ++v) {
     if (number[v] < 0) continue;
     const Vec3 p = mesh.vertices[v];
@@ -96,8 +111,11 @@ Mesh weld(const Mesh& mesh) {
   const std::vector<char> keep = worth_keeping(faces, welded.vertices.size());
   welded.faces.reserve(faces.size());
   for (std::size_t f = 0; f < faces.size(); ++f)
-    if (keep[f]) welded.faces.push_back(faces[f]);
-  return welded;
+    if (keep[f] != kDropped) {
+      welded.faces.push_back(faces[f]);
+      result.is_film.push_back(keep[f] == kFilm);
+    }
+  return result;
 }
 
 }  // namespace rlacd

@@ -12,8 +12,12 @@ namespace rlacd {
 std::vector<std::int32_t> first_in_place(const std::vector<Vec3>& points);
 
 // The distinct places of the vertices that faces use, in the order in which any vertex first has them, without zeros of
-// negative sign; and the faces that have three different corners, the first of those with the same corners in any
-// order. Linear time.
-Mesh weld(const Mesh& mesh);
+// negative sign; and the faces that have three different corners. Of those with the same corners, the first that is
+// wound like most of them stays; it is a film if as many are wound in either way. Linear time.
+struct Welded {
+  Mesh mesh;
+  std::vector<char> is_film;  // of each face
+};
+Welded weld(const Mesh& mesh);
 
 }  // namespace rlacd

@@ -165,7 +165,9 @@ def close_holes(
         no_cap = np.zeros(int(some.sum()), dtype=bool)
         kept = first_of_doubled(faces, len(soup.vertices))
         # Where more than two faces met before, which of them continue each other is a guess: caps did not cause that.
-        trusted = np.concatenate([whole & ~rims.flap & ~soup.at_valence(soup.edges.valence > 2), ~no_cap])
+        sure = whole & ~rims.flap & ~soup.at_valence(soup.edges.valence > 2)
+        before = ~whole & (False if soup.trusted is None else soup.trusted)
+        trusted = np.concatenate([sure | before, ~no_cap])
         return Soup(soup.vertices, faces, owners, trusted).only(kept), np.concatenate([rims.flap, no_cap])[kept]
 
     # A cap is useful only if it gives the body an inside: a strip whose cap lies on itself stays a sheet.

@@ -51,7 +51,9 @@ from rlacd.solid.topology import (
     Edges,
     IntArray,
     bodies_of,
+    detach_films,
     face_areas,
+    is_balanced,
     signed_tetrahedra,
 )
 
@@ -125,11 +127,12 @@ def repair(
     frame = Frame.of(points)
     points = frame.to_frame(points)
     poll_stop()
-    surface = vertices, _ = _native.weld(points, corners)
-    taken = _taken_as_it_is(*surface)
+    welded_vertices, welded_faces, is_film = _native.weld(points, corners)
+    taken = _taken_as_it_is(welded_vertices, welded_faces)
     if taken is not None:
-        return Solid(taken[0], surface, frame, (taken[1],), tuple(warnings))
-    faces = surface[1].astype(np.int64)
+        return Solid(taken[0], (welded_vertices, welded_faces), frame, (taken[1],), tuple(warnings))
+    vertices, faces = detach_films(welded_vertices, welded_faces.astype(np.int64), is_film)
+    surface = (vertices, faces.astype(np.int32))
 
     if len(faces) == 0 or face_areas(vertices, faces).max() < NO_AREA:
         warnings.append("no face has an area: the hull of the points stands in for the solid")
@@ -223,7 +226,7 @@ class _Repair:
         if self._is_oriented(soup):
             parts = self._as_they_are(soup)
         else:
-            soup = self._cap(self._drop_hidden(soup))
+            soup = self._cap(self._drop_hidden(self._trust_windings(soup)))
             parts = self._wrap_crowds(soup, self._build(soup))
         if keep_cavities:
             inward = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces), self.bodies) < 0
@@ -295,6 +298,24 @@ class _Repair:
         self.faces_out = np.bincount(soup.body)
         solids = [to_manifold(v, f) for v, f in split_labels(soup.vertices, faces, soup.body)]
         return list(zip(solids, range(self.bodies), strict=True))
+
+    def _trust_windings(self, soup: Soup) -> Soup:
+        """Trust the windings of closed bodies if the angles between their faces join the inside with the outside.
+
+        Where corners were rounded, slivers fold over and angles around an edge with four faces are wrong.
+        """
+        uneven, crowded = np.zeros((2, self.bodies), dtype=bool)
+        uneven[soup.body[soup.at_valence(~is_balanced(soup.faces, soup.edges))]] = True
+        crowded[soup.body[soup.at_valence(soup.edges.valence > 2)]] = True
+        if not (crowded & ~uneven).any():
+            return soup
+        share = soup.sheet_share(self.bodies)
+        doubted = crowded & ~uneven & (share > FLAPS)
+        if not doubted.any():
+            return soup
+        trusting = Soup(soup.vertices, soup.faces, soup.body, doubted[soup.body])
+        better = doubted & (trusting.sheet_share(self.bodies) < share / 2)
+        return Soup(soup.vertices, soup.faces, soup.body, better[soup.body]) if better.any() else soup
 
     def _drop_hidden(self, soup: Soup) -> Soup:
         """Drop faces that lie inside their own body, if they are what keeps the body from having an inside.

@@ -95,6 +95,51 @@ def bodies_of(faces: IntArray, edges: Edges) -> tuple[int, IntArray]:
     return components(len(faces), face, first[edges.of_halfedge])
 
 
+def is_balanced(faces: IntArray, edges: Edges) -> BoolArray:
+    """Return ``[E]`` whether as many faces run along an edge in one direction as in the other."""
+    forward = np.bincount(edges.of_halfedge, (faces < faces[:, _NEXT]).ravel(), len(edges.valence))
+    return np.asarray(2 * forward == edges.valence)
+
+
+def detach_films(vertices: FloatArray, faces: IntArray, is_film: BoolArray) -> tuple[FloatArray, IntArray]:
+    """Give films vertices of their own if the bodies they hang on are closed without them.
+
+    A film stands for as many faces wound one way as the other: a sheet with two sides, or a pocket closed by rounding.
+
+    Parameters
+    ----------
+    vertices, faces
+        ``[V, 3]`` and ``[F, 3]``.
+    is_film
+        ``[F]``.
+
+    Returns
+    -------
+    tuple
+        The vertices, copies last, and the faces.
+    """
+    if is_film.all() or not is_film.any():
+        return vertices, faces
+    edges = Edges.of(faces, len(vertices))
+    halfedge = edges.of_halfedge.reshape(-1, 3)
+    rest_edges = Edges.of(faces[~is_film], len(vertices))
+    bodies, body = bodies_of(faces[~is_film], rest_edges)
+    is_open = np.zeros(bodies, dtype=bool)
+    uneven = ~is_balanced(faces[~is_film], rest_edges)
+    is_open[body[uneven[rest_edges.of_halfedge].reshape(-1, 3).any(axis=1)]] = True
+    beside_body, beside_open = np.zeros((2, len(edges.valence)), dtype=bool)
+    beside_body[halfedge[~is_film]] = True
+    beside_open[halfedge[~is_film][is_open[body]]] = True
+    patches, patch = bodies_of(faces[is_film], Edges.of(faces[is_film], len(vertices)))
+    hangs = np.bincount(patch, beside_body[halfedge[is_film]].any(axis=1), patches) > 0
+    needed = np.bincount(patch, beside_open[halfedge[is_film]].any(axis=1), patches) > 0
+    detached = np.flatnonzero(is_film)[(hangs & ~needed)[patch]]
+    corners, index = np.unique(faces[detached], return_inverse=True)
+    result = faces.copy()
+    result[detached] = len(vertices) + index.reshape(-1, 3)
+    return np.concatenate([vertices, vertices[corners]]), result
+
+
 @dataclass(frozen=True)
 class Sides:
     """How the sides of the faces connect around the edges.
