@@ -18,7 +18,7 @@ from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
 from rlacd.repair.union import to_arrays, to_manifold, unite, volume_of
 from rlacd.solid.input_mesh import InputMesh
-from rlacd.solid.topology import Edges, bodies_of, components, face_areas, signed_tetrahedra
+from rlacd.solid.topology import Edges, bodies_of, components, detach_films, face_areas, signed_tetrahedra
 
 
 def soup(seed: int, count: int, faces: int) -> tuple[np.ndarray, np.ndarray]:
@@ -246,3 +246,30 @@ def test_cavities_and_what_stands_in_them_are_filled(seed: int) -> None:
     assert len(faces) == expected.num_tri()
     assert len(vertices) == expected.num_vert()
     assert volume_of(unite(solids, keep_cavities=True)) == pytest.approx(sum(solid.volume() for solid in solids))
+
+
+def test_films_on_closed_bodies_get_vertices_of_their_own() -> None:
+    box = shapes()["two"].split()[0]
+    vertices = np.concatenate([np.asarray(box.vertices, dtype=float), box.vertices[box.faces[0, :1]] + 1.0])
+    leaf = np.array([[*box.faces[0, :2], len(box.vertices)]])
+    for closed in (True, False):
+        faces = np.concatenate([box.faces[0 if closed else 1 :], leaf, leaf[:, ::-1]])
+        welded, kept, is_film = _native.weld(vertices, faces)
+        assert is_film.sum() == 1
+        more, detached = detach_films(welded, kept.astype(np.int64), is_film)
+        assert np.array_equal(more[detached], welded[kept])
+        assert len(more) == len(welded) + (3 if closed else 0)
+    sheet = np.concatenate([leaf, leaf[:, ::-1]])
+    welded, kept, is_film = _native.weld(vertices, sheet)
+    assert detach_films(welded, kept.astype(np.int64), is_film)[0] is welded
+
+
+def test_windings_decide_where_rounding_folds_a_closed_surface() -> None:
+    def wall(x: float, y: float, z: float) -> float:
+        s, c = np.sin(4 * np.array([x, y, z])), np.cos(4 * np.array([x, y, z]))
+        return float(min(0.35 - abs(s @ np.roll(c, -1)), 0.98 - max(abs(x), abs(y), abs(z))))
+
+    body = Manifold.level_set(wall, [-1, -1, -1, 1, 1, 1], 0.1).to_mesh64()
+    rounded = np.asarray(body.vert_properties[:, :3], dtype=np.float32).astype(float)
+    exact, solid = Manifold(body).volume(), repair(load_mesh((rounded, body.tri_verts)))
+    assert solid.manifold.volume() / solid.frame.scale**3 == pytest.approx(exact, rel=2e-3)
