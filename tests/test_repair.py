@@ -5,11 +5,13 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from rlacd.errors import EmptyMeshError
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.caps import HOLE
+from rlacd.repair.distance import points_covering
 from rlacd.repair.repair import GAP, repair
 from rlacd.repair.union import to_arrays, to_manifold
 from tests.repaired import BOX, check_closed, join, moved, solid_of, steps, volume
@@ -199,3 +201,17 @@ def test_a_closed_mesh_with_folds_is_kept(corpus):
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     assert steps(solid) == ["closed"]
     assert solid.manifold.volume() == pytest.approx(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6, abs=1e-6)
+
+
+@pytest.mark.parametrize("spacing", [0.05, 0.2, 1.0])
+def test_points_cover_every_face_and_share_corners(spacing: float) -> None:
+    ball = trimesh.creation.icosphere(3)
+    faces = np.concatenate([ball.faces, [[0, 40, 300], [5, 77, 500]]])
+    vertices = np.asarray(ball.vertices)
+    points, on = points_covering(vertices, faces, spacing)
+    weights = np.random.default_rng(0).dirichlet([1, 1, 1], (len(faces), 40))
+    samples = np.einsum("fsc,fcx->fsx", weights, vertices[faces]).reshape(-1, 3)
+    assert cKDTree(points).query(np.concatenate([samples, vertices]))[0].max() <= spacing
+    np.testing.assert_allclose(trimesh.triangles.closest_point(vertices[faces[on]], points), points, atol=1e-12)
+    if spacing == 1.0:
+        assert len(points) < len(vertices) + 50

@@ -51,6 +51,23 @@ class SurfaceQuery:
         return result
 
 
+def points_covering(vertices: FloatArray, faces: IntArray, spacing: float) -> tuple[FloatArray, IntArray]:
+    """Choose points such that no point of a face is farther than `spacing` from one of them; corners are among them.
+
+    Returns the points ``[N, 3]`` and a face ``[N]`` each lies on. Faces no larger than `spacing` share their corners.
+    """
+    corners = vertices[faces]
+    small = (_squared(np.roll(corners, -1, axis=1) - corners) <= spacing**2).all(axis=1)
+    first = np.full(len(vertices), -1, dtype=np.int64)
+    numbers = np.flatnonzero(small)
+    poll_stop()
+    first[faces[numbers[::-1], ::-1].ravel()] = np.repeat(numbers[::-1], 3)
+    shared = np.flatnonzero(first >= 0)
+    large = np.flatnonzero(~small)
+    points, on = spread_points(vertices, faces[large], spacing)
+    return np.concatenate([vertices[shared], points]), np.concatenate([first[shared], large[on]])
+
+
 def spread_points(vertices: FloatArray, faces: IntArray, spacing: float) -> tuple[FloatArray, IntArray]:
     """Lay a grid over every face so that no point of a face is farther than `spacing` from a grid point.
 

@@ -26,7 +26,7 @@ from rlacd import _native
 from rlacd._native import poll_stop
 from rlacd.errors import EmptyMeshError
 from rlacd.repair.caps import FLAPS, close_holes
-from rlacd.repair.distance import SurfaceQuery, spread_points
+from rlacd.repair.distance import SurfaceQuery, points_covering, spread_points
 from rlacd.repair.holes import MOST_FREE_EDGES, close_cracks
 from rlacd.repair.skin import skin
 from rlacd.repair.soup import NO_AREA, Soup, hidden_faces, on_repeated_edge
@@ -443,7 +443,7 @@ class _Repair:
         if is_slab.sum() <= _CROWD and _crossings(boxes) <= _CROSSINGS:
             return parts
         slabs = soup.only(is_slab[soup.body])
-        points, _ = spread_points(slabs.vertices, slabs.faces, self.reach.pitch / 2)
+        points, _ = points_covering(slabs.vertices, slabs.faces, self.reach.pitch / 2)
         wrap = self._wrap(self.reach.around_points(points), HALF_THICKNESS / 2)
         if wrap.volume() <= 0:
             return parts
@@ -488,12 +488,12 @@ class _Repair:
             return
         solid = SurfaceQuery(*to_arrays(self.solid), self.input.threads)
         poll_stop()
-        points, _ = spread_points(solid.vertices, solid.faces, GAP)
+        points, _ = points_covering(solid.vertices, solid.faces, GAP)
         closest, face = self.input.closest(points)
         np.maximum.at(self.deviation, self.body_of_input[face], np.linalg.norm(points - closest, axis=1))
 
         changed = np.flatnonzero(self.step[self.body_of_input] >= STEPS.index("outer skin"))
-        points, on = spread_points(self.input.vertices, self.input.faces[changed], GAP)
+        points, on = points_covering(self.input.vertices, self.input.faces[changed], GAP)
         distance = solid.distance(points)
         lost = np.flatnonzero(distance > 2 * HALF_THICKNESS)
         lost = lost[~solid.inside(points[lost])]

@@ -13,7 +13,7 @@ import numpy as np
 from scipy import ndimage
 
 from rlacd._native import poll_stop
-from rlacd.repair.distance import SurfaceQuery, spread_points
+from rlacd.repair.distance import SurfaceQuery, points_covering
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.topology import BoolArray, IntArray
 
@@ -49,7 +49,7 @@ class Reach:
     def of(cls, vertices: FloatArray, faces: IntArray, radius: float, resolution: int) -> Reach:
         """Roll a ball around a surface; the longest side of the frame has `resolution` cells."""
         pitch = 2.0 / resolution
-        points, _ = spread_points(vertices, faces, pitch / 2)
+        points, _ = points_covering(vertices, faces, pitch / 2)
         margin = int(np.ceil(radius / pitch)) + 3
         origin = points.min(axis=0) - margin * pitch
         cell = np.rint((points - origin) / pitch).astype(np.int64)
