@@ -10,6 +10,7 @@ void bind_hull(nanobind::module_& m);
 void bind_mesh(nanobind::module_& m);
 void bind_navigable(nanobind::module_& m);
 void bind_plane_cut(nanobind::module_& m);
+void bind_simplifier(nanobind::module_& m);
 void bind_simplify(nanobind::module_& m);
 void bind_stop(nanobind::module_& m);
 void bind_sweep(nanobind::module_& m);
@@ -31,6 +32,7 @@ NB_MODULE(_native, m) {
   rlacd::bind_mesh(m);
   rlacd::bind_navigable(m);
   rlacd::bind_plane_cut(m);
+  rlacd::bind_simplifier(m);
   rlacd::bind_simplify(m);
   rlacd::bind_stop(m);
   rlacd::bind_sweep(m);

@@ -25,6 +25,7 @@ from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import AS_PUBLISHED, Policy, make_policy
 from rlacd.presets import PresetName
 from rlacd.progress import ProgressCallback
+from rlacd.proxy import Lift, Proxy, simplify
 from rlacd.renamed import with_former
 from rlacd.repair.repair import repair
 from rlacd.report import make_report
@@ -40,6 +41,9 @@ MeshLike: TypeAlias = "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene 
 
 COARSER = 1.5
 """With `max_hulls`, thresholds that grow by this factor are tried, and the best decomposition is kept."""
+
+MARGIN = 0.3
+"""Parts of a proxy have to be tighter by this share of its deviation: their hulls still have to grow to the solid."""
 
 
 def decompose(
@@ -213,6 +217,41 @@ def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Cl
         return _Reached(solid, options, _unprepared(options, solid), parts)
     if options.max_hulls is None:  # otherwise the threshold may be exceeded anyway
         goal = with_limits(goal, options.max_vertices, options.max_faces)
+    proxy = _proxy(root, goal, options, clock)
+    if proxy is not None:
+        return _through_proxy(solid, root, proxy, goal, options, workers, clock)
+    parts, goal, found = _cut_and_searched(root, goal, options, workers, clock)
+    return _Reached(solid, options, goal, parts, found)
+
+
+def _proxy(root: Component, goal: Criterion, options: Options, clock: Clock) -> Proxy | None:
+    """A simpler solid to decompose in place of a dense one."""
+    if goal.obstacles is not None:
+        return None
+    try:
+        with clock.stage("simplify"):
+            return simplify(root, options.threshold)
+    except Stopped:
+        clock.note_stop()
+        return None
+
+
+def _through_proxy(
+    solid: Solid, root: Component, proxy: Proxy, goal: Criterion, options: Options, workers: Workers, clock: Clock
+) -> _Reached:
+    on_proxy = goal.scaled(1 - MARGIN * proxy.deviation / options.threshold)
+    parts, _, found = _cut_and_searched(proxy.component, on_proxy, options, workers, clock)
+    policy = make_policy(options.policy, SweepCache(), _scale(goal))
+    with clock.stage("lift"):
+        lift = Lift(root, proxy.deviation, goal, on_proxy, policy, workers, clock)
+        parts = lift(parts, mend=options.max_hulls is None and clock.stopped_by is None)
+    return _Reached(solid, options, goal, parts, found)
+
+
+def _cut_and_searched(
+    root: Component, goal: Criterion, options: Options, workers: Workers, clock: Clock
+) -> tuple[list[Part], Criterion, SearchSummary | None]:
+    """The parts of a solid, the criterion as settled on them, and a summary of the search."""
     sweeps = SweepCache()
     tree = CutTree(root, make_policy(options.policy, sweeps, _scale(goal)), workers)
     parts, goal = _parts(tree, goal, options, workers, clock)
@@ -231,7 +270,7 @@ def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Cl
                 parts, found = search(context, parts, bounds, clock, most_parts=options.max_hulls, first=policy)
     except Stopped:
         clock.note_stop()
-    return _Reached(solid, options, goal, parts, found)
+    return parts, goal, found
 
 
 def _scale(criterion: Criterion) -> float | None:

@@ -1,0 +1,31 @@
+// Python bindings of the simplification of a closed mesh.
+#include "base/arrays.hpp"
+#include "proxy/simplifier.hpp"
+
+namespace rlacd {
+
+void bind_simplifier(nb::module_& m) {
+  nb::class_<Simplifier>(m, "Simplifier", "A closed, oriented manifold mesh that gets fewer and fewer triangles.")
+      .def(
+          "__init__",
+          [](Simplifier* self, const PointsIn& vertices, const FacesIn& faces) {
+            const Mesh mesh = to_finite_mesh(vertices, faces);
+            nb::gil_scoped_release release;
+            new (self) Simplifier(mesh);
+          },
+          nb::arg("vertices"), nb::arg("faces"))
+      .def(
+          "reduce", [](Simplifier& self, std::size_t count) { self.reduce(count); }, nb::arg("count"),
+          nb::call_guard<nb::gil_scoped_release>(),
+          "Collapse edges until at most `count` triangles are left, or hardly any edge can be collapsed.")
+      .def(
+          "mesh",
+          [](const Simplifier& self) {
+            Mesh mesh = self.mesh();
+            return nb::make_tuple(to_array<double>(std::move(mesh.vertices)),
+                                  to_array<std::int32_t>(std::move(mesh.faces)));
+          },
+          "The vertices [V, 3] and faces [F, 3] reached.");
+}
+
+}  // namespace rlacd

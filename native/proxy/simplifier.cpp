@@ -1,0 +1,247 @@
+#include "proxy/simplifier.hpp"
+
+#include <cmath>
+
+#include "base/stop.hpp"
+
+namespace rlacd {
+namespace {
+
+// Edges drawn for each collapse: few while there are many faces, and more as each collapse matters more.
+constexpr std::size_t kFewChoices = 6, kMostChoices = 150, kChoicesTimesFaces = 400'000;
+// Moving along a flat surface costs nothing: this share of a quadric's trace holds points near the middle of the edge.
+constexpr double kStiffness = 1e-5;
+constexpr double kFarthest = 1;           // a point moves at most this many lengths of its edge from its middle
+constexpr double kTurned = 0.3;           // least cosine of the angle by which a collapse may turn a face
+constexpr std::size_t kMostFailures = 3;  // draws for each face left without an edge that can be collapsed
+constexpr std::size_t kFewest = 4;
+constexpr std::size_t kBetweenPolls = 1024;
+
+Vec3 face_normal(Vec3 a, Vec3 b, Vec3 c) { return cross(b - a, c - a); }
+
+}  // namespace
+
+void Simplifier::Quadric::add_plane(Vec3 n, double offset, double weight) {
+  xx += weight * n.x * n.x;
+  xy += weight * n.x * n.y;
+  xz += weight * n.x * n.z;
+  yy += weight * n.y * n.y;
+  yz += weight * n.y * n.z;
+  zz += weight * n.z * n.z;
+  b = b - (weight * offset) * n;
+  c += weight * offset * offset;
+}
+
+void Simplifier::Quadric::add(const Quadric& other) {
+  xx += other.xx;
+  xy += other.xy;
+  xz += other.xz;
+  yy += other.yy;
+  yz += other.yz;
+  zz += other.zz;
+  b = b + other.b;
+  c += other.c;
+}
+
+Vec3 Simplifier::Quadric::times(Vec3 x) const {
+  return {xx * x.x + xy * x.y + xz * x.z, xy * x.x + yy * x.y + yz * x.z, xz * x.x + yz * x.y + zz * x.z};
+}
+
+double Simplifier::Quadric::at(Vec3 x) const { return dot(x, times(x)) + 2 * dot(b, x) + c; }
+
+Vec3 Simplifier::Quadric::least_near(Vec3 x) const {
+  const double stiffness = kStiffness * (xx + yy + zz);
+  const double a = xx + stiffness, e = yy + stiffness, i = zz + stiffness;
+  const Vec3 row0 = {e * i - yz * yz, xz * yz - xy * i, xy * yz - xz * e};
+  const double determinant = a * row0.x + xy * row0.y + xz * row0.z;
+  if (!(determinant > 0)) return x;
+  const Vec3 row1 = {row0.y, a * i - xz * xz, xy * xz - a * yz};
+  const Vec3 row2 = {row0.z, row1.z, a * e - xy * xy};
+  const Vec3 slope = times(x) + b;
+  return x - (1 / determinant) * Vec3{dot(row0, slope), dot(row1, slope), dot(row2, slope)};
+}
+
+Simplifier::Simplifier(const Mesh& mesh)
+    : points_(mesh.vertices),
+      quadrics_(mesh.vertices.size()),
+      faces_(mesh.faces),
+      alive_(mesh.faces.size()),
+      place_(mesh.faces.size()),
+      first_(mesh.vertices.size(), -1),
+      last_(mesh.vertices.size(), -1),
+      next_(3 * mesh.faces.size(), -1),
+      mark_(mesh.vertices.size(), 0) {
+  for (std::size_t f = 0; f < faces_.size(); ++f) {
+    if (f % kBetweenPolls == 0) poll_stop();
+    alive_[f] = place_[f] = static_cast<std::int32_t>(f);
+    const auto [a, b, c] = faces_[f];
+    const Vec3 normal = face_normal(points_[a], points_[b], points_[c]);
+    const double length = norm(normal);
+    for (int k = 0; k < 3; ++k) {
+      const std::int32_t v = faces_[f][k], corner = static_cast<std::int32_t>(3 * f) + k;
+      if (length > 0) quadrics_[v].add_plane((1 / length) * normal, dot(normal, points_[a]) / length, length / 6);
+      if (first_[v] < 0)
+        first_[v] = corner;
+      else
+        next_[last_[v]] = corner;
+      last_[v] = corner;
+    }
+  }
+}
+
+void Simplifier::reduce(std::size_t count) {
+  std::size_t failures = 0, steps = 0;
+  while (size() > std::max(count, kFewest) && failures < kMostFailures * size()) {
+    if (++steps % kBetweenPolls == 0) poll_stop();
+    candidates_.clear();
+    const std::size_t choices = std::clamp(kChoicesTimesFaces / size(), kFewChoices, kMostChoices);
+    for (std::size_t k = 0; k < choices; ++k) candidates_.push_back(random_edge());
+    // Cheap edges that cannot be collapsed would be drawn again and again.
+    std::sort(candidates_.begin(), candidates_.end(),
+              [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
+    const bool done =
+        std::any_of(candidates_.begin(), candidates_.end(), [this](const auto& c) { return collapse(c); });
+    failures = done ? 0 : failures + choices;
+  }
+}
+
+Mesh Simplifier::mesh() const {
+  Mesh result;
+  std::vector<std::int32_t> number(points_.size(), -1);
+  for (std::size_t f = 0; f < faces_.size(); ++f) {
+    if (place_[f] < 0) continue;
+    Triangle face = faces_[f];
+    for (std::int32_t& v : face) {
+      if (number[v] < 0) {
+        number[v] = static_cast<std::int32_t>(result.vertices.size());
+        result.vertices.push_back(points_[v]);
+      }
+      v = number[v];
+    }
+    result.faces.push_back(face);
+  }
+  return result;
+}
+
+// SplitMix64.
+std::uint64_t Simplifier::draw() {
+  std::uint64_t z = (state_ += 0x9E3779B97F4A7C15u);
+  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
+  z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
+  return z ^ (z >> 31);
+}
+
+Simplifier::Candidate Simplifier::random_edge() {
+  const std::uint64_t number = draw();
+  const Triangle& face = faces_[alive_[static_cast<std::size_t>((number >> 8) % alive_.size())]];
+  const auto k = static_cast<std::size_t>(number % 3);
+  Candidate edge;
+  edge.from = face[k];
+  edge.to = face[(k + 1) % 3];
+  Quadric both = quadrics_[edge.from];
+  both.add(quadrics_[edge.to]);
+  const Vec3 middle = 0.5 * (points_[edge.from] + points_[edge.to]);
+  edge.point = both.least_near(middle);
+  if (norm2(edge.point - middle) > kFarthest * kFarthest * norm2(points_[edge.to] - points_[edge.from])) {
+    edge.point = middle;
+    for (const std::int32_t end : {edge.from, edge.to})
+      if (both.at(points_[end]) < both.at(edge.point)) edge.point = points_[end];
+  }
+  edge.cost = both.at(edge.point);
+  return edge;
+}
+
+// Lists the faces around a vertex that are left, and forgets the others.
+void Simplifier::gather(std::int32_t vertex, std::vector<std::int32_t>& faces) {
+  faces.clear();
+  std::int32_t before = -1;
+  for (std::int32_t corner = first_[vertex]; corner >= 0; corner = next_[corner]) {
+    if (place_[corner / 3] < 0) continue;
+    if (before < 0)
+      first_[vertex] = corner;
+    else
+      next_[before] = corner;
+    before = corner;
+    faces.push_back(corner / 3);
+  }
+  if (before >= 0) {
+    next_[before] = -1;
+    last_[vertex] = before;
+  } else {
+    first_[vertex] = last_[vertex] = -1;
+  }
+}
+
+bool Simplifier::turns_over(const std::vector<std::int32_t>& faces, std::int32_t vertex, std::int32_t other,
+                            Vec3 point) const {
+  for (const std::int32_t f : faces) {
+    const Triangle& face = faces_[f];
+    Vec3 corner[3], moved[3];
+    bool vanishes = false;
+    for (int k = 0; k < 3; ++k) {
+      vanishes |= face[k] == other;
+      corner[k] = points_[face[k]];
+      moved[k] = face[k] == vertex ? point : corner[k];
+    }
+    if (vanishes) continue;
+    const Vec3 before = face_normal(corner[0], corner[1], corner[2]);
+    const Vec3 after = face_normal(moved[0], moved[1], moved[2]);
+    const double product = dot(before, after);
+    // A face without an area may become anything that has one.
+    if (!(norm2(after) > 0) || product * std::fabs(product) < kTurned * kTurned * norm2(before) * norm2(after))
+      return true;
+  }
+  return false;
+}
+
+// The link condition: the two vertices have no common neighbours but those opposite their edge.
+bool Simplifier::keeps_topology(std::int32_t from, std::int32_t to) {
+  ++stamp_;
+  for (const std::int32_t f : around_from_)
+    for (const std::int32_t v : faces_[f]) mark_[v] = stamp_;
+  const std::int32_t common = ++stamp_;
+  int shared_vertices = 0, shared_faces = 0;
+  for (const std::int32_t f : around_to_) {
+    bool is_shared = false;
+    for (const std::int32_t v : faces_[f]) {
+      is_shared |= v == from;
+      if (v == from || v == to || mark_[v] != common - 1) continue;
+      mark_[v] = common;
+      ++shared_vertices;
+    }
+    shared_faces += is_shared ? 1 : 0;
+  }
+  return shared_vertices == 2 && shared_faces == 2;
+}
+
+bool Simplifier::collapse(const Candidate& edge) {
+  gather(edge.from, around_from_);
+  gather(edge.to, around_to_);
+  if (!keeps_topology(edge.from, edge.to) || turns_over(around_from_, edge.from, edge.to, edge.point) ||
+      turns_over(around_to_, edge.to, edge.from, edge.point))
+    return false;
+  for (const std::int32_t f : around_to_) {
+    bool vanishes = false;
+    for (std::int32_t& v : faces_[f]) {
+      vanishes |= v == edge.from;
+      if (v == edge.to) v = edge.from;
+    }
+    if (vanishes) remove(f);
+  }
+  points_[edge.from] = edge.point;
+  quadrics_[edge.from].add(quadrics_[edge.to]);
+  next_[last_[edge.from]] = first_[edge.to];
+  last_[edge.from] = last_[edge.to];
+  first_[edge.to] = last_[edge.to] = -1;
+  return true;
+}
+
+void Simplifier::remove(std::int32_t face) {
+  const std::int32_t at = place_[face];
+  alive_[at] = alive_.back();
+  place_[alive_[at]] = at;
+  alive_.pop_back();
+  place_[face] = -1;
+}
+
+}  // namespace rlacd
