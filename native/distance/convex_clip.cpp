@@ -172,7 +172,7 @@ class Clip {
       if (kept_.size() < 3) return;
       polygon_.swap(kept_);
     }
-    emit(f);
+    emit();
   }
 
   // Where a facet crosses a side of the polygon.
@@ -190,7 +190,7 @@ class Clip {
     return {p + (at_p / (at_p - at_q)) * (q - p), {v, w, facet}, kNone};
   }
 
-  void emit(std::int32_t f) {
+  void emit() {
     numbers_.clear();
     for (const Corner& corner : polygon_) numbers_.push_back(number_of(corner.key, corner.point));
     for (std::size_t k = 2; k < polygon_.size(); ++k)
@@ -214,7 +214,6 @@ class Clip {
       Crossings& own = crossings_[found->second];
       (last == edge.left ? own.exits : own.entries).push_back({dot(polygon_[k].point - from, to - from), numbers_[k]});
     }
-    static_cast<void>(f);
   }
 
   std::int32_t number_of(const Key& key, Vec3 point) {
@@ -336,8 +335,26 @@ class Clip {
         if (at < 0) return false;
         if (loop.size() > 2) section.rims.push_back(std::move(loop));
       }
-      if (!section.rims.empty()) result_.sections.push_back(std::move(section));
+      if (section.rims.empty() || fill(section)) continue;
+      result_.sections.push_back(std::move(section));
     }
+    return true;
+  }
+
+  // Closes sections that are triangles, or no wider than the planes were moved: facets that touch the solid's faces.
+  bool fill(const ConvexClip::Section& section) {
+    Vec3 twice_area{0, 0, 0};
+    double length = 0;
+    for (const auto& rim : section.rims)
+      for (std::size_t k = 0; k < rim.size(); ++k) {
+        const Vec3 p = result_.mesh.vertices[rim[k]], q = result_.mesh.vertices[rim[(k + 1) % rim.size()]];
+        twice_area = twice_area + cross(p - result_.mesh.vertices[rim[0]], q - result_.mesh.vertices[rim[0]]);
+        length += norm(q - p);
+      }
+    const bool is_triangle = section.rims.size() == 1 && section.rims[0].size() == 3;
+    if (!is_triangle && norm(twice_area) > 4 * kNudge * length) return false;
+    for (const auto& rim : section.rims)
+      for (std::size_t k = 2; k < rim.size(); ++k) result_.mesh.faces.push_back({rim[0], rim[k - 1], rim[k]});
     return true;
   }
 

@@ -19,8 +19,27 @@ from rlacd.cut_and_merge import cut_and_merge
 from rlacd.decomposition import Decomposition
 from rlacd.fields import check_callback
 from rlacd.io.read.load import load_mesh
-from rlacd.merge import drop_slivers, in_input, limit_part, limit_roughly, merge_to_count, with_limits
-from rlacd.options import CONCAVITY, DEFAULT_RESOLUTION, DEFAULT_THRESHOLD, OPTION_NAMES, OpenName, Options, QualityName
+from rlacd.merge import (
+    drop_slivers,
+    in_input,
+    limit_part,
+    limit_roughly,
+    merge_lifted,
+    merge_to_count,
+    simple_part,
+    with_limits,
+)
+from rlacd.options import (
+    CONCAVITY,
+    DEFAULT_RESOLUTION,
+    DEFAULT_THRESHOLD,
+    OPTION_NAMES,
+    SIMPLE,
+    DetailName,
+    OpenName,
+    Options,
+    QualityName,
+)
 from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import AS_PUBLISHED, Policy, make_policy
 from rlacd.presets import PresetName
@@ -42,7 +61,7 @@ MeshLike: TypeAlias = "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene 
 COARSER = 1.5
 """With `max_hulls`, thresholds that grow by this factor are tried, and the best decomposition is kept."""
 
-MARGIN = 0.3
+MARGIN = 1.5
 """Parts of a proxy have to be tighter by this share of its deviation: their hulls still have to grow to the solid."""
 
 
@@ -55,6 +74,7 @@ def decompose(
     max_hulls: int | None = None,
     max_vertices: int | None = None,
     max_faces: int | None = None,
+    detail: DetailName = SIMPLE,
     merge: bool = True,
     policy: str | Policy = "greedy",
     resolution: int = DEFAULT_RESOLUTION,
@@ -90,6 +110,9 @@ def decompose(
         Limits on the vertices and triangles of each hull. A limited hull still contains its part, and the threshold
         holds for it too, unless the limit is below 24 vertices or 44 triangles, or `max_hulls` is given: if the
         threshold is then exceeded, a warning says by how much.
+    detail : "simple" or "full"
+        ``simple``: hulls leave out corners that add little, so that they have few, as far as the part still meets the
+        criterion. ``full``: the exact hulls of the parts.
     merge : bool
         Unite parts whose joint hull still meets the threshold.
     policy : str or Policy
@@ -191,8 +214,10 @@ class _Reached(NamedTuple):
 
 
 def _cleaned(reached: _Reached, max_vertices: int | None, max_faces: int | None, workers: Workers) -> list[Part]:
-    """The parts without slivers, inside the limits."""
+    """The parts without slivers, with simple hulls inside the limits."""
     parts = drop_slivers(reached.parts, workers)
+    if reached.options.detail == SIMPLE:
+        parts = workers.map(lambda part: simple_part(part, reached.goal, max_vertices, max_faces), parts)
     return workers.map(lambda part: limit_part(part, max_vertices, max_faces), parts)
 
 
@@ -239,12 +264,17 @@ def _proxy(root: Component, goal: Criterion, options: Options, clock: Clock) -> 
 def _through_proxy(
     solid: Solid, root: Component, proxy: Proxy, goal: Criterion, options: Options, workers: Workers, clock: Clock
 ) -> _Reached:
-    on_proxy = goal.scaled(1 - MARGIN * proxy.deviation / options.threshold)
+    """Decompose a proxy under a tighter criterion, and carry the parts to the solid."""
+    share = proxy.deviation / options.threshold
+    on_proxy = goal.scaled(1 - MARGIN * share)
     parts, _, found = _cut_and_searched(proxy.component, on_proxy, options, workers, clock)
     policy = make_policy(options.policy, SweepCache(), _scale(goal))
     with clock.stage("lift"):
         lift = Lift(root, proxy.deviation, goal, on_proxy, policy, workers, clock)
         parts = lift(parts, mend=options.max_hulls is None and clock.stopped_by is None)
+        if options.merge and clock.stopped_by is None:  # the margin may have kept some apart
+            rehearsal = goal.scaled(1 + MARGIN * share)
+            parts = merge_lifted(parts, proxy.component, rehearsal, lift.confirmed, workers, clock)
     return _Reached(solid, options, goal, parts, found)
 
 

@@ -40,6 +40,10 @@ onto the surface folds over itself; more than 400 would take over 4 GB."""
 OpenName = Literal["auto", "solid", "thin"]
 
 OPEN: tuple[OpenName, ...] = get_args(OpenName)
+
+SIMPLE: Literal["simple"] = "simple"
+DetailName = Literal["simple", "full"]
+DETAILS: tuple[DetailName, ...] = get_args(DetailName)
 """What becomes of bodies with openings; see `rlacd.repair.repair.repair`."""
 
 QualityName = Literal["fast", "balanced", "best"]
@@ -116,6 +120,13 @@ class Options:
         "At most this many triangles per hull; below 44 the threshold may be exceeded.",
         integer(4, rule="an integer, at least 4 (a tetrahedron)"),
         panel=LIMITS,
+    )
+    detail: DetailName = option(
+        SIMPLE,
+        "simple leaves out corners of hulls that add little, within the threshold; full keeps the exact hulls.",
+        one_of(DETAILS),
+        panel=LIMITS,
+        metavar="|".join(DETAILS),
     )
     merge: bool = option(
         True,

@@ -2,7 +2,18 @@
 
 from rlacd.merge.in_input import in_input
 from rlacd.merge.limited import limit_part, limit_roughly, with_limits
-from rlacd.merge.merge import merge_parts, merge_to_count
+from rlacd.merge.merge import merge_lifted, merge_parts, merge_to_count
+from rlacd.merge.simple import simple_part
 from rlacd.merge.slivers import drop_slivers
 
-__all__ = ["drop_slivers", "in_input", "limit_part", "limit_roughly", "merge_parts", "merge_to_count", "with_limits"]
+__all__ = [
+    "drop_slivers",
+    "in_input",
+    "limit_part",
+    "limit_roughly",
+    "merge_lifted",
+    "merge_parts",
+    "merge_to_count",
+    "simple_part",
+    "with_limits",
+]

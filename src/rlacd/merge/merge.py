@@ -80,6 +80,34 @@ def merge_parts(
     return _unite_pairs([*new, *old], len(new), _Bridged(criterion, workers, clock, solid), workers, clock)
 
 
+def merge_lifted(
+    parts: Sequence[Part],
+    proxy: Component,
+    rehearsal: Criterion,
+    confirmed: Callable[[Hull], Part | None],
+    workers: Workers,
+    clock: Clock,
+) -> list[Part]:
+    """Unite pairs of parts that were carried from a proxy to a solid, if their joint hull is tight on both.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+        They may overlap, and need not consist of components.
+    proxy : Component
+        Most pairs are rejected here, quickly.
+    rehearsal : Criterion
+        What the proxy clipped to a joint hull has to meet.
+    confirmed : callable
+        Returns the solid clipped to a hull, or None if it does not meet the criterion.
+    workers : Workers
+    clock : Clock
+    """
+    return _unite_pairs(
+        parts, len(parts), _Lifted(rehearsal, workers, clock, proxy, few=0, confirmed=confirmed), workers, clock
+    )
+
+
 class _Pairing(Protocol):
     """A way to find pairs of parts that may be united, and to unite them."""
 
@@ -201,13 +229,14 @@ class _Bridged:
     workers: Workers
     clock: Clock
     solid: Component
+    few: int = FEW
 
     def pairs(
         self, alive: Mapping[int, Part], boxes: Boxes, new: Sequence[int]
     ) -> tuple[list[_Pair], list[tuple[int, int]]]:
         """Pairs that may be feasible: how much of the joint hull the solid fills is not known yet."""
         screen = self.criterion.screen
-        reach = np.inf if len(boxes.ids) <= FEW else screen.reach
+        reach = np.inf if len(boxes.ids) <= self.few else screen.reach
         pairs = boxes.pairs(new, reach, across=True)
         found: list[_Pair] = []
         never: list[tuple[int, int]] = []
@@ -234,6 +263,19 @@ class _Bridged:
     def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
         """Clip the solid to the joint hull."""
         return _clipped(first, second, Hull.around(first.hull, second.hull), self.criterion, self.solid), False
+
+
+@dataclass(frozen=True)
+class _Lifted(_Bridged):
+    """Pairs within reach, judged the same way on a proxy; unions are then confirmed on the solid it stands for."""
+
+    confirmed: Callable[[Hull], Part | None] = lambda hull: None
+
+    def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
+        """Clip the proxy to the joint hull, then the solid."""
+        hull = Hull.around(first.hull, second.hull)
+        rehearsed = _clipped(first, second, hull, self.criterion, self.solid)
+        return (None if rehearsed is None else self.confirmed(hull)), False
 
 
 @dataclass(frozen=True)

@@ -79,16 +79,22 @@ class Lift:
         """
         origins: list[Part | None] = list(parts)  # None for a part that was cut on the solid
         hulls = [limit_hull(part.hull, tolerance=SMOOTH) for part in parts]
-        known: dict[int, Part] = {}
+        known: dict[int, Part] = {}  # by their hulls
+        met: set[int] = set()
         criterion = self.on_proxy
         for round_ in range(ROUNDS + 2):
             with self.clock.shielded():
                 hulls = self._covering(hulls)
-                lifted = self.workers.map(lambda hull: known.get(id(hull)) or self._clipped(hull), hulls)
-            failing = self._failing(lifted, origins) if mend and round_ <= ROUNDS else []
+                fresh = [hull for hull in hulls if id(hull) not in known]
+                known |= {id(part.hull): part for part in self.workers.map(self._clipped, fresh)}
+                lifted = [known[id(hull)] for hull in hulls]
+            if not mend or round_ > ROUNDS:
+                return lifted
+            failing = self._failing({i: part for i, part in enumerate(lifted) if id(part) not in met}, origins)
             if not failing:
                 return lifted
-            known = {id(part.hull): part for part in lifted}
+            met = {id(part) for part in lifted} - {id(lifted[i]) for i in failing}
+            known = {id(part.hull): part for part in lifted}  # and keeps the hulls, whose ids stay theirs
             criterion = criterion.scaled(TIGHTER)
             for i in reversed(failing):
                 origin = origins[i]
@@ -97,6 +103,11 @@ class Lift:
                 origins[i : i + 1] = [None] * len(new) if round_ == ROUNDS else new
                 hulls[i : i + 1] = [limit_hull(part.hull, tolerance=SMOOTH) for part in new]
         return lifted
+
+    def confirmed(self, hull: Hull) -> Part | None:
+        """Get what the solid fills of a hull; None if it does not meet the goal."""
+        part = self._clipped(hull)
+        return part if self.goal.is_met(part) else None
 
     def _covering(self, hulls: Sequence[Hull]) -> list[Hull]:
         """The hulls, grown where necessary to cover the solid's surface; those that need not grow are the same."""
@@ -112,12 +123,12 @@ class Lift:
             return Part(hull.vertices, hull.faces, hull.volume, hull)
         return Part(vertices, faces, max(0.0, _native.mesh_volume(vertices, faces)), hull)
 
-    def _failing(self, lifted: Sequence[Part], origins: Sequence[Part | None]) -> list[int]:
+    def _failing(self, lifted: dict[int, Part], origins: Sequence[Part | None]) -> list[int]:
         """Indices of the parts that fail on the solid, although they met their criterion on the proxy."""
         try:
-            verdicts = self.workers.map(self.goal.is_met, lifted)
-            failing = [i for i, met in enumerate(verdicts) if not met and origins[i] is not None]
-            return [i for i in failing if self.on_proxy.is_met(origins[i])]  # type: ignore[arg-type]
+            verdicts = self.workers.map(self.goal.is_met, lifted.values())
+            failing = [i for i, met in zip(lifted, verdicts, strict=True) if not met]
+            return [i for i in failing if (origin := origins[i]) is not None and self.on_proxy.is_met(origin)]
         except Stopped:
             self.clock.note_stop()
             return []

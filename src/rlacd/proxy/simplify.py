@@ -26,7 +26,7 @@ NEAR = 0.1
 OFTEN = 0.99
 """Share of the vertices looked at whose distance counts as the deviation: single spots may be worse."""
 
-ANYWHERE = 0.4
+ANYWHERE = 0.6
 """No vertex looked at is farther from the proxy than this share of the threshold."""
 
 STEP = 0.7

@@ -1,0 +1,40 @@
+"""Hulls with few corners: what room the criterion leaves is used to leave out corners that add little."""
+
+from __future__ import annotations
+
+import math
+
+from rlacd.criteria import Criterion
+from rlacd.merge.limits import limit_hull
+from rlacd.solid.component import Part
+
+ROOM = 0.2
+"""A simple hull grows by at most this share of what the criterion allows beyond a part."""
+
+TRIES = 3
+"""If the criterion is no longer met, half the growth is tried, and so on."""
+
+
+def simple_part(part: Part, criterion: Criterion, max_vertices: int | None, max_faces: int | None) -> Part:
+    """Get the part with a hull of few corners that still meets the criterion; the same part if there is none.
+
+    Parameters
+    ----------
+    part : Part
+    criterion : Criterion
+        One that does not bound how far a hull may reach beyond its part leaves hulls as they are.
+    max_vertices, max_faces : int, optional
+        Limits on the hull's vertices and triangles. If the hull exceeds them, it is left for `limit_part`.
+    """
+    if not math.isfinite(criterion.overhang):
+        return part
+    growth = ROOM * criterion.overhang
+    for _ in range(TRIES):
+        hull = limit_hull(part.hull, max_vertices, max_faces, tolerance=growth)
+        if hull is part.hull:
+            return part
+        simple = part.with_hull(hull)
+        if criterion.is_met(simple):
+            return simple
+        growth /= 2
+    return part
