@@ -66,7 +66,7 @@ def test_promises_hold_on_known_shapes(shape: str, threshold: float) -> None:
 
 def test_convex_input_is_one_hull_exactly() -> None:
     ball = trimesh.creation.icosphere(3)
-    result = rlacd.decompose(ball)
+    result = rlacd.decompose(ball, detail="full")
     assert len(result) == 1
     assert result.hulls[0].volume == pytest.approx(ball.volume)
     assert result.report["concavity"]["max"] < 1e-6

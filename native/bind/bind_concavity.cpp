@@ -135,7 +135,7 @@ void bind_concavity(nb::module_& m) {
       .def(
           "uncovered",
           [](const Filling& self, const std::vector<PointsIn>& vertices, const std::vector<FacesIn>& faces,
-             double reach, double grain) {
+             double reach, double grain, int threads) {
             if (vertices.empty() || vertices.size() != faces.size())
               throw std::invalid_argument("there must be one array of faces for each array of vertices");
             if (!(grain > 0)) throw std::invalid_argument("the grain must be positive");
@@ -144,13 +144,13 @@ void bind_concavity(nb::module_& m) {
             std::vector<std::vector<Vec3>> points;
             {
               nb::gil_scoped_release release;
-              points = self.uncovered(hulls, reach, grain);
+              points = self.uncovered(hulls, reach, grain, threads);
             }
             nb::list result;
             for (std::vector<Vec3>& own : points) result.append(to_array<double>(std::move(own)));
             return result;
           },
-          nb::arg("vertices"), nb::arg("faces"), nb::arg("reach"), nb::arg("grain"),
+          nb::arg("vertices"), nb::arg("faces"), nb::arg("reach"), nb::arg("grain"), nb::arg("threads") = 0,
           "Points [N, 3] that each convex hull has to take in, so that together they cover the solid's surface.\n\n"
           "Hulls grow by at most `grain` more than they must. Hulls farther than `reach` from a face are only looked "
           "at\n"

@@ -46,8 +46,9 @@ class Filling {
   bool comes_deeper(const Mesh& hull, double threshold) const;
 
   std::optional<ConvexClip> clipped(const Mesh& hull) const { return clip_to_convex(solid_, surface_, hull); }
-  std::vector<std::vector<Vec3>> uncovered(const std::vector<Mesh>& hulls, double reach, double grain) const {
-    return rlacd::uncovered(solid_, surface_.bvh(), hulls, reach, grain);
+  std::vector<std::vector<Vec3>> uncovered(const std::vector<Mesh>& hulls, double reach, double grain,
+                                           int threads) const {
+    return rlacd::uncovered(solid_, surface_.bvh(), hulls, reach, grain, threads);
   }
 
  private:

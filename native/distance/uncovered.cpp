@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "base/parallel.hpp"
 #include "base/stop.hpp"
 #include "hull/convex_planes.hpp"
 
@@ -62,49 +63,48 @@ struct Body {
 
 using Group = std::vector<std::int32_t>;
 
+constexpr int kLevels = 5;
+
+// One child of a node of the tree, and the bodies that may be near it.
+struct Branch {
+  std::int32_t node;
+  int side;
+  Group near;
+};
+
 class Cover {
  public:
-  Cover(const Mesh& solid, const Bvh& bvh, const std::vector<Mesh>& hulls, double reach, double grain)
-      : solid_(solid), bvh_(bvh), reach_(reach), grain_(grain), taken_(hulls.size()) {
-    bodies_.reserve(hulls.size());
-    for (const Mesh& hull : hulls) {
-      all_.push_back(static_cast<std::int32_t>(bodies_.size()));
-      bodies_.emplace_back(hull);
+  Cover(const Mesh& solid, const Bvh& bvh, const std::vector<Body>& bodies, const Group& all, double reach,
+        double grain)
+      : solid_(solid), bvh_(bvh), bodies_(bodies), all_(all), reach_(reach), grain_(grain), taken_(bodies.size()) {}
+
+  // Goes through one child of a node and everything below it.
+  void visit(const Branch& branch) {
+    poll_stop();
+    const Bvh::Node& node = bvh_.nodes()[branch.node];
+    const Box& box = node.box[branch.side];
+    if (box.is_empty()) return;
+    Group near;
+    for (const std::int32_t i : branch.near) {
+      if (!bodies_[i].is_near(box, reach_)) continue;
+      if (bodies_[i].holds(box)) return;
+      near.push_back(i);
+    }
+    if (near.empty()) near = all_;
+    const std::int32_t child = node.child[branch.side];
+    if (child >= 0) {
+      for (int side = 0; side < 2; ++side) visit({child, side, near});
+      return;
+    }
+    for (std::int32_t k = 0; k < node.leaf_size[branch.side]; ++k) {
+      const Triangle& face = solid_.faces[bvh_.face(~child + k)];
+      take({solid_.vertices[face[0]], solid_.vertices[face[1]], solid_.vertices[face[2]]}, near);
     }
   }
 
-  std::vector<std::vector<Vec3>> run() {
-    visit(0, all_);
-    return std::move(taken_);
-  }
+  const std::vector<std::vector<Vec3>>& taken() const { return taken_; }
 
  private:
-  void visit(std::int32_t at, const Group& near) {
-    poll_stop();
-    const Bvh::Node& node = bvh_.nodes()[at];
-    for (int side = 0; side < 2; ++side) {
-      const Box& box = node.box[side];
-      if (box.is_empty()) continue;
-      Group nearer;
-      bool is_held = false;
-      for (const std::int32_t i : near) {
-        if (!bodies_[i].is_near(box, reach_)) continue;
-        nearer.push_back(i);
-        if ((is_held = bodies_[i].holds(box))) break;
-      }
-      if (is_held) continue;
-      const Group& candidates = nearer.empty() ? all_ : nearer;
-      if (node.child[side] >= 0) {
-        visit(node.child[side], candidates);
-        continue;
-      }
-      for (std::int32_t k = 0; k < node.leaf_size[side]; ++k) {
-        const Triangle& face = solid_.faces[bvh_.face(~node.child[side] + k)];
-        take({solid_.vertices[face[0]], solid_.vertices[face[1]], solid_.vertices[face[2]]}, candidates);
-      }
-    }
-  }
-
   void take(const Corners& corner, const Group& candidates) {
     std::int32_t best = -1;
     double least = std::numeric_limits<double>::infinity();  // growth of the hull that takes the whole triangle
@@ -130,17 +130,51 @@ class Cover {
 
   const Mesh& solid_;
   const Bvh& bvh_;
+  const std::vector<Body>& bodies_;
+  const Group& all_;
   const double reach_, grain_;
-  std::vector<Body> bodies_;
-  Group all_;
   std::vector<std::vector<Vec3>> taken_;
 };
 
+// The branches of the tree at a fixed depth: the same work for any number of threads.
+std::vector<Branch> branches(const Bvh& bvh, const Group& all) {
+  std::vector<Branch> found = {{0, 0, all}, {0, 1, all}};
+  for (int level = 0; level < kLevels; ++level) {
+    std::vector<Branch> below;
+    for (const Branch& branch : found) {
+      const std::int32_t child = bvh.nodes()[branch.node].child[branch.side];
+      if (child < 0) {
+        below.push_back(branch);
+        continue;
+      }
+      for (int side = 0; side < 2; ++side) below.push_back({child, side, all});
+    }
+    found = std::move(below);
+  }
+  return found;
+}
+
 }  // namespace
 
-std::vector<std::vector<Vec3>> uncovered(const Mesh& solid, const Bvh& bvh, const std::vector<Mesh>& hulls,
-                                         double reach, double grain) {
-  return Cover(solid, bvh, hulls, reach, grain).run();
+std::vector<std::vector<Vec3>> uncovered(const Mesh& mesh, const Bvh& bvh, const std::vector<Mesh>& hulls, double reach,
+                                         double grain, int threads) {
+  std::vector<Body> bodies;
+  Group all;
+  for (const Mesh& hull : hulls) {
+    all.push_back(static_cast<std::int32_t>(bodies.size()));
+    bodies.emplace_back(hull);
+  }
+  const std::vector<Branch> work = branches(bvh, all);
+  std::vector<std::vector<std::vector<Vec3>>> taken(work.size());
+  parallel_for(work.size(), threads, [&](std::size_t i) {
+    Cover cover(mesh, bvh, bodies, all, reach, grain);
+    cover.visit(work[i]);
+    taken[i] = cover.taken();
+  });
+  std::vector<std::vector<Vec3>> result(hulls.size());
+  for (const auto& own : taken)
+    for (std::size_t i = 0; i < own.size(); ++i) result[i].insert(result[i].end(), own[i].begin(), own[i].end());
+  return result;
 }
 
 }  // namespace rlacd

@@ -16,6 +16,6 @@ namespace rlacd {
 // Hulls grow by at most `grain` more than they must. A hull whose box is farther from a triangle than `reach` takes it
 // only if all are.
 std::vector<std::vector<Vec3>> uncovered(const Mesh& mesh, const Bvh& bvh, const std::vector<Mesh>& hulls, double reach,
-                                         double grain);
+                                         double grain, int threads);
 
 }  // namespace rlacd

@@ -105,7 +105,7 @@ class Filling:
         self, hull_vertices: FloatArray, hull_faces: IntArray
     ) -> tuple[FloatArray, IntArray, list[tuple[list[IntArray], list[FloatArray]]]] | None: ...
     def uncovered(
-        self, vertices: list[FloatArray], faces: list[IntArray], reach: float, grain: float
+        self, vertices: list[FloatArray], faces: list[IntArray], reach: float, grain: float, threads: int = 0
     ) -> list[FloatArray]: ...
 
 def meets_concavity(

@@ -44,7 +44,7 @@ from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import AS_PUBLISHED, Policy, make_policy
 from rlacd.presets import PresetName
 from rlacd.progress import ProgressCallback
-from rlacd.proxy import Lift, Proxy, simplify
+from rlacd.proxy import FEW, Lift, Proxy, simplify
 from rlacd.renamed import with_former
 from rlacd.repair.repair import repair
 from rlacd.report import make_report
@@ -136,7 +136,8 @@ def decompose(
         unless the policy stands for a published method (``navacd``, ``greedy-SCORE``). ``balanced``, the default if
         parts are merged: also a search for fewer parts, whose work is limited to a multiple of that of the pass.
         ``best``: the same, followed by a long search.
-        No level is worse than the one before it: it gives fewer hulls, or equally many with no more volume.
+        No level is worse than the one before it: it finds fewer hulls, or equally many with no more volume before
+        `detail` simplifies them.
     budget : float, optional
         Seconds the search may take, instead of the limits of the level; the result then depends on the speed of the
         machine. ``best`` has 5, and more if the search of ``balanced`` takes longer.
@@ -251,7 +252,7 @@ def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Cl
 
 def _proxy(root: Component, goal: Criterion, options: Options, clock: Clock) -> Proxy | None:
     """A simpler solid to decompose in place of a dense one."""
-    if goal.obstacles is not None:
+    if goal.obstacles is not None or len(root.faces) < FEW:
         return None
     try:
         with clock.stage("simplify"):

@@ -1,6 +1,6 @@
 """Decomposing a simpler copy of a dense solid, and carrying the parts back to the solid itself."""
 
 from rlacd.proxy.lift import Lift
-from rlacd.proxy.simplify import Proxy, simplify
+from rlacd.proxy.simplify import FEW, Proxy, simplify
 
-__all__ = ["Lift", "Proxy", "simplify"]
+__all__ = ["FEW", "Lift", "Proxy", "simplify"]

@@ -56,7 +56,7 @@ class Lift:
         Chooses the planes where parts are cut again.
     workers : Workers
     clock : Clock
-        When it stops, parts are kept as they are.
+        When it stops, the parts stay those of the proxy, with hulls that cover the solid.
     """
 
     solid: Component
@@ -78,21 +78,28 @@ class Lift:
             Cut parts again if they meet their criterion on the proxy only.
         """
         origins: list[Part | None] = list(parts)  # None for a part that was cut on the solid
-        hulls = [limit_hull(part.hull, tolerance=SMOOTH) for part in parts]
+        with self.clock.shielded():
+            hulls = self._covering([limit_hull(part.hull, tolerance=SMOOTH) for part in parts])
+        try:
+            return self._tested(hulls, origins) if mend else self.workers.map(self._clipped, hulls)
+        except Stopped:
+            self.clock.note_stop()
+            return [part.with_hull(hull) for part, hull in zip(parts, hulls, strict=True)]
+
+    def _tested(self, hulls: list[Hull], origins: list[Part | None]) -> list[Part]:
+        """Clip the solid to the hulls and cut parts again until all meet the goal."""
         known: dict[int, Part] = {}  # by their hulls
         met: set[int] = set()
         criterion = self.on_proxy
         for round_ in range(ROUNDS + 2):
-            with self.clock.shielded():
-                hulls = self._covering(hulls)
-                fresh = [hull for hull in hulls if id(hull) not in known]
-                known |= {id(part.hull): part for part in self.workers.map(self._clipped, fresh)}
-                lifted = [known[id(hull)] for hull in hulls]
-            if not mend or round_ > ROUNDS:
-                return lifted
+            fresh = [hull for hull in hulls if id(hull) not in known]
+            known |= {id(part.hull): part for part in self.workers.map(self._clipped, fresh)}
+            lifted = [known[id(hull)] for hull in hulls]
+            if round_ > ROUNDS:
+                break
             failing = self._failing({i: part for i, part in enumerate(lifted) if id(part) not in met}, origins)
             if not failing:
-                return lifted
+                break
             met = {id(part) for part in lifted} - {id(lifted[i]) for i in failing}
             known = {id(part.hull): part for part in lifted}  # and keeps the hulls, whose ids stay theirs
             criterion = criterion.scaled(TIGHTER)
@@ -102,6 +109,7 @@ class Lift:
                 new = self._on_proxy(origin, criterion) if round_ < ROUNDS else self._on_solid(lifted[i])
                 origins[i : i + 1] = [None] * len(new) if round_ == ROUNDS else new
                 hulls[i : i + 1] = [limit_hull(part.hull, tolerance=SMOOTH) for part in new]
+            hulls = self._covering(hulls)
         return lifted
 
     def confirmed(self, hull: Hull) -> Part | None:
@@ -112,7 +120,11 @@ class Lift:
     def _covering(self, hulls: Sequence[Hull]) -> list[Hull]:
         """The hulls, grown where necessary to cover the solid's surface; those that need not grow are the same."""
         points = self.solid.filling.uncovered(
-            [hull.vertices for hull in hulls], [hull.faces for hull in hulls], 2 * self.deviation + SMOOTH, GRAIN
+            [hull.vertices for hull in hulls],
+            [hull.faces for hull in hulls],
+            2 * self.deviation + SMOOTH,
+            GRAIN,
+            self.workers.threads,
         )
         return [_grown(hull, own) if len(own) else hull for hull, own in zip(hulls, points, strict=True)]
 
@@ -125,13 +137,9 @@ class Lift:
 
     def _failing(self, lifted: dict[int, Part], origins: Sequence[Part | None]) -> list[int]:
         """Indices of the parts that fail on the solid, although they met their criterion on the proxy."""
-        try:
-            verdicts = self.workers.map(self.goal.is_met, lifted.values())
-            failing = [i for i, met in zip(lifted, verdicts, strict=True) if not met]
-            return [i for i in failing if (origin := origins[i]) is not None and self.on_proxy.is_met(origin)]
-        except Stopped:
-            self.clock.note_stop()
-            return []
+        verdicts = self.workers.map(self.goal.is_met, lifted.values())
+        failing = [i for i, met in zip(lifted, verdicts, strict=True) if not met]
+        return [i for i in failing if (origin := origins[i]) is not None and self.on_proxy.is_met(origin)]
 
     def _on_proxy(self, part: Part, criterion: Criterion) -> list[Part]:
         whole = reunite(part.members)

@@ -1,0 +1,172 @@
+"""Dense solids are decomposed through a simpler copy; what is promised holds for the solid itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from manifold3d import Manifold, Mesh64
+
+import rlacd
+from rlacd import _native
+from rlacd.criteria import Concavity
+from rlacd.proxy import simplify
+from rlacd.solid.component import Component, Part
+from rlacd.solid.distance import hull_union
+from rlacd.solid.hull import Hull
+
+
+def noisy(mesh: trimesh.Trimesh, noise: float = 0.001) -> trimesh.Trimesh:
+    """A shape about 2 long, with its vertices moved along their normals."""
+    mesh = mesh.copy()
+    mesh.apply_scale(2 / max(mesh.extents))
+    shift = np.random.default_rng(0).normal(0, noise, (len(mesh.vertices), 1))
+    return trimesh.Trimesh(mesh.vertices + shift * mesh.vertex_normals, mesh.faces, process=False)
+
+
+def ring() -> trimesh.Trimesh:
+    return noisy(trimesh.creation.torus(1.0, 0.3, 120, 60))
+
+
+def cross() -> trimesh.Trimesh:
+    bars = [trimesh.creation.box(extents) for extents in ((2, 0.3, 0.3), (0.3, 2, 0.3))]
+    united = trimesh.boolean.union(bars, engine="manifold")
+    return noisy(trimesh.Trimesh(*trimesh.remesh.subdivide_to_size(united.vertices, united.faces, 0.04)))
+
+
+SHAPES = {"ring": ring, "cross": cross}
+
+
+def component(mesh: trimesh.Trimesh) -> Component:
+    return Component((np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int32)))
+
+
+def frame_scale(mesh: trimesh.Trimesh) -> float:
+    return float(2 / max(mesh.extents))
+
+
+def in_frame(hulls: list[trimesh.Trimesh], mesh: trimesh.Trimesh) -> list[Hull]:
+    middle, scale = mesh.bounds.mean(axis=0), frame_scale(mesh)
+    found = [Hull.of(np.array((hull.vertices - middle) * scale)) for hull in hulls]
+    return [hull for hull in found if hull is not None]
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("quality", ["fast", "balanced"])
+def test_promises_hold_on_the_solid_itself(shape: str, quality: rlacd.QualityName) -> None:
+    mesh = SHAPES[shape]()
+    result = rlacd.decompose(mesh, quality=quality)
+    assert "lift" in result.report["seconds"]
+    assert not result.report["warnings"]
+    assert result.report["concavity"]["max"] <= 0.05
+    hulls = in_frame(list(result), mesh)
+    middle, scale = mesh.bounds.mean(axis=0), frame_scale(mesh)
+    vertices = np.array((mesh.vertices - middle) * scale)
+    faces = np.array(mesh.faces, dtype=np.int32)
+    assert hull_union(hulls, 1).under(vertices, faces, 1e-4, 1)[1] <= 1e-3
+    # The strict test, with parts made by another library: the solid clipped to each hull.
+    solid = Manifold(Mesh64(vertices, faces.astype(np.uint64)))
+    for hull in hulls:
+        clipped = solid ^ Manifold(Mesh64(hull.vertices, hull.faces.astype(np.uint64)))
+        surface = clipped.to_mesh64()
+        part = Part(
+            np.array(surface.vert_properties[:, :3]),
+            np.array(surface.tri_verts, dtype=np.int32),
+            clipped.volume(),
+            hull,
+        )
+        assert Concavity(0.0501).is_met(part)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_noise_and_density_cost_hardly_any_parts(shape: str) -> None:
+    dense = SHAPES[shape]()
+    plain = {"ring": trimesh.creation.torus(1.0, 0.3, 32, 16), "cross": cross()}[shape]
+    if shape == "cross":
+        plain = trimesh.boolean.union(
+            [trimesh.creation.box(extents) for extents in ((2, 0.3, 0.3), (0.3, 2, 0.3))], engine="manifold"
+        )
+    assert len(rlacd.decompose(dense, quality="fast")) <= len(rlacd.decompose(plain, quality="fast")) + 1
+
+
+def test_the_bytes_do_not_depend_on_threads() -> None:
+    mesh = ring()
+    first, second = (rlacd.decompose(mesh, quality="fast", threads=threads) for threads in (1, 3))
+    assert len(first) == len(second)
+    for a, b in zip(first, second, strict=True):
+        assert a.vertices.tobytes() == b.vertices.tobytes()
+
+
+def test_limits_hold_and_are_met_by_the_threshold() -> None:
+    result = rlacd.decompose(ring(), quality="fast", max_vertices=32)
+    assert max(len(hull.vertices) for hull in result) <= 32
+    assert result.report["concavity"]["max"] <= 0.05
+    few = rlacd.decompose(ring(), quality="fast", max_hulls=3)
+    assert len(few) <= 3
+    assert few.report["hausdorff"]["under"] <= 1e-3
+
+
+def test_stopped_at_any_time_the_hulls_cover_the_solid() -> None:
+    mesh = ring()
+    for stage in ("simplify", "cut", "merge", "lift"):
+        result = rlacd.decompose(mesh, progress=lambda p, stage=stage: p.stage != stage)
+        assert not result.report["complete"]
+        scaled = np.array((mesh.vertices - mesh.bounds.mean(axis=0)) * frame_scale(mesh))
+        union = hull_union(in_frame(list(result), mesh), 1)
+        assert union.under(scaled, np.array(mesh.faces, dtype=np.int32), 1e-4, 1)[1] <= 1e-3
+
+
+def test_simple_solids_are_decomposed_as_they_are() -> None:
+    result = rlacd.decompose(trimesh.creation.torus(1.0, 0.3, 16, 16), quality="fast")
+    assert "lift" not in result.report["seconds"]
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_proxy_is_near_closed_and_of_the_same_kind(shape: str) -> None:
+    mesh = SHAPES[shape]()
+    solid = component(mesh)
+    proxy = simplify(solid, 0.05)
+    assert proxy is not None
+    simple = trimesh.Trimesh(proxy.component.vertices, proxy.component.faces, process=False)
+    assert len(simple.faces) < 0.2 * len(mesh.faces)
+    assert simple.is_watertight
+    assert simple.is_winding_consistent
+    assert simple.euler_number == mesh.euler_number
+    assert simple.volume == pytest.approx(solid.volume, rel=0.02)
+    distances = _native.Surface(proxy.component.vertices, proxy.component.faces).distance(solid.vertices, 1)
+    assert np.quantile(distances, 0.98) <= 0.005
+
+
+def test_simplifying_stops_where_the_topology_would_change() -> None:
+    torus = trimesh.creation.torus(1.0, 0.3, 24, 12)
+    simplifier = _native.Simplifier(np.array(torus.vertices), np.array(torus.faces, dtype=np.int32))
+    simplifier.reduce(0)
+    simple = trimesh.Trimesh(*simplifier.mesh(), process=False)
+    assert simple.is_watertight
+    assert simple.euler_number == 0
+    assert 7 <= len(simple.vertices) < 40  # no triangulation of a torus has fewer than seven vertices
+
+
+def test_simplifying_gives_the_same_bytes_every_time() -> None:
+    mesh = ring()
+    found = []
+    for _ in range(2):
+        simplifier = _native.Simplifier(np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int32))
+        simplifier.reduce(500)
+        found.append(simplifier.mesh()[0].tobytes())
+    assert found[0] == found[1]
+
+
+def test_simple_hulls_hold_the_full_ones_and_have_fewer_corners() -> None:
+    mesh = trimesh.creation.capsule(height=2, radius=1, count=[32, 32])
+    simple, full = (rlacd.decompose(mesh, quality="fast", detail=detail) for detail in ("simple", "full"))
+    assert len(simple) == len(full) == 1
+    assert len(simple.hulls[0].vertices) < 0.8 * len(full.hulls[0].vertices)
+    assert (simple.hulls[0].volume, full.hulls[0].volume) == (
+        pytest.approx(mesh.volume, rel=0.03),
+        pytest.approx(mesh.convex_hull.volume),
+    )
+    around = in_frame(list(simple), mesh)
+    held = in_frame(list(full), mesh)
+    assert hull_union(around, 1).distance(held[0].vertices, 1).max() <= 1e-9
+    assert simple.report["concavity"]["max"] <= 0.05
