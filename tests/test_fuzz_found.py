@@ -48,6 +48,7 @@ def test_a_point_that_is_no_number_is_refused() -> None:
         _native.Surface(vertices, faces)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("count", "step"), [(12, "slab"), (60, "wrapped")])
 def test_sheets_that_all_cross_are_wrapped_when_they_are_many(count: int, step: str) -> None:
     """Uniting some hundred of them one by one took a quarter of an hour."""

@@ -248,6 +248,7 @@ def test_when_no_process_can_play_that_is_one_clear_error(meshes: Path, tmp_path
         run(meshes, tmp_path / "run", pool=Doomed(range(5, 10**6)), validation=0)
 
 
+@pytest.mark.slow
 def test_solids_without_anything_to_cut_are_one_clear_error(
     meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -105,6 +105,7 @@ def test_merging_cut_short_is_the_same_for_any_number_of_threads(most: float) ->
     assert 1 <= len(counts[0]) <= 16
 
 
+@pytest.mark.slow
 def test_a_pass_whose_merging_is_cut_short_meets_the_threshold_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = sponge().to_mesh64()
     solid = mesh.vert_properties[:, :3], mesh.tri_verts
