@@ -14,8 +14,11 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from rlacd import _native
+from rlacd.criteria import Concavity
 from rlacd.errors import OptionError
+from rlacd.merge import limit_part
 from rlacd.merge.limits import limit_hull
+from rlacd.solid.component import Part
 from rlacd.solid.hull import Hull
 
 
@@ -223,3 +226,18 @@ def test_bad_hulls_are_refused() -> None:
         _native.simplify_hull(flat * np.nan, faces, 4, 4)
     with pytest.raises(ValueError, match="no vertices"):
         _native.simplify_hull(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32), 4, 4)
+
+
+def test_redundant_corners_stay_if_the_threshold_needs_them() -> None:
+    cube = np.array(np.meshgrid(*[[0.0, 1.0]] * 3)).reshape(3, -1).T
+    chamfer = np.ones(3) - 4e-7 * np.eye(3)
+    hull = hull_of(np.concatenate([cube[:-1], chamfer]))
+    part = Part(hull.vertices, hull.faces, hull.volume, hull)
+    simple = limit_part(part, None, None)
+    assert len(simple.hull.vertices) == 8 < len(hull.vertices)
+    tight = Concavity(1e-7)  # the corner lies 4e-7 / sqrt(3) outside
+    assert tight.is_met(part)
+    assert not tight.is_met(simple)
+    assert limit_part(part, None, None, tight) is part
+    assert limit_part(part, 8, None, tight).hull.volume == simple.hull.volume
+    assert limit_part(part, None, None, Concavity(0.05)).hull.volume == simple.hull.volume

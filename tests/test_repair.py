@@ -13,7 +13,9 @@ from rlacd.io.read.load import load_mesh
 from rlacd.repair.caps import HOLE
 from rlacd.repair.distance import points_covering
 from rlacd.repair.repair import GAP, repair
-from rlacd.repair.union import to_arrays, to_manifold
+from rlacd.repair.union import to_arrays
+from rlacd.solid.component import Component
+from rlacd.solid.manifold import to_manifold
 from tests.repaired import BOX, check_closed, join, moved, solid_of, steps, volume
 
 
@@ -192,6 +194,7 @@ def test_folded_faces_stay_where_they_are(seed):
     vertices, faces = FOLDED
     turned = np.ascontiguousarray(vertices @ Rotation.random(random_state=seed).as_matrix())
     assert to_manifold(turned, faces).volume() == pytest.approx(1, abs=1e-4)
+    assert Component((turned, faces.astype(np.int32))).manifold.volume() == pytest.approx(1, abs=1e-4)
 
 
 def test_a_closed_mesh_with_folds_is_kept(corpus):

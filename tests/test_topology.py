@@ -16,8 +16,9 @@ from scipy.sparse.csgraph import connected_components
 from rlacd import _native
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
-from rlacd.repair.union import to_arrays, to_manifold, unite, volume_of
+from rlacd.repair.union import to_arrays, unite, volume_of
 from rlacd.solid.input_mesh import InputMesh
+from rlacd.solid.manifold import to_manifold
 from rlacd.solid.topology import Edges, bodies_of, components, detach_films, face_areas, signed_tetrahedra
 
 

@@ -219,7 +219,7 @@ def _cleaned(reached: _Reached, max_vertices: int | None, max_faces: int | None,
     parts = drop_slivers(reached.parts, workers)
     if reached.options.detail == SIMPLE:
         parts = workers.map(lambda part: simple_part(part, reached.goal, max_vertices, max_faces), parts)
-    return workers.map(lambda part: limit_part(part, max_vertices, max_faces), parts)
+    return workers.map(lambda part: limit_part(part, max_vertices, max_faces, reached.goal), parts)
 
 
 def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Clock) -> _Reached:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
 import trimesh
 
 from rlacd._version import __version__
@@ -16,7 +17,7 @@ from rlacd.merge.slivers import is_sliver
 from rlacd.options import Options
 from rlacd.presets import Preset, find_preset
 from rlacd.solid.component import Part, concatenated
-from rlacd.solid.distance import hull_distances
+from rlacd.solid.distance import hull_distances, hull_union
 from rlacd.solid.hull import Hull
 from rlacd.solid.mass import Mass, mass_of
 from rlacd.solid.solid import Solid
@@ -25,6 +26,9 @@ from rlacd.workers import Workers
 HONEST_WITHIN = 5e-3
 """How far the union of the hulls may reach beyond the threshold before the report warns: slack for repair and
 measurement."""
+
+PLACES = 100_000
+"""Points of the input among which the one farthest from the hulls is looked for."""
 
 
 def make_report(
@@ -43,10 +47,10 @@ def make_report(
     is_cover = len(solid.faces) == 0  # hulls of an input that was not repaired: the parts in them are unknown
     errors = None if is_cover else clock.if_in_time(lambda: workers.map(criterion.error, parts), lambda: None)
     summary = criterion.summary(errors)
-    over = under = None
+    over = under = place = None
     has_surface = len(solid.surface[1]) > 0  # a cloud of points has none
     if has_surface:
-        over, under = clock.if_in_time(lambda: _distances(solid, parts, workers), lambda: (None, None))
+        over, under, place = clock.if_in_time(lambda: _distances(solid, parts, workers), lambda: (None, None, None))
     stands_for_mass = [(part.hull.vertices, part.hull.faces) for part in parts] if is_cover else [solid.mesh]
     mass = mass_of(*concatenated(stands_for_mass), solid.frame)
     return {
@@ -77,6 +81,7 @@ def make_report(
                 [part.hull for part in parts],
                 over,
                 under,
+                place,
                 options,
                 criterion.overhang if not summary.warnings else math.inf,
             ),
@@ -104,9 +109,18 @@ def _mass(mass: Mass) -> dict[str, Any]:
     return now | {"volume_m": volume, "centre_m": centre, "inertia_m": inertia}
 
 
-def _distances(solid: Solid, parts: Sequence[Part], workers: Workers) -> tuple[float, float]:
-    distances = hull_distances([part.hull for part in parts], *solid.surface, threads=workers.threads)
-    return distances.over[1], distances.under[1]
+def _distances(solid: Solid, parts: Sequence[Part], workers: Workers) -> tuple[float, float, str | None]:
+    """How far the hulls reach out and fall short, and where they fall short most if that is worth a warning."""
+    hulls = [part.hull for part in parts]
+    distances = hull_distances(hulls, *solid.surface, threads=workers.threads)
+    over, under = distances.over[1], distances.under[1]
+    if under <= HONEST_WITHIN:
+        return over, under, None
+    vertices, faces = solid.surface
+    points = np.concatenate([vertices, vertices[faces].mean(axis=1)])
+    points = np.ascontiguousarray(points[:: 1 + len(points) // PLACES])
+    away = hull_union(hulls, workers.threads).distance(points)
+    return over, under, solid.frame.place(points[away.argmax()])
 
 
 def _coarse(solid: Solid) -> list[str]:
@@ -149,15 +163,15 @@ def _cut_short(clock: Clock) -> list[str]:
 
 
 def _shortcomings(
-    hulls: Sequence[Hull], over: float | None, under: float | None, options: Options, overhang: float
+    hulls: Sequence[Hull], over: float | None, under: float | None, place: str | None, options: Options, overhang: float
 ) -> list[str]:
     sentences = [] if options.preset is None else engine_shortcomings(find_preset(options.preset), hulls)
     if options.max_hulls is not None and len(hulls) > options.max_hulls:
         sentences.append(f"{len(hulls)} hulls are left, more than the {options.max_hulls} asked for.")
     if under is not None and under > HONEST_WITHIN:
         sentences.append(
-            f"Some of the input's surface lies {under:.4g} from the hulls: the repair gave up what could not be made "
-            "solid (see `deviation` in `repair`)."
+            f"Some of the input's surface lies {under:.4g} from the hulls, most near {place}: the repair gave up what "
+            "could not be made solid (see `deviation` in `repair`)."
         )
     if over is not None and over > overhang + HONEST_WITHIN:
         sentences.append(

@@ -14,11 +14,11 @@ import numpy as np
 from rlacd import _native
 from rlacd.criteria import Concavity
 from rlacd.errors import OptionError
-from rlacd.repair.union import to_manifold
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Part
 from rlacd.solid.distance import hull_union
 from rlacd.solid.hull import Hull
+from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import Solid
 
 TOLERANCE = 1e-3

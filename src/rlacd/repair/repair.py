@@ -36,7 +36,6 @@ from rlacd.repair.union import (
     slab_of_faces,
     split_labels,
     to_arrays,
-    to_manifold,
     unite,
     unite_around_cavities,
     volume_of,
@@ -45,6 +44,7 @@ from rlacd.repair.voxels import Reach
 from rlacd.solid.arrays import IntArray as Indices
 from rlacd.solid.frame import FloatArray, Frame
 from rlacd.solid.input_mesh import InputMesh
+from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import BodyRepair, Solid
 from rlacd.solid.topology import (
     BoolArray,
@@ -248,16 +248,12 @@ class _Repair:
         shells = [body for body in self.mouths if self.step[body] == STEPS.index("slab")]
         if not shells:
             return
-        place = self._place(self.mouths[shells[0]])
+        place = self.frame.place(self.mouths[shells[0]])
         if len(shells) == 1:
             sentence = f"1 open body became a thin shell; --open solid fills it (its widest opening is at {place})."
         else:
             sentence = f"{len(shells)} open bodies became thin shells; --open solid fills them (one opens at {place})."
         self.warnings.append(sentence)
-
-    def _place(self, point: FloatArray) -> str:
-        """A point of the frame, formatted in the input's unit."""
-        return "(" + ", ".join(f"{x:.4g}" for x in self.frame.to_input(point)) + ")"
 
     def report(self) -> tuple[BodyRepair, ...]:
         """One record per body."""
@@ -352,7 +348,7 @@ class _Repair:
         self._note(closed.bodies, "capped")
         self.by_room |= closed.by_room
         if len(closed.far):
-            place = self._place(closed.where[closed.far.argmax()])
+            place = self.frame.place(closed.where[closed.far.argmax()])
             self.warnings.append(
                 f"Holes were closed although the caps lead up to {closed.far.max():.3f} (longest side = 2) away from "
                 f"the surface: the widest is at {place}."

@@ -6,62 +6,25 @@ from typing import TypeAlias
 
 import manifold3d
 import numpy as np
-from manifold3d import Error, Manifold, Mesh64, OpType
+from manifold3d import Manifold, OpType
 
 from rlacd import _native
 from rlacd._native import poll_stop
 from rlacd.solid.arrays import IntArray as Indices
 from rlacd.solid.boolean_time import require_time_for
 from rlacd.solid.frame import FloatArray
+from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import surface_of
-from rlacd.solid.topology import IntArray, face_areas, signed_tetrahedra
+from rlacd.solid.topology import IntArray
 
 Shape: TypeAlias = Manifold | tuple[FloatArray, Indices]
 """A closed solid: a manifold, or vertices float64 [V, 3] and faces int32 [F, 3]."""
-
-# If manifold3d moves faces by more than `_MOVED` on average, corners are moved by less than `_HAIR` (frame units).
-_MOVED, _HAIR = 1e-5, 1e-9
-_HAIRS = 4  # about one in a hundred leaves two faces so nearly coplanar that it does not help
 
 # Uniting takes time per mesh even without overlaps; above this number, disjoint meshes are composed instead.
 MOST_UNITED = 4000
 
 # Number of triangles united at once; the work may be stopped between batches.
 _AT_ONCE = 20_000
-
-
-def to_manifold(vertices: FloatArray, faces: IntArray) -> Manifold:
-    """Return the solid a closed, oriented mesh bounds; the solid is empty if the mesh is not closed.
-
-    manifold3d treats a face folded back onto its neighbour, in one plane, as degenerate and flips its edges and those
-    around it: surfaces came back up to 0.1 away. Such a solid is rebuilt with each corner moved by a hair, so that no
-    two faces are coplanar.
-    """
-    manifold = _taken_over(vertices, faces)
-    if manifold.is_empty():
-        return manifold
-    moved = _moved(manifold, vertices, faces)
-    for seed in range(_HAIRS):
-        if moved <= _MOVED:
-            break
-        hair = np.random.default_rng(seed).uniform(-_HAIR / 2, _HAIR / 2, np.shape(vertices))
-        other = _taken_over(vertices + hair, faces)
-        if not other.is_empty() and (less := _moved(other, vertices, faces)) < moved:
-            manifold, moved = other, less
-    return manifold
-
-
-def _taken_over(vertices: FloatArray, faces: IntArray) -> Manifold:
-    require_time_for(len(faces))
-    mesh = Mesh64(np.ascontiguousarray(vertices, dtype=np.float64), np.ascontiguousarray(faces, dtype=np.uint64))
-    manifold = Manifold(mesh)
-    return manifold if manifold.status() == Error.NoError else Manifold()
-
-
-def _moved(manifold: Manifold, vertices: FloatArray, faces: IntArray) -> float:
-    """How far manifold3d moved the faces on average, estimated from the volume."""
-    area = float(face_areas(vertices, faces).sum())
-    return abs(manifold.volume() - float(signed_tetrahedra(vertices, faces).sum())) / area if area > 0 else 0.0
 
 
 def to_arrays(solid: Shape) -> tuple[FloatArray, IntArray]:
@@ -72,7 +35,7 @@ def to_arrays(solid: Shape) -> tuple[FloatArray, IntArray]:
 
 def as_manifold(solid: Shape) -> Manifold:
     """Return a solid in the form that booleans take."""
-    return solid if isinstance(solid, Manifold) else Manifold(Mesh64(solid[0], solid[1].astype(np.uint64)))
+    return solid if isinstance(solid, Manifold) else to_manifold(*solid)
 
 
 def volume_of(solid: Shape) -> float:

@@ -16,6 +16,7 @@ from rlacd import _native
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.boolean_time import require_time_for
 from rlacd.solid.hull import Hull
+from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import surface_of
 
 NEGLIGIBLE_VOLUME = 1e-12
@@ -252,7 +253,7 @@ class Component(Part):
     @cached_property
     def manifold(self) -> Manifold:
         """The solid, ready for booleans."""
-        return Manifold(Mesh64(self.vertices, self.faces.astype(np.uint64)))
+        return to_manifold(self.vertices, self.faces)
 
     @cached_property
     def filling(self) -> _native.Filling:

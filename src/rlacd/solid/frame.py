@@ -57,3 +57,7 @@ class Frame:
     def to_input(self, points: ArrayLike) -> FloatArray:
         """Map points ``[N, 3]`` from the frame back to the input's unit."""
         return np.ascontiguousarray(np.asarray(points, dtype=np.float64) / self.scale + self.center)
+
+    def place(self, point: FloatArray) -> str:
+        """A point ``[3]`` of the frame as text, in the input's unit."""
+        return "(" + ", ".join(f"{x:.4g}" for x in self.to_input(point)) + ")"

@@ -1,0 +1,54 @@
+"""Closed meshes as solids of manifold3d, without the faces it would move."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+from manifold3d import Error, Manifold, Mesh64
+from numpy.typing import NDArray
+
+from rlacd.solid.boolean_time import require_time_for
+from rlacd.solid.frame import FloatArray
+from rlacd.solid.topology import face_areas, signed_tetrahedra
+
+Faces: TypeAlias = NDArray[np.int64] | NDArray[np.int32]
+
+# If manifold3d moves faces by more than `_MOVED` on average, corners are moved by less than `_HAIR` (frame units).
+_MOVED, _HAIR = 1e-5, 1e-9
+_HAIRS = 4  # about one in a hundred leaves two faces so nearly coplanar that it does not help
+
+
+def to_manifold(vertices: FloatArray, faces: Faces) -> Manifold:
+    """Return the solid a closed, oriented mesh bounds; the solid is empty if the mesh is not closed.
+
+    manifold3d treats a face folded back onto its neighbour, in one plane, as degenerate and flips its edges and those
+    around it: surfaces came back up to 0.1 away. Such a solid is rebuilt with each corner moved by a hair, so that no
+    two faces are coplanar.
+    """
+    manifold = _taken_over(vertices, faces)
+    if manifold.is_empty():
+        return manifold
+    moved = _moved(manifold, vertices, faces)
+    for seed in range(_HAIRS):
+        if moved <= _MOVED:
+            break
+        hair = np.random.default_rng(seed).uniform(-_HAIR / 2, _HAIR / 2, np.shape(vertices))
+        other = _taken_over(vertices + hair, faces)
+        if not other.is_empty() and (less := _moved(other, vertices, faces)) < moved:
+            manifold, moved = other, less
+    return manifold
+
+
+def _taken_over(vertices: FloatArray, faces: Faces) -> Manifold:
+    require_time_for(len(faces))
+    mesh = Mesh64(np.ascontiguousarray(vertices, dtype=np.float64), np.ascontiguousarray(faces, dtype=np.uint64))
+    manifold = Manifold(mesh)
+    return manifold if manifold.status() == Error.NoError else Manifold()
+
+
+def _moved(manifold: Manifold, vertices: FloatArray, faces: Faces) -> float:
+    """How far manifold3d moved the faces on average, estimated from the volume."""
+    faces = faces.astype(np.int64)
+    area = float(face_areas(vertices, faces).sum())
+    return abs(manifold.volume() - float(signed_tetrahedra(vertices, faces).sum())) / area if area > 0 else 0.0
