@@ -12,8 +12,10 @@
 namespace rlacd {
 namespace {
 
-// Planes are moved out by one to two times this: far above rounding, far below any distance that matters.
+// Planes are moved out by one to two times this: far above rounding, far below any distance that matters. If crossings
+// contradict each other, it is tried again with larger ones.
 constexpr double kNudge = 1e-8;
+constexpr double kLarger[] = {1, 3.3, 11};
 constexpr double kInside = 0.5, kAccuracy = 4;
 
 struct HalfSpace {
@@ -35,7 +37,7 @@ struct Polytope {
 };
 
 // The corners of the polytope are the facets of the hull of its planes' dual points.
-std::optional<Polytope> nudged(const Mesh& hull) {
+std::optional<Polytope> nudged(const Mesh& hull, double nudge) {
   const ConvexPlanes planes(hull);
   Vec3 middle{0, 0, 0};
   for (const Vec3 p : hull.vertices) middle = middle + (1.0 / static_cast<double>(hull.vertices.size())) * p;
@@ -44,7 +46,7 @@ std::optional<Polytope> nudged(const Mesh& hull) {
   for (std::size_t i = 0; i < planes.size(); ++i) {
     const auto plane = static_cast<std::int32_t>(i);
     const double golden = 0.6180339887498949 * static_cast<double>(i + 1);
-    all.push_back({planes.normal(plane), planes.offset(plane) + kNudge * (1 + golden - std::floor(golden))});
+    all.push_back({planes.normal(plane), planes.offset(plane) + nudge * (1 + golden - std::floor(golden))});
     const double height = all.back().depth(middle);
     if (!(height > 0)) return std::nullopt;
     duals.push_back((1 / height) * all.back().normal);
@@ -375,8 +377,12 @@ class Clip {
 }  // namespace
 
 std::optional<ConvexClip> clip_to_convex(const Mesh& solid, const Surface& surface, const Mesh& hull) {
-  std::optional<Polytope> polytope = nudged(hull);
-  return polytope ? Clip(solid, surface, std::move(*polytope)).run() : std::nullopt;
+  for (const double larger : kLarger) {
+    std::optional<Polytope> polytope = nudged(hull, larger * kNudge);
+    if (!polytope) continue;
+    if (std::optional<ConvexClip> clip = Clip(solid, surface, std::move(*polytope)).run()) return clip;
+  }
+  return std::nullopt;
 }
 
 }  // namespace rlacd

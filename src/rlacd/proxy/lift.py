@@ -32,6 +32,9 @@ GRAIN = 5e-4
 SMOOTH = 2e-3
 """The hulls of a proxy's parts are simplified within this first: they have to grow anyway."""
 
+TRIM = 1e-3
+"""Grown hulls are simplified within this: noise gives them many corners."""
+
 TIGHTER = 0.8
 """Parts that fail on the solid are cut again under a criterion tighter by this factor, and by its powers."""
 
@@ -156,4 +159,4 @@ class Lift:
 def _grown(hull: Hull, points: FloatArray) -> Hull:
     grown = Hull.of(np.concatenate([hull.vertices, points]))
     assert grown is not None, "a hull stays solid when it grows"
-    return grown
+    return limit_hull(grown, tolerance=TRIM)

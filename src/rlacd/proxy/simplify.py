@@ -42,6 +42,12 @@ LOST = 0.02
 WORTHWHILE = 0.5
 """A proxy has at most this share of the solid's triangles."""
 
+LARGE_STEP = 0.5
+"""The same while the proxy is larger than any that is looked at."""
+
+TYPICAL = 8
+"""Proxies with more than one triangle in this many are only looked at where smaller ones are not near enough."""
+
 SAMPLES = 2000
 """Number of the solid's vertices whose distances are measured, besides one of each body."""
 
@@ -64,17 +70,25 @@ class Proxy:
 def simplify(solid: Component, threshold: float) -> Proxy | None:
     """Make the smallest proxy that is near enough for a threshold; None if none is worthwhile."""
     looked_at = solid.vertices[_samples(solid)]
+    for largest in (max(FEW, len(solid.faces) // TYPICAL), WORTHWHILE * len(solid.faces)):
+        proxy = _smallest(solid, looked_at, threshold, largest)
+        if proxy is not None:
+            return proxy
+    return None
+
+
+def _smallest(solid: Component, looked_at: FloatArray, threshold: float, largest: float) -> Proxy | None:
+    """The smallest proxy that is near enough, if one with at most `largest` triangles is."""
     mesh = solid.vertices, solid.faces
     best: Proxy | None = None
-    while (count := math.floor(STEP * len(mesh[1]))) >= COARSEST:
+    while (count := math.floor((STEP if len(mesh[1]) <= largest else LARGE_STEP) * len(mesh[1]))) >= COARSEST:
         mesh = _reduced(mesh, count)
-        if len(mesh[1]) > WORTHWHILE * len(solid.faces) and len(mesh[1]) <= count:
-            continue
-        near = _as_proxy(mesh, solid, looked_at, threshold)
-        if near is None:
-            break
-        best = near
-        if len(mesh[1]) > count:
+        if len(mesh[1]) <= largest:
+            near = _as_proxy(mesh, solid, looked_at, threshold)
+            if near is None:
+                break
+            best = near
+        if len(mesh[1]) > count:  # hardly any edge can be collapsed any more
             break
     return best
 
@@ -97,8 +111,6 @@ def _as_proxy(
     mesh: tuple[FloatArray, IntArray], solid: Component, looked_at: FloatArray, threshold: float
 ) -> Proxy | None:
     """The mesh as a proxy of a solid, if it is near enough."""
-    if len(mesh[1]) > WORTHWHILE * len(solid.faces):
-        return None
     if abs(_native.mesh_volume(*mesh) - solid.volume) > LOST * solid.volume:
         return None
     distances = _native.Surface(*mesh).distance(looked_at, 1)
