@@ -32,6 +32,9 @@ OBJECTS = {
 WIDTH = 1200
 """Pixels of a picture."""
 
+TITLE = 0.17
+"""Share of a picture above what it shows: it holds the seconds taken, which depend on the machine."""
+
 
 def main(meshes: Path, out: Path) -> None:
     """Draw every object beside its hulls."""
@@ -44,8 +47,8 @@ def main(meshes: Path, out: Path) -> None:
             drawn = Path(folder) / "drawn.png"
             result.picture(drawn, up=up)
             with Image.open(drawn) as picture:
-                height = picture.height * WIDTH // picture.width
-                picture.convert("RGB").resize((WIDTH, height)).save(out / f"{stem}.webp", quality=80)
+                shown = picture.convert("RGB").crop((0, int(TITLE * picture.height), picture.width, picture.height))
+                shown.resize((WIDTH, shown.height * WIDTH // shown.width)).save(out / f"{stem}.webp", quality=80)
         report = result.report
         cells = [f"{len(result.source.faces):,}", str(report["parts"]), f"{report['faces']:,}"]
         print(f"| {stem} | {' | '.join(cells)} | {report['hausdorff']['over']:.3f} |", flush=True)

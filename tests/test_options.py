@@ -118,8 +118,10 @@ def assert_accepted_or_told(call: Any, *others: type[Exception]) -> None:
 @pytest.mark.parametrize("odd", ODD.values(), ids=ODD.keys())
 def test_options_of_decompose_are_checked_before_any_work(odd: Any) -> None:
     for name in (*OPTION_NAMES, "progress", "threshold_m"):
+        # Python 3.13 takes a hostile object for a function that can be called: what it raises then is the caller's own.
+        raised = (RuntimeError,) if name == "progress" and isinstance(odd, Hostile) else ()
         assert_accepted_or_told(
-            lambda name=name: rlacd.decompose("no such file.obj", **{name: odd}), MeshFileError, WeightsError
+            lambda name=name: rlacd.decompose("no such file.obj", **{name: odd}), MeshFileError, WeightsError, *raised
         )
 
 
