@@ -25,6 +25,7 @@ from manifold3d import Manifold
 from rlacd import _native
 from rlacd._native import poll_stop
 from rlacd.errors import EmptyMeshError
+from rlacd.memory import BYTES_REPAIRED, require_memory
 from rlacd.repair.caps import FLAPS, close_holes
 from rlacd.repair.distance import SurfaceQuery, points_covering, spread_points
 from rlacd.repair.holes import MOST_FREE_EDGES, close_cracks
@@ -131,6 +132,7 @@ def repair(
     taken = _taken_as_it_is(welded_vertices, welded_faces)
     if taken is not None:
         return Solid(taken[0], (welded_vertices, welded_faces), frame, (taken[1],), tuple(warnings))
+    require_memory(len(welded_faces), BYTES_REPAIRED, mesh.name)
     vertices, faces = detach_films(welded_vertices, welded_faces.astype(np.int64), is_film)
     surface = (vertices, faces.astype(np.int32))
 

@@ -24,8 +24,9 @@ from rlacd.io.read.gltf import plain_gltf
 from rlacd.io.read.limits import MOST_TRIANGLES
 from rlacd.io.read.off import is_off, plain_off
 from rlacd.io.read.open_file import LARGEST, read_file
-from rlacd.io.read.text import check_text, plain_obj, plain_ply, plain_stl
+from rlacd.io.read.text import check_text, declared_triangles, plain_obj, plain_ply, plain_stl
 from rlacd.io.read.xml import check_3mf, collada_of
+from rlacd.memory import BYTES_READ, require_memory
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.topology import BoolArray, IntArray
@@ -95,6 +96,8 @@ def _read(path: Path) -> trimesh.Scene:
     if extension not in FORMATS:
         hint = f"rename it to .{holds}, which it seems to hold" if holds else "convert it to glb, obj, stl or ply"
         raise MeshFileError(f"{path} is in no format that is read here: {hint}")
+    if (declared := declared_triangles(content, extension)) is not None:
+        require_memory(declared, BYTES_READ, path.name)
     beside = _FolderResolver(path.parent)
     try:
         content, extension = _checked(path, content, extension, beside)
@@ -318,6 +321,7 @@ def _clean(vertices: FloatArray, faces: IntArray, name: str) -> InputMesh:
     """Check the indices and drop faces and vertices that are not finite."""
     if len(faces) and (faces.min() < 0 or faces.max() >= len(vertices)):
         _raise_out_of_range(faces, len(vertices))
+    require_memory(len(faces), BYTES_READ, name)
     warnings = []
     finite: BoolArray = np.asarray(np.isfinite(vertices).all(axis=1))
     if not finite.all():

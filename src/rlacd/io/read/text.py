@@ -30,6 +30,25 @@ def check_text(path: Path, content: bytes) -> None:
         raise MeshFileError(f"{path} has {lines} lines, more than {MOST_TRIANGLES}: simplify it first")
 
 
+def declared_triangles(content: bytes, extension: str) -> int | None:
+    """Return how many triangles a file holds by its own account, before anything is parsed.
+
+    None if its format does not say so, or if the file is too short for as many: parsers have words for that.
+    """
+    count = None
+    match extension:
+        case "stl" if b"\0" in content[:512]:
+            count = int.from_bytes(content[80:84], "little")
+        case "stl":
+            return content.count(b"endfacet")
+        case "obj":
+            return content.count(b"\nf ")
+        case "ply" if (end := PLY_END.search(content)) is not None:
+            found = PLY_ELEMENT.findall(content[: end.end()])
+            count = next((int(word) for name, word in found if name == b"face" and word.isdigit()), None)
+    return count if count is not None and 4 * count <= len(content) else None
+
+
 def plain_obj(path: Path, content: bytes) -> bytes:
     """Remove the materials of faces: each would make a separate mesh with a table as long as all vertices."""
     check_text(path, content)
