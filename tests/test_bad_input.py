@@ -142,7 +142,7 @@ def test_vertices_that_are_not_numbers_are_left_out_and_said() -> None:
     assert any("NaN or infinite" in sentence for sentence in result.report["warnings"])
 
 
-def test_a_triangle_that_is_given_up_is_said() -> None:
+def test_a_triangle_that_is_given_up_is_reported() -> None:
     vertices = np.vstack([ELL, [[1e6, 0, 0]]])
     result = check((vertices, np.vstack([FACES, [[0, 1, len(ELL)]]])))
     missed = result.report["hausdorff"]["under"]

@@ -41,7 +41,7 @@ class Counter:
 
 
 @pytest.mark.nightly
-def test_a_cluster_that_is_not_there_is_told() -> None:
+def test_a_cluster_that_is_not_there_is_reported() -> None:
     assert not ray.is_initialized(), "comes before the cluster of the other tests"
     with pytest.raises(OptionError, match="jobs belongs"):
         RayPool("auto", 2)
@@ -102,7 +102,7 @@ def test_a_node_dies_half_way_and_the_results_are_those_of_one_machine(cluster: 
 
 
 @pytest.mark.nightly
-def test_a_network_of_ones_own_and_a_shared_address_reach_the_nodes(cluster: Cluster, tmp_path: Path) -> None:
+def test_a_custom_network_and_a_shared_address_reach_the_nodes(cluster: Cluster, tmp_path: Path) -> None:
     from importlib.resources import files
 
     write_ell(tmp_path / "assets" / "a.obj")

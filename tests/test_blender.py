@@ -133,7 +133,7 @@ def test_options_reach_the_decomposition_and_a_second_run_replaces_the_first() -
     assert_covered(thing)
 
 
-def test_modifiers_count_unless_told_otherwise() -> None:
+def test_modifiers_count_unless_switched_off() -> None:
     thing = place(trimesh.creation.box())
     array = thing.modifiers.new("row", "ARRAY")
     array.count, array.relative_offset_displace = 3, (2.0, 0.0, 0.0)
@@ -163,7 +163,7 @@ def test_what_cannot_be_done_is_one_sentence() -> None:
     assert not bpy.ops.object.rlacd_convex_hulls.poll()
 
 
-def test_a_missing_rlacd_is_said_with_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_rlacd_is_reported_with_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
     place(elbow())
     monkeypatch.setitem(sys.modules, "rlacd.errors", None)
     with pytest.raises(RuntimeError, match=r"rlacd is missing in Blender's Python: run .* -m pip install rlacd"):

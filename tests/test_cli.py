@@ -137,7 +137,7 @@ def test_a_folder_can_be_filled_in_any_format(mesh: Path, stand_in: StandIn) -> 
     assert (mesh.parent / "out" / "ell_000.stl").exists()
 
 
-def test_a_concavity_above_the_threshold_is_said(mesh: Path, stand_in: StandIn) -> None:
+def test_a_concavity_above_the_threshold_is_reported(mesh: Path, stand_in: StandIn) -> None:
     stand_in.report = {"concavity": {"max": 0.07}}
     assert "threshold 0.05, exceeded" in rlacd("decompose", mesh).stderr
 
@@ -197,7 +197,7 @@ def test_errors_are_one_sentence_and_a_code(mesh: Path, stand_in: StandIn, error
     assert not mesh.with_name("ell_hulls.glb").exists()
 
 
-def test_a_missing_input_is_said_to_be_missing(tmp_path: Path) -> None:
+def test_a_missing_input_is_reported_as_missing(tmp_path: Path) -> None:
     run = rlacd("decompose", tmp_path / "no" / "chair.glb")
     assert run.exit_code == 2
     assert run.stderr == f"rlacd: {tmp_path}/no/chair.glb does not exist: check the spelling and the folder\n"
@@ -262,7 +262,7 @@ def test_ctrl_c_twice_quits_and_writes_nothing(mesh: Path, stand_in: StandIn) ->
     assert not mesh.with_name("ell_hulls.glb").exists()
 
 
-def test_help_names_every_exit_code_and_version_is_told() -> None:
+def test_help_names_every_exit_code_and_version_is_printed() -> None:
     run = rlacd("decompose", "--help")
     assert run.exit_code == 0
     for code in ("0 ", "1 ", "2 ", "3 ", "4 ", "130 "):

@@ -79,7 +79,7 @@ def test_options_of_coacd_that_mean_something_are_obeyed() -> None:
         our_coacd.run_coacd(four, apx_mode="sphere")
 
 
-def test_options_without_meaning_are_said_once_each() -> None:
+def test_options_without_meaning_are_reported_once_each() -> None:
     mesh = our_coacd.Mesh(table().vertices, table().faces)
     given: dict[str, Any] = {"mcts_iterations": 500, "preprocess_mode": "off", "pca": True}
     with pytest.warns(UnusedOptionWarning) as said:

@@ -77,7 +77,7 @@ def test_inradius_of_known_bodies() -> None:
     assert inradius(Component(Manifold.tetrahedron()).hull) == pytest.approx(1 / np.sqrt(3))
 
 
-def test_slivers_are_told_from_thin_but_sound_parts() -> None:
+def test_slivers_are_distinguished_from_thin_but_sound_parts() -> None:
     assert is_sliver(box(1, 1, 0.01).hull)
     assert not is_sliver(box(1, 1, 0.03).hull)
     assert not is_sliver(Component(Manifold.sphere(1, 32)).hull)

@@ -89,7 +89,7 @@ def test_links_to_files_count_and_links_to_folders_do_not(tmp_path: Path) -> Non
     assert [asset.name for asset in find_assets(tmp_path)] == ["broken.obj", "link.obj", "real/a.obj"]
 
 
-def test_a_missing_folder_is_told(tmp_path: Path) -> None:
+def test_a_missing_folder_is_reported(tmp_path: Path) -> None:
     with pytest.raises(MeshFileError, match="no folder"):
         find_assets(tmp_path / "nothing")
 
@@ -260,7 +260,7 @@ def test_a_mesh_that_is_gone_cannot_claim_the_result_of_another(store: ResultSto
     assert store.size("a.glb") == 1
 
 
-def test_half_a_line_is_cut_off_and_a_damaged_one_is_told(tmp_path: Path) -> None:
+def test_half_a_line_is_cut_off_and_a_damaged_one_is_reported(tmp_path: Path) -> None:
     store = FolderStore(tmp_path)
     journal = tmp_path / ".rlacd" / "m.jsonl"
     journal.parent.mkdir()
@@ -294,7 +294,7 @@ def test_opening_sweeps_up_what_a_killed_run_left(tmp_path: Path) -> None:
     assert sorted(os.listdir(tmp_path / "a")) == ["mesh.stl"]
 
 
-def test_an_address_nobody_knows_is_told() -> None:
+def test_an_unknown_address_is_reported() -> None:
     pytest.importorskip("fsspec", reason="the extra fleet is not installed")
     with pytest.raises(OptionError, match="gopher"):
         open_store("gopher://bucket/out")

@@ -142,7 +142,7 @@ def test_far_from_the_origin_a_glb_keeps_the_shape(tmp_path: Path) -> None:
     assert mesh.bounds == pytest.approx(box.bounds, abs=1e-8)
 
 
-def test_too_thin_for_single_precision_is_said_and_double_precision_formats_work(tmp_path: Path) -> None:
+def test_too_thin_for_single_precision_is_reported_and_double_precision_formats_work(tmp_path: Path) -> None:
     # Thinner than the spacing of float32 numbers at its corners, on a slant so that no axis helps.
     plate = trimesh.creation.box((1.0, 1.0, 1e-9))
     plate.apply_transform(trimesh.transformations.rotation_matrix(0.7, [1.0, 2.0, 3.0]))

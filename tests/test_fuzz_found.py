@@ -103,14 +103,14 @@ def test_reuniting_layers_that_nearly_touch_piles_up_no_faces() -> None:
 
 
 @pytest.mark.parametrize(("faces", "said"), [(5, True), (12, False)])
-def test_a_hull_of_few_faces_that_leaves_the_room_for_balls_is_told_of(faces: int, said: bool) -> None:
+def test_a_hull_of_few_faces_that_leaves_the_room_for_balls_is_reported(faces: int, said: bool) -> None:
     """A tetrahedron around a cube reaches twice its length out of it; where it goes, no balls had been placed."""
     cube = trimesh.creation.box((1, 1, 1))
     result = rlacd.decompose(cube, criterion=rlacd.NavigableSpace(0.4, 0.005), max_faces=faces, quality="fast")
     assert any("bounding box" in warning for warning in result.report["warnings"]) is said
 
 
-def test_a_mesh_of_a_few_steps_of_floating_point_is_told_of() -> None:
+def test_a_mesh_of_a_few_steps_of_floating_point_is_reported() -> None:
     """Hulls thinner than coordinates resolve are made thicker: by much, in a mesh nine steps long."""
     cube = trimesh.creation.box((1, 1, 1))
     far, near = cube.copy(), cube.copy()

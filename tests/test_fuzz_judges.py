@@ -77,7 +77,7 @@ def test_a_broken_limit_is_seen(limit: dict[str, int]) -> None:
     assert judge(replace(good, options={**good.options, **limit}))
 
 
-def test_what_is_wrong_with_a_hull_is_told() -> None:
+def test_what_is_wrong_with_a_hull_is_reported() -> None:
     cube = creation.box()
     vertices, faces = np.array(cube.vertices), np.array(cube.faces)
     assert why_not_convex(vertices, faces) is None

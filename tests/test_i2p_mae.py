@@ -152,7 +152,7 @@ def test_nearest_points_are_the_nearest() -> None:
     assert torch.equal(gather(points, found)[2, 5, 3], points[2, found[2, 5, 3]])
 
 
-def test_groups_that_are_nobodys_members_are_not_seen() -> None:
+def test_groups_without_members_are_not_seen() -> None:
     scales = HierarchicalEncoder(TINY).pyramid(clouds(4))
     top = (torch.arange(TINY.groups[-1]) % 3 == 0).float().repeat(4, 1)
     seen = seen_below(scales, top)
@@ -163,7 +163,7 @@ def test_groups_that_are_nobodys_members_are_not_seen() -> None:
             visible = {m for group in visible for m in scales[level].members[cloud, group].tolist()}
 
 
-def test_what_is_nobodys_member_changes_nothing() -> None:
+def test_a_group_without_members_changes_nothing() -> None:
     """A point that no group has among its nearest may move."""
     encoder = tiny_encoder()
     points = clouds(1, 400)
@@ -212,7 +212,7 @@ def test_known_components_are_not_encoded_again(monkeypatch: pytest.MonkeyPatch)
     assert torch.equal(encoder.encode(points, directions), first)
 
 
-def test_too_few_points_are_said() -> None:
+def test_too_few_points_are_reported() -> None:
     with pytest.raises(OptionError, match="16 points; this encoder needs at least 32"):
         tiny_encoder().features(clouds(1, 16))
 
@@ -237,7 +237,7 @@ def test_the_first_missing_parameter_is_named(tmp_path: Path) -> None:
         I2PMAEEncoder.from_checkpoint(published({}, tmp_path / "none.pth"))
 
 
-def test_weights_of_another_size_or_not_finite_are_said(tmp_path: Path) -> None:
+def test_weights_of_another_size_or_not_finite_are_reported(tmp_path: Path) -> None:
     with pytest.raises(WeightsError, match=r"first_conv\.0\.weight has shape \[8, 3, 1\], not \[128, 3, 1\]"):
         I2PMAEEncoder.from_checkpoint(published(dict(tiny_encoder().state_dict()), tmp_path / "other.pth"))
     state = {k: v.clone() for k, v in I2PMAEEncoder(Sizes()).state_dict().items()}
@@ -265,7 +265,7 @@ def test_files_cut_short_are_one_error_that_names_the_first_parameter(
 @pytest.mark.filterwarnings("ignore:Detected pickle protocol")
 @pytest.mark.parametrize("content", [b"hello", b"\x80\x04N.", pickle.dumps([1, 2]), b"PK\x05\x06" + 18 * b"\0"])
 @pytest.mark.parametrize("ending", [".pth", ".safetensors"])
-def test_files_of_something_else_are_said(tmp_path: Path, content: bytes, ending: str) -> None:
+def test_files_of_something_else_are_reported(tmp_path: Path, content: bytes, ending: str) -> None:
     path = tmp_path / f"weights{ending}"
     path.write_bytes(content)
     with pytest.raises(WeightsError, match="no file of weights"):
@@ -275,7 +275,7 @@ def test_files_of_something_else_are_said(tmp_path: Path, content: bytes, ending
 
 
 @pytest.mark.parametrize("sizes", [{"groups": [1]}, {"depth": "deep"}, {"layers": 3}, {"heads": 7}, [1], 3])
-def test_damaged_sizes_are_said(tmp_path: Path, sizes: object) -> None:
+def test_damaged_sizes_are_reported(tmp_path: Path, sizes: object) -> None:
     save_file(tiny_encoder().state_dict(), tmp_path / "w.safetensors", {"rlacd": json.dumps({"sizes": sizes})})
     with pytest.raises(WeightsError, match=r"w\.safetensors"):
         I2PMAEEncoder.from_checkpoint(tmp_path / "w.safetensors")
@@ -300,7 +300,7 @@ def test_nothing_in_a_checkpoint_is_run(tmp_path: Path) -> None:
     assert not (tmp_path / "ran").exists()
 
 
-def test_without_weights_it_is_said_where_to_get_them(tmp_path: Path) -> None:
+def test_without_weights_the_error_says_where_to_get_them(tmp_path: Path) -> None:
     with pytest.raises(OptionError, match="takes no weights"):
         make_encoder("profile", "weights.pth")
     with pytest.raises(OptionError, match="or i2p-mae"):

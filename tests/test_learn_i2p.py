@@ -186,7 +186,7 @@ def test_worker_processes_change_nothing(meshes: Path, weights: Path, tmp_path: 
     assert learned(tmp_path / "alone") == learned(tmp_path / "spread")
 
 
-def test_too_few_points_and_unusable_files_are_said_before_a_run_begins(
+def test_too_few_points_and_unusable_files_are_reported_before_a_run_begins(
     meshes: Path, weights: Path, tmp_path: Path
 ) -> None:
     with pytest.raises(OptionError, match="16 points; this encoder needs at least 32"):

@@ -165,6 +165,6 @@ def test_prioritised_replay_draws_large_errors_more_and_weighs_them_less() -> No
     assert weights[3] / weights[0] == pytest.approx(1 / 5, rel=0.01)
 
 
-def test_nothing_to_sample_is_said() -> None:
+def test_nothing_to_sample_is_reported() -> None:
     with pytest.raises(RlacdError, match="nothing to learn from"):
         Replay(4, 1, 2).sample(1, np.random.default_rng(0))

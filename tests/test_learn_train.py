@@ -111,12 +111,12 @@ def test_presets_are_valid_and_the_papers_is_the_papers() -> None:
         ("seed", -1),
     ],
 )
-def test_options_out_of_range_are_said(name: str, value: Any) -> None:
+def test_options_out_of_range_are_reported(name: str, value: Any) -> None:
     with pytest.raises(OptionError, match=f"{name} is"):
         TrainOptions(**{name: value})
 
 
-def test_unknown_presets_and_options_are_said() -> None:
+def test_unknown_presets_and_options_are_reported() -> None:
     with pytest.raises(OptionError, match="preset is 'best'"):
         TrainOptions.preset("best")
     with pytest.raises(OptionError, match="no option 'speed'"):
@@ -234,7 +234,7 @@ class Doomed(InProcessPool):
 
 
 @pytest.mark.slow
-def test_an_episode_nobody_can_play_is_said_and_left_out(meshes: Path, tmp_path: Path) -> None:
+def test_an_episode_that_no_worker_can_play_is_reported_and_left_out(meshes: Path, tmp_path: Path) -> None:
     said: list[str] = []
     for name in ("a", "b"):
         run(meshes, tmp_path / name, pool=Doomed({1, 4}), say=said.append, validation=0)
@@ -322,7 +322,7 @@ def test_a_run_is_not_overwritten_and_not_resumed_with_other_options(meshes: Pat
         run(meshes, tmp_path / "run", resume=True, batch=9, validation=0)
 
 
-def test_damaged_checkpoints_and_folders_without_meshes_are_said(meshes: Path, tmp_path: Path) -> None:
+def test_damaged_checkpoints_and_folders_without_meshes_are_reported(meshes: Path, tmp_path: Path) -> None:
     run(meshes, tmp_path / "run", iterations=40, validation=0)
     broken = tmp_path / "run" / "checkpoint" / "weights.safetensors"
     broken.write_bytes(broken.read_bytes()[:1000])

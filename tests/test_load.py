@@ -172,7 +172,7 @@ def test_polygons_of_an_off_file(tmp_path):
     assert len(load_mesh(path).faces) == 2 + 1 + 3
 
 
-def test_an_off_file_under_another_name_is_told(box, tmp_path):
+def test_an_off_file_under_another_name_is_reported(box, tmp_path):
     for letters in LETTERS:
         path = tmp_path / "box.ply"
         path.write_text(off(box, letters, header=HEADERS[2]))

@@ -333,7 +333,7 @@ def test_names_of_files_that_xml_cannot_hold_are_refused(tmp_path: Path, wooden:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_folders_that_may_not_be_written_to_are_said_before_any_work(
+def test_folders_that_may_not_be_written_to_are_reported_before_any_work(
     tmp_path: Path, wooden: Decomposition, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Told by the operating system's own answer, since tests may run as root, who may write everywhere."""
@@ -398,7 +398,7 @@ def test_a_failing_disk_leaves_the_older_model_with_its_meshes(
     assert fall_in_mujoco(tmp_path / "table.xml", 0.0).hulls == len(wooden), "every mesh it names is still there"
 
 
-def test_hulls_too_thin_for_simulators_are_said(tmp_path: Path) -> None:
+def test_hulls_too_thin_for_simulators_are_reported(tmp_path: Path) -> None:
     plate = trimesh.creation.box((1.0, 1.0, 1e-9))
     plate.apply_transform(trimesh.transformations.rotation_matrix(0.7, [1.0, 2.0, 3.0]))
     thin = Decomposition([hull_of(plate.vertices)], {"name": "plate"}, plate)

@@ -335,7 +335,7 @@ def test_lengths_in_the_unit_of_the_input() -> None:
         ({"reachable_only": "yes"}, "reachable_only"),
     ],
 )
-def test_options_out_of_range_are_told(given: dict[str, Any], says: str) -> None:
+def test_options_out_of_range_are_reported(given: dict[str, Any], says: str) -> None:
     with pytest.raises(OptionError, match=says):
         NavigableSpace(**given)
 
@@ -350,7 +350,7 @@ def test_a_space_can_be_compared_and_hashed() -> None:
 @pytest.mark.parametrize(
     ("seed", "says"), [((0, 0, 0.05), "inside"), ((0, 0, 0.2), "radius"), ((0, 0, -0.75), "closed plane")]
 )
-def test_a_seed_without_room_is_told(seed: tuple[float, float, float], says: str) -> None:
+def test_a_seed_without_room_is_reported(seed: tuple[float, float, float], says: str) -> None:
     with pytest.raises(OptionError, match=says):
         prepare(table(), seeds=[seed], closed_planes=[((0, 0, 1), -0.8)])
 
@@ -362,13 +362,13 @@ def test_a_ball_larger_than_the_object_leaves_one_hull_and_says_so() -> None:
     assert nav.is_met(Component(solid_of(table()).manifold))
 
 
-def test_a_radius_too_small_for_the_grid_is_told() -> None:
+def test_a_radius_too_small_for_the_grid_is_reported() -> None:
     nav = prepare(box((-1, -0.2, -0.2), (1, 0.2, 0.2)) - box((-0.5, -0.1, 0), (0.5, 0.1, 1)), 0.002, 0.002)
     assert len(nav.balls) > 0
     assert any("is small" in warning for warning in nav.warnings)
 
 
-def test_what_was_open_is_told() -> None:
+def test_what_was_open_is_reported() -> None:
     vertices, faces = _cup()
     nav = NavigableSpace().prepare(repair(load_mesh((vertices, faces))))
     assert any("open bod" in warning for warning in nav.warnings)

@@ -172,7 +172,7 @@ def bumpy_ball() -> trimesh.Trimesh:
     return ball
 
 
-def test_one_pass_does_without_parts_that_others_can_hold_together() -> None:
+def test_one_pass_eliminates_parts_that_others_can_hold_together() -> None:
     """A policy that stands for a published method does not: the same cuts, merged, are more hulls."""
     space, mesh = rlacd.NavigableSpace(0.1, 0.02), bumpy_ball()
     divided = [rlacd.decompose(mesh, criterion=space, quality="fast", threads=threads) for threads in (1, 3)]

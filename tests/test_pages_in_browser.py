@@ -99,7 +99,7 @@ def test_the_explode_slider_pulls_the_hulls_apart(seen: Watched) -> None:
 
 
 @pytest.mark.nightly
-def test_another_threshold_decomposes_anew(seen: Watched, viewer: Viewer) -> None:
+def test_another_threshold_decomposes_again(seen: Watched, viewer: Viewer) -> None:
     page = seen.page
     before = pixels(page)
     page.fill("#threshold-number", "1.9")
@@ -118,7 +118,7 @@ def test_another_threshold_decomposes_anew(seen: Watched, viewer: Viewer) -> Non
 
 
 @pytest.mark.nightly
-def test_a_bad_threshold_is_told_and_nothing_is_lost(seen: Watched) -> None:
+def test_a_bad_threshold_is_reported_and_nothing_is_lost(seen: Watched) -> None:
     page = seen.page
     page.fill("#threshold-number", "-3")
     page.keyboard.press("Enter")
@@ -399,7 +399,7 @@ def test_work_can_be_stopped(browser: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.nightly
-def test_a_server_that_stops_is_told(browser: Any, mesh: Path) -> None:
+def test_a_server_that_stops_is_reported(browser: Any, mesh: Path) -> None:
     with open_page(browser) as watched:
         with open_viewer(mesh, port=0) as viewer:
             watched.page.goto(viewer.address)

@@ -198,7 +198,7 @@ def bodies(*solids: Manifold) -> list[tuple[FloatArray, IntArray]]:
     return _native.bodies(component.vertices, component.faces)
 
 
-def test_bodies_hang_together_by_edges() -> None:
+def test_bodies_are_connected_by_edges() -> None:
     apart = bodies(block(1, 1, 1), block(1, 1, 1, (3, 0, 0)), block(0.2, 0.2, 0.2, (6, 0, 0)))
     assert [len(faces) for _, faces in apart] == [12, 12, 12]
     assert sorted(round(_native.mesh_volume(*body), 9) for body in apart) == [0.008, 1, 1]

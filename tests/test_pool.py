@@ -91,7 +91,7 @@ def test_what_is_shared_reaches_a_process_once_and_again_when_it_changes(one: Lo
     assert one.submit(ask(shared={"network": first})).result().values["shared"] == {"network": {"weights": 1}}
 
 
-def test_a_death_is_told_and_is_nobody_elses(pool: Pool) -> None:
+def test_a_death_is_reported_to_its_request_only(pool: Pool) -> None:
     if isinstance(pool, InProcessPool):
         pytest.skip("nobody watches this process")
     well = [pool.submit(ask(number=n)) for n in range(3)]
@@ -162,7 +162,7 @@ def test_closing_ends_what_is_running_at_once() -> None:
     assert not any(child.is_running() for child in own)
 
 
-def test_a_server_that_is_not_there_is_told(one: LocalPool) -> None:
+def test_a_server_that_is_not_there_is_reported(one: LocalPool) -> None:
     with pytest.raises(WorkerDiedError, match="ended with code 1") as told:
         one.submit(Request("nowhere.at.all:Server", {})).result()
     assert "nowhere" in told.value.last_words

@@ -72,7 +72,7 @@ def test_options_given_go_before_the_preset() -> None:
     assert warning.endswith("more than 64, the limit for Newton.")
 
 
-def test_a_sheet_that_a_gpu_refuses_is_said() -> None:
+def test_a_sheet_that_a_gpu_refuses_is_reported() -> None:
     sheet = trimesh.creation.box((1.0, 1.0, 0.004))
     assert rlacd.decompose(sheet, preset="physx", threads=1).report["warnings"] == []
     (warning,) = rlacd.decompose(sheet, preset="physx-gpu", threads=1).report["warnings"]

@@ -213,12 +213,12 @@ def test_the_loss_falls(meshes: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "value"), [("size", "huge"), ("hidden", 1.0), ("batch", 1), ("steps", 0), ("stretch", 0.5)]
 )
-def test_options_out_of_range_are_said(name: str, value: Any) -> None:
+def test_options_out_of_range_are_reported(name: str, value: Any) -> None:
     with pytest.raises(OptionError, match=f"{name} is"):
         PretrainOptions(**{name: value})
 
 
-def test_what_cannot_be_done_is_said(meshes: Path, tmp_path: Path) -> None:
+def test_what_cannot_be_done_is_reported(meshes: Path, tmp_path: Path) -> None:
     with pytest.raises(OptionError, match=r"has to end in \.safetensors"):
         run(meshes, tmp_path / "w.pth")
     with pytest.raises(OptionError, match="size small needs at least 256"):
@@ -242,7 +242,7 @@ def test_the_command_makes_weights_that_the_encoder_reads(meshes: Path, tmp_path
     assert "--resume" in again.output
 
 
-def test_the_loss_is_told_on_held_out_meshes(meshes: Path, tmp_path: Path) -> None:
+def test_the_loss_is_reported_on_held_out_meshes(meshes: Path, tmp_path: Path) -> None:
     out = run(meshes, tmp_path / "w.safetensors")
     assert [point["step"] for point in curves(out) if "validation_loss" in point] == [6, 12]
     listed = json.loads((out.with_suffix(".run") / "meshes.json").read_text())

@@ -35,7 +35,7 @@ def test_a_pinhole_is_closed_without_a_word():
     assert not solid.warnings
 
 
-def test_a_small_hole_in_a_scan_is_closed_and_told():
+def test_a_small_hole_in_a_scan_is_closed_and_reported():
     mesh, full = with_hole(0.08)
     solid = solid_of(mesh)
     assert steps(solid) == ["capped"]

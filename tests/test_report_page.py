@@ -155,7 +155,7 @@ def test_a_cloud_of_points_and_balls_can_be_shown() -> None:
 
 
 @pytest.mark.slow
-def test_the_picture_is_inside_and_its_absence_is_said(
+def test_the_picture_is_inside_and_its_absence_is_reported(
     result: Decomposition, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("mitsuba", reason="the extra view is not installed")

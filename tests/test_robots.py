@@ -357,7 +357,7 @@ def test_an_mjcf_keeps_every_byte_but_meshes_and_their_geoms(arm: Path) -> None:
     assert any("tetrahedron" in warning and "no file" in warning for warning in done.warnings)
 
 
-def test_what_is_included_is_said_to_be_left(arm: Path) -> None:
+def test_what_is_included_is_reported_as_left(arm: Path) -> None:
     arm.write_text(ARM.replace("<worldbody>", '<include file="more.xml"/>\n  <worldbody>'), encoding="utf-8")
     done = rlacd.rewrite_robot(arm, arm.with_name("out.xml"), threads=1)
     assert any("<include>" in warning for warning in done.warnings)

@@ -32,7 +32,7 @@ def neighbourhood(solid: Component, parts: list[Part], workers: Workers, seed: i
     )
 
 
-def test_what_nobody_can_take_whole_is_divided() -> None:
+def test_what_no_part_can_take_whole_is_divided() -> None:
     parts = bent_bar()
     with Workers(1) as workers:
         assert len(merge_parts(parts, CRITERION, workers, Clock())) == 3
@@ -131,7 +131,7 @@ def test_small_parts_are_drawn_more_often_and_only_those_near_take() -> None:
     assert drawn.min() > 0
 
 
-def test_a_search_in_vain_ends() -> None:
+def test_a_search_without_gain_ends() -> None:
     """A cube and a ball on it: pieces can be given away for ever, and two parts are the least there can be."""
     cube, ball = Component(box((-1, -1, -1), (1, 1, 0))), Component(Manifold.sphere(0.7, 24).translate((0, 0, 0.7)))
     solid = Component(cube.manifold + ball.manifold)

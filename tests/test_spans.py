@@ -37,7 +37,7 @@ documents = st.tuples(starts, elements()).map("".join)
 
 @pytest.mark.slow
 @given(documents)
-def test_every_element_is_where_it_is_said_to_be(text: str) -> None:
+def test_every_element_is_at_its_reported_place(text: str) -> None:
     """Its bytes alone parse, with lxml, to the same tag, attributes and number of children."""
     document = parse(NOWHERE, text.encode())
     theirs = [node for node in etree.fromstring(text.encode()).iter() if isinstance(node.tag, str)]

@@ -82,7 +82,7 @@ def test_sixty_streams_hold_no_more_than_their_threads(viewer: Viewer) -> None:
         assert status_of(again.recv(100)) == 200, "streams that have gone make room"
 
 
-def test_connections_beyond_the_limit_are_told_and_make_room_when_they_end(viewer: Viewer) -> None:
+def test_connections_beyond_the_limit_are_reported_and_make_room_when_they_end(viewer: Viewer) -> None:
     with ExitStack() as stack:
         for _ in range(MOST_CONNECTIONS):
             stack.enter_context(connected(viewer))
@@ -207,7 +207,7 @@ ENDINGS = {
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("ending", ENDINGS)
-def test_nothing_is_said_of_leaks_when_python_ends(rough: Path, ending: str) -> None:
+def test_no_leaks_are_printed_when_python_ends(rough: Path, ending: str) -> None:
     mesh = rough if "view" in ending else rough.with_name("cube.stl")
     trimesh.creation.box().export(rough.with_name("cube.stl"))
     program = f"import rlacd\nmesh = {os.fspath(mesh)!r}\n{ENDINGS[ending]}"

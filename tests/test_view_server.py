@@ -346,7 +346,7 @@ def test_the_command_gives_the_hulls_that_are_shown(viewer: Viewer, tmp_path: Pa
     assert ask(viewer, "GET", "/download?format=glb").body == place.read_bytes()
 
 
-def test_what_is_not_there_is_said(viewer: Viewer, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_not_there_is_reported(viewer: Viewer, monkeypatch: pytest.MonkeyPatch) -> None:
     settled(viewer, run=1)
     assert "no balls" in ask(viewer, "GET", "/download?format=balls.csv").json["error"]
     monkeypatch.setitem(sys.modules, "pxr", None)
@@ -375,7 +375,7 @@ def test_pages_of_other_sites_are_turned_away(viewer: Viewer) -> None:
     assert ask(viewer, "POST", "/decompose", options, Origin=f"http://{own}").status == 202
 
 
-def test_nobody_else_can_reach_it(viewer: Viewer) -> None:
+def test_no_other_machine_can_reach_it(viewer: Viewer) -> None:
     port = int(urllib.parse.urlsplit(viewer.address).port or 0)
     assert urllib.parse.urlsplit(viewer.address).hostname == "127.0.0.1"
     outward = [info[4][0] for info in socket.getaddrinfo(socket.gethostname(), port, socket.AF_INET)]
@@ -401,7 +401,7 @@ def test_a_long_search_is_cancelled_and_keeps_what_it_has(mesh: Path, tmp_path: 
         assert report["seconds"]["total"] < 60
 
 
-def test_the_file_is_read_anew_and_its_loss_is_said(tmp_path: Path) -> None:
+def test_the_file_is_read_again_and_its_loss_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "cube.stl"
     trimesh.creation.box().export(path)
     with open_viewer(path, port=0) as viewer:

@@ -125,7 +125,9 @@ def test_stopping_does_not_reach_into_the_next_run(session: Session, work: Work)
         (RuntimeError("surprise"), "a bug in rlacd (RuntimeError: surprise)"),
     ],
 )
-def test_an_error_is_said_and_what_there_was_stays(session: Session, work: Work, error: Exception, says: str) -> None:
+def test_an_error_is_reported_and_what_there_was_stays(
+    session: Session, work: Work, error: Exception, says: str
+) -> None:
     session.decompose({"threshold": 0.1})
     work.go_on()
     until(session, "idle", run=1)
@@ -143,7 +145,7 @@ def test_an_error_is_said_and_what_there_was_stays(session: Session, work: Work,
     assert until(session, "idle", run=2).error is None
 
 
-def test_quiet_is_told_and_closing_lets_everyone_go(work: Work) -> None:
+def test_quiet_is_reported_and_closing_releases_every_waiter(work: Work) -> None:
     session = Session(work)
     changes = session.changes(patience=0.01)
     assert next(changes) == SessionState()
