@@ -15,6 +15,8 @@ constexpr double kFarthest = 1;           // a point moves at most this many len
 constexpr double kTurned = 0.3;           // least cosine of the angle by which a collapse may turn a face
 constexpr std::size_t kMostFailures = 3;  // draws for each face left without an edge that can be collapsed
 constexpr std::size_t kFewest = 4;
+// Of more faces than this, edges are drawn from a window that moves along: the memory they are in is then near.
+constexpr std::size_t kLarge = 30'000, kWindow = 512, kAlong = 37;
 constexpr std::size_t kBetweenPolls = 1024;
 
 Vec3 face_normal(Vec3 a, Vec3 b, Vec3 c) { return cross(b - a, c - a); }
@@ -95,7 +97,9 @@ void Simplifier::reduce(std::size_t count) {
     if (++steps % kBetweenPolls == 0) poll_stop();
     candidates_.clear();
     const std::size_t choices = std::clamp(kChoicesTimesFaces / size(), kFewChoices, kMostChoices);
-    for (std::size_t k = 0; k < choices; ++k) candidates_.push_back(random_edge());
+    const std::size_t window = std::min(size(), kWindow);
+    window_ = size() > kLarge ? (window_ + kAlong) % size() : 0;
+    for (std::size_t k = 0; k < choices; ++k) candidates_.push_back(random_edge(size() > kLarge ? window : size()));
     // Cheap edges that cannot be collapsed would be drawn again and again.
     std::sort(candidates_.begin(), candidates_.end(),
               [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
@@ -131,9 +135,9 @@ std::uint64_t Simplifier::draw() {
   return z ^ (z >> 31);
 }
 
-Simplifier::Candidate Simplifier::random_edge() {
+Simplifier::Candidate Simplifier::random_edge(std::size_t window) {
   const std::uint64_t number = draw();
-  const Triangle& face = faces_[alive_[static_cast<std::size_t>((number >> 8) % alive_.size())]];
+  const Triangle& face = faces_[alive_[(window_ + static_cast<std::size_t>(number >> 8) % window) % alive_.size()]];
   const auto k = static_cast<std::size_t>(number % 3);
   Candidate edge;
   edge.from = face[k];

@@ -46,7 +46,7 @@ class Simplifier {
   };
 
   std::uint64_t draw();
-  Candidate random_edge();
+  Candidate random_edge(std::size_t window);  // of the faces from `window_` on
   bool collapse(const Candidate& edge);
   void gather(std::int32_t vertex, std::vector<std::int32_t>& faces);
   bool turns_over(const std::vector<std::int32_t>& faces, std::int32_t vertex, std::int32_t other, Vec3 point) const;
@@ -61,6 +61,7 @@ class Simplifier {
   std::vector<std::int32_t> around_from_, around_to_, mark_;
   std::vector<Candidate> candidates_;
   std::int32_t stamp_ = 0;
+  std::size_t window_ = 0;
   std::uint64_t state_ = 0;
 };
 

@@ -397,8 +397,8 @@ def _triangulated(outlines: list[FloatArray]) -> tuple[IntArray, float]:
 
 
 def _caps(sections: list[tuple[list[IntArray], list[FloatArray]]]) -> tuple[IntArray, float]:
-    """Triangles [T, 3] that close sections, each of rims and their outlines [R, 2], and the largest share of one's area
-    that is upside down.
+    """Triangles [T, 3] that close sections, each of rims and their outlines [R, 2], and the share of their area that is
+    upside down.
 
     Side by side in one plane they are triangulated together, which is quicker.
     """
@@ -411,11 +411,12 @@ def _caps(sections: list[tuple[list[IntArray], list[FloatArray]]]) -> tuple[IntA
         beside += [outline + np.array([x - left, 0.0]) for outline in outlines]
         x += 1.1 * (right - left)
     triangles, folded = _triangulated(beside)
-    if folded <= NEGLIGIBLE_FOLD:
-        return np.concatenate(rims)[triangles], folded
-    each = [(np.concatenate(own), *_triangulated(outlines)) for own, outlines in sections]
-    caps = [corners[triangles] for corners, triangles, _ in each]
-    return np.concatenate(caps), max(folded for _, _, folded in each)
+    if folded > NEGLIGIBLE_FOLD:
+        each = [_triangulated(outlines)[0] for _, outlines in sections]
+        sizes = [sum(map(len, own)) for own, _ in sections]
+        triangles = np.concatenate([own + first for own, first in zip(each, np.cumsum([0, *sizes[:-1]]), strict=True)])
+        folded = _share_upside_down(np.concatenate(beside), triangles)
+    return np.concatenate(rims)[triangles], folded
 
 
 def _share_upside_down(points: FloatArray, triangles: IntArray) -> float:
