@@ -4,12 +4,14 @@ import contextlib
 import io
 import json
 import socket
+from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
 from rlacd.errors import EmptyMeshError, MeshDataError, MeshError, MeshFileError
+from rlacd.io.read import text
 from rlacd.io.read.load import load_mesh
 
 FORMATS = ["obj", "stl", "ply", "off", "glb", "gltf", "dae", "3mf"]
@@ -338,3 +340,27 @@ def test_real_files_of_every_kind(corpus):
         assert len(loaded.faces) == len(reference.faces)
         np.testing.assert_allclose(loaded.vertices.min(axis=0), reference.vertices.min(axis=0), atol=1e-6)
         np.testing.assert_allclose(loaded.vertices.max(axis=0), reference.vertices.max(axis=0), atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["float", "double"])
+@pytest.mark.parametrize("tail", [b"", b"\n", b"\n\n  \n", b"\r\n"])
+def test_text_ply_gives_what_its_parser_gives(kind: str, tail: bytes, tmp_path: Path, monkeypatch) -> None:
+    rng = np.random.default_rng(3)
+    points, faces = rng.normal(size=(40, 3)), rng.integers(0, 40, (60, 3))
+    head = f"ply\nformat ascii 1.0\ncomment by hand\nelement vertex 40\nproperty {kind} x\nproperty {kind} nx\n"
+    head += (
+        f"property {kind} y\nproperty {kind} z\nelement face 60\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    lines = [f"{x!r} 0.5 {y:.3e} {z}" for x, y, z in points.tolist()]
+    lines += [f"3 {a} {b} {c}" for a, b, c in faces.tolist()]
+    path = tmp_path / "soup.ply"
+    path.write_bytes(head.encode() + "\n".join(lines).encode() + tail)
+    quick = load_mesh(path)
+    assert text.binary_ply(head.encode(), "\n".join(lines).encode()) is not None
+    assert text.binary_ply(head.encode(), "\n".join(lines[:-1]).encode()) is None
+    assert text.binary_ply(head.encode(), "\n".join([*lines[:-1], "3 1 nan 2"]).encode()) is None
+    assert text.binary_ply(head.encode(), "\n".join([*lines[:-1], "2 1 0 2"]).encode()) is None
+    monkeypatch.setattr(text, "binary_ply", lambda *_: None)
+    slow = load_mesh(path)
+    assert np.array_equal(quick.vertices, slow.vertices)
+    assert np.array_equal(quick.faces, slow.faces)

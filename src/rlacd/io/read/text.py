@@ -7,7 +7,10 @@ time linear in its length.
 from __future__ import annotations
 
 import re
+import warnings
 from pathlib import Path
+
+import numpy as np
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.limits import MOST_TRIANGLES
@@ -17,6 +20,18 @@ MOST_FIELDS = 2000
 
 PLY_ELEMENT = re.compile(rb"^element\s+(\S+)\s+(\S+)", re.MULTILINE)
 PLY_END = re.compile(rb"^end_header[ \t]*\r?\n", re.MULTILINE)
+_COMMENTS = rb"(?:(?:comment|obj_info)[^\n]*\n)*"
+PLAIN_HEADER = re.compile(
+    rb"ply\r?\n"
+    + _COMMENTS
+    + rb"format ascii 1\.0\s*\n"
+    + _COMMENTS
+    + rb"element vertex (?P<vertices>\d{1,9})\s*\n(?P<fields>(?:property (?:float|double|float32|float64) \w+\s*\n)+)"
+    + _COMMENTS
+    + rb"element face (?P<faces>\d{1,9})\s*\nproperty list \w+ u?int(?:32)? vertex_ind(?:ex|ices)\s*\n"
+    + _COMMENTS
+    + rb"end_header[ \t]*\r?\n"
+)
 EMPTY_LINES = re.compile(rb"[ \t]*[\r\n]\s*")
 BODY_END = re.compile(rb"endsolid", re.IGNORECASE)
 
@@ -85,10 +100,43 @@ def plain_ply(path: Path, content: bytes) -> bytes:
     if b"ascii" not in header.lower().split(b"\n", 2)[1]:
         return content
     check_text(path, content)
+    if (plain := binary_ply(header, content[end.end() :])) is not None:
+        return plain
     body = EMPTY_LINES.sub(b"\n", content[end.end() :].strip())
     if body.count(b"\n") + bool(body) < sum(counts):
         raise MeshFileError(f"{path} is cut off: its header promises {sum(counts)} lines; export it again")
     return header + body + b"\n"
+
+
+def binary_ply(header: bytes, body: bytes) -> bytes | None:
+    """Return a text file of vertices and triangles only in binary form, which parses forty times as fast, or None."""
+    found = PLAIN_HEADER.fullmatch(header)
+    if found is None:
+        return None
+    fields = [line.split()[1:] for line in found["fields"].splitlines()]
+    names = [name for _, name in fields]
+    if any(names.count(name) != 1 for name in (b"x", b"y", b"z")):
+        return None
+    axes = [names.index(name) for name in (b"x", b"y", b"z")]
+    vertices, faces = int(found["vertices"]), int(found["faces"])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # of text that ends in something else than numbers
+        values = np.fromstring(body, dtype=np.float64, sep=" ")
+    if len(values) != vertices * len(fields) + 4 * faces:
+        return None
+    points = values[: vertices * len(fields)].reshape(vertices, len(fields))[:, axes]
+    rows = values[vertices * len(fields) :].reshape(faces, 4)
+    with np.errstate(invalid="ignore"):  # of NaN, which is no number of a corner
+        corners = rows[:, 1:].astype(np.int32)
+    if (rows[:, 0] != 3).any() or (corners != rows[:, 1:]).any():
+        return None
+    records = np.empty(faces, dtype=[("count", "u1"), ("corners", "<i4", 3)])
+    records["count"], records["corners"] = 3, corners
+    is_double = any(fields[axis][0] in (b"double", b"float64") for axis in axes)
+    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {vertices}"]
+    lines += [f"property {'double' if is_double else 'float'} {name}" for name in "xyz"]
+    lines += [f"element face {faces}", "property list uchar int vertex_indices", "end_header\n"]
+    return "\n".join(lines).encode() + points.astype("<f8" if is_double else "<f4").tobytes() + records.tobytes()
 
 
 def count_in(path: Path, word: bytes) -> int:
