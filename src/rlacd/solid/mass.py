@@ -39,7 +39,9 @@ class Mass:
 
 def mass_of(vertices: FloatArray, faces: IntArray, frame: Frame) -> Mass:
     """Integrate over a closed, outward mesh ``[V, 3]``, ``[F, 3]`` in the frame."""
-    volume, centre, inertia = _native.mesh_mass(vertices, faces)
+    volume, centre, inertia = _native.mesh_mass(
+        np.ascontiguousarray(vertices, dtype=np.float64), np.ascontiguousarray(faces, dtype=np.int32)
+    )
     with np.errstate(over="ignore", under="ignore"):  # at the ends of float64's range, volumes overflow or underflow
         unit = np.minimum(np.float64(1.0) / frame.scale, _GREATEST)
         return Mass(
