@@ -44,7 +44,7 @@ def test_the_hottest_spot_is_as_far_as_the_report_says(threshold: float, place: 
 
 def test_one_hull_of_an_elbow_is_hot_where_it_bridges_the_corner() -> None:
     mesh = elbow()
-    result = rlacd.decompose(mesh, threshold=2.0)
+    result = rlacd.decompose(mesh, threshold=2.0, detail="full")
     (part,) = heat_map(result)
     frame = frame_of(result)
     # The bridge runs from the tip (2, ., 0.4) to (0.4, ., 2); its middle, (1.2, ., 1.2), is 0.8 away from either beam.

@@ -11,6 +11,9 @@ from rlacd.solid.component import Part
 ROOM = 0.2
 """A simple hull grows by at most this share of what the criterion allows beyond a part."""
 
+MOST = 0.02
+"""Nor by more than this (the longest side of the input is 2), however large the threshold."""
+
 TRIES = 3
 """If the criterion is no longer met, half the growth is tried, and so on."""
 
@@ -28,7 +31,7 @@ def simple_part(part: Part, criterion: Criterion, max_vertices: int | None, max_
     """
     if not math.isfinite(criterion.overhang):
         return part
-    growth = ROOM * criterion.overhang
+    growth = min(ROOM * criterion.overhang, MOST)
     for _ in range(TRIES):
         hull = limit_hull(part.hull, max_vertices, max_faces, tolerance=growth)
         if hull is part.hull:

@@ -101,8 +101,12 @@ def is_balanced(faces: IntArray, edges: Edges) -> BoolArray:
     return np.asarray(2 * forward == edges.valence)
 
 
+NO_FILM = 1e-12
+"""Films of less area than this are folds that rounding has closed."""
+
+
 def detach_films(vertices: FloatArray, faces: IntArray, is_film: BoolArray) -> tuple[FloatArray, IntArray]:
-    """Give films vertices of their own if the bodies they hang on are closed without them.
+    """Give films vertices of their own if the bodies they hang on are closed without them; drop those without an area.
 
     A film stands for as many faces wound one way as the other: a sheet with two sides, or a pocket closed by rounding.
 
@@ -137,7 +141,9 @@ def detach_films(vertices: FloatArray, faces: IntArray, is_film: BoolArray) -> t
     corners, index = np.unique(faces[detached], return_inverse=True)
     result = faces.copy()
     result[detached] = len(vertices) + index.reshape(-1, 3)
-    return np.concatenate([vertices, vertices[corners]]), result
+    a, b, c = vertices[faces[detached]].transpose(1, 0, 2)
+    nothing = detached[np.linalg.norm(np.cross(b - a, c - a), axis=1) < 2 * NO_FILM]
+    return np.concatenate([vertices, vertices[corners]]), np.delete(result, nothing, axis=0)
 
 
 @dataclass(frozen=True)
