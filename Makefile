@@ -63,7 +63,7 @@ test: lint
 	$(PYTEST) -m 'not nightly'
 
 test-all: lint
-	$(PYTEST)
+	RLACD_RANDOM=1 $(PYTEST)
 
 nightly: test-all sanitize soak
 

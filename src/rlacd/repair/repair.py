@@ -134,6 +134,8 @@ def repair(
         return Solid(taken[0], (welded_vertices, welded_faces), frame, (taken[1],), tuple(warnings))
     require_memory(len(welded_faces), BYTES_REPAIRED, mesh.name)
     vertices, faces = detach_films(welded_vertices, welded_faces.astype(np.int64), is_film)
+    detached = np.asarray(faces[:, 0] >= len(welded_vertices))
+    faces = faces[~_is_inside(vertices, faces, detached, threads)]
     surface = (vertices, faces.astype(np.int32))
 
     if len(faces) == 0 or face_areas(vertices, faces).max() < NO_AREA:
@@ -184,6 +186,15 @@ def _taken_as_it_is(vertices: FloatArray, faces: Indices) -> tuple[tuple[FloatAr
     separate = (vertices, outward) if has_no_pinch else _native.separate_fans(vertices, outward)
     step = "closed" if volume > 0 else "reoriented"
     return _native.along_a_curve(*separate), BodyRepair(0, step, len(faces), len(faces), 0.0)
+
+
+def _is_inside(vertices: FloatArray, faces: IntArray, film: BoolArray, threads: int | None) -> BoolArray:
+    """Return ``[F]`` which films lie inside the other faces: where two bodies touch."""
+    inside = film.copy()
+    if film.any():
+        middle = vertices[faces[film]].mean(axis=1)
+        inside[film] = np.abs(SurfaceQuery(vertices, faces[~film], threads).winding(middle)) > 0.75
+    return inside
 
 
 class _Repair:
