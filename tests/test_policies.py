@@ -14,6 +14,7 @@ from manifold3d import Manifold
 
 import rlacd
 from rlacd.policies import make_policy
+from rlacd.policies.shortlist import RandomShortlist
 
 DOCS = Path(__file__).parent.parent / "docs" / "policies.md"
 
@@ -85,3 +86,32 @@ def test_answers_that_are_no_planes_are_refused(answer: Any) -> None:
 def test_what_cannot_choose_is_no_policy(given: Any) -> None:
     with pytest.raises(rlacd.OptionError, match="policy"):
         rlacd.decompose(table(), policy=given)
+
+
+@pytest.mark.parametrize("name", ["random-10+edges", "random-1+edges", "random-10"])
+def test_random_shortlists_cut_by_one_of_their_planes_whatever_was_cut_before(name: str) -> None:
+    root = rlacd.Component((np.asarray(table().vertices), np.asarray(table().faces, dtype=np.int32)))
+    plane = make_policy(name).choose(root)
+    assert plane is not None
+    again = rlacd.Component((root.vertices, root.faces))
+    policy = make_policy(name)
+    policy.choose(root.cut(plane)[0])
+    assert policy.choose(again) == plane
+    known = [rlacd.SweepCache(concave_edges=4 if "edges" in name else 0).candidates(root)]
+    assert plane in [block.plane(i) for block in known for i in range(len(block))]
+
+
+def test_a_random_shortlist_of_all_planes_is_greedy() -> None:
+    root = rlacd.Component((np.asarray(table().vertices), np.asarray(table().faces, dtype=np.int32)))
+    for policy, greedy in (
+        (RandomShortlist(150), "greedy-hull-sum+edges"),
+        (RandomShortlist(150, concave_edges=0), "greedy-hull-sum"),
+    ):
+        planes = [policy.choose(root), make_policy(greedy).choose(root)]
+        sums = [sum(side.hull.volume for side in root.cut(plane) if side is not None) for plane in planes]
+        assert sums[0] == pytest.approx(sums[1], rel=1e-9)
+
+
+def test_seeds_of_random_shortlists_draw_different_planes() -> None:
+    root = rlacd.Component((np.asarray(table().vertices), np.asarray(table().faces, dtype=np.int32)))
+    assert len({RandomShortlist(1, concave_edges=0, seed=seed).choose(root) for seed in range(8)}) > 1

@@ -13,7 +13,10 @@ SCORES = ("hull-sum", "max-excess", "excess-norm")
 AS_PUBLISHED = (*(f"greedy-{score}" for score in SCORES), *(f"greedy-{score}{EDGES}" for score in SCORES), "navacd")
 """Policies of published methods, for comparison: one pass is cuts and merging, and nothing else."""
 
-POLICIES = ("greedy", *AS_PUBLISHED, "learned")
+CONTROLS = (f"random-10{EDGES}", f"random-1{EDGES}", "random-10")
+"""The paper's deployment with random planes in place of the network's best: what a learned policy has to beat."""
+
+POLICIES = ("greedy", *AS_PUBLISHED, *CONTROLS, "learned")
 
 WEIGHTS_ENDING = ".onnx"
 """A policy's name that ends so is the path of a network to use in place of the shipped one."""

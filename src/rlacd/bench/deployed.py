@@ -20,17 +20,18 @@ from rlacd.io.read.load import load_mesh
 from rlacd.merge import limit_part
 from rlacd.planes.candidates import OFFSETS_PER_AXIS, Candidates
 from rlacd.planes.concave_edges import concave_edge_planes
-from rlacd.planes.sweep import SLIVER, sweep
+from rlacd.planes.sweep import SLIVER, Sweep, sweep
 from rlacd.policies.features import candidates_of
 from rlacd.policies.greedy import cheapest, excess_norm, hull_sum
 from rlacd.policies.learned import Learned
+from rlacd.policies.shortlist import generator_of
 from rlacd.repair.repair import repair
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Plane
 from rlacd.solid.hull import Hull
 from rlacd.workers import Workers
 
-RANKINGS = ("learned", "excess")
+RANKINGS = ("learned", "excess", "random")
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,8 @@ class Deployment:
     Attributes
     ----------
     ranking : str
-        "learned": the shipped network; "excess": the greedy score ``rlacd.policies.greedy.excess_norm``.
+        "learned": the shipped network; "excess": the greedy score ``rlacd.policies.greedy.excess_norm``; "random": a
+        draw that the component alone determines, the control for the others.
     planes : int
         Number of best-ranked axis planes to evaluate (the paper's #AP).
     edges : int
@@ -84,7 +86,7 @@ class Deployment:
             else:
                 raise OptionError(
                     f"planes:{word} is not known; there are ap=N, ce=N, no-spatial, no-principal, "
-                    f"{' and '.join(RANKINGS)}."
+                    f"{', '.join(RANKINGS[:-1])} and {RANKINGS[-1]}."
                 )
         return cls(**given)  # type: ignore[arg-type]
 
@@ -120,10 +122,17 @@ class Deployed:
         kinds = np.repeat([self._of.spatial, self._of.principal], 3 * OFFSETS_PER_AXIS)
         exists = np.concatenate([kinds, np.zeros(len(swept.candidates) - len(kinds), dtype=bool)])
         valid = next((v for s in (SLIVER, SLIVER / 100) if (v := exists & swept.valid(s)).any()), exists & False)
-        cost = excess_norm(swept) if self._learned is None else self._learned.rank(component, swept)
+        cost = self._cost(component, swept)
         ranked = np.argsort(np.where(valid, cost, np.inf), kind="stable")
         best = np.sort(ranked[: min(self._of.planes, int(valid.sum()))])  # sweep order: ties go to the first
         return Candidates(swept.candidates.directions[best], swept.candidates.offsets[best])
+
+    def _cost(self, component: Component, swept: Sweep) -> FloatArray:
+        if self._learned is not None:
+            return self._learned.rank(component, swept)
+        if self._of.ranking == "random":
+            return generator_of(component).random(len(swept.candidates))
+        return excess_norm(swept)
 
 
 def decompose_as_deployed(

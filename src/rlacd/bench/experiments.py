@@ -22,6 +22,7 @@ TABLE_1_METHODS = (
     "learned:space",
     "navacd",
     "greedy-hull-sum",
+    "random-10+edges",
     "greedy",
     "learned",
     "greedy:balanced",
@@ -118,10 +119,13 @@ TABLE_2_ARMS = {
     "without concave edges' planes": "planes:ce=0",
 }
 
+RANDOM_ARM = {"random planes, #AP 10, #CE 4": "planes:random"}
+"""The control: random planes in place of the ranking's best."""
+
 
 def kinds_of_planes(bench: Bench, ranking: str, setting: float) -> Page:
     """Leave out one kind of planes at a time (Table 2)."""
-    arms = {label: f"{name}:{ranking}" for label, name in TABLE_2_ARMS.items()}
+    arms = {label: f"{name}:{ranking}" for label, name in TABLE_2_ARMS.items()} | RANDOM_ARM
     return _arms(bench, "Kinds of planes (Table 2)", arms, setting)
 
 
@@ -132,7 +136,7 @@ def numbers_of_planes(bench: Bench, ranking: str, setting: float, planes: Sequen
     arms = {f"#AP {n}, #CE 4": f"planes:ap={n}:{ranking}" for n in planes}
     arms |= {f"#AP 10, #CE {n}": f"planes:ce={n}:{ranking}" for n in edges}
     first = {"#AP 10, #CE 4": f"planes:{ranking}"}
-    arms = {**first, **{label: name for label, name in arms.items() if label not in first}}
+    arms = {**first, **{label: name for label, name in arms.items() if label not in first}, **RANDOM_ARM}
     return _arms(bench, "Numbers of planes (Table 3)", arms, setting)
 
 

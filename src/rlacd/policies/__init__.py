@@ -5,7 +5,8 @@ from rlacd.policies.greedy import SCORES, Greedy
 from rlacd.policies.navacd import CONCAVE_EDGES, NavACD
 from rlacd.policies.policy import CheckedPolicy, Policy
 from rlacd.policies.qpolicy import QPolicy
-from rlacd.policy_names import AS_PUBLISHED, EDGES, POLICIES, WEIGHTS_ENDING, is_policy
+from rlacd.policies.shortlist import RandomShortlist
+from rlacd.policy_names import AS_PUBLISHED, CONTROLS, EDGES, POLICIES, WEIGHTS_ENDING, is_policy
 
 
 def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: float | None = None) -> Policy:
@@ -15,6 +16,8 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
     - ``greedy-SCORE``: the plane with the least SCORE among the 150 alone (``hull-sum`` is the paper's baseline);
       ``greedy-SCORE+edges``: among the 150 and those of the edges.
     - ``navacd``: the plane with the least sum of hull volumes, among three planes and those of four concave edges.
+    - ``random-N+edges``: the plane with the least sum of hull volumes among N random ones of the 150 and those of four
+      concave edges; ``random-N``: among the random ones alone. Controls for learned policies.
     - ``learned``, or the path of an ONNX file: ranks the planes of ``greedy`` by the number of parts the component is
       expected to end in. If the file is a Q network, as exported by ``rlacd train``, the paper's rule applies instead:
       the least sum of hull volumes among the network's ten best planes and those of four concave edges.
@@ -55,6 +58,8 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
     family, _, score = name.partition("-")
     if family == "greedy" and score.removesuffix(EDGES) in SCORES:
         return Greedy(score.removesuffix(EDGES), concave_edges=CONCAVE_EDGES if score.endswith(EDGES) else 0)
+    if name in CONTROLS:
+        return RandomShortlist(int(score.removesuffix(EDGES)), CONCAVE_EDGES if score.endswith(EDGES) else 0)
     raise KeyError(name)
 
 

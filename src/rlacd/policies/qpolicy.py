@@ -8,12 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rlacd.planes.candidates import Candidates
-from rlacd.planes.concave_edges import concave_edge_planes
-from rlacd.planes.sweep import sweep
-from rlacd.policies.greedy import cheapest, hull_sum
 from rlacd.policies.navacd import CONCAVE_EDGES
 from rlacd.policies.observe import Float32Array, Observation, candidates_of, observe
+from rlacd.policies.shortlist import least_hulls
 from rlacd.solid.component import Component, Plane
 
 if TYPE_CHECKING:
@@ -67,12 +64,7 @@ class QPolicy:
         best = best_planes(self._values(seen), seen.mask, self._shortlist)
         if len(best) == 1 and not self._concave_edges:
             return candidates.plane(int(best[0]))
-        directions = candidates.directions[best // candidates.offsets.shape[1]]
-        short = Candidates(directions, candidates.offsets.ravel()[best][:, None])
-        if self._concave_edges:
-            short = Candidates.joined(short, concave_edge_planes(component, self._concave_edges))
-        scored = sweep(component, short, threads)
-        return cheapest(scored, hull_sum(scored)) or candidates.plane(int(best[0]))
+        return least_hulls(component, candidates, best, self._concave_edges, threads)
 
 
 def best_planes(values: Float32Array, mask: NDArray[np.bool_], count: int) -> NDArray[np.intp]:
