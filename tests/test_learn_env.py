@@ -193,7 +193,7 @@ def test_folders_without_anything_to_learn_are_one_clear_error(tmp_path: Path, m
         env.reset(seed=0)
 
 
-@pytest.mark.parametrize("name", ["profile", "pointnet"])
+@pytest.mark.parametrize("name", ["profile", "profile-without-hull"])
 def test_encoders_keep_the_protocol_and_ignore_size_and_place(name: str) -> None:
     encoder = make_encoder(name)
     assert isinstance(encoder, Encoder)

@@ -274,7 +274,7 @@ def test_the_exported_policy_computes_what_torch_does(meshes: Path, tmp_path: Pa
     from rlacd.solid.component import Component
     from tests.learning import small_solids
 
-    for name, scale_input in (("profile", True), ("pointnet", False)):
+    for name, scale_input in (("profile", True), ("profile-without-hull", False)):
         encoder = make_encoder(name)
         torch.manual_seed(0)
         network = QNetwork(encoder.dim + 3 * scale_input, 1000.0)

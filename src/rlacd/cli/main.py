@@ -17,7 +17,7 @@ from rlacd.cli.batch import BATCH_EPILOG, batch_command
 from rlacd.cli.bench import app as bench
 from rlacd.cli.decompose import decompose_command
 from rlacd.cli.exit_codes import EPILOG, ExitCode, exit_codes
-from rlacd.cli.train import pretrain_command, train_command
+from rlacd.cli.train import train_command
 from rlacd.cli.view import view
 from rlacd.plain_json import printable
 
@@ -97,4 +97,3 @@ app.command("view", epilog=EPILOG)(view)
 app.command("batch", epilog=BATCH_EPILOG)(batch_command())
 app.add_typer(bench, name="bench")
 app.command("train", epilog=EPILOG)(train_command())
-app.command("pretrain", epilog=EPILOG)(pretrain_command())

@@ -1,4 +1,4 @@
-"""The commands `rlacd train` and `rlacd pretrain`; their options and help are the fields of a dataclass."""
+"""The command `rlacd train`; its options and help are the fields of a dataclass."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from rlacd.cli.exit_codes import exit_codes
 from rlacd.cli.parameters import REQUIRED, Parameters, chosen, command, option_parameters
 from rlacd.errors import MissingExtraError, OptionError
 from rlacd.learn.paper.options import PRESETS, TrainOptions
-from rlacd.learn.pretrain.options import PretrainOptions
 
 EXTRA = ("torch", "gymnasium", "tensorboard", "safetensors", "onnx", "onnxscript", "onnxruntime")
 
@@ -32,20 +31,6 @@ TRAIN_HELP = """Train a policy that chooses cuts, by the paper's reinforcement l
 
 The run's folder gets the curves, a checkpoint to --resume from, and in the end policy.onnx, which decompose takes as
 --policy. A preset sets all options; those given beside it change it.
-"""
-
-PRETRAIN_HELP = """Make weights for --encoder i2p-mae out of a folder of meshes, without any labels.
-
-Most of a point cloud is hidden, and the encoder learns to say what was there (the 3-D half of I2P-MAE).
-
-\b
-[bold]Examples[/bold]
-  rlacd pretrain meshes/ --out weights.safetensors
-  rlacd pretrain meshes/ --out weights.safetensors --resume
-  rlacd pretrain meshes/ --out small.safetensors --size small --points 1024 --batch 32 --steps 1000
-  rlacd train meshes/ --run run/ --encoder i2p-mae --encoder-weights weights.safetensors
-
-Beside the weights a folder, weights.run, gets the curves and a checkpoint to --resume from.
 """
 
 MESHES = (REQUIRED, Annotated[Path, typer.Argument(help="A folder of meshes, of any depth.")])
@@ -103,21 +88,6 @@ def train_command() -> Callable[..., None]:
         **WHERE,
     }
     return command(train, TRAIN_HELP, own | option_parameters(TrainOptions, note="without a preset: "))
-
-
-def pretrain_command() -> Callable[..., None]:
-    """Build `rlacd pretrain`."""
-
-    def pretrain(**given: Any) -> None:
-        with exit_codes():
-            meshes, out, resume = (given.pop(name) for name in ("meshes", "out", "resume"))
-            options = PretrainOptions(**chosen(given))
-            _learn("rlacd.learn.pretrain.run", "pretrain")(meshes, out, options, resume=resume, say=typer.echo)
-            typer.echo(f"{out}: give it to  rlacd train --encoder i2p-mae --encoder-weights")
-
-    out = typer.Option("--out", "-o", metavar="FILE.safetensors", help="Where the weights go.")
-    own: Parameters = {"meshes": MESHES, "out": (REQUIRED, Annotated[Path, out]), "resume": RESUME}
-    return command(pretrain, PRETRAIN_HELP, own | option_parameters(PretrainOptions))
 
 
 def _learn(module: str, name: str) -> Callable[..., Path]:

@@ -16,13 +16,10 @@ class Curves:
     ----------
     run : Path
         Folder for ``curves.jsonl`` and ``tensorboard/``.
-    counted : str
-        Name of the step counter.
     """
 
-    def __init__(self, run: Path, counted: str = "cuts") -> None:
+    def __init__(self, run: Path) -> None:
         self._folder = run
-        self._counted = counted
         self._path = run / "curves.jsonl"
         self._board: SummaryWriter | None = None
 
@@ -31,7 +28,7 @@ class Curves:
         kept = []
         if self._path.exists():
             lines = self._path.read_text(encoding="utf-8").splitlines(keepends=True)
-            kept = [line for line in lines if line.endswith("\n") and json.loads(line)[self._counted] <= count]
+            kept = [line for line in lines if line.endswith("\n") and json.loads(line)["cuts"] <= count]
         if count == 0:
             kept = []
         self._path.write_text("".join(kept), encoding="utf-8")
@@ -40,7 +37,7 @@ class Curves:
     def add(self, count: int, values: Mapping[str, float], seconds: float) -> None:
         """Append a point to several curves."""
         with open(self._path, "a", encoding="utf-8") as file:
-            file.write(json.dumps({self._counted: count, **values, "seconds": round(seconds, 3)}) + "\n")
+            file.write(json.dumps({"cuts": count, **values, "seconds": round(seconds, 3)}) + "\n")
         if self._board is not None:
             for name, value in {**values, "seconds": seconds}.items():
                 group = "validation/" + name[11:] if name.startswith("validation_") else "training/" + name

@@ -3,7 +3,6 @@
 from rlacd.learn.encoders.encoder import Encoder, describe
 from rlacd.learn.encoders.i2p_mae import I2PMAEEncoder
 from rlacd.learn.encoders.named import I2P_MAE, AnyEncoder, make_encoder
-from rlacd.learn.encoders.pointnet import PointNetEncoder
 from rlacd.learn.encoders.profile import ProfileEncoder, ProfileWithoutHull
 
 __all__ = [
@@ -11,7 +10,6 @@ __all__ = [
     "AnyEncoder",
     "Encoder",
     "I2PMAEEncoder",
-    "PointNetEncoder",
     "ProfileEncoder",
     "ProfileWithoutHull",
     "describe",

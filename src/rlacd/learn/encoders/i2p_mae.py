@@ -13,7 +13,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import torch
@@ -86,16 +85,6 @@ class Sizes:
         return all(width % self.heads == 0 for width in self.widths)
 
 
-SIZES: Mapping[str, Sizes] = MappingProxyType(
-    {
-        "published": Sizes(),
-        "small": Sizes((256, 128, 32), (16, 8, 8), (48, 96, 192), depth=2, heads=6, embedding=64),
-        "tiny": Sizes((32, 16, 8), (8, 4, 4), (12, 24, 48), depth=1, heads=2, embedding=16),
-    }
-)
-"""Named sizes: the paper's, one suited to CPUs, and one for quick trials."""
-
-
 class GroupEmbedding(nn.Module):
     """A shared MLP over the members of a group that concatenates the group's maximum to each, with a final maximum."""
 
@@ -137,9 +126,9 @@ class Scale:
 def seen_below(scales: list[Scale], top: Tensor) -> list[Tensor]:
     """Tell for every scale which groups are seen, 1 or 0 [B, G], given those of the last scale.
 
-    A group is seen if it is a member of a seen group of the next scale; the others are masked in attention, in
-    inference as in pretraining. In inference all groups of the last scale are seen, but occasionally a group of a finer
-    scale belongs to no group: the published weights were never trained on it.
+    A group is seen if it is a member of a seen group of the next scale; the others are masked in attention. All groups
+    of the last scale are seen, but occasionally a group of a finer scale belongs to no group: the published weights
+    were never trained on it.
     """
     seen = [top]
     for below, above in pairwise(reversed(scales)):
@@ -150,7 +139,7 @@ def seen_below(scales: list[Scale], top: Tensor) -> list[Tensor]:
 
 
 class HierarchicalEncoder(nn.Module):
-    """The pyramid; for its use see `I2PMAEEncoder.features`, and with hidden groups `rlacd.learn.pretrain`."""
+    """The pyramid; for its use see `I2PMAEEncoder.features`."""
 
     def __init__(self, sizes: Sizes) -> None:
         super().__init__()
@@ -194,12 +183,13 @@ class I2PMAEEncoder(nn.Module):
 
     Parameters
     ----------
-    sizes : Sizes
+    sizes : Sizes, optional
+        As published by default.
     """
 
-    def __init__(self, sizes: Sizes = SIZES["published"]) -> None:
+    def __init__(self, sizes: Sizes | None = None) -> None:
         super().__init__()
-        self.sizes = sizes
+        self.sizes = sizes = sizes or Sizes()
         self.dim = 2 * sizes.widths[-1]
         self.h_encoder = HierarchicalEncoder(sizes)
         self._known: OrderedDict[bytes, Tensor] = OrderedDict()
@@ -207,7 +197,7 @@ class I2PMAEEncoder(nn.Module):
 
     @classmethod
     def from_checkpoint(cls, path: str | Path) -> I2PMAEEncoder:
-        """Read the published checkpoint (``.pth``), or weights made by ``rlacd pretrain`` (``.safetensors``).
+        """Read the published checkpoint (``.pth``), or weights that state their sizes (``.safetensors``).
 
         Only tensors are read, never arbitrary pickle; anything else in the file is ignored.
 
@@ -247,7 +237,7 @@ class I2PMAEEncoder(nn.Module):
     def forward(self, points: Tensor, directions: Tensor) -> Tensor:
         """See `Encoder.encode`; the directions are ignored.
 
-        Component and hull are scaled together into the unit ball, which the clouds of the pretraining fill.
+        Component and hull are scaled together into the unit ball, as the published pretraining does.
         """
         batch, _, count, _ = points.shape
         radius = points.square().sum(-1).amax(dim=(1, 2)).sqrt().clamp_min(1e-12)

@@ -10,15 +10,14 @@ import torch
 
 from rlacd.errors import OptionError
 from rlacd.learn.encoders.i2p_mae import I2PMAEEncoder
-from rlacd.learn.encoders.pointnet import PointNetEncoder
 from rlacd.learn.encoders.profile import ProfileEncoder, ProfileWithoutHull
 
-AnyEncoder = ProfileEncoder | PointNetEncoder | I2PMAEEncoder
+AnyEncoder = ProfileEncoder | I2PMAEEncoder
 
 I2P_MAE = "i2p-mae"
 
-_LIGHT: Mapping[str, type[ProfileEncoder] | type[PointNetEncoder]] = MappingProxyType(
-    {"profile": ProfileEncoder, "profile-without-hull": ProfileWithoutHull, "pointnet": PointNetEncoder}
+_LIGHT: Mapping[str, type[ProfileEncoder]] = MappingProxyType(
+    {"profile": ProfileEncoder, "profile-without-hull": ProfileWithoutHull}
 )
 
 PUBLISHED = "https://github.com/ZrrSkywalker/I2P-MAE"
@@ -30,9 +29,9 @@ def make_encoder(name: str, weights: str | Path = "", device: torch.device | str
     Parameters
     ----------
     name : str
-        ``profile``, ``profile-without-hull``, ``pointnet`` or ``i2p-mae``.
+        ``profile``, ``profile-without-hull`` or ``i2p-mae``.
     weights : path
-        For ``i2p-mae``: the published checkpoint, or a file made by ``rlacd pretrain``.
+        For ``i2p-mae``: the published checkpoint.
     device : torch.device
         Device of ``i2p-mae``; the light encoders run where the points are.
 
@@ -47,8 +46,7 @@ def make_encoder(name: str, weights: str | Path = "", device: torch.device | str
         if not str(weights):
             raise OptionError(
                 f"encoder {I2P_MAE} needs weights: give --encoder-weights FILE, the pre-trained checkpoint that "
-                f"{PUBLISHED} links to or one that `rlacd pretrain` makes of your meshes, or use --encoder profile, "
-                "which needs none."
+                f"{PUBLISHED} links to, or use --encoder profile, which needs none."
             )
         return I2PMAEEncoder.from_checkpoint(weights).to(device)
     if name not in _LIGHT:

@@ -1,4 +1,4 @@
-"""Files of encoder weights: the published checkpoint, and our own; read as tensors, never as arbitrary pickle."""
+"""Files of encoder weights: the published checkpoint, or safetensors; read as tensors, never as arbitrary pickle."""
 
 from __future__ import annotations
 
@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
 from torch import Tensor
 
-from rlacd.errors import OutputError, WeightsError
+from rlacd.errors import WeightsError
 
 METADATA = "rlacd"
 """Key of our JSON in a safetensors file's metadata."""
@@ -58,8 +57,7 @@ class Weights:
             found = self.state.get(name)
             if found is None:
                 raise WeightsError(
-                    f"{self.path} is no I2P-MAE checkpoint: {name} is missing; give the published pre-trained file, "
-                    "or one made by `rlacd pretrain`."
+                    f"{self.path} is no I2P-MAE checkpoint: {name} is missing; give the published pre-trained file."
                 )
             if found.shape != wanted.shape:
                 raise WeightsError(
@@ -90,27 +88,6 @@ def load_weights(path: Path) -> Weights:
             "missing; fetch or make it again."
         ) from error
     return Weights(path, {name.removeprefix("module."): value for name, value in state.items()}, sizes)
-
-
-def save_weights(path: Path, state: Mapping[str, Tensor], about: Mapping[str, Any]) -> None:
-    """Write a safetensors file atomically; `about` goes into its metadata as JSON, and ``about["sizes"]`` is read back.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
-    partial = path.with_name(path.name + ".new")
-    try:
-        save_file({name: value.detach().cpu().contiguous() for name, value in state.items()}, partial, _metadata(about))
-        partial.chmod(0o644)  # temporary files are private to their owner
-        partial.replace(path)
-    except (OSError, SafetensorError) as error:
-        raise OutputError(f"{path} cannot be written ({error}); choose another place.") from error
-
-
-def _metadata(about: Mapping[str, Any]) -> dict[str, str]:
-    return {METADATA: json.dumps(about, sort_keys=True)}
 
 
 def _read_safetensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:

@@ -42,12 +42,10 @@ class TrainOptions:
     # What the network sees
     encoder: str = option(
         "profile",
-        "What describes a component: counts between the planes, random features, or the paper's pretrained I2P-MAE.",
-        one_of=("profile", "profile-without-hull", "pointnet", "i2p-mae"),
+        "What describes a component: counts between the planes, or the paper's pretrained I2P-MAE.",
+        one_of=("profile", "profile-without-hull", "i2p-mae"),
     )
-    encoder_weights: str = option(
-        "", "The file of i2p-mae's weights: the published checkpoint, or one that `rlacd pretrain` made."
-    )
+    encoder_weights: str = option("", "The file of i2p-mae's weights: the published checkpoint.")
     points: int = option(
         2048, "Points on the surface of a component, and as many on its hull (paper).", least=16, most=65536
     )
