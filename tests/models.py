@@ -65,6 +65,10 @@ def fall_in_mujoco(path: Path, seconds: float = 1.5) -> Rest:
 
 
 def _lowest_in_mujoco(model: Any, data: Any, geom: int) -> float:
+    import mujoco
+
+    if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX:
+        return float(data.geom_xpos[geom, 2] - np.abs(data.geom_xmat[geom].reshape(3, 3)[2]) @ model.geom_size[geom])
     mesh = model.geom_dataid[geom]
     first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
     points = model.mesh_vert[first : first + count] @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from rlacd.presets import PRESETS, Preset
     from rlacd.progress import Progress
     from rlacd.solid.component import Component, Plane
+    from rlacd.solid.primitive import Primitive
 
 __all__ = [
     "PRESETS",
@@ -42,6 +43,7 @@ __all__ = [
     "Plane",
     "Policy",
     "Preset",
+    "Primitive",
     "Progress",
     "Rewritten",
     "RlacdError",
@@ -67,6 +69,7 @@ _HOME = {
     "Policy": "policies",
     "Component": "solid.component",
     "Plane": "solid.component",
+    "Primitive": "solid.primitive",
     "Sweep": "planes.sweep",
     "SweepCache": "planes.sweep_cache",
     **dict.fromkeys((name for name in __all__ if name.endswith("Error")), "errors"),

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias, cast
 
 import numpy as np
 import trimesh
@@ -26,9 +27,11 @@ from rlacd.merge import (
     limit_roughly,
     merge_lifted,
     merge_to_count,
+    primitive_part,
     simple_part,
     with_limits,
 )
+from rlacd.merge.primitives import SLACK
 from rlacd.options import (
     CONCAVITY,
     DEFAULT_RESOLUTION,
@@ -43,6 +46,7 @@ from rlacd.options import (
 from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import AS_PUBLISHED, Policy, make_policy
 from rlacd.presets import PresetName
+from rlacd.primitive_kinds import PrimitiveKind
 from rlacd.progress import ProgressCallback
 from rlacd.proxy import FEW, Lift, Proxy, simplify
 from rlacd.renamed import with_former
@@ -75,6 +79,7 @@ def decompose(
     max_vertices: int | None = None,
     max_faces: int | None = None,
     detail: DetailName = SIMPLE,
+    primitives: bool | Sequence[PrimitiveKind] = (),
     merge: bool = True,
     policy: str | Policy = "greedy",
     resolution: int = DEFAULT_RESOLUTION,
@@ -113,6 +118,11 @@ def decompose(
     detail : "simple" or "full"
         ``simple``: hulls leave out corners that add little, so that they have few, as far as the part still meets the
         criterion. ``full``: the exact hulls of the parts.
+    primitives : bool or sequence of str
+        A part becomes a ``"sphere"``, ``"capsule"``, ``"box"`` or ``"cylinder"`` if one contains its hull and meets the
+        threshold: the simplest whose volume is within a quarter of the least. Only those named; True allows all. Its
+        hull is then a convex polyhedron around the primitive, and ``Decomposition.primitives`` describes it. Models
+        (MJCF, URDF, SDF, USD) hold primitives in place of such hulls.
     merge : bool
         Unite parts whose joint hull still meets the threshold.
     policy : str or Policy
@@ -215,11 +225,20 @@ class _Reached(NamedTuple):
 
 
 def _cleaned(reached: _Reached, max_vertices: int | None, max_faces: int | None, workers: Workers) -> list[Part]:
-    """The parts without slivers, with simple hulls inside the limits."""
-    parts = drop_slivers(reached.parts, workers)
-    if reached.options.detail == SIMPLE:
-        parts = workers.map(lambda part: simple_part(part, reached.goal, max_vertices, max_faces), parts)
-    return workers.map(lambda part: limit_part(part, max_vertices, max_faces, reached.goal), parts)
+    """The parts without slivers, as primitives or with simple hulls inside the limits."""
+    kinds, goal = cast("tuple[PrimitiveKind, ...]", reached.options.primitives), reached.goal
+    slack = SLACK + 8 * reached.solid.frame.resolution
+
+    def cleaned(part: Part) -> Part:
+        if kinds:
+            shaped = primitive_part(part, goal, kinds, max_vertices, max_faces, slack)
+            if shaped is not part:
+                return shaped
+        if reached.options.detail == SIMPLE:
+            part = simple_part(part, goal, max_vertices, max_faces)
+        return limit_part(part, max_vertices, max_faces, goal)
+
+    return workers.map(cleaned, drop_slivers(reached.parts, workers))
 
 
 def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Clock) -> _Reached:

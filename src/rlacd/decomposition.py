@@ -40,6 +40,9 @@ class Decomposition(Result):
             Why the work was stopped early.
         ``parts``, ``faces``, ``vertices`` : int
             Number of hulls, and of all their triangles and vertices.
+        ``primitives`` : dict
+            With the option `primitives`: how many parts became a ``sphere``, ``capsule``, ``box`` or ``cylinder``, and
+            how many stayed a ``hull``. `primitives` of the result says what each part is.
         ``concavity`` : dict
             ``per_part`` lists the concavity of each hull's part in the order of ``hulls``; ``max`` is the worst. Both
             are None where there was no time to measure them; so are the distances below. ``warnings`` says so.

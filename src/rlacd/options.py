@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -13,6 +14,7 @@ from rlacd.errors import OptionError
 from rlacd.fields import check_fields, custom, integer, number, one_of, option
 from rlacd.policy_names import POLICIES, policy_name, read_policy
 from rlacd.presets import PRESETS, PresetName, find_preset
+from rlacd.primitive_kinds import PRIMITIVE_KINDS, PrimitiveKind, read_primitives
 from rlacd.space_options import NAVIGABLE, SpaceOptions
 
 if TYPE_CHECKING:
@@ -65,6 +67,8 @@ def _criterion(given: Any) -> Any:
 
 
 CRITERION = one_of((CONCAVITY,))
+
+
 _SECONDS = number(above=0, rule="a positive number of seconds")
 
 
@@ -127,6 +131,15 @@ class Options:
         one_of(DETAILS),
         panel=LIMITS,
         metavar="|".join(DETAILS),
+    )
+    primitives: bool | Sequence[PrimitiveKind] = option(
+        (),
+        "Parts become a box, sphere, capsule or cylinder where one meets the threshold; written as such to MJCF, URDF, "
+        "SDF, USD and Unreal, else as meshes.",
+        custom(f"True, or some of {', '.join(PRIMITIVE_KINDS)}", read_primitives, f"all {' '.join(PRIMITIVE_KINDS)}"),
+        panel=LIMITS,
+        metavar="all|box,sphere,…",
+        usual="none",
     )
     merge: bool = option(
         True,
@@ -219,6 +232,7 @@ class Options:
             _require(
                 not unused, "threshold", self.threshold_abs or self.threshold, "left out: a NavigableSpace has none"
             )
+            _require(not self.primitives, "primitives", self.primitives, "left out with a NavigableSpace")
         if self.quality is None:  # searching means merging
             object.__setattr__(self, "quality", "balanced" if self.merge else "fast")
         for name in ("budget", "search_steps"):
@@ -230,7 +244,8 @@ class Options:
 
     def as_plain(self) -> dict[str, Any]:
         """Everything as plain values, the criterion by its name or its own options, a policy by its name."""
-        return dataclasses.asdict(dataclasses.replace(self, policy="greedy")) | {"policy": policy_name(self.policy)}
+        plain = dataclasses.asdict(dataclasses.replace(self, policy="greedy"))
+        return plain | {"policy": policy_name(self.policy), "primitives": [*plain["primitives"]]}
 
     def at_scale(self, scale: float) -> Options:
         """Get the same options with the threshold in the frame, of which one of the input's units takes `scale`.

@@ -16,6 +16,7 @@ from rlacd.criteria import Criterion
 from rlacd.merge.slivers import is_sliver
 from rlacd.options import Options
 from rlacd.presets import Preset, find_preset
+from rlacd.primitive_kinds import PRIMITIVE_KINDS
 from rlacd.solid.component import Part, concatenated
 from rlacd.solid.distance import hull_distances, hull_union
 from rlacd.solid.hull import Hull
@@ -61,6 +62,7 @@ def make_report(
         "parts": len(hulls),
         "faces": sum(len(hull.faces) for hull in hulls),
         "vertices": sum(len(hull.vertices) for hull in hulls),
+        **({"primitives": _primitives(parts)} if options.primitives else {}),
         **summary.entries,
         "hausdorff": {"over": over, "under": under},
         "scale": solid.frame.scale,
@@ -92,6 +94,12 @@ def make_report(
             ),
         ],
     }
+
+
+def _primitives(parts: Sequence[Part]) -> dict[str, int]:
+    """How many parts are of each kind; those that stayed hulls last."""
+    kinds = [None if part.hull.primitive is None else part.hull.primitive.kind for part in parts]
+    return {kind: kinds.count(kind) for kind in PRIMITIVE_KINDS} | {"hull": kinds.count(None)}
 
 
 def _options(options: Options) -> dict[str, Any]:

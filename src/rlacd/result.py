@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, overload
 
 import trimesh
 
+from rlacd.primitive_kinds import PRIMITIVE_KINDS
 from rlacd.solid.balls import Balls
+from rlacd.solid.primitive import PRIMITIVE, Primitive
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -24,6 +27,12 @@ class Result:
     def name(self) -> str:
         """What the input is called: ``report["name"]``."""
         return str(self.report.get("name") or "mesh")
+
+    @property
+    def primitives(self) -> list[Primitive | None]:
+        """For each hull the box, sphere, capsule or cylinder that it stands for, in the input's unit; None if none."""
+        plain = [hull.metadata.get(PRIMITIVE) for hull in self.hulls]
+        return [None if each is None else Primitive.of_plain(each) for each in plain]
 
     @overload
     def __getitem__(self, index: int) -> trimesh.Trimesh: ...
@@ -41,6 +50,8 @@ class Result:
     def __repr__(self) -> str:
         faces = sum(len(hull.faces) for hull in self.hulls)
         words = [f"{len(self)} hull{'s' * (len(self) != 1)} of {self.name}", f"{faces} faces"]
+        shapes = Counter(each.kind for each in self.primitives if each is not None)
+        words[1:1] = [f"{shapes[kind]} as {kind}" for kind in PRIMITIVE_KINDS if shapes[kind]]
         worst = self.report.get("concavity", {}).get("max")
         if worst is not None:
             words.append(f"max concavity {worst:.4f}")

@@ -10,6 +10,7 @@ import trimesh
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
+from rlacd.solid.primitive import PRIMITIVE
 
 _BOX_VERTICES, _BOX_FACES = 8, 12
 
@@ -30,13 +31,14 @@ def in_input(
     Returns
     -------
     trimesh.Trimesh
-        Convex and closed, with positive volume.
+        Convex and closed, with positive volume. If the hull stands for a primitive, ``metadata`` describes it.
     """
     points = frame.to_input(hull.vertices)
     there = Hull.of(points)
     if there is None:
         there = plain_hull(points, max_vertices, max_faces)
-    return trimesh.Trimesh(there.vertices, there.faces, process=False)
+    metadata = {} if hull.primitive is None else {PRIMITIVE: hull.primitive.in_input(frame).as_plain()}
+    return trimesh.Trimesh(there.vertices, there.faces, process=False, metadata=metadata)
 
 
 def plain_hull(points: FloatArray, max_vertices: int | None, max_faces: int | None) -> Hull:

@@ -9,6 +9,7 @@ import numpy as np
 
 from rlacd import _native
 from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.primitive import Primitive
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,11 +23,15 @@ class Hull:
     faces : int32 [F, 3]
         Triangles, counter-clockwise seen from outside; coplanar triangles stay apart.
     volume : float
+    primitive : Primitive or None
+        What it stands for: a primitive inside it, which contains everything the hull has to. `volume` is then that of
+        the primitive.
     """
 
     vertices: FloatArray
     faces: IntArray
     volume: float
+    primitive: Primitive | None = None
 
     @cached_property
     def box(self) -> FloatArray:

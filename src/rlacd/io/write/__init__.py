@@ -16,12 +16,13 @@ from rlacd.io.write.encode import ENCODERS
 from rlacd.io.write.engines import encode_godot, encode_unreal
 from rlacd.io.write.folder import check_names, write_folder
 from rlacd.io.write.mjcf import encode_mjcf
-from rlacd.io.write.model import Model, check_model_options, mesh_files, model_of
+from rlacd.io.write.model import MeshFile, Model, check_model_options, model_of, shapes_of
 from rlacd.io.write.sdf import encode_sdf
 from rlacd.io.write.target import FORMATS, MODELS, WITH_MESHES, Target, check_file, check_name, hull_target, mesh_folder
 from rlacd.io.write.urdf import encode_urdf
 from rlacd.io.write.usd import encode_usd
 from rlacd.output_options import DENSITY
+from rlacd.primitive_kinds import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.result import Result
 
 __all__ = [
@@ -43,6 +44,11 @@ __all__ = [
 
 
 _WITH_MESHES = {"mjcf": encode_mjcf, "urdf": encode_urdf, "sdf": encode_sdf}
+_PRIMITIVES: dict[str, tuple[PrimitiveKind, ...]] = {
+    "mjcf": PRIMITIVE_KINDS,
+    "urdf": ("sphere", "box", "cylinder"),  # many of its readers refuse a file with a capsule
+    "sdf": PRIMITIVE_KINDS,
+}
 _ONE_FILE = {"usd": encode_usd, "unreal": encode_unreal, "godot": encode_godot}
 
 
@@ -80,10 +86,11 @@ def save(
 def _save_with_meshes(model: Model, target: Target, one_mesh: bool) -> None:
     folder = mesh_folder(target.path, target.file_format)
     stem = file_stem(model.name)
-    hulls, visual = mesh_files(model, stem, one_mesh=one_mesh)
-    files = {file.name: file.data for file in (*([] if visual is None else [visual]), *hulls)}
+    shapes, visual = shapes_of(model, stem, _PRIMITIVES[target.file_format], one_mesh=one_mesh)
+    meshes = [shape for shape in (visual, *shapes) if isinstance(shape, MeshFile)]
+    files = {file.name: file.data for file in meshes}
     check_names(folder, stem, list(files))
-    described = _WITH_MESHES[target.file_format](model, hulls, visual, folder.name)
+    described = _WITH_MESHES[target.file_format](model, shapes, visual, folder.name)
     write_folder(folder, stem, files, then=lambda: write_file(target.path, described))
 
 

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 from lxml import etree
 
-from rlacd.io.write.model import TO_Z_UP, MeshFile, Model, numbers
+from rlacd.io.write.model import TO_Z_UP, MeshFile, Model, Shape, numbers
 from rlacd.io.write.palette import hull_colors
+from rlacd.solid.primitive import Primitive
 
 LEAST_INERTIA = 1e-14
 """MuJoCo refuses moving bodies with less than 1e-15 of mass or inertia; those are rounded up."""
 
 
-def encode_mjcf(model: Model, hulls: list[MeshFile], visual: MeshFile | None, folder: str) -> bytes:
+def encode_mjcf(model: Model, shapes: list[Shape], visual: MeshFile | None, folder: str) -> bytes:
     """Describe the body; mesh files are in `folder`, relative to the model.
 
     Groups follow the convention of the MuJoCo Menagerie: 2 is visible, 3 collides and is hidden by default.
@@ -53,7 +54,23 @@ def encode_mjcf(model: Model, hulls: list[MeshFile], visual: MeshFile | None, fo
 
     if visual is not None:
         add("visual", f"{model.name}_visual", visual)
-    for index, (hull, color) in enumerate(zip(hulls, hull_colors(len(hulls)), strict=True)):
-        add("collision", f"{model.name}_{index:03d}", hull, rgba=numbers([*np.round(color / 255, 3), 1.0]))
+    for index, (shape, color) in enumerate(zip(shapes, hull_colors(len(shapes)), strict=True)):
+        name, rgba = f"{model.name}_{index:03d}", numbers([*np.round(color / 255, 3), 1.0])
+        if isinstance(shape, MeshFile):
+            add("collision", name, shape, rgba=rgba)
+        else:
+            etree.SubElement(body, "geom", {"name": name, "class": "collision", **_primitive(shape), "rgba": rgba})
     etree.indent(root)
     return bytes(etree.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"
+
+
+def _primitive(shape: Primitive) -> dict[str, str]:
+    """The attributes of a geom; MJCF has half lengths."""
+    radius, *length = shape.size
+    size = [extent / 2 for extent in shape.size] if shape.kind == "box" else [radius, *(each / 2 for each in length)]
+    return {
+        "type": shape.kind,
+        "size": numbers(size),
+        "pos": numbers(shape.centre),
+        "quat": numbers(shape.quaternion),
+    }

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import trimesh
@@ -15,10 +16,12 @@ from rlacd.fields import about, read
 from rlacd.io.write.encode import encode_obj, encode_plain_obj, hull_name
 from rlacd.io.write.single_precision import placed_hull, placed_mesh
 from rlacd.output_options import DENSITY, OutputOptions
+from rlacd.primitive_kinds import PrimitiveKind
 from rlacd.result import Result
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import Frame
 from rlacd.solid.mass import Mass, mass_of
+from rlacd.solid.primitive import Primitive
 
 TO_Z_UP = {
     "x": (math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0),
@@ -38,6 +41,8 @@ class Model:
         Printable, without line breaks; from the name of the user's file.
     hulls
         At least one.
+    primitives
+        For each hull what it stands for, or None.
     visual
         The input as it was read; None for a point cloud.
     mass
@@ -48,6 +53,7 @@ class Model:
 
     name: str
     hulls: Sequence[trimesh.Trimesh]
+    primitives: Sequence[Primitive | None]
     visual: trimesh.Trimesh | None
     mass: Mass
     up: str
@@ -72,6 +78,10 @@ class MeshFile:
     shift: FloatArray
 
 
+Shape: TypeAlias = "MeshFile | Primitive"
+"""What collides: a mesh file, or a primitive that needs none."""
+
+
 def model_of(result: Result, *, density: float = DENSITY, up: str = "z") -> Model:
     """Collect everything to be written of a decomposition.
 
@@ -92,7 +102,7 @@ def model_of(result: Result, *, density: float = DENSITY, up: str = "z") -> Mode
     name = printable_name(result.name).replace("::", "_")  # a separator between names in SDF
     if name == "world" or re.fullmatch("__.*__", name):
         name = f"body_{name.strip('_')}"  # simulators reserve those names
-    return Model(name, result.hulls, visual, mass, up)
+    return Model(name, result.hulls, result.primitives, visual, mass, up)
 
 
 def check_model_options(density: float, up: str) -> tuple[float, str]:
@@ -114,18 +124,24 @@ def node_name(name: str) -> str:
     return re.sub(r"\s+", "_", printable_name(name))
 
 
-def mesh_files(model: Model, stem: str, *, one_mesh: bool = False) -> tuple[list[MeshFile], MeshFile | None]:
-    """Encode the hulls and the visible mesh as OBJ files, ``<stem>_000.obj``, ... and ``<stem>_visual.obj``.
+def shapes_of(
+    model: Model, stem: str, kinds: Collection[PrimitiveKind], *, one_mesh: bool = False
+) -> tuple[list[Shape], MeshFile | None]:
+    """The shapes that collide and the visible mesh: OBJ files ``<stem>_000.obj``, ... and ``<stem>_visual.obj``.
 
-    With `one_mesh`, the hulls are the objects of a single file, ``<stem>_collision.obj``.
+    A hull that stands for a primitive of one of the `kinds` is that primitive. With `one_mesh`, the hulls are objects
+    of a single file, ``<stem>_collision.obj``.
 
     Raises
     ------
     OutputError
         A hull is too thin for the single precision of simulators.
     """
-    hulls = []
-    for index, hull in enumerate(model.hulls):
+    shapes: list[Shape] = []
+    for index, (hull, primitive) in enumerate(zip(model.hulls, model.primitives, strict=True)):
+        if primitive is not None and primitive.kind in kinds and not one_mesh:
+            shapes.append(primitive)
+            continue
         placed = placed_hull(hull)
         if placed is None:
             raise OutputError(
@@ -134,13 +150,21 @@ def mesh_files(model: Model, stem: str, *, one_mesh: bool = False) -> tuple[list
             )
         rounded, shift = placed
         exact = rounded if shift.any() else hull  # readers in double precision get the exact hull if possible
-        hulls.append(MeshFile(f"{stem}_{index:03d}.obj", encode_plain_obj(exact), shift))
+        shapes.append(MeshFile(f"{stem}_{index:03d}.obj", encode_plain_obj(exact), shift))
     if one_mesh:
-        hulls = [_one_file(model, f"{stem}_collision.obj", any(hull.shift.any() for hull in hulls))]
+        far = any(isinstance(shape, MeshFile) and shape.shift.any() for shape in shapes)
+        shapes = [_one_file(model, f"{stem}_collision.obj", far)]
     if model.visual is None:
-        return hulls, None
+        return shapes, None
     visual, shift = placed_mesh(model.visual)
-    return hulls, MeshFile(f"{stem}_visual.obj", encode_plain_obj(visual), shift)
+    return shapes, MeshFile(f"{stem}_visual.obj", encode_plain_obj(visual), shift)
+
+
+def primitive_sizes(shape: Primitive) -> dict[str, str]:
+    """The sizes of a primitive by the names that URDF and SDF share."""
+    if shape.kind == "box":
+        return {"size": numbers(shape.size)}
+    return dict(zip(("radius", "length"), map(numbers, ([size] for size in shape.size)), strict=False))
 
 
 def numbers(values: Sequence[float] | FloatArray) -> str:

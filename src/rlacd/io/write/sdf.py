@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from lxml import etree
 
-from rlacd.io.write.model import TO_Z_UP, MeshFile, Model, numbers
+from rlacd.io.write.model import TO_Z_UP, MeshFile, Model, Shape, numbers, primitive_sizes
 
 DRAKE = "http://drake.mit.edu"
 
 
-def encode_sdf(model: Model, hulls: list[MeshFile], visual: MeshFile | None, folder: str) -> bytes:
+def encode_sdf(model: Model, shapes: list[Shape], visual: MeshFile | None, folder: str) -> bytes:
     """Describe the body; mesh files are in `folder`, relative to the model."""
     root = etree.Element("sdf", version="1.9", nsmap={"drake": DRAKE})
     described = etree.SubElement(root, "model", name=model.name)
@@ -36,9 +36,19 @@ def encode_sdf(model: Model, hulls: list[MeshFile], visual: MeshFile | None, fol
 
     if visual is not None:
         add("visual", visual, f"{model.name}_visual")
-    for index, hull in enumerate(hulls):
-        # Without this element Drake treats the mesh as a surface, with far poorer contacts.
-        etree.SubElement(add("collision", hull, f"{model.name}_{index:03d}"), f"{{{DRAKE}}}declare_convex")
+    for index, shape in enumerate(shapes):
+        name = f"{model.name}_{index:03d}"
+        if isinstance(shape, MeshFile):
+            # Without this element Drake treats the mesh as a surface, with far poorer contacts.
+            etree.SubElement(add("collision", shape, name), f"{{{DRAKE}}}declare_convex")
+            continue
+        collision = etree.SubElement(link, "collision", name=name)
+        w, x, y, z = shape.quaternion
+        pose = etree.SubElement(collision, "pose", rotation_format="quat_xyzw")
+        pose.text = f"{numbers(shape.centre)} {numbers([x, y, z, w])}"
+        primitive = etree.SubElement(etree.SubElement(collision, "geometry"), shape.kind)
+        for tag, text in primitive_sizes(shape).items():
+            _text(primitive, tag, text)
     etree.indent(root)
     return bytes(etree.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from lxml import etree
 
-from rlacd.io.write.model import MeshFile, Model, numbers
+from rlacd.io.write.model import MeshFile, Model, Shape, numbers, primitive_sizes
 
 
-def encode_urdf(model: Model, hulls: list[MeshFile], visual: MeshFile | None, folder: str) -> bytes:
+def encode_urdf(model: Model, shapes: list[Shape], visual: MeshFile | None, folder: str) -> bytes:
     """Describe the body; mesh files are in `folder`, relative to the model."""
     robot = etree.Element("robot", name=model.name)
     # MuJoCo reads URDF too, but by default looks for every mesh beside it and drops visual-only geometry.
@@ -27,15 +27,19 @@ def encode_urdf(model: Model, hulls: list[MeshFile], visual: MeshFile | None, fo
         },
     )
 
-    def add(kind: str, file: MeshFile, name: str) -> None:
-        shape = etree.SubElement(link, kind, name=name)
-        etree.SubElement(shape, "origin", xyz=numbers(file.shift), rpy="0 0 0")
-        geometry = etree.SubElement(shape, "geometry")
-        etree.SubElement(geometry, "mesh", filename=f"{folder}/{file.name}")
+    def add(kind: str, shape: Shape, name: str) -> None:
+        described = etree.SubElement(link, kind, name=name)
+        if isinstance(shape, MeshFile):
+            etree.SubElement(described, "origin", xyz=numbers(shape.shift), rpy="0 0 0")
+            geometry = etree.SubElement(described, "geometry")
+            etree.SubElement(geometry, "mesh", filename=f"{folder}/{shape.name}")
+        else:
+            etree.SubElement(described, "origin", xyz=numbers(shape.centre), rpy=numbers(shape.roll_pitch_yaw))
+            etree.SubElement(etree.SubElement(described, "geometry"), shape.kind, primitive_sizes(shape))
 
     if visual is not None:
         add("visual", visual, f"{model.name}_visual")
-    for index, hull in enumerate(hulls):
-        add("collision", hull, f"{model.name}_{index:03d}")
+    for index, shape in enumerate(shapes):
+        add("collision", shape, f"{model.name}_{index:03d}")
     etree.indent(robot)
     return bytes(etree.tostring(robot, encoding="utf-8", xml_declaration=True)) + b"\n"

@@ -15,6 +15,7 @@ from rlacd.io.write.encode import hull_name
 from rlacd.io.write.model import Model
 from rlacd.io.write.palette import hull_colors, linear_from_srgb
 from rlacd.io.write.single_precision import placed_hull, placed_mesh
+from rlacd.solid.primitive import Primitive
 
 
 def require_usd() -> None:
@@ -66,17 +67,20 @@ def encode_usd(model: Model, ending: str) -> bytes:
         _mesh(stage, body.GetPath().AppendChild("visual"), visual, shift)
     group = UsdGeom.Scope.Define(stage, body.GetPath().AppendChild("collision"))
     UsdGeom.Imageable(group).CreatePurposeAttr(UsdGeom.Tokens.guide)
-    for index, (hull, color) in enumerate(zip(model.hulls, hull_colors(len(model.hulls)), strict=True)):
+    colors = hull_colors(len(model.hulls))
+    for index, (hull, shape, color) in enumerate(zip(model.hulls, model.primitives, colors, strict=True)):
+        path = group.GetPath().AppendChild(hull_name(index))
+        if shape is not None:
+            _collider(_primitive(stage, path, shape), color)
+            continue
         placed = placed_hull(hull)
         if placed is None:
             raise OutputError(
                 f"cannot write {hull_name(index)} as USD: it is too thin for single precision; "
                 "write .obj, .ply or .stl, which keep double precision."
             )
-        mesh = _mesh(stage, group.GetPath().AppendChild(hull_name(index)), *placed)
-        mesh.CreatePurposeAttr(UsdGeom.Tokens.guide)
-        mesh.CreateDisplayColorAttr([Gf.Vec3f(*linear_from_srgb(color).tolist())])
-        UsdPhysics.CollisionAPI.Apply(mesh.GetPrim())
+        mesh = _mesh(stage, path, *placed)
+        _collider(mesh, color)
         UsdPhysics.MeshCollisionAPI.Apply(mesh.GetPrim()).CreateApproximationAttr(UsdPhysics.Tokens.convexHull)
     return _bytes(layer, ending)
 
@@ -100,6 +104,34 @@ def _mesh(stage: Any, path: Any, mesh: trimesh.Trimesh, shift: np.ndarray[Any, A
     if shift.any():
         prim.AddTranslateOp().Set(Gf.Vec3d(*shift.tolist()))
     return prim
+
+
+def _primitive(stage: Any, path: Any, shape: Primitive) -> Any:
+    from pxr import Gf, UsdGeom
+
+    kind = {"box": UsdGeom.Cube, "sphere": UsdGeom.Sphere, "capsule": UsdGeom.Capsule, "cylinder": UsdGeom.Cylinder}
+    prim = kind[shape.kind].Define(stage, path)
+    w, x, y, z = shape.quaternion
+    prim.AddTranslateOp().Set(Gf.Vec3d(*shape.centre.tolist()))
+    prim.AddOrientOp(UsdGeom.XformOp.PrecisionDouble).Set(Gf.Quatd(w, x, y, z))
+    if shape.kind == "box":
+        prim.CreateSizeAttr(1.0)
+        prim.AddScaleOp(UsdGeom.XformOp.PrecisionDouble).Set(Gf.Vec3d(*shape.size))
+    else:
+        prim.CreateRadiusAttr(shape.size[0])
+    if shape.kind in ("capsule", "cylinder"):
+        prim.CreateAxisAttr(UsdGeom.Tokens.z)
+        prim.CreateHeightAttr(shape.size[1])
+    prim.CreateExtentAttr(UsdGeom.Boundable.ComputeExtentFromPlugins(prim, 0.0))
+    return prim
+
+
+def _collider(prim: Any, color: Any) -> None:
+    from pxr import Gf, UsdGeom, UsdPhysics
+
+    prim.CreatePurposeAttr(UsdGeom.Tokens.guide)
+    prim.CreateDisplayColorAttr([Gf.Vec3f(*linear_from_srgb(color).tolist())])
+    UsdPhysics.CollisionAPI.Apply(prim.GetPrim())
 
 
 def _set_mass(api: Any, model: Model) -> None:

@@ -1,0 +1,277 @@
+"""Parts that become a box, sphere, capsule or cylinder: fitted around the hull, kept if the criterion is still met."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Collection, Iterator
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from rlacd.criteria import Criterion
+from rlacd.primitive_kinds import PRIMITIVE_KINDS, PrimitiveKind
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.component import Part
+from rlacd.solid.hull import Hull
+from rlacd.solid.primitive import Primitive
+
+SLACK = 1e-9
+"""Primitives are larger than what they are fitted to by this, so that rounding leaves no point outside (frame)."""
+
+SIMPLER = 1.25
+"""A simpler primitive is preferred unless its volume exceeds that of the tightest by this factor."""
+
+FACETS, EDGES = 12, 6
+"""Directions of facets and edges of the hull that are tried as axes, largest first, besides principal axes and the
+frame's."""
+
+SAME_DIRECTION = 0.9998
+"""Cosine of the angle (1 degree) below which two directions are tried once."""
+
+ROUND_AXES = 4
+"""Axes about which capsules and cylinders are fitted: those with the least volume by a lower bound."""
+
+RADII = np.linspace(1.0, 1.4, 21)
+"""Radii of capsules that are tried, over the least one: a wider capsule may be shorter."""
+
+
+def primitive_part(
+    part: Part,
+    criterion: Criterion,
+    kinds: Collection[PrimitiveKind],
+    max_vertices: int | None = None,
+    max_faces: int | None = None,
+    slack: float = SLACK,
+) -> Part:
+    """Get the part with a primitive for a hull, if one meets the criterion; otherwise the same part.
+
+    Of all that meet it, the simplest is taken whose volume is within `SIMPLER` of the least. The hull of the result is
+    a convex polyhedron around the primitive, within the limits. The criterion decides on it as strictly as on any hull,
+    except that its volume is the primitive's own.
+
+    Parameters
+    ----------
+    part : Part
+    criterion : Criterion
+    kinds : collection of str
+        Those to choose from.
+    max_vertices, max_faces : int, optional
+        Limits on the polyhedron's vertices and triangles.
+    slack : float
+        How much larger a primitive is made than needed, for later rounding.
+    """
+    fitted = [
+        primitive.grown(primitive.beyond(part.hull.vertices) + slack) for primitive in fit_primitives(part.hull, kinds)
+    ]
+
+    def judged(primitive: Primitive) -> Part | None:
+        for corners in primitive.polyhedra():
+            hull = Hull.of(np.ascontiguousarray(corners))
+            if hull is None or len(hull.vertices) > (max_vertices or np.inf) or len(hull.faces) > (max_faces or np.inf):
+                return None
+            if criterion.screen.excludes(part.volume, primitive.volume):
+                return None
+            candidate = part.with_hull(replace(hull, volume=primitive.volume, primitive=primitive))
+            if criterion.is_met(candidate):
+                return candidate
+        return None
+
+    fitted.sort(key=lambda primitive: primitive.volume)
+    for place, tightest in enumerate(fitted):
+        found = judged(tightest)
+        if found is None:
+            continue
+        simpler = [
+            other
+            for other in fitted[place + 1 :]
+            if other.volume <= SIMPLER * tightest.volume and _rank(other) < _rank(tightest)
+        ]
+        return next((better for better in map(judged, sorted(simpler, key=_rank)) if better is not None), found)
+    return part
+
+
+def fit_primitives(hull: Hull, kinds: Collection[PrimitiveKind] = PRIMITIVE_KINDS) -> list[Primitive]:
+    """Fit a primitive of each kind around a hull, with little volume.
+
+    The sphere is the smallest. The box is the smallest of those with an edge along one of the candidate axes, which
+    include the normals of the largest facets; capsules and cylinders are the smallest about candidate axes.
+    """
+    points = hull.vertices
+    fitted: list[Primitive] = []
+    if "sphere" in kinds:
+        centre, radius = smallest_ball(points)
+        fitted.append(Primitive("sphere", centre, np.eye(3), (radius,)))
+    if not {"box", "capsule", "cylinder"} & set(kinds):
+        return fitted
+    shadows = [shadow for axis in _candidate_axes(hull) if (shadow := _Shadow.of(points, axis)) is not None]
+    if "box" in kinds:
+        fitted += sorted((shadow.box() for shadow in shadows), key=lambda box: box.volume)[:1]
+    shadows = sorted(shadows, key=lambda shadow: shadow.area * shadow.length)[:ROUND_AXES]
+    circles = [(shadow, *smallest_ball(shadow.outline)) for shadow in shadows]
+    if "cylinder" in kinds:
+        cylinders = [shadow.cylinder(centre, radius) for shadow, centre, radius in circles]
+        fitted += sorted(cylinders, key=lambda cylinder: cylinder.volume)[:1]
+    if "capsule" in kinds:
+        capsules = [shadow.capsule(centre, radius) for shadow, centre, radius in circles]
+        fitted += sorted(capsules, key=lambda capsule: capsule.volume)[:1]
+    return fitted
+
+
+def smallest_ball(points: FloatArray) -> tuple[FloatArray, float]:
+    """The smallest ball around points [N, D]: centre [D] and radius.
+
+    Farthest points join the support set one at a time, and the smallest ball of the set is found among the
+    circumscribed balls of its subsets (Gärtner, "Fast and Robust Smallest Enclosing Balls", ESA 1999).
+    """
+    support = points[:1]
+    centre, radius = points[0], 0.0
+    for _ in range(1000):
+        distances = np.linalg.norm(points - centre, axis=1)
+        farthest = int(distances.argmax())
+        if distances[farthest] <= radius * (1 + 1e-12):
+            break
+        support, larger = _least_support(np.vstack([points[farthest], support]))
+        if larger[1] <= radius:  # rounding leaves nothing to gain
+            return centre, float(distances.max())
+        centre, radius = larger
+    return centre, radius
+
+
+def _least_support(points: FloatArray) -> tuple[FloatArray, tuple[FloatArray, float]]:
+    """The subset of a few points, the first among it, whose circumscribed ball is the smallest around all of them."""
+    balls = []
+    for size in range(1, min(len(points), points.shape[1] + 1) + 1):
+        for rest in itertools.combinations(range(1, len(points)), size - 1):
+            subset = points[[0, *rest]]
+            offsets = subset[1:] - subset[0]
+            # In the subset's affine hull, equally far from all of it.
+            towards = np.linalg.lstsq(2 * offsets, (offsets**2).sum(axis=1), rcond=None)[0] if size > 1 else 0.0
+            centre = subset[0] + towards
+            distances = np.linalg.norm(points - centre, axis=1)
+            radius = float(distances[[0, *rest]].max())
+            if distances.max() <= radius * (1 + 1e-10):
+                balls.append((subset, (centre, float(distances.max()))))
+    return min(balls, key=lambda ball: ball[1][1])
+
+
+class _Shadow:
+    """A hull seen along an axis: the outline of its projection, and its extent along the axis.
+
+    Attributes
+    ----------
+    outline : float64 [N, 2]
+        Corners of the projection's convex hull, counter-clockwise.
+    area, length : float
+    """
+
+    def __init__(self, points: FloatArray, axes: FloatArray, seen: ConvexHull) -> None:
+        self._axes = axes
+        self._points = points @ axes
+        self.outline: FloatArray = self._points[seen.vertices, :2]
+        self.area = float(seen.volume)
+        along = self._points[:, 2]
+        self._middle = float(along.min() + along.max()) / 2
+        self.length = float(np.ptp(along))
+
+    @classmethod
+    def of(cls, points: FloatArray, axis: FloatArray) -> _Shadow | None:
+        """None if the projection is too thin for its convex hull to be computed."""
+        axes = _axes_along(axis)
+        try:
+            return cls(points, axes, ConvexHull((points @ axes)[:, :2]))
+        except QhullError:
+            return None
+
+    def box(self) -> Primitive:
+        """The smallest box with edges along the axis: a side of its base lies along one of the outline."""
+        sides = np.roll(self.outline, -1, axis=0) - self.outline
+        sides /= np.linalg.norm(sides, axis=1)[:, None]
+        across = np.stack([-sides[:, 1], sides[:, 0]], axis=1)
+        extents = [self.outline @ directions.T for directions in (sides, across)]
+        widths = [np.ptp(extent, axis=0) for extent in extents]
+        best = int((widths[0] * widths[1]).argmin())
+        base = np.eye(3)
+        base[:2, 0], base[:2, 1] = sides[best], across[best]
+        middle = [float(extent[:, best].min() + extent[:, best].max()) / 2 for extent in extents]
+        axes = self._axes @ base
+        size = float(widths[0][best]), float(widths[1][best]), self.length
+        return Primitive("box", axes @ [*middle, self._middle], axes, size)
+
+    def cylinder(self, centre: FloatArray, radius: float) -> Primitive:
+        """The smallest cylinder along the axis, given the smallest circle around the outline."""
+        place = self._axes @ [*centre, self._middle]
+        return Primitive("cylinder", place, self._axes, (radius, self.length))
+
+    def capsule(self, centre: FloatArray, radius: float) -> Primitive:
+        """The smallest capsule about the circle's axis."""
+        away = ((self._points[:, :2] - centre) ** 2).sum(axis=1)
+        best: Primitive | None = None
+        for wider in radius * RADII:
+            reach = np.sqrt(np.maximum(wider**2 - away, 0.0))  # of the ends' spheres beyond their centres
+            first, last = float((self._points[:, 2] + reach).min()), float((self._points[:, 2] - reach).max())
+            length = max(last - first, 0.0)
+            place = self._axes @ [*centre, (first + last) / 2]
+            capsule = Primitive("capsule", place, self._axes, (float(wider), length))
+            if best is None or capsule.volume < best.volume:
+                best = capsule
+        assert best is not None
+        return best
+
+
+def _candidate_axes(hull: Hull) -> FloatArray:
+    """Directions [N, 3] along which a primitive may lie: of large facets and long edges, principal, and the frame's."""
+    corners = hull.vertices[hull.faces]
+    edges = (np.roll(corners, -1, axis=1) - corners).reshape(-1, 3)
+    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    centred = hull.vertices - hull.vertices.mean(axis=0)
+    principal = np.linalg.eigh(centred.T @ centred)[1].T
+    groups = (
+        _distinct(crosses, FACETS, together=True),
+        _distinct(edges, EDGES),
+        [*principal, *np.eye(3)],
+    )
+    return np.array(list(_new_directions(itertools.chain(*groups))))
+
+
+def _distinct(vectors: FloatArray, most: int, together: bool = False) -> list[FloatArray]:
+    """The directions of the longest vectors [N, 3]; `together`, of the largest sums of parallel ones."""
+    lengths = np.linalg.norm(vectors, axis=1)
+    vectors, lengths = vectors[lengths > 0], lengths[lengths > 0]
+    if together:
+        units = vectors / lengths[:, None]
+        # Coplanar triangles have equal normals up to rounding, and opposite facets are one direction.
+        units *= np.where(np.abs(units).max(axis=1) == units.max(axis=1), 1.0, -1.0)[:, None]
+        _, first, group = np.unique(np.round(units, 4), axis=0, return_index=True, return_inverse=True)
+        lengths = np.bincount(group.ravel(), weights=lengths)
+        vectors = units[first]
+    order = np.argsort(-lengths, kind="stable")
+    found: list[FloatArray] = []
+    for direction in _new_directions(iter(vectors[order])):
+        found.append(direction)
+        if len(found) == most:
+            break
+    return found
+
+
+def _new_directions(vectors: Iterator[FloatArray]) -> Iterator[FloatArray]:
+    """Unit vectors, without those nearly parallel to an earlier one."""
+    seen = np.zeros((0, 3))
+    for vector in vectors:
+        unit = vector / np.linalg.norm(vector)
+        if not (np.abs(seen @ unit) > SAME_DIRECTION).any():
+            seen = np.vstack([seen, unit])
+            yield unit
+
+
+def _axes_along(axis: FloatArray) -> FloatArray:
+    """A rotation whose third column is the axis."""
+    across = np.zeros(3)
+    across[int(np.abs(axis).argmin())] = 1.0
+    x = np.cross(across, axis)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(axis, x), axis], axis=1)
+
+
+def _rank(primitive: Primitive) -> int:
+    return PRIMITIVE_KINDS.index(primitive.kind)

@@ -1,0 +1,439 @@
+"""Primitives: fitted around parts, tested as strictly as hulls, and read as primitives by the programs they are for."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
+from lxml import etree
+
+import rlacd
+from rlacd.errors import OptionError
+from rlacd.merge.primitives import fit_primitives, smallest_ball
+from rlacd.primitive_kinds import PRIMITIVE_KINDS, PrimitiveKind
+from rlacd.solid.hull import Hull
+from tests.hulls import assert_convex_hull
+from tests.models import TABLE_VOLUME, fall_in_bullet, fall_in_drake, fall_in_mujoco, table
+
+Array = npt.NDArray[np.float64]
+
+DIRECTIONS: Array = trimesh.creation.icosphere(subdivisions=2).vertices
+
+SIZES: dict[PrimitiveKind, tuple[float, ...]] = {
+    "sphere": (0.4,),
+    "capsule": (0.2, 0.7),
+    "box": (0.3, 0.5, 0.9),
+    "cylinder": (0.3, 0.8),
+}
+
+
+def pose(seed: int) -> tuple[Array, Array]:
+    random = np.random.default_rng(seed)
+    return trimesh.transformations.random_rotation_matrix(random.random(3))[:3, :3], random.uniform(-1, 1, 3)
+
+
+def support(kind: str, size: tuple[float, ...], axes: Array, centre: Array) -> Array:
+    """How far a primitive reaches in `DIRECTIONS`, by its textbook support function."""
+    own = DIRECTIONS @ axes
+    if kind == "box":
+        reach = np.abs(own) @ np.array(size) / 2
+    else:
+        radius, length = (*size, 0.0)[:2]
+        around = np.hypot(own[:, 0], own[:, 1]) if kind == "cylinder" else 1.0
+        reach = radius * around + length / 2 * np.abs(own[:, 2])
+    return np.asarray(DIRECTIONS @ centre + reach)
+
+
+def support_of(primitive: rlacd.Primitive) -> Array:
+    return support(primitive.kind, primitive.size, primitive.axes, primitive.centre)
+
+
+def points_on(kind: str, seed: int) -> Array:
+    """Points spread over a primitive's surface, with the corners of a box and the rims of a cylinder."""
+    size, (axes, centre) = SIZES[kind], pose(seed)  # type: ignore[index]
+    if kind == "box":
+        own = np.array(list(itertools.product((-0.5, 0.5), repeat=3))) * size
+    else:
+        radius, length = (*size, 0.0)[:2]
+        angles = np.linspace(0, 2 * np.pi, 48, endpoint=False)
+        ring = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+        ends = np.array([[0, 0, -length / 2], [0, 0, length / 2]])
+        shape = ring if kind == "cylinder" else trimesh.creation.icosphere(subdivisions=4).vertices
+        own = (ends[:, None] + radius * shape).reshape(-1, 3)
+    return np.asarray(own @ axes.T + centre)
+
+
+def solid(kind: str, seed: int = 1) -> trimesh.Trimesh:
+    return trimesh.convex.convex_hull(points_on(kind, seed))
+
+
+def samples_on(primitive: rlacd.Primitive, count: int = 400) -> Array:
+    """Points of the true, round surface: the farthest from the centre along each direction that lies inside."""
+    random = np.random.default_rng(0)
+    ways = random.normal(size=(count, 3))
+    ways /= np.linalg.norm(ways, axis=1)[:, None]
+    near, far = np.zeros(count), np.full(count, 10.0)
+    for _ in range(60):
+        middle = (near + far) / 2
+        inside = depth(primitive, primitive.centre + middle[:, None] * ways) >= 0
+        near, far = np.where(inside, middle, near), np.where(inside, far, middle)
+    return np.asarray(primitive.centre + near[:, None] * ways)
+
+
+def depth(primitive: rlacd.Primitive, points: Array) -> Array:
+    """At least 0 for points inside; written apart from the code that is tested."""
+    x, y, z = ((points - primitive.centre) @ primitive.axes).T
+    if primitive.kind == "box":
+        a, b, c = primitive.size
+        return np.minimum.reduce([a / 2 - abs(x), b / 2 - abs(y), c / 2 - abs(z)])
+    radius, length = (*primitive.size, 0.0)[:2]
+    if primitive.kind == "cylinder":
+        return np.minimum(radius - np.hypot(x, y), length / 2 - abs(z))
+    return np.asarray(radius - np.sqrt(x**2 + y**2 + np.clip(abs(z) - length / 2, 0, None) ** 2))
+
+
+# --- fits -------------------------------------------------------------------------------------------------------------
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(2, 3), st.integers(1, 40))
+def test_the_smallest_ball_touches_points_that_hold_it(seed: int, dimensions: int, count: int) -> None:
+    """It contains all points, and its centre is in the hull of those on its surface: then no smaller ball exists."""
+    points = np.random.default_rng(seed).normal(size=(count, dimensions)).round(1)
+    centre, radius = smallest_ball(points)
+    distances = np.linalg.norm(points - centre, axis=1)
+    assert distances.max() <= radius * (1 + 1e-9) + 1e-15
+    touching = points[distances >= radius * (1 - 1e-7)]
+    from scipy.optimize import nnls
+
+    _, residual = nnls(np.vstack([(touching - centre).T, np.ones(len(touching))]), [*np.zeros(dimensions), 1.0])
+    assert residual < 1e-5
+
+
+@pytest.mark.parametrize("kind", PRIMITIVE_KINDS)
+@pytest.mark.parametrize("seed", range(4))
+def test_a_primitive_of_any_pose_is_found_again(kind: PrimitiveKind, seed: int) -> None:
+    hull = Hull.of(points_on(kind, seed))
+    assert hull is not None
+    (fitted,) = fit_primitives(hull, [kind])
+    assert fitted.kind == kind
+    assert fitted.beyond(hull.vertices) < 1e-9
+    assert fitted.volume == pytest.approx(rlacd.Primitive(kind, np.zeros(3), np.eye(3), SIZES[kind]).volume, rel=0.02)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_fits_and_their_polyhedra_contain_any_hull(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    hull = Hull.of(random.normal(size=(random.integers(4, 60), 3)) * random.choice([1e-3, 0.1, 1.0], 3))
+    assert hull is not None
+    fits = fit_primitives(hull)
+    assert [fit.kind for fit in fits].count("sphere") == 1
+    for fit in fits:
+        grown = fit.grown(fit.beyond(hull.vertices) + 1e-9)
+        assert depth(grown, hull.vertices).min() >= 0
+        reach = support_of(grown)
+        for corners in grown.polyhedra():
+            slack = (corners @ DIRECTIONS.T).max(axis=0) - reach
+            assert slack.min() > -1e-9
+            assert slack.max() < 0.08 * max(grown.size)
+
+
+# --- decompositions ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", PRIMITIVE_KINDS)
+def test_a_solid_that_is_a_primitive_becomes_it(kind: PrimitiveKind) -> None:
+    mesh = solid(kind)
+    result = rlacd.decompose(mesh, primitives=True, quality="fast", threads=1)
+    (found,) = result.primitives
+    assert found is not None
+    assert found.kind == kind
+    assert result.report["primitives"] == {**dict.fromkeys((*PRIMITIVE_KINDS, "hull"), 0), kind: 1}
+    assert found.volume == pytest.approx(mesh.volume, rel=0.02)
+    assert depth(found, mesh.vertices).min() >= 0
+    assert f"1 as {kind}" in repr(result)
+
+
+def test_a_table_is_five_boxes_of_the_right_size() -> None:
+    result = rlacd.decompose(table(), primitives=True, threads=1)
+    boxes = primitives_of(result)
+    assert [box.kind for box in boxes] == ["box"] * 5
+    assert sorted(max(boxes, key=lambda box: box.volume).size) == pytest.approx([0.02, 0.3, 0.4], abs=1e-6)
+    assert result.report["mass"]["volume_abs"] == pytest.approx(TABLE_VOLUME, rel=1e-9)
+
+
+def test_without_the_option_nothing_changes_and_the_report_counts_none() -> None:
+    plain = rlacd.decompose(table(), threads=1)
+    assert plain.primitives == [None] * len(plain)
+    assert "primitives" not in plain.report
+    none = rlacd.decompose(table(), primitives=False, threads=1)
+    assert all((a.vertices == b.vertices).all() for a, b in zip(plain, none, strict=True))
+
+
+def assert_true(result: rlacd.Decomposition, threshold: float = 0.05) -> None:
+    """Every hull contains its primitive, the primitives cover the input, and reach no farther than the threshold."""
+    scale = result.report["scale"]
+    for hull, primitive in zip(result, result.primitives, strict=True):
+        assert_convex_hull(hull)
+        if primitive is not None:
+            assert ((hull.vertices @ DIRECTIONS.T).max(axis=0) - support_of(primitive)).min() * scale > -1e-8
+    assert result.report["concavity"]["max"] <= threshold
+    assert result.report["hausdorff"]["over"] <= threshold + 5e-3
+    surface, _ = trimesh.sample.sample_surface(result.source, 3000, seed=0)
+    inside = np.zeros(len(surface), dtype=bool)
+    for hull, primitive in zip(result, result.primitives, strict=True):
+        if primitive is not None:
+            inside |= depth(primitive, surface) * scale >= -1e-7
+        else:
+            planes = hull.face_normals, np.einsum("fi,fi->f", hull.face_normals, hull.triangles[:, 0])
+            inside |= ((surface @ planes[0].T - planes[1]) * scale <= 1e-6).all(axis=1)
+    assert inside.mean() > 0.999 - result.report["hausdorff"]["under"] * 100
+    for primitive in result.primitives:
+        if primitive is not None:
+            _, distances, _ = trimesh.proximity.closest_point(result.source, samples_on(primitive, 60))
+            on_border = distances * scale
+            assert np.median(on_border) <= threshold + 5e-3
+
+
+def test_primitives_of_real_meshes_cover_them_within_the_threshold(corpus: Path) -> None:
+    names = ("raw/chair_ivar_0668.obj", "test/vhacd/hornbug.ply", "test/vhacd/beshon.ply")
+    shapes = 0
+    for name in names:
+        result = rlacd.decompose(corpus / name, primitives=True, quality="fast", threads=1)
+        shapes += sum(each is not None for each in result.primitives)
+        assert_true(result)
+    assert shapes > 10
+
+
+def test_limits_hold_for_the_polyhedra_too() -> None:
+    ball = trimesh.creation.icosphere(subdivisions=4)
+    result = rlacd.decompose(ball, primitives=True, max_vertices=64, threshold=0.2, quality="fast", threads=1)
+    assert [each.kind for each in result.primitives if each is not None] == ["sphere"]
+    assert len(result[0].vertices) == 42
+    low = rlacd.decompose(table(), primitives=["box", "cylinder"], max_vertices=8, quality="fast", threads=1)
+    assert max(len(hull.vertices) for hull in low) <= 8
+    assert {each.kind for each in low.primitives if each is not None} == {"box"}
+
+
+def test_only_the_kinds_named_are_used() -> None:
+    for kinds in (["box"], "box", ("box", "sphere"), " box , sphere "):
+        result = rlacd.decompose(solid("cylinder"), primitives=kinds, threshold=0.5, quality="fast", threads=1)  # type: ignore[arg-type]
+        assert all(each is None or each.kind in ("box", "sphere") for each in result.primitives)
+    assert result.report["options"]["primitives"] == ["sphere", "box"]
+
+
+def test_bytes_do_not_depend_on_threads(tmp_path: Path) -> None:
+    files = [
+        rlacd.decompose(table(), primitives=True, threads=threads).save(tmp_path / str(threads) / "table.xml")
+        for threads in (1, 2)
+    ]
+    assert files[0].read_bytes() == files[1].read_bytes()
+
+
+@pytest.mark.parametrize("wrong", ["ball", ["box", "cone"], "", 3, [3], {"box": 1}])
+def test_what_is_no_primitive_is_refused_in_one_sentence(wrong: Any) -> None:
+    with pytest.raises(OptionError, match=r"primitives is .*; it has to be True, or some of sphere, capsule, box"):
+        rlacd.decompose(table(), primitives=wrong)
+
+
+def test_primitives_need_the_concavity_criterion() -> None:
+    with pytest.raises(OptionError, match="primitives"):
+        rlacd.decompose(table(), criterion=rlacd.NavigableSpace(), primitives=True)
+
+
+# --- programs that read them ------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def shapes() -> rlacd.Decomposition:
+    """One of each kind, turned, side by side, and a tetrahedron, which is none of them."""
+    meshes = [solid(kind, seed).apply_translation([2.2 * seed, 0, 0]) for seed, kind in enumerate(PRIMITIVE_KINDS)]
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    meshes.append(trimesh.convex.convex_hull(corners).apply_translation([9.0, 0, 0]))
+    joined = trimesh.util.concatenate(meshes)
+    result = rlacd.decompose(joined, primitives=True, threshold=0.01, quality="fast", threads=1)
+    kinds = [None if each is None else each.kind for each in result.primitives]
+    assert set(kinds) == {*PRIMITIVE_KINDS, None}, kinds
+    assert len(kinds) == 5
+    return result
+
+
+def primitives_of(result: rlacd.Decomposition) -> list[rlacd.Primitive]:
+    return [each for each in result.primitives if each is not None]
+
+
+def test_mujoco_has_the_same_shapes(tmp_path: Path, shapes: rlacd.Decomposition) -> None:
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    model = mujoco.MjModel.from_xml_path(str(shapes.save(tmp_path / "shapes.xml")))
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    kinds = {
+        mujoco.mjtGeom.mjGEOM_BOX: "box",
+        mujoco.mjtGeom.mjGEOM_SPHERE: "sphere",
+        mujoco.mjtGeom.mjGEOM_CAPSULE: "capsule",
+        mujoco.mjtGeom.mjGEOM_CYLINDER: "cylinder",
+    }
+    geoms = [g for g in range(model.ngeom) if model.geom_contype[g]]
+    assert len(geoms) == len(shapes)
+    for geom, primitive in zip(geoms, shapes.primitives, strict=True):
+        kind = kinds.get(mujoco.mjtGeom(model.geom_type[geom]))
+        assert kind == (None if primitive is None else primitive.kind)
+        if primitive is not None:
+            half, axes = model.geom_size[geom], data.geom_xmat[geom].reshape(3, 3)
+            size = tuple(2 * half) if kind == "box" else (half[0], 2 * half[1])[: len(primitive.size)]
+            there = support(str(kind), size, axes, data.geom_xpos[geom])
+            assert there == pytest.approx(support_of(primitive), abs=1e-9)
+    volume = sum(abs(body.volume) for body in shapes.source.split())
+    assert model.body_mass[1] == pytest.approx(1000 * volume, rel=1e-6)
+
+
+def test_bullet_has_the_same_shapes(tmp_path: Path, shapes: rlacd.Decomposition) -> None:
+    bullet = pytest.importorskip("pybullet", reason="the extra sim is not installed")
+    client = bullet.connect(bullet.DIRECT)
+    try:
+        body = bullet.loadURDF(
+            str(shapes.save(tmp_path / "shapes.urdf")),
+            flags=bullet.URDF_USE_INERTIA_FROM_FILE | bullet.URDF_USE_IMPLICIT_CYLINDER,
+            physicsClientId=client,
+        )
+        found = bullet.getCollisionShapeData(body, -1, physicsClientId=client)
+        centre = np.array(bullet.getDynamicsInfo(body, -1, physicsClientId=client)[3])
+        turned = np.array(bullet.getDynamicsInfo(body, -1, physicsClientId=client)[4])
+    finally:
+        bullet.disconnect(client)
+    body_axes = trimesh.transformations.quaternion_matrix([turned[3], *turned[:3]])[:3, :3]
+    kinds = {bullet.GEOM_BOX: "box", bullet.GEOM_SPHERE: "sphere", bullet.GEOM_CYLINDER: "cylinder"}
+    for data, primitive in zip(found, shapes.primitives, strict=True):
+        _, _, shape, size, _, place, (x, y, z, w) = data
+        kind = kinds.get(shape)
+        if primitive is None or primitive.kind == "capsule":  # written as a mesh: URDF proper has no capsules
+            assert kind is None
+            continue
+        assert kind == primitive.kind
+        given = {"box": tuple(size), "sphere": (size[0],), "cylinder": (size[1], size[0])}[primitive.kind]
+        axes = body_axes @ trimesh.transformations.quaternion_matrix([w, x, y, z])[:3, :3]
+        there = support(primitive.kind, given, axes, centre + body_axes @ place)
+        assert there == pytest.approx(support_of(primitive), abs=1e-5)
+
+
+def test_drake_has_the_same_shapes(tmp_path: Path, shapes: rlacd.Decomposition) -> None:
+    pytest.importorskip("pydrake", reason="drake is not installed")
+    from pydrake.geometry import Box, Capsule, Cylinder, Role, Sphere
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+    from pydrake.systems.framework import DiagramBuilder
+
+    plant, scene = AddMultibodyPlantSceneGraph(DiagramBuilder(), 0.001)
+    (instance,) = Parser(plant).AddModels(str(shapes.save(tmp_path / "shapes.sdf")))
+    (index,) = plant.GetBodyIndices(instance)
+    inspector = scene.model_inspector()
+    ids = plant.GetCollisionGeometriesForBody(plant.get_body(index))
+    assert len(ids) == len(shapes)
+    sizes = {
+        Box: lambda shape: tuple(shape.size()),
+        Sphere: lambda shape: (shape.radius(),),
+        Capsule: lambda shape: (shape.radius(), shape.length()),
+        Cylinder: lambda shape: (shape.radius(), shape.length()),
+    }
+    named = {inspector.GetName(i).split("::")[-1]: i for i in ids}
+    for name, primitive in zip(sorted(named), shapes.primitives, strict=True):
+        assert inspector.GetProperties(named[name], Role.kProximity) is not None
+        shape, place = inspector.GetShape(named[name]), inspector.GetPoseInFrame(named[name])
+        if primitive is None:
+            assert type(shape) not in sizes
+            continue
+        size = sizes[type(shape)](shape)
+        assert type(shape).__name__.lower() == primitive.kind
+        there = support(primitive.kind, size, place.rotation().matrix(), place.translation())
+        assert there == pytest.approx(support_of(primitive), abs=1e-9)
+
+
+def test_usd_has_the_same_shapes_and_its_validators_find_nothing(tmp_path: Path, shapes: rlacd.Decomposition) -> None:
+    pytest.importorskip("pxr", reason="the extra usd is not installed")
+    from pxr import Usd, UsdGeom, UsdPhysics, UsdValidation
+
+    stage = Usd.Stage.Open(str(shapes.save(tmp_path / "shapes.usda")))
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    assert [error.GetMessage() for error in UsdValidation.ValidationContext(validators).Validate(stage)] == []
+    prims = [prim for prim in stage.Traverse() if prim.HasAPI(UsdPhysics.CollisionAPI)]
+    for prim, primitive in zip(prims, shapes.primitives, strict=True):
+        assert UsdGeom.Imageable(prim).ComputePurpose() == "guide"
+        if primitive is None:
+            assert prim.IsA(UsdGeom.Mesh)
+            continue
+        world = np.array(UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(0.0))  # rows from the left
+        own = UsdGeom.Gprim(prim)
+        if primitive.kind == "box":
+            extents = np.linalg.norm(world[:3, :3], axis=1) * UsdGeom.Cube(own).GetSizeAttr().Get()
+            axes, size = (world[:3, :3] / np.linalg.norm(world[:3, :3], axis=1)[:, None]).T, tuple(extents)
+        else:
+            typed = {"sphere": UsdGeom.Sphere, "capsule": UsdGeom.Capsule, "cylinder": UsdGeom.Cylinder}
+            schema = typed[primitive.kind](own)
+            height = () if primitive.kind == "sphere" else (schema.GetHeightAttr().Get(),)
+            axes, size = world[:3, :3].T, (schema.GetRadiusAttr().Get(), *height)
+            assert primitive.kind == "sphere" or schema.GetAxisAttr().Get() == "Z"
+        there = support(primitive.kind, size, axes, world[3, :3])
+        assert there == pytest.approx(support_of(primitive), abs=1e-9)
+
+
+def test_unreal_finds_primitives_by_name(tmp_path: Path, shapes: rlacd.Decomposition) -> None:
+    path = shapes.save(tmp_path / "shapes.glb", file_format="unreal")
+    read = trimesh.load_scene(path, process=False)
+    prefixes = {"box": "UBX", "sphere": "USP", "capsule": "UCP", "cylinder": "UCX", None: "UCX"}
+    for index, (hull, primitive) in enumerate(zip(shapes, shapes.primitives, strict=True)):
+        name = f"{prefixes[None if primitive is None else primitive.kind]}_mesh_{index:02d}"
+        assert read.geometry[name].volume == pytest.approx(hull.volume, rel=1e-5)
+
+
+def test_formats_without_primitives_hold_the_meshes(tmp_path: Path, shapes: rlacd.Decomposition) -> None:
+    for name in ("shapes.glb", "shapes.obj", "folder/"):
+        shapes.save(str(tmp_path) + f"/{name}")
+    assert len(list((tmp_path / "folder").glob("*.obj"))) == len(shapes)
+    read = trimesh.load_scene(tmp_path / "shapes.glb", process=False)
+    assert [read.geometry[f"hull_{i:03d}"].volume for i in range(len(shapes))] == pytest.approx(
+        [hull.volume for hull in shapes], rel=1e-5
+    )
+    one = etree.parse(str(shapes.save(tmp_path / "shapes.urdf", one_mesh=True)))
+    assert len(one.findall(".//collision")) == 1
+
+
+def test_a_table_of_boxes_stands_in_every_simulator(tmp_path: Path) -> None:
+    result = rlacd.decompose(table(), primitives=True, threads=1)
+    path = result.save(tmp_path / "table.xml")
+    assert "<mesh" in path.read_text()  # what is seen
+    assert path.read_text().count('type="box"') == 5
+    bullet, drake = (fall(result.save(tmp_path / f"table.{ending}")) for fall, ending in FALLS)
+    for rest in (bullet, drake):
+        assert rest.hulls == 5
+        assert rest.mass == pytest.approx(TABLE_VOLUME * 1000, rel=1e-6)
+        assert abs(rest.lowest) < 2e-3
+        assert rest.speed < 1e-2
+    mujoco = fall_in_mujoco(path)
+    assert mujoco.hulls == 5
+    assert abs(mujoco.lowest) < 2e-3
+    assert mujoco.speed < 1e-2
+
+
+FALLS = ((fall_in_bullet, "urdf"), (fall_in_drake, "sdf"))
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_angles_and_quaternions_give_the_axes_back(seed: int) -> None:
+    axes, centre = pose(seed)
+    tilted = trimesh.transformations.euler_matrix(0.3, math.pi / 2, 0.2)[:3, :3]
+    for rotation in (axes, tilted, np.eye(3)):
+        primitive = rlacd.Primitive("box", centre, rotation, (1.0, 2.0, 3.0))
+        roll, pitch, yaw = primitive.roll_pitch_yaw
+        assert trimesh.transformations.euler_matrix(roll, pitch, yaw, "sxyz")[:3, :3] == pytest.approx(
+            rotation, abs=1e-7
+        )
+        assert trimesh.transformations.quaternion_matrix(primitive.quaternion)[:3, :3] == pytest.approx(
+            rotation, abs=1e-9
+        )
