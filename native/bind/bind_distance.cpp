@@ -10,6 +10,27 @@ namespace {
 
 constexpr std::size_t kChunk = 256;
 
+// The closest points of a surface: neighbours in the list are often near each other, so the triangle found for one
+// point bounds the distance of the next. The bound allows for rounding, so
+// that the triangle found is the same without it.
+template <class Take>
+void for_each_closest(const Bvh& bvh, const std::vector<Vec3>& points, int threads, const Take& take) {
+  const std::size_t chunks = (points.size() + kChunk - 1) / kChunk;
+  parallel_for(chunks, threads, [&](std::size_t chunk) {
+    std::int32_t near = -1;
+    for (std::size_t i = chunk * kChunk; i < std::min(points.size(), (chunk + 1) * kChunk); ++i) {
+      Bvh::Hit hit;
+      if (near >= 0) {
+        const double known = bvh.distance(near, points[i]), slack = 1e-7 * std::sqrt(bvh.triangle(near).longest2);
+        hit = bvh.closest(points[i], -1, 0, known + slack);
+      }
+      if (hit.slot < 0) hit = bvh.closest(points[i]);
+      near = hit.slot;
+      take(i, hit);
+    }
+  });
+}
+
 // Runs task(i) for every point without the GIL, in chunks large enough to justify a thread.
 template <class Task>
 void for_each_point(std::size_t count, int threads, const Task& task) {
@@ -45,8 +66,8 @@ void bind_distance(nb::module_& m) {
             std::vector<double> distances(points.size());
             {
               nb::gil_scoped_release release;
-              for_each_point(points.size(), threads,
-                             [&](std::size_t i) { distances[i] = std::sqrt(self.bvh().closest(points[i]).distance2); });
+              for_each_closest(self.bvh(), points, threads,
+                               [&](std::size_t i, const Bvh::Hit& hit) { distances[i] = std::sqrt(hit.distance2); });
             }
             return to_array<double>(std::move(distances));
           },
@@ -60,8 +81,7 @@ void bind_distance(nb::module_& m) {
             std::vector<std::int32_t> faces(points.size());
             {
               nb::gil_scoped_release release;
-              for_each_point(points.size(), threads, [&](std::size_t i) {
-                const Bvh::Hit hit = self.bvh().closest(points[i]);
+              for_each_closest(self.bvh(), points, threads, [&](std::size_t i, const Bvh::Hit& hit) {
                 closest[i] = hit.point;
                 faces[i] = self.bvh().face(hit.slot);
               });

@@ -1,11 +1,17 @@
 // Python bindings of welding, of the topology of soups and of closed meshes.
+#include <nanobind/stl/optional.h>
+
 #include <cmath>
+#include <optional>
 
 #include "base/arrays.hpp"
 #include "base/stop.hpp"
 #include "mesh/curve.hpp"
 #include "mesh/edges.hpp"
+#include "mesh/least_bent.hpp"
 #include "mesh/point_bodies.hpp"
+#include "mesh/spread_points.hpp"
+#include "mesh/wedges.hpp"
 #include "mesh/weld.hpp"
 
 namespace rlacd {
@@ -15,6 +21,7 @@ namespace {
 constexpr std::size_t kBetweenPolls = 4096;
 
 using IndicesIn = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using MarksIn = nb::ndarray<const bool, nb::c_contig, nb::device::cpu>;
 using WideFacesIn = nb::ndarray<const std::int64_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 
 // Copies faces in and checks their indices.
@@ -35,6 +42,12 @@ std::vector<Triangle> to_faces(const WideFacesIn& array, std::int64_t vertices) 
 // The same for a mesh whose vertices are only read.
 Mesh to_wide_mesh(const PointsIn& vertices, const WideFacesIn& faces) {
   return {to_points(vertices), to_faces(faces, static_cast<std::int64_t>(vertices.shape(0)))};
+}
+
+std::vector<bool> to_marks(const std::optional<MarksIn>& array, std::size_t count) {
+  if (!array) return {};
+  if (array->size() != count) throw std::invalid_argument("not as many marks as items");
+  return std::vector<bool>(array->data(), array->data() + count);
 }
 
 nb::tuple as_tuple(Mesh&& mesh) {
@@ -79,6 +92,54 @@ void bind_mesh(nb::module_& m) {
       "The undirected edges of faces [F, 3]: the edge [3F] of each halfedge, the edges' vertices [E, 2], ascending, "
       "and how\n"
       "many halfedges each has [E].");
+  m.def(
+      "wedges",
+      [](const PointsIn& vertices, const WideFacesIn& faces, const IndicesIn& edge_of_halfedge, std::int64_t edges,
+         const std::optional<MarksIn>& trusted) {
+        const Mesh mesh = to_wide_mesh(vertices, faces);
+        const std::vector<std::int64_t> edge(edge_of_halfedge.data(),
+                                             edge_of_halfedge.data() + edge_of_halfedge.size());
+        if (edge.size() != 3 * mesh.faces.size()) throw std::invalid_argument("every halfedge has an edge");
+        for (const std::int64_t e : edge)
+          if (e < 0 || e >= edges) throw std::invalid_argument("edge out of range");
+        const std::vector<bool> sure = to_marks(trusted, mesh.faces.size());
+        Wedges found;
+        {
+          nb::gil_scoped_release release;
+          found = wedges_of(mesh, edge, static_cast<std::size_t>(edges), sure);
+        }
+        return nb::make_tuple(to_array<std::int64_t>(std::move(found.halfedges)),
+                              to_array<std::int64_t>(std::move(found.sides)));
+      },
+      nb::arg("vertices"), nb::arg("faces"), nb::arg("edge_of_halfedge"), nb::arg("edges"),
+      nb::arg("trusted") = nb::none(),
+      "The wedges of space around the edges: the halfedges [3F, 2] that bound each, going around its edge from its "
+      "smaller\n"
+      "to its larger vertex by the right-hand rule, and the sides [3F, 2] of their faces that do: 2 f is the front of "
+      "face f,\n"
+      "2 f + 1 its back. Coincident faces, and trusted ones [F], alternate as their windings require.");
+  m.def(
+      "least_bent",
+      [](const PointsIn& points, const PointsIn& beside, const std::optional<MarksIn>& taken, double bend) {
+        const std::size_t count = points.shape(0);
+        if (count < 3) throw std::invalid_argument("a loop has at least three points");
+        if (beside.shape(0) != count) throw std::invalid_argument("not as many normals as points");
+        if (!(bend >= 0)) throw std::invalid_argument("the weight of bending must not be negative");
+        const Loop loop = {to_points(points), to_points(beside), to_marks(taken, count * count), bend};
+        require_finite(loop.points);
+        std::vector<Triangle> triangles;
+        {
+          nb::gil_scoped_release release;
+          triangles = least_bent(loop);
+        }
+        return to_array<std::int32_t>(std::move(triangles));
+      },
+      nb::arg("points"), nb::arg("beside"), nb::arg("taken") = nb::none(), nb::arg("bend") = 1.0,
+      "Triangulates a closed loop [N, 3] with the least bending; [N - 2, 3], wound like the loop. `beside` [N, 3] has "
+      "the\n"
+      "unit normals of the faces beyond its edges, which run against it; `taken` [N, N] marks pairs of points that "
+      "should\n"
+      "not get an edge; `bend` weighs bending, and with 0 the area is least.");
   m.def(
       "components",
       [](std::int64_t count, const IndicesIn& a, const IndicesIn& b) {
@@ -133,6 +194,23 @@ void bind_mesh(nb::module_& m) {
         return to_array<double>(std::move(volume));
       },
       nb::arg("vertices"), nb::arg("faces"), "The signed volume [F] between the origin and each face.");
+  m.def(
+      "spread_points",
+      [](const PointsIn& vertices, const WideFacesIn& faces, double spacing) {
+        const Mesh mesh = to_wide_mesh(vertices, faces);
+        if (!(spacing > 0)) throw std::invalid_argument("the spacing must be positive");
+        SpreadPoints spread;
+        {
+          nb::gil_scoped_release release;
+          spread = spread_points(mesh, spacing);
+        }
+        return nb::make_tuple(to_array<double>(std::move(spread.points)),
+                              to_array<std::int32_t>(std::move(spread.faces)));
+      },
+      nb::arg("vertices"), nb::arg("faces"), nb::arg("spacing"),
+      "Points [N, 3], corners included, such that no point of a face is farther than `spacing` from one of them, and "
+      "the\n"
+      "face [N] each lies on, ascending.");
   m.def(
       "closed_bodies",
       [](const PointsIn& vertices, const FacesIn& faces) -> nb::object {

@@ -67,6 +67,19 @@ def weld(vertices: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray, In
 def edges(
     faces: NDArray[np.int64], count: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]: ...  # [3F], [E, 2], [E]
+def wedges(
+    vertices: FloatArray,
+    faces: NDArray[np.int64],
+    edge_of_halfedge: NDArray[np.int64],
+    edges: int,
+    trusted: NDArray[np.bool_] | None = None,
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]: ...  # [3F, 2], [3F, 2]
+def least_bent(
+    points: FloatArray, beside: FloatArray, taken: NDArray[np.bool_] | None = None, bend: float = 1.0
+) -> IntArray: ...  # [N - 2, 3]
+def spread_points(
+    vertices: FloatArray, faces: NDArray[np.int64], spacing: float
+) -> tuple[FloatArray, IntArray]: ...  # [N, 3], [N]
 def components(count: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> tuple[int, NDArray[np.int64]]: ...
 def face_areas(vertices: FloatArray, faces: NDArray[np.int64]) -> FloatArray: ...  # [F]
 def signed_tetrahedra(vertices: FloatArray, faces: NDArray[np.int64]) -> FloatArray: ...  # [F]

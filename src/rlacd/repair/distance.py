@@ -6,13 +6,14 @@ from functools import cached_property
 
 import numpy as np
 
+from rlacd import _native
 from rlacd._native import Surface, poll_stop
 from rlacd.solid.frame import FloatArray
-from rlacd.solid.topology import BoolArray, IntArray
+from rlacd.solid.topology import BoolArray, IntArray, first_of_doubled
 
-_CHUNK = 1_000_000
-_STEPS = np.array([1, 2, 3, *(s << k for k in range(1, 9) for s in (2, 3))])
-_LARGEST = 1024
+# Odd numbers that spread the bits of places over all bits of a product.
+_MIX = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
+_HALF = np.uint64(32)
 
 
 class SurfaceQuery:
@@ -57,7 +58,8 @@ def points_covering(vertices: FloatArray, faces: IntArray, spacing: float) -> tu
     Returns the points ``[N, 3]`` and a face ``[N]`` each lies on. Faces no larger than `spacing` share their corners.
     """
     corners = vertices[faces]
-    small = (_squared(np.roll(corners, -1, axis=1) - corners) <= spacing**2).all(axis=1)
+    edges = np.roll(corners, -1, axis=1) - corners
+    small = (np.einsum("...j,...j->...", edges, edges) <= spacing**2).all(axis=1)
     first = np.full(len(vertices), -1, dtype=np.int64)
     numbers = np.flatnonzero(small)
     poll_stop()
@@ -73,40 +75,26 @@ def spread_points(vertices: FloatArray, faces: IntArray, spacing: float) -> tupl
 
     Returns the points ``[N, 3]``, corners included, and the face ``[N]`` each lies on.
     """
-    if len(faces) == 0:
-        return np.empty((0, 3)), np.empty(0, np.int64)
-    corners = vertices[faces]
-    lengths = _squared(np.roll(corners, -1, axis=1) - corners)
-    # Rotate every face so that its longest edge runs from a to b, then cover it in rows parallel to that edge.
-    turn = (lengths.argmax(axis=1)[:, None] + np.arange(3)) % 3
-    a, b, c = np.moveaxis(np.take_along_axis(corners, turn[..., None], axis=1), 1, 0)
-    base = np.sqrt(lengths.max(axis=1))
-    height = np.linalg.norm(np.cross(b - a, c - a), axis=1) / np.maximum(base, np.finfo(float).tiny)
-    columns, rows = _round_up(base / spacing), _round_up(height / spacing)
-    points: list[FloatArray] = []
-    owner: list[IntArray] = []
-    for pattern in np.unique(columns * _LARGEST + rows):
-        n, m = divmod(int(pattern), _LARGEST)
-        some = np.flatnonzero((columns == n) & (rows == m))
-        poll_stop()
-        v, u = np.divmod(np.arange(n * m + m), n + 1)
-        u, v = np.append(u / n, 0.0)[None, :, None], np.append(v / m, 1.0)[None, :, None]
-        for chunk in np.array_split(some, max(1, len(some) * u.size // _CHUNK)):
-            poll_stop()
-            row_start, row_end = (
-                a[chunk, None] * (1 - v) + c[chunk, None] * v,
-                b[chunk, None] * (1 - v) + c[chunk, None] * v,
-            )
-            points.append((row_start * (1 - u) + row_end * u).reshape(-1, 3))
-            owner.append(np.repeat(chunk, u.size))
-    return np.concatenate(points), np.concatenate(owner)
+    points, face = _native.spread_points(vertices, faces, spacing)
+    return points, face.astype(np.int64)
 
 
-def _round_up(steps: FloatArray) -> IntArray:
-    """Round up to 1, 2, 3, 4, 6, 8, 12, 16, ...: few distinct grids for any number of faces."""
-    return _STEPS[np.minimum(np.searchsorted(_STEPS, steps), len(_STEPS) - 1)]
-
-
-def _squared(vectors: FloatArray) -> FloatArray:
-    result: FloatArray = np.einsum("...j,...j->...", vectors, vectors)
-    return result
+def shared_faces(
+    vertices: FloatArray, faces: IntArray, other_vertices: FloatArray, other_faces: IntArray
+) -> tuple[BoolArray, BoolArray]:
+    """Return which faces ``[F]`` and ``[G]`` of two meshes have their corners in the same places, however wound."""
+    places = np.concatenate([vertices, other_vertices]) + 0.0  # no -0.0
+    bits = places.view(np.uint64)
+    key = (bits[:, 0] * _MIX[0]) ^ (bits[:, 1] * _MIX[1] + (bits[:, 0] >> _HALF))
+    key ^= bits[:, 2] * _MIX[2] + (bits[:, 1] >> _HALF)
+    order = np.argsort(key, kind="stable")
+    poll_stop()
+    # Places between which another one with the same key lies get several numbers: faces with them count as different.
+    new = (places[order[1:]] != places[order[:-1]]).any(axis=1)
+    number = np.zeros(len(places), dtype=np.int64)
+    number[order[1:]] = np.cumsum(new)
+    poll_stop()
+    mine, others = number[faces], number[len(vertices) + other_faces]
+    is_other = ~first_of_doubled(np.concatenate([others, mine]), len(places))[len(others) :]
+    is_mine = ~first_of_doubled(np.concatenate([mine, others]), len(places))[len(mine) :]
+    return is_other, is_mine

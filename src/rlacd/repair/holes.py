@@ -12,7 +12,7 @@ import mapbox_earcut
 import numpy as np
 from scipy.spatial import cKDTree
 
-from rlacd._native import poll_stop
+from rlacd._native import least_bent, poll_stop
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.topology import BoolArray, Edges, IntArray, components, first_of_doubled, nondegenerate
 
@@ -20,11 +20,6 @@ from rlacd.solid.topology import BoolArray, Edges, IntArray, components, first_o
 _EXACT_LOOP = 60
 LONGEST_EXACT_LOOP = 250
 """Loops of more edges than this are not triangulated optimally."""
-
-# Weight of area against bending.
-_AREA = 0.1
-# Cost of an edge that already exists: above everything else, but still better than no cap.
-_TAKEN = 1e3
 
 # Edges processed between two polls of the stop.
 _AT_ONCE = 1000
@@ -167,14 +162,14 @@ def cap(points: FloatArray, beside: FloatArray, taken: BoolArray | None = None, 
     if len(points) <= 3:
         return np.array([[0, 2, 1]])
     if len(points) <= _EXACT_LOOP:
-        return _least_bent(points, beside, taken, bend)[:, ::-1]
+        return least_bent(points, beside, taken, bend)[:, ::-1].astype(np.int64)
     middle = points.mean(axis=0)
     _, _, axes = np.linalg.svd(points - middle, full_matrices=False)
     flat = np.ascontiguousarray((points - middle) @ axes[:2].T)
     ears = mapbox_earcut.triangulate_float64(flat, np.array([len(points)], dtype=np.uint32)).reshape(-1, 3)
     if len(ears) != len(points) - 2:  # the loop's projection crosses itself: no plane fits
         if len(points) <= LONGEST_EXACT_LOOP:
-            return _least_bent(points, beside, taken, bend)[:, ::-1]
+            return least_bent(points, beside, taken, bend)[:, ::-1].astype(np.int64)
         return _strips(len(points))[:, ::-1]
     triangles: IntArray = ears.astype(np.int64)
     a, b, c = triangles.T
@@ -192,54 +187,3 @@ def _strips(count: int) -> IntArray:
             triangles.append((low, high - 1, high))
             high -= 1
     return np.array(triangles, dtype=np.int64)
-
-
-def _least_bent(points: FloatArray, beside: FloatArray, taken: BoolArray | None, bend: float) -> IntArray:
-    """Triangulate a loop with the least bending, by dynamic programming.
-
-    The cost is the sum over all edges, those of the loop included, of length times angle between the faces: the total
-    absolute mean curvature, which restores the sharp edges of an object where least area would cut them off. A small
-    weight on area decides where nothing bends. After Liepa, "Filling holes in meshes" (2003).
-    """
-    n = len(points)
-    cost, choice = np.zeros((n, n)), np.zeros((n, n), dtype=np.int64)
-    normal = np.zeros((n, n, 3))  # of the triangle behind the chord from i to k
-    ring = np.arange(n)
-    # The triangles here run with the loop, the adjacent faces against it.
-    normal[ring[:-1], ring[1:]] = -beside[:-1]
-    span_of = np.linalg.norm(points[:, None] - points, axis=2)
-    per_area = _AREA / max(float(span_of.max()), np.finfo(float).tiny)
-    span_of *= bend
-    for span in range(2, n):
-        poll_stop()
-        first = np.arange(n - span)[:, None]
-        middle, last = first + np.arange(1, span), first + span
-        cross = np.cross(points[middle] - points[first], points[last] - points[first])
-        twice = np.linalg.norm(cross, axis=2)
-        cross /= np.maximum(twice, np.finfo(float).tiny)[..., None]
-        total = cost[first, middle] + cost[middle, last] + per_area * twice
-        total += span_of[first, middle] * _angle(cross, normal[first, middle])
-        total += span_of[middle, last] * _angle(cross, normal[middle, last])
-        if taken is not None and span < n - 1:
-            total += np.where(taken[first, last], _TAKEN, 0.0)
-        if span == n - 1:
-            total += span_of[0, n - 1] * _angle(cross, -beside[n - 1])
-        best = total.argmin(axis=1)[:, None]
-        cost[first, last] = np.take_along_axis(total, best, axis=1)
-        choice[first, last] = np.take_along_axis(middle, best, axis=1)
-        normal[first[:, 0], last[:, 0]] = np.take_along_axis(cross, best[..., None], axis=1)[:, 0]
-    triangles, open_spans = [], [(0, n - 1)]
-    while open_spans:
-        i, k = open_spans.pop()
-        if k - i < 2:
-            continue
-        j = int(choice[i, k])
-        triangles.append((i, j, k))
-        open_spans += [(i, j), (j, k)]
-    return np.array(triangles, dtype=np.int64)
-
-
-def _angle(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Angles between unit vectors in radians; a right angle for one that is zero."""
-    result: FloatArray = np.arccos(np.clip(np.einsum("...i,...i->...", a, b), -1, 1))
-    return result

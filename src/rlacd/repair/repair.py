@@ -27,7 +27,7 @@ from rlacd._native import poll_stop
 from rlacd.errors import EmptyMeshError
 from rlacd.memory import BYTES_REPAIRED, require_memory
 from rlacd.repair.caps import FLAPS, close_holes
-from rlacd.repair.distance import SurfaceQuery, points_covering, spread_points
+from rlacd.repair.distance import SurfaceQuery, points_covering, shared_faces, spread_points
 from rlacd.repair.holes import MOST_FREE_EDGES, close_cracks
 from rlacd.repair.skin import skin
 from rlacd.repair.soup import NO_AREA, Soup, hidden_faces, on_repeated_edge
@@ -496,12 +496,13 @@ class _Repair:
         if self.step.max() < STEPS.index("outer skin"):
             return
         solid = SurfaceQuery(*to_arrays(self.solid), self.input.threads)
+        kept, taken_over = shared_faces(solid.vertices, solid.faces, self.input.vertices, self.input.faces)
         poll_stop()
-        points, _ = points_covering(solid.vertices, solid.faces, GAP)
+        points, _ = points_covering(solid.vertices, solid.faces[~kept], GAP)
         closest, face = self.input.closest(points)
         np.maximum.at(self.deviation, self.body_of_input[face], np.linalg.norm(points - closest, axis=1))
 
-        changed = np.flatnonzero(self.step[self.body_of_input] >= STEPS.index("outer skin"))
+        changed = np.flatnonzero((self.step[self.body_of_input] >= STEPS.index("outer skin")) & ~taken_over)
         points, on = points_covering(self.input.vertices, self.input.faces[changed], GAP)
         distance = solid.distance(points)
         lost = np.flatnonzero(distance > 2 * HALF_THICKNESS)

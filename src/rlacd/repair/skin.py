@@ -12,7 +12,7 @@ import numpy as np
 
 from rlacd._native import poll_stop
 from rlacd.solid.frame import FloatArray
-from rlacd.solid.topology import BoolArray, IntArray, Sides, components, facing_sides
+from rlacd.solid.topology import BoolArray, IntArray, Sides, components
 
 # A sharp fold would push its vertex far out to keep the distance to both flanks; stop at this multiple.
 _LONGEST_MITER = 2.0
@@ -47,7 +47,7 @@ def skin(
     corner_slot[slots] = np.arange(len(slots))
 
     first, second = sides.wedges.T
-    side_first, side_second = facing_sides(faces, sides.wedges)
+    side_first, side_second = sides.facing.T
     poll_stop()
     used = keep[sides.label[side_first]]
     first, second, side_first, side_second = first[used], second[used], side_first[used], side_second[used]

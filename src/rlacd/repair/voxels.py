@@ -7,6 +7,7 @@ point of its boundary is within about 1.4 radii of the surface.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,10 @@ from rlacd._native import poll_stop
 from rlacd.repair.distance import SurfaceQuery, points_covering
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.topology import BoolArray, IntArray
+
+
+# Distances between cells are roots of whole numbers: this much more than a radius adds only rounding.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -32,8 +37,8 @@ class Reach:
         Radius of the ball.
     reached
         ``[X, Y, Z]``, cells the ball can cover.
-    depth
-        ``[X, Y, Z]``, distance to the nearest cell of the surface.
+    occupied
+        ``[X, Y, Z]``, cells of the surface.
     room
         ``[X, Y, Z]``, label of every connected set of cells where the ball fits but which it cannot enter; 0 elsewhere.
     """
@@ -42,7 +47,7 @@ class Reach:
     pitch: float
     radius: float
     reached: BoolArray
-    depth: FloatArray
+    occupied: BoolArray
     room: IntArray
 
     @classmethod
@@ -56,14 +61,11 @@ class Reach:
         occupied = np.zeros(cell.max(axis=0) + 1 + margin, dtype=bool)
         occupied[tuple(cell.T)] = True
         poll_stop()
-        depth = ndimage.distance_transform_edt(~occupied) * pitch
-        poll_stop()
-        label, _ = ndimage.label(depth > radius)
+        label, _ = ndimage.label(~_grown(occupied, radius / pitch))
         outside = label == label[0, 0, 0]
-        poll_stop()
-        reached = ndimage.distance_transform_edt(~outside) * pitch <= radius
+        reached = _grown(outside, radius / pitch)
         room = np.where(outside, 0, label)
-        return cls(origin, pitch, radius, reached, depth, room)
+        return cls(origin, pitch, radius, reached, occupied, room)
 
     def covers(self, points: FloatArray) -> BoolArray:
         """Return ``[N]`` whether the ball can reach each point; it can reach all points off the grid."""
@@ -79,7 +81,7 @@ class Reach:
         labels = labels[labels > 0]
         if len(labels) == 0:
             return labels
-        deepest = ndimage.maximum_position(self.depth, self.room, labels)
+        deepest = ndimage.maximum_position(ndimage.distance_transform_cdt(~self.occupied, "taxicab"), self.room, labels)
         centers = self.origin + np.array(deepest) * self.pitch
         return labels[~solid.inside(centers)]
 
@@ -95,16 +97,13 @@ class Reach:
 
     def around_rooms(self, rooms: IntArray) -> BoolArray:
         """Return ``[X, Y, Z]`` the unreachable cells of some rooms and of their walls."""
-        distance = ndimage.distance_transform_edt(~np.isin(self.room, rooms)) * self.pitch
-        cells: BoolArray = (distance <= self.radius + 2 * self.pitch) & ~self.reached
-        return cells
+        return _grown(np.isin(self.room, rooms), self.radius / self.pitch + 2) & ~self.reached
 
     def around_points(self, points: FloatArray) -> BoolArray:
         """Return ``[X, Y, Z]`` the unreachable cells at and between some points."""
         mark = np.zeros(self.reached.shape, dtype=bool)
         mark[tuple(np.rint((points - self.origin) / self.pitch).astype(np.int64).T)] = True
-        cells: BoolArray = (ndimage.distance_transform_edt(~mark) * self.pitch <= self.radius) & ~self.reached
-        return cells
+        return _grown(mark, self.radius / self.pitch) & ~self.reached
 
     def wrap(self, cells: BoolArray, surface: SurfaceQuery, thickness: float) -> tuple[FloatArray, IntArray]:
         """Return the closed surface of a set of cells, projected onto a surface where it is near.
@@ -122,6 +121,25 @@ class Reach:
         points[attached] = (closest + np.minimum(step, 1)[:, None] * away)[attached]
         _smooth(points, quads, ~attached)
         return points, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def _grown(cells: BoolArray, radius: float) -> BoolArray:
+    """Return ``[X, Y, Z]`` which cells are at most `radius` cells away from one of `cells`."""
+    result = np.zeros_like(cells)
+    reach = int(radius + _ROUNDING)
+    padded = np.pad(cells, reach)
+    tall = {0: padded}  # grown along the last axis alone
+    for z in range(1, reach + 1):
+        tall[z] = tall[z - 1].copy()
+        tall[z][..., z:] |= padded[..., :-z]
+        tall[z][..., :-z] |= padded[..., z:]
+    x, y, z = cells.shape
+    for dx, dy in itertools.product(range(-reach, reach + 1), repeat=2):
+        left = (radius + _ROUNDING) ** 2 - dx**2 - dy**2
+        if left >= 0:
+            poll_stop()
+            result |= tall[int(left**0.5)][reach + dx : reach + dx + x, reach + dy : reach + dy + y, reach : reach + z]
+    return result
 
 
 def _boundary_squares(solid: BoolArray) -> tuple[FloatArray, IntArray]:

@@ -25,9 +25,6 @@ from rlacd.solid.frame import FloatArray
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
-# Faces closer in angle than this (radians) coincide to the precision of float32 files.
-_SAME_ANGLE = 1e-4
-
 _NEXT = np.array([1, 2, 0])
 
 
@@ -154,7 +151,10 @@ class Sides:
     ----------
     wedges
         ``[W, 2]`` pairs of halfedges ``(h, g)``: going around their edge from its smaller to its larger vertex by the
-        right-hand rule, g follows h with nothing in between. A boundary edge gives ``h == g``.
+        right-hand rule, g follows h with nothing in between. A boundary edge gives ``h == g``. Faces at equal angles,
+        to the precision of float32 files, and all around edges of trusted faces alternate as their windings require.
+    facing
+        ``[W, 2]``, the sides that bound each wedge, on its first and on its second halfedge.
     label
         ``[2F]``, the component of every side.
     volume
@@ -166,104 +166,11 @@ class Sides:
     """
 
     wedges: IntArray
+    facing: IntArray
     label: IntArray
     volume: FloatArray
     area: FloatArray
     sheet: BoolArray
-
-
-def _angles_around(vertices: FloatArray, faces: IntArray, ends: IntArray, halfedges: IntArray) -> FloatArray:
-    """Angle of the faces of halfedges around their edges ``ends`` ``[N, 2]``, from a direction fixed per edge."""
-    tail = vertices[ends[:, 0]]
-    axis = vertices[ends[:, 1]] - tail
-    axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), np.finfo(float).tiny)
-    poll_stop()
-    apex = vertices[_apex(faces, halfedges)]
-    across = apex - tail
-    # Any direction not parallel to the axis can serve as zero, as long as all faces of the edge share it.
-    helper = np.eye(3)[np.abs(axis).argmin(axis=1)]
-    zero = np.cross(axis, helper)
-    zero /= np.maximum(np.linalg.norm(zero, axis=1, keepdims=True), np.finfo(float).tiny)
-    poll_stop()
-    quarter = np.cross(axis, zero)
-    angle: FloatArray = np.arctan2((across * quarter).sum(axis=1), (across * zero).sum(axis=1))
-    return angle
-
-
-def _apex(faces: IntArray, halfedges: IntArray) -> IntArray:
-    corners: IntArray = faces[halfedges // 3, (halfedges % 3 + 2) % 3]
-    return corners
-
-
-def wedges_of(vertices: FloatArray, faces: IntArray, edges: Edges, trusted: BoolArray | None = None) -> IntArray:
-    """Return the wedges ``[3F, 2]`` around all edges (see `Sides`).
-
-    Around an edge with ``trusted`` ``[F]`` faces only, wedges alternate as the windings require, whatever the angles.
-    """
-    poll_stop()
-    angle = np.zeros(3 * len(faces))
-    crowded = np.flatnonzero(edges.valence[edges.of_halfedge] > 2)  # the order of one or two faces needs no angle
-    if len(crowded):
-        ends = edges.vertices[edges.of_halfedge[crowded]]
-        angle[crowded] = _angles_around(vertices, faces, ends, crowded)
-        poll_stop()
-        order = np.lexsort((angle, edges.of_halfedge))
-        doubted = np.ones(len(edges.valence), dtype=bool)
-        if trusted is not None:
-            doubted[:] = False
-            doubted[edges.of_halfedge[np.repeat(~trusted, 3)]] = True
-        _order_ties(order, angle, edges, (faces < faces[:, _NEXT]).ravel(), ~doubted)
-    else:
-        order = np.argsort(edges.of_halfedge, kind="stable")
-    start = np.concatenate([[0], np.cumsum(edges.valence)])
-    poll_stop()
-    follower = np.arange(1, len(order) + 1)
-    follower[start[1:] - 1] = start[:-1]  # the last face around an edge is followed by the first
-    return np.stack([order, order[follower]], axis=1)
-
-
-def _order_ties(order: IntArray, angle: FloatArray, edges: Edges, forward: BoolArray, trusted: BoolArray) -> None:
-    """Put coincident faces around an edge into the order their windings require, in place.
-
-    Their angles cannot tell which comes first, and a wrong guess would join the inside with the outside. If windings
-    are consistent, both sides of a wedge are fronts or both are backs. Around ``trusted`` ``[E]`` edges all angles
-    count as equal.
-    """
-    start = np.concatenate([[0], np.cumsum(edges.valence)])
-    poll_stop()
-    sorted_angle = angle[order]
-    gap = np.empty(len(order))
-    gap[:-1] = np.diff(sorted_angle)
-    gap[start[1:] - 1] = sorted_angle[start[:-1]] + 2 * np.pi - sorted_angle[start[1:] - 1]
-    tied = np.zeros(len(edges.valence), dtype=bool)
-    gap[trusted[edges.of_halfedge[order]]] = 0
-    tied[edges.of_halfedge[order[gap < _SAME_ANGLE]]] = True
-    for edge in np.flatnonzero(tied & (edges.valence > 2)):
-        poll_stop()
-        here = slice(start[edge], start[edge + 1])
-        ring, gaps = order[here], gap[here]
-        alone = (gaps >= _SAME_ANGLE) & (np.roll(gaps, 1) >= _SAME_ANGLE)
-        # Begin with a face whose position is certain, else after the widest wedge: no tie crosses it.
-        turn = int(alone.argmax()) if alone.any() else int(gaps.argmax()) + 1
-        ring, gaps = np.roll(ring, -turn), np.roll(gaps, -turn)
-        result: list[int] = []
-        for group in np.split(ring, np.flatnonzero(gaps[:-1] >= _SAME_ANGLE) + 1):
-            left = group.tolist()
-            while left:
-                # The wedge after a face shows its front if it runs forward; the next face shows its front to the same
-                # wedge if it runs backward. With nothing to go by, fronts face out.
-                wanted = not forward[result[-1]] if result else False
-                result.append(left.pop(next((i for i, h in enumerate(left) if forward[h] == wanted), 0)))
-        order[here] = result
-
-
-def facing_sides(faces: IntArray, wedges: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the sides ``[W]`` that bound each wedge, on its first and on its second halfedge."""
-    forward = (faces < faces[:, _NEXT]).ravel()
-    poll_stop()
-    first, second = wedges.T
-    # Seen along the edge, a face that runs with it shows its front to what follows counter-clockwise.
-    return 2 * (first // 3) + ~forward[first], 2 * (second // 3) + forward[second]
 
 
 def signed_tetrahedra(vertices: FloatArray, faces: IntArray) -> FloatArray:
@@ -281,17 +188,16 @@ def _sums(group: IntArray, values: FloatArray, number: int) -> FloatArray:
 
 
 def sides_of(vertices: FloatArray, faces: IntArray, edges: Edges, trusted: BoolArray | None = None) -> Sides:
-    """Join the sides of all faces across their wedges; see `wedges_of`."""
-    wedges = wedges_of(vertices, faces, edges, trusted)
-    poll_stop()
-    first, second = facing_sides(faces, wedges)
-    number, label = components(2 * len(faces), first, second)
+    """Join the sides of all faces across their wedges, except where ``trusted`` ``[F]`` faces meet by their angles."""
+    wedges, facing = _native.wedges(vertices, faces, edges.of_halfedge, len(edges.valence), trusted)
+    number, label = components(2 * len(faces), *np.ascontiguousarray(facing.T))
     poll_stop()
     tetrahedra = signed_tetrahedra(vertices, faces)
     area = face_areas(vertices, faces)
     front, back = label[0::2], label[1::2]
     return Sides(
         wedges=wedges,
+        facing=facing,
         label=label,
         volume=_sums(front, tetrahedra, number) - _sums(back, tetrahedra, number),
         area=_sums(front, area, number) + _sums(back, area, number),
