@@ -11,8 +11,8 @@ from rlacd._native import Surface, poll_stop
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.topology import BoolArray, IntArray, first_of_doubled
 
-# Odd numbers that spread the bits of places over all bits of a product.
-_MIX = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
+# An odd number that spreads the bits of a factor over the upper half of the product.
+_MIX = np.uint64(0x9E3779B97F4A7C15)
 _HALF = np.uint64(32)
 
 
@@ -84,9 +84,10 @@ def shared_faces(
 ) -> tuple[BoolArray, BoolArray]:
     """Return which faces ``[F]`` and ``[G]`` of two meshes have their corners in the same places, however wound."""
     places = np.concatenate([vertices, other_vertices]) + 0.0  # no -0.0
-    bits = places.view(np.uint64)
-    key = (bits[:, 0] * _MIX[0]) ^ (bits[:, 1] * _MIX[1] + (bits[:, 0] >> _HALF))
-    key ^= bits[:, 2] * _MIX[2] + (bits[:, 1] >> _HALF)
+    key = np.zeros(len(places), dtype=np.uint64)
+    for bits in places.view(np.uint64).T:
+        key = (key ^ bits) * _MIX
+        key ^= key >> _HALF
     order = np.argsort(key, kind="stable")
     poll_stop()
     # Places between which another one with the same key lies get several numbers: faces with them count as different.

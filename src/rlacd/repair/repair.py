@@ -21,6 +21,7 @@ from functools import cached_property
 
 import numpy as np
 from manifold3d import Manifold
+from scipy.spatial import cKDTree
 
 from rlacd import _native
 from rlacd._native import poll_stop
@@ -32,7 +33,9 @@ from rlacd.repair.holes import MOST_FREE_EDGES, close_cracks
 from rlacd.repair.skin import skin
 from rlacd.repair.soup import NO_AREA, Soup, hidden_faces, on_repeated_edge
 from rlacd.repair.union import (
+    MOST_UNITED,
     Shape,
+    as_manifold,
     hull_of_points,
     slab_of_faces,
     split_labels,
@@ -240,7 +243,7 @@ class _Repair:
             parts = self._as_they_are(soup)
         else:
             soup = self._cap(self._drop_hidden(self._trust_windings(soup)))
-            parts = self._wrap_crowds(soup, self._build(soup))
+            parts = self._build_or_wrap(soup)
         if keep_cavities:
             inward = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces), self.bodies) < 0
             self.solid: Shape = unite_around_cavities(
@@ -374,6 +377,11 @@ class _Repair:
 
     def _build(self, soup: Soup) -> list[tuple[Manifold, int]]:
         """Turn every body into closed solids; returns them, and the body each belongs to."""
+        walls, sheets = self._walls_and_sheets(soup)
+        return self._skins(walls) + self._skins(sheets.in_patches())
+
+    def _walls_and_sheets(self, soup: Soup) -> tuple[Soup, Soup]:
+        """The faces that bound something solid, and those that become slabs."""
         sides = soup.sides
         front, back = sides.label[0::2], sides.label[1::2]
         none = _FLAT * sides.area
@@ -393,7 +401,7 @@ class _Repair:
         self._note(soup.body[sheet], "slab")
         poll_stop()
         mixed = np.bincount(soup.body[sheet], minlength=self.bodies) > 0
-        return self._skins(soup.only(~sheet & (wall | ~mixed[soup.body]))) + self._skins(soup.only(sheet).in_patches())
+        return soup.only(~sheet & (wall | ~mixed[soup.body])), soup.only(sheet)
 
     def _skins(self, soup: Soup) -> list[tuple[Manifold, int]]:
         """Build the outer side components of a soup; sheets and flat bodies get thickness."""
@@ -445,17 +453,24 @@ class _Repair:
         """Return a solid of grid cells, projected onto the input and simplified."""
         return to_manifold(*self.reach.wrap(cells, self.input, HALF_THICKNESS)).simplify(error)
 
-    def _wrap_crowds(self, soup: Soup, parts: list[tuple[Manifold, int]]) -> list[tuple[Manifold, int]]:
-        """Wrap crowds of sheets (leaves, feathers) as one body, where no ball of radius `GAP` can tell them apart."""
+    def _build_or_wrap(self, soup: Soup) -> list[tuple[Manifold, int]]:
+        """Build every body, but wrap crowds of sheets (leaves, feathers) as one, as a ball of radius `GAP` sees it."""
+        walls, sheets = self._walls_and_sheets(soup)
         is_slab = self.step == STEPS.index("slab")
-        boxes = np.array([part.bounding_box() for part, body in parts if is_slab[body]]).reshape(-1, 2, 3)
-        if is_slab.sum() <= _CROWD and _crossings(boxes) <= _CROSSINGS:
-            return parts
+        crowded = is_slab.sum() > _CROWD
+        if crowded:  # slabs of single faces are most of the work, and not needed
+            parts = self._skins(walls.only(~is_slab[walls.body]))
+        else:
+            parts = self._skins(walls) + self._skins(sheets.in_patches())
+            boxes = np.array([part.bounding_box() for part, body in parts if is_slab[body]]).reshape(-1, 2, 3)
+            if _crossings(boxes) <= _CROSSINGS:
+                return parts
         slabs = soup.only(is_slab[soup.body])
         points, _ = points_covering(slabs.vertices, slabs.faces, self.reach.pitch / 2)
         wrap = self._wrap(self.reach.around_points(points), HALF_THICKNESS / 2)
         if wrap.volume() <= 0:
-            return parts
+            slabs_too = (walls.only(is_slab[walls.body]), sheets.in_patches()) if crowded else ()
+            return parts + [part for some in slabs_too for part in self._skins(some)]
         first = int(slabs.body.min())
         self._note(slabs.body, "wrapped")
         self.faces_out[is_slab] = 0
@@ -480,9 +495,12 @@ class _Repair:
         points, on = spread_points(slabs.vertices, slabs.faces, GAP)
         wall = np.bincount(on, ~np.isin(self.reach.rooms_near(points), rooms), len(slabs.faces)) == 0
         before = self.faces_out.copy()
-        self.faces_out[is_slab] = 0
-        others = [part for part, body in parts if not is_slab[body]]
-        united = unite([*others, *(part for part, _ in self._build(slabs.only(~wall))), wrap])
+        if wall.any() or len(parts) > MOST_UNITED:  # that many overlap in what was made of them
+            self.faces_out[is_slab] = 0
+            others = [part for part, body in parts if not is_slab[body]]
+            united = unite([*others, *(part for part, _ in self._build(slabs.only(~wall))), wrap])
+        else:
+            united = unite([as_manifold(self.solid), wrap])
         if volume_of(united) <= volume_of(self.solid):
             self.faces_out = before
             return
@@ -506,10 +524,26 @@ class _Repair:
         points, on = points_covering(self.input.vertices, self.input.faces[changed], GAP)
         distance = solid.distance(points)
         lost = np.flatnonzero(distance > 2 * HALF_THICKNESS)
-        lost = lost[~solid.inside(points[lost])]
+        lost = lost[~_inside_by_balls(solid, points[lost], distance[lost])]
         body = self.body_of_input[changed[on[lost]]]
         np.maximum.at(self.deviation, body, distance[lost])
         self.lost = float(distance[lost].max(initial=0.0, where=self.step[body] == STEPS.index("capped")))
+
+
+def _inside_by_balls(solid: SurfaceQuery, points: FloatArray, distance: FloatArray) -> BoolArray:
+    """Return ``[N]`` whether a closed surface winds around points at known distances from it.
+
+    A ball around a point up to the surface lies on one side of it, with all points in it.
+    """
+    ball = np.full(len(points), -1, dtype=np.int64)
+    centers: list[int] = []
+    tree = cKDTree(points)
+    for i in np.argsort(-distance, kind="stable").tolist():
+        if ball[i] < 0:
+            poll_stop()
+            ball[tree.query_ball_point(points[i], 0.99 * distance[i])] = len(centers)
+            centers.append(i)
+    return solid.inside(points[centers])[ball]
 
 
 def _crossings(boxes: FloatArray) -> int:

@@ -18,7 +18,6 @@ from rlacd.repair.distance import SurfaceQuery, points_covering
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.topology import BoolArray, IntArray
 
-
 # Distances between cells are roots of whole numbers: this much more than a radius adds only rounding.
 _ROUNDING = 1e-9
 
