@@ -30,7 +30,6 @@ METHODS: dict[str, dict[str, Any]] = {
     "greedy-150": {"policy": "greedy-hull-sum", "quality": "fast"},
     "greedy-162": {"policy": "greedy-hull-sum+edges", "quality": "fast"},
     "greedy": {"quality": "fast"},
-    "learned": {"policy": "learned", "quality": "fast"},
     "balanced": {"quality": "balanced"},
     "best": {"quality": "best", "budget": 5.0},
 }

@@ -73,7 +73,6 @@ ARMS: dict[str, Callable[[float], Policy]] = {
     "random-10": named("random-10"),
     "navacd": named("navacd"),
     "excess-norm+12 (`greedy`)": named("greedy"),
-    "learned": named("learned"),
 }
 """What is compared: name to a function from the criterion's length to a policy."""
 

@@ -36,10 +36,10 @@ import trimesh
 from fuzz.files import read_hulls
 from fuzz.geometry import why_not_convex
 from fuzz.mutations import Seed, mutated, repacked
+from fuzz.networks import q_network
 from fuzz.worker import Watched
 from rlacd.batch import JobSpec
 from rlacd.pool import ProcessLimits, WorkerDiedError
-from rlacd.weights import __name__ as weights_package
 
 CPU_SECONDS, SECONDS, MEMORY = 60.0, 1800.0, 2 * 2**30
 """Limits of an input: CPU time, wall time, bytes. A decomposition gets a timeout of one second."""
@@ -75,8 +75,7 @@ def seeds_of(meshes: Path) -> dict[str, list[Seed]]:
     for name in small[:: max(1, len(small) // SMALL_MESHES)][:SMALL_MESHES]:
         for kind, seed in written(trimesh.load_mesh(meshes / name, process=False)):
             found.setdefault(kind, []).append(seed)
-    weights = Path(sys.modules[weights_package].__file__ or "").with_name("ranker.onnx")
-    found["onnx"] = [Seed(weights.read_bytes())]
+    found["onnx"] = [Seed(q_network())]
     return found
 
 

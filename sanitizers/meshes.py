@@ -26,7 +26,6 @@ SPACE = rlacd.NavigableSpace
 WAYS: dict[str, dict[str, Any]] = {
     **{f"fast, {policy}": {"quality": "fast", "policy": policy} for policy in POLICIES},
     "balanced": {},
-    "balanced, learned": {"policy": "learned"},
     "best": {"quality": "best", "search_steps": 40},
     "fine": {"threshold": 0.02, "quality": "fast"},
     "coarse, 8 corners": {"threshold": 0.2, "max_vertices": 8},

@@ -25,7 +25,7 @@ NATIVE_TESTS = (
     *("hull", "sweep", "glue", "surface", "distance", "concavity", "concave_edges", "limits", "component", "metrics"),
     *("plane_cut", "bridges", "least_excess", "shift", "dissolve", "fuzz_found"),
     *("convex_clip", "proxy", "topology", "repair_kernels", "repair_openings", "repair_sheets", "stop"),
-    *("navigable", "navigable_decompose", "merge", "repair", "decompose", "search", "learned", "fuzz", "bad_input"),
+    *("navigable", "navigable_decompose", "merge", "repair", "decompose", "search", "networks", "fuzz", "bad_input"),
 )
 """Files of tests/ that reach the kernels."""
 

@@ -21,7 +21,7 @@ PRELOADED = [
     "tests.bounded",
     "rlacd.io.read.load",
     "rlacd.io.robots",
-    "rlacd.policies.learned",
+    "rlacd.policies.q_network",
     "trimesh.exchange.load",
 ]
 

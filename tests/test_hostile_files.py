@@ -9,7 +9,7 @@ import json
 import os
 import re
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,6 @@ from rlacd.errors import MeshFileError, OutputError, RlacdError, TrainingError, 
 from rlacd.io.read.load import load_mesh
 from rlacd.io.read.open_file import LARGEST
 from rlacd.io.robots import rewrite_robot
-from rlacd.policies.learned import PlaneRanker
 from rlacd.policies.q_network import OnnxQ
 from tests.bounded import bounded
 from tests.hostile import HARMLESS, REFUSED
@@ -108,9 +107,8 @@ def test_a_robot_that_never_ends_is_refused(kind: str, ending: str, tmp_path: Pa
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("network", [PlaneRanker, OnnxQ])
-def test_weights_that_never_end_are_refused(kind: str, network: Any, tmp_path: Path) -> None:
-    check_refused(WeightsError, KINDS[kind], network, special(tmp_path, kind, ".onnx"))
+def test_weights_that_never_end_are_refused(kind: str, tmp_path: Path) -> None:
+    check_refused(WeightsError, KINDS[kind], OnnxQ, special(tmp_path, kind, ".onnx"))
 
 
 def test_a_link_to_an_ordinary_mesh_is_followed(tmp_path: Path) -> None:
@@ -279,27 +277,14 @@ def test_a_manifest_that_is_a_pipe_is_refused(tmp_path: Path) -> None:
 # --- weights and checkpoints ------------------------------------------------------------------------------------------
 
 
-def network(folder: Path, about: dict[str, Any], location: str | None = None) -> Path:
-    """An ONNX file that says it is one of ours; its weights may be in another file."""
-    onnx = pytest.importorskip("onnx", reason="the extra train is not installed")
-    made, kind = onnx.helper, onnx.TensorProto
-    weights = made.make_tensor("w", kind.FLOAT, [4], np.arange(4, dtype=np.float32).tobytes(), raw=True)
-    if location is not None:
-        weights = onnx.TensorProto(name="w", data_type=kind.FLOAT, dims=[4], data_location=kind.EXTERNAL)
-        for key, value in {"location": location, "offset": "0", "length": "16"}.items():
-            weights.external_data.add(key=key, value=value)
-    outputs = [made.make_tensor_value_info(name, kind.FLOAT, None) for name in ("q", "q_edges", "value")]
-    inputs = [made.make_tensor_value_info(name, kind.FLOAT, None) for name in ("planes", "edges", "component")]
-    nodes = [made.make_node("Identity", ["w"], [name]) for name in ("q", "q_edges", "value")]
-    graph = made.make_graph(nodes, "g", inputs, outputs, initializer=[weights])
-    model = made.make_model(graph, opset_imports=[made.make_opsetid("", 18)], ir_version=9)
-    made.set_model_props(model, {"rlacd": json.dumps(about)})
+def network(folder: Path, change: Mapping[str, Any], location: str | None = None) -> Path:
+    """A Q network with changed metadata; its weights may be in another file."""
+    pytest.importorskip("onnx", reason="the extra train is not installed")
+    from fuzz.networks import ABOUT, q_network
+
     path = folder / "net.onnx"
-    path.write_bytes(model.SerializeToString())
+    path.write_bytes(q_network({**ABOUT, **change}, location))
     return path
-
-
-ABOUT = {"kind": "guide", "features": 2, "scales": [0.01, 0.2], "per_axis": 25, "blend": 1.0, "edge_bonus": 0.0}
 
 
 @pytest.mark.parametrize("location", ["beside.bin", "../secret.bin", "/etc/passwd", "/dev/zero"])
@@ -311,27 +296,17 @@ def test_weights_in_another_file_are_not_looked_for(
     for place in (inside / "beside.bin", tmp_path / "secret.bin"):
         place.write_bytes(bytes(16))
     monkeypatch.chdir(inside)
-    check_refused(WeightsError, "damaged", PlaneRanker, network(inside, ABOUT, location))
+    check_refused(WeightsError, "damaged", OnnxQ, network(inside, {}, location))
 
 
 @pytest.mark.parametrize(
     "change",
-    [
-        {"per_axis": 10**9},
-        {"per_axis": -1},
-        {"blend": float("nan")},
-        {"scales": [0.1, float("inf")]},
-        {"edge_bonus": "many"},
-        {"scales": 3},
-    ],
+    [{"points": 10**9}, {"points": -1}, {"points": 0.5}, {"threshold": float("nan")}, {"threshold": "many"}],
     ids=json.dumps,
 )
 def test_weights_that_ask_for_too_much_are_refused(change: dict[str, Any], tmp_path: Path) -> None:
-    from rlacd.policies.features import VERSION
-
-    sound = {**ABOUT, "features": VERSION}
-    PlaneRanker(network(tmp_path, sound))
-    check_refused(WeightsError, "metadata", PlaneRanker, network(tmp_path, {**sound, **change}))
+    OnnxQ(network(tmp_path, {}))
+    check_refused(WeightsError, "metadata", OnnxQ, network(tmp_path, change))
 
 
 def checkpoint(folder: Path) -> Path:

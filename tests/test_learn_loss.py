@@ -14,7 +14,6 @@ torch = pytest.importorskip("torch", reason="needs the extra train")
 from rlacd.errors import RlacdError  # noqa: E402
 from rlacd.learn.paper.loss import bellman_loss, boltzmann, dual_state_target, soft_value  # noqa: E402
 from rlacd.learn.paper.replay import Replay  # noqa: E402
-from rlacd.learn.paper.sumtree import SumTree  # noqa: E402
 
 Q = torch.tensor([[1.0, 2.0, 3.0], [4.0, 0.0, -1.0]])
 MASK = torch.tensor([[True, True, False], [True, True, True]])
@@ -56,29 +55,11 @@ def test_dual_state_target_by_hand() -> None:
 
 def test_loss_by_hand_and_only_through_the_planes_taken() -> None:
     q = Q.clone().requires_grad_()
-    loss, errors = bellman_loss(q, torch.tensor([1, 0]), torch.tensor([12.0, 4.0]), torch.tensor([0.5, 1.0]), 10.0)
-    assert errors.tolist() == pytest.approx([-1.0, 0.0])
-    assert loss.item() == pytest.approx(0.5 * (0.5 * 1 + 0) / 2)
+    loss = bellman_loss(q, torch.tensor([1, 0]), torch.tensor([12.0, 4.0]), 10.0)
+    assert loss.item() == pytest.approx(0.5 * (1 + 0) / 2)
     loss.backward()
     assert q.grad is not None
-    assert q.grad.tolist() == [pytest.approx([0, 0.5 * -1.0 / 10 / 2, 0]), [0, 0, 0]]
-
-
-def test_sum_tree_draws_in_proportion() -> None:
-    tree = SumTree(5)
-    tree.set(np.arange(5), np.array([1.0, 0.0, 2.0, 5.0, 2.0]))
-    tree.set(np.array([3]), np.array([5.0]))
-    drawn = tree.draw((np.arange(1000) + 0.5) / 1000)
-    assert np.bincount(drawn, minlength=5).tolist() == [100, 0, 200, 500, 200]
-
-
-@given(st.lists(st.floats(0, 1e6), min_size=1, max_size=40), st.floats(0, 1, exclude_max=True))
-def test_sum_tree_never_draws_what_has_no_weight(weights: list[float], at: float) -> None:
-    tree = SumTree(len(weights))
-    tree.set(np.arange(len(weights)), np.array(weights))
-    assert tree.total == pytest.approx(sum(weights))
-    if tree.total > 0:
-        assert weights[int(tree.draw(np.array([at]))[0])] > 0
+    assert q.grad.tolist() == [pytest.approx([0, -1.0 / 10 / 2, 0]), [0, 0, 0]]
 
 
 class Model:
@@ -108,12 +89,10 @@ class Model:
         self.frontier += new
 
 
-@given(st.integers(1, 9), st.lists(st.integers(0, 3), min_size=1, max_size=60), st.booleans())
+@given(st.integers(1, 9), st.lists(st.integers(0, 3), min_size=1, max_size=60))
 @settings(max_examples=60, deadline=None)
-def test_replay_gives_back_the_last_transitions_and_forgets_the_rest(
-    capacity: int, children: list[int], prioritised: bool
-) -> None:
-    replay = Replay(capacity, 3, 11, priority=0.6 if prioritised else 0.0)
+def test_replay_gives_back_the_last_transitions_and_forgets_the_rest(capacity: int, children: list[int]) -> None:
+    replay = Replay(capacity, 3, 11)
     model = Model(replay)
     for count in children:
         model.step(count)
@@ -133,13 +112,11 @@ def test_replay_gives_back_the_last_transitions_and_forgets_the_rest(
     assert replay.components == len(needed)
 
 
-@pytest.mark.parametrize("priority", [0.0, 0.7])
-def test_restored_replay_goes_on_as_the_saved_one(priority: float) -> None:
-    one, other = Replay(20, 3, 11, priority), Replay(20, 3, 11, priority)
+def test_restored_replay_goes_on_as_the_saved_one() -> None:
+    one, other = Replay(20, 3, 11), Replay(20, 3, 11)
     model = Model(one)
     for count in [2, 1, 0, 2] * 12:
         model.step(count)
-    one.set_errors(np.arange(20), np.linspace(0, 3, 20).astype(np.float32))
     other.restore({name: array.copy() for name, array in one.state().items()})
     for replay in (one, other):
         model.replay, frontier = replay, list(model.frontier)
@@ -149,20 +126,6 @@ def test_restored_replay_goes_on_as_the_saved_one(priority: float) -> None:
     a, b = one.sample(64, np.random.default_rng(3)), other.sample(64, np.random.default_rng(3))
     for name in vars(a):
         assert np.array_equal(getattr(a, name), getattr(b, name)), name
-
-
-def test_prioritised_replay_draws_large_errors_more_and_weighs_them_less() -> None:
-    replay = Replay(4, 1, 2, priority=1.0, correction=1.0)
-    for i in range(4):
-        row = replay.add_component(np.full(1, i, np.float32), np.ones(2, bool))
-        replay.add(row, 0, 0.0, [], [])
-        replay.release(row)
-    replay.set_errors(np.arange(4), np.array([1, 1, 1, 5], np.float32))
-    batch = replay.sample(8000, np.random.default_rng(0))
-    counts = np.bincount(batch.index, minlength=4) / 8000
-    assert counts == pytest.approx([1 / 8, 1 / 8, 1 / 8, 5 / 8], abs=0.01)
-    weights = {int(i): float(w) for i, w in zip(batch.index, batch.weights, strict=True)}
-    assert weights[3] / weights[0] == pytest.approx(1 / 5, rel=0.01)
 
 
 def test_nothing_to_sample_is_reported() -> None:

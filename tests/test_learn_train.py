@@ -91,7 +91,7 @@ def test_presets_are_valid_and_the_papers_is_the_papers() -> None:
     paper = TrainOptions.preset("paper")
     assert (paper.threshold, paper.volume_reward, paper.finish_reward) == (0.04, 1000, 1000)
     assert (paper.replay, paper.iterations, paper.warmup) == (100_000, 1_000_000, 10_000)
-    assert (paper.epsilon, paper.epsilon_decay, paper.points, paper.priority) == (0.2, 0.99, 2048, 0)
+    assert (paper.epsilon, paper.epsilon_decay, paper.points) == (0.2, 0.99, 2048)
     assert (paper.discount, paper.finish_counts, paper.rotate) == ("hull", "solid", True)
     assert not paper.scale_input
     assert not paper.value_bound
@@ -158,11 +158,10 @@ def test_the_same_seed_gives_the_same_weights_and_another_does_not(meshes: Path,
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("priority", [0.0, 0.6])
-def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, tmp_path: Path, priority: float) -> None:
-    run(meshes, tmp_path / "whole", priority=priority)
-    run(meshes, tmp_path / "halves", priority=priority, iterations=70)
-    run(meshes, tmp_path / "halves", priority=priority, resume=True)
+def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, tmp_path: Path) -> None:
+    run(meshes, tmp_path / "whole")
+    run(meshes, tmp_path / "halves", iterations=70)
+    run(meshes, tmp_path / "halves", resume=True)
     assert_same_run(tmp_path / "whole", tmp_path / "halves")
 
 

@@ -65,14 +65,13 @@ def mesh(tmp_path: Path) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("policy", ["greedy", "learned"])
-def test_no_network_no_display_no_gpu(policy: str, mesh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_network_no_display_no_gpu(mesh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A connection to any address would end the process, whatever library asks for it."""
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "")
     words = ["decompose", str(mesh), "-o", str(mesh.with_name("out.glb")), "--report", str(mesh.with_name("out.html"))]
-    run = command([*words, "--policy", policy], Fault("no network", (0,), {"FAULT_NETWORK": "1"}))
+    run = command(words, Fault("no network", (0,), {"FAULT_NETWORK": "1"}))
     assert run.code == 0, run.said
     assert {"out.glb", "out.html"} <= set(tree(mesh.parent))
 

@@ -126,8 +126,8 @@ def decompose(
     merge : bool
         Unite parts whose joint hull still meets the threshold.
     policy : str or Policy
-        What chooses the cuts of the first pass: ``greedy``, ``greedy-SCORE``, ``navacd``, ``learned``, the path of an
-        ONNX file (see `rlacd.policies.make_policy`), or any object with a method ``choose``: see `rlacd.Policy`.
+        What chooses the cuts of the first pass: ``greedy``, ``greedy-SCORE``, ``navacd``, ``random-N``, the path of
+        an ONNX file (see `rlacd.policies.make_policy`), or any object with a method ``choose``: see `rlacd.Policy`.
     resolution : int
         Cells along the longest side of the grid on which repair looks for enclosed spaces.
     open : "auto", "solid" or "thin"
@@ -176,7 +176,7 @@ def decompose(
     OptionError
         An option has the wrong type or is out of range; raised before any work is done.
     MissingExtraError
-        A learned policy is requested without the extra ``learned``.
+        A network is requested without the extra ``learned``.
     """
     given = locals()
     chosen = with_former(Options, {name: given[name] for name in OPTION_NAMES}, {"threshold_m": threshold_m})
@@ -324,7 +324,7 @@ def _cut_and_searched(
 
 
 def _scale(criterion: Criterion) -> float | None:
-    """How far a hull may reach beyond its part, if the criterion bounds that: an input of learned policies."""
+    """How far a hull may reach beyond its part, if the criterion bounds that: an input of networks."""
     return criterion.overhang if math.isfinite(criterion.overhang) else None
 
 

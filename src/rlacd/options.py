@@ -150,12 +150,11 @@ class Options:
     )
     policy: str | Policy = option(
         "greedy",
-        "What chooses the next cut: navacd is the quickest, learned asks a network, FILE.onnx is one of yours "
-        "(both: extra rlacd[learned]).",
+        "What chooses the next cut: navacd is the quickest, FILE.onnx is a network of yours (extra rlacd[learned]).",
         custom(
             f"one of {', '.join(POLICIES)}, an .onnx file, or (in Python) an object with a method `choose`",
             read_policy,
-            "greedy navacd learned FILE.onnx …",
+            "greedy navacd FILE.onnx …",
         ),
         panel=METHOD,
         metavar="NAME",

@@ -16,10 +16,10 @@ AS_PUBLISHED = (*(f"greedy-{score}" for score in SCORES), *(f"greedy-{score}{EDG
 CONTROLS = (f"random-10{EDGES}", f"random-1{EDGES}", "random-10")
 """The paper's deployment with random planes in place of the network's best: what a learned policy has to beat."""
 
-POLICIES = ("greedy", *AS_PUBLISHED, *CONTROLS, "learned")
+POLICIES = ("greedy", *AS_PUBLISHED, *CONTROLS)
 
 WEIGHTS_ENDING = ".onnx"
-"""A policy's name that ends so is the path of a network to use in place of the shipped one."""
+"""A policy's name that ends so is the path of a network."""
 
 
 def read_policy(given: Any) -> Any:

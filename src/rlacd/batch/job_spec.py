@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import asdict, dataclass, field, replace
-from importlib.resources import files
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -176,10 +175,9 @@ def _file_kind(file_format: str | None, folders: bool, preset: str | None) -> tu
 
 
 def _weights(policy: str) -> str:
-    digest = hashlib.sha256(files("rlacd.weights").joinpath("ranker.onnx").read_bytes())
-    if policy.endswith(WEIGHTS_ENDING):
-        try:
-            digest.update(read_file(policy))
-        except OSError as error:
-            raise WeightsError(f"The policy {policy} cannot be read ({error}); give another path.") from error
-    return digest.hexdigest()
+    if not policy.endswith(WEIGHTS_ENDING):
+        return ""
+    try:
+        return hashlib.sha256(read_file(policy)).hexdigest()
+    except OSError as error:
+        raise WeightsError(f"The policy {policy} cannot be read ({error}); give another path.") from error

@@ -25,11 +25,8 @@ DEFAULT_METHODS = (
     "vhacdx:hulls",
     "navacd",
     "greedy",
-    "learned",
     "greedy:balanced",
-    "learned:balanced",
     "greedy:best",
-    "learned:best",
 )
 """The methods that `rlacd bench compare` runs by default."""
 

@@ -18,20 +18,19 @@ from rlacd.cut_and_merge import cut_and_merge
 from rlacd.errors import OptionError
 from rlacd.io.read.load import load_mesh
 from rlacd.merge import limit_part
-from rlacd.planes.candidates import OFFSETS_PER_AXIS, Candidates
-from rlacd.planes.concave_edges import concave_edge_planes
+from rlacd.planes.candidates import OFFSETS_PER_AXIS, axis_and_principal
 from rlacd.planes.sweep import SLIVER, Sweep, sweep
-from rlacd.policies.features import candidates_of
-from rlacd.policies.greedy import cheapest, excess_norm, hull_sum
-from rlacd.policies.learned import Learned
-from rlacd.policies.shortlist import generator_of
+from rlacd.policies.greedy import excess_norm
+from rlacd.policies.observe import observe
+from rlacd.policies.shortlist import generator_of, least_hulls
+from rlacd.policy_names import WEIGHTS_ENDING
 from rlacd.repair.repair import repair
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Plane
 from rlacd.solid.hull import Hull
 from rlacd.workers import Workers
 
-RANKINGS = ("learned", "excess", "random")
+RANKINGS = ("excess", "random")
 
 
 @dataclass(frozen=True)
@@ -41,8 +40,8 @@ class Deployment:
     Attributes
     ----------
     ranking : str
-        "learned": the shipped network; "excess": the greedy score ``rlacd.policies.greedy.excess_norm``; "random": a
-        draw that the component alone determines, the control for the others.
+        "excess": the greedy score ``rlacd.policies.greedy.excess_norm``; "random": a draw that the component alone
+        determines, the control; or the path of a Q network (ONNX).
     planes : int
         Number of best-ranked axis planes to evaluate (the paper's #AP).
     edges : int
@@ -51,15 +50,15 @@ class Deployment:
         Whether the planes along x, y, z and along the principal axes exist.
     """
 
-    ranking: str = "learned"
+    ranking: str = "excess"
     planes: int = 10
     edges: int = 4
     spatial: bool = True
     principal: bool = True
 
     def __post_init__(self) -> None:
-        if self.ranking not in RANKINGS:
-            raise OptionError(f"ranking is {self.ranking!r}; it has to be one of {', '.join(RANKINGS)}.")
+        if self.ranking not in RANKINGS and not self.ranking.endswith(WEIGHTS_ENDING):
+            raise OptionError(f"ranking is {self.ranking!r}; it has to be {', '.join(RANKINGS)} or FILE.onnx.")
         if self.planes < 0 or self.edges < 0:
             raise OptionError("planes and edges have to be at least 0.")
         if not (self.edges or (self.planes and (self.spatial or self.principal))):
@@ -81,12 +80,12 @@ class Deployment:
                 given["planes" if key == "ap" else "edges"] = int(value)
             elif word in ("no-spatial", "no-principal"):
                 given[word.removeprefix("no-")] = False
-            elif word in RANKINGS:
+            elif word in RANKINGS or word.endswith(WEIGHTS_ENDING):
                 given["ranking"] = word
             else:
                 raise OptionError(
                     f"planes:{word} is not known; there are ap=N, ce=N, no-spatial, no-principal, "
-                    f"{', '.join(RANKINGS[:-1])} and {RANKINGS[-1]}."
+                    f"{', '.join(RANKINGS)} and FILE.onnx."
                 )
         return cls(**given)  # type: ignore[arg-type]
 
@@ -103,33 +102,27 @@ class Deployed:
 
     def __init__(self, deployment: Deployment, threshold: float) -> None:
         self._of = deployment
-        self._learned = Learned(scale=threshold) if deployment.ranking == "learned" else None
+        self._threshold = threshold
+        self._network = None
+        if deployment.ranking.endswith(WEIGHTS_ENDING):
+            from rlacd.policies.q_network import load_q_network  # needs an extra
+
+            self._network = load_q_network(deployment.ranking)
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None when no candidate is valid."""
-        blocks = [self._best_along_axes(component, threads), concave_edge_planes(component, self._of.edges)]
-        blocks = [block for block in blocks if len(block)]
-        if not blocks:
-            return None
-        scored = sweep(component, Candidates.joined(*blocks), threads)
-        return cheapest(scored, hull_sum(scored))
-
-    def _best_along_axes(self, component: Component, threads: int) -> Candidates:
-        """The best-ranked valid planes along the enabled axes."""
-        swept = sweep(
-            component, candidates_of(component, OFFSETS_PER_AXIS), threads
-        )  # the network needs the full sweep
-        kinds = np.repeat([self._of.spatial, self._of.principal], 3 * OFFSETS_PER_AXIS)
-        exists = np.concatenate([kinds, np.zeros(len(swept.candidates) - len(kinds), dtype=bool)])
+        candidates = axis_and_principal(component)
+        swept = sweep(component, candidates, threads)
+        exists = np.repeat([self._of.spatial, self._of.principal], 3 * OFFSETS_PER_AXIS)
         valid = next((v for s in (SLIVER, SLIVER / 100) if (v := exists & swept.valid(s)).any()), exists & False)
-        cost = self._cost(component, swept)
-        ranked = np.argsort(np.where(valid, cost, np.inf), kind="stable")
+        ranked = np.argsort(np.where(valid, self._cost(component, swept), np.inf), kind="stable")
         best = np.sort(ranked[: min(self._of.planes, int(valid.sum()))])  # sweep order: ties go to the first
-        return Candidates(swept.candidates.directions[best], swept.candidates.offsets[best])
+        return least_hulls(component, candidates, best, self._of.edges, threads)
 
     def _cost(self, component: Component, swept: Sweep) -> FloatArray:
-        if self._learned is not None:
-            return self._learned.rank(component, swept)
+        if self._network is not None:
+            seen = observe(component, swept.candidates, self._threshold, self._network.points)
+            return -self._network(seen).astype(np.float64)
         if self._of.ranking == "random":
             return generator_of(component).random(len(swept.candidates))
         return excess_norm(swept)

@@ -19,12 +19,10 @@ TARGETS = (0.15, 0.10)
 TABLE_1_METHODS = (
     "coacd",
     "navacd:space",
-    "learned:space",
     "navacd",
     "greedy-hull-sum",
     "random-10+edges",
     "greedy",
-    "learned",
     "greedy:balanced",
     "greedy:best",
 )

@@ -27,9 +27,9 @@ so a run can be stopped and started again. Pages are written as Markdown and HTM
 [bold]Methods[/bold]
   coacd                          CoACD (its number: concavity threshold)
   vhacdx, vhacdx:hulls           V-HACD 4 (volume error in percent; most hulls)
-  greedy, learned, navacd, ...   policies of rlacd (concavity threshold); :balanced or :best searches,
+  greedy, navacd, FILE.onnx, ...  policies of rlacd (concavity threshold); :balanced or :best searches,
                                  :space asks for navigable space (tolerance)
-  planes[:ap=N][:ce=N][:no-spatial][:no-principal][:learned|:excess|:random]
+  planes[:ap=N][:ce=N][:no-spatial][:no-principal][:excess|:random|:FILE.onnx]
                                  the paper's deployment, its kinds and numbers of planes left free
 """
 
@@ -39,7 +39,7 @@ Meshes = Annotated[Path, typer.Argument(help="A folder of meshes, of any depth."
 Out = Annotated[Path, typer.Option("--out", "-o", help="A folder for results, pages and pictures.")]
 Methods = Annotated[str | None, typer.Option(help="Separated by commas.", show_default=False)]
 Threshold = Annotated[float, typer.Option("--threshold", "-t", help="Concavity threshold.")]
-Ranking = Annotated[str, typer.Option(help="What ranks the planes along the axes: learned, excess or random.")]
+Ranking = Annotated[str, typer.Option(help="What ranks the planes along the axes: excess, random or FILE.onnx.")]
 MeanError = Annotated[list[float] | None, typer.Option(help="Mean D_h to tune to; may be repeated.")]
 Close = Annotated[float, typer.Option(min=0.001, help="How far from it the mean may be, relative to it.")]
 
@@ -113,12 +113,12 @@ def table_1(bench: Bench, methods: Methods = None, at: MeanError = None, close: 
     return _equal_accuracy(bench, "Equal accuracy (Table 1)", methods, at, close)
 
 
-GREEDY_METHODS = "greedy-hull-sum,greedy-hull-sum+edges,random-10+edges,random-1+edges,navacd,greedy,learned"
+GREEDY_METHODS = "greedy-hull-sum,greedy-hull-sum+edges,random-10+edges,random-1+edges,navacd,greedy"
 
 
 @experiment("paper-greedy")
 def greedy(bench: Bench, methods: Methods = GREEDY_METHODS, at: MeanError = None, close: Close = 0.02) -> Page:
-    """The same for one step ahead, random shortlists (the control) and the learned ranking (4.4.3)."""
+    """The same for greedy policies, one step ahead, and random shortlists; add the path of a network (4.4.3)."""
     return _equal_accuracy(bench, "Greedy against the policy (4.4.3)", methods, at, close)
 
 
@@ -147,7 +147,7 @@ def vhacd(
 
 
 @experiment("paper-table-2")
-def table_2(bench: Bench, ranking: Ranking = "learned", threshold: Threshold = 0.05) -> Page:
+def table_2(bench: Bench, ranking: Ranking = "excess", threshold: Threshold = 0.05) -> Page:
     """Leave out spatial planes, PCA planes, planes of concave edges (Table 2)."""
     from rlacd.bench.experiments import kinds_of_planes
 
@@ -159,7 +159,7 @@ def table_3(
     bench: Bench,
     planes: Annotated[str, typer.Option(help="#AP: ranked planes that go on.")] = "1,5,10,20,50,150",
     edges: Annotated[str, typer.Option(help="#CE: concave edges asked.")] = "0,4,16,64",
-    ranking: Ranking = "learned",
+    ranking: Ranking = "excess",
     threshold: Threshold = 0.05,
 ) -> Page:
     """Vary the numbers of planes and of concave edges (Table 3)."""

@@ -25,7 +25,7 @@ from torch import Tensor
 from rlacd.errors import OutputError, TrainingError
 from rlacd.io.read.open_file import read_file
 
-FORMAT = 2
+FORMAT = 3
 
 DAMAGE = (OSError, ValueError, KeyError, TypeError, RecursionError, MemoryError)
 """Exceptions that reading a damaged file may raise, beyond those of its format."""

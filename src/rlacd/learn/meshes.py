@@ -1,16 +1,10 @@
-"""The solids of a training: a folder of meshes, split into training and held-out ones, each repaired once.
-
-There are two kinds of lists. `list_meshes` reads every file, skips those with too many triangles, and draws the
-held-out ones; `small_files` and `is_held_out` go by file size and name alone, so that thousands of files need not be
-read.
-"""
+"""The solids of a training: a folder of meshes, split into training and held-out ones, each repaired once."""
 
 from __future__ import annotations
 
 import dataclasses
 import hashlib
 import json
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,9 +24,6 @@ from rlacd.solid.component import Component
 from rlacd.solid.frame import Frame
 
 ENDINGS = frozenset({".ply", ".obj", ".stl", ".off", ".glb", ".gltf", ".dae", ".3mf"})
-
-HELD_OUT = 24
-"""One mesh in this many is held out by `is_held_out`."""
 
 TURNS = (0.0, 45.0, 90.0, 180.0)
 """Degrees about one axis: the paper's augmentation."""
@@ -102,17 +93,6 @@ def list_once(meshes: Path, run: Path, max_faces: int, validation: int, seed: in
     run.mkdir(parents=True, exist_ok=True)
     kept.write_text(json.dumps(dataclasses.asdict(found), indent=1), encoding="utf-8")
     return found
-
-
-def small_files(folder: Path, max_bytes: int) -> list[str]:
-    """List the meshes below a folder whose files have at most `max_bytes`, sorted."""
-    found = (p for p in folder.rglob("*") if p.suffix.lower() in ENDINGS and p.stat().st_size <= max_bytes)
-    return sorted(p.relative_to(folder).as_posix() for p in found)
-
-
-def is_held_out(name: str) -> bool:
-    """Tell whether a mesh is held out; its name alone decides."""
-    return zlib.crc32(name.encode()) % HELD_OUT == 0
 
 
 def shuffled(names: Sequence[str], seed: int) -> list[str]:

@@ -18,9 +18,8 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
     - ``navacd``: the plane with the least sum of hull volumes, among three planes and those of four concave edges.
     - ``random-N+edges``: the plane with the least sum of hull volumes among N random ones of the 150 and those of four
       concave edges; ``random-N``: among the random ones alone. Controls for learned policies.
-    - ``learned``, or the path of an ONNX file: ranks the planes of ``greedy`` by the number of parts the component is
-      expected to end in. If the file is a Q network, as exported by ``rlacd train``, the paper's rule applies instead:
-      the least sum of hull volumes among the network's ten best planes and those of four concave edges.
+    - the path of a Q network in an ONNX file, as exported by ``rlacd train``: the paper's rule, the plane with the
+      least sum of hull volumes among the network's ten best planes and those of four concave edges.
 
     Parameters
     ----------
@@ -28,7 +27,7 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
     sweeps : SweepCache, optional
         Sweeps over the 150 planes and those of four concave edges, shared with others.
     scale : float, optional
-        The criterion's length in the frame, such as the concavity threshold; an input of learned policies.
+        The criterion's length in the frame, such as the concavity threshold; an input of networks.
 
     Raises
     ------
@@ -37,7 +36,7 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
     WeightsError
         The network cannot be loaded.
     MissingExtraError
-        A learned policy is requested without the extra ``learned``.
+        A network is requested without the extra ``learned``.
     """
     if not isinstance(name, str):
         return CheckedPolicy(name)
@@ -46,15 +45,9 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
     if name == "navacd":
         return NavACD()
     if name.endswith(WEIGHTS_ENDING):
-        from rlacd.policies.q_network import load_q_network
+        from rlacd.policies.q_network import load_q_network  # onnxruntime takes a while to import
 
-        q_network = load_q_network(name)
-        if q_network is not None:
-            return QPolicy.deployed(q_network, scale)
-    if name == "learned" or name.endswith(WEIGHTS_ENDING):
-        from rlacd.policies.learned import Learned  # onnxruntime takes a while to import
-
-        return Learned(None if name == "learned" else name, scale, sweeps=sweeps)
+        return QPolicy.deployed(load_q_network(name), scale)
     family, _, score = name.partition("-")
     if family == "greedy" and score.removesuffix(EDGES) in SCORES:
         return Greedy(score.removesuffix(EDGES), concave_edges=CONCAVE_EDGES if score.endswith(EDGES) else 0)

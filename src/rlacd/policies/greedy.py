@@ -15,9 +15,7 @@ from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
 
 EXPONENT = 1.3
-"""Exponent of the norm that gives the fewest parts (docs/research/measurements.md).
-
-The norm is also an input of the plane ranker: after a change, the ranker has to be trained again."""
+"""Exponent of the norm that gives the fewest parts (docs/research/measurements.md)."""
 
 
 def hull_sum(s: Sweep) -> FloatArray:

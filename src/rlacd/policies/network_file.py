@@ -12,12 +12,10 @@ from rlacd.errors import MissingExtraError
 try:
     import onnxruntime
 except ImportError as error:
-    raise MissingExtraError(
-        "learned policies need an extra: run  pip install 'rlacd[learned]'  and try again."
-    ) from error
+    raise MissingExtraError("networks need an extra: run  pip install 'rlacd[learned]'  and try again.") from error
 
 
-def open_network(content: bytes, optimized: bool = True) -> onnxruntime.InferenceSession:
+def open_network(content: bytes) -> onnxruntime.InferenceSession:
     """Load a network to run on one thread: components are processed in parallel already.
 
     External files with weights, which an ONNX file can refer to, are not read.
@@ -31,7 +29,5 @@ def open_network(content: bytes, optimized: bool = True) -> onnxruntime.Inferenc
     settings.intra_op_num_threads = settings.inter_op_num_threads = 1
     settings.log_severity_level = 4
     settings.add_session_config_entry("session.model_external_initializers_file_folder_path", os.devnull)
-    if not optimized:
-        settings.graph_optimization_level = onnxruntime.GraphOptimizationLevel.ORT_DISABLE_ALL
     # Without the option a damaged file is opened twice, and the reason printed.
     return onnxruntime.InferenceSession(content, settings, providers=["CPUExecutionProvider"], enable_fallback=0)

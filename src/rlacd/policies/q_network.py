@@ -86,19 +86,9 @@ class OnnxQ:
 
 
 @lru_cache(maxsize=2)
-def load_q_network(path: str) -> OnnxQ | None:
-    """Load the Q network of a file; the last two are cached. None if the file is unreadable or something else.
-
-    Raises
-    ------
-    WeightsError
-        The file is a Q network, but not of this version.
-    """
-    try:
-        kind = _about(open_network(read_file(path), optimized=False)).get("kind")
-    except Exception:  # the plane ranker's loader reports what is wrong with the file
-        return None
-    return OnnxQ(path) if kind == KIND else None
+def load_q_network(path: str) -> OnnxQ:
+    """Load the Q network of a file (see `OnnxQ`); the last two are cached."""
+    return OnnxQ(path)
 
 
 def _about(session: onnxruntime.InferenceSession) -> dict[str, Any]:

@@ -44,8 +44,8 @@ def dual_state_target(reward: Tensor, values: Tensor, discounts: Tensor, owner: 
     return reward.index_add(0, owner, discounts * values)
 
 
-def bellman_loss(q: Tensor, planes: Tensor, target: Tensor, weight: Tensor, unit: float) -> tuple[Tensor, Tensor]:
-    """Half the mean weighted squared error of Q(p, m), in units of `unit`.
+def bellman_loss(q: Tensor, planes: Tensor, target: Tensor, unit: float) -> Tensor:
+    """Half the mean squared error of Q(p, m), in units of `unit`.
 
     Parameters
     ----------
@@ -53,15 +53,10 @@ def bellman_loss(q: Tensor, planes: Tensor, target: Tensor, weight: Tensor, unit
     planes : int64 [B]
         The planes taken.
     target : float32 [B]
-    weight : float32 [B]
-        Importance weights of prioritised replay; otherwise ones.
 
     Returns
     -------
-    loss : float32 scalar
-    error : float32 [B]
-        Temporal-difference errors, in units of `unit`, detached.
+    float32 scalar
     """
     taken = q.gather(1, planes[:, None])[:, 0]
-    error = (taken - target) / unit
-    return 0.5 * (weight * error.square()).mean(), error.detach()
+    return 0.5 * ((taken - target) / unit).square().mean()

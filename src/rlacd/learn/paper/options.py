@@ -74,8 +74,6 @@ class TrainOptions:
     epsilon: float = option(0.2, "Share of random cuts at first (paper).", least=0, most=1)
     epsilon_decay: float = option(0.99, "Factor on it every 1000 cuts (paper).", least=0, most=1)
     replay: int = option(100_000, "Transitions kept (paper).", least=1)
-    priority: float = option(0.0, "Exponent of prioritised replay; 0 draws uniformly (paper).", least=0, most=1)
-    priority_correction: float = option(0.4, "Exponent of its importance weights.", least=0, most=1)
 
     # The run
     seed: int = option(0, "The same seed, meshes and options give the same weights on CPU.", least=0, most=2**63 - 1)

@@ -14,12 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd.errors import RlacdError
-from rlacd.learn.paper.sumtree import SumTree
 from rlacd.policies.observe import Float32Array
 from rlacd.solid.arrays import BoolArray
-
-LEAST_PRIORITY = 1e-3
-"""Added to every error, so that every transition keeps a chance to be drawn."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,13 +24,9 @@ class TransitionBatch:
 
     Attributes
     ----------
-    index : int64 [B]
-        Positions in the buffer, for `Replay.set_errors`.
     features : float32 [B, D]
     planes : int64 [B]
     rewards : float32 [B]
-    weights : float32 [B]
-        Importance weights, at most 1.
     child_features : float32 [C, D]
     child_masks : bool [C, A]
         Never all False in a row.
@@ -44,11 +36,9 @@ class TransitionBatch:
         Batch row of each child.
     """
 
-    index: NDArray[np.int64]
     features: Float32Array
     planes: NDArray[np.int64]
     rewards: Float32Array
-    weights: Float32Array
     child_features: Float32Array
     child_masks: BoolArray
     child_discounts: Float32Array
@@ -67,17 +57,10 @@ class Replay:
         Number of features per component.
     actions : int
         Number of planes per component.
-    priority : float
-        Exponent of prioritised replay (Schaul et al. 2016); 0 draws uniformly.
-    correction : float
-        Exponent of the importance weights.
     """
 
-    def __init__(self, capacity: int, dim: int, actions: int, priority: float = 0.0, correction: float = 0.4) -> None:
+    def __init__(self, capacity: int, dim: int, actions: int) -> None:
         self.capacity, self.dim, self.actions = capacity, dim, actions
-        self._priority, self._correction = priority, correction
-        self._tree = SumTree(capacity) if priority > 0 else None
-        self._greatest = 1.0
         self._features = np.zeros((64, dim), dtype=np.float16)
         self._masks = np.zeros((64, (actions + 7) // 8), dtype=np.uint8)
         self._bounds = np.zeros(64, dtype=np.float32)
@@ -136,45 +119,26 @@ class Replay:
         self._states[i], self._planes[i], self._rewards[i] = state, plane, reward
         self._children[i] = np.asarray(children, dtype=np.int64)
         self._discounts[i] = np.asarray(discounts, dtype=np.float32)
-        if self._tree is not None:
-            self._tree.set(np.array([i]), np.array([self._greatest]))
         self._next = (i + 1) % self.capacity
         self._count = min(self._count + 1, self.capacity)
 
     def sample(self, count: int, rng: np.random.Generator) -> TransitionBatch:
-        """Draw `count` transitions, with replacement."""
+        """Draw `count` transitions uniformly, with replacement."""
         if self._count == 0:
             raise RlacdError("there is nothing to learn from yet; let `warmup` be at least 1.")
-        if self._tree is None:
-            index = rng.integers(self._count, size=count)
-            weights: Float32Array = np.ones(count, dtype=np.float32)
-        else:
-            index = self._tree.draw((np.arange(count) + rng.random(count)) / count)
-            share = self._tree.get(index) / self._tree.total
-            rarity = (share * self._count) ** -self._correction
-            weights = (rarity / rarity.max()).astype(np.float32)
+        index = rng.integers(self._count, size=count)
         children = [self._children[i] for i in index]
         rows = np.concatenate(children)
         return TransitionBatch(
-            index,
             self._features[self._states[index]].astype(np.float32),
             self._planes[index],
             self._rewards[index],
-            weights,
             self._features[rows].astype(np.float32),
             self.masks(rows),  # type: ignore[arg-type]
             np.concatenate([self._discounts[i] for i in index]),
             self._bounds[rows],
             np.repeat(np.arange(count), [len(c) for c in children]),
         )
-
-    def set_errors(self, index: NDArray[np.int64], errors: Float32Array) -> None:
-        """Set the priorities of transitions to their temporal-difference errors; no effect on uniform draws."""
-        if self._tree is None:
-            return
-        priorities = (np.abs(errors).astype(np.float64) + LEAST_PRIORITY) ** self._priority
-        self._greatest = max(self._greatest, float(priorities.max()))
-        self._tree.set(index, priorities)
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Return everything as arrays, for a checkpoint."""
@@ -191,9 +155,7 @@ class Replay:
             "children": np.concatenate([np.empty(0, np.int64), *children]),
             "discounts": np.concatenate([np.empty(0, np.float32), *discounts]),
             "counts": np.array([len(c) for c in children], dtype=np.int64),
-            "priorities": self._tree.get(np.arange(self._count)) if self._tree is not None else np.empty(0),
             "cursor": np.array([self._next, self._count], dtype=np.int64),
-            "greatest": np.array([self._greatest]),
         }
 
     def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
@@ -202,7 +164,6 @@ class Replay:
         self._bounds, self._users = state["bounds"].copy(), state["users"].copy()
         self._free = state["free"].tolist()
         self._next, self._count = (int(x) for x in state["cursor"])
-        self._greatest = float(state["greatest"][0])
         self._states[: self._count] = state["states"]
         self._planes[: self._count] = state["planes"]
         self._rewards[: self._count] = state["rewards"]
@@ -210,8 +171,6 @@ class Replay:
         if self._count:
             self._children[: self._count] = np.split(state["children"], ends)
             self._discounts[: self._count] = np.split(state["discounts"], ends)
-        if self._tree is not None:
-            self._tree.set(np.arange(self._count), state["priorities"])
 
     def _grow(self) -> None:
         size = len(self._users)

@@ -139,7 +139,7 @@ class Training:
         self.target = QNetwork(self.inputs, self.unit).to(self.device)
         self.target.copy_from(self.network)
         self.optimizer = torch.optim.Adam(self.network.parameters(), lr=options.learning_rate, fused=True)
-        self.replay = Replay(options.replay, self.inputs, PLANES, options.priority, options.priority_correction)
+        self.replay = Replay(options.replay, self.inputs, PLANES)
         self.rng = np.random.default_rng([options.seed, 0])
         self.solids = solids
         self.rollouts = rollouts
@@ -230,11 +230,10 @@ class Training:
                 self._tensor(batch.rewards), values, self._tensor(batch.child_discounts), self._tensor(batch.owner)
             )
         q = self.network(self._tensor(batch.features))
-        loss, errors = bellman_loss(q, self._tensor(batch.planes), target, self._tensor(batch.weights), self.unit)
+        loss = bellman_loss(q, self._tensor(batch.planes), target, self.unit)
         self.optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         self.optimizer.step()
-        self.replay.set_errors(batch.index, errors.cpu().numpy())
         self.learned += 1
         if self.learned % options.target_every == 0:
             self.target.copy_from(self.network)

@@ -1,1 +1,0 @@
-"""The shipped weights; see README.md beside them."""
