@@ -140,7 +140,7 @@ def test_all_that_decides_the_bytes_is_in_the_key_and_nothing_else(tmp_path: Pat
         kept = {what: options.pop(what) for what in written if what in options}
         return JobSpec.of(options, **kept).key(content, name)  # type: ignore[arg-type]
 
-    same = [key(), key(threads=2), key(threshold=0.05), key(name="b/chair.obj"), key(file_format="glb"), key(up="z")]
+    same = [key(), key(threads=2), key(threshold=0.05), key(name="b/chair.obj"), key(file_format="glb")]
     assert len(set(same)) == 1
     others = [
         key("d"),
@@ -156,6 +156,8 @@ def test_all_that_decides_the_bytes_is_in_the_key_and_nothing_else(tmp_path: Pat
         key(file_format="urdf", one_mesh=True),
         key(density=2.0),
         key(up="y"),
+        key(mass=2.0),
+        key(keep_input=True),
         key(policy="navacd"),
         key(criterion=NavigableSpace(0.1)),
         key(criterion=NavigableSpace(0.2)),

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal, NamedTuple, TypeAlias, cast
+from typing import Any, Literal, NamedTuple, TypeAlias, cast
 
 import numpy as np
 import trimesh
@@ -18,7 +19,9 @@ from rlacd.criteria import Concavity, Criterion, NavigableSpace
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.decomposition import Decomposition
+from rlacd.errors import OptionError
 from rlacd.fields import check_callback
+from rlacd.io.read.conventions import UNITS
 from rlacd.io.read.load import load_mesh
 from rlacd.merge import (
     drop_slivers,
@@ -42,6 +45,8 @@ from rlacd.options import (
     OpenName,
     Options,
     QualityName,
+    RelativeTo,
+    UnitName,
 )
 from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import AS_PUBLISHED, Policy, make_policy
@@ -51,12 +56,15 @@ from rlacd.progress import ProgressCallback
 from rlacd.proxy import FEW, Lift, Proxy, simplify
 from rlacd.renamed import with_former
 from rlacd.repair.repair import repair
-from rlacd.report import make_report
+from rlacd.report import joint_report, make_report
 from rlacd.search import SearchContext, eliminate_parts, level, search
 from rlacd.search.levels import SearchSummary
+from rlacd.solid.balls import Balls
 from rlacd.solid.component import Component, Part
 from rlacd.solid.cover import cover
+from rlacd.solid.frame import Frame
 from rlacd.solid.input_mesh import InputMesh
+from rlacd.solid.provenance import owners
 from rlacd.solid.solid import Solid
 from rlacd.workers import Workers
 
@@ -91,6 +99,10 @@ def decompose(
     budget: float | None = None,
     search_steps: int | None = None,
     preset: PresetName | None = None,
+    per_node: bool = False,
+    relative_to: RelativeTo = "scene",
+    unit: UnitName | None = None,
+    scale: float | None = None,
     progress: ProgressCallback | None = None,
     threshold_m: float | None = None,
 ) -> Decomposition:
@@ -155,9 +167,19 @@ def decompose(
         Steps the search may take, instead of the limits of the level (about 10 to 20 a second on one core). The result
         does not depend on the speed of the machine.
     preset : str, optional
-        The engine the hulls are for: ``mujoco``, ``physx``, ``physx-gpu``, ``unity``, ``unreal``, ``newton`` or
-        ``bullet``. Each of its limits applies unless `max_vertices` or `max_faces`, respectively, is given, and
-        ``report["warnings"]`` says what the engine will not accept; see `rlacd.PRESETS`.
+        The engine the hulls are for: ``mujoco``, ``physx``, ``physx-gpu``, ``unity``, ``unreal``, ``newton``,
+        ``bullet`` or ``godot``. Each of its limits applies unless `max_vertices` or `max_faces`, respectively, is
+        given, and ``report["warnings"]`` says what the engine will not accept; see `rlacd.PRESETS`.
+    per_node : bool
+        Decompose each node of a scene separately, such as the doors and drawers of a cupboard, which move. The limits
+        on hulls hold for each. Every hull's ``metadata`` names its node, with or without this.
+    relative_to : "scene" or "node"
+        With `per_node`, what `threshold` is relative to: the size of the whole scene, or of each node.
+    unit : "mm", "cm", "m", "in" or "file", optional
+        The unit of the input, which is converted to metres; ``file`` takes what the file says. By default coordinates
+        stay as they are.
+    scale : float, optional
+        Factor to multiply the input's coordinates by, also after a conversion by `unit`.
     progress : callable, optional
         Called with a `Progress` between steps, and several times a second during long ones; when it returns False, the
         decomposition reached so far is returned as promptly as after a timeout.
@@ -186,32 +208,97 @@ def decompose(
     clock = Clock(options.timeout, progress)
     with clock.running(), Workers(options.threads, clock.stop) as workers:
         with clock.stage("load"):
-            source = load_mesh(mesh)
-        reached = _decomposed(source, options, workers, clock)
-        solid, goal = reached.solid, reached.goal
-        clock.nothing_left_to_stop()
-        with clock.stage("finish"):
-            limits = options.max_vertices, options.max_faces
-            parts = clock.if_in_time(
-                lambda: _cleaned(reached, *limits, workers),
-                lambda: [limit_roughly(part, *limits) for part in reached.parts],
-            )
-            with clock.shielded():
-                hulls = workers.map(lambda part: in_input(part.hull, solid.frame, *limits), parts)
-        with clock.stage("measure"):
-            report = make_report(solid, parts, hulls, reached.options, goal, workers, clock)
+            source = in_metres(load_mesh(mesh), options)
+        apart = options.per_node and len(source.nodes) > 1
+        done = _each_node(source, options, workers, clock) if apart else _as_one(source, options, workers, clock)
     report = {
         "name": Path(source.name).stem if isinstance(mesh, (str, os.PathLike)) else "mesh",
-        **report,
-        "search": None if reached.found is None else reached.found.as_plain(),
+        **done.report,
+        "provenance": [{"node": hull.metadata.get("node"), "body": hull.metadata.get("body")} for hull in done.hulls],
+        "up": source.up,
+        "metres": source.metres,
         "seconds": {**clock.seconds, "total": clock.elapsed},
     }
-    return Decomposition(
-        hulls,
-        report,
-        trimesh.Trimesh(source.vertices, source.faces, process=False),
-        goal.obstacles.in_input(solid.frame) if goal.obstacles is not None else None,
-    )
+    surface = trimesh.Trimesh(source.vertices, source.faces, process=False)
+    return Decomposition(done.hulls, report, surface, done.balls, source)
+
+
+class _Done(NamedTuple):
+    """Hulls in the input's unit, with what was measured."""
+
+    hulls: list[trimesh.Trimesh]
+    report: dict[str, Any]
+    balls: Balls | None = None
+
+
+def _as_one(source: InputMesh, options: Options, workers: Workers, clock: Clock) -> _Done:
+    reached = _decomposed(source, options, workers, clock)
+    clock.nothing_left_to_stop()
+    done = _finished(reached, workers, clock)
+    if source.node_of is not None:
+        places = owners(done.hulls, source.vertices, source.faces, source.node_of)
+        for hull, place in zip(done.hulls, places, strict=True):
+            hull.metadata |= {"node": source.nodes[place].name, "node_index": place}
+    return done
+
+
+def _each_node(source: InputMesh, options: Options, workers: Workers, clock: Clock) -> _Done:
+    """Decompose every node separately; lengths of the joint report are in the frame of the whole scene."""
+    scale = Frame.of(source.vertices[np.unique(source.faces)]).scale
+    assert source.node_of is not None
+    used = np.unique(source.node_of).tolist()
+    meshes = [source.of_node(index) for index in used]
+    reached = [_decomposed(mesh, options.for_node(scale, _scale_of(mesh)), workers, clock) for mesh in meshes]
+    clock.nothing_left_to_stop()
+    done = [_finished(one, workers, clock) for one in reached]
+    bodies = 0
+    for place, one in zip(used, done, strict=True):
+        for hull in one.hulls:
+            body = hull.metadata["body"]
+            whose = {"node": source.nodes[place].name, "node_index": place}
+            hull.metadata |= whose | {"body": None if body is None else body + bodies}
+        bodies += len(one.report["repair"])
+    names = [source.nodes[place].name for place in used]
+    report = joint_report(list(zip(names, (one.report for one in done), strict=True)), scale)
+    report["options"] |= {name: getattr(options, name) for name in ("threshold", "threshold_abs")}
+    report["warnings"][:0] = source.warnings
+    return _Done([hull for one in done for hull in one.hulls], report)
+
+
+def _scale_of(mesh: InputMesh) -> float:
+    return Frame.of(mesh.vertices).scale
+
+
+def _finished(reached: _Reached, workers: Workers, clock: Clock) -> _Done:
+    """Clean the parts, carry them to the input's unit, and measure them."""
+    solid, goal = reached.solid, reached.goal
+    with clock.stage("finish"):
+        limits = reached.options.max_vertices, reached.options.max_faces
+        parts = clock.if_in_time(
+            lambda: _cleaned(reached, *limits, workers),
+            lambda: [limit_roughly(part, *limits) for part in reached.parts],
+        )
+        with clock.shielded():
+            hulls = workers.map(lambda part: in_input(part.hull, solid.frame, *limits), parts)
+    with clock.stage("measure"):
+        report = make_report(solid, parts, hulls, reached.options, goal, workers, clock)
+        with clock.shielded():
+            bodies = _bodies(solid, hulls)
+    for hull, body in zip(hulls, bodies, strict=True):
+        hull.metadata["body"] = body
+    report["search"] = None if reached.found is None else reached.found.as_plain()
+    balls = goal.obstacles.in_input(solid.frame) if goal.obstacles is not None else None
+    return _Done(hulls, report, balls)
+
+
+def _bodies(solid: Solid, hulls: list[trimesh.Trimesh]) -> list[int] | list[None]:
+    """The body of each hull, by its number in the report; None if the input was not repaired."""
+    if len(solid.bodies) == 0:
+        return [None] * len(hulls)
+    if solid.body_of is None:
+        return [0] * len(hulls)
+    vertices, faces = solid.surface
+    return owners(hulls, solid.frame.to_input(vertices), faces, solid.body_of)
 
 
 class _Reached(NamedTuple):
@@ -222,6 +309,23 @@ class _Reached(NamedTuple):
     goal: Criterion
     parts: list[Part]
     found: SearchSummary | None = None
+
+
+def in_metres(source: InputMesh, options: Options) -> InputMesh:
+    """Convert the input as the options say.
+
+    Raises
+    ------
+    OptionError
+        The unit is to be that of the file, which does not say it.
+    """
+    factor = 1.0 if options.scale is None else options.scale
+    if options.unit == "file" and source.metres is None:
+        raise OptionError(f"unit is 'file', but {source.name} does not say its unit; give mm, cm, m or in.")
+    if options.unit is not None:
+        factor *= UNITS.get(options.unit, source.metres or 1.0)
+        source = replace(source, metres=1.0)
+    return source if factor == 1.0 else source.scaled(factor)
 
 
 def _cleaned(reached: _Reached, max_vertices: int | None, max_faces: int | None, workers: Workers) -> list[Part]:

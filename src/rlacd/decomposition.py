@@ -65,6 +65,13 @@ class Decomposition(Result):
             Wall time of each stage, and their ``total``.
         ``repair`` : list of dict
             For each body of the input, the step that made it a closed solid and how far that moved its surface.
+        ``provenance`` : list of dict
+            For each hull, in the order of ``hulls``, what most of the surface inside it belongs to: ``node``, the name
+            of the input's node, None if it has no scene; ``body``, its number in ``repair``. Also in
+            ``hull.metadata``.
+        ``up``, ``metres``
+            The axis that points up and the unit of length in metres, as the input's format or file says; the unit is
+            None if it does not.
         ``warnings`` : list of str
             What the caller should know: one sentence each.
     source : trimesh.Trimesh
@@ -79,8 +86,10 @@ class Decomposition(Result):
         *,
         file_format: str | None = None,
         density: float = 1000.0,
-        up: Axis = "z",
+        mass: float | None = None,
+        up: Axis | None = None,
         one_mesh: bool = False,
+        keep_input: bool = False,
     ) -> Path:
         """Write the hulls to one file, to a folder, or as a model; never leaves a half-written file.
 
@@ -95,14 +104,20 @@ class Decomposition(Result):
         file_format : str, optional
             The format inside a folder: ``"obj"`` (default), ``"glb"``, ``"ply"`` or ``"stl"``. Or ``"unreal"`` or
             ``"godot"``, for a ``*.glb`` (or, with unreal, ``*.obj``) with the input and hulls named as those engines
-            expect.
+            expect: the hulls of a glTF file, and of a scene or textured mesh from memory, are added to the input's own
+            scene, under the nodes they belong to, and everything else stays as it is.
         density : float
             Mass per cubic unit of the input: models say how heavy the repaired input is.
-        up : {"x", "y", "z"}
-            The axis of the input that points up (y in files from glTF): MJCF and SDF stand the body up, USD says so.
+        mass : float, optional
+            Mass of the whole body, instead of `density`.
+        up : {"x", "y", "z"}, optional
+            The axis of the input that points up; by default what its format or file says (y for glTF), else z. MJCF and
+            SDF stand the body up, USD says so.
         one_mesh : bool
             For URDF: one ``<collision>`` whose OBJ file has an object a hull, which Bullet reads as several shapes;
             others take it for one.
+        keep_input : bool
+            For GLB: the input's own scene with the hulls added, as for the engines.
 
         Returns
         -------
@@ -115,13 +130,22 @@ class Decomposition(Result):
             The ending is unknown, the place cannot be written to, or a hull is too thin for single precision where the
             format knows nothing else.
         OptionError
-            `file_format` is unknown or does not go with `path`; `density` or `up` is out of range.
+            `file_format` is unknown or does not go with `path`; `density`, `mass` or `up` is out of range.
         MissingExtraError
             USD was asked for and the extra ``usd`` is not installed.
         """
         from rlacd.io.write import save
 
-        return save(self, path, file_format=file_format, density=density, up=up, one_mesh=one_mesh)
+        return save(
+            self,
+            path,
+            file_format=file_format,
+            density=density,
+            mass=mass,
+            up=up,
+            one_mesh=one_mesh,
+            keep_input=keep_input,
+        )
 
     def save_balls(self, path: str | os.PathLike[str]) -> Path:
         """Write the balls that no hull touches.
@@ -147,7 +171,7 @@ class Decomposition(Result):
             raise OutputError("there are no balls to write; decompose with a NavigableSpace.")
         return save_balls(self.balls, path)
 
-    def picture(self, path: str | os.PathLike[str], *, width: int = 1600, up: Axis = "z") -> Path:
+    def picture(self, path: str | os.PathLike[str], *, width: int = 1600, up: Axis | None = None) -> Path:
         """Draw the input beside its hulls, together and pulled apart, as a PNG file; needs no display and no GPU.
 
         Parameters
@@ -156,8 +180,8 @@ class Decomposition(Result):
             Where to write; must end in ``.png``.
         width : int
             Width in pixels, 300 to 8000; the height follows.
-        up : {"x", "y", "z"}
-            The axis of the input that points up in the picture; files from glTF have y.
+        up : {"x", "y", "z"}, optional
+            The axis of the input that points up in the picture; as for `save`.
 
         Returns
         -------
@@ -177,15 +201,15 @@ class Decomposition(Result):
 
         return draw_picture(self, path, width=width, up=up)
 
-    def save_report(self, path: str | os.PathLike[str], *, up: Axis = "z") -> Path:
+    def save_report(self, path: str | os.PathLike[str], *, up: Axis | None = None) -> Path:
         """Write a page with a 3-D view of the hulls, what was measured and what was repaired; needs no network.
 
         Parameters
         ----------
         path : path-like
             Where to write; must end in ``.html``.
-        up : {"x", "y", "z"}
-            The axis of the input that points up; files from glTF have y.
+        up : {"x", "y", "z"}, optional
+            The axis of the input that points up; as for `save`.
 
         Returns
         -------
@@ -215,13 +239,13 @@ class Decomposition(Result):
             scene.add_geometry(colored, node_name=hull_name(index), geom_name=hull_name(index))
         return scene
 
-    def show(self, *, up: Axis = "z") -> Path:
+    def show(self, *, up: Axis | None = None) -> Path:
         """Open a 3-D view of the input and its hulls in the browser; needs no extra and no network.
 
         Parameters
         ----------
-        up : {"x", "y", "z"}
-            The axis of the input that points up; files from glTF have y.
+        up : {"x", "y", "z"}, optional
+            The axis of the input that points up; as for `save`.
 
         Returns
         -------

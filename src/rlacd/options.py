@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from rlacd.errors import OptionError
-from rlacd.fields import check_fields, custom, integer, number, one_of, option
+from rlacd.fields import check_fields, custom, flag, integer, number, one_of, option
 from rlacd.policy_names import POLICIES, policy_name, read_policy
 from rlacd.presets import PRESETS, PresetName, find_preset
 from rlacd.primitive_kinds import PRIMITIVE_KINDS, PrimitiveKind, read_primitives
@@ -52,6 +52,10 @@ QualityName = Literal["fast", "balanced", "best"]
 
 QUALITIES: tuple[QualityName, ...] = get_args(QualityName)
 """Levels of search; see `rlacd.search`."""
+
+RelativeTo = Literal["scene", "node"]
+
+UnitName = Literal["mm", "cm", "m", "in", "file"]
 
 MAX_THREADS = 1024
 MAX_SEED = 2**63 - 1
@@ -219,6 +223,36 @@ class Options:
         metavar="ENGINE",
     )
 
+    per_node: bool = option(
+        False,
+        "Decompose each node of a scene separately, such as doors and drawers, which move.",
+        flag(),
+        panel=METHOD,
+        flags=("--per-node",),
+    )
+    relative_to: RelativeTo = option(
+        "scene",
+        "With --per-node, whether --threshold is relative to the size of the whole scene or of each node.",
+        one_of(get_args(RelativeTo)),
+        panel=METHOD,
+        metavar="scene|node",
+    )
+    unit: UnitName | None = option(
+        None,
+        "The unit of the mesh, which is converted to metres; file takes what the file says.",
+        one_of(get_args(UnitName)),
+        panel=METHOD,
+        usual="coordinates stay as they are",
+        metavar="|".join(get_args(UnitName)),
+    )
+    scale: float | None = option(
+        None,
+        "Multiply the mesh's coordinates by this.",
+        number(above=0, rule="a positive factor"),
+        panel=METHOD,
+        usual="1",
+    )
+
     def __post_init__(self) -> None:
         check_fields(self)
         if self.preset is not None:
@@ -232,6 +266,7 @@ class Options:
                 not unused, "threshold", self.threshold_abs or self.threshold, "left out: a NavigableSpace has none"
             )
             _require(not self.primitives, "primitives", self.primitives, "left out with a NavigableSpace")
+            _require(not self.per_node, "per_node", True, "left out: the space around a scene is that of all its nodes")
         if self.quality is None:  # searching means merging
             object.__setattr__(self, "quality", "balanced" if self.merge else "fast")
         for name in ("budget", "search_steps"):
@@ -263,6 +298,26 @@ class Options:
                 f"{MIN_THRESHOLD / scale:.4g} and {MAX_THRESHOLD / scale:.4g} (0.05 % and 100 % of its longest side)."
             )
         return dataclasses.replace(self, threshold=threshold)
+
+    def for_node(self, scene: float, node: float) -> Options:
+        """Get the same options with the threshold in the frame of a node.
+
+        Parameters
+        ----------
+        scene, node : float
+            Frame units per unit of the input, of the whole scene and of the node.
+
+        Raises
+        ------
+        OptionError
+            `threshold_abs` is too small or too large for the scene.
+        """
+        if self.relative_to == "node" and self.threshold_abs is None:
+            return self
+        threshold = self.at_scale(scene).threshold * node / scene
+        return dataclasses.replace(
+            self, threshold=min(max(threshold, MIN_THRESHOLD), MAX_THRESHOLD), threshold_abs=None
+        )
 
 
 OPTION_NAMES = tuple(field.name for field in dataclasses.fields(Options))

@@ -62,6 +62,22 @@ class OutputOptions:
         usual=f"{DENSITY:g}",
         python=".save(density=)",
     )
+    mass: float | None = option(
+        None,
+        "Mass of the whole body, instead of --density.",
+        number(above=0, rule="a positive mass"),
+        panel=OUTPUT,
+        python=".save(mass=)",
+    )
+    keep_input: bool | None = option(
+        None,
+        "In a .glb, the input's own scene with the hulls added under the nodes they belong to; always so with --format "
+        "unreal and godot.",
+        flag(),
+        panel=OUTPUT,
+        flags=("--keep-input",),
+        python=".save(keep_input=)",
+    )
     one_mesh: bool | None = option(
         None,
         "In a .urdf, one collision with all hulls as objects of its mesh, for Bullet.",
@@ -111,7 +127,7 @@ class OutputOptions:
         one_of(("x", "y", "z"), rule="x, y or z"),
         panel=OUTPUT,
         metavar="AXIS",
-        usual="y for glb and gltf, else z",
+        usual="what the format or file says (y for glb and gltf), else z",
     )
     quiet: bool | None = option(
         None,

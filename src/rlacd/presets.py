@@ -8,8 +8,9 @@ The numbers are the engines' own where they have any:
 - Unity: 255 triangles a convex `MeshCollider`.
 - Newton: 64 vertices (`maxhullvert`), its default for meshes it imports.
 
-MuJoCo, Bullet and Unreal set none; there, every corner costs time in every contact, so 64 are a good limit, and 32 for
-Unreal, the most that its own tool for convex collision offers. Triangles stand for polygons, of which there are never
+MuJoCo, Bullet, Unreal and Godot set none; there, every corner costs time in every contact, so 64 are a good limit, and
+32 for Unreal, the most that its own tool for convex collision offers, and for Godot, the default of its own
+(``max_num_vertices_per_convex_hull``). Triangles stand for polygons, of which there are never
 more.
 """
 
@@ -20,7 +21,7 @@ from typing import Literal
 
 from rlacd.fields import one_of, read
 
-PresetName = Literal["mujoco", "physx", "physx-gpu", "unity", "unreal", "newton", "bullet"]
+PresetName = Literal["mujoco", "physx", "physx-gpu", "unity", "unreal", "newton", "bullet", "godot"]
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,7 @@ PRESETS: dict[str, Preset] = {
     "unreal": Preset("Unreal", 32, None, ".glb", "unreal"),
     "newton": Preset("Newton", 64, None, ".usd"),
     "bullet": Preset("Bullet", 64, None, ".urdf"),
+    "godot": Preset("Godot", 32, None, ".glb", "godot"),
 }
 """By the word that ``preset=`` and ``--preset`` take."""
 

@@ -20,7 +20,7 @@ from rlacd.primitive_kinds import PRIMITIVE_KINDS
 from rlacd.solid.component import Part, concatenated
 from rlacd.solid.distance import hull_distances, hull_union
 from rlacd.solid.hull import Hull
-from rlacd.solid.mass import Mass, mass_of
+from rlacd.solid.mass import Mass, joint_mass, mass_of
 from rlacd.solid.solid import Solid
 from rlacd.workers import Workers
 
@@ -100,6 +100,61 @@ def _primitives(parts: Sequence[Part]) -> dict[str, int]:
     """How many parts are of each kind; those that stayed hulls last."""
     kinds = [None if part.hull.primitive is None else part.hull.primitive.kind for part in parts]
     return {kind: kinds.count(kind) for kind in PRIMITIVE_KINDS} | {"hull": kinds.count(None)}
+
+
+def joint_report(reports: Sequence[tuple[str, dict[str, Any]]], scale: float) -> dict[str, Any]:
+    """Join the reports of a scene's nodes, which were decomposed separately.
+
+    Parameters
+    ----------
+    reports : sequence of (str, dict)
+        Each node's name and report.
+    scale : float
+        Frame units of the scene per unit of the input: its lengths are in that frame.
+    """
+    each = [(name, report, scale / report["scale"]) for name, report in reports]
+    first = reports[0][1]
+    nodes = []
+    per_part: list[float] | None = []
+    for name, report, factor in each:
+        errors = report["concavity"]["per_part"]
+        per_part = None if errors is None or per_part is None else [*per_part, *(error * factor for error in errors)]
+        nodes.append({"node": name, "parts": report["parts"], "scale": report["scale"]})
+    sides = ("over", "under")
+    far = {side: [_times(report["hausdorff"][side], factor) for _, report, factor in each] for side in sides}
+    repairs = [(name, body, factor) for name, report, factor in each for body in report["repair"]]
+    stopped = next((report for _, report, _ in each if not report["complete"]), first)
+    return {
+        "version": first["version"],
+        "options": dict(first["options"]),
+        "complete": stopped["complete"],
+        "stopped_by": stopped["stopped_by"],
+        **({"primitives": _added([r["primitives"] for _, r, _ in each])} if "primitives" in first else {}),
+        **{what: sum(report[what] for _, report, _ in each) for what in ("parts", "faces", "vertices")},
+        "concavity": {"per_part": per_part, "max": None if per_part is None else max(per_part)},
+        "hausdorff": {side: None if None in far[side] else max(far[side]) for side in sides},  # type: ignore[type-var]
+        "scale": scale,
+        "mass": _mass(joint_mass([_read_mass(report["mass"]) for _, report, _ in each])),
+        "repair": [
+            {**body, "body": index, "deviation": body["deviation"] * factor, "node": name}
+            for index, (name, body, factor) in enumerate(repairs)
+        ],
+        "nodes": nodes,
+        "search": None,
+        "warnings": [f"{name}: {warning}" for name, report, _ in each for warning in report["warnings"]],
+    }
+
+
+def _times(length: float | None, factor: float) -> float | None:
+    return None if length is None else length * factor
+
+
+def _added(counts: Sequence[dict[str, int]]) -> dict[str, int]:
+    return {kind: sum(count[kind] for count in counts) for kind in counts[0]}
+
+
+def _read_mass(plain: dict[str, Any]) -> Mass:
+    return Mass(plain["volume_abs"], np.array(plain["centre_abs"]), np.array(plain["inertia_abs"]))
 
 
 def _options(options: Options) -> dict[str, Any]:

@@ -9,8 +9,11 @@ from typing import Any, overload
 
 import trimesh
 
+from rlacd.fields import checked
+from rlacd.output_options import Axis, OutputOptions
 from rlacd.primitive_kinds import PRIMITIVE_KINDS
 from rlacd.solid.balls import Balls
+from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.primitive import PRIMITIVE, Primitive
 
 
@@ -22,6 +25,12 @@ class Result:
     report: dict[str, Any]
     source: trimesh.Trimesh
     balls: Balls | None = None
+    input: InputMesh | None = None
+
+    def up_axis(self, up: str | None = None) -> Axis:
+        """The axis that points up: as given, or by the convention of the input's format."""
+        given: Axis | None = checked(OutputOptions, "up", up)
+        return given or (self.input.up if self.input is not None else "z")
 
     @property
     def name(self) -> str:

@@ -15,6 +15,7 @@ from rlacd.errors import OptionError, WeightsError
 from rlacd.io.read.open_file import read_file
 from rlacd.io.write import DENSITY, FORMATS, MODELS, check_model_options, hull_target
 from rlacd.options import Options
+from rlacd.output_options import OutputOptions
 from rlacd.policies import make_policy
 from rlacd.pool import Shared
 from rlacd.presets import find_preset
@@ -55,6 +56,8 @@ class JobSpec:
     density: float = DENSITY
     up: str | None = None
     one_mesh: bool = False
+    mass: float | None = None
+    keep_input: bool = False
     weights: str = ""
 
     @classmethod
@@ -67,6 +70,8 @@ class JobSpec:
         density: float | None = None,
         up: str | None = None,
         one_mesh: bool = False,
+        mass: float | None = None,
+        keep_input: bool = False,
     ) -> JobSpec:
         """Check everything that can be checked before a mesh is read.
 
@@ -77,7 +82,7 @@ class JobSpec:
         file_format : str, optional
             A value of ``--format``, or any ending of a hull file; by default the preset's format, else glb.
             Whether each mesh gets a folder with one file per hull.
-        density, up, one_mesh
+        density, up, one_mesh, mass, keep_input
             As for `rlacd.Decomposition.save`.
 
         Raises
@@ -94,16 +99,17 @@ class JobSpec:
             raise OptionError("policy has to be a name or a file in a batch: its processes are given plain values.")
         make_policy(checked.policy)
         ending, wanted = _file_kind(file_format, folders, checked.preset)
-        check_model_options(DENSITY if density is None else density, up or "z")
+        check_model_options(DENSITY if density is None else density, up)
+        OutputOptions(mass=mass)
         with TemporaryDirectory() as folder:
-            hull_target(f"{folder}/mesh{ending or '/'}", wanted)
+            hull_target(f"{folder}/mesh{ending or '/'}", wanted, keep_input=keep_input)
         if one_mesh and ending != ".urdf":
             raise OptionError("one mesh for all hulls is for .urdf files; leave it out.")
         plain = {"threads": 1, **options}
         if isinstance(checked.criterion, NavigableSpace):
             plain["criterion"] = asdict(checked.criterion)
         weight = DENSITY if density is None else density
-        return cls(plain, ending, wanted, weight, up, one_mesh, _weights(checked.policy))
+        return cls(plain, ending, wanted, weight, up, one_mesh, mass, keep_input, _weights(checked.policy))
 
     @property
     def threads(self) -> int:
@@ -125,13 +131,9 @@ class JobSpec:
             PurePosixPath(name).stem,  # models carry this name
             self.weights,
             options,
-            [self.ending, self.file_format, self.density, self.up_of(name), self.one_mesh],
+            [self.ending, self.file_format, self.density, self.up, self.one_mesh, self.mass, self.keep_input],
         ]
         return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
-
-    def up_of(self, name: str) -> str:
-        """Return the axis of a mesh that points up."""
-        return self.up or ("y" if PurePosixPath(name).suffix.lower() in (".glb", ".gltf") else "z")
 
     def arguments(self) -> dict[str, Any]:
         """Get the keyword arguments of `rlacd.decompose`."""

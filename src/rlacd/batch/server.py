@@ -57,8 +57,8 @@ def make(
     result = _hull(spec, mesh) if hull_only else decompose(mesh, **spec.arguments())
     with TemporaryDirectory(dir=staging) as folder:
         place = f"{folder}/{stem}{spec.ending or '/'}"
-        written: dict[str, Any] = {"density": spec.density, "up": spec.up_of(mesh.name), "one_mesh": spec.one_mesh}
-        result.save(place, file_format=spec.file_format, **written)
+        names = ("file_format", "density", "mass", "up", "one_mesh", "keep_input")
+        result.save(place, **{name: getattr(spec, name) for name in names})
         paths = sorted(path for path in Path(folder).rglob("*") if path.is_file())
         paths.sort(key=lambda path: -len(path.relative_to(folder).parts))
         files = {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}

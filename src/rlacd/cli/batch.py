@@ -51,7 +51,7 @@ BATCH_EPILOG = """\b
 BATCH = "Batch"
 """Help panel of this command's own options."""
 
-WRITTEN = ("density", "up", "one_mesh")
+WRITTEN = ("density", "mass", "up", "one_mesh", "keep_input")
 """Options of `rlacd decompose` that describe how hulls are written."""
 
 
@@ -139,6 +139,8 @@ def _batch(own: dict[str, Any], given: dict[str, Any]) -> Batch:
         density=written.density,
         up=written.up,
         one_mesh=bool(written.one_mesh),
+        mass=written.mass,
+        keep_input=bool(written.keep_input),
     )
     limits = ProcessLimits(own["limit"], int(own["memory"] * 2**30))
     return Batch(own["assets"], own["out"], spec, limits, own["fallback"], own["glob"], own["redo"])

@@ -14,7 +14,7 @@ from rlacd.cli.exit_codes import ExitCode, exit_codes
 from rlacd.cli.options import decompose_options, how_parameters
 from rlacd.cli.parameters import REQUIRED, Parameters, chosen, command, option_parameters, taken
 from rlacd.errors import MeshFileError, OptionError
-from rlacd.output_options import Axis, OutputOptions
+from rlacd.output_options import OutputOptions
 
 STDOUT = "-"
 ROBOTS = (".urdf", ".xml")
@@ -78,11 +78,12 @@ def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any]) -> bool:
     from rlacd.plain_json import to_json
     from rlacd.view import draw_picture, is_html, save_report_page
 
-    up: Axis = wanted.up or _usual_up(mesh)
+    up = wanted.up
     with Watch(quiet=bool(wanted.quiet)) as watch:
         result = decompose(mesh, **options, progress=watch)
     place = str(wanted.output)
-    written = chosen({"file_format": wanted.file_format, "density": wanted.density, "one_mesh": wanted.one_mesh})
+    names = ("file_format", "density", "mass", "one_mesh", "keep_input")
+    written = chosen({name: getattr(wanted, name) for name in names})
     result.save(place, up=up, **written)
     if not wanted.quiet:
         say(summary(result, place))
@@ -146,7 +147,8 @@ def _check_mesh(wanted: OutputOptions) -> None:
     from rlacd.io.write import check_balls, check_file, hull_target
     from rlacd.view import check_picture
 
-    hull_target(str(wanted.output), wanted.file_format, one_mesh=bool(wanted.one_mesh))
+    flags = {"one_mesh": bool(wanted.one_mesh), "keep_input": bool(wanted.keep_input)}
+    hull_target(str(wanted.output), wanted.file_format, **flags)
     if wanted.package_dirs:
         raise OptionError("--package-dir belongs to robots: a .urdf or .xml file as input.")
     if wanted.report not in (None, STDOUT):
@@ -164,7 +166,7 @@ def _check_robot(asked: OutputOptions, wanted: OutputOptions) -> None:
 
     if wanted.report is not None and is_html(wanted.report):
         raise OptionError("--report as a page belongs to a single mesh; for a robot give a .json file.")
-    for name in ("picture", "balls", "file_format", "density", "one_mesh"):
+    for name in ("picture", "balls", "file_format", "density", "mass", "one_mesh", "keep_input"):
         if getattr(asked, name) is not None:
             spelled = "format" if name == "file_format" else name.replace("_", "-")
             raise OptionError(f"--{spelled} belongs to a single mesh; leave it out for a robot.")
@@ -196,7 +198,3 @@ def _check_output(mesh: Path, wanted: OutputOptions) -> None:
 
 def _same(path: str | Path) -> str:
     return os.path.normcase(os.path.realpath(path))  # unlike Path.resolve, accepts circular links
-
-
-def _usual_up(mesh: Path) -> Axis:
-    return "y" if mesh.suffix.lower() in (".glb", ".gltf") else "z"

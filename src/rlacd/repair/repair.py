@@ -161,7 +161,7 @@ def repair(
         other = _Repair(query, frame, resolution, keep_cavities, open_bodies, doubted, bend)
         if other.deviation.max() < work.deviation.max():
             work = other
-    return Solid(work.solid, surface, frame, work.report(), tuple(warnings + work.warnings))
+    return Solid(work.solid, surface, frame, work.report(), tuple(warnings + work.warnings), body_of=work.body_of_input)
 
 
 def _used(mesh: InputMesh) -> tuple[FloatArray, IntArray]:

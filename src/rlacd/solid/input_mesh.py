@@ -2,10 +2,50 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from rlacd.output_options import Axis
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.topology import IntArray
+
+
+@dataclass(frozen=True)
+class SourceNode:
+    """A node of the input's scene that places triangles.
+
+    Attributes
+    ----------
+    name
+        As in the file, otherwise that of its mesh, otherwise made up.
+    key
+        What identifies it in the asset: the index of a glTF node, or a node's name in a scene of trimesh.
+    transform
+        ``[4, 4]`` from the node's coordinates to those of the mesh.
+    """
+
+    name: str
+    key: int | str
+    transform: FloatArray
+
+
+@dataclass(frozen=True)
+class Asset:
+    """The input with everything that is not triangles, for files that keep it.
+
+    Attributes
+    ----------
+    content
+        The bytes of a glTF file, or a scene or mesh of trimesh.
+    folder
+        Where the files are that it refers to.
+    """
+
+    content: Any
+    folder: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -22,9 +62,44 @@ class InputMesh:
         File name, or the kind of object given.
     warnings
         What was left out.
+    up
+        The axis that points up by the input's own convention.
+    metres
+        The unit of length in metres, if the input says it.
+    nodes
+        The nodes that place triangles; empty if the input has no scene.
+    node_of
+        ``[F]``, the index in `nodes` of each face; None without nodes.
+    asset
+        The input itself, if it is a scene that can be kept.
+    factor
+        What the input's coordinates were multiplied by.
     """
 
     vertices: FloatArray
     faces: IntArray
     name: str
     warnings: tuple[str, ...]
+    up: Axis = "z"
+    metres: float | None = None
+    nodes: tuple[SourceNode, ...] = ()
+    node_of: IntArray | None = None
+    asset: Asset | None = None
+    factor: float = 1.0
+
+    def scaled(self, factor: float) -> InputMesh:
+        """Multiply all coordinates."""
+        return replace(self, vertices=self.vertices * factor, factor=self.factor * factor)
+
+    def of_node(self, index: int) -> InputMesh:
+        """Get only the triangles that one node places, and the vertices that they use."""
+        assert self.node_of is not None
+        used, faces = np.unique(self.faces[self.node_of == index], return_inverse=True)
+        return replace(
+            self,
+            vertices=np.ascontiguousarray(self.vertices[used]),
+            faces=np.ascontiguousarray(faces.reshape(-1, 3).astype(np.int64)),
+            warnings=(),
+            nodes=(),
+            node_of=None,
+        )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,6 +50,18 @@ def mass_of(vertices: FloatArray, faces: IntArray, frame: Frame) -> Mass:
             frame.to_input(centre[None])[0],
             _times(inertia, unit, 5),
         )
+
+
+def joint_mass(masses: Sequence[Mass]) -> Mass:
+    """Add up bodies of density one that do not overlap."""
+    volume = sum(mass.volume_abs for mass in masses)
+    weights = [mass.volume_abs / volume if volume > 0 else 1 / len(masses) for mass in masses]
+    centre = np.sum([weight * mass.centre_abs for weight, mass in zip(weights, masses, strict=True)], axis=0)
+    inertia = np.zeros((3, 3))
+    for mass in masses:
+        away = mass.centre_abs - centre
+        inertia += mass.inertia_abs + mass.volume_abs * (away @ away * np.eye(3) - np.outer(away, away))
+    return Mass(float(volume), centre, inertia)
 
 
 def _times(value: Any, unit: np.float64, power: int) -> FloatArray:

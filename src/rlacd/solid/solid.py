@@ -53,6 +53,8 @@ class Solid:
         What was done to each body.
     warnings
         One sentence for each thing the user should know.
+    body_of
+        ``[F]``, the body of each face of the surface; None if there is only one.
     """
 
     shape: Manifold | tuple[FloatArray, NDArray[np.int32]]
@@ -60,6 +62,7 @@ class Solid:
     frame: Frame
     bodies: tuple[BodyRepair, ...]
     warnings: tuple[str, ...]
+    body_of: NDArray[np.int64] | None = None
 
     @property
     def vertices(self) -> FloatArray:

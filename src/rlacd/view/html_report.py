@@ -9,9 +9,8 @@ from typing import Any
 
 from rlacd._version import __version__
 from rlacd.errors import MissingExtraError, OutputError
-from rlacd.fields import about, path_like, read
+from rlacd.fields import path_like, read
 from rlacd.io.write import check_file, write_file
-from rlacd.output_options import OutputOptions
 from rlacd.result import Result
 from rlacd.view.heat import heat_map
 from rlacd.view.page import still_page
@@ -48,7 +47,7 @@ def check_report_page(path: str | os.PathLike[str], up: str | None = None) -> Pa
 
 
 def save_report_page(
-    decomposition: Result, path: str | os.PathLike[str], *, up: str = "z", picture: bool = True
+    decomposition: Result, path: str | os.PathLike[str], *, up: str | None = None, picture: bool = True
 ) -> Path:
     """Write a report as one self-contained HTML file.
 
@@ -60,7 +59,7 @@ def save_report_page(
     decomposition : Result
     path : path-like
         A ``.html`` file.
-    up : {"x", "y", "z"}
+    up : {"x", "y", "z"}, optional
         The axis of the input that points up.
     picture : bool
         Include the picture, which takes a few seconds to render. Without the extra ``view`` it is left out, and a note
@@ -76,13 +75,17 @@ def save_report_page(
     OutputError, OptionError
         As for `check_report_page`.
     """
-    place = check_report_page(path, read(about(OutputOptions, "up").kind, "up", up))
+    place = check_report_page(path, up)
     write_file(place, report_page(decomposition, up=up, picture=picture).encode())
     return place
 
 
-def report_page(decomposition: Result, *, up: str = "z", picture: bool = True, unit: str = "") -> str:
-    """Build the text of the report; see `save_report_page`."""
+def report_page(decomposition: Result, *, up: str | None = None, picture: bool = True, unit: str | None = None) -> str:
+    """Build the text of the report; see `save_report_page`. The unit is the input's, unless it is given."""
+    up = decomposition.up_axis(up)
+    if unit is None:
+        metres = decomposition.input is not None and decomposition.input.metres == 1.0
+        unit = "m" if metres else ""
     data: dict[str, Any] = {
         **scene(decomposition, up, unit=unit),
         "heat": heat_scene(heat_map(decomposition, triangles=HEAT_TRIANGLES)),

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from rlacd.errors import OutputError
-from rlacd.fields import about, checked, integer, path_like, read
+from rlacd.fields import checked, integer, path_like, read
 from rlacd.io.write import check_file, write_file
 from rlacd.io.write.palette import linear_from_srgb
 from rlacd.output_options import OutputOptions
@@ -66,7 +66,7 @@ def draw_picture(
     *,
     width: int = 1600,
     samples: int = 16,
-    up: str = "z",
+    up: str | None = None,
 ) -> Path:
     """Draw the input, its hulls and the exploded hulls side by side, with one line of numbers.
 
@@ -80,7 +80,7 @@ def draw_picture(
         Pixels, from 300 to 8,000.
     samples : int
         Light paths per pixel: more are slower and less grainy.
-    up : {"x", "y", "z"}
+    up : {"x", "y", "z"}, optional
         The axis of the input that points up in the picture.
 
     Returns
@@ -97,13 +97,13 @@ def draw_picture(
     OptionError
         `width`, `samples` or `up` is out of range.
     """
-    place = check_picture(path, read(about(OutputOptions, "up").kind, "up", up))
+    place = check_picture(path, up=up)
     write_file(place, picture_bytes(decomposition, width=width, samples=samples, up=up))
     return place
 
 
 def picture_bytes(
-    decomposition: Result, *, width: int = 1600, samples: int = 16, up: str = "z", clear: bool = False
+    decomposition: Result, *, width: int = 1600, samples: int = 16, up: str | None = None, clear: bool = False
 ) -> bytes:
     """Draw the picture as the bytes of a PNG file; see `draw_picture`.
 
@@ -113,6 +113,7 @@ def picture_bytes(
     samples = read(integer(1, 10_000), "samples", samples)
 
     image = require_extra("PIL.Image")
+    up = decomposition.up_axis(up)
     panels: list[tuple[str, list[Body], Spheres | None]] = [
         ("input", [_body(decomposition.source.triangles, INPUT_COLOR, up)], None),
         ("hulls", _hull_bodies(decomposition, up, pull=0.0), None),

@@ -136,8 +136,7 @@ def read_subject(mesh: str | os.PathLike[str], up: str | None = None) -> Subject
         The file cannot be read or holds nothing usable.
     """
     read = load_mesh(mesh)
-    is_gltf = Path(mesh).suffix.lower() in (".glb", ".gltf")
-    return Subject(Path(mesh), Path(read.name).stem, up or ("y" if is_gltf else "z"), "m" if is_gltf else "", read)
+    return Subject(Path(mesh), Path(read.name).stem, up or read.up, "m" if read.metres == 1.0 else "", read)
 
 
 def read_controls(given: dict[str, Any]) -> ViewerControls:

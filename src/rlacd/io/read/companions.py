@@ -8,6 +8,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from rlacd.errors import MeshFileError
+from rlacd.io.read.beside import DATA, IMAGES
 from rlacd.io.read.open_file import LARGEST, read_file
 
 
@@ -45,18 +46,20 @@ def lay_out(files: Mapping[str, bytes], folder: Path) -> Path:
 
 
 def _buffers(path: Path, content: bytes) -> dict[str, bytes]:
-    """Files beside a glTF file that its buffers name; the loader reports those missing or outside the folder."""
+    """Files beside a glTF file that its buffers and images name; the loader reports missing buffers."""
     if path.suffix.lower() != ".gltf":
         return {}
     try:
-        uris = [str(buffer["uri"]) for buffer in json.loads(content)["buffers"] if "uri" in buffer]
-    except (ValueError, KeyError, TypeError, RecursionError):
+        header = json.loads(content)
+        named = [*header.get("buffers", []), *header.get("images", [])]
+        uris = [str(one["uri"]) for one in named if "uri" in one]
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return {}
     found: dict[str, bytes] = {}
     for name in sorted({spelled for uri in uris if not uri.startswith("data:") for spelled in (uri, unquote(uri))}):
         try:
             buffer = (path.parent / name).resolve()
-            if buffer.is_relative_to(path.parent.resolve()):
+            if buffer.is_relative_to(path.parent.resolve()) and buffer.suffix.lower() in DATA | IMAGES:
                 found[name] = read_file(buffer, LARGEST - sum(map(len, found.values())))
         except (OSError, ValueError, RuntimeError):
             continue

@@ -59,7 +59,7 @@ def plain_gltf(path: Path, content: bytes, beside: Callable[[str], bytes]) -> by
     FileNotFoundError
         Raised by `beside`.
     """
-    header, rest = _header(path, content)
+    header, rest = split(path, content)
     try:
         plain = _plain(path, header)
         _check(path, plain, _bytes_given(path, plain, len(content), beside))
@@ -74,7 +74,21 @@ def plain_gltf(path: Path, content: bytes, beside: Callable[[str], bytes]) -> by
     return b"".join((head, text, rest))
 
 
-def _header(path: Path, content: bytes) -> tuple[Json, bytes | None]:
+def node_names(path: Path, content: bytes) -> list[str]:
+    """Name every node of a glTF file: as it is called, like its mesh, or by its index."""
+    header, _ = split(path, content)
+    meshes = header.get("meshes", [])
+
+    def named(index: int, node: Json) -> str:
+        own = node.get("name")
+        if not own and "mesh" in node:
+            own = meshes[node["mesh"]].get("name")
+        return own if own and isinstance(own, str) else f"node_{index}"
+
+    return [named(index, node) for index, node in enumerate(header.get("nodes", []))]
+
+
+def split(path: Path, content: bytes) -> tuple[Json, bytes | None]:
     """Split a file into its JSON and, if it is binary, the bytes that follow."""
     text, rest = content, None
     if content.startswith(MAGIC):

@@ -10,34 +10,32 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeAlias
-from urllib.parse import unquote
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
-from trimesh.resolvers import Resolver
 
 from rlacd.errors import EmptyMeshError, MeshDataError, MeshFileError
-from rlacd.io.read.gltf import plain_gltf
+from rlacd.io.read.beside import FolderFiles
+from rlacd.io.read.conventions import stated
+from rlacd.io.read.gltf import node_names, plain_gltf
 from rlacd.io.read.limits import MOST_TRIANGLES
 from rlacd.io.read.off import is_off, plain_off
-from rlacd.io.read.open_file import LARGEST, read_file
+from rlacd.io.read.open_file import read_file
 from rlacd.io.read.text import check_text, declared_triangles, plain_obj, plain_ply, plain_stl
 from rlacd.io.read.xml import check_3mf, collada_of
 from rlacd.memory import BYTES_READ, require_memory
 from rlacd.solid.frame import FloatArray
-from rlacd.solid.input_mesh import InputMesh
+from rlacd.solid.input_mesh import Asset, InputMesh, SourceNode
 from rlacd.solid.topology import BoolArray, IntArray
 
 Source: TypeAlias = str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]
 
 FORMATS = ("obj", "stl", "ply", "off", "glb", "gltf", "dae", "zae", "3mf", "xyz")
 """The formats that are read. trimesh parses more, but those parsers have not been reviewed against hostile files."""
-
-# Only triangles are needed: no colours, and no images, whose decoders are the riskier part of any loader.
-_DATA_FILES = {".bin"}
 
 
 def load_mesh(source: Source) -> InputMesh:
@@ -65,20 +63,46 @@ def load_mesh(source: Source) -> InputMesh:
         There are no points at all.
     """
     if isinstance(source, str | os.PathLike):
-        path = Path(source)
-        return _clean(*_bake(_read(path), path.name), path.name)
+        return _from_file(Path(source))
     if isinstance(source, trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud):
         kind = type(source).__name__
-        return _clean(*_bake(source, kind), kind)
+        baked = _bake(source, kind)
+        looks = isinstance(source, trimesh.Scene) or (isinstance(source, trimesh.Trimesh) and source.visual.defined)
+        return replace(_clean(baked, kind), asset=Asset(source) if looks else None)
     if isinstance(source, tuple) and len(source) == 2:
-        return _clean(*_arrays(*source), "arrays")
+        return _clean(_Baked(*_arrays(*source)), "arrays")
     raise MeshDataError(
         f"cannot take a mesh from {type(source).__name__}: give a path, a trimesh object, or a tuple (vertices, faces)"
     )
 
 
-def _read(path: Path) -> trimesh.Scene:
-    """Parse a file; raises MeshFileError with the most likely reason."""
+def _from_file(path: Path) -> InputMesh:
+    """Read a file, with the conventions and the scene that it states."""
+    content, extension, scene = _read(path)
+    mesh = _clean(_bake(scene, path.name), path.name)
+    up, metres = stated(extension, content, scene)
+    mesh = replace(mesh, up=up, metres=metres)
+    if extension not in ("glb", "gltf"):
+        return replace(mesh, asset=Asset(scene) if len(mesh.nodes) > 1 else None)
+    names = node_names(path, content)
+    # The triangles were read from a file without names, whose nodes are therefore called by their index.
+    keys = [int(str(node.key).partition("_")[0]) for node in mesh.nodes]
+    nodes = tuple(replace(node, name=names[key], key=key) for node, key in zip(mesh.nodes, keys, strict=True))
+    return replace(_joined(replace(mesh, nodes=nodes)), asset=Asset(content, path.parent))
+
+
+def _joined(mesh: InputMesh) -> InputMesh:
+    """Make one node of those with the same key, into which the primitives of a mesh are split."""
+    if mesh.node_of is None:
+        return mesh
+    first: dict[int | str, int] = {}
+    place = np.array([first.setdefault(node.key, len(first)) for node in mesh.nodes], dtype=np.int64)
+    kept = {node.key: node for node in reversed(mesh.nodes)}
+    return replace(mesh, nodes=tuple(kept[key] for key in first), node_of=place[mesh.node_of])
+
+
+def _read(path: Path) -> tuple[bytes, str, trimesh.Scene]:
+    """Parse a file: its content, format and scene; raises MeshFileError with the most likely reason."""
     # Opened here, not by name in the parser: a name that looks like a URL must never be fetched.
     try:
         content = read_file(path)
@@ -98,11 +122,11 @@ def _read(path: Path) -> trimesh.Scene:
         raise MeshFileError(f"{path} is in no format that is read here: {hint}")
     if (declared := declared_triangles(content, extension)) is not None:
         require_memory(declared, BYTES_READ, path.name)
-    beside = _FolderResolver(path.parent)
+    beside = FolderFiles(path.parent)
     try:
-        content, extension = _checked(path, content, extension, beside)
+        plain, extension = _checked(path, content, extension, beside)
         scene = trimesh.load_scene(
-            io.BytesIO(content),
+            io.BytesIO(plain),
             file_type=extension,
             resolver=beside,
             allow_remote=False,
@@ -125,10 +149,10 @@ def _read(path: Path) -> trimesh.Scene:
         ) from error
     if holds and holds != extension and not scene.geometry:
         raise MeshFileError(f"{path} is not {extension} but {holds}: rename it to .{holds}")
-    return scene
+    return plain if extension == "dae" else content, extension, scene
 
 
-def _checked(path: Path, content: bytes, extension: str, beside: _FolderResolver) -> tuple[bytes, str]:
+def _checked(path: Path, content: bytes, extension: str, beside: FolderFiles) -> tuple[bytes, str]:
     """Return the content to parse, in a form that is safe for the parser; raises MeshFileError."""
     match extension:
         case "gltf" | "glb":
@@ -178,57 +202,23 @@ def _format_of(content: bytes) -> str | None:
 _OBJ_WORDS = {b"v", b"vn", b"vt", b"vp", b"f", b"l", b"p", b"g", b"o", b"s", b"mtllib", b"usemtl"}
 
 
-class _FolderResolver(Resolver):  # type: ignore[misc]
-    """Serves data files of one folder only.
+class _Baked(NamedTuple):
+    """Triangles, and the node that places each."""
 
-    A name that leads out of the folder, by ``..``, an absolute path or a link, counts as missing; so do images and
-    material libraries.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder.resolve()
-        self._read: dict[Path, bytes] = {}
-
-    def get(self, name: str) -> bytes:
-        """Return the content of a file in the folder, cached, since a file may be named any number of times.
-
-        Raises
-        ------
-        FileNotFoundError
-            There is no such file, or it may not be read.
-        """
-        for spelled in dict.fromkeys((name, unquote(name))):
-            try:
-                path = (self._folder / spelled.strip()).resolve()
-                if path.suffix.lower() not in _DATA_FILES or not path.is_relative_to(self._folder):
-                    continue
-                if path not in self._read:
-                    self._read[path] = read_file(path, LARGEST - sum(map(len, self._read.values())))
-            except (OSError, ValueError, RuntimeError):  # a name with a NUL, circular links
-                continue
-            return self._read[path]
-        raise FileNotFoundError(f"{name!r:.200} is not a data file beside the mesh")
-
-    def write(self, name: str, data: Any) -> None:
-        """Refuse: loading writes nothing."""
-        raise PermissionError(name)
-
-    def namespaced(self, namespace: str) -> _FolderResolver:
-        """Stay in the same folder."""
-        raise FileNotFoundError(namespace)
-
-    def keys(self) -> Iterator[str]:
-        """List nothing: files are asked for by name."""
-        return iter(())
+    vertices: FloatArray
+    faces: IntArray
+    nodes: tuple[SourceNode, ...] = ()
+    node_of: IntArray | None = None
 
 
-def _bake(source: trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud, name: str) -> tuple[FloatArray, IntArray]:
+def _bake(source: trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud, name: str) -> _Baked:
     """Concatenate all triangles of a scene, with every instance transformed; if there are none, its points."""
     vertices: list[FloatArray] = []
     faces: list[IntArray] = []
     points: list[FloatArray] = []
+    nodes: list[SourceNode] = []
     count = 0
-    for geometry, transform in _instances(source, name):
+    for node, geometry, transform in _instances(source, name):
         if isinstance(geometry, trimesh.Trimesh):
             v, f = _arrays(geometry.vertices, geometry.faces)
             if transform is not None:
@@ -242,19 +232,21 @@ def _bake(source: trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud, name: st
                 _raise_out_of_range(f, len(v))
             vertices.append(v)
             faces.append(f + count)
+            nodes.append(SourceNode(str(node), node, np.eye(4) if transform is None else transform))
             count += len(v)
         elif isinstance(geometry, trimesh.PointCloud):
             v, _ = _arrays(geometry.vertices, [])
             points.append(v if transform is None else v @ transform[:3, :3].T + transform[:3, 3])
     if vertices:
-        return np.concatenate(vertices), np.concatenate(faces)
-    return (np.concatenate(points) if points else np.empty((0, 3))), np.empty((0, 3), dtype=np.int64)
+        node_of = np.repeat(np.arange(len(nodes)), [len(f) for f in faces])
+        return _Baked(np.concatenate(vertices), np.concatenate(faces), tuple(nodes), node_of)
+    return _Baked(np.concatenate(points) if points else np.empty((0, 3)), np.empty((0, 3), dtype=np.int64))
 
 
-def _instances(source: Any, name: str) -> Iterator[tuple[Any, FloatArray | None]]:
-    """Yield each geometry of a scene with its transform, None for the identity, once per instance."""
+def _instances(source: Any, name: str) -> Iterator[tuple[Any, Any, FloatArray | None]]:
+    """Yield each node and its geometry with the transform, None for the identity, once per instance."""
     if not isinstance(source, trimesh.Scene):
-        yield source, None
+        yield "mesh", source, None
         return
     data = source.graph.transforms.node_data
     instances = [(node, source.geometry[data[node]["geometry"]]) for node in source.graph.nodes_geometry]
@@ -264,7 +256,7 @@ def _instances(source: Any, name: str) -> Iterator[tuple[Any, FloatArray | None]
     placed = {source.graph.base_frame: np.eye(4)}
     for node, geometry in instances:
         transform = _placed(source.graph, node, placed, name)
-        yield geometry, None if np.array_equal(transform, np.eye(4)) else transform
+        yield node, geometry, None if np.array_equal(transform, np.eye(4)) else transform
 
 
 def _placed(graph: Any, node: Any, placed: dict[Any, FloatArray], name: str) -> FloatArray:
@@ -317,8 +309,9 @@ def _raise_out_of_range(faces: IntArray, count: int) -> None:
     raise MeshDataError(f"a face uses vertex {wrong} but there are {count} (counted from 0): the file is damaged")
 
 
-def _clean(vertices: FloatArray, faces: IntArray, name: str) -> InputMesh:
+def _clean(baked: _Baked, name: str) -> InputMesh:
     """Check the indices and drop faces and vertices that are not finite."""
+    vertices, faces, nodes, node_of = baked
     if len(faces) and (faces.min() < 0 or faces.max() >= len(vertices)):
         _raise_out_of_range(faces, len(vertices))
     require_memory(len(faces), BYTES_READ, name)
@@ -333,7 +326,9 @@ def _clean(vertices: FloatArray, faces: IntArray, name: str) -> InputMesh:
             "them were left out"
         )
         faces = (np.cumsum(finite) - 1)[faces[usable]]
+        node_of = None if node_of is None else node_of[usable]
         vertices = vertices[finite]
     if len(vertices) == 0:
         raise EmptyMeshError(f"{name} holds no points, so there is nothing to decompose: check the export")
-    return InputMesh(np.ascontiguousarray(vertices), np.ascontiguousarray(faces), name, tuple(warnings))
+    arrays = np.ascontiguousarray(vertices), np.ascontiguousarray(faces)
+    return InputMesh(*arrays, name, tuple(warnings), nodes=nodes, node_of=node_of)

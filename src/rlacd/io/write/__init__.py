@@ -12,16 +12,17 @@ import trimesh
 from rlacd.errors import OutputError
 from rlacd.io.write.atomic import write_file
 from rlacd.io.write.balls import check_balls, save_balls
-from rlacd.io.write.encode import ENCODERS
-from rlacd.io.write.engines import encode_godot, encode_unreal
+from rlacd.io.write.encode import ENCODERS, encode_glb, hull_name
+from rlacd.io.write.engines import ENGINE_NAMES, encode_engine
 from rlacd.io.write.folder import check_names, write_folder
+from rlacd.io.write.keep import encode_kept, is_kept
 from rlacd.io.write.mjcf import encode_mjcf
-from rlacd.io.write.model import MeshFile, Model, check_model_options, model_of, shapes_of
+from rlacd.io.write.model import MeshFile, Model, check_model_options, model_of, node_name, shapes_of
 from rlacd.io.write.sdf import encode_sdf
 from rlacd.io.write.target import FORMATS, MODELS, WITH_MESHES, Target, check_file, check_name, hull_target, mesh_folder
 from rlacd.io.write.urdf import encode_urdf
 from rlacd.io.write.usd import encode_usd
-from rlacd.output_options import DENSITY
+from rlacd.output_options import DENSITY, Axis
 from rlacd.primitive_kinds import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.result import Result
 
@@ -49,7 +50,6 @@ _PRIMITIVES: dict[str, tuple[PrimitiveKind, ...]] = {
     "urdf": ("sphere", "box", "cylinder"),  # many of its readers refuse a file with a capsule
     "sdf": PRIMITIVE_KINDS,
 }
-_ONE_FILE = {"usd": encode_usd, "unreal": encode_unreal, "godot": encode_godot}
 
 
 def save(
@@ -58,8 +58,10 @@ def save(
     *,
     file_format: str | None = None,
     density: float = DENSITY,
-    up: str = "z",
+    mass: float | None = None,
+    up: Axis | None = None,
     one_mesh: bool = False,
+    keep_input: bool = False,
 ) -> Path:
     """Write a decomposition; see `rlacd.Decomposition.save`.
 
@@ -71,16 +73,32 @@ def save(
         The format needs an extra that is not installed.
     """
     check_model_options(density, up)
-    target = hull_target(path, file_format, one_mesh=one_mesh)
+    target = hull_target(path, file_format, one_mesh=one_mesh, keep_input=keep_input)
+    ending = target.path.suffix.lower().lstrip(".")
+    if target.file_format in ENGINE_NAMES and ending == "glb" and is_kept(result):
+        write_file(target.path, encode_kept(result, ENGINE_NAMES[target.file_format], colored=False))
+        return target.path
+    if keep_input and result.hulls:
+        write_file(target.path, _with_input(result))
+        return target.path
     if target.file_format not in MODELS:
         return save_hulls(result.hulls, path, stem=result.name, file_format=file_format)
-    model = model_of(result, density=density, up=up)
+    model = model_of(result, density=density, mass=mass, up=up)
     if target.file_format in WITH_MESHES:
         _save_with_meshes(model, target, one_mesh)
+    elif target.file_format == "usd":
+        write_file(target.path, encode_usd(model, ending))
     else:
-        encode = _ONE_FILE[target.file_format]
-        write_file(target.path, encode(model, target.path.suffix.lower().lstrip(".")))
+        write_file(target.path, encode_engine(model, target.file_format, ending))
     return target.path
+
+
+def _with_input(result: Result) -> bytes:
+    """GLB of the input with its hulls: its own scene, or the triangles in grey where it has none."""
+    if is_kept(result):
+        return encode_kept(result, lambda name, index, primitive: f"{name}_{hull_name(index)}", colored=True)
+    visual = (node_name(result.name), result.source) if len(result.source.faces) else None
+    return encode_glb(result.hulls, visual=visual)
 
 
 def _save_with_meshes(model: Model, target: Target, one_mesh: bool) -> None:

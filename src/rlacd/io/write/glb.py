@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,9 +16,9 @@ import trimesh
 
 ROUGHNESS = 0.8
 
-_JSON, _BINARY = 0x4E4F534A, 0x004E4942
+JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 _FLOAT, _UNSIGNED_INT = 5126, 5125
-_ATTRIBUTES, _INDICES = 34962, 34963
+ATTRIBUTES, INDICES = 34962, 34963
 
 
 class Placed(NamedTuple):
@@ -45,24 +45,7 @@ class Placed(NamedTuple):
 def glb(solids: Iterable[Placed], generator: str) -> bytes:
     """Write solids as the bytes of a GLB file, in their order."""
     solids = list(solids)
-    positions = [np.asarray(solid.mesh.vertices).astype("<f4") for solid in solids]
-    indices = [np.asarray(solid.mesh.faces).astype("<u4") for solid in solids]
-    accessors: list[dict[str, Any]] = []
-    at = [0, 0]
-    for points, corners in zip(positions, indices, strict=True):
-        bounds = {"min": points.min(axis=0).tolist(), "max": points.max(axis=0).tolist()}
-        accessors += [
-            {"bufferView": 0, "byteOffset": at[0], "componentType": _FLOAT, "count": len(points), "type": "VEC3"}
-            | bounds,
-            {
-                "bufferView": 1,
-                "byteOffset": at[1],
-                "componentType": _UNSIGNED_INT,
-                "count": corners.size,
-                "type": "SCALAR",
-            },
-        ]
-        at = [at[0] + points.nbytes, at[1] + corners.nbytes]
+    (positions, indices), accessors = packed([solid.mesh for solid in solids], 0)
     described = {
         "asset": {"version": "2.0", "generator": generator},
         "scene": 0,
@@ -75,29 +58,46 @@ def glb(solids: Iterable[Placed], generator: str) -> bytes:
             }
             for i, solid in enumerate(solids)
         ],
-        "materials": [
-            {
-                "name": solid.name,
-                "pbrMetallicRoughness": {
-                    "baseColorFactor": [*solid.color.tolist(), 1.0],
-                    "metallicFactor": 0.0,
-                    "roughnessFactor": ROUGHNESS,
-                },
-            }
-            for solid in solids
-        ],
+        "materials": [material(solid) for solid in solids],
         "accessors": accessors,
         "bufferViews": [
-            {"buffer": 0, "byteOffset": 0, "byteLength": at[0], "target": _ATTRIBUTES},
-            {"buffer": 0, "byteOffset": at[0], "byteLength": at[1], "target": _INDICES},
+            {"buffer": 0, "byteOffset": 0, "byteLength": len(positions), "target": ATTRIBUTES},
+            {"buffer": 0, "byteOffset": len(positions), "byteLength": len(indices), "target": INDICES},
         ],
-        "buffers": [{"byteLength": sum(at)}],
+        "buffers": [{"byteLength": len(positions) + len(indices)}],
     }
     text = json.dumps(described, separators=(",", ":"), allow_nan=False).encode()
-    chunks = _chunk(_JSON, text + b" " * (-len(text) % 4)) + _chunk(
-        _BINARY, b"".join(array.tobytes() for array in (*positions, *indices))
-    )
+    chunks = chunk(JSON_CHUNK, text + b" " * (-len(text) % 4)) + chunk(BINARY_CHUNK, positions + indices)
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def packed(meshes: Sequence[trimesh.Trimesh], first_view: int) -> tuple[tuple[bytes, bytes], list[dict[str, Any]]]:
+    """All positions and all indices, and the accessors of each mesh into views of the two."""
+    positions = [np.asarray(mesh.vertices).astype("<f4") for mesh in meshes]
+    indices = [np.asarray(mesh.faces).astype("<u4") for mesh in meshes]
+    accessors: list[dict[str, Any]] = []
+    at = [0, 0]
+    for points, corners in zip(positions, indices, strict=True):
+        where = {"bufferView": first_view, "byteOffset": at[0], "componentType": _FLOAT}
+        bounds = {"min": points.min(axis=0).tolist(), "max": points.max(axis=0).tolist()}
+        accessors.append(where | {"count": len(points), "type": "VEC3"} | bounds)
+        where = {"bufferView": first_view + 1, "byteOffset": at[1], "componentType": _UNSIGNED_INT}
+        accessors.append(where | {"count": corners.size, "type": "SCALAR"})
+        at = [at[0] + points.nbytes, at[1] + corners.nbytes]
+    data = b"".join(array.tobytes() for array in positions), b"".join(array.tobytes() for array in indices)
+    return data, accessors
+
+
+def material(solid: Placed) -> dict[str, Any]:
+    """The material of a solid, in its colour."""
+    return {
+        "name": solid.name,
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [*solid.color.tolist(), 1.0],
+            "metallicFactor": 0.0,
+            "roughnessFactor": ROUGHNESS,
+        },
+    }
 
 
 def _node(mesh: int, solid: Placed) -> dict[str, Any]:
@@ -105,5 +105,6 @@ def _node(mesh: int, solid: Placed) -> dict[str, Any]:
     return node | {"translation": solid.shift.tolist()} if solid.shift.any() else node
 
 
-def _chunk(kind: int, content: bytes) -> bytes:
+def chunk(kind: int, content: bytes) -> bytes:
+    """A chunk with its header."""
     return struct.pack("<II", len(content), kind) + content

@@ -12,7 +12,7 @@ import numpy as np
 import trimesh
 
 from rlacd.errors import OutputError
-from rlacd.fields import about, read
+from rlacd.fields import about, checked, read
 from rlacd.io.write.encode import encode_obj, encode_plain_obj, hull_name
 from rlacd.io.write.single_precision import placed_hull, placed_mesh
 from rlacd.output_options import DENSITY, OutputOptions
@@ -82,7 +82,7 @@ Shape: TypeAlias = "MeshFile | Primitive"
 """What collides: a mesh file, or a primitive that needs none."""
 
 
-def model_of(result: Result, *, density: float = DENSITY, up: str = "z") -> Model:
+def model_of(result: Result, *, density: float = DENSITY, mass: float | None = None, up: str | None = None) -> Model:
     """Collect everything to be written of a decomposition.
 
     Raises
@@ -90,27 +90,30 @@ def model_of(result: Result, *, density: float = DENSITY, up: str = "z") -> Mode
     OutputError
         There are no hulls, or the body weighs nothing at this density.
     OptionError
-        `density` is not positive, or `up` is not an axis.
+        `density` or `mass` is not positive, or `up` is not an axis.
     """
-    density, up = check_model_options(density, up)
+    density, up = check_model_options(density, up)[0], result.up_axis(up)
+    mass = checked(OutputOptions, "mass", mass)
     if not result.hulls:
         raise OutputError("there are no hulls to write; decompose a mesh first.")
-    mass = _mass(result).scaled(density)
-    if not (0 < mass.volume_abs < math.inf and np.isfinite(mass.inertia_abs).all()):
-        raise OutputError(f"the mass of {result.name} at density {density:g} is {mass.volume_abs:g}; scale the mesh.")
+    of_volume = _mass(result)
+    if mass is not None and of_volume.volume_abs > 0:
+        density = mass / of_volume.volume_abs
+    weighed = of_volume.scaled(density)
+    if not (0 < weighed.volume_abs < math.inf and np.isfinite(weighed.inertia_abs).all()):
+        raise OutputError(
+            f"the mass of {result.name} at density {density:g} is {weighed.volume_abs:g}; scale the mesh."
+        )
     visual = result.source if len(result.source.faces) else None
     name = printable_name(result.name).replace("::", "_")  # a separator between names in SDF
     if name == "world" or re.fullmatch("__.*__", name):
         name = f"body_{name.strip('_')}"  # simulators reserve those names
-    return Model(name, result.hulls, result.primitives, visual, mass, up)
+    return Model(name, result.hulls, result.primitives, visual, weighed, up)
 
 
-def check_model_options(density: float, up: str) -> tuple[float, str]:
-    """Return both as plain values; raises OptionError unless `density` is a positive number and `up` is x, y or z."""
-    return (
-        read(about(OutputOptions, "density").kind, "density", density),
-        read(about(OutputOptions, "up").kind, "up", up),
-    )
+def check_model_options(density: float, up: str | None) -> tuple[float, str | None]:
+    """Return both as plain values; raises OptionError unless `density` is positive and `up` an axis or None."""
+    return read(about(OutputOptions, "density").kind, "density", density), checked(OutputOptions, "up", up)
 
 
 def printable_name(name: str) -> str:

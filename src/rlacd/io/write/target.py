@@ -56,7 +56,13 @@ class Target:
     is_folder: bool
 
 
-def hull_target(path: str | os.PathLike[str], file_format: str | None = None, *, one_mesh: bool = False) -> Target:
+def hull_target(
+    path: str | os.PathLike[str],
+    file_format: str | None = None,
+    *,
+    one_mesh: bool = False,
+    keep_input: bool = False,
+) -> Target:
     """Interpret `path` as `Decomposition.save` does and check that it can be written to.
 
     Parameters
@@ -68,19 +74,24 @@ def hull_target(path: str | os.PathLike[str], file_format: str | None = None, *,
         The format of the files in a folder.
     one_mesh : bool
         Whether a model has all its hulls in one mesh file; only URDF supports that.
+    keep_input : bool
+        Whether the file holds the input too; only GLB does.
 
     Raises
     ------
     OutputError
         Unknown ending, no permission, or a folder where a file is expected or the reverse.
     OptionError
-        `file_format` is unknown, or given for a single file with another ending; or `one_mesh` for anything but URDF.
+        `file_format` is unknown, or given for a single file with another ending; or `one_mesh` for anything but URDF,
+        or `keep_input` for anything but GLB.
     """
     file_format = checked(OutputOptions, "file_format", file_format)
     one_mesh = read(flag(), "one_mesh", one_mesh)
     target = _target(read(path_like(), "path", path), file_format)
     if one_mesh and target.file_format != "urdf":
         raise OptionError(f"one mesh for all hulls is for .urdf files, not for {target.path}: leave it out.")
+    if read(flag(), "keep_input", keep_input) and (target.is_folder or target.path.suffix.lower() != ".glb"):
+        raise OptionError(f"the input is kept in .glb files, not in {target.path}: leave it out, or write a .glb.")
     return target
 
 

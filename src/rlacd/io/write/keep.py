@@ -1,0 +1,239 @@
+"""The input's own scene with hulls added under the nodes they belong to: glTF in, glTF out, nothing lost.
+
+The JSON of a glTF file is edited and its binary chunk appended to; no index that it holds changes. So nodes,
+transforms, materials, textures, skins, animations, extensions and whatever else is unknown here stay as they are. Files
+that it refers to are put into it, so that the binary file stands alone.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import struct
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from rlacd.errors import OutputError
+from rlacd.io.read.beside import DATA, IMAGES, FolderFiles
+from rlacd.io.read.gltf import MAGIC, split
+from rlacd.io.write.glb import ATTRIBUTES, BINARY_CHUNK, INDICES, JSON_CHUNK, Placed, chunk, material, packed
+from rlacd.io.write.palette import hull_colors, linear_from_srgb
+from rlacd.io.write.single_precision import placed_hull
+from rlacd.result import Result
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.input_mesh import Asset, InputMesh, SourceNode
+from rlacd.solid.primitive import Primitive
+
+Named = Callable[[str, int, Primitive | None], str]
+"""The name of a hull, from that of its node, its number there, and the primitive that it stands for."""
+
+_MIME = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".webp": "image/webp", ".ktx2": "image/ktx2"}
+
+
+def encode_kept(result: Result, named: Named, *, colored: bool) -> bytes:
+    """Write the input as GLB, with each hull as a child of the node it belongs to.
+
+    Parameters
+    ----------
+    result : Result
+        Of an input that has an asset.
+    named : callable
+        Names a hull after its node.
+    colored : bool
+        Give every hull a material of its own; otherwise it has none.
+
+    Raises
+    ------
+    OutputError
+        A hull is too thin for single precision.
+    """
+    mesh = result.input
+    assert mesh is not None
+    assert mesh.asset is not None
+    scene = _Scene(mesh.asset, result.name)
+    nodes = mesh.nodes or (SourceNode(result.name, -1, np.eye(4)),)
+    counts: dict[str, int] = {}
+    primitives = result.primitives
+    colors = linear_from_srgb(hull_colors(len(result)))
+    for index, (hull, color) in enumerate(zip(result.hulls, colors, strict=True)):
+        node = nodes[int(hull.metadata.get("node_index", 0))]
+        name = result.name if len(mesh.nodes) < 2 and not isinstance(node.key, int) else node.name
+        number = counts.get(name, 0)
+        counts[name] = number + 1
+        at = scene.index_of(node.key)
+        inverse = None if scene.is_skinned(at) else _inverse(node.transform)
+        primitive = primitives[index] if inverse is None or _keeps_shape(inverse) else None
+        placed = _local(hull, mesh, inverse, named(name, number, primitive))
+        scene.add(placed._replace(color=color), None if inverse is None else at, colored)
+    return scene.encoded()
+
+
+def _local(hull: trimesh.Trimesh, mesh: InputMesh, inverse: FloatArray | None, name: str) -> Placed:
+    """A hull in the coordinates of its node, or in those of the scene if there is no way into its node's."""
+    points, faces = np.asarray(hull.vertices) / mesh.factor, np.asarray(hull.faces)
+    if inverse is not None:
+        points = points @ inverse[:3, :3].T + inverse[:3, 3]
+        if np.linalg.det(inverse[:3, :3]) < 0:
+            faces = faces[:, ::-1]
+    placed = placed_hull(trimesh.Trimesh(points, faces, process=False))
+    if placed is None:
+        raise OutputError(
+            f"cannot write {name} as GLB: it is too thin for single precision; "
+            "write .obj, .ply or .stl, which keep double precision."
+        )
+    return Placed(name, *placed, np.zeros(3))
+
+
+def _inverse(transform: FloatArray) -> FloatArray | None:
+    """The way into a node's coordinates; None if the node flattens what is in it."""
+    if not np.isfinite(transform).all() or np.linalg.cond(transform[:3, :3]) > 1e6:
+        return None
+    return np.asarray(np.linalg.inv(transform))
+
+
+def _keeps_shape(transform: FloatArray) -> bool:
+    """Whether a transform stretches all directions alike."""
+    product = transform[:3, :3].T @ transform[:3, :3]
+    return bool(np.allclose(product, product[0, 0] * np.eye(3), rtol=0, atol=1e-6 * product[0, 0]))
+
+
+class _Scene:
+    """A glTF file that is being added to."""
+
+    def __init__(self, asset: Asset, name: str) -> None:
+        content, folder = asset.content, asset.folder
+        self._name = name
+        self._by_name = not isinstance(content, bytes)
+        if not isinstance(content, bytes):
+            content = _exported(content, name)
+        header, rest = split(Path(f"{name}.glb"), content)
+        self._header: dict[str, Any] = header
+        self._binary, self._others = _chunks(rest)
+        self._added: list[bytes] = []
+        self._take_in(None if folder is None else FolderFiles(folder, DATA | IMAGES))
+        self._nodes = {node.get("name"): index for index, node in enumerate(header.get("nodes", []))}
+
+    def index_of(self, key: int | str) -> int | None:
+        """The index of a source node."""
+        return self._nodes.get(key, self._nodes.get(self._name)) if self._by_name else int(key)
+
+    def is_skinned(self, index: int | None) -> bool:
+        """Whether a node's mesh follows a skeleton: engines move such a node away from below its hulls."""
+        return index is not None and "skin" in self._header["nodes"][index]
+
+    def add(self, placed: Placed, parent: int | None, colored: bool) -> None:
+        """Add a hull below a node, or at the top."""
+        header = self._header
+        nodes, meshes = header.setdefault("nodes", []), header.setdefault("meshes", [])
+        views, accessors = header.setdefault("bufferViews", []), header.setdefault("accessors", [])
+        (points, corners), described = packed([placed.mesh], len(views))
+        views += [self._append(points, ATTRIBUTES), self._append(corners, INDICES)]
+        primitive = {"attributes": {"POSITION": len(accessors)}, "indices": len(accessors) + 1, "mode": 4}
+        accessors += described
+        if colored:
+            materials = header.setdefault("materials", [])
+            primitive["material"] = len(materials)
+            materials.append(material(placed))
+        node: dict[str, Any] = {"name": placed.name, "mesh": len(meshes)}
+        if placed.shift.any():
+            node["translation"] = placed.shift.tolist()
+        meshes.append({"name": placed.name, "primitives": [primitive]})
+        if parent is not None:
+            nodes[parent].setdefault("children", []).append(len(nodes))
+        else:
+            scenes = header.setdefault("scenes", [{}])
+            scenes[header.setdefault("scene", 0)].setdefault("nodes", []).append(len(nodes))
+        nodes.append(node)
+
+    def encoded(self) -> bytes:
+        """The file."""
+        header = self._header
+        buffers = header.setdefault("buffers", [])
+        added = b"".join(self._added)
+        if self._binary is None and buffers:  # the first buffer is an extension's own: its place is taken
+            data = base64.b64encode(added).decode("ascii")
+            buffers.append({"byteLength": len(added), "uri": f"data:application/octet-stream;base64,{data}"})
+            binary = b""
+        else:
+            binary = (self._binary or b"") + added
+            if buffers:
+                buffers[0]["byteLength"] = len(binary)
+            else:
+                buffers.append({"byteLength": len(binary)})
+        text = json.dumps(header, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+        chunks = chunk(JSON_CHUNK, text + b" " * (-len(text) % 4))
+        if binary:
+            chunks += chunk(BINARY_CHUNK, binary)
+        chunks += self._others
+        return struct.pack("<4sII", MAGIC, 2, 12 + len(chunks)) + chunks
+
+    def _append(self, data: bytes, target: int | None) -> dict[str, Any]:
+        """Add bytes, and return the view of them."""
+        buffers = self._header.get("buffers", [])
+        own = self._binary is None and len(buffers) > 0
+        start = sum(map(len, self._added)) + (0 if own else len(self._binary or b""))
+        self._added.append(data + bytes(-len(data) % 4))
+        view: dict[str, Any] = {
+            "buffer": len(buffers) if own else 0,
+            "byteOffset": start,
+            "byteLength": len(data),
+        }
+        return view if target is None else view | {"target": target}
+
+    def _take_in(self, files: FolderFiles | None) -> None:
+        """Put the files that buffers and images name into this one; those that are missing stay named."""
+        for index, buffer in enumerate(self._header.get("buffers", [])):
+            data = _read(files, buffer.get("uri"))
+            if index == 0 and self._binary is None and (data is not None or _is_data(buffer.get("uri"))):
+                data = base64.b64decode(buffer["uri"].partition(",")[2]) if data is None else data
+                del buffer["uri"]
+                self._binary = data + bytes(-len(data) % 4)
+            elif data is not None:
+                buffer["uri"] = "data:application/octet-stream;base64," + base64.b64encode(data).decode("ascii")
+        for image in self._header.get("images", []):
+            uri = image.get("uri")
+            data = _read(files, uri)
+            if data is not None:
+                views = self._header.setdefault("bufferViews", [])
+                views.append(self._append(data, None))
+                image["bufferView"] = len(views) - 1
+                image.setdefault("mimeType", _MIME.get(Path(uri).suffix.lower(), "image/png"))
+                del image["uri"]
+
+
+def _exported(content: Any, name: str) -> bytes:
+    scene = content if isinstance(content, trimesh.Scene) else trimesh.Scene({name: content})
+    return bytes(scene.export(file_type="glb"))
+
+
+def _chunks(rest: bytes | None) -> tuple[bytes | None, bytes]:
+    """The binary chunk, if there is one, and all others as they are."""
+    if not rest:
+        return None, b""
+    length, kind = struct.unpack_from("<II", rest, 0)
+    if kind != BINARY_CHUNK:
+        return None, rest
+    binary = rest[8 : 8 + length]
+    return binary + bytes(-len(binary) % 4), rest[8 + length :]
+
+
+def _read(files: FolderFiles | None, uri: Any) -> bytes | None:
+    if files is None or not isinstance(uri, str) or _is_data(uri):
+        return None
+    try:
+        return files.get(uri)
+    except FileNotFoundError:
+        return None
+
+
+def _is_data(uri: Any) -> bool:
+    return isinstance(uri, str) and uri.startswith("data:")
+
+
+def is_kept(result: Result) -> bool:
+    """Whether the input has a scene that a file can keep."""
+    return result.input is not None and result.input.asset is not None

@@ -1,0 +1,218 @@
+"""The input's own scene in the output: untouched but for the hulls, each under the node it belongs to."""
+
+from __future__ import annotations
+
+import copy
+import shutil
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+import rlacd
+from rlacd.errors import OptionError
+from tests.assets import Json, Rig, png, read_glb, view_of
+from tests.hulls import assert_convex_hull
+
+NAMES = {"unreal": "UCX_{}_00", "godot": "{}_000-convcolonly", None: "{}_hull_000"}
+"""The name of the first hull of a node."""
+
+
+@pytest.fixture(scope="module")
+def cart(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return Rig().glb(tmp_path_factory.mktemp("cart") / "cart.glb")
+
+
+@pytest.fixture(scope="module")
+def apart(cart: Path) -> rlacd.Decomposition:
+    return rlacd.decompose(cart, per_node=True, threads=1)
+
+
+def without_hulls(header: Json, before: Json) -> Json:
+    """Take what was added out of the JSON again, checking that it is only that."""
+    left = copy.deepcopy(header)
+    for kind in ("nodes", "meshes", "accessors", "bufferViews", "materials"):
+        del left[kind][len(before[kind]) :]
+    del left["scenes"][0]["nodes"][len(before["scenes"][0]["nodes"]) :]
+    for node, was in zip(left["nodes"], before["nodes"], strict=True):
+        if "children" in node:
+            node["children"] = [child for child in node["children"] if child < len(before["nodes"])]
+            if not node["children"] and "children" not in was:
+                del node["children"]
+    return left
+
+
+@pytest.mark.parametrize("file_format", NAMES)
+@pytest.mark.parametrize("stored", ["glb", "gltf", "embedded"])
+def test_a_textured_animated_scene_comes_back_node_by_node(
+    tmp_path: Path, stored: str, file_format: str | None
+) -> None:
+    rig = Rig()
+    path = tmp_path / f"cart.{'glb' if stored == 'glb' else 'gltf'}"
+    rig.glb(path) if stored == "glb" else rig.gltf(path, embedded=stored == "embedded")
+    result = rlacd.decompose(path, per_node=True, threads=1, quality="fast")
+    (tmp_path / "elsewhere").mkdir()
+    out = tmp_path / "elsewhere" / "out.glb"
+    result.save(out, file_format=file_format, keep_input=file_format is None)
+    header, binary, others = read_glb(out)
+
+    left = without_hulls(header, rig.header)
+    image = left["images"][0]
+    assert view_of(header, binary, image.pop("bufferView")) == png()
+    assert image == {"mimeType": "image/png", "name": "red and blue"}
+    same = {name: value for name, value in rig.header.items() if name not in ("images", "buffers")}
+    assert {name: left[name] for name in same} == same
+    assert set(left) == {*same, "images", "buffers"}
+    assert binary[: len(rig.binary)] == rig.binary  # and with it every array, of skins and animations too
+    assert others == ([(b"XTRA", b"unknown!")] if stored == "glb" else [])
+    assert (len(header["materials"]) > 1) == (file_format is None)
+
+    nodes = header["nodes"]
+    for index, called in ((0, "Axle"), (1, "Wheel"), (2, "wheel"), (3, "Flag pole")):
+        below = header["scenes"][0] if "skin" in nodes[index] else nodes[index]
+        added = [child for child in below.get("children", below.get("nodes", [])) if child >= len(rig.header["nodes"])]
+        assert [nodes[child]["name"] for child in added] == [NAMES[file_format].format(called)]
+
+
+def test_hulls_lie_around_their_node_wherever_it_goes(tmp_path: Path, cart: Path, apart: rlacd.Decomposition) -> None:
+    """Placed by a reader of its own, each hull covers what its node shows; the scene is stretched, turned, mirrored."""
+    read = trimesh.load_scene(apart.save(tmp_path / "out.glb", file_format="unreal"), process=False)
+    before = trimesh.load_scene(cart, process=False)
+    for number, hull in enumerate(apart):
+        node = hull.metadata["node"]
+        transform, mesh = read.graph[f"UCX_{node}_00"]
+        placed = read.geometry[mesh].copy().apply_transform(transform)
+        assert_convex_hull(placed)
+        assert placed.volume == pytest.approx(hull.volume, rel=1e-5)
+        assert np.allclose(placed.bounds, hull.bounds, atol=1e-6)
+        assert apart.report["provenance"][number]["node"] == node
+    assert np.allclose(read.bounds, before.bounds, atol=0.02)
+
+
+def test_hulls_of_a_scene_as_a_whole_know_their_node(tmp_path: Path, cart: Path) -> None:
+    result = rlacd.decompose(cart, threads=1)
+    nodes = [hull.metadata["node"] for hull in result]
+    assert {one["node"] for one in result.report["provenance"]} == set(nodes)
+    assert {"Axle", "Flag pole"} <= set(nodes) <= {"Axle", "Wheel", "wheel", "Flag pole"}
+    bodies = {repair["body"] for repair in result.report["repair"]}
+    assert {hull.metadata["body"] for hull in result} <= bodies
+    header, _, _ = read_glb(result.save(tmp_path / "out.glb", file_format="godot"))
+    assert sum(node.get("name", "").endswith("-convcolonly") for node in header["nodes"]) == len(result)
+
+
+def test_nodes_apart_share_the_threshold_of_the_scene() -> None:
+    """A bracket that is small in its scene needs no cut there, but does on its own."""
+    bracket = trimesh.util.concatenate(
+        [
+            trimesh.creation.box((0.1, 0.02, 0.02)),
+            trimesh.creation.box((0.02, 0.1, 0.02)).apply_translation((0.04, 0.04, 0)),
+        ]
+    )
+    scene = trimesh.Scene()
+    scene.add_geometry(trimesh.creation.box((3, 1, 1)), node_name="cupboard")
+    move = trimesh.transformations.translation_matrix((0, 1, 0))
+    scene.add_geometry(bracket, node_name="handle", transform=move)
+    counts: dict[str, list[str]] = {}
+    for relative_to in ("scene", "node"):
+        result = rlacd.decompose(scene, per_node=True, relative_to=relative_to, threads=1)
+        counts[relative_to] = [hull.metadata["node"] for hull in result]
+        worst = result.report["concavity"]
+        assert len(worst["per_part"]) == len(result)
+        assert result.report["parts"] == len(result)
+        assert result.report["mass"]["volume_abs"] == pytest.approx(3.0 + 0.1 * 0.02**2 + 0.08 * 0.02**2, rel=1e-6)
+        assert [body["body"] for body in result.report["repair"]] == list(range(len(result.report["repair"])))
+    assert counts["scene"] == ["cupboard", "handle"]
+    assert counts["node"].count("handle") == 2
+    tight = rlacd.decompose(scene, per_node=True, threshold_abs=0.002, threads=1)
+    assert [hull.metadata["node"] for hull in tight].count("handle") == 2
+
+
+def test_nodes_apart_cannot_have_a_navigable_space() -> None:
+    with pytest.raises(OptionError, match="per_node"):
+        rlacd.decompose(trimesh.creation.box(), per_node=True, criterion=rlacd.NavigableSpace(radius=0.1))
+
+
+def test_a_scene_in_memory_keeps_its_looks(tmp_path: Path) -> None:
+    scene = trimesh.Scene()
+    red = trimesh.creation.box((1, 1, 1))
+    red.visual = trimesh.visual.ColorVisuals(red, vertex_colors=np.tile([255, 0, 0, 255], (8, 1)))
+    turn = trimesh.transformations.rotation_matrix(0.4, (0, 0, 1)) @ trimesh.transformations.translation_matrix(
+        (3, 0, 0)
+    )
+    scene.add_geometry(red, node_name="crate", transform=turn)
+    scene.add_geometry(trimesh.creation.icosphere(2), node_name="ball")
+    result = rlacd.decompose(scene, threads=1)
+    read = trimesh.load_scene(result.save(tmp_path / "out.glb", keep_input=True), process=False)
+    assert (np.asarray(read.geometry[read.graph["crate"][1]].visual.vertex_colors)[:, :3] == [255, 0, 0]).all()
+    assert np.allclose(read.graph["crate"][0], turn, atol=1e-6)
+    for hull in result:
+        transform, mesh = read.graph[f"{hull.metadata['node']}_hull_000"]
+        assert np.allclose(read.geometry[mesh].copy().apply_transform(transform).bounds, hull.bounds, atol=1e-5)
+
+
+def test_an_input_without_a_scene_is_kept_in_grey(tmp_path: Path) -> None:
+    path = tmp_path / "ball.stl"
+    trimesh.creation.icosphere(2).export(path)
+    result = rlacd.decompose(path, threads=1)
+    read = trimesh.load_scene(result.save(tmp_path / "out.glb", keep_input=True), process=False)
+    assert sorted(read.geometry) == ["ball", "hull_000"]
+    with pytest.raises(OptionError, match=r"\.glb"):
+        result.save(tmp_path / "out.obj", keep_input=True)
+
+
+def test_files_outside_the_folder_stay_outside(tmp_path: Path) -> None:
+    """A hostile scene names a picture above its folder: it is not copied."""
+    (tmp_path / "in").mkdir()
+    (tmp_path / "secret.png").write_bytes(png())
+    path = Rig().gltf(tmp_path / "in" / "cart.gltf")
+    path.write_text(path.read_text().replace("paint.png", "../secret.png"))
+    result = rlacd.decompose(path, threads=1, quality="fast")
+    header, binary, _ = read_glb(result.save(tmp_path / "out.glb", file_format="unreal"))
+    assert header["images"][0]["uri"] == "../secret.png"
+    assert png() not in binary[len(Rig().binary) :]
+
+
+def test_the_same_scene_gives_the_same_bytes(tmp_path: Path, cart: Path) -> None:
+    files = [
+        rlacd.decompose(cart, per_node=True, threads=threads).save(tmp_path / f"{threads}.glb", file_format="godot")
+        for threads in (1, 2)
+    ]
+    assert files[0].read_bytes() == files[1].read_bytes()
+
+
+COUNT = """
+extends SceneTree
+func _count(node):
+	var count = 1 if node is StaticBody else 0
+	for child in node.get_children():
+		count += _count(child)
+	return count
+func _init():
+	var scene = load("res://cart.glb").instance()
+	print("bodies ", _count(scene), " wheel ", scene.find_node("Wheel", true, false) is MeshInstance)
+	quit()
+"""
+
+
+@pytest.mark.nightly
+def test_godot_makes_a_static_body_of_every_hull(tmp_path: Path, apart: rlacd.Decomposition) -> None:
+    godot = shutil.which("godot3-server")
+    if godot is None:
+        pytest.skip("godot3-server is not installed (apt-get install godot3-server)")
+    (tmp_path / "project.godot").write_text('config_version=4\n\n[application]\nconfig/name="cart"\n')
+    (tmp_path / "count.gd").write_text(COUNT)
+    apart.save(tmp_path / "cart.glb", file_format="godot")
+    quiet = subprocess.DEVNULL
+    with subprocess.Popen([godot, "--editor", "--quit"], cwd=tmp_path, stdout=quiet, stderr=quiet) as editor:
+        until = time.monotonic() + 120
+        while time.monotonic() < until and not list((tmp_path / ".import").glob("cart.glb-*.md5")):
+            time.sleep(0.2)
+        editor.kill()  # it does not always leave by itself
+    run = subprocess.run(
+        [godot, "-s", "count.gd"], cwd=tmp_path, timeout=120, capture_output=True, text=True, check=False
+    )
+    said = run.stdout
+    assert f"bodies {len(apart)} wheel True" in said
