@@ -134,7 +134,7 @@ def test_all_that_decides_the_bytes_is_in_the_key_and_nothing_else(tmp_path: Pat
     for policy in policies:
         policy.write_bytes(q_network())
 
-    written = ("file_format", "density", "up", "folders", "one_mesh")
+    written = ("file_format", "density", "mass", "up", "folders", "one_mesh", "keep_input")
 
     def key(content: str = "c", name: str = "a/chair.obj", **options: object) -> str:
         kept = {what: options.pop(what) for what in written if what in options}
