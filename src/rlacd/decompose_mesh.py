@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from rlacd._native import Stopped
 from rlacd.clock import Clock
-from rlacd.criteria import Concavity, Criterion, NavigableSpace
+from rlacd.criteria import AddedVolume, Concavity, Criterion, NavigableSpace
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.decomposition import Decomposition
@@ -41,12 +41,14 @@ from rlacd.options import (
     DEFAULT_THRESHOLD,
     OPTION_NAMES,
     SIMPLE,
+    VOLUME,
     DetailName,
     OpenName,
     Options,
     QualityName,
     RelativeTo,
     UnitName,
+    VolumeOf,
 )
 from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import AS_PUBLISHED, Policy, make_policy
@@ -80,9 +82,11 @@ MARGIN = 1.5
 def decompose(
     mesh: MeshLike,
     *,
-    criterion: Literal["concavity"] | NavigableSpace = CONCAVITY,
+    criterion: Literal["concavity", "volume"] | NavigableSpace = CONCAVITY,
     threshold: float = DEFAULT_THRESHOLD,
     threshold_abs: float | None = None,
+    volume_tolerance: float = 0.01,
+    volume_of: VolumeOf = "part",
     max_hulls: int | None = None,
     max_vertices: int | None = None,
     max_faces: int | None = None,
@@ -112,14 +116,19 @@ def decompose(
     ----------
     mesh : path, trimesh.Trimesh, trimesh.Scene or (vertices, faces)
         Any triangle mesh or file of one; it need not be closed, oriented or clean.
-    criterion : "concavity" or NavigableSpace
-        Decides when a part is tight enough: its concavity is at most `threshold`, or its hull stays out of the space
-        that a ball of a given size can reach.
+    criterion : "concavity", "volume" or NavigableSpace
+        Decides when a part is tight enough: its concavity is at most `threshold`; its hull adds at most
+        `volume_tolerance` of volume; or its hull stays out of the space that a ball of a given size can reach.
     threshold : float
         Largest concavity of a part, in the frame where the input's longest side is 2 (CoACD's measure and frame):
         how far the surfaces of a part and its hull may lie apart. Between 0.001 and 2.
     threshold_abs : float, optional
         The same in the input's unit; replaces `threshold`.
+    volume_tolerance : float
+        With the criterion ``volume``, the share of volume that a hull may add: 0.01 is 1 %, as in V-HACD. Parts smaller
+        than a thousandth of the whole's convex hull count as this large.
+    volume_of : "part" or "whole"
+        Whether it is a share of each part's own volume, or of the whole solid's.
     max_hulls : int, optional
         Maximum number of hulls: returns the decomposition with the least concavity among those found. It may exceed
         the threshold; ``report["warnings"]`` then says by how much.
@@ -375,7 +384,7 @@ def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Cl
 
 def _proxy(root: Component, goal: Criterion, options: Options, clock: Clock) -> Proxy | None:
     """A simpler solid to decompose in place of a dense one."""
-    if goal.obstacles is not None or len(root.faces) < FEW:
+    if not math.isfinite(goal.overhang) or len(root.faces) < FEW:
         return None
     try:
         with clock.stage("simplify"):
@@ -436,12 +445,16 @@ def _prepared(options: Options, solid: Solid, workers: Workers, clock: Clock) ->
     if isinstance(options.criterion, NavigableSpace):
         with clock.stage("space"):
             return options.criterion.prepare(solid, workers.threads)
+    if options.criterion == VOLUME:
+        return AddedVolume.of(options.volume_tolerance, options.volume_of, solid)
     return Concavity(options.threshold)
 
 
 def _unprepared(options: Options, solid: Solid) -> Criterion:
     if isinstance(options.criterion, NavigableSpace):
         return options.criterion.unprepared(solid.frame.scale)
+    if options.criterion == VOLUME:
+        return AddedVolume(options.volume_tolerance, None, 0.0)
     return Concavity(options.threshold)
 
 

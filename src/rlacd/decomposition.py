@@ -46,6 +46,9 @@ class Decomposition(Result):
         ``concavity`` : dict
             ``per_part`` lists the concavity of each hull's part in the order of ``hulls``; ``max`` is the worst. Both
             are None where there was no time to measure them; so are the distances below. ``warnings`` says so.
+        ``volume`` : dict
+            Instead of ``concavity`` with the criterion ``volume``: ``tolerance``, ``relative_to``, and ``per_part`` and
+            ``max``, the shares of volume that the hulls add.
         ``navigable`` : dict
             Instead of ``concavity`` with `NavigableSpace`: ``radius`` and ``tolerance``; ``balls``, their number;
             ``shrunk`` and ``dropped``, how many had to give way to parts that no cut could keep off them, and ``most``,

@@ -26,6 +26,11 @@ DEFAULT_RESOLUTION = 100
 CONCAVITY: Literal["concavity"] = "concavity"
 """The default criterion's name."""
 
+VOLUME: Literal["volume"] = "volume"
+"""The name of the criterion that V-HACD and NavACD use."""
+
+VolumeOf = Literal["part", "whole"]
+
 DEFAULT_THRESHOLD = 0.05
 """CoACD's default."""
 
@@ -70,7 +75,7 @@ def _criterion(given: Any) -> Any:
     return CRITERION.read(given)
 
 
-CRITERION = one_of((CONCAVITY,))
+CRITERION = one_of((CONCAVITY, VOLUME))
 
 
 _SECONDS = number(above=0, rule="a positive number of seconds")
@@ -86,13 +91,16 @@ class Options:
         A value is of the wrong type or out of its range.
     """
 
-    criterion: Literal["concavity"] | SpaceOptions = option(
+    criterion: Literal["concavity", "volume"] | SpaceOptions = option(
         CONCAVITY,
-        "When a hull is tight enough: concavity (see --threshold), or navigable: it stays out of the space that a ball "
-        "of --radius can reach, and what no ball can reach may be filled.",
-        custom(f'"{CONCAVITY}" or an `rlacd.NavigableSpace`', _criterion, f"{CONCAVITY} {NAVIGABLE}"),
+        "When a hull is tight enough: concavity (see --threshold); volume: it adds at most --tolerance of volume, such "
+        "as 1%; or navigable: it stays out of the space that a ball of --radius can reach, and what no ball can reach "
+        "may be filled.",
+        custom(
+            f'"{CONCAVITY}", "{VOLUME}" or an `rlacd.NavigableSpace`', _criterion, f"{CONCAVITY} {VOLUME} {NAVIGABLE}"
+        ),
         panel=TIGHT,
-        metavar=f"{CONCAVITY}|{NAVIGABLE}",
+        metavar=f"{CONCAVITY}|{VOLUME}|{NAVIGABLE}",
     )
     threshold: float = option(
         DEFAULT_THRESHOLD,
@@ -110,6 +118,20 @@ class Options:
         number(above=0, rule="a positive length in the input's unit"),
         panel=TIGHT,
         former="threshold_m",
+    )
+    volume_tolerance: float = option(
+        0.01,
+        "With --criterion volume: the share of volume that a hull may add; --tolerance on the command line.",
+        number(1e-4, 10.0),
+        panel=TIGHT,
+        flags=(),
+    )
+    volume_of: VolumeOf = option(
+        "part",
+        "With --criterion volume: whether --tolerance is a share of each part's own volume or of the whole's.",
+        one_of(get_args(VolumeOf)),
+        panel=TIGHT,
+        metavar="part|whole",
     )
     max_hulls: int | None = option(
         None,
@@ -260,6 +282,11 @@ class Options:
             for name in ("max_vertices", "max_faces"):
                 if getattr(self, name) is None:
                     object.__setattr__(self, name, getattr(engine, name))
+        if self.criterion == VOLUME:
+            unused = self.threshold_abs is not None or self.threshold != DEFAULT_THRESHOLD
+            rule = "left out: the criterion volume has a volume_tolerance"
+            _require(not unused, "threshold", self.threshold_abs or self.threshold, rule)
+            _require(not self.primitives, "primitives", self.primitives, "left out with the criterion volume")
         if isinstance(self.criterion, SpaceOptions):
             unused = self.threshold_abs is not None or self.threshold != DEFAULT_THRESHOLD
             _require(

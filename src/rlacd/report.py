@@ -115,10 +115,12 @@ def joint_report(reports: Sequence[tuple[str, dict[str, Any]]], scale: float) ->
     each = [(name, report, scale / report["scale"]) for name, report in reports]
     first = reports[0][1]
     nodes = []
+    criterion = "volume" if "volume" in first else "concavity"
     per_part: list[float] | None = []
     for name, report, factor in each:
-        errors = report["concavity"]["per_part"]
-        per_part = None if errors is None or per_part is None else [*per_part, *(error * factor for error in errors)]
+        errors = report[criterion]["per_part"]
+        unit = factor if criterion == "concavity" else 1.0
+        per_part = None if errors is None or per_part is None else [*per_part, *(error * unit for error in errors)]
         nodes.append({"node": name, "parts": report["parts"], "scale": report["scale"]})
     sides = ("over", "under")
     far = {side: [_times(report["hausdorff"][side], factor) for _, report, factor in each] for side in sides}
@@ -131,7 +133,7 @@ def joint_report(reports: Sequence[tuple[str, dict[str, Any]]], scale: float) ->
         "stopped_by": stopped["stopped_by"],
         **({"primitives": _added([r["primitives"] for _, r, _ in each])} if "primitives" in first else {}),
         **{what: sum(report[what] for _, report, _ in each) for what in ("parts", "faces", "vertices")},
-        "concavity": {"per_part": per_part, "max": None if per_part is None else max(per_part)},
+        criterion: first[criterion] | {"per_part": per_part, "max": None if per_part is None else max(per_part)},
         "hausdorff": {side: None if None in far[side] else max(far[side]) for side in sides},  # type: ignore[type-var]
         "scale": scale,
         "mass": _mass(joint_mass([_read_mass(report["mass"]) for _, report, _ in each])),

@@ -64,6 +64,9 @@ class Result:
         worst = self.report.get("concavity", {}).get("max")
         if worst is not None:
             words.append(f"max concavity {worst:.4f}")
+        added = self.report.get("volume", {}).get("max")
+        if added is not None:
+            words.append(f"at most {100 * added:.2f} % of volume added")
         if self.balls is not None:
             words.append(f"{len(self.balls)} balls left free")
         if not self.report.get("complete", True):

@@ -88,7 +88,8 @@ class SpaceOptions:
     )
     tolerance: float | None = option(
         0.05,
-        "Space nearer to the surface than this may be filled; the same share.",
+        "Space nearer to the surface than this may be filled; the same share. With --criterion volume: the share of "
+        "volume that a hull may add, such as 1%.",
         number(*LENGTHS, rule=_SHARE, typed=str),
         panel=PANEL,
         metavar="NUMBER",

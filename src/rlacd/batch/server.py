@@ -84,6 +84,8 @@ def _summary(report: dict[str, Any]) -> dict[str, Any]:
     kept: dict[str, Any] = {what: report[what] for what in same if what in report}
     if "concavity" in report:
         kept["concavity"] = report["concavity"]["max"]
+    if "volume" in report:
+        kept["added_volume"] = report["volume"]["max"]
     if "navigable" in report:
         kept["intrusion"] = report["navigable"]["intrusion"]["max"]
     return {**kept, "warnings": report["warnings"]}

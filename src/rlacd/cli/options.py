@@ -10,7 +10,7 @@ from typing import Any
 from rlacd.cli.parameters import Parameters, chosen, option_parameters
 from rlacd.errors import OptionError
 from rlacd.fields import about
-from rlacd.options import CONCAVITY, Options
+from rlacd.options import CONCAVITY, VOLUME, Options
 from rlacd.renamed import former_names
 from rlacd.space_options import NAVIGABLE, SpaceOptions
 
@@ -53,11 +53,22 @@ def decompose_options(
     given = _lengths(given, metres)
     space = {name: given.pop(name) for name in _SPACE if name in given}
     criterion = given.pop("criterion", CONCAVITY)
-    if criterion not in (CONCAVITY, NAVIGABLE):
-        raise OptionError(f"criterion is {criterion!r}; it has to be {CONCAVITY} or {NAVIGABLE}.")
-    if criterion == CONCAVITY:
+    if criterion not in (CONCAVITY, VOLUME, NAVIGABLE):
+        raise OptionError(f"criterion is {criterion!r}; it has to be {CONCAVITY}, {VOLUME} or {NAVIGABLE}.")
+    if criterion == VOLUME:
+        if "tolerance" in space:
+            given["volume_tolerance"] = space.pop("tolerance")
         if space:
             raise OptionError(f"{_typed(next(iter(space)), space)} needs --criterion navigable.")
+        if "threshold" in given or "threshold_abs" in given:
+            raise OptionError("--threshold belongs to --criterion concavity; give --tolerance instead, such as 1%.")
+        return {**given, "criterion": VOLUME}
+    if "volume_of" in given:
+        raise OptionError("--volume-of needs --criterion volume.")
+    if criterion == CONCAVITY:
+        if space:
+            needed = f"{VOLUME} or {NAVIGABLE}" if "tolerance" in space else NAVIGABLE
+            raise OptionError(f"{_typed(next(iter(space)), space)} needs --criterion {needed}.")
         return given
     if "threshold" in given or "threshold_abs" in given:
         raise OptionError("--threshold belongs to --criterion concavity; give --radius and --tolerance instead.")

@@ -118,6 +118,9 @@ def _fit(report: dict[str, Any]) -> str:
         threshold = report.get("options", {}).get("threshold")
         verdict = "" if threshold is None else f" (threshold {threshold:g}{', exceeded' * (worst > threshold)})"
         words.append(f"max concavity {worst:.4f}{verdict}")
+    added = report.get("volume")
+    if added is not None and added["max"] is not None:
+        words.append(f"hulls add up to {100 * added['max']:.2f} % of volume (tolerance {100 * added['tolerance']:g} %)")
     space = report.get("navigable")
     if space is not None:
         intruding = space["intrusion"]["max"]

@@ -14,13 +14,12 @@ import numpy.typing as npt
 from rlacd.compat.unused import warn_unused
 from rlacd.decompose_mesh import decompose
 from rlacd.errors import MeshDataError
-from rlacd.fields import flag, integer, read
+from rlacd.fields import flag, integer, number, read
 
 __all__ = ["compute_vhacd"]
 
 _UNUSED = {
-    "resolution": "nothing is turned into voxels; rlacd.decompose(threshold=...) sets how tight hulls are",
-    "minimumVolumePercentErrorAllowed": "tightness is a distance; see rlacd.decompose(threshold=...)",
+    "resolution": "nothing is turned into voxels",
     "maxRecursionDepth": "parts are cut until they are tight",
     "shrinkWrap": "hulls lie on the mesh's own vertices",
     "fillMode": "what is not closed is repaired",
@@ -55,9 +54,11 @@ def compute_vhacd(
         Maximum number of hulls.
     maxNumVerticesPerCH : int
         Maximum number of vertices per hull.
+    minimumVolumePercentErrorAllowed : float
+        The share of its part's volume that a hull may add, in per cent; exceeded only if `maxConvexHulls` demands it.
     asyncACD : bool
         Whether to use all processors; the result is the same either way.
-    resolution, minimumVolumePercentErrorAllowed, maxRecursionDepth, shrinkWrap, fillMode, minEdgeLength, findBestPlane
+    resolution, maxRecursionDepth, shrinkWrap, fillMode, minEdgeLength, findBestPlane
         Accepted but unused; a warning explains this once.
 
     Returns
@@ -75,8 +76,11 @@ def compute_vhacd(
     given = locals()
     defaults = {name: parameter.default for name, parameter in inspect.signature(compute_vhacd).parameters.items()}
     warn_unused("compute_vhacd", given, defaults, _UNUSED)
+    percent = read(number(0), "minimumVolumePercentErrorAllowed", minimumVolumePercentErrorAllowed)
     result = decompose(
         (np.asarray(points, dtype=np.float64), _triangles(faces)),
+        criterion="volume",
+        volume_tolerance=min(max(percent / 100, 1e-4), 10.0),
         max_hulls=read(integer(1), "maxConvexHulls", maxConvexHulls),
         max_vertices=read(integer(4), "maxNumVerticesPerCH", maxNumVerticesPerCH),
         threads=None if read(flag(), "asyncACD", asyncACD) else 1,

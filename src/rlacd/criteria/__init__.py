@@ -3,5 +3,6 @@
 from rlacd.criteria.concavity import Concavity
 from rlacd.criteria.criterion import Criterion
 from rlacd.criteria.navigable import Navigable, NavigableSpace
+from rlacd.criteria.volume import AddedVolume
 
-__all__ = ["Concavity", "Criterion", "Navigable", "NavigableSpace"]
+__all__ = ["AddedVolume", "Concavity", "Criterion", "Navigable", "NavigableSpace"]

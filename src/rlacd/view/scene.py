@@ -117,6 +117,6 @@ def _mesh(vertices: ArrayLike, faces: ArrayLike) -> dict[str, str]:
 
 def _errors(report: dict[str, Any], count: int) -> list[float | None]:
     """The criterion's measurement of each part, for either criterion."""
-    measured = report.get("concavity") or report.get("navigable", {}).get("intrusion") or {}
+    measured = report.get("concavity") or report.get("volume") or report.get("navigable", {}).get("intrusion") or {}
     per_part = measured.get("per_part") or []
     return list(per_part) if len(per_part) == count else [None] * count

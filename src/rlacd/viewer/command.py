@@ -29,12 +29,16 @@ def as_command(mesh: str | os.PathLike[str], given: dict[str, Any], usual: Any) 
     str
         One line, quoted for a POSIX shell.
     """
-    of_criterion = ("radius", "tolerance") if given.get("criterion") == "navigable" else ("threshold",)
+    lengths = {"navigable": ("radius", "tolerance"), "volume": ("volume_tolerance",)}
+    of_criterion = lengths.get(str(given.get("criterion")), ("threshold",))
     words = ["rlacd", "decompose", os.fspath(mesh)]
     for field in dataclasses.fields(usual):
         value = given.get(field.name)
-        if field.name in ("threshold", "radius", "tolerance") and field.name not in of_criterion:
+        if field.name in ("threshold", "radius", "tolerance", "volume_tolerance") and field.name not in of_criterion:
             continue
         if value is not None and value != getattr(usual, field.name):
-            words += [f"--{field.name.replace('_', '-')}", f"{value:g}" if isinstance(value, float) else str(value)]
+            words += [
+                f"--{field.name.removeprefix('volume_').replace('_', '-')}",
+                f"{value:g}" if isinstance(value, float) else str(value),
+            ]
     return shlex.join([*words, "-o", f"{file_stem(Path(mesh).stem)}_hulls{ENDING}"])

@@ -8,7 +8,7 @@ from typing import Any
 
 from rlacd.criteria import NavigableSpace
 from rlacd.errors import OptionError
-from rlacd.options import CONCAVITY, QUALITIES, Options
+from rlacd.options import CONCAVITY, QUALITIES, VOLUME, Options
 from rlacd.solid.input_mesh import InputMesh
 
 NAVIGABLE = "navigable"
@@ -24,6 +24,7 @@ class ViewerControls:
     threshold: float = _DEFAULTS.threshold
     radius: float = _SPACE.radius or 0.0
     tolerance: float = _SPACE.tolerance or 0.0
+    volume_tolerance: float = _DEFAULTS.volume_tolerance
     quality: str = _DEFAULTS.quality or QUALITIES[0]
     max_hulls: int | None = None
     max_vertices: int | None = None
@@ -37,9 +38,11 @@ class ViewerControls:
         OptionError
             A value is out of range.
         """
-        if self.criterion not in (CONCAVITY, NAVIGABLE):
-            raise OptionError(f"criterion is {self.criterion!r}; it has to be {CONCAVITY} or {NAVIGABLE}.")
+        if self.criterion not in (CONCAVITY, VOLUME, NAVIGABLE):
+            raise OptionError(f"criterion is {self.criterion!r}; it has to be {CONCAVITY}, {VOLUME} or {NAVIGABLE}.")
         goal: dict[str, Any] = {"threshold": self.threshold}
+        if self.criterion == VOLUME:
+            goal = {"criterion": VOLUME, "volume_tolerance": self.volume_tolerance}
         if self.criterion == NAVIGABLE:
             goal = {"criterion": NavigableSpace(radius=self.radius, tolerance=self.tolerance)}
         options = {

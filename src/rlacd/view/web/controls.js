@@ -77,11 +77,21 @@ export class Controls {
       given.tolerance,
       this.changed,
     );
+    this.volume = new Length(
+      "volume_tolerance",
+      "Added volume",
+      "The share of its part's volume that a hull may add: 0.01 is 1 %.",
+      [0.001, 1],
+      given.volume_tolerance,
+      this.changed,
+    );
+    this.volume.tell = () => {}; // a share, not a length
     this.criterion = choice(
       "Criterion",
       "criterion",
       [
         ["concavity", "Concavity", "Every hull stays within the threshold of the surface, everywhere."],
+        ["volume", "Volume", "Every hull adds at most a share of volume, as V-HACD and NavACD measure it."],
         ["navigable", "Navigable space", "Hulls stay out of where a ball can go. Dents too narrow for the ball are filled, which saves hulls."],
       ],
       given.criterion,
@@ -116,6 +126,7 @@ export class Controls {
       this.threshold.element,
       this.radius.element,
       this.tolerance.element,
+      this.volume.element,
       this.quality,
       make("div", { class: "limits" }, this.hulls.element, this.corners.element),
     );
@@ -127,6 +138,8 @@ export class Controls {
     const size =
       criterion === "navigable"
         ? { radius: this.radius.value, tolerance: this.tolerance.value }
+        : criterion === "volume"
+        ? { volume_tolerance: this.volume.value }
         : { threshold: this.threshold.value };
     return { ...size, criterion, quality, max_hulls: this.hulls.value(), max_vertices: this.corners.value(), preset: this.options.preset ?? null };
   }
@@ -139,7 +152,7 @@ export class Controls {
 
   /** Make the threshold larger or smaller by a step, from the keyboard. */
   nudge(factor) {
-    const length = this.options.criterion === "navigable" ? this.radius : this.threshold;
+    const length = { navigable: this.radius, volume: this.volume }[this.options.criterion] ?? this.threshold;
     length.box.value = +(length.value * factor).toPrecision(2);
     length.box.dispatchEvent(new Event("change"));
   }
@@ -152,8 +165,10 @@ export class Controls {
   }
 
   #arrange() {
-    const navigable = this.options.criterion === "navigable";
-    this.threshold.element.hidden = navigable;
+    const { criterion } = this.options;
+    const navigable = criterion === "navigable";
+    this.threshold.element.hidden = criterion !== "concavity";
+    this.volume.element.hidden = criterion !== "volume";
     this.radius.element.hidden = this.tolerance.element.hidden = !navigable;
   }
 

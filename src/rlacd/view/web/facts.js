@@ -31,6 +31,7 @@ export const HINTS = {
   triangles: "Of all hulls together. Fewer are faster to collide.",
   concavity:
     "The farthest that a part's surface and its hull's lie apart, anywhere: how much room the worst dent has that a hull fills.",
+  added: "The largest share of its part's volume that a hull adds.",
   intrusion: "How deep a hull reaches into the space that a ball can get to.",
   balls: "Places that a ball of the chosen radius can reach and no hull covers.",
   over: "The farthest that the hulls' surface lies outside the input's.",
@@ -47,11 +48,12 @@ export const HINTS = {
 export function summary(scene, { draft = false } = {}) {
   const { report, parts } = scene;
   if (!report) return [];
-  const { concavity, navigable, seconds } = report;
+  const { concavity, volume, navigable, seconds } = report;
   const words = [
     term(plural(parts.length, "hull"), HINTS.hull),
     term(plural(report.faces ?? parts.length, "triangle"), HINTS.triangles),
     concavity && term(`concavity\u00a0${measure(concavity.max, scene)}`, HINTS.concavity),
+    volume?.max != null && term(`${percent(volume.max)} of volume added`, HINTS.added),
     navigable && term(`${plural(navigable.balls, "ball")} left free`, HINTS.balls),
     !draft && seconds?.total != null && term(`${seconds.total.toFixed(2)}\u00a0s`, HINTS.seconds),
     draft && term("first pass", HINTS.draft),
@@ -71,6 +73,8 @@ export function notes({ report }) {
   ].filter(Boolean).flatMap((word, i) => (i ? [" · ", word] : [word]));
 }
 
+const percent = (share) => `${digits(100 * share, 2)}\u00a0%`;
+
 export function warnings(report) {
   return (report.warnings ?? []).map((text) => make("p", { class: "warning" }, text));
 }
@@ -82,6 +86,7 @@ export function fitTable(report, scene) {
     if (value != null) rows.push([term(name, hint), measure(value, scene), `${digits(50 * value, 2)}\u00a0%`]);
   };
   add("Largest concavity", report.concavity?.max, HINTS.concavity);
+  if (report.volume?.max != null) rows.push([term("Largest added volume", HINTS.added), percent(report.volume.max), ""]);
   add("Deepest intrusion", report.navigable?.intrusion?.max, HINTS.intrusion);
   add("Hulls beyond the input", report.hausdorff?.over, HINTS.over);
   add("Input beyond the hulls", report.hausdorff?.under, HINTS.under);

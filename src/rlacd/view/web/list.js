@@ -27,7 +27,9 @@ export class PartList {
     this.scene = scene;
     const navigable = Boolean(scene.report?.navigable);
     const all = scene.parts.reduce((sum, part) => sum + part.volume, 0) || 1;
-    this.limit = navigable ? null : scene.report?.options?.threshold;
+    const volume = scene.report?.volume;
+    this.asShare = Boolean(volume);
+    this.limit = navigable ? null : (volume?.tolerance ?? scene.report?.options?.threshold);
     this.data = scene.parts.map((part, index) => ({
       index,
       color: part.color,
@@ -40,7 +42,7 @@ export class PartList {
       ["index", "Part", "In the order of the file."],
       ["faces", "Faces", "Triangles of the hull."],
       ["share", "Volume", "Share of all hulls' volume."],
-      navigable ? ["error", `Intrusion${unit}`, HINTS.intrusion] : ["error", `Concavity${unit}`, `${HINTS.concavity} The bar is full at the threshold.`],
+      volume ? ["error", "Added", `${HINTS.added} The bar is full at the tolerance.`] : navigable ? ["error", `Intrusion${unit}`, HINTS.intrusion] : ["error", `Concavity${unit}`, `${HINTS.concavity} The bar is full at the threshold.`],
     ];
     this.head.replaceChildren(
       ...this.columns.map(([key, text, hint]) =>
@@ -89,7 +91,7 @@ export class PartList {
       make("td", {}, swatch, String(part.index).padStart(3, "0")),
       make("td", {}, String(part.faces)),
       make("td", {}, `${digits(100 * part.share, 2)}\u00a0%`),
-      make("td", { class: "error" }, part.error == null ? "–" : digits(part.error / this.scene.scale, 2), this.limit ? make("span", { class: "track" }, gauge) : null),
+      make("td", { class: "error" }, part.error == null ? "–" : this.asShare ? `${digits(100 * part.error, 2)}\u00a0%` : digits(part.error / this.scene.scale, 2), this.limit ? make("span", { class: "track" }, gauge) : null),
     );
     row.number = part.index;
     return row;

@@ -1,0 +1,131 @@
+"""The volume that a hull adds, as a share: V-HACD's criterion, decided exactly on the solid instead of on voxels.
+
+A part is done when ``|CH| - |part| <= tolerance * max(base, LEAST |CH(solid)|)``, with the volume of the part or of the
+whole solid as the base. The least base, a thousandth of the whole's convex hull, stands for V-HACD's voxels: without
+it, a shell as thin as a sheet of paper would be cut until each piece is flat to a hundredth of the paper.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from rlacd.criteria.criterion import CriterionSummary
+from rlacd.criteria.screen import Part, Screen
+from rlacd.solid.hull import Hull
+from rlacd.solid.solid import Solid
+
+LEAST = 1e-3
+"""Of the volume of the whole's convex hull: parts smaller than this count as this large."""
+
+REACH = 0.2
+"""Parts farther apart than this (the longest side is 2) are not united: their joint hull would bridge the gap."""
+
+
+def share_of(added: float, base: float) -> float:
+    """What a hull adds, as a share of the base volume."""
+    return max(0.0, added) / base if base > 0 else (0.0 if added <= 0 else math.inf)
+
+
+@dataclass(frozen=True)
+class VolumeScreen(Screen):
+    """Tests of volumes alone."""
+
+    criterion: AddedVolume
+
+    def filled(self, part: Part) -> float:
+        """The part's volume: the rest of the hull is what the criterion counts."""
+        return part.volume
+
+    def least_error(self, volume: float, hull_volume: float) -> float:
+        """The error itself."""
+        return self.criterion.share(volume, hull_volume)
+
+    def excludes(self, volume: float, hull_volume: float) -> bool:
+        """Whether the hull adds too much."""
+        return self.least_error(volume, hull_volume) > self.criterion.tolerance
+
+
+@dataclass(frozen=True)
+class AddedVolume:
+    """The criterion "the hull adds at most this share of volume".
+
+    Attributes
+    ----------
+    tolerance
+        The share: 0.01 is 1 %.
+    whole
+        Volume of the solid if shares are of that; None if each is of the part's own.
+    least
+        Smallest base volume.
+    """
+
+    tolerance: float
+    whole: float | None
+    least: float
+
+    @classmethod
+    def of(cls, tolerance: float, relative_to: str, solid: Solid) -> AddedVolume:
+        """Make the criterion for a solid; `relative_to` is ``part`` or ``whole``."""
+        from rlacd._native import mesh_volume
+
+        hull = Hull.of(solid.vertices) if len(solid.vertices) else None
+        whole = float(mesh_volume(*solid.mesh)) if relative_to == "whole" else None
+        return cls(tolerance, whole, LEAST * hull.volume if hull is not None else 0.0)
+
+    def share(self, volume: float, hull_volume: float) -> float:
+        """The error of a part with these volumes."""
+        return share_of(hull_volume - volume, max(volume if self.whole is None else self.whole, self.least))
+
+    @property
+    def is_hereditary(self) -> bool:
+        """No: another part may fill what is missing from a part's hull."""
+        return False
+
+    @property
+    def screen(self) -> VolumeScreen:
+        """Tests of volumes."""
+        return VolumeScreen(REACH, self)
+
+    def is_met(self, part: Part) -> bool:
+        """Whether the hull adds at most the tolerance."""
+        return self.error(part) <= self.tolerance
+
+    def error(self, part: Part) -> float:
+        """The share that the hull adds."""
+        return self.share(part.volume, part.hull.volume)
+
+    def settled(self, parts: Sequence[Part]) -> AddedVolume:
+        """Unchanged: parts that exceed the tolerance are reported."""
+        return self
+
+    def scaled(self, factor: float) -> AddedVolume:
+        """The same criterion with `factor` times the tolerance."""
+        return replace(self, tolerance=self.tolerance * factor)
+
+    @property
+    def overhang(self) -> float:
+        """Infinite: a thin spike may reach far and add little."""
+        return math.inf
+
+    @property
+    def obstacles(self) -> None:
+        """None: volumes are not about space."""
+
+    def summary(self, errors: Sequence[float] | None) -> CriterionSummary:
+        """The share of each part, and how many exceed the tolerance."""
+        entries = {
+            "tolerance": self.tolerance,
+            "relative_to": "part" if self.whole is None else "whole",
+            "per_part": None if errors is None else list(errors),
+            "max": None if errors is None else max(errors),
+        }
+        if errors is None:
+            return CriterionSummary({"volume": entries}, ("There was no time to measure what the hulls add.",))
+        exceeding = [error for error in errors if error > self.tolerance]
+        warning = (
+            f"{len(exceeding)} of {len(errors)} hulls add more than {100 * self.tolerance:.3g} % of volume; "
+            f"the worst adds {100 * max(exceeding, default=0):.3g} %."
+        )
+        return CriterionSummary({"volume": entries}, (warning,) if exceeding else ())

@@ -1,0 +1,111 @@
+"""The criterion `volume`: no hull adds more than a share of volume, measured here by booleans of another library."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import manifold3d
+import numpy as np
+import pytest
+import trimesh
+from typer.testing import CliRunner
+
+import rlacd
+from rlacd.cli.main import app
+from rlacd.compat.vhacd import compute_vhacd
+from rlacd.errors import OptionError
+from tests.hulls import assert_convex_hull
+from tests.models import table
+
+
+def manifold_of(mesh: trimesh.Trimesh) -> manifold3d.Manifold:
+    vertices, faces = np.array(mesh.vertices, order="C"), np.array(mesh.faces, dtype=np.uint64, order="C")
+    return manifold3d.Manifold(manifold3d.Mesh64(vertices, faces))
+
+
+def cup() -> trimesh.Trimesh:
+    solid = manifold3d.Manifold.cylinder(2, 1, 1, 24) - manifold3d.Manifold.cylinder(2, 0.9, 0.9, 24).translate(
+        (0, 0, 0.1)
+    )
+    mesh = solid.to_mesh64()
+    return trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts, process=False)
+
+
+def torus() -> trimesh.Trimesh:
+    return trimesh.creation.torus(1.0, 0.3, major_sections=32, minor_sections=16)
+
+
+@pytest.mark.parametrize("tolerance", [0.02, 0.1, 0.5])
+@pytest.mark.parametrize("shape", [table, torus, cup])
+def test_no_hull_adds_more_than_the_share(shape: object, tolerance: float) -> None:
+    mesh: trimesh.Trimesh = shape()  # type: ignore[operator]
+    result = rlacd.decompose(mesh, criterion="volume", volume_tolerance=tolerance, threads=1)
+    solid = manifold_of(mesh)
+    least = 1e-3 * mesh.convex_hull.volume
+    for hull in result:
+        assert_convex_hull(hull)
+        inside = (manifold_of(hull) ^ solid).volume()
+        assert hull.volume - inside <= tolerance * max(inside, least) * (1 + 1e-6) + 1e-9
+    measured = result.report["volume"]
+    assert len(measured["per_part"]) == len(result)
+    assert measured["max"] == max(measured["per_part"]) <= tolerance
+    assert result.report["hausdorff"]["under"] < 0.005
+    assert result.report["warnings"] == []
+
+
+def test_a_tighter_share_takes_more_hulls_and_is_a_share_of_what_was_said() -> None:
+    counts = [len(rlacd.decompose(torus(), criterion="volume", volume_tolerance=share)) for share in (0.5, 0.1, 0.02)]
+    assert counts[0] < counts[1] < counts[2]
+    of_whole = rlacd.decompose(torus(), criterion="volume", volume_tolerance=0.02, volume_of="whole")
+    assert len(of_whole) < counts[2]
+    added = [share * torus().volume for share in of_whole.report["volume"]["per_part"]]
+    assert max(added) <= 0.02 * torus().volume
+    assert of_whole.report["volume"]["relative_to"] == "whole"
+
+
+def test_a_limit_on_hulls_may_exceed_the_share_and_says_by_how_much() -> None:
+    result = rlacd.decompose(torus(), criterion="volume", max_hulls=6, threads=1)
+    assert len(result) <= 6
+    assert result.report["volume"]["max"] > 0.01
+    assert any("add more than 1 % of volume" in warning for warning in result.report["warnings"])
+
+
+def test_the_same_bytes_for_any_threads() -> None:
+    results = [rlacd.decompose(torus(), criterion="volume", threads=threads) for threads in (1, 3)]
+    assert len(results[0]) == len(results[1])
+    for one, other in zip(*results, strict=True):
+        assert np.array_equal(one.vertices, other.vertices)
+
+
+def test_the_command_line_takes_a_share(tmp_path: Path) -> None:
+    mesh = tmp_path / "torus.ply"
+    torus().export(mesh)
+    args = [str(mesh), "-o", str(tmp_path / "o.glb"), "--criterion", "volume", "--tolerance", "10%", "--report", "-"]
+    run = CliRunner().invoke(app, ["decompose", *args])
+    assert run.exit_code == 0, run.output
+    said = json.loads(run.stdout)
+    assert said["options"]["volume_tolerance"] == pytest.approx(0.1)
+    assert said["volume"]["max"] <= 0.1
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        ({"threshold": 0.02}, "threshold"),
+        ({"volume_tolerance": 0}, "volume_tolerance"),
+        ({"volume_of": "all"}, "volume_of"),
+        ({"primitives": True}, "primitives"),
+    ],
+)
+def test_options_that_do_not_go_with_it(options: dict[str, object], named: str) -> None:
+    with pytest.raises(OptionError, match=named):
+        rlacd.decompose(torus(), criterion="volume", **options)  # type: ignore[arg-type]
+
+
+def test_v_hacds_own_word_for_it_counts() -> None:
+    mesh = torus()
+    coarse, fine = (
+        compute_vhacd(mesh.vertices, mesh.faces, minimumVolumePercentErrorAllowed=percent) for percent in (50.0, 10.0)
+    )
+    assert len(coarse) < len(fine) <= 64
