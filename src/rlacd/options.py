@@ -121,10 +121,9 @@ class Options:
     )
     volume_tolerance: float = option(
         0.01,
-        "With --criterion volume: the share of volume that a hull may add; --tolerance on the command line.",
+        "With --criterion volume: the share of volume that a hull may add; the same as --tolerance 1%.",
         number(1e-4, 10.0),
         panel=TIGHT,
-        flags=(),
     )
     volume_of: VolumeOf = option(
         "part",
