@@ -182,7 +182,7 @@ def test_options_of_the_other_functions_are_checked(odd: Any, tmp_path: Path) ->
         ({"quality": np.eye(2)}, r"quality is array\(\[\[1\., 0\.\], \[0\., 1\.\]\]\); it has to be one of fast, "),
         (
             {"criterion": np.zeros(2)},
-            r'criterion is array\(.*\); it has to be "concavity" or an `rlacd\.NavigableSpace`',
+            r'criterion is array\(.*\); it has to be "concavity", "volume" or an `rlacd\.NavigableSpace`',
         ),
         ({"seed": 10**5000}, "seed is an object of type int; it has to be an integer between 0 and"),
         (
