@@ -216,7 +216,7 @@ def test_everything_offered_can_be_downloaded_and_read(viewer: Viewer) -> None:
     [
         ({"threshold": -1}, "threshold is -1"),
         ({"threshold": "tight"}, "threshold is 'tight'"),
-        ({"criterion": "beauty"}, "concavity or navigable"),
+        ({"criterion": "beauty"}, "concavity, volume or navigable"),
         ({"criterion": "navigable", "radius": 0}, "radius"),
         ({"quality": "perfect"}, "quality"),
         ({"max_hulls": 1.5}, "max_hulls"),
@@ -463,7 +463,7 @@ def test_mistakes_are_found_before_anything_is_served(mesh: Path, tmp_path: Path
         (["{mesh}", "--port", "99999"], "no port"),
         (["{mesh}", "--up", "w"], "x, y or z"),
         (["{mesh}", "--threshold", "-1"], "threshold is -1"),
-        (["{mesh}", "--criterion", "beauty"], "concavity or navigable"),
+        (["{mesh}", "--criterion", "beauty"], "concavity, volume or navigable"),
     ],
 )
 def test_the_command_says_what_is_wrong_in_one_sentence(mesh: Path, words: list[str], says: str) -> None:
