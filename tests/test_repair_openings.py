@@ -182,3 +182,22 @@ def test_a_loop_around_an_island_keeps_the_island():
         mesh = trimesh.Trimesh(flat.vertices, np.delete(faces, np.setdiff1d(patch, touching), axis=0), process=False)
         solid = solid_of(mesh, open_bodies="solid")
         assert volume(solid) == pytest.approx(16, rel=1e-9)
+
+
+def test_a_noisy_slit_between_two_bodies_that_close_each_other_is_filled() -> None:
+    """Two halves of a ball whose rims do not quite meet: caps that nothing can reach, a hair apart or crossing."""
+    ball = trimesh.creation.uv_sphere(1.0, count=[32, 64])
+    halves = []
+    rng = np.random.default_rng(0)
+    for side in (1, -1):
+        half = trimesh.Trimesh(ball.vertices, ball.faces[side * ball.triangles_center[:, 2] > 0])
+        half.vertices += rng.normal(0, 0.0015, half.vertices.shape)
+        halves.append(half)
+    solid = solid_of(join(*halves))
+    assert set(steps(solid)) == {"wrapped"}
+    rim = rng.normal(size=(500, 2))
+    radius = np.sqrt(rng.uniform(0, 0.95**2, (500, 1))) / np.linalg.norm(rim, axis=1, keepdims=True)
+    inner = np.column_stack([rim * radius, np.zeros(500)])
+    surface = SurfaceQuery(*to_arrays(solid.manifold))
+    assert surface.inside(inner).all()
+    assert surface.distance(inner).min() > 0.01

@@ -19,7 +19,7 @@ from rlacd._native import poll_stop
 from rlacd.repair.distance import SurfaceQuery, spread_points
 from rlacd.repair.holes import LONGEST_EXACT_LOOP, cap
 from rlacd.repair.rims import Rims, rims_of
-from rlacd.repair.soup import Soup, crossed_share
+from rlacd.repair.soup import Soup, crossed_share, face_normals
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.topology import (
     BoolArray,
@@ -65,6 +65,10 @@ class Closed:
         The bodies that were capped.
     by_room
         ``[bodies]``, bodies that were capped only because nothing can reach a cap.
+    hidden
+        Points ``[N, 3]`` of such caps, away from the surface.
+    across
+        The unit normals of the caps there, ``[N, 3]``.
     far
         Distances of caps from the surface, for each body with a cap that something can reach.
     where
@@ -78,6 +82,8 @@ class Closed:
     soup: Soup
     bodies: IntArray
     by_room: BoolArray
+    hidden: FloatArray
+    across: FloatArray
     far: FloatArray
     where: FloatArray
     hollow: IntArray
@@ -191,8 +197,20 @@ def close_holes(
     widest = [np.flatnonzero(loop_body == one)[by_loop[loop_body == one].argmax()] for one in hollow.tolist()]
     mouths = np.array([soup.vertices[rims.loops[loop]].mean(axis=0) for loop in widest]).reshape(-1, 3)
     result = capped()[0] if chosen.any() else soup
+    hidden = np.flatnonzero(unreachable & ~excused & chosen[loop_body[place]])
+    # Slender faces have many points; one of each cell is enough.
+    hidden = hidden[np.unique(np.floor(points[hidden] * (2 / gap)), axis=0, return_index=True)[1]]
+    across = face_normals(soup.vertices, caps[on[hidden]])
     return Closed(
-        result, np.flatnonzero(chosen[joined]), by_room & chosen, distance[wide], points[wide], hollow, mouths
+        result,
+        np.flatnonzero(chosen[joined]),
+        by_room & chosen,
+        points[hidden],
+        across,
+        distance[wide],
+        points[wide],
+        hollow,
+        mouths,
     )
 
 
@@ -229,9 +247,7 @@ def _caps(soup: Soup, rims: Rims, bend: float) -> tuple[IntArray, IntArray]:
 
 def _smooth_share(soup: Soup, rims: Rims, caps: IntArray, owner: IntArray) -> FloatArray:
     """Return ``[L]`` the share of each loop along which its cap continues the adjacent faces."""
-    a, b, c = (soup.vertices[caps[:, i]] for i in range(3))
-    normal = np.cross(b - a, c - a)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+    normal = face_normals(soup.vertices, caps)
     # The cap's face at each edge of the rim, found by loop and edge.
     count = len(soup.vertices)
     key = ((caps * count + np.roll(caps, -1, axis=1)) + owner[:, None] * count**2).ravel()

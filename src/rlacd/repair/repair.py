@@ -70,6 +70,9 @@ HALF_THICKNESS = 1e-3
 GAP = 0.03
 """Greatest distance of a cap from the input's surface, and the radius of the ball a gap must stop, in frame units."""
 
+# Widest slit between caps that is filled, and the distance up to which a cap is part of the solid's surface.
+_SLIT, _ON_SURFACE = GAP / 4, 1e-6
+
 _WELDS = (2e-5, 5e-4)
 _WRAP_ERROR = 4e-3
 # What a capped body may lose before its caps are made another way.
@@ -235,6 +238,7 @@ class _Repair:
         self.deviation = np.zeros(self.bodies)
         self.faces_out = np.zeros(self.bodies, dtype=np.int64)
         self.by_room = np.zeros(self.bodies, dtype=bool)  # capped only because nothing can reach the cap
+        self.hidden, self.across = np.empty((2, 0, 3))  # points of such caps, and the normals there
         self._note(body[(faces != surface.faces[origin]).any(axis=1)], "welded")
 
         soup = Soup(surface.vertices, faces, body)
@@ -253,6 +257,7 @@ class _Repair:
             self.solid = unite([part for part, _ in parts])
             if open_bodies != "thin":
                 self._wrap_rooms(soup, parts)
+                self._fill_slits()
         if volume_of(self.solid) == 0:
             self.warnings.append("the surface could not be closed: the hull of its points stands in for the solid")
             self.step[:] = STEPS.index("hull")
@@ -363,6 +368,7 @@ class _Repair:
         self.mouths = dict(zip(closed.hollow.tolist(), closed.mouths, strict=True))
         self._note(closed.bodies, "capped")
         self.by_room |= closed.by_room
+        self.hidden, self.across = closed.hidden, closed.across
         if len(closed.far):
             place = self.frame.place(closed.where[closed.far.argmax()])
             self.warnings.append(
@@ -508,6 +514,26 @@ class _Repair:
         wrapped = np.concatenate([slabs.body[wall], np.flatnonzero(self.by_room)])
         self._note(wrapped, "wrapped")
         self.faces_out[wrapped.min(initial=self.bodies - 1)] += wrap.num_tri()
+
+    def _fill_slits(self) -> None:
+        """Fill the slits between the caps of bodies that close each other, such as a pot and its lid.
+
+        Nothing can reach such caps; where they should coincide, noise leaves slits that would have to be cut around.
+        """
+        if len(self.hidden) == 0 or volume_of(self.solid) == 0:
+            return
+        solid = SurfaceQuery(*to_arrays(self.solid), self.input.threads)
+        bare = solid.distance(self.hidden) < _ON_SURFACE
+        points, step = self.hidden[bare], _SLIT * self.across[bare]
+        points = points[solid.inside(points + step) & solid.inside(points - step)]
+        if len(points) == 0:
+            return
+        wrap = self._wrap(self.reach.around_points(points), _WRAP_ERROR)
+        united = unite([as_manifold(self.solid), wrap])
+        if volume_of(united) > volume_of(self.solid):
+            self.solid = united
+            self._note(np.flatnonzero(self.by_room), "wrapped")
+            self.faces_out[self.by_room.argmax()] += wrap.num_tri()
 
     def _measure(self) -> None:
         """Record, for the changed bodies, how far the solid and the input deviate from each other."""

@@ -116,6 +116,13 @@ def across(vertices: FloatArray, faces: IntArray, halfedges: IntArray) -> FloatA
     return np.asarray(away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), np.finfo(float).tiny))
 
 
+def face_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return ``[F, 3]`` the unit normals of faces; zero for those without an area."""
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    normal = np.cross(b - a, c - a)
+    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny))
+
+
 def on_repeated_edge(faces: IntArray, count: int) -> BoolArray:
     """Return ``[F]`` which faces have a directed edge that another face has too."""
     key = (faces * count + np.roll(faces, -1, axis=1)).ravel()
@@ -144,8 +151,7 @@ def crossed_share(vertices: FloatArray, faces: IntArray) -> float:
 def _winding_beside(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return ``[2, F]`` how often faces wind around a point before each face and one behind; positive inside."""
     a, b, c = (vertices[faces[:, i]] for i in range(3))
-    normal = np.cross(b - a, c - a)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+    normal = face_normals(vertices, faces)
     middle = (a + b + c) / 3
     query = SurfaceQuery(vertices, faces)
     beside = np.stack([query.winding(middle + _BESIDE * normal), query.winding(middle - _BESIDE * normal)])
