@@ -107,6 +107,30 @@ def compare(
     return compare_page(bench, "Side by side", entries, pictures, up)
 
 
+@experiment("physics")
+def physics(
+    bench: Bench,
+    ways: Annotated[
+        str | None,
+        typer.Option(
+            help="Separated by commas: coacd, vhacdx:hulls, one-hull, balanced, fast, fast:full (exact hulls), "
+            "fast:64, fast:32, fast:16 (most vertices), fast:primitives; default: all.",
+            show_default=False,
+        ),
+    ] = None,
+) -> Page:
+    """Simulate the hulls: a pile that settles, and balls dropped into every hole; needs rlacd[sim].
+
+    \b
+    [bold]Example[/bold]
+      rlacd bench physics meshes/ --out run/
+    """
+    from rlacd.bench.physics import WAYS, physics_page
+
+    chosen = WAYS if ways is None else [word.strip() for word in ways.split(",") if word.strip()]
+    return physics_page(bench, chosen, typer.echo)
+
+
 @experiment("paper-table-1")
 def table_1(bench: Bench, methods: Methods = None, at: MeanError = None, close: Close = 0.02) -> Page:
     """Tune every method to the same mean D_h, then compare (4.4.1)."""

@@ -1,0 +1,289 @@
+"""What a simulator makes of a decomposition: a pile of copies settles, and balls are dropped into every hollow."""
+
+from __future__ import annotations
+
+import copy
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from lxml import etree
+
+from rlacd import _native
+from rlacd.errors import MissingExtraError
+from rlacd.io.write import save
+from rlacd.result import Result
+from rlacd.solid.arrays import BoolArray, FloatArray
+
+SIZE = 0.2
+"""Longest side of every object in metres; simulators are tuned for things that a hand can hold."""
+
+COPIES, SECONDS, STEP = 20, 2.5, 0.002
+
+BIN = 1.6
+"""Half the width of the bin that the pile falls into, in longest sides."""
+
+AT_REST = 0.05
+"""Metres per second; a pile is at rest when nothing moves faster."""
+
+GRID = 7
+"""Balls are dropped on a grid of this many per side, along each of the six directions of the axes."""
+
+BALL = 0.03
+"""Radius of the balls, in longest sides."""
+
+NEAR = 0.025
+"""How far from its true place a ball may rest, in longest sides: the usual threshold of 0.05, in the frame."""
+
+FALL_SPEED, DROP_STEP = 0.5, 0.001
+"""The speed in metres per second at which balls fall, so slowly that they tunnel through nothing."""
+
+
+@dataclass(frozen=True)
+class Pile:
+    """How a pile of copies settled.
+
+    Attributes
+    ----------
+    steps_per_second : float
+        Steps per CPU second.
+    contacts : float
+        Mean number of contacts per step, over the last second.
+    penetration : float
+        Mean depth of the deepest contact, over the last second, in longest sides.
+    drift : float
+        How much energy changes per second over the last half second, in joules per kilogram.
+    rest : float
+        Seconds until nothing moves faster than `AT_REST`; infinite if that does not happen.
+    """
+
+    steps_per_second: float
+    contacts: float
+    penetration: float
+    drift: float
+    rest: float
+
+
+@dataclass(frozen=True)
+class Drops:
+    """Where balls came to rest.
+
+    Attributes
+    ----------
+    holes, passed : int
+        Balls that, by the exact mesh, pass through the object's convex hull to the other side; those that did.
+    hollows, rested : int
+        Balls that, by the exact mesh, come to rest more than `NEAR` inside the object's convex hull; those that came to
+        rest within `NEAR` of that place.
+
+    Balls are counted only if one wider by `NEAR` does the same: others may differ by what the threshold allows.
+    """
+
+    holes: int
+    passed: int
+    hollows: int
+    rested: int
+
+
+def model_size(result: Result) -> int:
+    """Bytes of a body's MJCF file and its collision meshes."""
+    with tempfile.TemporaryDirectory(prefix="rlacd-") as folder:
+        save(result, Path(folder) / "body.xml")
+        files = [path for path in Path(folder).rglob("*") if path.is_file()]
+        return sum(path.stat().st_size for path in files if "_visual" not in path.name)
+
+
+def pile_in_mujoco(result: Result) -> Pile:
+    """Drop copies of a body whose longest side is `SIZE` into a bin, in MuJoCo."""
+    mujoco = _mujoco()
+    with tempfile.TemporaryDirectory(prefix="rlacd-") as folder:
+        path = save(result, Path(folder) / "body.xml")
+        root = etree.parse(str(path)).getroot()
+        world = root.find("worldbody")
+        (body,) = world.findall("body")
+        world.remove(body)
+        for index, (place, turn) in enumerate(_places()):
+            other = copy.deepcopy(body)
+            for named in other.iter():
+                if "name" in named.attrib:
+                    named.set("name", f"{named.get('name')}_copy{index}")
+            other.set("pos", " ".join(map(str, place)))
+            other.set("quat", " ".join(map(str, turn)))
+            world.append(other)
+        planes = [("0 0 0", "0 0 1")]
+        planes += [(f"{-s * BIN * SIZE} 0 0", f"{s} 0 0") for s in (-1, 1)]
+        planes += [(f"0 {-s * BIN * SIZE} 0", f"0 {s} 0") for s in (-1, 1)]
+        for at, normal in planes:
+            etree.SubElement(world, "geom", type="plane", size="9 9 1", pos=at, zaxis=normal)
+        path.write_bytes(etree.tostring(root))
+        model = mujoco.MjModel.from_xml_path(str(path))
+    model.opt.timestep = STEP
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+    data = mujoco.MjData(model)
+    steps = round(SECONDS / STEP)
+    contacts, depth, speed, energy = np.zeros((4, steps))
+    began = time.process_time()
+    for step in range(steps):
+        mujoco.mj_step(model, data)
+        contacts[step] = data.ncon
+        depth[step] = max(0.0, -data.contact.dist.min()) if data.ncon else 0.0
+        speed[step] = np.abs(data.qvel.reshape(-1, 6)[:, :3]).max()
+        energy[step] = data.energy.sum()
+    return _settled(steps / (time.process_time() - began), STEP, contacts, depth, speed, energy / model.body_mass.sum())
+
+
+def pile_in_bullet(result: Result) -> Pile:
+    """Drop copies of a body whose longest side is `SIZE` into a bin, in PyBullet."""
+    try:
+        import pybullet as bullet
+    except ImportError as error:
+        raise MissingExtraError("PyBullet is missing: run  pip install 'rlacd[sim]'  and try again.") from error
+    client = bullet.connect(bullet.DIRECT)
+    at = {"physicsClientId": client}
+    try:
+        bullet.setGravity(0, 0, -9.81, **at)
+        normals = [(0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)]
+        for normal in normals:
+            plane = bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=normal, **at)
+            away = np.array(normal) * (-BIN * SIZE if normal[2] == 0 else 0.0)
+            bullet.createMultiBody(0, plane, basePosition=away.tolist(), **at)
+        with tempfile.TemporaryDirectory(prefix="rlacd-") as folder:
+            path = str(save(result, Path(folder) / "body.urdf"))
+            flags = bullet.URDF_USE_INERTIA_FROM_FILE | bullet.URDF_USE_IMPLICIT_CYLINDER
+            bodies = [
+                bullet.loadURDF(path, place.tolist(), [*turn[1:], turn[0]], flags=flags, **at)
+                for place, turn in _places()
+            ]
+        mass = bullet.getDynamicsInfo(bodies[0], -1, **at)[0]
+        steps = round(SECONDS * 240)
+        contacts, depth, speed, energy = np.zeros((4, steps))
+        spent = 0.0
+        for step in range(steps):
+            began = time.process_time()
+            bullet.stepSimulation(**at)
+            spent += time.process_time() - began
+            distances = [contact[8] for contact in bullet.getContactPoints(**at)]
+            contacts[step] = len(distances)
+            depth[step] = max(0.0, -min(distances, default=0.0))
+            moving = np.array([bullet.getBaseVelocity(body, **at)[0] for body in bodies])
+            heights = [bullet.getBasePositionAndOrientation(body, **at)[0][2] for body in bodies]
+            speed[step] = np.abs(moving).max()
+            energy[step] = (0.5 * (moving**2).sum() + 9.81 * sum(heights)) / len(bodies)
+        assert mass > 0
+        return _settled(steps / spent, 1 / 240, contacts, depth, speed, energy)
+    finally:
+        bullet.disconnect(client)
+
+
+def drops_in_mujoco(result: Result) -> Drops:
+    """Drop balls onto a fixed body whose longest side is `SIZE`, from all six sides, in MuJoCo."""
+    surface = _native.Surface(
+        np.ascontiguousarray(result.source.vertices, dtype=np.float64),
+        np.ascontiguousarray(result.source.faces, dtype=np.int32),
+    )
+    outside = result.source.convex_hull
+    around = _native.Surface(np.asarray(outside.vertices, dtype=np.float64), np.asarray(outside.faces, dtype=np.int32))
+    counts = np.zeros(4, dtype=int)
+    for axis in range(3):
+        for sign in (-1.0, 1.0):
+            starts, way, far = _above(result.source.bounds, axis, sign)
+            true = _exact_depths(surface, starts, way, far)
+            wide = _exact_depths(surface, starts, way, far, BALL + NEAR)
+            met = _exact_depths(around, starts, way, far)
+            found = _depths_in_mujoco(result, starts, axis, sign, far)
+            holes = (met < far) & (wide >= far)
+            hollows = (true < far) & (true > met + NEAR * SIZE) & (wide > true - 2 * NEAR * SIZE)
+            passed = holes & (found >= far - NEAR * SIZE)
+            rested = hollows & (np.abs(found - true) <= NEAR * SIZE)
+            counts += [holes.sum(), passed.sum(), hollows.sum(), rested.sum()]
+    return Drops(*counts.tolist())
+
+
+def _depths_in_mujoco(result: Result, starts: FloatArray, axis: int, sign: float, far: float) -> FloatArray:
+    """How far balls fall; each slides along its own line, slowed so that it does not tunnel through anything."""
+    mujoco = _mujoco()
+    with tempfile.TemporaryDirectory(prefix="rlacd-") as folder:
+        path = save(result, Path(folder) / "body.xml")
+        spec = mujoco.MjSpec.from_file(str(path))
+        (body,) = spec.worldbody.bodies
+        for joint in body.joints:
+            spec.delete(joint)
+        way = np.zeros(3)
+        way[axis] = sign
+        spec.option.gravity, spec.option.timestep = (9.81 * way).tolist(), DROP_STEP
+        for start in starts:
+            ball = spec.worldbody.add_body(pos=start.tolist())
+            ball.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=way.tolist(), damping=9.81 / FALL_SPEED)
+            # They meet the body, not each other.
+            ball.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[BALL * SIZE, 0, 0], mass=1.0, contype=2, conaffinity=1
+            )
+        model = spec.compile()
+    data = mujoco.MjData(model)
+    for _ in range(round(1.2 * far / FALL_SPEED / DROP_STEP)):
+        mujoco.mj_step(model, data)
+    fallen: FloatArray = np.minimum(np.array(data.qpos), far)
+    return fallen
+
+
+def _above(bounds: FloatArray, axis: int, sign: float) -> tuple[FloatArray, FloatArray, float]:
+    """Where balls start [N, 3], outside the box; the way they fall [3]; and how far it is to the other side."""
+    low, high = np.asarray(bounds)
+    others = [other for other in range(3) if other != axis]
+    lines = [np.linspace(low[other], high[other], GRID + 2)[1:-1] for other in others]
+    starts = np.zeros((GRID**2, 3))
+    starts[:, others] = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 2)
+    clearance = 1.5 * BALL * SIZE
+    starts[:, axis] = (low if sign > 0 else high)[axis] - sign * clearance
+    way = np.zeros(3)
+    way[axis] = sign
+    return starts, way, float((high - low)[axis] + 2 * clearance)
+
+
+def _exact_depths(
+    surface: _native.Surface, starts: FloatArray, way: FloatArray, far: float, ball: float = BALL
+) -> FloatArray:
+    """How far balls fall until they touch a surface, by sphere tracing; `far` if they do not."""
+    fallen = np.zeros(len(starts))
+    moving = np.ones(len(starts), dtype=bool)
+    while moving.any():
+        free = surface.distance(np.ascontiguousarray(starts[moving] + fallen[moving, None] * way)) - ball * SIZE
+        fallen[moving] += np.maximum(free, 1e-5)
+        moving[moving] = (free > 1e-5) & (fallen[moving] < far)
+    depths: FloatArray = np.minimum(fallen, far)
+    return depths
+
+
+def _settled(
+    rate: float, step: float, contacts: FloatArray, depth: FloatArray, speed: FloatArray, energy: FloatArray
+) -> Pile:
+    last, half = round(1 / step), round(0.5 / step)
+    fast: BoolArray = speed > AT_REST
+    end = int(np.flatnonzero(fast)[-1]) + 1 if fast.any() else 0
+    return Pile(
+        rate,
+        float(contacts[-last:].mean()),
+        float(depth[-last:].mean()) / SIZE,
+        float(abs(energy[-1] - energy[-min(half, len(energy))]) / 0.5),
+        end * step if end < len(speed) else float("inf"),
+    )
+
+
+def _places() -> list[tuple[FloatArray, FloatArray]]:
+    """Where the copies begin: on a grid above the bin, each turned at random."""
+    random = np.random.default_rng(0)
+    grid = [(x, y, z) for z in range(COPIES) for x in (-0.7, 0.7) for y in (-0.7, 0.7)][:COPIES]
+    turns = random.normal(size=(COPIES, 4))
+    turns /= np.linalg.norm(turns, axis=1)[:, None]
+    return [(SIZE * np.array([x, y, 1.0 + 1.2 * z]), turn) for (x, y, z), turn in zip(grid, turns, strict=True)]
+
+
+def _mujoco() -> Any:
+    try:
+        import mujoco
+    except ImportError as error:
+        raise MissingExtraError("MuJoCo is missing: run  pip install 'rlacd[sim]'  and try again.") from error
+    return mujoco

@@ -1,0 +1,83 @@
+"""`rlacd bench physics`: balls fall where the exact mesh lets them, and piles settle."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from typer.testing import CliRunner
+
+import rlacd
+from rlacd.bench import simulate
+from rlacd.bench.physics import OURS
+from rlacd.cli.main import app
+
+pytest.importorskip("mujoco", reason="the extra sim is not installed")
+
+
+def cup() -> trimesh.Trimesh:
+    """A cup 0.2 m high, open at the top, with a hole of 8 cm through its bottom."""
+    profile = [(0.04, 0.0), (0.07, 0.0), (0.07, 0.2), (0.06, 0.2), (0.06, 0.02), (0.04, 0.02), (0.04, 0.0)]
+    return trimesh.creation.revolve(np.array(profile), sections=32)
+
+
+@pytest.fixture(scope="module")
+def decomposed() -> rlacd.Decomposition:
+    return rlacd.decompose(cup(), quality="fast", threads=1)
+
+
+def test_balls_pass_the_hole_of_a_cup_and_rest_in_it_as_hulls_but_not_as_one(decomposed: rlacd.Decomposition) -> None:
+    drops = simulate.drops_in_mujoco(decomposed)
+    assert drops.holes >= 2  # along the axis, from above and from below
+    assert drops.passed == drops.holes
+    assert drops.hollows > 0
+    assert drops.rested >= 0.9 * drops.hollows
+    one = simulate.drops_in_mujoco(rlacd.decompose(cup(), max_hulls=1, quality="fast", threads=1))
+    assert (one.holes, one.hollows) == (drops.holes, drops.hollows)
+    assert one.passed == 0
+    assert one.rested == 0
+
+
+def test_a_convex_body_has_neither_holes_nor_hollows() -> None:
+    box = rlacd.decompose(trimesh.creation.box((0.2, 0.1, 0.1)), quality="fast", threads=1)
+    assert simulate.drops_in_mujoco(box) == simulate.Drops(0, 0, 0, 0)
+
+
+def test_exact_depths_are_those_of_a_ball_over_a_box() -> None:
+    """On a face, a ball stops one radius above it; beside an edge, it slides down the circle around the edge."""
+    box = trimesh.creation.box((0.2, 0.2, 0.2))
+    surface = simulate._native.Surface(np.asarray(box.vertices), np.asarray(box.faces, dtype=np.int32))
+    radius = simulate.BALL * simulate.SIZE
+    starts = np.array([[0.0, 0.0, 0.2], [0.1 + radius / 2, 0.0, 0.2], [0.1 + 2 * radius, 0.0, 0.2]])
+    found = simulate._exact_depths(surface, starts, np.array([0.0, 0.0, -1.0]), 0.5)
+    beside = 0.1 - radius * np.sqrt(3) / 2
+    assert found == pytest.approx([0.1 - radius, beside, 0.5], abs=5e-5)
+
+
+def test_a_pile_settles_alike_in_both_engines(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pybullet", reason="the extra sim is not installed")
+    monkeypatch.setattr(simulate, "COPIES", 4)
+    box = rlacd.decompose(trimesh.creation.box((0.2, 0.1, 0.1)), quality="fast", threads=1)
+    for pile in (simulate.pile_in_mujoco(box), simulate.pile_in_bullet(box)):
+        assert pile.steps_per_second > 0
+        assert pile.contacts >= 4
+        assert pile.penetration < 0.02
+        assert pile.rest < simulate.SECONDS
+        assert pile.drift < 0.1
+
+
+def test_the_command_writes_a_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(simulate, "SECONDS", 0.1)
+    cup().export(tmp_path / "cup.ply")
+    given = ["bench", "physics", str(tmp_path), "--out", str(tmp_path / "run")]
+    done = CliRunner().invoke(app, [*given, "--ways", "one-hull,fast:primitives"])
+    assert done.exit_code == 0, done.output
+    page = (tmp_path / "run" / "physics.md").read_text()
+    assert "| one-hull | 1.0 |" in page
+    assert "cup.ply, fast:primitives" in page
+    wrong = CliRunner().invoke(app, [*given, "--ways", "slow"])
+    assert wrong.exit_code != 0
+    assert "there is no way 'slow'" in wrong.output
+    assert {"one-hull", "fast", "balanced"} <= set(OURS)
