@@ -83,7 +83,9 @@ class Outcome:
     bullet: Pile | None
 
 
-def physics_page(bench: Bench, ways: Sequence[str] = WAYS, say: Callable[[str], None] = lambda line: None) -> Page:
+def physics_page(
+    bench: Bench, ways: Sequence[str] = WAYS, bullet: bool = True, say: Callable[[str], None] = lambda line: None
+) -> Page:
     """Simulate every mesh, decomposed in every way.
 
     Parameters
@@ -91,6 +93,8 @@ def physics_page(bench: Bench, ways: Sequence[str] = WAYS, say: Callable[[str], 
     bench : Bench
     ways : sequence of str
         Some of `WAYS`.
+    bullet : bool
+        Also simulate in PyBullet, if it is installed.
     say : callable
         Receives a line per simulation.
 
@@ -110,7 +114,7 @@ def physics_page(bench: Bench, ways: Sequence[str] = WAYS, say: Callable[[str], 
         for way, result in _decompositions(bench, mesh, ways, failed):
             try:
                 drops, mujoco = drops_in_mujoco(result), pile_in_mujoco(result)
-                bullet = _in_bullet(result)
+                in_bullet = _in_bullet(result) if bullet else None
             except (RlacdError, ValueError) as error:
                 if isinstance(error, MissingExtraError):
                     raise
@@ -118,7 +122,9 @@ def physics_page(bench: Bench, ways: Sequence[str] = WAYS, say: Callable[[str], 
                 continue
             corners = statistics.fmean(len(hull.vertices) for hull in result.hulls)
             over = result.report["hausdorff"]["over"] if way in OURS else None
-            outcomes.append(Outcome(mesh, way, len(result), corners, model_size(result), over, drops, mujoco, bullet))
+            outcomes.append(
+                Outcome(mesh, way, len(result), corners, model_size(result), over, drops, mujoco, in_bullet)
+            )
             say(f"{mesh}  {way}: {len(result)} parts, {mujoco.steps_per_second:.0f} steps/s, {asdict(drops)}")
     page = Page(
         "Physics",

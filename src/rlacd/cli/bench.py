@@ -118,6 +118,7 @@ def physics(
             show_default=False,
         ),
     ] = None,
+    bullet: Annotated[bool, typer.Option("--bullet/--no-bullet", help="Also simulate in PyBullet.")] = True,
 ) -> Page:
     """Simulate the hulls: a pile that settles, and balls dropped into every hole; needs rlacd[sim].
 
@@ -128,7 +129,7 @@ def physics(
     from rlacd.bench.physics import WAYS, physics_page
 
     chosen = WAYS if ways is None else [word.strip() for word in ways.split(",") if word.strip()]
-    return physics_page(bench, chosen, typer.echo)
+    return physics_page(bench, chosen, bullet, typer.echo)
 
 
 @experiment("paper-table-1")
