@@ -26,7 +26,7 @@ from rlacd.io.write import save_hulls
 from rlacd.options import Options
 from tests.trouble import write_ell
 
-NOT_OPTIONS = ("self", "path", "file_format")
+NOT_OPTIONS = ("self", "path", "file_format", "scene")
 
 # --- which meshes, and what their results are called ------------------------------------------------------------------
 

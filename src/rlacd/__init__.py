@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from rlacd.decomposition import Decomposition
     from rlacd.errors import (
         EmptyMeshError,
+        ImplausibleBodyWarning,
         MeshDataError,
         MeshError,
         MeshFileError,
@@ -33,6 +34,7 @@ __all__ = [
     "Component",
     "Decomposition",
     "EmptyMeshError",
+    "ImplausibleBodyWarning",
     "MeshDataError",
     "MeshError",
     "MeshFileError",
@@ -72,7 +74,7 @@ _HOME = {
     "Primitive": "solid.primitive",
     "Sweep": "planes.sweep",
     "SweepCache": "planes.sweep_cache",
-    **dict.fromkeys((name for name in __all__ if name.endswith("Error")), "errors"),
+    **dict.fromkeys((name for name in __all__ if name.endswith(("Error", "Warning"))), "errors"),
 }
 
 

@@ -93,6 +93,7 @@ class Decomposition(Result):
         up: Axis | None = None,
         one_mesh: bool = False,
         keep_input: bool = False,
+        scene: bool = False,
     ) -> Path:
         """Write the hulls to one file, to a folder, or as a model; never leaves a half-written file.
 
@@ -121,6 +122,8 @@ class Decomposition(Result):
             others take it for one.
         keep_input : bool
             For GLB: the input's own scene with the hulls added, as for the engines.
+        scene : bool
+            For MJCF: a floor and a light too, with the body just above the floor.
 
         Returns
         -------
@@ -148,6 +151,7 @@ class Decomposition(Result):
             up=up,
             one_mesh=one_mesh,
             keep_input=keep_input,
+            scene=scene,
         )
 
     def save_balls(self, path: str | os.PathLike[str]) -> Path:

@@ -41,3 +41,7 @@ class MissingExtraError(RlacdError, ImportError):
 
 class WeightsError(RlacdError, ValueError):
     """A file with a learned policy's weights is missing, damaged, or made for something else."""
+
+
+class ImplausibleBodyWarning(UserWarning):
+    """A simulator's file describes a body whose size or mass suggests another unit."""

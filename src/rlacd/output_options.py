@@ -78,6 +78,14 @@ class OutputOptions:
         flags=("--keep-input",),
         python=".save(keep_input=)",
     )
+    scene: bool | None = option(
+        None,
+        "In a .xml (MJCF), a floor and a light too, and the body just above the floor: drop it into MuJoCo's viewer.",
+        flag(),
+        panel=OUTPUT,
+        flags=("--scene",),
+        python=".save(scene=)",
+    )
     one_mesh: bool | None = option(
         None,
         "In a .urdf, one collision with all hulls as objects of its mesh, for Bullet.",

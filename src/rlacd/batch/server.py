@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,7 +16,7 @@ from rlacd.batch.job_spec import POLICY, JobSpec
 from rlacd.batch.store import open_store, put_files, under
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
-from rlacd.errors import MeshError, RlacdError
+from rlacd.errors import ImplausibleBodyWarning, MeshError, RlacdError
 from rlacd.io.read.companions import lay_out
 from rlacd.io.read.load import load_mesh
 from rlacd.pool import Blobs, Shared
@@ -58,11 +59,14 @@ def make(
     with TemporaryDirectory(dir=staging) as folder:
         place = f"{folder}/{stem}{spec.ending or '/'}"
         names = ("file_format", "density", "mass", "up", "one_mesh", "keep_input")
-        result.save(place, **{name: getattr(spec, name) for name in names})
+        with warnings.catch_warnings(record=True) as doubts:
+            warnings.simplefilter("always", ImplausibleBodyWarning)
+            result.save(place, **{name: getattr(spec, name) for name in names})
         paths = sorted(path for path in Path(folder).rglob("*") if path.is_file())
         paths.sort(key=lambda path: -len(path.relative_to(folder).parts))
         files = {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
-    return _summary(result.report), files
+    facts = _summary(result.report)
+    return facts | {"warnings": [*facts["warnings"], *(str(doubt.message) for doubt in doubts)]}, files
 
 
 def _hull(spec: JobSpec, mesh: Path) -> Decomposition:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,7 +14,7 @@ import typer
 from rlacd.cli.exit_codes import ExitCode, exit_codes
 from rlacd.cli.options import decompose_options, how_parameters
 from rlacd.cli.parameters import REQUIRED, Parameters, chosen, command, option_parameters, taken
-from rlacd.errors import MeshFileError, OptionError
+from rlacd.errors import ImplausibleBodyWarning, MeshFileError, OptionError
 from rlacd.output_options import OutputOptions
 
 STDOUT = "-"
@@ -82,11 +83,15 @@ def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any]) -> bool:
     with Watch(quiet=bool(wanted.quiet)) as watch:
         result = decompose(mesh, **options, progress=watch)
     place = str(wanted.output)
-    names = ("file_format", "density", "mass", "one_mesh", "keep_input")
+    names = ("file_format", "density", "mass", "one_mesh", "keep_input", "scene")
     written = chosen({name: getattr(wanted, name) for name in names})
-    result.save(place, up=up, **written)
+    with warnings.catch_warnings(record=True) as doubts:
+        warnings.simplefilter("always", ImplausibleBodyWarning)
+        result.save(place, up=up, **written)
     if not wanted.quiet:
         say(summary(result, place))
+    for doubt in doubts:
+        say(f"  warning: {doubt.message}")
     if wanted.report == STDOUT:
         typer.echo(to_json(result.report), nl=False)
     elif wanted.report is not None and is_html(wanted.report):
@@ -147,7 +152,7 @@ def _check_mesh(wanted: OutputOptions) -> None:
     from rlacd.io.write import check_balls, check_file, hull_target
     from rlacd.view import check_picture
 
-    flags = {"one_mesh": bool(wanted.one_mesh), "keep_input": bool(wanted.keep_input)}
+    flags = {"one_mesh": bool(wanted.one_mesh), "keep_input": bool(wanted.keep_input), "scene": bool(wanted.scene)}
     hull_target(str(wanted.output), wanted.file_format, **flags)
     if wanted.package_dirs:
         raise OptionError("--package-dir belongs to robots: a .urdf or .xml file as input.")
@@ -166,7 +171,7 @@ def _check_robot(asked: OutputOptions, wanted: OutputOptions) -> None:
 
     if wanted.report is not None and is_html(wanted.report):
         raise OptionError("--report as a page belongs to a single mesh; for a robot give a .json file.")
-    for name in ("picture", "balls", "file_format", "density", "mass", "one_mesh", "keep_input"):
+    for name in ("picture", "balls", "file_format", "density", "mass", "one_mesh", "keep_input", "scene"):
         if getattr(asked, name) is not None:
             spelled = "format" if name == "file_format" else name.replace("_", "-")
             raise OptionError(f"--{spelled} belongs to a single mesh; leave it out for a robot.")

@@ -26,7 +26,9 @@ from rlacd.io.robots.urdf import plan_urdf
 from rlacd.io.write import check_file, check_name, file_stem, write_file
 from rlacd.io.write.encode import encode_plain_obj
 from rlacd.io.write.folder import check_names, write_folder
+from rlacd.options import CONCAVITY, MAX_THRESHOLD
 from rlacd.output_options import OutputOptions
+from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 
 ENDINGS = {".urdf": "urdf", ".xml": "mjcf"}
@@ -118,6 +120,11 @@ def rewrite_robot(
         raise MeshFileError(
             f"{source} is no {kind.upper()}: it starts with <{document.root.tag}>, not <{ROOTS[kind]}>."
         )
+    for name in ("unit", "scale", "per_node"):
+        if options.get(name):
+            raise OptionError(
+                f"{name} belongs to a single mesh; the description of a robot says it for each of its own."
+            )
     references = References(source, packages)
     folder = place.with_name(f"{place.stem}_{kind}")
     plan, warnings = _plan(document, kind, references, place, folder)
@@ -140,6 +147,7 @@ def rewrite_robot(
         shares[use] = [HullFile(*pair) for pair in zip(written, (volumes / volumes.sum()).tolist(), strict=True)]
         meshes[use] = RewrittenMesh(use.path, list(written), result)
         warnings += [f"{use.path.name}: {warning}" for warning in result.report.get("warnings", [])]
+    warnings += _fewer(meshes, options)
     data = replaced(document.data, plan.edit(shares))
     check_names(folder, stem, list(files))
     write_folder(folder, stem, files, then=lambda: write_file(place, data))
@@ -188,11 +196,51 @@ def _reference(old: str, hull: str, references: References, folder: Path) -> str
     return f"{folder.name}/{hull}"
 
 
+def _fewer(meshes: Mapping[MeshUse, RewrittenMesh], options: Mapping[str, Any]) -> list[str]:
+    """Say what one threshold for the whole robot would give, if each mesh's own made many hulls of small ones."""
+    hulls = sum(len(mesh.files) for mesh in meshes.values())
+    of_meshes = "criterion" not in options or options["criterion"] == CONCAVITY
+    stated = any(options.get(name) is not None for name in ("threshold_abs", "threshold_m", "max_hulls", "timeout"))
+    if not of_meshes or stated or len(meshes) < 2 or hulls < MANY * len(meshes):
+        return []
+    largest = min(mesh.result.report["scale"] for mesh in meshes.values())
+    length = float(f"{_threshold(meshes) / largest:.1g}")
+    quick = {name: value for name, value in options.items() if name not in ("threshold", "budget", "search_steps")}
+    fewer = sum(
+        len(_coarse(mesh.result.source, {**quick, "quality": "fast", "threshold_abs": length}))
+        for mesh in meshes.values()
+    )
+    if fewer > FEWER * hulls:
+        return []
+    return [
+        f"{len(meshes)} meshes became {hulls} hulls, as the threshold is relative to each; --threshold-abs {length:g} "
+        f"gives {fewer} or fewer."
+    ]
+
+
+MANY, FEWER = 10, 0.7
+"""Hulls per mesh from which on fewer are suggested, and the share of them that is worth a word."""
+
+
+def _threshold(meshes: Mapping[MeshUse, RewrittenMesh]) -> float:
+    """The threshold of the meshes, where the longest side of each is 2."""
+    return float(next(iter(meshes.values())).result.report["options"]["threshold"])
+
+
+def _coarse(mesh: trimesh.Trimesh, options: Mapping[str, Any]) -> Decomposition:
+    """Decompose a mesh with a length as the threshold; one that is larger than the mesh is cut to it."""
+    given = dict(options)
+    if isinstance(given.get("threshold_abs"), (int, float)):
+        scale = Frame.of(mesh.vertices[np.unique(mesh.faces)] if len(mesh.faces) else mesh.vertices).scale
+        given["threshold_abs"] = min(given["threshold_abs"], MAX_THRESHOLD / scale)
+    return decompose((mesh.vertices, mesh.faces), **given)
+
+
 def _decomposed(use: MeshUse, unit: float, options: Mapping[str, Any]) -> Decomposition:
     try:
         mesh = load_mesh(use.path)
         faces = mesh.faces if np.prod(np.sign(use.scale)) > 0 else mesh.faces[:, ::-1]
-        return decompose((mesh.vertices * unit * use.scale, faces), **options)
+        return _coarse(trimesh.Trimesh(mesh.vertices * unit * use.scale, faces, process=False), options)
     except MeshError as error:
         if str(use.path) in str(error):
             raise

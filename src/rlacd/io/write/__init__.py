@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 import re
+import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import trimesh
 
-from rlacd.errors import OutputError
+from rlacd.errors import ImplausibleBodyWarning, OutputError
 from rlacd.io.write.atomic import write_file
 from rlacd.io.write.balls import check_balls, save_balls
 from rlacd.io.write.encode import ENCODERS, encode_glb, hull_name
@@ -17,7 +19,7 @@ from rlacd.io.write.engines import ENGINE_NAMES, encode_engine
 from rlacd.io.write.folder import check_names, write_folder
 from rlacd.io.write.keep import encode_kept, is_kept
 from rlacd.io.write.mjcf import encode_mjcf
-from rlacd.io.write.model import MeshFile, Model, check_model_options, model_of, node_name, shapes_of
+from rlacd.io.write.model import MeshFile, Model, check_model_options, implausible, model_of, node_name, shapes_of
 from rlacd.io.write.sdf import encode_sdf
 from rlacd.io.write.target import FORMATS, MODELS, WITH_MESHES, Target, check_file, check_name, hull_target, mesh_folder
 from rlacd.io.write.urdf import encode_urdf
@@ -44,6 +46,9 @@ __all__ = [
 ]
 
 
+SIMULATED = (*WITH_MESHES, "usd")
+"""Formats whose readers take lengths to be in metres."""
+
 _WITH_MESHES = {"mjcf": encode_mjcf, "urdf": encode_urdf, "sdf": encode_sdf}
 _PRIMITIVES: dict[str, tuple[PrimitiveKind, ...]] = {
     "mjcf": PRIMITIVE_KINDS,
@@ -62,6 +67,7 @@ def save(
     up: Axis | None = None,
     one_mesh: bool = False,
     keep_input: bool = False,
+    scene: bool = False,
 ) -> Path:
     """Write a decomposition; see `rlacd.Decomposition.save`.
 
@@ -73,7 +79,7 @@ def save(
         The format needs an extra that is not installed.
     """
     check_model_options(density, up)
-    target = hull_target(path, file_format, one_mesh=one_mesh, keep_input=keep_input)
+    target = hull_target(path, file_format, one_mesh=one_mesh, keep_input=keep_input, scene=scene)
     ending = target.path.suffix.lower().lstrip(".")
     if target.file_format in ENGINE_NAMES and ending == "glb" and is_kept(result):
         write_file(target.path, encode_kept(result, ENGINE_NAMES[target.file_format], colored=False))
@@ -83,7 +89,9 @@ def save(
         return target.path
     if target.file_format not in MODELS:
         return save_hulls(result.hulls, path, stem=result.name, file_format=file_format)
-    model = model_of(result, density=density, mass=mass, up=up)
+    model = replace(model_of(result, density=density, mass=mass, up=up), is_scene=scene)
+    if target.file_format in SIMULATED and (doubt := implausible(model)) is not None:
+        warnings.warn(doubt, ImplausibleBodyWarning, stacklevel=3)
     if target.file_format in WITH_MESHES:
         _save_with_meshes(model, target, one_mesh)
     elif target.file_format == "usd":

@@ -31,7 +31,11 @@ def encode_mjcf(model: Model, shapes: list[Shape], visual: MeshFile | None, fold
 
     asset = etree.SubElement(root, "asset")
     world = etree.SubElement(root, "worldbody")
+    if model.is_scene:
+        _add_stage(asset, world)
     body = etree.SubElement(world, "body", name=model.name)
+    if model.is_scene:
+        body.set("pos", numbers([0.0, 0.0, _lift(model)]))
     if model.up != "z":
         body.set("quat", numbers(TO_Z_UP[model.up]))
     etree.SubElement(body, "freejoint", name=model.name)
@@ -62,6 +66,23 @@ def encode_mjcf(model: Model, shapes: list[Shape], visual: MeshFile | None, fold
             etree.SubElement(body, "geom", {"name": name, "class": "collision", **_primitive(shape), "rgba": rgba})
     etree.indent(root)
     return bytes(etree.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"
+
+
+def _add_stage(asset: etree._Element, world: etree._Element) -> None:
+    """A checkered floor and a light."""
+    grid = {"builtin": "checker", "rgb1": "0.8 0.82 0.85", "rgb2": "0.7 0.72 0.75", "width": "300", "height": "300"}
+    etree.SubElement(asset, "texture", {"name": "floor", "type": "2d", **grid})
+    etree.SubElement(asset, "material", name="floor", texture="floor", texuniform="true", texrepeat="5 5")
+    etree.SubElement(world, "light", pos="0 0 10", dir="0.3 0.2 -1", directional="true")
+    etree.SubElement(world, "geom", name="floor", type="plane", size="0 0 0.05", material="floor")
+
+
+def _lift(model: Model) -> float:
+    """How high the body has to stand for its lowest point to be a twentieth of its height above the floor."""
+    axis = "xyz".index(model.up)
+    bounds = np.array([hull.bounds[:, axis] for hull in model.hulls])
+    lowest, highest = float(bounds[:, 0].min()), float(bounds[:, 1].max())
+    return (highest - lowest) / 20 - lowest
 
 
 def _primitive(shape: Primitive) -> dict[str, str]:

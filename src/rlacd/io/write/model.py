@@ -49,6 +49,8 @@ class Model:
         Of the repaired solid, at the requested density.
     up
         The axis of the input that points up.
+    is_scene
+        Whether to add a floor and a light, where the format has them.
     """
 
     name: str
@@ -57,6 +59,7 @@ class Model:
     visual: trimesh.Trimesh | None
     mass: Mass
     up: str
+    is_scene: bool = False
 
 
 @dataclass(frozen=True)
@@ -109,6 +112,23 @@ def model_of(result: Result, *, density: float = DENSITY, mass: float | None = N
     if name == "world" or re.fullmatch("__.*__", name):
         name = f"body_{name.strip('_')}"  # simulators reserve those names
     return Model(name, result.hulls, result.primitives, visual, weighed, up)
+
+
+def implausible(model: Model) -> str | None:
+    """Say in a sentence what suggests that the input's unit is not the metre, as simulators take it to be."""
+    bounds = np.array([hull.bounds for hull in model.hulls])
+    size = float((bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)).max())
+    mass = model.mass.volume_abs
+    if LENGTHS[0] <= size <= LENGTHS[1] and MASSES[0] <= mass <= MASSES[1]:
+        return None
+    return (
+        f"the body of {model.name} is {size:.3g} m long and weighs {mass:.3g} kg, as simulators take lengths to be in "
+        "metres: unit='mm' (--unit mm) converts it, mass= (--mass) sets its mass."
+    )
+
+
+LENGTHS, MASSES = (1e-3, 50.0), (1e-6, 1e6)
+"""What is plausible for a body: metres, and kilograms."""
 
 
 def check_model_options(density: float, up: str | None) -> tuple[float, str | None]:

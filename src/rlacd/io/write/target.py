@@ -62,6 +62,7 @@ def hull_target(
     *,
     one_mesh: bool = False,
     keep_input: bool = False,
+    scene: bool = False,
 ) -> Target:
     """Interpret `path` as `Decomposition.save` does and check that it can be written to.
 
@@ -76,6 +77,8 @@ def hull_target(
         Whether a model has all its hulls in one mesh file; only URDF supports that.
     keep_input : bool
         Whether the file holds the input too; only GLB does.
+    scene : bool
+        Whether a model has a floor and a light; only MJCF does.
 
     Raises
     ------
@@ -83,13 +86,15 @@ def hull_target(
         Unknown ending, no permission, or a folder where a file is expected or the reverse.
     OptionError
         `file_format` is unknown, or given for a single file with another ending; or `one_mesh` for anything but URDF,
-        or `keep_input` for anything but GLB.
+        `keep_input` for anything but GLB, or `scene` for anything but MJCF.
     """
     file_format = checked(OutputOptions, "file_format", file_format)
     one_mesh = read(flag(), "one_mesh", one_mesh)
     target = _target(read(path_like(), "path", path), file_format)
     if one_mesh and target.file_format != "urdf":
         raise OptionError(f"one mesh for all hulls is for .urdf files, not for {target.path}: leave it out.")
+    if read(flag(), "scene", scene) and target.file_format != "mjcf":
+        raise OptionError(f"a scene with a floor is for .xml files (MJCF), not for {target.path}: leave it out.")
     if read(flag(), "keep_input", keep_input) and (target.is_folder or target.path.suffix.lower() != ".glb"):
         raise OptionError(f"the input is kept in .glb files, not in {target.path}: leave it out, or write a .glb.")
     return target

@@ -1,0 +1,155 @@
+"""Units and the up axis: what a file says, what options say, and that Python and the command line agree."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from lxml import etree
+from typer.testing import CliRunner
+
+import rlacd
+from rlacd.cli.main import app
+from rlacd.errors import OptionError
+from tests.models import TABLE_VOLUME, decomposed_table, fall_in_mujoco, table
+
+UP = {"glb": "y", "gltf": "y", "obj": "z", "stl": "z", "ply": "z", "off": "z", "dae": "z", "3mf": "z"}
+"""The axis that points up in files of each format that say nothing else."""
+
+
+def written(folder: Path, ending: str) -> Path:
+    path = folder / f"chair.{ending}"
+    if ending == "gltf":
+        for name, data in trimesh.Scene(table()).export(file_type="gltf").items():
+            (folder / name).write_bytes(data)
+        (folder / "model.gltf").rename(path)
+    else:
+        table().export(path)
+    return path
+
+
+def told(path: Path, axis: str, metres: float) -> None:
+    """Put an up axis and a unit into a COLLADA file."""
+    text = path.read_text()
+    head, _, rest = text.partition("<asset>")
+    _, _, rest = rest.partition("</asset>")
+    said = f'<asset><unit name="u" meter="{metres:g}"/><up_axis>{axis.upper()}_UP</up_axis></asset>'
+    path.write_text(head + said + rest)
+
+
+@pytest.mark.parametrize("ending", [*UP, "dae x", "dae y"])
+def test_python_and_the_command_line_agree_on_what_points_up(tmp_path: Path, ending: str) -> None:
+    ending, _, axis = ending.partition(" ")
+    path = written(tmp_path, ending)
+    up = axis or UP[ending]
+    if ending == "dae":
+        told(path, up, 1.0)
+    result = rlacd.decompose(path, threads=1)
+    assert result.report["up"] == up
+    result.save(tmp_path / "python" / "chair.xml")
+    run = CliRunner().invoke(
+        app,
+        ["decompose", str(path), "-o", str(tmp_path / "shell" / "chair.xml"), "--threads", "1", "--density", "1000"],
+    )
+    assert run.exit_code == 0, run.output
+    by_python, by_shell = ((tmp_path / way / "chair.xml").read_bytes() for way in ("python", "shell"))
+    assert by_python == by_shell
+    body = etree.fromstring(by_python).find("worldbody/body")
+    assert (body.get("quat") is None) == (up == "z")
+
+
+def test_units_that_files_state(tmp_path: Path) -> None:
+    assert rlacd.decompose(written(tmp_path, "glb"), threads=1).report["metres"] == 1.0
+    assert rlacd.decompose(written(tmp_path, "3mf"), threads=1).report["metres"] == 1e-3
+    assert rlacd.decompose(written(tmp_path, "stl"), threads=1).report["metres"] is None
+    path = written(tmp_path, "dae")
+    told(path, "z", 0.0254)
+    in_inches = rlacd.decompose(path, threads=1)
+    assert in_inches.report["metres"] == pytest.approx(0.0254)
+    assert np.allclose(in_inches.source.extents, table().extents, atol=1e-6)  # as they are, unless asked for
+    in_metres = rlacd.decompose(path, threads=1, unit="file")
+    assert np.allclose(in_metres.source.extents, table().extents * 0.0254, atol=1e-7)
+    with pytest.raises(OptionError, match="does not say its unit"):
+        rlacd.decompose(written(tmp_path, "ply"), unit="file")
+
+
+@pytest.mark.parametrize(("unit", "metres"), [("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("in", 0.0254)])
+def test_a_unit_and_a_factor_convert_everything(unit: str, metres: float) -> None:
+    plain = rlacd.decompose(table(), threads=1)
+    result = rlacd.decompose(table(), unit=unit, scale=2.0, threads=1)  # type: ignore[arg-type]
+    factor = 2 * metres
+    assert len(result) == len(plain)
+    assert result.report["mass"]["volume_abs"] == pytest.approx(TABLE_VOLUME * factor**3, rel=1e-6)
+    volumes = [sorted(hull.volume for hull in each) for each in (result, plain)]
+    assert np.allclose(volumes[0], np.array(volumes[1]) * factor**3, rtol=1e-6, atol=0)
+    assert np.allclose(result.source.vertices, plain.source.vertices * factor, rtol=1e-12, atol=0)
+
+
+def test_a_mass_of_ones_own(tmp_path: Path) -> None:
+    rest = fall_in_mujoco(decomposed_table().save(tmp_path / "table.xml", mass=3.5))
+    assert rest.mass == pytest.approx(3.5, rel=1e-6)
+    with pytest.raises(OptionError, match="mass"):
+        decomposed_table().save(tmp_path / "table.xml", mass=-1.0)
+
+
+@pytest.mark.parametrize("ending", ["xml", "urdf", "sdf"])
+def test_an_implausible_body_is_doubted(tmp_path: Path, ending: str) -> None:
+    """A table in millimetres would be 400 m long as metres."""
+    big = table().apply_scale(1000)
+    result = rlacd.decompose(big, threads=1)
+    with pytest.warns(rlacd.ImplausibleBodyWarning, match=r"400 m long .*--unit mm"):
+        result.save(tmp_path / f"table.{ending}")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        result.save(tmp_path / "table.obj")
+        rlacd.decompose(big, unit="mm", threads=1).save(tmp_path / f"small.{ending}")
+    path = tmp_path / "big.stl"
+    big.export(path)
+    said = CliRunner().invoke(app, ["decompose", str(path), "-o", str(tmp_path / f"cli.{ending}")])
+    assert "400 m long" in said.output
+
+
+def test_a_scene_has_a_floor_to_land_on(tmp_path: Path) -> None:
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    upright = table().apply_transform(trimesh.transformations.rotation_matrix(-np.pi / 2, (1, 0, 0)))
+    result = rlacd.decompose(upright, threads=1)
+    model = mujoco.MjModel.from_xml_path(str(result.save(tmp_path / "table.xml", scene=True, up="y")))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 0
+    for _ in range(1000):
+        mujoco.mj_step(model, data)
+    assert data.ncon > 0
+    assert np.abs(data.qvel).max() < 0.05
+    assert 0.1 < data.xipos[1][2] < 0.2  # it stands on its legs
+    with pytest.raises(OptionError, match="MJCF"):
+        result.save(tmp_path / "table.urdf", scene=True)
+
+
+def test_a_robot_of_many_hulls_is_told_of_a_threshold_for_all(tmp_path: Path) -> None:
+    """A large plain box and small rings that are cut finely: the suggestion holds when it is followed."""
+    trimesh.creation.box((2, 0.3, 0.3)).export(tmp_path / "arm.stl")
+    ring = trimesh.creation.torus(0.05, 0.015, major_sections=32, minor_sections=12)
+    ring.export(tmp_path / "ring.stl")
+    links = "".join(
+        f'<link name="{name}"><collision><geometry><mesh filename="{name}.stl"/></geometry></collision></link>'
+        for name in ("arm", "ring")
+    )
+    joint = '<joint name="j" type="fixed"><parent link="arm"/><child link="ring"/></joint>'
+    (tmp_path / "robot.urdf").write_text(f'<robot name="r">{links}{joint}</robot>')
+    done = rlacd.rewrite_robot(tmp_path / "robot.urdf", tmp_path / "acd.urdf", threshold=0.01, threads=1)
+    hulls = sum(len(mesh.files) for mesh in done.meshes)
+    assert hulls > 20
+    said = next(warning for warning in done.warnings if "--threshold-abs" in warning)
+    assert said.startswith(f"2 meshes became {hulls} hulls")
+    length, _, promised = said.partition("--threshold-abs ")[2].partition(" gives ")
+    followed = rlacd.rewrite_robot(
+        tmp_path / "robot.urdf", tmp_path / "few.urdf", threshold_abs=float(length), threads=1
+    )
+    assert sum(len(mesh.files) for mesh in followed.meshes) <= int(promised.split()[0]) < hulls
+    assert not any("--threshold-abs" in warning for warning in followed.warnings)
+    with pytest.raises(OptionError, match="unit"):
+        rlacd.rewrite_robot(tmp_path / "robot.urdf", tmp_path / "mm.urdf", unit="mm")
