@@ -291,8 +291,8 @@ def _finished(reached: _Reached, workers: Workers, clock: Clock) -> _Done:
             hulls = workers.map(lambda part: in_input(part.hull, solid.frame, *limits), parts)
     with clock.stage("measure"):
         report = make_report(solid, parts, hulls, reached.options, goal, workers, clock)
-        with clock.shielded():
-            bodies = _bodies(solid, hulls)
+        unknown: list[int] | list[None] = [None] * len(hulls)
+        bodies = clock.if_in_time(lambda: _bodies(solid, hulls), lambda: unknown)
     for hull, body in zip(hulls, bodies, strict=True):
         hull.metadata["body"] = body
     report["search"] = None if reached.found is None else reached.found.as_plain()
@@ -301,7 +301,7 @@ def _finished(reached: _Reached, workers: Workers, clock: Clock) -> _Done:
 
 
 def _bodies(solid: Solid, hulls: list[trimesh.Trimesh]) -> list[int] | list[None]:
-    """The body of each hull, by its number in the report; None if the input was not repaired."""
+    """The body of each hull, by its number in the report; None if the input was not repaired, or there is no time."""
     if len(solid.bodies) == 0:
         return [None] * len(hulls)
     if solid.body_of is None:

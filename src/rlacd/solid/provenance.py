@@ -8,6 +8,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from rlacd._native import poll_stop
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.topology import IntArray
 
@@ -41,16 +42,23 @@ def owners(
     if (label_of == label_of[0]).all():
         return [int(label_of[0])] * len(hulls)
     points, labels = _spread(vertices, faces, label_of)
+    order = np.argsort(points[:, 0], kind="stable")
+    points, labels = points[order], labels[order]
     found = []
     for hull in hulls:
-        lower, upper = hull.bounds
+        poll_stop()
+        corners = np.asarray(hull.vertices)[hull.faces]
+        lower, upper = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
         slack = SLACK * float((upper - lower).max())
-        near = np.flatnonzero(((points >= lower - slack) & (points <= upper + slack)).all(axis=1))
-        normals, origins = np.asarray(hull.face_normals), np.asarray(hull.triangles[:, 0])
-        height = points[near] @ normals.T - (normals * origins).sum(axis=1)
+        first, last = np.searchsorted(points[:, 0], (lower[0] - slack, upper[0] + slack))
+        some = points[first:last]
+        near = first + np.flatnonzero(((some >= lower - slack) & (some <= upper + slack)).all(axis=1))
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
+        height = points[near] @ normals.T - (normals * corners[:, 0]).sum(axis=1)
         inside = near[(height <= slack).all(axis=1)]
         if len(inside) == 0:
-            inside = np.array([((points - hull.bounds.mean(axis=0)) ** 2).sum(axis=1).argmin()])
+            inside = np.array([((points - (lower + upper) / 2) ** 2).sum(axis=1).argmin()])
         found.append(int(np.bincount(labels[inside]).argmax()))
     return found
 
@@ -62,8 +70,9 @@ def _spread(vertices: FloatArray, faces: NDArray[np.integer], label_of: IntArray
     draw = np.random.default_rng(0)
     whole = area.sum()
     chosen = []
-    for label in np.unique(label_of):
-        mine = np.flatnonzero(label_of == label)
+    order = np.argsort(label_of, kind="stable")
+    for mine in np.split(order, np.flatnonzero(np.diff(label_of[order])) + 1):
+        poll_stop()
         weight = area[mine]
         count = max(LEAST, round(SAMPLES * weight.sum() / whole)) if whole > 0 else LEAST
         share = weight / weight.sum() if weight.sum() > 0 else None
