@@ -24,7 +24,6 @@ def to_onnx(
     example: tuple[Tensor, ...],
     inputs: Sequence[str],
     outputs: Sequence[str],
-    sizes: Mapping[str, Mapping[int, str]] | None = None,
 ) -> onnx.ModelProto:
     """Export a module of tensors [B, ...] to tensors [B, ...], for any B, without traces of the exporting machine.
 
@@ -35,12 +34,8 @@ def to_onnx(
         Inputs of the shapes to expect, except for B, which should be 2 here.
     inputs, outputs : sequence of str
         Names in the graph.
-    sizes : mapping, optional
-        For each input, further dynamic axes: the name of each by its index.
     """
-    names = ("batch", *dict.fromkeys(name for axes in (sizes or {}).values() for name in axes.values()))
-    dims = {name: torch.export.Dim(name, min=1 if name == "batch" else 2) for name in names}
-    shapes = [{0: "batch", **(sizes or {}).get(name, {})} for name in inputs]
+    batch = torch.export.Dim("batch", min=1)
     for logger in ("torch.onnx", "onnxscript"):
         logging.getLogger(logger).setLevel(logging.ERROR)
     with warnings.catch_warnings():
@@ -52,7 +47,7 @@ def to_onnx(
             verbose=False,
             input_names=list(inputs),
             output_names=list(outputs),
-            dynamic_shapes=tuple({axis: dims[name] for axis, name in axes.items()} for axes in shapes),
+            dynamic_shapes=tuple({0: batch} for _ in inputs),
             opset_version=OPSET,
             custom_translation_table={torch.ops.rlacd.farthest_points.default: onnx_operators.farthest_points},
         )
