@@ -239,7 +239,9 @@ def test_bytes_do_not_depend_on_threads(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("wrong", ["ball", ["box", "cone"], "", 3, [3], {"box": 1}])
 def test_what_is_no_primitive_is_refused_in_one_sentence(wrong: Any) -> None:
-    with pytest.raises(OptionError, match=r"primitives is .*; it has to be True, or some of sphere, capsule, box"):
+    with pytest.raises(
+        OptionError, match=r"primitives is .*; it has to be all \(True\), or some of sphere, capsule, box"
+    ):
         rlacd.decompose(table(), primitives=wrong)
 
 

@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 import rlacd
 from rlacd.cli.main import app
 from rlacd.errors import OptionError
+from rlacd.io.write.model import SHEET, SHEET_THICKNESS
 from tests.models import TABLE_VOLUME, decomposed_table, fall_in_mujoco, table
 
 UP = {"glb": "y", "gltf": "y", "obj": "z", "stl": "z", "ply": "z", "off": "z", "dae": "z", "3mf": "z"}
@@ -110,6 +111,22 @@ def test_an_implausible_body_is_doubted(tmp_path: Path, ending: str) -> None:
     big.export(path)
     said = CliRunner().invoke(app, ["decompose", str(path), "-o", str(tmp_path / f"cli.{ending}")])
     assert "400 m long" in said.output
+
+
+def test_a_hollow_shell_is_doubted_unless_its_mass_is_given(tmp_path: Path) -> None:
+    """A box of faces without its lid: repair makes its walls a thousandth of its longest side thick."""
+    walls = trimesh.creation.box((0.2, 0.2, 0.2))
+    walls.update_faces(walls.face_normals[:, 2] < 0.5)
+    shell = rlacd.decompose(walls, open="thin", quality="fast", threads=1)
+    assert [body["step"] for body in shell.report["repair"]] == [SHEET]
+    assert shell.report["mass"]["volume_abs"] == pytest.approx(5 * 0.2**2 * SHEET_THICKNESS * 0.1, rel=0.02)
+    with pytest.warns(rlacd.ImplausibleBodyWarning, match=r"hollow shell .* walls 0.0002 thick"):
+        shell.save(tmp_path / "shell.xml")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        shell.save(tmp_path / "shell.xml", mass=0.3)
+        shell.save(tmp_path / "shell.glb")
+        decomposed_table().save(tmp_path / "table.xml")
 
 
 def test_a_scene_has_a_floor_to_land_on(tmp_path: Path) -> None:

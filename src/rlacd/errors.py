@@ -44,4 +44,4 @@ class WeightsError(RlacdError, ValueError):
 
 
 class ImplausibleBodyWarning(UserWarning):
-    """A simulator's file describes a body whose size or mass suggests another unit."""
+    """A simulator's file describes a body whose size or mass suggests another unit, or a hollow shell."""

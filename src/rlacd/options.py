@@ -161,7 +161,9 @@ class Options:
         (),
         "Parts become a box, sphere, capsule or cylinder where one meets the threshold; written as such to MJCF, URDF, "
         "SDF, USD and Unreal, else as meshes.",
-        custom(f"True, or some of {', '.join(PRIMITIVE_KINDS)}", read_primitives, f"all {' '.join(PRIMITIVE_KINDS)}"),
+        custom(
+            f"all (True), or some of {', '.join(PRIMITIVE_KINDS)}", read_primitives, f"all {' '.join(PRIMITIVE_KINDS)}"
+        ),
         panel=LIMITS,
         metavar="all|box,sphere,…",
         usual="none",

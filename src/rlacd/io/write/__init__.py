@@ -19,7 +19,16 @@ from rlacd.io.write.engines import ENGINE_NAMES, encode_engine
 from rlacd.io.write.folder import check_names, write_folder
 from rlacd.io.write.keep import encode_kept, is_kept
 from rlacd.io.write.mjcf import encode_mjcf
-from rlacd.io.write.model import MeshFile, Model, check_model_options, implausible, model_of, node_name, shapes_of
+from rlacd.io.write.model import (
+    MeshFile,
+    Model,
+    check_model_options,
+    hollow,
+    implausible,
+    model_of,
+    node_name,
+    shapes_of,
+)
 from rlacd.io.write.sdf import encode_sdf
 from rlacd.io.write.target import FORMATS, MODELS, WITH_MESHES, Target, check_file, check_name, hull_target, mesh_folder
 from rlacd.io.write.urdf import encode_urdf
@@ -90,8 +99,10 @@ def save(
     if target.file_format not in MODELS:
         return save_hulls(result.hulls, path, stem=result.name, file_format=file_format)
     model = replace(model_of(result, density=density, mass=mass, up=up), is_scene=scene)
-    if target.file_format in SIMULATED and (doubt := implausible(model)) is not None:
-        warnings.warn(doubt, ImplausibleBodyWarning, stacklevel=3)
+    if target.file_format in SIMULATED:
+        for doubt in (implausible(model), None if mass is not None else hollow(result)):
+            if doubt is not None:
+                warnings.warn(doubt, ImplausibleBodyWarning, stacklevel=3)
     if target.file_format in WITH_MESHES:
         _save_with_meshes(model, target, one_mesh)
     elif target.file_format == "usd":

@@ -127,6 +127,21 @@ def implausible(model: Model) -> str | None:
     )
 
 
+def hollow(result: Result) -> str | None:
+    """Say in a sentence if most of the input is open sheets, whose mass is that of the thickness repair gave them."""
+    bodies = result.report.get("repair", [])
+    sheets = sum(body["faces_in"] for body in bodies if body["step"] == SHEET)
+    if 2 * sheets <= sum(body["faces_in"] for body in bodies):
+        return None
+    return (
+        f"{result.name} is a hollow shell of open sheets, so its mass and inertia are those of walls "
+        f"{SHEET_THICKNESS / result.report['scale']:.3g} thick: mass= (--mass) sets its mass."
+    )
+
+
+SHEET, SHEET_THICKNESS = "slab", 2e-3
+"""The step of repair that gives sheets a thickness, and that thickness, where the longest side is 2."""
+
 LENGTHS, MASSES = (1e-3, 50.0), (1e-6, 1e6)
 """What is plausible for a body: metres, and kilograms."""
 
