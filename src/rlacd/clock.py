@@ -16,8 +16,8 @@ StoppedBy = Literal["timeout", "cancel"]
 
 GRACE, GRACE_SHARE, LEAST_GRACE = 0.4, 0.04, 0.1
 """After a stop, writing up the result may take `GRACE` seconds plus `GRACE_SHARE` of the timeout, and always at least
-`LEAST_GRACE` seconds; then optional work is skipped. The promise is 1 s and 10 %: the rest is for what cannot be
-skipped."""
+`LEAST_GRACE` seconds; then optional work is skipped. After a cancellation it may take half as long: the command line
+then still has to write files. The promise is 1 s and 10 %: the rest is for what cannot be skipped."""
 
 _T = TypeVar("_T")
 
@@ -144,7 +144,7 @@ class Clock:
         self._nothing_left_to_stop = True
         self._end = math.inf if self._timeout is None else self._timeout * (1 + GRACE_SHARE) + GRACE
         if self.stopped_by == "cancel":
-            self._end = min(self._end, self._stopped_at + GRACE)
+            self._end = min(self._end, self._stopped_at + GRACE / 2)
         self.stop.arm(max(self._end - self.elapsed, LEAST_GRACE))
 
     def if_in_time(self, work: Callable[[], _T], otherwise: Callable[[], _T]) -> _T:

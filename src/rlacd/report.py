@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -67,7 +66,7 @@ def make_report(
         "hausdorff": {"over": over, "under": under},
         "scale": solid.frame.scale,
         "mass": _mass(mass),
-        "repair": [asdict(body) for body in solid.bodies],
+        "repair": [{**vars(body)} for body in solid.bodies],
         "warnings": [
             *solid.warnings,
             *_coarse(solid),
