@@ -14,8 +14,8 @@ from rlacd.merge import drop_slivers, merge_parts
 from rlacd.solid.component import Component, Part
 from rlacd.workers import Workers
 
-MOST_MERGING = 20e6
-"""Units of work (see `rlacd.work`) after which merging stops: ten to twenty seconds of one core."""
+MOST_MERGING = 14e6
+"""Units of work (see `rlacd.work`) after which merging stops: about fourteen seconds of one core."""
 
 
 @dataclass(frozen=True)

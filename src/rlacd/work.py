@@ -60,12 +60,12 @@ def choosing(faces: int) -> float:
 
 def judging(faces: int, hull_faces: int) -> float:
     """Decide whether a part meets the criterion."""
-    return 35 + 0.14 * faces + 1.6 * hull_faces
+    return 30 + 0.7 * (faces + hull_faces)
 
 
 def cutting(faces: int) -> float:
     """Cut a component by a plane and compute the hulls of its sides."""
-    return 280 + 0.8 * faces
+    return 200 + 0.95 * faces
 
 
 def joining(vertices: int) -> float:
@@ -80,19 +80,24 @@ def screening(vertices: int) -> float:
 
 def testing(vertices: int) -> float:
     """Test a hull against the solid."""
-    return 150 + 1.4 * vertices
+    return 160 + 0.5 * vertices
+
+
+def probing(vertices: int) -> float:
+    """Test only whether the solid comes too deep inside a hull."""
+    return 5 + 0.85 * vertices
 
 
 def gluing(faces: int) -> float:
     """Glue two parts that have `faces` faces in total."""
-    return 20 + 0.35 * faces
+    return 20 + 0.12 * faces
 
 
-def filling(solid_faces: int, faces: int, hull_faces: int) -> float:
+def filling(faces: int, hull_faces: int) -> float:
     """Clip a solid to a hull around parts that have `faces` faces in total."""
-    return 1200 + 0.65 * solid_faces + 7.0 * faces + 9.0 * hull_faces
+    return 370 + 0.95 * faces + 6.3 * hull_faces
 
 
 def reuniting(faces: int, count: int) -> float:
     """Reunite `count` components that have `faces` faces in total into one solid."""
-    return 1300 + 6.5 * faces + 390.0 * count
+    return 2.7 * faces + 730 * count

@@ -258,7 +258,7 @@ class _Bridged:
 
     def price(self, first: Part, second: Part) -> float:
         """The work of clipping the solid and judging."""
-        return price_of_clipping(first, second, self.solid)
+        return price_of_clipping(first, second)
 
     def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
         """Clip the solid to the joint hull."""
@@ -311,7 +311,7 @@ class Uniter:
             union = Part.glued(first, second, hull)
             if not screen.excludes(union.volume, hull.volume) and self.criterion.is_met(union):
                 return union
-        if feasibility is not Feasibility.MAYBE or not self.account.pay(price_of_clipping(first, second, self.solid)):
+        if feasibility is not Feasibility.MAYBE or not self.account.pay(price_of_clipping(first, second)):
             return None
         return _clipped(first, second, hull, self.criterion, self.solid)
 
@@ -329,10 +329,10 @@ def price_of_gluing(first: Part, second: Part) -> float:
     return work.gluing(faces) + work.judging(faces, hull_faces)
 
 
-def price_of_clipping(first: Part, second: Part, solid: Component) -> float:
+def price_of_clipping(first: Part, second: Part) -> float:
     """The work of clipping the solid to the joint hull of two parts, and judging the result."""
     faces, hull_faces = first.size + second.size, len(first.hull.faces) + len(second.hull.faces)
-    return work.filling(solid.size, faces, hull_faces) + work.judging(faces, hull_faces)
+    return work.filling(faces, hull_faces) + work.judging(faces, hull_faces)
 
 
 def is_alone(part: Part) -> bool:

@@ -25,11 +25,11 @@ SHARE = 2 / 5
 HOPELESS = 5
 """A pass is abandoned when its pieces outnumber the parts by this factor: merging will not make up for that."""
 
-TIMES_FIRST_PASS = 7.5
+TIMES_FIRST_PASS = 4
 """Limit on the work of a search, as a multiple of the work of the first pass."""
 
-MOST_WORK = 10e6
-"""Absolute limit on the work of a search in units: about ten seconds of one core."""
+MOST_WORK = 7e6
+"""Absolute limit on the work of a search in units: about seven seconds of one core."""
 
 ANOTHER_PASS = 1.5
 """A pass is abandoned when it exceeds this multiple of the work of the first."""

@@ -34,6 +34,15 @@ class Operator(Enum):
     REDISTRIBUTE = "a part is divided among those around"
 
 
+EXPECTED = {Operator.RECUT: 0.06, Operator.TRANSFER: 0.03, Operator.REDISTRIBUTE: 0.1}
+"""Prior estimate of the parts a trial saves (measured: docs/search.md)."""
+
+EXPECTED_OF_LARGE = 0.015
+"""The same for recuts of clusters larger than the smallest."""
+
+OPINION = 10
+"""Weight of this prior, in trials."""
+
 AS_MUCH_AS = {Operator.TRANSFER: 3.0, Operator.REDISTRIBUTE: 0.6}
 """Prior estimate of the work of giving a part away: that of recutting a cluster of this many parts."""
 
@@ -53,14 +62,15 @@ class Trial:
 class _Tally:
     """Number of trials, parts they saved, and work they took."""
 
+    expected: float
     tried: int = 0
     gained: int = 0
     work: float = 0.0
 
     @property
     def rate(self) -> float:
-        """Parts saved per trial, with an optimistic prior of 1 in 10."""
-        return (self.gained + 1) / (self.tried + 10)
+        """Parts saved per trial; the prior weighs `OPINION` trials."""
+        return (self.gained + OPINION * self.expected) / (self.tried + OPINION)
 
 
 class OperatorSampler:
@@ -75,8 +85,8 @@ class OperatorSampler:
             (Operator.TRANSFER, 1, None),
             (Operator.REDISTRIBUTE, 1, None),
         ]
-        self._kinds = {(move, size): _Tally() for move, size, _ in self._operators}
-        self._policies = [_Tally() for _ in range(policies)]
+        self._kinds = {(move, size): _Tally(_expected(move, size)) for move, size, _ in self._operators}
+        self._policies = [_Tally(EXPECTED[Operator.RECUT]) for _ in range(policies)]
         self._cut: list[set[Cluster]] = [set() for _ in range(policies)]
         self._given: dict[tuple[Operator, int, Cluster], int] = {}
         self._units = self._spent = 0.0
@@ -161,3 +171,7 @@ def _giver(graph: PartGraph, random: np.random.Generator, move: Operator, reach:
 def giving_away(move: Operator, graph: PartGraph, giver: int, random: np.random.Generator, reach: float) -> Trial:
     """Make the trial that gives a part to those within reach."""
     return Trial(move, (giver,), None, graph.near(giver, reach), int(random.integers(2**32)))
+
+
+def _expected(move: Operator, size: int) -> float:
+    return EXPECTED_OF_LARGE if size > SIZES[0] else EXPECTED[move]

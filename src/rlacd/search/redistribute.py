@@ -91,7 +91,7 @@ def _may_be_taken(part: Part, around: Sequence[Part], uniter: Uniter) -> bool:
     return all(
         any(
             uniter.account.pay(
-                work.joining(len(around[i].hull.vertices)) + work.testing(len(around[i].hull.vertices)) / 2
+                work.joining(len(around[i].hull.vertices)) + work.probing(len(around[i].hull.vertices))
             )
             and not uniter.forbids(_with_point(around[i].hull, corners[k]))
             for i in np.argsort([_gap(other.box, corners[k]) for other in around], kind="stable").tolist()

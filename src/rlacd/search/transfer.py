@@ -150,7 +150,7 @@ def _bite(
 def _is_too_much(corners: FloatArray, taker: Part, uniter: Uniter) -> bool:
     """Whether the taker cannot even have the given corners [N, 3] of the piece: decided without cutting."""
     count = len(corners) + len(taker.hull.vertices)
-    if not uniter.account.pay(work.joining(count) + work.testing(count) / 2):
+    if not uniter.account.pay(work.joining(count) + work.probing(count)):
         return True
     hull = Hull.of(np.concatenate([taker.hull.vertices, corners]))
     return hull is not None and uniter.forbids(hull)
