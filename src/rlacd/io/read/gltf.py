@@ -114,7 +114,10 @@ def split(path: Path, content: bytes) -> tuple[Json, bytes | None]:
 def _plain(path: Path, header: Json) -> Json:
     hidden = [name for name in UNREAD if name in header.get("extensionsRequired", [])]
     if hidden:
-        raise MeshFileError(f"{path} hides its triangles by {hidden[0]}: export it again without compression")
+        raise MeshFileError(
+            f"{path} hides its triangles by {hidden[0]}: export it again without compression, for which Blender can "
+            "import it"
+        )
     plain: Json = {key: header[key] for key in ("scene",) if key in header}
     plain["asset"] = {"version": header.get("asset", {}).get("version", "2.0")}
     for key, fields in KEPT.items():

@@ -37,6 +37,14 @@ Source: TypeAlias = str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | t
 FORMATS = ("obj", "stl", "ply", "off", "glb", "gltf", "dae", "zae", "3mf", "xyz")
 """The formats that are read. trimesh parses more, but those parsers have not been reviewed against hostile files."""
 
+CONVERTERS = {
+    "blend": "export it from Blender (File > Export > glTF 2.0)",
+    "vrm": "rename it to .glb, which it is",
+    **dict.fromkeys(("fbx", "usd", "usda", "usdc", "usdz"), "import it into Blender and export it as glTF 2.0"),
+    **dict.fromkeys(("step", "stp", "iges", "igs"), "export it from a CAD program, such as FreeCAD, as stl or obj"),
+}
+"""What to do with files that people have and that are not read."""
+
 
 def load_mesh(source: Source) -> InputMesh:
     """Read a mesh of any format and bring all its bodies into one list of triangles.
@@ -118,7 +126,8 @@ def _read(path: Path) -> tuple[bytes, str, trimesh.Scene]:
     extension = path.suffix.lower().lstrip(".")
     holds = _format_of(content)
     if extension not in FORMATS:
-        hint = f"rename it to .{holds}, which it seems to hold" if holds else "convert it to glb, obj, stl or ply"
+        renamed = f"rename it to .{holds}, which it seems to hold" if holds else None
+        hint = CONVERTERS.get(extension) or renamed or "convert it to glb, obj, stl or ply"
         raise MeshFileError(f"{path} is in no format that is read here: {hint}")
     if (declared := declared_triangles(content, extension)) is not None:
         require_memory(declared, BYTES_READ, path.name)
