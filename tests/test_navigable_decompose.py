@@ -280,7 +280,7 @@ def test_an_open_mesh_says_what_was_measured_to() -> None:
         lambda: rlacd.NavigableSpace(0.05, float("nan")),
         lambda: rlacd.NavigableSpace(0.05, 0.01, seeds=[(1, 2)]),
         lambda: rlacd.NavigableSpace(0.05, 0.01, closed_planes=[((0, 0, 0), 1)]),
-        lambda: rlacd.decompose(ell(), criterion="volume"),
+        lambda: rlacd.decompose(ell(), criterion="balls"),
         lambda: rlacd.decompose(ell(), criterion=rlacd.NavigableSpace(), threshold=0.1),
     ],
 )

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rlacd._native import poll_stop
 from rlacd.solid.arrays import FloatArray
+from rlacd.solid.frame import Frame
 from rlacd.solid.topology import IntArray
 
 SAMPLES = 100_000
@@ -41,13 +42,14 @@ def owners(
     """
     if (label_of == label_of[0]).all():
         return [int(label_of[0])] * len(hulls)
-    points, labels = _spread(vertices, faces, label_of)
+    frame = Frame.of(vertices)  # areas and squares of any finite coordinates fit in a double there
+    points, labels = _spread(frame.to_frame(vertices), faces, label_of)
     order = np.argsort(points[:, 0], kind="stable")
     points, labels = points[order], labels[order]
     found = []
     for hull in hulls:
         poll_stop()
-        corners = np.asarray(hull.vertices)[hull.faces]
+        corners = frame.to_frame(hull.vertices)[hull.faces]
         lower, upper = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
         slack = SLACK * float((upper - lower).max())
         first, last = np.searchsorted(points[:, 0], (lower[0] - slack, upper[0] + slack))
