@@ -28,7 +28,7 @@ HOPELESS = 5
 TIMES_FIRST_PASS = 4
 """Limit on the work of a search, as a multiple of the work of the first pass."""
 
-MOST_WORK = 7e6
+MOST_WORK = 6e6
 """Absolute limit on the work of a search in units: about seven seconds of one core."""
 
 ANOTHER_PASS = 1.5
