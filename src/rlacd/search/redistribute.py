@@ -90,9 +90,7 @@ def _may_be_taken(part: Part, around: Sequence[Part], uniter: Uniter) -> bool:
     outermost = sorted(set(np.argmax(corners @ directions.T, axis=0).tolist()))
     return all(
         any(
-            uniter.account.pay(
-                work.joining(len(around[i].hull.vertices)) + work.probing(len(around[i].hull.vertices))
-            )
+            uniter.account.pay(work.joining(len(around[i].hull.vertices)) + work.probing(len(around[i].hull.vertices)))
             and not uniter.forbids(_with_point(around[i].hull, corners[k]))
             for i in np.argsort([_gap(other.box, corners[k]) for other in around], kind="stable").tolist()
         )
