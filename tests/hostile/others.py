@@ -5,8 +5,10 @@ from __future__ import annotations
 from tests.hostile.gltf import gltf
 from tests.hostile.registry import refused
 
-for ending in ("xaml", "3dxml", "step", "stp", "xdmf", "h5", "vtk", "msh", "binvox", "zip", "dxf"):
+for ending in ("xaml", "3dxml", "xdmf", "h5", "vtk", "msh", "binvox", "zip", "dxf"):
     refused(f"another format.{ending}", "convert it")(lambda: b"anything")
+for ending in ("step", "stp"):
+    refused(f"another format.{ending}", "export it from a CAD program")(lambda: b"anything")
 
 
 @refused("a node below one whose mesh there is not.gltf", "placed nowhere")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import gc
 import io
 import os
 import shlex
@@ -52,7 +54,16 @@ def main() -> None:
     """Run the command line: the entry point of the ``rlacd`` script and of ``python -m rlacd``."""
     if isinstance(sys.stdout, io.TextIOWrapper):  # JSON is UTF-8, and file names hold more than a code page of Windows
         sys.stdout.reconfigure(encoding="utf-8")
-    app(prog_name="rlacd")
+    # Little of what a command allocates can be freed before it ends, so look for that rarely.
+    gc.set_threshold(100_000, 50, 50)
+    try:
+        app(prog_name="rlacd")
+    except SystemExit as ended:
+        if ended.code == ExitCode.STOPPED_EARLY:  # late already: freeing thousands of hulls one by one takes long
+            with contextlib.suppress(BrokenPipeError):
+                sys.stdout.flush()
+            os._exit(ExitCode.STOPPED_EARLY)
+        raise
 
 
 def _print_version(wanted: bool) -> None:

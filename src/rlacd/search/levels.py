@@ -28,8 +28,8 @@ HOPELESS = 5
 TIMES_FIRST_PASS = 4
 """Limit on the work of a search, as a multiple of the work of the first pass."""
 
-MOST_WORK = 6e6
-"""Absolute limit on the work of a search in units: about seven seconds of one core."""
+LEAST_WORK, MOST_WORK = 0.15e6, 6e6
+"""Absolute limits on that limit, in units: about 0.15 and 6 seconds of one core."""
 
 ANOTHER_PASS = 1.5
 """A pass is abandoned when it exceeds this multiple of the work of the first."""
@@ -162,7 +162,7 @@ def search(
     at_a_limit = most_parts is not None and not all(context.workers.map(context.criterion.is_met, parts))
     first_pass = clock.work.done
     bounded = level.bounded and not (at_a_limit and level.seconds is not None)
-    allowed = min(TIMES_FIRST_PASS * first_pass, MOST_WORK) if bounded else math.inf
+    allowed = min(max(TIMES_FIRST_PASS * first_pass, LEAST_WORK), MOST_WORK) if bounded else math.inf
     budget = SearchBudget(clock, level.seconds, len(parts), patient=bounded, work=Work(allowed))
     if most_parts is not None and at_a_limit:
         if len(parts) <= most_parts:
