@@ -163,7 +163,7 @@ def test_no_mesh_stops_the_others(trouble: dict[str, str], tmp_path: Path) -> No
     (assets / "bad.obj").write_text("no mesh")
     (assets / "gone.obj").symlink_to(assets / "nowhere")
     (assets / "shut.obj").mkdir()
-    run = batch(assets, "-o", out, "--jobs", 2, "--limit", 20, "--memory", 1)
+    run = batch(assets, "-o", out, "--jobs", 2, "--limit", 12, "--memory", 1)
     assert run.exit_code == 5, run.output
     told = rows(out)
     assert {name.removesuffix(".obj"): row["status"] for name, row in told.items()} == {
@@ -172,7 +172,7 @@ def test_no_mesh_stops_the_others(trouble: dict[str, str], tmp_path: Path) -> No
         **dict.fromkeys(["bad", "gone"], "failed"),
     }
     assert told["dies.obj"]["error"] == "its process died of SIGSEGV"
-    assert told["hangs.obj"]["error"] == "it took more than 20 s"
+    assert told["hangs.obj"]["error"] == "it took more than 12 s"
     assert told["grows.obj"]["error"] == "it needed more than 1 GB of memory"
     assert "surprise" in told["bug.obj"]["error"]
     assert "does not exist" in told["gone.obj"]["error"]
@@ -187,9 +187,9 @@ def test_no_mesh_stops_the_others(trouble: dict[str, str], tmp_path: Path) -> No
     assert "last words" in times["dies.obj"]["last_words"]
     assert "attempts" not in times["well.obj"]
 
-    again = batch(assets, "-o", out, "--limit", 20, "--memory", 1)  # the same limits: it would end the same
+    again = batch(assets, "-o", out, "--limit", 12, "--memory", 1)  # the same limits: it would end the same
     assert (again.exit_code, "0 now" in again.stderr) == (5, True)
-    refused = batch(assets, "-o", out, "--limit", 20, "--memory", 1, "--no-fallback", "--glob", "dies.obj")
+    refused = batch(assets, "-o", out, "--limit", 12, "--memory", 1, "--no-fallback", "--glob", "dies.obj")
     assert refused.exit_code == 5
     assert rows(out)["dies.obj"]["status"] == "failed"
     assert not (out / "dies.glb").exists()

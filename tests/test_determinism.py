@@ -89,7 +89,7 @@ def test_a_batch_of_real_meshes_writes_what_decompose_writes(
 @pytest.mark.parametrize("name", MESHES)
 def test_the_same_bytes_in_every_process_and_for_any_number_of_threads(name: str, corpus: Path, tmp_path: Path) -> None:
     digits = set()
-    for seed, threads in enumerate((1, 2, 5)):
+    for seed, threads in enumerate((1, 5)):
         out = tmp_path / f"{seed}.ply"
         rlacd(["decompose", corpus / name, "-o", out, "-q", "--threads", threads], hash_seed=seed)
         digits.add(out.read_bytes())

@@ -140,9 +140,11 @@ print(Bench(meshes, find_meshes(meshes), BenchStore(out), say=lambda _: None).ru
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "file", ["test_load.py", "test_formats.py", "test_options.py", "test_decomposition.py", "test_pool.py"]
+    ("file", "marks"),
+    [(f"test_{name}.py", "not slow and not nightly") for name in ("load", "formats", "options", "decomposition")]
+    + [("test_pool.py", "not nightly")],
 )
-def test_the_tests_of_the_core_pass(file: str) -> None:
+def test_the_tests_of_the_core_pass(file: str, marks: str) -> None:
     tests = ROOT / "tests" / file
-    run = elsewhere("-m", "pytest", "-x", "-q", "-n0", "-p", "no:cacheprovider", tests, encoding="utf-8")
+    run = elsewhere("-m", "pytest", "-x", "-q", "-n0", "-m", marks, "-p", "no:cacheprovider", tests, encoding="utf-8")
     assert run.returncode == 0, run.stdout[-3000:]

@@ -86,9 +86,10 @@ def stops(most: int, ratio: float = 1.7) -> list[int]:
     return [round(ratio**k) for k in range(60) if ratio**k < most]
 
 
-@pytest.mark.parametrize("ratio", [2.5, pytest.param(1.7, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow) if name in LONG else name for name in SMALL]
+    ("name", "ratio"),
+    [pytest.param(name, 4, marks=pytest.mark.slow) if name in LONG else (name, 2.5) for name in SMALL]
+    + [pytest.param(name, 1.7, marks=pytest.mark.nightly) for name in SMALL],
 )
 def test_stopped_at_any_poll_the_hulls_cover_the_input(polls: list[int], name: str, ratio: float) -> None:
     stages = set()
