@@ -220,6 +220,7 @@ def test_numbers_of_numpy_are_numbers_and_the_report_stays_plain() -> None:
     assert type(result.report["options"]["max_hulls"]) is int
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("threshold", [0.001, 0.02, 2])
 def test_the_ends_of_the_threshold(threshold: float) -> None:
     result = check((ELL, FACES), threshold=threshold)

@@ -280,6 +280,7 @@ def shell(*words: object, **options: Any) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, timeout=120, **options)
 
 
+@pytest.mark.slow
 def test_a_real_run_in_a_pipe(mesh: Path) -> None:
     run = shell("decompose", mesh, "-o", mesh.with_name("out.obj"), "--report", "-")
     assert run.returncode == 0, run.stderr

@@ -39,6 +39,7 @@ def test_run_coacd_has_the_originals_signature() -> None:
     assert [(p.name, p.default) for p in ours.values()] == [(p.name, p.default) for p in theirs.values()]
 
 
+@pytest.mark.slow
 def test_run_coacd_gives_the_originals_kind_of_result() -> None:
     coacd = pytest.importorskip("coacd", reason="the extra bench is not installed")
     mesh = table()

@@ -83,6 +83,7 @@ def test_far_apart_bodies_stay_apart() -> None:
     assert sum(hull.volume for hull in result) == pytest.approx(4)
 
 
+@pytest.mark.slow
 def test_a_cavity_costs_nothing() -> None:
     hollow = mesh_of(Manifold.sphere(1, 64) - Manifold.sphere(0.8, 64))
     assert len(rlacd.decompose(hollow)) == 1

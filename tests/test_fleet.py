@@ -74,6 +74,7 @@ def test_what_a_result_is_called_does_not_depend_on_the_glob(tmp_path: Path) -> 
         assert all(everything[asset.name] == asset.place for asset in find_assets(tmp_path, glob))
 
 
+@pytest.mark.slow
 @given(st.sets(st.from_regex(r"([aA]/)?[aA](\.(obj|stl|STL)){1,3}", fullmatch=True), max_size=12))
 def test_no_two_results_share_a_name_on_any_disk(names: set[str]) -> None:
     places = _places(sorted(names))

@@ -59,6 +59,7 @@ def test_a_hostile_mesh_is_refused_with_its_reason(name: str, tmp_path: Path) ->
     check_refused(RlacdError, f"{re.escape(path.name)}.*({says})", load, path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HARMLESS)
 def test_what_only_looks_hostile_is_read(name: str, tmp_path: Path) -> None:
     faces, extent = bounded(load, HARMLESS[name](tmp_path))
@@ -148,6 +149,7 @@ def test_a_robot_with_entities_is_refused(doctype: str, used: str, ending: str, 
     check_refused(MeshFileError, "DOCTYPE", rewrite_robot, path, tmp_path / f"out{ending}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "says"),
     [

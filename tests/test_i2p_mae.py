@@ -81,6 +81,7 @@ def test_names_and_shapes_are_the_published_ones(stand_in: dict[str, torch.Tenso
     assert not any(p.requires_grad for p in official.parameters())
 
 
+@pytest.mark.slow
 def test_features_are_those_of_the_official_code(
     official: I2PMAEEncoder, features: tuple[torch.Tensor, np.ndarray]
 ) -> None:

@@ -172,6 +172,7 @@ def bumpy_ball() -> trimesh.Trimesh:
     return ball
 
 
+@pytest.mark.slow
 def test_one_pass_eliminates_parts_that_others_can_hold_together() -> None:
     """A policy that stands for a published method does not: the same cuts, merged, are more hulls."""
     space, mesh = rlacd.NavigableSpace(0.1, 0.02), bumpy_ball()
@@ -215,6 +216,7 @@ def mesh(tmp_path: Path) -> Path:
     return tmp_path / "ell.stl"
 
 
+@pytest.mark.slow
 def test_the_command_writes_the_balls(mesh: Path, tmp_path: Path) -> None:
     words = ["decompose", mesh, "-o", tmp_path / "out.glb", "--criterion", "navigable"]
     for ending in ("csv", "glb"):

@@ -28,6 +28,7 @@ def decomposed() -> rlacd.Decomposition:
     return rlacd.decompose(cup(), quality="fast", threads=1)
 
 
+@pytest.mark.slow
 def test_balls_pass_the_hole_of_a_cup_and_rest_in_it_as_hulls_but_not_as_one(decomposed: rlacd.Decomposition) -> None:
     drops = simulate.drops_in_mujoco(decomposed)
     assert drops.holes >= 2  # along the axis, from above and from below
@@ -68,6 +69,7 @@ def test_a_pile_settles_alike_in_both_engines(monkeypatch: pytest.MonkeyPatch) -
         assert pile.drift < 0.1
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(simulate, "SECONDS", 0.1)
     cup().export(tmp_path / "cup.ply")

@@ -55,6 +55,7 @@ exec("import os; print(hasattr(os, 'killpg'), hasattr(os, 'replace')); import fc
     assert "ModuleNotFoundError" in run.stderr
 
 
+@pytest.mark.slow
 def test_every_module_is_imported() -> None:
     """But those of training, and those whose extras are not installed."""
     program = """
@@ -73,6 +74,7 @@ for module in pkgutil.walk_packages(rlacd.__path__, "rlacd."):
     assert len(run.stdout.split()) > 100
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["glb", "obj", "xml"])
 def test_a_mesh_is_decomposed_and_written(ring: Path, ending: str) -> None:
     out = ring.with_name(f"結果.{ending}")
@@ -82,6 +84,7 @@ def test_a_mesh_is_decomposed_and_written(ring: Path, ending: str) -> None:
     assert out.exists()
 
 
+@pytest.mark.slow
 def test_a_folder_is_written_twice(ring: Path) -> None:
     for _ in range(2):
         run = elsewhere("-m", "rlacd", "decompose", ring, "-o", f"{ring.parent / 'hulls'}/", "--quiet")
@@ -89,6 +92,7 @@ def test_a_folder_is_written_twice(ring: Path) -> None:
     assert len(list((ring.parent / "hulls").glob("*.obj"))) > 2
 
 
+@pytest.mark.slow
 def test_facts_about_a_file_are_printed_in_utf_8(ring: Path) -> None:
     run = elsewhere("-m", "rlacd", "info", ring)
     assert run.returncode == 0, run.stderr
@@ -97,6 +101,7 @@ def test_facts_about_a_file_are_printed_in_utf_8(ring: Path) -> None:
     assert json.loads(run.stdout)
 
 
+@pytest.mark.slow
 def test_a_batch_runs_in_processes_and_passes_over_what_is_done(ring: Path) -> None:
     out = ring.parents[1] / "out"
     first = elsewhere("-m", "rlacd", "batch", ring.parent, "-o", out, "--jobs", 2)

@@ -21,6 +21,7 @@ def ball() -> trimesh.Trimesh:
     return trimesh.creation.icosphere(subdivisions=2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PRESETS)
 def test_round_bodies_are_brought_inside_the_limits(name: str) -> None:
     preset = PRESETS[name]

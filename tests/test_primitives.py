@@ -202,6 +202,7 @@ def assert_true(result: rlacd.Decomposition, threshold: float = 0.05) -> None:
             assert np.median(on_border) <= threshold + 5e-3
 
 
+@pytest.mark.slow
 def test_primitives_of_real_meshes_cover_them_within_the_threshold(corpus: Path) -> None:
     names = ("raw/chair_ivar_0668.obj", "test/vhacd/hornbug.ply", "test/vhacd/beshon.ply")
     shapes = 0

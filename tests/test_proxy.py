@@ -89,6 +89,7 @@ def test_noise_and_density_cost_hardly_any_parts(shape: str) -> None:
     assert len(rlacd.decompose(dense, quality="fast")) <= len(rlacd.decompose(plain, quality="fast")) + 1
 
 
+@pytest.mark.slow
 def test_the_bytes_do_not_depend_on_threads() -> None:
     mesh = ring()
     first, second = (rlacd.decompose(mesh, quality="fast", threads=threads) for threads in (1, 3))
@@ -97,6 +98,7 @@ def test_the_bytes_do_not_depend_on_threads() -> None:
         assert a.vertices.tobytes() == b.vertices.tobytes()
 
 
+@pytest.mark.slow
 def test_limits_hold_and_are_met_by_the_threshold() -> None:
     result = rlacd.decompose(ring(), quality="fast", max_vertices=32)
     assert max(len(hull.vertices) for hull in result) <= 32
@@ -106,6 +108,7 @@ def test_limits_hold_and_are_met_by_the_threshold() -> None:
     assert few.report["hausdorff"]["under"] <= 1e-3
 
 
+@pytest.mark.slow
 def test_stopped_at_any_time_the_hulls_cover_the_solid() -> None:
     mesh = ring()
     for stage in ("simplify", "cut", "merge", "lift"):

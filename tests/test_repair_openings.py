@@ -184,6 +184,7 @@ def test_a_loop_around_an_island_keeps_the_island():
         assert volume(solid) == pytest.approx(16, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_noisy_slit_between_two_bodies_that_close_each_other_is_filled() -> None:
     """Two halves of a ball whose rims do not quite meet: caps that nothing can reach, a hair apart or crossing."""
     ball = trimesh.creation.uv_sphere(1.0, count=[32, 64])

@@ -163,6 +163,7 @@ def test_separate_fans_have_a_vertex_each() -> None:
     assert found[4]
 
 
+@pytest.mark.slow
 def test_a_closed_body_is_taken_as_manifold3d_would_take_it(corpus: Path) -> None:
     taken = 0
     for name in (corpus / "quick.txt").read_text().split():

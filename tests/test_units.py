@@ -146,6 +146,7 @@ def test_a_scene_has_a_floor_to_land_on(tmp_path: Path) -> None:
         result.save(tmp_path / "table.urdf", scene=True)
 
 
+@pytest.mark.slow
 def test_a_robot_of_many_hulls_is_told_of_a_threshold_for_all(tmp_path: Path) -> None:
     """A large plain box and small rings that are cut finely: the suggestion holds when it is followed."""
     trimesh.creation.box((2, 0.3, 0.3)).export(tmp_path / "arm.stl")

@@ -66,6 +66,7 @@ def head(path: str, *lines: str, method: str = "GET") -> bytes:
     return "\r\n".join([f"{method} {path} HTTP/1.1", "Host: 127.0.0.1", *lines, "", ""]).encode()
 
 
+@pytest.mark.slow
 def test_sixty_streams_hold_no_more_than_their_threads(viewer: Viewer) -> None:
     before = threading.active_count()
     with ExitStack() as stack:

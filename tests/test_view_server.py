@@ -475,6 +475,7 @@ def test_the_command_says_what_is_wrong_in_one_sentence(mesh: Path, words: list[
     assert run.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for one process")
 def test_the_command_tells_its_address_and_ends_with_ctrl_c(mesh: Path) -> None:
     command = [sys.executable, "-c", "from rlacd.cli.main import main; main()", "view", str(mesh), "--no-browser"]

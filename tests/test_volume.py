@@ -36,6 +36,7 @@ def torus() -> trimesh.Trimesh:
     return trimesh.creation.torus(1.0, 0.3, major_sections=32, minor_sections=16)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tolerance", [0.02, 0.1, 0.5])
 @pytest.mark.parametrize("shape", [table, torus, cup])
 def test_no_hull_adds_more_than_the_share(shape: object, tolerance: float) -> None:
