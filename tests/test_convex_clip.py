@@ -57,6 +57,7 @@ def is_closed(faces: np.ndarray) -> bool:
     return len(there[0]) == len(back[0]) and all((a == b).all() for a, b in zip(there, back, strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", solids())
 def test_clipping_agrees_with_a_boolean(name: str) -> None:
     mesh = solids()[name]
