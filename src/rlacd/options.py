@@ -210,7 +210,7 @@ class Options:
     )
     timeout: float | None = option(
         None,
-        "Stop after this time and keep what is reached.",
+        "Stop after this time and keep the result so far.",
         _SECONDS,
         panel=RUN,
         metavar="SECONDS",

@@ -80,7 +80,7 @@ class OutputOptions:
     )
     scene: bool | None = option(
         None,
-        "In a .xml (MJCF), a floor and a light too, and the body just above the floor: drop it into MuJoCo's viewer.",
+        "In .xml (MJCF), add a floor and a light and place the body just above the floor, ready for MuJoCo's viewer.",
         flag(),
         panel=OUTPUT,
         flags=("--scene",),
@@ -106,7 +106,7 @@ class OutputOptions:
     )
     report: str | None = option(
         None,
-        "Write everything measured: as JSON, or as a page to look at if the name ends in .html; - writes JSON to "
+        "Write all measurements as JSON, or as an HTML page if the name ends in .html; - writes JSON to "
         "stdout, and nothing else there.",
         path_like(),
         panel=OUTPUT,
@@ -139,7 +139,7 @@ class OutputOptions:
     )
     quiet: bool | None = option(
         None,
-        "Say nothing unless something is wrong.",
+        "Print only warnings and errors.",
         flag(),
         panel=OUTPUT,
         flags=("--quiet", "-q"),

@@ -17,7 +17,7 @@ BETWEEN_POLLS = 0.05
 """Seconds between two looks, while others work, at whether they have to stop."""
 
 SHARES = 16
-"""Many items are handed to the threads in so many portions a thread."""
+"""Portions per thread into which many items are split."""
 
 _T = TypeVar("_T")
 _R = TypeVar("_R")

@@ -30,7 +30,7 @@ class BenchLimits:
     memory : int
         Bytes of address space, on Linux; 0 for no limit.
     threads : int
-        Threads of each process.
+        Threads per process.
     jobs : int
         Number of concurrent processes.
     """

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rlacd.batch import Batch
     from rlacd.pool import Pool
 
-HELP = """Decompose all meshes of a folder; what is done already is passed over.
+HELP = """Decompose every mesh in a folder, skipping those already done.
 
 \b
 [bold]Examples[/bold]
@@ -33,7 +33,7 @@ HELP = """Decompose all meshes of a folder; what is done already is passed over.
   rlacd batch assets/ -o s3://bucket/hulls --ray auto
 
 A mesh whose process dies, hangs or needs too much memory is tried once more alone, and is then given its convex hull.
-OUT/manifest.jsonl tells what became of each mesh. Killed at any moment, the same command goes on where it was.
+OUT/manifest.jsonl records the outcome for each mesh. To resume after an interruption, run the same command again.
 Ctrl-C once finishes what is running; twice quits at once.
 """
 
@@ -72,18 +72,26 @@ _OWN: Parameters = {
         metavar="OUT",
         help="A folder, or an address that fsspec knows: s3://bucket/path.",
     ),
-    "glob": _option("**", str, help="Only these: 'chair_*.obj' in any folder, 'furniture/*' by the whole name."),
+    "glob": _option(
+        "**", str, help="Only meshes that match: 'chair_*.obj' in any folder, 'furniture/*' by the whole path."
+    ),
     "jobs": _option(
-        None, int | None, min=1, help="Meshes at a time. [dim]\\[default: all cores][/dim]", show_default=False
+        None,
+        int | None,
+        min=1,
+        help="Meshes processed at a time. [dim]\\[default: all cores][/dim]",
+        show_default=False,
     ),
     "ray": _option(None, str | None, metavar="ADDRESS", help="Use a Ray cluster: its address, auto, or local."),
     "limit": _option(
-        600.0, float, metavar="SECONDS", min=0.1, help="What one mesh may take before its process is ended."
+        600.0, float, metavar="SECONDS", min=0.1, help="Time limit per mesh; after it the mesh's process is killed."
     ),
-    "memory": _option(4.0, float, metavar="GB", min=0.0, help="What the process of a mesh may hold; 0: no limit."),
+    "memory": _option(4.0, float, metavar="GB", min=0.0, help="Memory limit per mesh; 0 means no limit."),
     "fallback": _option(True, bool, "--fallback/--no-fallback", help="Give meshes that fail their convex hull."),
-    "folders": _option(False, bool, "--folders", help="A folder a mesh with one file a hull."),
-    "redo": _option("none", str, metavar="WHICH", help="Make results again: none, those that failed (failed), or all."),
+    "folders": _option(False, bool, "--folders", help="Write a folder per mesh with one file per hull."),
+    "redo": _option(
+        "none", str, metavar="WHICH", help="Which meshes to do again: none, those that failed (failed), or all."
+    ),
     "folder_format": _option(
         None,
         str | None,
@@ -93,11 +101,15 @@ _OWN: Parameters = {
         "[dim]\\[default: what --preset says, or glb][/dim]",
         show_default=False,
     ),
-    "threads": _option(None, int | None, help="Threads of each mesh. [dim]\\[default: 1][/dim]", show_default=False),
+    "threads": _option(None, int | None, help="Threads per mesh. [dim]\\[default: 1][/dim]", show_default=False),
     "timeout": _option(
-        None, float | None, metavar="SECONDS", help="After so long, keep what is reached of a mesh.", show_default=False
+        None,
+        float | None,
+        metavar="SECONDS",
+        help="Stop a mesh after this time and keep the result so far.",
+        show_default=False,
     ),
-    "dry_run": _option(False, bool, "--dry-run", help="Tell which meshes would be done, and write nothing."),
+    "dry_run": _option(False, bool, "--dry-run", help="List the meshes that would be processed, and write nothing."),
 }
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rlacd.bench import Bench
     from rlacd.bench.page import Page
 
-HELP = """Compare decompositions by other tools and by rlacd: fewer, tighter hulls, and how long they take.
+HELP = """Compare rlacd with other tools: number of hulls, how tight they are, and time.
 
 Every mesh and method runs in a process of its own, with limits; results are kept in a folder and never computed twice,
 so a run can be stopped and started again. Pages are written as Markdown and HTML, all numbers as CSV.
@@ -53,14 +53,16 @@ Runs: Parameters = {
     ),
     "first": (
         None,
-        Annotated[int | None, typer.Option(min=1, help="Only so many of the meshes.", show_default=False)],
+        Annotated[
+            int | None, typer.Option(min=1, help="Only the first meshes, up to this number.", show_default=False)
+        ],
     ),
     "limit": (
         600.0,
         Annotated[float, typer.Option("--limit", min=0.1, help="Seconds a method may take for one mesh.")],
     ),
     "memory": (12.0, Annotated[float, typer.Option(min=0.0, help="GB a process may use (Linux); 0: no limit.")]),
-    "threads": (1, Annotated[int, typer.Option(min=1, help="Threads of each process.")]),
+    "threads": (1, Annotated[int, typer.Option(min=1, help="Threads per process.")]),
     "jobs": (1, Annotated[int, typer.Option(min=1, help="Processes at a time.")]),
 }
 """Options of every command that runs methods on meshes: name to default and annotation."""
@@ -90,7 +92,7 @@ def compare(
     bench: Bench,
     methods: Methods = None,
     threshold: Threshold = 0.05,
-    pictures: Annotated[int, typer.Option(min=0, help="Draw so many meshes by every method.")] = 8,
+    pictures: Annotated[int, typer.Option(min=0, help="Number of meshes to draw with every method.")] = 8,
     up: Annotated[str, typer.Option(help="The axis that points up in the pictures: x, y or z.")] = "z",
 ) -> Page:
     """Compare methods at their own numbers; those with a concavity threshold all at the same.

@@ -34,7 +34,7 @@ HELP = """Turn a mesh into convex hulls for collision.
   rlacd decompose robot.urdf -o robot_acd.urdf
   rlacd decompose house.glb --criterion navigable --radius-abs 0.3 --tolerance-abs 0.05
 
-Ctrl-C once stops gracefully and writes what is reached; twice quits at once.
+Ctrl-C once stops and writes the result so far; twice quits at once.
 """
 
 MESH = typer.Argument(

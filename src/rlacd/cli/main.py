@@ -89,7 +89,7 @@ def info(
     mesh: Annotated[Path, typer.Argument(metavar="FILE", help="The mesh to look at.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
 ) -> None:
-    """Tell what a file holds and how it would be repaired, without decomposing it.
+    """Show what a file contains and how it would be repaired, without decomposing it.
 
     \b
     [bold]Examples[/bold]

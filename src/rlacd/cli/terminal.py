@@ -72,7 +72,7 @@ class Watch:
     def _on_interrupt(self, number: int, frame: FrameType | None) -> None:
         self.interrupted = True
         signal.signal(signal.SIGINT, signal.default_int_handler)
-        say("stopping; what is reached will be written (Ctrl-C again to quit at once)")
+        say("stopping; the result so far will be written (Ctrl-C again to quit at once)")
 
 
 def summary(result: Decomposition, written: str) -> str:

@@ -42,7 +42,7 @@ def view(
     threads: Annotated[int | None, typer.Option(help="Threads to use, all cores by default.")] = None,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
 ) -> None:
-    """Look at a mesh and its hulls in the browser, and try thresholds and criteria on it.
+    """Show a mesh and its hulls in the browser, and try thresholds and criteria.
 
     \b
     [bold]Examples[/bold]

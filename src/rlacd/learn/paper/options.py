@@ -79,7 +79,7 @@ class TrainOptions:
     seed: int = option(0, "The same seed, meshes and options give the same weights on CPU.", least=0, most=2**63 - 1)
     environments: int = option(
         4,
-        "Episodes side by side; each begins when the one so many before it has been learned from.",
+        "Episodes played side by side; each begins once the one this many before it has been learned from.",
         least=1,
         most=4096,
     )
