@@ -16,7 +16,7 @@ import pytest
 import trimesh
 
 import rlacd
-from rlacd import _native
+from rlacd import _native, decompose_mesh
 from rlacd.clock import Clock
 from rlacd.io.read.load import load_mesh
 from rlacd.solid.cover import MOST_HULLS, cover
@@ -105,6 +105,24 @@ def test_stopped_at_any_poll_the_hulls_cover_the_input(polls: list[int], name: s
     else:
         pytest.fail("it never came to its end")
     assert {"repair", "cut"} <= stages
+
+
+def test_the_nodes_of_hulls_may_stay_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = trimesh.Scene()
+    for index in range(3):
+        scene.add_geometry(
+            trimesh.creation.box(),
+            node_name=f"box {index}",
+            transform=trimesh.transformations.translation_matrix([2 * index, 0, 0]),
+        )
+
+    def late(*_: object) -> list[int]:
+        raise _native.Stopped
+
+    assert {row["node"] for row in rlacd.decompose(scene).report["provenance"]} == {"box 0", "box 1", "box 2"}
+    monkeypatch.setattr(decompose_mesh, "owners", late)
+    result = rlacd.decompose(scene)
+    assert [row["node"] for row in result.report["provenance"]] == [None] * 3
 
 
 @pytest.mark.slow

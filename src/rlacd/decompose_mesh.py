@@ -244,9 +244,9 @@ def _as_one(source: InputMesh, options: Options, workers: Workers, clock: Clock)
     reached = _decomposed(source, options, workers, clock)
     clock.nothing_left_to_stop()
     done = _finished(reached, workers, clock)
-    if source.node_of is not None:
-        places = owners(done.hulls, source.vertices, source.faces, source.node_of)
-        for hull, place in zip(done.hulls, places, strict=True):
+    if (node_of := source.node_of) is not None:
+        places = clock.if_in_time(lambda: owners(done.hulls, source.vertices, source.faces, node_of), lambda: [])
+        for hull, place in zip(done.hulls, places, strict=False):
             hull.metadata |= {"node": source.nodes[place].name, "node_index": place}
     return done
 
