@@ -57,6 +57,10 @@ def hull_sum(per_axis: int, edges: int) -> Callable[[float], Policy]:
 
 
 def named(name: str) -> Callable[[float], Policy]:
+    if Path(name, "best.safetensors").exists():
+        from rlacd.learn.paper.torch_policy import load_policy
+
+        return lambda scale: load_policy(Path(name))
     return lambda scale: make_policy(name, SweepCache(), scale)
 
 
@@ -116,7 +120,9 @@ def run(
     faces: int = 12_000,
     listed: Annotated[Path | None, typer.Option("--list", help="Files in place of a split's.")] = None,
     first: Annotated[int | None, typer.Option(help="Only so many of them.")] = None,
-    arms: Annotated[list[str] | None, typer.Option("--arm", help="A key of ARMS, or a policy's name.")] = None,
+    arms: Annotated[
+        list[str] | None, typer.Option("--arm", help="A key of ARMS, a policy's name, or a training run.")
+    ] = None,
     threshold: float = 0.05,
     space: Annotated[bool, typer.Option(help="Navigable space (5 %, 1 %) in place of concavity.")] = False,
     turned: bool = False,

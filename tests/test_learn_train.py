@@ -345,38 +345,3 @@ def test_a_checkpoint_half_written_leaves_the_one_before(meshes: Path, tmp_path:
     (cut_short / "checkpoint.new" / "state.json").write_text("{")
     run(meshes, cut_short, resume=True, validation=0)
     assert weights(tmp_path / "whole") == weights(cut_short)
-
-
-@pytest.mark.nightly
-def test_training_on_one_solid_learns_to_finish_it(tmp_path: Path) -> None:
-    """A cross falls into three parts, if its arms are cut off where they begin; values count the cuts to come."""
-    meshes = write_meshes(tmp_path / "meshes")
-    for other in ("angle", "apart", "box", "broken", "deeper/table"):
-        (meshes / f"{other}.ply").unlink()
-    changes = {
-        "threshold": 0.15,
-        "iterations": 1500,
-        "warmup": 500,
-        "batch": 32,
-        "validation": 0,
-        "rotate": False,
-        "replay": 5000,
-        "max_cuts": 8,
-        "temperature": 0.0,
-        "volume_reward": 0.0,
-        "finish_reward": 0.0,
-        "cut_cost": 100.0,
-        "discount": "static",
-        "static_discount": 1.0,
-        "value_bound": True,
-        "learning_rate": 3e-4,
-        "target_every": 100,
-        "epsilon": 0.1,
-        "checkpoint_seconds": 1000.0,
-        "log_every": 250,
-    }
-    run(meshes, tmp_path / "run", **changes)
-    found = curves(tmp_path / "run")
-    assert found[0]["episode_parts"] > 8
-    assert found[-1]["episode_parts"] < 5
-    assert -200 <= found[-1]["value"] <= -100  # two cuts from the cross, one from what the first one leaves

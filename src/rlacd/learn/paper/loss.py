@@ -60,3 +60,8 @@ def bellman_loss(q: Tensor, planes: Tensor, target: Tensor, unit: float) -> Tens
     """
     taken = q.gather(1, planes[:, None])[:, 0]
     return 0.5 * ((taken - target) / unit).square().mean()
+
+
+def cost_loss(values: Tensor, target: Tensor) -> Tensor:
+    """Half the mean squared error of the logarithm of negative values [B]: the same for 3 cuts of 2 as for 30 of 20."""
+    return 0.5 * (values / target).log().square().mean()

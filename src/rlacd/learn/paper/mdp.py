@@ -137,7 +137,7 @@ class CutProcess:
         """Cut component `index` of the frontier by a plane."""
         component = self.frontier.pop(index)
         self._candidates.pop(component, None)
-        settled, made = self._fall_apart(component, plane)
+        settled, made = self.fall_apart(component, plane)
         self.frontier += settled.unfinished
         self.finished += settled.finished
         self.stuck += settled.stuck
@@ -153,7 +153,8 @@ class CutProcess:
         discounts = [child.hull.volume / whole for child in settled.unfinished]
         return Cut(reward, settled.unfinished, discounts, settled.finished, settled.stuck, made)
 
-    def _fall_apart(self, component: Component, plane: Plane) -> tuple[CutResult, bool]:
+    def fall_apart(self, component: Component, plane: Plane) -> tuple[CutResult, bool]:
+        """Return what a cut would leave of a component of the frontier, and whether the plane cuts it at all."""
         sides = self._cache.sides(component, plane)
         if not sides:
             return CutResult(stuck=[component]), False

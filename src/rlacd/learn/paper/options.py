@@ -51,6 +51,14 @@ class TrainOptions:
     )
     scale_input: bool = option(False, "Tell the network how large the component is, too (the paper does not).")
 
+    lookahead: int = option(
+        0,
+        "The network values components, not planes (not paper): this many planes of least hull sum are cut, and "
+        "the one whose sides are worth most is taken. 0: it values the planes.",
+        least=0,
+        most=150,
+    )
+
     # Soft Q-learning
     iterations: int = option(1_000_000, "Cuts made, each followed by learning (paper: 1e6).", least=1)
     warmup: int = option(10_000, "First cuts, made at random without learning (paper: 1e4).", least=0)
@@ -66,6 +74,12 @@ class TrainOptions:
         one_of=("hull", "static"),
     )
     static_discount: float = option(0.99, "That constant, for each side.", least=0, most=1)
+    returns: str = option(
+        "one-step",
+        "What the network learns from: a cut's reward and the values of its sides (paper, eq. 8), or the rewards of "
+        "the rest of the episode.",
+        one_of=("one-step", "monte-carlo"),
+    )
     value_bound: bool = option(
         False,
         "Bound values by what can still be earned: hull volume, finishing, less one cut's cost (not paper).",
@@ -94,6 +108,10 @@ class TrainOptions:
         check_fields(self)
         if self.discount == "hull" and not math.isfinite(self.volume_reward + self.finish_reward):
             raise OptionError("volume_reward and finish_reward have to be finite.")
+        if self.lookahead and (self.volume_reward or self.finish_reward or not self.cut_cost):
+            raise OptionError(
+                "lookahead counts cuts: volume_reward and finish_reward have to be 0, cut_cost more than 0."
+            )
 
     @property
     def unit(self) -> float:
@@ -134,11 +152,18 @@ PRESETS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
             "scale_input": True,
             "volume_reward": 0.0,
             "finish_reward": 0.0,
-            "cut_cost": 100.0,
+            "cut_cost": 1.0,
             "discount": "static",
             "static_discount": 1.0,
-            "value_bound": True,
-            "target_every": 500,
+            "returns": "monte-carlo",
+            "lookahead": 4,
+            "learn_every": 4,
+            "iterations": 4_000,
+            "warmup": 500,
+            "epsilon": 0.1,
+            "points": 512,
+            "max_faces": 500,
+            "validate_every": 1_000,
         },
         "quick": {
             "batch": 32,
@@ -156,5 +181,5 @@ PRESETS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
         },
     }
 )
-"""Changes to the defaults: the paper's run; the same scaled to two cores; the same method with the number of cuts as
-its objective, as the first runs suggested (docs/research/experiments.md); and a run of a few minutes to try it."""
+"""Changes to the defaults: the paper's run; the same scaled to two cores; a component's number of cuts, learned from
+whole episodes and used in lookahead (docs/research/learning.md); and a run of a few minutes to try the paper's."""

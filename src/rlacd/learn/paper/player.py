@@ -12,14 +12,15 @@ import torch
 from numpy.typing import NDArray
 
 from rlacd.learn.encoders import Encoder, describe
+from rlacd.learn.paper.lookahead import Lookahead, promising
 from rlacd.learn.paper.loss import boltzmann
 from rlacd.learn.paper.mdp import CutProcess, Reward
 from rlacd.learn.paper.options import TrainOptions
 from rlacd.learn.paper.qnetwork import QNetwork
 from rlacd.learn.paper.record import ENDED, Record
-from rlacd.policies.observe import Float32Array, observe
+from rlacd.policies.observe import Float32Array, observe, valid_planes
 from rlacd.solid.arrays import BoolArray, FloatArray
-from rlacd.solid.component import Component
+from rlacd.solid.component import Component, Plane
 
 
 @dataclass
@@ -66,10 +67,13 @@ class Player:
         rewards: list[Reward] = []
         while not (ended := self._ended(len(planes))):
             largest = cutting.largest()
-            seen = frontier.pop(largest)
-            plane, value = self._choose(seen)
-            component = cutting.frontier[largest]
-            cut = cutting.cut(largest, cutting.candidates(component).plane(plane))
+            component, seen = cutting.frontier[largest], frontier.pop(largest)
+            if self.options.lookahead:
+                plane, value = 0, np.nan
+                cut = cutting.cut(largest, self._look_ahead(component))
+            else:
+                plane, value = self._choose(seen)
+                cut = cutting.cut(largest, cutting.candidates(component).plane(plane))
             children = self._see(cut.unfinished)
             frontier += children
             everything += children
@@ -106,9 +110,22 @@ class Player:
         options = self.options
         seen = [observe(c, self.cutting.candidates(c), options.threshold, options.points) for c in components]
         features = describe(self.encoder, seen, options.scale_input)
+        only = np.ones(1, dtype=np.bool_)  # the value of a component is that of its only action
         return [
-            _Seen(row, o.mask, c.volume / c.hull.volume) for row, o, c in zip(features, seen, components, strict=True)
+            _Seen(row, only if options.lookahead else o.mask, c.volume / c.hull.volume)
+            for row, o, c in zip(features, seen, components, strict=True)
         ]
+
+    def _look_ahead(self, component: Component) -> Plane:
+        """Choose one of the promising planes, at random or by lookahead."""
+        planes = promising(component, self.options.lookahead)
+        if not planes:  # the sweep is stricter than the mask
+            candidates = self.cutting.candidates(component)
+            return candidates.plane(int(valid_planes(component, candidates).argmax()))
+        if self.network is None or self.rng.random() < self.epsilon:
+            return planes[int(self.rng.integers(len(planes)))]
+        values = Lookahead(self.network, self.encoder, self.options).values(self.cutting, component, planes)
+        return planes[int(values.argmax())]
 
     def _choose(self, seen: _Seen) -> tuple[int, float]:
         """Choose a plane, at random or by the Boltzmann policy; also returns the greatest Q, nan without a network."""

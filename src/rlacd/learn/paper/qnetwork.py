@@ -8,6 +8,8 @@ from itertools import pairwise
 import torch
 from torch import Tensor, nn
 
+from rlacd.learn.paper.options import TrainOptions
+
 HIDDEN = (1024, 512, 256, 128)
 """Widths of the paper's layers."""
 
@@ -26,11 +28,20 @@ class QNetwork(nn.Module):
         hundred thousand steps just to reach that scale.
     hidden : sequence of int
     outputs : int
+    costs : bool
+        The values are negative, and the layers' outputs are their logarithms.
     """
 
-    def __init__(self, inputs: int, unit: float = 1.0, hidden: Sequence[int] = HIDDEN, outputs: int = PLANES) -> None:
+    def __init__(
+        self,
+        inputs: int,
+        unit: float = 1.0,
+        hidden: Sequence[int] = HIDDEN,
+        outputs: int = PLANES,
+        costs: bool = False,
+    ) -> None:
         super().__init__()
-        self.unit = unit
+        self.unit, self.outputs, self.costs = unit, outputs, costs
         layers: list[nn.Module] = []
         for before, after in pairwise((inputs, *hidden)):
             layers += [nn.Linear(before, after), nn.ReLU()]
@@ -38,8 +49,14 @@ class QNetwork(nn.Module):
 
     def forward(self, features: Tensor) -> Tensor:
         """Values Q(p, m) [B, 150] of features [B, inputs]."""
-        values: Tensor = self.unit * self.layers(features)
-        return values
+        out: Tensor = self.layers(features)
+        return -self.unit * out.exp() if self.costs else self.unit * out
+
+    @classmethod
+    def of(cls, inputs: int, options: TrainOptions) -> QNetwork:
+        """Make the network of a training: values of planes, or the cost of a component."""
+        counts = options.lookahead > 0
+        return cls(inputs, options.unit, outputs=1 if counts else PLANES, costs=counts)
 
     @torch.no_grad()
     def copy_from(self, other: QNetwork) -> None:

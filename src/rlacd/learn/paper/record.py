@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -18,6 +18,32 @@ Longs: TypeAlias = NDArray[np.int64]
 
 ENDED = ("terminal", "stuck", "cap", "nothing", "lost")
 """Ways to end: all parts finished; some cannot be cut; truncated; nothing to cut; the episode could not be played."""
+
+
+@dataclass(frozen=True)
+class Transition:
+    """A cut: the component cut, by its number in the record, and the discounts of the unfinished ones it left."""
+
+    state: int
+    children: dict[int, float]
+
+
+def whole_returns(cuts: Sequence[Transition], rewards: Sequence[float]) -> list[tuple[float, dict[int, float]]]:
+    """Discounted sum of the rewards of each cut and of all later ones of the same component.
+
+    Returned with the components that were left uncut when the episode was truncated, and their discounts.
+    """
+    returns: list[tuple[float, dict[int, float]]] = []
+    of: dict[int, tuple[float, dict[int, float]]] = {}
+    for cut, reward in zip(reversed(cuts), reversed(rewards), strict=True):
+        total, left = reward, {}
+        for child, discount in cut.children.items():
+            gained, below = of.get(child, (0.0, {child: 1.0}))
+            total += discount * gained
+            left |= {row: discount * weight for row, weight in below.items()}
+        of[cut.state] = total, left
+        returns.append(of[cut.state])
+    return returns[::-1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +114,17 @@ class Record:
     def how(self) -> str:
         """Return how it ended."""
         return ENDED[self.ended]
+
+    def transitions(self, discount: float | None) -> list[Transition]:
+        """Which components each cut left; `discount` replaces the recorded ones."""
+        joined, cuts = self.joined.tolist(), []
+        frontier, new = list(range(joined[0])), joined[0]
+        for index, count in zip(self.index.tolist(), joined[1:], strict=True):
+            children = {c: self.discounts[c] if discount is None else discount for c in range(new, new + count)}
+            cuts.append(Transition(frontier.pop(index), children))
+            frontier += children
+            new += count
+        return cuts
 
     def reward(self, cut: int) -> Reward:
         """Get the reward of a cut."""

@@ -92,7 +92,7 @@ class RolloutServer:
             state = load(shared["network"].blobs["weights"])
             if not self._weights:
                 inputs = self._encoder.dim + (SCALE_INPUTS if self._options.scale_input else 0)
-                self._network = QNetwork(inputs, self._options.unit)
+                self._network = QNetwork.of(inputs, self._options)
             self._network.load_state_dict(state)
             self._weights = shared["network"].key
 

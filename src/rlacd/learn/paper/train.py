@@ -13,7 +13,6 @@ import json
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -29,11 +28,11 @@ from rlacd.learn.device import pick_device
 from rlacd.learn.encoders import AnyEncoder, I2PMAEEncoder, make_encoder
 from rlacd.learn.meshes import MeshList, Solids, list_once
 from rlacd.learn.paper.export import export_policy
-from rlacd.learn.paper.loss import bellman_loss, dual_state_target, soft_value
+from rlacd.learn.paper.loss import bellman_loss, cost_loss, dual_state_target, soft_value
 from rlacd.learn.paper.mdp import Reward
 from rlacd.learn.paper.options import TrainOptions
-from rlacd.learn.paper.qnetwork import PLANES, QNetwork
-from rlacd.learn.paper.record import Record
+from rlacd.learn.paper.qnetwork import QNetwork
+from rlacd.learn.paper.record import Record, whole_returns
 from rlacd.learn.paper.replay import Replay
 from rlacd.learn.paper.rollouts import Acting, Rollouts
 from rlacd.learn.paper.torch_policy import torch_policy
@@ -133,13 +132,12 @@ class Training:
         self.device = pick_device(options.device)
         self.encoder = encoder
         self.inputs = self.encoder.dim + (SCALE_INPUTS if options.scale_input else 0)
-        self.unit = options.unit
         torch.manual_seed(options.seed)
-        self.network = QNetwork(self.inputs, self.unit).to(self.device)
-        self.target = QNetwork(self.inputs, self.unit).to(self.device)
+        self.network = QNetwork.of(self.inputs, options).to(self.device)
+        self.target = QNetwork.of(self.inputs, options).to(self.device)
         self.target.copy_from(self.network)
         self.optimizer = torch.optim.Adam(self.network.parameters(), lr=options.learning_rate, fused=True)
-        self.replay = Replay(options.replay, self.inputs, PLANES)
+        self.replay = Replay(options.replay, self.inputs, self.network.outputs)
         self.rng = np.random.default_rng([options.seed, 0])
         self.solids = solids
         self.rollouts = rollouts
@@ -185,25 +183,22 @@ class Training:
 
     def learn_from(self, record: Record) -> None:
         """Add an episode to the replay buffer cut by cut, and learn after each."""
-        rows = iter(self._keep(record))
-        frontier = list(islice(rows, int(record.joined[0])))
-        discounts = iter(record.discounts[int(record.joined[0]) :].tolist())
-        for k, count in enumerate(record.joined[1:].tolist()):
-            state, children = frontier.pop(int(record.index[k])), list(islice(rows, count))
-            weights = list(islice(discounts, count))
-            if self.options.discount == "static":
-                weights = [self.options.static_discount] * count
-            reward = self.reward(record.reward(k))
-            self.replay.add(state, int(record.planes[k]), reward, children, weights)
-            self.replay.release(state)
-            frontier += children
-            self._add("reward", reward)
+        rows, options = self._keep(record), self.options
+        cuts = record.transitions(options.static_discount if options.discount == "static" else None)
+        rewards = [self.reward(record.reward(k)) for k in range(record.cuts)]
+        targets = list(zip(rewards, [cut.children for cut in cuts], strict=True))
+        if options.returns == "monte-carlo":
+            targets = whole_returns(cuts, rewards)
+        for k, (cut, (gained, children)) in enumerate(zip(cuts, targets, strict=True)):
+            left = [rows[child] for child in children]
+            self.replay.add(rows[cut.state], int(record.planes[k]), gained, left, list(children.values()))
+            self._add("reward", rewards[k])
             if np.isfinite(record.values[k]):
                 self._add("value", float(record.values[k]))
             self.cuts += 1
             if self.cuts > self.options.warmup and self.cuts % self.options.learn_every == 0:
                 self.learn()
-        for row in frontier:
+        for row in rows:
             self.replay.release(row)
         if record.cuts:
             self._add("episode_parts", float(record.parts))
@@ -230,7 +225,8 @@ class Training:
                 self._tensor(batch.rewards), values, self._tensor(batch.child_discounts), self._tensor(batch.owner)
             )
         q = self.network(self._tensor(batch.features))
-        loss = bellman_loss(q, self._tensor(batch.planes), target, self.unit)
+        planes = self._tensor(batch.planes)
+        loss = cost_loss(q[:, 0], target) if self.network.costs else bellman_loss(q, planes, target, options.unit)
         self.optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         self.optimizer.step()
@@ -260,9 +256,11 @@ class Training:
         if self.baseline is None:
             self.baseline = count_parts(Greedy("hull-sum"), solids, criterion, MOST_PARTS)
         score = count_parts(torch_policy(self.network, self.encoder, self.options), solids, criterion, MOST_PARTS)
-        short = torch_policy(self.network, self.encoder, self.options, shortlist=10)
-        deployed = count_parts(short, solids, criterion, MOST_PARTS).against(self.baseline)
-        values = score.against(self.baseline) | {f"deployed_{k}": v for k, v in deployed.items()}
+        values = score.against(self.baseline)
+        if not self.options.lookahead:
+            short = torch_policy(self.network, self.encoder, self.options, shortlist=10)
+            deployed = count_parts(short, solids, criterion, MOST_PARTS).against(self.baseline)
+            values |= {f"deployed_{k}": v for k, v in deployed.items()}
         self.curves.add(self.cuts, {f"validation_{k}": v for k, v in values.items()}, self.seconds)
         self.say(f"cut {self.cuts}  validation: " + "  ".join(f"{k} {v:.3f}" for k, v in values.items()))
         if values["merged_ratio"] <= self.best:
@@ -315,13 +313,15 @@ class Training:
         self.curves.restart(self.cuts)
 
     def export(self) -> Path:
-        """Export the best network, or the current one if none was validated."""
+        """Export the best network, or the current one if none was validated; of lookahead, only the weights."""
         from safetensors.torch import load_file
 
         best = self.folder / "best.safetensors"
         if not best.exists():
             self._save_weights("best.safetensors")
-        network = QNetwork(self.inputs, self.unit)
+        if self.options.lookahead:
+            return best
+        network = QNetwork.of(self.inputs, self.options)
         network.load_state_dict(load_file(best))
         return export_policy(self.folder / "policy.onnx", self.encoder, network, self.options)
 
@@ -330,7 +330,7 @@ class Training:
         self.curves.close()
 
     def _keep(self, record: Record) -> list[int]:
-        """Rows in the replay buffer of all components of an episode; each is released when it is cut, or at the end."""
+        """Rows in the replay buffer of all components of an episode, in the order of the record."""
         bounds = self.options.volume_reward * (1 - record.fill) + self.options.finish_reward - self.options.cut_cost
         return [
             self.replay.add_component(features, mask, bound)
