@@ -26,7 +26,7 @@ from rlacd.learn.meshes import Solids, list_meshes
 from rlacd.learn.paper.mdp import CutProcess, terminal_reward
 from rlacd.planes.candidates import axis_and_principal
 from rlacd.planes.sweep import sweep
-from rlacd.policies.observe import observe, valid_planes
+from rlacd.policies.observe import SCALE_INPUTS, observe, valid_planes
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component
 from rlacd.workers import Workers
@@ -204,7 +204,7 @@ def test_encoders_keep_the_protocol_and_ignore_size_and_place(name: str) -> None
     assert features.shape == (2, encoder.dim)
     assert features[0] == pytest.approx(features[1], abs=0.05)
     assert seen[1].scale[0] == pytest.approx(seen[0].scale[0] - 2)
-    assert describe(encoder, seen, scale_input=True).shape == (2, encoder.dim + 3)
+    assert describe(encoder, seen, scale_input=True).shape == (2, encoder.dim + SCALE_INPUTS)
 
 
 def test_profiles_count_points_between_the_planes() -> None:

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 torch = pytest.importorskip("torch", reason="needs the extra train")
 
 from rlacd.errors import RlacdError  # noqa: E402
-from rlacd.learn.paper.loss import bellman_loss, boltzmann, dual_state_target, soft_value  # noqa: E402
+from rlacd.learn.paper.loss import bellman_loss, boltzmann, cost_loss, dual_state_target, soft_value  # noqa: E402
+from rlacd.learn.paper.record import Transition, whole_returns  # noqa: E402
 from rlacd.learn.paper.replay import Replay  # noqa: E402
 
 Q = torch.tensor([[1.0, 2.0, 3.0], [4.0, 0.0, -1.0]])
@@ -62,6 +63,22 @@ def test_loss_by_hand_and_only_through_the_planes_taken() -> None:
     assert q.grad.tolist() == [pytest.approx([0, -1.0 / 10 / 2, 0]), [0, 0, 0]]
 
 
+def test_cost_loss_by_hand_depends_on_the_ratio_only() -> None:
+    assert cost_loss(torch.tensor([-2.0, -8.0]), torch.tensor([-1.0, -8.0])).item() == pytest.approx(
+        math.log(2) ** 2 / 4
+    )
+    assert cost_loss(torch.tensor([-20.0]), torch.tensor([-10.0])) == cost_loss(
+        torch.tensor([-2.0]), torch.tensor([-1.0])
+    )
+
+
+def test_whole_returns_by_hand() -> None:
+    # 0 falls into 1 and 2, then 2 into 3 and 4, and 1 is finished by its cut; 3 and 4 are left when the episode ends.
+    cuts = [Transition(0, {1: 0.5, 2: 0.25}), Transition(2, {3: 0.5, 4: 1.0}), Transition(1, {})]
+    returns = whole_returns(cuts, [1.0, 10.0, 100.0])
+    assert returns == [(1 + 0.5 * 100 + 0.25 * 10, {3: 0.125, 4: 0.25}), (10.0, {3: 0.5, 4: 1.0}), (100.0, {})]
+
+
 class Model:
     """What a replay buffer has to behave like: a list of whole transitions, nothing shared."""
 
@@ -75,7 +92,7 @@ class Model:
         self.made += 1
         mask = np.zeros(11, dtype=bool)
         mask[self.made % 11] = True
-        return self.replay.add_component(np.full(3, self.made, np.float32), mask, float(self.made)), float(self.made)
+        return self.replay.add_component(np.full(3, self.made, np.float32), mask), float(self.made)
 
     def step(self, children: int) -> None:
         if not self.frontier:
@@ -104,7 +121,6 @@ def test_replay_gives_back_the_last_transitions_and_forgets_the_rest(capacity: i
         mine = batch.owner == i
         assert (batch.planes[i], batch.rewards[i]) == (plane, np.float32(reward))
         assert batch.child_features[mine, 0].tolist() == names
-        assert batch.child_bounds[mine].tolist() == names
         assert [int(m.argmax()) for m in batch.child_masks[mine]] == [int(n) % 11 for n in names]
         assert batch.child_discounts[mine] == pytest.approx(shares)
     needed = {name for name, *_ in model.transitions[-capacity:]} | {n for _, n in model.frontier}

@@ -94,7 +94,6 @@ def test_presets_are_valid_and_the_papers_is_the_papers() -> None:
     assert (paper.epsilon, paper.epsilon_decay, paper.points) == (0.2, 0.99, 2048)
     assert (paper.discount, paper.finish_counts, paper.rotate) == ("hull", "solid", True)
     assert not paper.scale_input
-    assert not paper.value_bound
     assert TrainOptions.preset("quick", seed=3).seed == 3
 
 
@@ -114,6 +113,14 @@ def test_presets_are_valid_and_the_papers_is_the_papers() -> None:
 def test_options_out_of_range_are_reported(name: str, value: Any) -> None:
     with pytest.raises(OptionError, match=f"{name} is"):
         TrainOptions(**{name: value})
+
+
+def test_lookahead_has_to_count_cuts() -> None:
+    with pytest.raises(OptionError, match="volume_reward and finish_reward have to be 0"):
+        TrainOptions(lookahead=4, cut_cost=1.0)
+    with pytest.raises(OptionError, match="cut_cost more than 0"):
+        TrainOptions(lookahead=4, volume_reward=0.0, finish_reward=0.0)
+    assert TrainOptions.preset("counting").lookahead == 4
 
 
 def test_unknown_presets_and_options_are_reported() -> None:
@@ -268,7 +275,7 @@ def test_the_exported_policy_computes_what_torch_does(meshes: Path, tmp_path: Pa
     from rlacd.learn.paper.export import PointsToValues, export_policy
     from rlacd.learn.paper.qnetwork import QNetwork
     from rlacd.planes.candidates import axis_and_principal
-    from rlacd.policies.observe import observe
+    from rlacd.policies.observe import SCALE_INPUTS, observe
     from rlacd.policies.q_network import OnnxQ
     from rlacd.solid.component import Component
     from tests.learning import small_solids
@@ -276,7 +283,7 @@ def test_the_exported_policy_computes_what_torch_does(meshes: Path, tmp_path: Pa
     for name, scale_input in (("profile", True), ("profile-without-hull", False)):
         encoder = make_encoder(name)
         torch.manual_seed(0)
-        network = QNetwork(encoder.dim + 3 * scale_input, 1000.0)
+        network = QNetwork(encoder.dim + SCALE_INPUTS * scale_input, 1000.0)
         options = TrainOptions(encoder=name, scale_input=scale_input, points=256)
         path = export_policy(tmp_path / f"{name}.onnx", encoder, network, options)
         module, exported = PointsToValues(encoder, network, scale_input), OnnxQ(path)
@@ -345,3 +352,16 @@ def test_a_checkpoint_half_written_leaves_the_one_before(meshes: Path, tmp_path:
     (cut_short / "checkpoint.new" / "state.json").write_text("{")
     run(meshes, cut_short, resume=True, validation=0)
     assert weights(tmp_path / "whole") == weights(cut_short)
+
+
+def test_lookahead_is_trained_and_leaves_a_policy(meshes: Path, tmp_path: Path) -> None:
+    counted = {"volume_reward": 0.0, "finish_reward": 0.0, "cut_cost": 1.0, "discount": "static"}
+    counted |= {"static_discount": 1.0, "returns": "monte-carlo", "lookahead": 2, "iterations": 60}
+    assert run(meshes, tmp_path / "run", validation=0, **counted).name == "best.safetensors"
+    assert all(point["reward"] == -1 for point in curves(tmp_path / "run"))
+    from rlacd.learn.paper.torch_policy import load_policy
+    from rlacd.solid.component import Component
+    from tests.learning import small_solids
+
+    plane = load_policy(tmp_path / "run").choose(Component(small_solids()["angle"]))
+    assert plane is not None

@@ -20,7 +20,7 @@ from rlacd.learn.meshes import Solids, list_meshes
 from rlacd.learn.paper.episodes import Episodes
 from rlacd.learn.paper.mdp import CutProcess, Reward
 from rlacd.planes.candidates import OFFSETS_PER_AXIS
-from rlacd.policies.observe import Observation, observe
+from rlacd.policies.observe import SCALE_INPUTS, Observation, observe
 from rlacd.solid.arrays import BoolArray
 from rlacd.solid.component import Component
 
@@ -39,7 +39,7 @@ class CutEnv(gymnasium.Env[_Observed, NDArray[np.int64]]):
 
     - ``points`` float32 [S, 2, N, 3]: points of the component's surface and of its hull's, in its own frame;
     - ``directions`` float32 [S, 6, 3]: normals of its candidate planes;
-    - ``scale`` float32 [S, 3]: see `rlacd.policies.observe.Observation`;
+    - ``scale`` float32 [S, 10]: see `rlacd.policies.observe.Observation`;
     - ``taken`` int8 [S]: 1 if the slot holds a component.
 
     The action is a slot and one of its 150 planes. Planes not allowed by ``info["action_mask"]`` [S, 150] cut nothing
@@ -100,7 +100,7 @@ class CutEnv(gymnasium.Env[_Observed, NDArray[np.int64]]):
             {
                 "points": spaces.Box(-1.0, 1.0, (slots, 2, points, 3), np.float32),
                 "directions": spaces.Box(-1.0, 1.0, (slots, 6, 3), np.float32),
-                "scale": spaces.Box(-LARGEST_SCALE, LARGEST_SCALE, (slots, 3), np.float32),
+                "scale": spaces.Box(-LARGEST_SCALE, LARGEST_SCALE, (slots, SCALE_INPUTS), np.float32),
                 "taken": spaces.MultiBinary(slots),
             }
         )

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from rlacd import _native
 from rlacd.criteria.concavity import VOLUME_WEIGHT, volume_radius
 from rlacd.planes.candidates import Candidates, axis_and_principal
+from rlacd.planes.concave_edges import reflex_edges
 from rlacd.planes.sweep import SLIVER
-from rlacd.solid.arrays import BoolArray
+from rlacd.solid.arrays import BoolArray, FloatArray
 from rlacd.solid.component import Component
 
 Float32Array = NDArray[np.float32]
 
-SCALE_INPUTS = 3
+SCALE_INPUTS = 10
 """Length of `Observation.scale`."""
 
 
@@ -31,9 +32,10 @@ class Observation:
         centred and its longest side is 2.
     directions : float32 [6, 3]
         Unit normals of the candidate planes: the coordinate axes, then the principal axes.
-    scale : float32 [3]
+    scale : float32 [10]
         What that frame hides: log2 of half the longest side of the component's box in the solid's frame, 0.3 R_v over
-        the threshold, and the share of its hull that the component fills.
+        the threshold, and the share of its hull that the component fills. Then the box's proportions, and its reflex
+        edges (`creases`).
     mask : bool [150]
         Which planes are valid.
     """
@@ -66,13 +68,35 @@ def observe(component: Component, candidates: Candidates, threshold: float, coun
         ]
     )
     relative = VOLUME_WEIGHT * volume_radius(component.volume, hull.volume) / threshold
-    scale = np.array([np.log2(radius), relative, component.volume / hull.volume], dtype=np.float32)
+    shape = np.sort(upper - lower)[:2] / (2 * radius)
+    scale = [np.log2(radius), relative, component.volume / hull.volume, *shape, *creases(component, threshold)]
     return Observation(
         ((points - (lower + upper) / 2) / radius).astype(np.float32),
         candidates.directions.astype(np.float32),
-        scale,
+        np.array(scale, dtype=np.float32),
         valid_planes(component, candidates),
     )
+
+
+def creases(component: Component, threshold: float) -> FloatArray:
+    """Sums over the reflex edges [5], as log(1 + x): what a component's parts are best predicted by.
+
+    Number; length times angle; number, and length times angle, of those deeper below the hull than the threshold;
+    greatest depth. Lengths are relative to the box's longest side, depths to the threshold.
+    """
+    edges, hull = reflex_edges(component), component.hull
+    if not len(edges):
+        return np.zeros(5)
+    corners = hull.vertices[hull.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normals, axis=1)
+    normals, corners = normals[length > 0] / length[length > 0, None], corners[length > 0, 0]
+    ends = component.vertices[edges.ends]
+    depth = ((normals * corners).sum(axis=1) - ends.mean(axis=1) @ normals.T).min(axis=1) / threshold
+    size = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) * edges.angle / np.ptp(component.box, axis=0).max()
+    deep = depth > 1
+    sums: FloatArray = np.log1p([len(edges), size.sum(), deep.sum(), size[deep].sum(), max(depth.max(), 0)])
+    return sums
 
 
 def valid_planes(component: Component, candidates: Candidates) -> BoolArray:

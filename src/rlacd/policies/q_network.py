@@ -74,7 +74,7 @@ class OnnxQ:
             raise WeightsError(f"The metadata of {path} are damaged; export the policy again.") from error
 
     def run(self, points: Float32Array, directions: Float32Array, scale: Float32Array) -> Float32Array:
-        """Values [B, 150] of points [B, 2, N, 3], directions [B, 6, 3] and scale [B, 3]."""
+        """Values [B, 150] of points [B, 2, N, 3], directions [B, 6, 3] and scale [B, S]."""
         given = dict(zip(INPUTS, (points, directions, scale), strict=True))
         values: Float32Array = self._session.run(list(OUTPUTS), given)[0]
         return values

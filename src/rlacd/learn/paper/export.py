@@ -31,7 +31,7 @@ class PointsToValues(nn.Module):
         self.scale_input = scale_input
 
     def forward(self, points: Tensor, directions: Tensor, scale: Tensor) -> Tensor:
-        """Values [B, 150] of points [B, 2, N, 3], directions [B, 6, 3] and scale [B, 3]."""
+        """Values [B, 150] of points [B, 2, N, 3], directions [B, 6, 3] and scale [B, S]."""
         features = self.encoder(points, directions)
         if self.scale_input:
             features = torch.cat([features, scale], dim=1)

@@ -49,7 +49,7 @@ class TrainOptions:
     points: int = option(
         2048, "Points on the surface of a component, and as many on its hull (paper).", least=16, most=65536
     )
-    scale_input: bool = option(False, "Tell the network how large the component is, too (the paper does not).")
+    scale_input: bool = option(False, "Tell the network the component's size and creases, too (not paper).")
 
     lookahead: int = option(
         0,
@@ -79,10 +79,6 @@ class TrainOptions:
         "What the network learns from: a cut's reward and the values of its sides (paper, eq. 8), or the rewards of "
         "the rest of the episode.",
         one_of=("one-step", "monte-carlo"),
-    )
-    value_bound: bool = option(
-        False,
-        "Bound values by what can still be earned: hull volume, finishing, less one cut's cost (not paper).",
     )
     target_every: int = option(1000, "Gradient steps between copies to the target network.", least=1)
     epsilon: float = option(0.2, "Share of random cuts at first (paper).", least=0, most=1)
@@ -157,7 +153,6 @@ PRESETS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
             "static_discount": 1.0,
             "returns": "monte-carlo",
             "lookahead": 4,
-            "learn_every": 4,
             "iterations": 4_000,
             "warmup": 500,
             "epsilon": 0.1,

@@ -29,7 +29,6 @@ class _Seen:
 
     features: Float32Array
     mask: BoolArray
-    fill: float
 
 
 @dataclass(frozen=True)
@@ -86,7 +85,6 @@ class Player:
         return Record(
             features=np.stack([seen.features for seen in everything]).astype(np.float16),
             masks=np.stack([seen.mask for seen in everything]),
-            fill=np.array([seen.fill for seen in everything]),
             discounts=np.array(discounts),
             joined=np.array(joined, np.int64),
             index=np.array(index, np.int64),
@@ -111,10 +109,7 @@ class Player:
         seen = [observe(c, self.cutting.candidates(c), options.threshold, options.points) for c in components]
         features = describe(self.encoder, seen, options.scale_input)
         only = np.ones(1, dtype=np.bool_)  # the value of a component is that of its only action
-        return [
-            _Seen(row, only if options.lookahead else o.mask, c.volume / c.hull.volume)
-            for row, o, c in zip(features, seen, components, strict=True)
-        ]
+        return [_Seen(row, only if options.lookahead else o.mask) for row, o in zip(features, seen, strict=True)]
 
     def _look_ahead(self, component: Component) -> Plane:
         """Choose one of the promising planes, at random or by lookahead."""

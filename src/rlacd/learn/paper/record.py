@@ -36,7 +36,8 @@ def whole_returns(cuts: Sequence[Transition], rewards: Sequence[float]) -> list[
     returns: list[tuple[float, dict[int, float]]] = []
     of: dict[int, tuple[float, dict[int, float]]] = {}
     for cut, reward in zip(reversed(cuts), reversed(rewards), strict=True):
-        total, left = reward, {}
+        total = reward
+        left: dict[int, float] = {}
         for child, discount in cut.children.items():
             gained, below = of.get(child, (0.0, {child: 1.0}))
             total += discount * gained
@@ -56,8 +57,6 @@ class Record:
         Of the components, in the order in which they were appended to the frontier.
     masks : bool [N, A]
         Their valid planes.
-    fill : float64 [N]
-        Fraction of the hull that the solid fills: 1 - fill bounds the volume that cutting can save.
     discounts : float64 [N]
         Discount of each as a child; 1 for the initial components.
     joined : int64 [1 + T]
@@ -77,7 +76,6 @@ class Record:
 
     features: NDArray[np.float16]
     masks: BoolArray
-    fill: FloatArray
     discounts: FloatArray
     joined: Longs
     index: Longs
@@ -94,7 +92,6 @@ class Record:
         return cls(
             features=np.empty((0, 0), np.float16),
             masks=np.empty((0, 0), np.bool_),
-            fill=floats,
             discounts=floats,
             joined=np.zeros(1, np.int64),
             index=ints,

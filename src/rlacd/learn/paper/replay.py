@@ -30,8 +30,8 @@ class TransitionBatch:
     child_features : float32 [C, D]
     child_masks : bool [C, A]
         Never all False in a row.
-    child_discounts, child_bounds : float32 [C]
-        gamma, and the upper bounds on their values given to `Replay.add_component`.
+    child_discounts : float32 [C]
+        gamma.
     owner : int64 [C]
         Batch row of each child.
     """
@@ -42,7 +42,6 @@ class TransitionBatch:
     child_features: Float32Array
     child_masks: BoolArray
     child_discounts: Float32Array
-    child_bounds: Float32Array
     owner: NDArray[np.int64]
 
 
@@ -63,7 +62,6 @@ class Replay:
         self.capacity, self.dim, self.actions = capacity, dim, actions
         self._features = np.zeros((64, dim), dtype=np.float16)
         self._masks = np.zeros((64, (actions + 7) // 8), dtype=np.uint8)
-        self._bounds = np.zeros(64, dtype=np.float32)
         self._users = np.zeros(64, dtype=np.int32)
         self._free = list(range(63, -1, -1))
         self._states = np.zeros(capacity, dtype=np.int64)
@@ -82,14 +80,14 @@ class Replay:
         """Number of feature rows in use."""
         return len(self._users) - len(self._free)
 
-    def add_component(self, features: Float32Array, mask: BoolArray, bound: float = np.inf) -> int:
+    def add_component(self, features: Float32Array, mask: BoolArray) -> int:
         """Store a component's features [D] and valid planes [A]; the row stays until `release`, and while a transition
         refers to it.
         """
         if not self._free:
             self._grow()
         row = self._free.pop()
-        self._features[row], self._masks[row], self._bounds[row] = features, np.packbits(mask), bound
+        self._features[row], self._masks[row] = features, np.packbits(mask)
         self._users[row] = 1
         return row
 
@@ -136,7 +134,6 @@ class Replay:
             self._features[rows].astype(np.float32),
             self.masks(rows),  # type: ignore[arg-type]
             np.concatenate([self._discounts[i] for i in index]),
-            self._bounds[rows],
             np.repeat(np.arange(count), [len(c) for c in children]),
         )
 
@@ -146,7 +143,6 @@ class Replay:
         return {
             "features": self._features,
             "masks": self._masks,
-            "bounds": self._bounds,
             "users": self._users,
             "free": np.array(self._free, dtype=np.int64),
             "states": self._states[: self._count],
@@ -161,7 +157,7 @@ class Replay:
     def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Restore the result of `state` from a buffer with the same parameters."""
         self._features, self._masks = state["features"].copy(), state["masks"].copy()
-        self._bounds, self._users = state["bounds"].copy(), state["users"].copy()
+        self._users = state["users"].copy()
         self._free = state["free"].tolist()
         self._next, self._count = (int(x) for x in state["cursor"])
         self._states[: self._count] = state["states"]
@@ -176,6 +172,5 @@ class Replay:
         size = len(self._users)
         self._features = np.concatenate([self._features, np.zeros_like(self._features)])
         self._masks = np.concatenate([self._masks, np.zeros_like(self._masks)])
-        self._bounds = np.concatenate([self._bounds, np.zeros_like(self._bounds)])
         self._users = np.concatenate([self._users, np.zeros_like(self._users)])
         self._free = list(range(2 * size - 1, size - 1, -1))

@@ -217,10 +217,6 @@ class Training:
         with torch.no_grad():
             q = self.target(self._tensor(batch.child_features))
             values = soft_value(q, self._tensor(batch.child_masks), options.temperature)
-            if options.value_bound:
-                # The worst possible return is to cut until the episode is truncated.
-                values = values.clamp_min(-options.cut_cost * options.max_cuts)
-                values = torch.minimum(values, self._tensor(batch.child_bounds))
             target = dual_state_target(
                 self._tensor(batch.rewards), values, self._tensor(batch.child_discounts), self._tensor(batch.owner)
             )
@@ -331,11 +327,7 @@ class Training:
 
     def _keep(self, record: Record) -> list[int]:
         """Rows in the replay buffer of all components of an episode, in the order of the record."""
-        bounds = self.options.volume_reward * (1 - record.fill) + self.options.finish_reward - self.options.cut_cost
-        return [
-            self.replay.add_component(features, mask, bound)
-            for features, mask, bound in zip(record.features, record.masks, bounds, strict=True)
-        ]
+        return [self.replay.add_component(*seen) for seen in zip(record.features, record.masks, strict=True)]
 
     def _tensor(self, array: np.ndarray) -> torch.Tensor:
         return torch.from_numpy(array).to(self.device)
