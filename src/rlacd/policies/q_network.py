@@ -81,7 +81,9 @@ class OnnxQ:
 
     def __call__(self, seen: Observation) -> Float32Array:
         """Values [150] of one observed component."""
-        values: Float32Array = self.run(seen.points[None], seen.directions[None], seen.scale[None])[0]
+        known = self._session.get_inputs()[-1].shape[1]  # older files know the first three entries of `scale`
+        scale = seen.scale[None, :known] if isinstance(known, int) else seen.scale[None]
+        values: Float32Array = self.run(seen.points[None], seen.directions[None], scale)[0]
         return values
 
 
