@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import ndimage
@@ -87,12 +88,18 @@ class Reach:
     def rooms_near(self, points: FloatArray) -> IntArray:
         """Return ``[N]`` the label of a room whose walls may contain each point, 0 for none."""
         reach = self.radius + 2 * self.pitch
-        away, index = ndimage.distance_transform_edt(self.room == 0, return_indices=True)
+        away, index = self._nearest_room
         cell = np.clip(np.rint((points - self.origin) / self.pitch).astype(np.int64), 0, np.array(self.room.shape) - 1)
         at = tuple(cell.T)
         nearest = self.room[tuple(index[(slice(None), *at)])]
         label: IntArray = np.where(away[at] * self.pitch <= reach, nearest, 0)
         return label
+
+    @cached_property
+    def _nearest_room(self) -> tuple[FloatArray, IntArray]:
+        """``[X, Y, Z], [3, X, Y, Z]`` the distance to the nearest cell of a room, and which it is, in cells."""
+        away, index = ndimage.distance_transform_edt(self.room == 0, return_indices=True)
+        return away, index
 
     def around_rooms(self, rooms: IntArray) -> BoolArray:
         """Return ``[X, Y, Z]`` the unreachable cells of some rooms and of their walls."""

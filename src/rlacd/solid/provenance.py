@@ -13,7 +13,7 @@ from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import Frame
 from rlacd.solid.topology import IntArray
 
-SAMPLES = 100_000
+SAMPLES = 10_000
 LEAST = 32
 """Points spread over the surface, and at least over each label's share of it."""
 
@@ -57,8 +57,10 @@ def owners(
         near = first + np.flatnonzero(((some >= lower - slack) & (some <= upper + slack)).all(axis=1))
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
-        height = points[near] @ normals.T - (normals * corners[:, 0]).sum(axis=1)
-        inside = near[(height <= slack).all(axis=1)]
+        x, y, z = points[near].T[:, :, None]
+        limit = (normals * corners[:, 0]).sum(axis=1) + slack
+        # Not a product of matrices: those start threads of their own.
+        inside = near[(x * normals[:, 0] + y * normals[:, 1] + z * normals[:, 2] <= limit).all(axis=1)]
         if len(inside) == 0:
             inside = np.array([((points - (lower + upper) / 2) ** 2).sum(axis=1).argmin()])
         found.append(int(np.bincount(labels[inside]).argmax()))
