@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 
 from rlacd._native import poll_stop
@@ -96,7 +97,7 @@ class Reach:
         return label
 
     @cached_property
-    def _nearest_room(self) -> tuple[FloatArray, IntArray]:
+    def _nearest_room(self) -> tuple[FloatArray, NDArray[np.int32]]:
         """``[X, Y, Z], [3, X, Y, Z]`` the distance to the nearest cell of a room, and which it is, in cells."""
         away, index = ndimage.distance_transform_edt(self.room == 0, return_indices=True)
         return away, index
