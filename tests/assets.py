@@ -161,3 +161,20 @@ def view_of(header: Json, binary: bytes, view: int) -> bytes:
     assert known["buffer"] == 0
     assert known["byteOffset"] + known["byteLength"] <= header["buffers"][0]["byteLength"] <= len(binary)
     return binary[known["byteOffset"] :][: known["byteLength"]]
+
+
+def painted_obj(folder: Path) -> Path:
+    """A crate as OBJ with half its faces of wood, which is a picture, and half in red."""
+    crate = trimesh.creation.box((1, 2, 3))
+    lines = ["mtllib crate.mtl", "o crate", *("v {:g} {:g} {:g}".format(*point) for point in crate.vertices)]
+    lines += ["vt 0 0", "vt 1 0", "vt 1 1"]
+    for half, paint in enumerate(("wood", "red")):
+        lines.append(f"usemtl {paint}")
+        for corners in crate.faces[half::2] + 1:
+            lines.append("f " + " ".join(f"{corner}/{place}" for place, corner in enumerate(corners, start=1)))
+    path = folder / "crate.obj"
+    path.write_text("\n".join(lines) + "\n")
+    paints = ["newmtl wood", "Kd 1 1 1", "map_Kd wood.png", "newmtl red", "Kd 1 0 0"]
+    (folder / "crate.mtl").write_text("\n".join(paints) + "\n")
+    (folder / "wood.png").write_bytes(png())
+    return path

@@ -39,13 +39,21 @@ class Asset:
     Attributes
     ----------
     content
-        The bytes of a glTF file, or a scene or mesh of trimesh.
-    folder
-        Where the files are that it refers to.
+        The bytes of a file, or a scene or mesh of trimesh.
+    path
+        Of the file, whose folder holds the files that it refers to; None for a scene or mesh from memory.
+    extension
+        Of its format, without the dot; empty for a scene or mesh from memory.
     """
 
     content: Any
-    folder: Path | None = None
+    path: Path | None = None
+    extension: str = ""
+
+    @property
+    def is_gltf(self) -> bool:
+        """Whether it is a glTF file, which is edited; anything else is converted."""
+        return self.extension in ("glb", "gltf")
 
 
 @dataclass(frozen=True)

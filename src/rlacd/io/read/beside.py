@@ -17,6 +17,9 @@ DATA = frozenset({".bin"})
 IMAGES = frozenset({".png", ".jpg", ".jpeg", ".webp", ".ktx2", ".dds"})
 """Copied, never decoded."""
 
+PICTURES = frozenset({".mtl", ".png", ".jpg", ".jpeg", ".bmp", ".tga", ".tif", ".tiff", ".gif", ".webp"})
+"""Materials, and pictures that are decoded: read only for files that keep them."""
+
 
 class FolderFiles(Resolver):  # type: ignore[misc]
     """Serves files of one folder only.

@@ -23,6 +23,7 @@ from rlacd.io.read.beside import FolderFiles
 from rlacd.io.read.conventions import stated
 from rlacd.io.read.gltf import node_names, plain_gltf
 from rlacd.io.read.limits import MOST_TRIANGLES
+from rlacd.io.read.looks import has_looks
 from rlacd.io.read.off import is_off, plain_off
 from rlacd.io.read.open_file import read_file
 from rlacd.io.read.text import check_text, declared_triangles, plain_obj, plain_ply, plain_stl
@@ -34,12 +35,11 @@ from rlacd.solid.topology import BoolArray, IntArray
 
 Source: TypeAlias = str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]
 
-FORMATS = ("obj", "stl", "ply", "off", "glb", "gltf", "dae", "zae", "3mf", "xyz")
+FORMATS = ("obj", "stl", "ply", "off", "glb", "gltf", "vrm", "dae", "zae", "3mf", "xyz")
 """The formats that are read. trimesh parses more, but those parsers have not been reviewed against hostile files."""
 
 CONVERTERS = {
     "blend": "export it from Blender (File > Export > glTF 2.0)",
-    "vrm": "rename it to .glb, which it is",
     **dict.fromkeys(("fbx", "usd", "usda", "usdc", "usdz"), "import it into Blender and export it as glTF 2.0"),
     **dict.fromkeys(("step", "stp", "iges", "igs"), "export it from a CAD program, such as FreeCAD, as stl or obj"),
 }
@@ -52,9 +52,9 @@ def load_mesh(source: Source) -> InputMesh:
     Parameters
     ----------
     source
-        A path (obj, stl, ply, off, glb, gltf, dae, zae, 3mf, xyz), a mesh or scene of trimesh, or vertices ``[V, 3]``
-        with faces ``[F, 3]`` (or quads ``[F, 4]``). Scenes are baked: every instance of a geometry is placed by its
-        transform. Paths and curves are ignored; point clouds give vertices without faces.
+        A path (obj, stl, ply, off, glb, gltf, vrm, dae, zae, 3mf, xyz), a mesh or scene of trimesh, or vertices
+        ``[V, 3]`` with faces ``[F, 3]`` (or quads ``[F, 4]``). Scenes are baked: every instance of a geometry is placed
+        by its transform. Paths and curves are ignored; point clouds give vertices without faces.
 
     Returns
     -------
@@ -91,12 +91,14 @@ def _from_file(path: Path) -> InputMesh:
     up, metres = stated(extension, content, scene)
     mesh = replace(mesh, up=up, metres=metres)
     if extension not in ("glb", "gltf"):
-        return replace(mesh, asset=Asset(scene) if len(mesh.nodes) > 1 else None)
+        return replace(
+            mesh, asset=Asset(content, path, extension) if has_looks(content, extension, len(mesh.nodes)) else None
+        )
     names = node_names(path, content)
     # The triangles were read from a file without names, whose nodes are therefore called by their index.
     keys = [int(str(node.key).partition("_")[0]) for node in mesh.nodes]
     nodes = tuple(replace(node, name=names[key], key=key) for node, key in zip(mesh.nodes, keys, strict=True))
-    return replace(_joined(replace(mesh, nodes=nodes)), asset=Asset(content, path.parent))
+    return replace(_joined(replace(mesh, nodes=nodes)), asset=Asset(content, path, extension))
 
 
 def _joined(mesh: InputMesh) -> InputMesh:
@@ -129,6 +131,7 @@ def _read(path: Path) -> tuple[bytes, str, trimesh.Scene]:
         renamed = f"rename it to .{holds}, which it seems to hold" if holds else None
         hint = CONVERTERS.get(extension) or renamed or "convert it to glb, obj, stl or ply"
         raise MeshFileError(f"{path} is in no format that is read here: {hint}")
+    extension = "glb" if extension == "vrm" else extension  # a VRM file is a GLB file
     if (declared := declared_triangles(content, extension)) is not None:
         require_memory(declared, BYTES_READ, path.name)
     beside = FolderFiles(path.parent)

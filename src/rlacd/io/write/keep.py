@@ -2,7 +2,7 @@
 
 The JSON of a glTF file is edited and its binary chunk appended to; no index that it holds changes. So nodes,
 transforms, materials, textures, skins, animations, extensions and whatever else is unknown here stay as they are. Files
-that it refers to are put into it, so that the binary file stands alone.
+that it refers to are put into it, so that the binary file stands alone. Anything else is converted first.
 """
 
 from __future__ import annotations
@@ -20,12 +20,13 @@ import trimesh
 from rlacd.errors import OutputError
 from rlacd.io.read.beside import DATA, IMAGES, FolderFiles
 from rlacd.io.read.gltf import MAGIC, split
+from rlacd.io.write.converted import converted, nodes_of
 from rlacd.io.write.glb import ATTRIBUTES, BINARY_CHUNK, INDICES, JSON_CHUNK, Placed, chunk, material, packed
 from rlacd.io.write.palette import hull_colors, linear_from_srgb
 from rlacd.io.write.single_precision import placed_hull
 from rlacd.result import Result
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.input_mesh import Asset, InputMesh, SourceNode
+from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.primitive import Primitive
 
 Named = Callable[[str, int, Primitive | None], str]
@@ -54,27 +55,28 @@ def encode_kept(result: Result, named: Named, *, colored: bool) -> bytes:
     mesh = result.input
     assert mesh is not None
     assert mesh.asset is not None
-    scene = _Scene(mesh.asset, result.name)
-    nodes = mesh.nodes or (SourceNode(result.name, -1, np.eye(4)),)
+    scene = _Scene(mesh, result.name)
+    is_gltf = mesh.asset.is_gltf
+    nodes = mesh.nodes if is_gltf else nodes_of(mesh, result.name)
+    factor = mesh.factor if is_gltf else 1.0  # a glTF file stays in its own unit
     counts: dict[str, int] = {}
     primitives = result.primitives
     colors = linear_from_srgb(hull_colors(len(result)))
     for index, (hull, color) in enumerate(zip(result.hulls, colors, strict=True)):
         node = nodes[int(hull.metadata.get("node_index", 0))]
-        name = result.name if len(mesh.nodes) < 2 and not isinstance(node.key, int) else node.name
-        number = counts.get(name, 0)
-        counts[name] = number + 1
+        number = counts.get(node.name, 0)
+        counts[node.name] = number + 1
         at = scene.index_of(node.key)
         inverse = None if scene.is_skinned(at) else _inverse(node.transform)
         primitive = primitives[index] if inverse is None or _keeps_shape(inverse) else None
-        placed = _local(hull, mesh, inverse, named(name, number, primitive))
+        placed = _local(hull, factor, inverse, named(node.name, number, primitive))
         scene.add(placed._replace(color=color), None if inverse is None else at, colored)
     return scene.encoded()
 
 
-def _local(hull: trimesh.Trimesh, mesh: InputMesh, inverse: FloatArray | None, name: str) -> Placed:
+def _local(hull: trimesh.Trimesh, factor: float, inverse: FloatArray | None, name: str) -> Placed:
     """A hull in the coordinates of its node, or in those of the scene if there is no way into its node's."""
-    points, faces = np.asarray(hull.vertices) / mesh.factor, np.asarray(hull.faces)
+    points, faces = np.asarray(hull.vertices) / factor, np.asarray(hull.faces)
     if inverse is not None:
         points = points @ inverse[:3, :3].T + inverse[:3, 3]
         if np.linalg.det(inverse[:3, :3]) < 0:
@@ -104,22 +106,21 @@ def _keeps_shape(transform: FloatArray) -> bool:
 class _Scene:
     """A glTF file that is being added to."""
 
-    def __init__(self, asset: Asset, name: str) -> None:
-        content, folder = asset.content, asset.folder
-        self._name = name
-        self._by_name = not isinstance(content, bytes)
-        if not isinstance(content, bytes):
-            content = _exported(content, name)
+    def __init__(self, mesh: InputMesh, name: str) -> None:
+        asset = mesh.asset
+        assert asset is not None
+        self._by_name = not asset.is_gltf
+        content = asset.content if asset.is_gltf else converted(mesh, name)
         header, rest = split(Path(f"{name}.glb"), content)
         self._header: dict[str, Any] = header
         self._binary, self._others = _chunks(rest)
         self._added: list[bytes] = []
-        self._take_in(None if folder is None else FolderFiles(folder, DATA | IMAGES))
+        self._take_in(FolderFiles(asset.path.parent, DATA | IMAGES) if asset.is_gltf and asset.path else None)
         self._nodes = {node.get("name"): index for index, node in enumerate(header.get("nodes", []))}
 
     def index_of(self, key: int | str) -> int | None:
         """The index of a source node."""
-        return self._nodes.get(key, self._nodes.get(self._name)) if self._by_name else int(key)
+        return self._nodes.get(key) if self._by_name else int(key)
 
     def is_skinned(self, index: int | None) -> bool:
         """Whether a node's mesh follows a skeleton: engines move such a node away from below its hulls."""
@@ -203,11 +204,6 @@ class _Scene:
                 image["bufferView"] = len(views) - 1
                 image.setdefault("mimeType", _MIME.get(Path(uri).suffix.lower(), "image/png"))
                 del image["uri"]
-
-
-def _exported(content: Any, name: str) -> bytes:
-    scene = content if isinstance(content, trimesh.Scene) else trimesh.Scene({name: content})
-    return bytes(scene.export(file_type="glb"))
 
 
 def _chunks(rest: bytes | None) -> tuple[bytes | None, bytes]:

@@ -1,0 +1,125 @@
+"""An input that is no glTF file, converted to one by trimesh, with all that trimesh carries of its looks."""
+
+from __future__ import annotations
+
+import copy
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from rlacd.io.read.gltf import MAGIC, split
+from rlacd.io.read.looks import looks_of
+from rlacd.io.write.encode import VISUAL_COLOR
+from rlacd.io.write.glb import JSON_CHUNK, ROUGHNESS, chunk
+from rlacd.io.write.palette import linear_from_srgb
+from rlacd.solid.input_mesh import InputMesh, SourceNode
+
+
+def converted(mesh: InputMesh, name: str) -> bytes:
+    """Write the input's scene as GLB, in the unit of the hulls.
+
+    A file with one mesh becomes one node called `name`, whatever number of materials the mesh has.
+
+    Parameters
+    ----------
+    mesh : InputMesh
+        Its asset is no glTF file.
+    name : str
+        For a mesh without a scene.
+    """
+    asset = mesh.asset
+    assert asset is not None
+    is_file = asset.path is not None
+    scene = _scene(mesh, name)
+    header, rest = split(Path(f"{name}.glb"), bytes(scene.export(file_type="glb")))
+    if is_file:
+        _tell_materials(header)
+        if len(mesh.nodes) < 2:
+            _join(header, name)
+    text = json.dumps(header, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+    chunks = chunk(JSON_CHUNK, text + b" " * (-len(text) % 4)) + (rest or b"")
+    return struct.pack("<4sII", MAGIC, 2, 12 + len(chunks)) + chunks
+
+
+def nodes_of(mesh: InputMesh, name: str) -> tuple[SourceNode, ...]:
+    """The nodes of the input as `converted` names and places them."""
+    assert mesh.asset is not None
+    if not mesh.nodes:
+        return (SourceNode(name, name, np.eye(4)),)
+    renamed = mesh.asset.path is not None and len(mesh.nodes) == 1
+    nodes = []
+    for node in mesh.nodes:
+        transform = node.transform.copy()
+        transform[:3, 3] *= mesh.factor
+        nodes.append(SourceNode(name if renamed else node.name, name if renamed else node.key, transform))
+    return tuple(nodes)
+
+
+def _scene(mesh: InputMesh, name: str) -> trimesh.Scene:
+    """The scene in the unit of the hulls; the triangles alone if looks cannot be read."""
+    asset = mesh.asset
+    assert asset is not None
+    content: Any = asset.content
+    if asset.path is not None:
+        content = looks_of(asset.path, content, asset.extension)
+    if content is None or (isinstance(content, trimesh.Scene) and not content.geometry):
+        return trimesh.Scene({name: trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)})
+    scene = content if isinstance(content, trimesh.Scene) else trimesh.Scene({name: content})
+    return scene if mesh.factor == 1.0 else _scaled(scene, mesh.factor)
+
+
+def _scaled(scene: trimesh.Scene, factor: float) -> trimesh.Scene:
+    """A copy with shapes and distances multiplied: a scale in the transforms would upset bodies in Godot."""
+    larger = scene.copy()
+    for geometry in larger.geometry.values():
+        geometry.apply_scale(factor)
+    transforms = larger.graph.transforms
+    for pair, edge in list(transforms.edge_data.items()):
+        if "matrix" in edge:
+            matrix = np.array(edge["matrix"], dtype=np.float64)
+            matrix[:3, 3] *= factor
+            larger.graph.update(frame_from=pair[0], frame_to=pair[1], matrix=matrix)
+    return larger
+
+
+def _tell_materials(header: dict[str, Any]) -> None:
+    """No other format knows metals, which glTF takes everything for that says nothing; what has no colour is grey."""
+    materials: list[dict[str, Any]] = header.setdefault("materials", [])
+    for material in materials:
+        material.setdefault("pbrMetallicRoughness", {}).setdefault("metallicFactor", 0.0)
+    for mesh in header.get("meshes", []):
+        for primitive in mesh["primitives"]:
+            if "material" in primitive:
+                continue
+            colored = "COLOR_0" in primitive["attributes"]
+            color = np.ones(3) if colored else linear_from_srgb(VISUAL_COLOR)
+            plain = {"baseColorFactor": [*color.tolist(), 1.0], "metallicFactor": 0.0, "roughnessFactor": ROUGHNESS}
+            described = {"pbrMetallicRoughness": plain}
+            if described not in materials:
+                materials.append(described)
+            primitive["material"] = materials.index(described)
+    if not materials:
+        del header["materials"]
+
+
+def _join(header: dict[str, Any], name: str) -> None:
+    """Make one node of the materials of a mesh, which trimesh writes as nodes of their own."""
+    nodes = header["nodes"]
+    placing = [index for index, node in enumerate(nodes) if "mesh" in node]
+    if not placing:
+        return
+    first = nodes[placing[0]]
+    mesh = copy.deepcopy(header["meshes"][first["mesh"]])
+    mesh["primitives"] = [
+        primitive for index in placing for primitive in header["meshes"][nodes[index]["mesh"]]["primitives"]
+    ]
+    for index in placing[1:]:
+        del nodes[index]["mesh"]
+    mesh["name"] = first["name"] = name
+    header["meshes"], first["mesh"] = [mesh], 0
+    if header["scenes"][0]["nodes"] == placing:  # nothing else is there: the emptied nodes go
+        header["nodes"], header["scenes"][0]["nodes"] = [first], [0]

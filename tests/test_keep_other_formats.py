@@ -1,0 +1,188 @@
+"""Inputs that are no glTF files and are kept: converted with all the looks that their parser reads."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+import rlacd
+from rlacd.io.read import looks
+from rlacd.io.read.companions import mesh_files
+from tests.assets import Json, painted_obj, png, read_glb, view_of
+from tests.hulls import assert_convex_hull
+
+Image = pytest.importorskip("PIL.Image", reason="the extra view is not installed")
+
+
+def kept(path: Path, out: Path, **options: Any) -> tuple[Json, bytes, rlacd.Decomposition]:
+    result = rlacd.decompose(path, quality="fast", threads=1, **options)
+    header, binary, _ = read_glb(result.save(out, file_format="unreal"))
+    return header, binary, result
+
+
+def pixels(data: bytes) -> Any:
+    return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
+
+
+def colors(header: Json, mesh: int = 0) -> list[list[float] | None]:
+    """The base colour of each material of a mesh, None where it is a picture."""
+    found = []
+    for primitive in header["meshes"][mesh]["primitives"]:
+        described = header["materials"][primitive["material"]]["pbrMetallicRoughness"]
+        assert described["metallicFactor"] == 0.0
+        found.append(None if "baseColorTexture" in described else described.get("baseColorFactor"))
+    return sorted(found, key=str)
+
+
+def test_an_obj_keeps_its_materials_and_its_picture_in_one_node(tmp_path: Path) -> None:
+    path = painted_obj(tmp_path)
+    header, binary, _ = kept(path, tmp_path / "out.glb")
+    assert [node["name"] for node in header["nodes"]] == ["crate", "UCX_crate_00"]
+    assert header["nodes"][0]["children"] == [1]
+    assert header["scenes"][0]["nodes"] == [0]
+    painted = header["meshes"][0]["primitives"]
+    assert len(painted) == 2
+    assert all("TEXCOORD_0" in primitive["attributes"] for primitive in painted)
+    assert colors(header) == [None, [1.0, 0.0, 0.0, 1.0]] or colors(header) == [[1.0, 0.0, 0.0, 1.0], None]
+    assert (pixels(view_of(header, binary, header["images"][0]["bufferView"])) == pixels(png())).all()
+    read = trimesh.load_scene(tmp_path / "out.glb", process=False)
+    crate = [mesh for name, mesh in read.geometry.items() if not name.startswith("UCX_")]
+    assert sum(mesh.area for mesh in crate) == pytest.approx(trimesh.creation.box((1, 2, 3)).area)
+
+
+@pytest.mark.parametrize("damage", ["missing", "cut off", "huge", "no materials"])
+def test_a_picture_that_cannot_be_read_is_left_out(
+    tmp_path: Path, damage: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = painted_obj(tmp_path)
+    if damage == "missing":
+        (tmp_path / "wood.png").unlink()
+    elif damage == "cut off":
+        (tmp_path / "wood.png").write_bytes(png()[:50])
+    elif damage == "huge":
+        monkeypatch.setattr(looks, "MOST_PIXELS", 3)
+    else:
+        (tmp_path / "crate.mtl").unlink()
+    header, _, _ = kept(path, tmp_path / "out.glb")
+    assert "images" not in header
+    assert [node["name"] for node in header["nodes"]] == ["crate", "UCX_crate_00"]
+
+
+def test_a_picture_outside_the_folder_is_not_read(tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    path = painted_obj(tmp_path / "in")
+    (tmp_path / "in" / "wood.png").rename(tmp_path / "wood.png")
+    paints = tmp_path / "in" / "crate.mtl"
+    paints.write_text(paints.read_text().replace("wood.png", "../wood.png"))
+    header, _, _ = kept(path, tmp_path / "out.glb")
+    assert "images" not in header
+    assert sorted(mesh_files(path)) == ["crate.mtl", "crate.obj"]
+
+
+def test_materials_and_pictures_are_sent_along_with_an_obj(tmp_path: Path) -> None:
+    assert sorted(mesh_files(painted_obj(tmp_path))) == ["crate.mtl", "crate.obj", "wood.png"]
+
+
+def test_too_many_materials_are_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(looks, "MOST_IN_TABLES", 10)
+    header, _, _ = kept(painted_obj(tmp_path), tmp_path / "out.glb")
+    assert len(header["meshes"][0]["primitives"]) == 1
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "binary"])
+def test_a_ply_keeps_the_colours_of_its_vertices(tmp_path: Path, encoding: str) -> None:
+    box = trimesh.creation.box()
+    tints = np.arange(32, dtype=np.uint8).reshape(8, 4) * 8
+    tints[:, 3] = 255
+    box.visual = trimesh.visual.ColorVisuals(box, vertex_colors=tints)
+    path = tmp_path / "box.ply"
+    path.write_bytes(box.export(file_type="ply", encoding=encoding, vertex_normal=False))
+    header, binary, _ = kept(path, tmp_path / "out.glb")
+    attributes = header["meshes"][0]["primitives"][0]["attributes"]
+    described = [header["accessors"][attributes[name]] for name in ("POSITION", "COLOR_0")]
+    assert [one["componentType"] for one in described] == [5126, 5121]
+    points, seen = (view_of(header, binary, one["bufferView"])[one.get("byteOffset", 0) :] for one in described)
+    for point, tint in zip(
+        np.frombuffer(points, "<f4").reshape(-1, 3), np.frombuffer(seen, "u1").reshape(-1, 4), strict=True
+    ):
+        assert (tints[np.abs(box.vertices - point).sum(axis=1).argmin()] == tint).all()
+
+
+def arm(folder: Path) -> Path:
+    """A scene as COLLADA, with a node in red and one in blue that is turned and moved."""
+    box = trimesh.creation.box((1, 0.2, 0.2))
+    points, corners = (" ".join(map(str, array.ravel().tolist())) for array in (box.vertices, box.faces))
+    turn = trimesh.transformations.translation_matrix((2, 0, 0)) @ trimesh.transformations.rotation_matrix(
+        0.5, (0, 0, 1)
+    )
+    effects, materials, geometries, nodes = "", "", "", ""
+    for name, tint, matrix in (("upper", "1 0 0 1", np.eye(4)), ("lower", "0 0 1 1", turn)):
+        effects += f"""<effect id="{name}-e"><profile_COMMON><technique sid="c"><lambert><diffuse><color>{tint}</color>
+            </diffuse></lambert></technique></profile_COMMON></effect>"""
+        materials += f'<material id="{name}-m"><instance_effect url="#{name}-e"/></material>'
+        geometries += f"""<geometry id="{name}"><mesh>
+            <source id="{name}-p"><float_array id="{name}-a" count="24">{points}</float_array><technique_common>
+            <accessor source="#{name}-a" count="8" stride="3"><param name="X" type="float"/>
+            <param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
+            <vertices id="{name}-v"><input semantic="POSITION" source="#{name}-p"/></vertices>
+            <triangles count="12" material="{name}-m"><input semantic="VERTEX" source="#{name}-v" offset="0"/>
+            <p>{corners}</p></triangles></mesh></geometry>"""
+        placed = " ".join(map(str, matrix.ravel().tolist()))
+        nodes += f"""<node id="{name}-n"><matrix>{placed}</matrix><instance_geometry url="#{name}"><bind_material>
+            <technique_common><instance_material symbol="{name}-m" target="#{name}-m"/></technique_common>
+            </bind_material></instance_geometry></node>"""
+    path = folder / "arm.dae"
+    path.write_text(f"""<?xml version="1.0"?>
+        <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+        <asset><unit name="metre" meter="1"/><up_axis>Z_UP</up_axis></asset>
+        <library_effects>{effects}</library_effects><library_materials>{materials}</library_materials>
+        <library_geometries>{geometries}</library_geometries>
+        <library_visual_scenes><visual_scene id="s">{nodes}</visual_scene></library_visual_scenes>
+        <scene><instance_visual_scene url="#s"/></scene></COLLADA>""")
+    return path
+
+
+def test_a_collada_file_keeps_nodes_and_colours(tmp_path: Path) -> None:
+    header, _, result = kept(arm(tmp_path), tmp_path / "out.glb", per_node=True)
+    named = {hull.metadata["node"] for hull in result}
+    assert len(named) == 2
+    nodes = header["nodes"]
+    for name in named:
+        node = next(node for node in nodes if node.get("name") == name)
+        assert [nodes[child]["name"] for child in node["children"]] == [f"UCX_{name}_00"]
+    tints = [colors(header, mesh)[0] for mesh in range(2)]
+    assert sorted(tints, key=str) == [[0.0, 0.0, 1.0, 1.0], [1.0, 0.0, 0.0, 1.0]]
+
+
+@pytest.mark.parametrize("name", ["crate.obj", "arm.dae"])
+def test_a_converted_file_is_in_the_unit_of_the_hulls(tmp_path: Path, name: str) -> None:
+    path = painted_obj(tmp_path) if name == "crate.obj" else arm(tmp_path)
+    _, _, result = kept(path, tmp_path / "out.glb", unit="cm", per_node=True)
+    read = trimesh.load_scene(tmp_path / "out.glb", process=False)
+    own = [node for node in read.graph.nodes_geometry if not node.startswith("UCX_")]
+    hulls = [node for node in read.graph.nodes_geometry if node.startswith("UCX_")]
+    assert len(hulls) == len(result)
+    bounds = np.array([read.geometry[read.graph[n][1]].copy().apply_transform(read.graph[n][0]).bounds for n in own])
+    assert np.allclose([bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)], result.source.bounds, atol=1e-6)
+    for node, hull in zip(sorted(hulls), sorted(result, key=lambda hull: hull.metadata.get("node") or ""), strict=True):
+        transform, mesh = read.graph[node]
+        placed = read.geometry[mesh].copy().apply_transform(transform)
+        assert_convex_hull(placed)
+        assert np.allclose(placed.bounds, hull.bounds, atol=1e-6)
+
+
+def test_a_scene_in_memory_is_not_changed_by_a_scale(tmp_path: Path) -> None:
+    scene = trimesh.Scene()
+    move = trimesh.transformations.translation_matrix((0, 5, 0))
+    scene.add_geometry(trimesh.creation.box(), node_name="crate", transform=move)
+    result = rlacd.decompose(scene, quality="fast", threads=1, scale=2.0)
+    read = trimesh.load_scene(result.save(tmp_path / "out.glb", keep_input=True), process=False)
+    assert np.allclose(read.graph["crate"][0][:3, 3], (0, 10, 0))
+    assert np.allclose(read.bounds, result.source.bounds, atol=0.01)
+    assert np.allclose(scene.bounds, [[-0.5, 4.5, -0.5], [0.5, 5.5, 0.5]])
+    assert "crate_hull_000" in read.graph.nodes
