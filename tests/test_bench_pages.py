@@ -232,8 +232,9 @@ class TestResultsInTheDocs:
 class TestArms:
     @pytest.mark.parametrize("experiment", ARMS)
     def test_arms_differ_in_what_they_say_only(self, experiment: str) -> None:
-        arms = [_options("quick", 100, 1, changes) for changes in ARMS[experiment].values()]
-        assert len(set(arms)) == len(arms)
+        for preset in ("quick", "counting"):
+            arms = [_options(preset, 100, 1, changes) for changes in ARMS[experiment].values()]
+            assert len(set(arms)) == len(arms)
         assert {(a.iterations, a.seed, a.warmup, a.validate_every) for a in arms} == {(100, 1, 20, 25)}
 
     def test_weights_have_the_ratio(self) -> None:
@@ -269,10 +270,11 @@ class TestArms:
             mesh = from_manifold(CROSS + box((0, 0, 0), (0.3 + 0.1 * number, 0.4, 1)))
             trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(folder / f"{number}.stl")
         said: list[str] = []
-        page = train_arms("paper-curves", folder, tmp_path / "run", "quick", 40, say=said.append)
+        page = train_arms("paper-curves", folder, tmp_path / "run", "quick", 40, seeds=2, say=said.append)
         table = next(block for block in page.blocks if isinstance(block, Table))
         assert [line[0] for line in table.lines] == list(ARMS["paper-curves"])
-        assert all(float(str(line[1])) > 0 for line in table.lines)
+        assert all(float(str(line[1]).partition(" ± ")[0]) > 0 for line in table.lines)
+        assert len({(tmp_path / "run" / f"paper-curves-1-seed-{s}" / "curves.jsonl").read_text() for s in (0, 1)}) == 2
         monkeypatch.setattr("rlacd.learn.paper.train.train", None)  # would fail if called
-        again = train_arms("paper-curves", folder, tmp_path / "run", "quick", 40, say=said.append)
+        again = train_arms("paper-curves", folder, tmp_path / "run", "quick", 40, seeds=2, say=said.append)
         assert again.markdown() == page.markdown()

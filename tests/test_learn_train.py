@@ -115,12 +115,10 @@ def test_options_out_of_range_are_reported(name: str, value: Any) -> None:
         TrainOptions(**{name: value})
 
 
-def test_lookahead_has_to_count_cuts() -> None:
-    with pytest.raises(OptionError, match="volume_reward and finish_reward have to be 0"):
-        TrainOptions(lookahead=4, cut_cost=1.0)
-    with pytest.raises(OptionError, match="cut_cost more than 0"):
-        TrainOptions(lookahead=4, volume_reward=0.0, finish_reward=0.0)
-    assert TrainOptions.preset("counting").lookahead == 4
+def test_something_has_to_be_earned_or_paid() -> None:
+    with pytest.raises(OptionError, match="all 0; there is nothing to learn"):
+        TrainOptions(volume_reward=0.0, finish_reward=0.0)
+    assert TrainOptions.preset("counting").cut_cost == 1
 
 
 def test_unknown_presets_and_options_are_reported() -> None:

@@ -1,7 +1,8 @@
 """The paper's experiments that train one policy per arm: all arms equally long, with the same seed and meshes.
 
-They are short compared with the paper's million cuts; the page states their length. An interrupted arm is resumed, and
-a finished one is not trained again.
+They are short compared with the paper's million cuts; the page states their length. With the presets of the paper an
+arm learns the values of planes by one-step targets; with `counting` the same rewards, discounts and inputs are learned
+as values of components from whole episodes. An interrupted arm is resumed, and a finished one is not trained again.
 """
 
 from __future__ import annotations
@@ -11,13 +12,18 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from rlacd.bench.charts import Curve, curves_chart
 from rlacd.bench.page import Figure, Heading, Page, Text
-from rlacd.bench.tables import Table
+from rlacd.bench.tables import Spread, Table
 from rlacd.errors import MissingExtraError, OptionError
 from rlacd.learn.paper.options import TrainOptions
 
 Changes = Mapping[str, Any]
+
+Points = list[dict[str, float]]
+"""The curves of one run, as in its ``curves.jsonl``."""
 
 RATIOS = (0.01, 0.1, 1.0, 10.0, 100.0)
 """lambda 1 / lambda 2, as in 4.5.3."""
@@ -26,29 +32,40 @@ LARGEST_WEIGHT = 1000.0
 """The larger of the two weights, as in the paper; the ratio determines the smaller one."""
 
 
-def _weights(ratio: float) -> Changes:
-    return {
-        "volume_reward": LARGEST_WEIGHT * min(1.0, ratio),
-        "finish_reward": LARGEST_WEIGHT * min(1.0, 1.0 / ratio),
-    }
+HULL: Changes = {"discount": "hull"}
+
+
+def _static(discount: float) -> Changes:
+    return {"discount": "static", "static_discount": discount}
+
+
+def _weights(volume: float, finish: float, cut: float = 0.0) -> Changes:
+    return {"volume_reward": volume, "finish_reward": finish, "cut_cost": cut}
+
+
+def _ratio(ratio: float) -> Changes:
+    return _weights(LARGEST_WEIGHT * min(1.0, ratio), LARGEST_WEIGHT * min(1.0, 1.0 / ratio))
 
 
 ARMS: Mapping[str, Mapping[str, Changes]] = {
     "paper-rewards": {
-        **{f"λ1/λ2 = {ratio:g}": _weights(ratio) for ratio in RATIOS},
-        "without r1": {"volume_reward": 0.0},
-        "without r2": {"finish_reward": 0.0},
+        **{f"λ1/λ2 = {ratio:g}": {**_ratio(ratio), **HULL} for ratio in RATIOS},
+        "without r1": {**_weights(0.0, LARGEST_WEIGHT), **HULL},
+        "without r2": {**_weights(LARGEST_WEIGHT, 0.0), **HULL},
+        "-1 a cut (not paper)": {**_weights(0.0, 0.0, 1.0), **_static(1.0)},
     },
     "paper-encoding": {
-        "component and hull": {},
-        "component alone": {"encoder": "profile-without-hull"},
+        "component and hull": {"scale_input": False},
+        "component alone": {"scale_input": False, "encoder": "profile-without-hull"},
+        "component and hull, sizes and creases (not paper)": {"scale_input": True},
     },
     "paper-curves": {
-        "share of the hull (eq. 9)": {},
-        **{f"{share:g} + {share:g}": {"discount": "static", "static_discount": share} for share in (0.5, 0.9, 0.99)},
+        "share of the hull (eq. 9)": HULL,
+        **{f"{share:g} + {share:g}": _static(share) for share in (0.5, 0.9, 0.99)},
     },
 }
-"""Changes to the preset made by each arm of an experiment."""
+"""Changes to the preset made by each arm of an experiment; they say all that the arms differ in, so that they hold for
+every preset."""
 
 TITLES = {
     "paper-rewards": "Weights of the rewards (4.5.3)",
@@ -66,10 +83,10 @@ def train_arms(
     folder: Path,
     preset: str,
     iterations: int | None,
-    seed: int = 0,
+    seeds: int = 1,
     say: Callable[[str], None] = print,
 ) -> Page:
-    """Train every arm of an experiment and return a page with their last validations and their curves.
+    """Train every arm of an experiment with every seed; return a page with their last validations and their curves.
 
     Parameters
     ----------
@@ -78,12 +95,13 @@ def train_arms(
     meshes : Path
         Training meshes; some of them are held out.
     folder : Path
-        Run folder; each arm gets a subfolder.
+        Run folder; each arm and seed gets a subfolder.
     preset : str
         See `rlacd.learn.paper.options.PRESETS`.
     iterations : int, optional
         Cuts per arm; the preset's number by default.
-    seed : int
+    seeds : int
+        Number of seeds, from 0 on; each has its own held-out meshes and first weights.
     say : callable
 
     Raises
@@ -93,30 +111,28 @@ def train_arms(
     TrainingError
         There are no usable meshes.
     """
-    arms = {label: _options(preset, iterations, seed, changes) for label, changes in ARMS[experiment].items()}
-    curves = {}
-    for number, (label, options) in enumerate(arms.items(), 1):
-        say(f"arm {number} of {len(arms)}: {label}")
-        curves[label] = _train(meshes, folder / f"{experiment}-{number}", options, say)
+    arms = ARMS[experiment]
+    first = _options(preset, iterations, 0, next(iter(arms.values())))
+    curves: dict[str, list[Points]] = {label: [] for label in arms}
+    for seed in range(seeds):
+        for number, (label, changes) in enumerate(arms.items(), 1):
+            say(f"seed {seed}, arm {number} of {len(arms)}: {label}")
+            run = folder / f"{experiment}-{number}-seed-{seed}"
+            curves[label].append(_train(meshes, run, _options(preset, iterations, seed, changes), say))
     page = Page(TITLES[experiment])
-    first = next(iter(arms.values()))
     page.add(
         Text(
-            f"Every arm: preset {preset}, {first.iterations:,} cuts (the paper: 1,000,000), seed {seed}, meshes of up "
-            f"to {first.max_faces} triangles, concavity {first.threshold:g}, {first.validation} meshes held out. "
-            "Ratios are geometric means over those, to greedy over 150 planes by the least sum of hull volumes; "
-            "deployed: the least sum among the network's ten best planes. One seed: differences of a few percent say "
-            "nothing."
+            f"Every arm: preset {preset}, {first.iterations:,} cuts (the paper: 1,000,000), {seeds} seeds, meshes of "
+            f"up to {first.max_faces} triangles, concavity {first.threshold:g}, {first.validation} meshes held out by "
+            "each seed. Ratios are geometric means over those, to greedy over 150 planes by the least sum of hull "
+            "volumes; deployed: the least sum among the network's ten best planes. Numbers are means over the seeds, "
+            "± their standard deviation; a single seed says nothing of differences of a few percent."
         ),
         _last_validations(curves),
         Heading("Curves"),
     )
     for key, name in (("loss", "loss"), ("value", "mean greatest value"), ("validation_merged_ratio", "merged parts")):
-        drawn = [
-            Curve(label, [p["cuts"] for p in points if key in p], [p[key] for p in points if key in p])
-            for label, points in curves.items()
-        ]
-        drawn = [curve for curve in drawn if curve.x]
+        drawn = [curve for label, runs in curves.items() if (curve := _mean_curve(label, runs, key)).x]
         if drawn:
             chart = curves_chart(drawn, "cuts", name, log_y=key == "loss")
             page.add(Figure(f"{experiment}-{key}.svg", chart, name))
@@ -133,25 +149,42 @@ def _options(preset: str, iterations: int | None, seed: int, changes: Changes) -
     return TrainOptions.preset(preset, seed=seed, **lengths, **changes)
 
 
-def _train(meshes: Path, run: Path, options: TrainOptions, say: Callable[[str], None]) -> list[dict[str, float]]:
+def _train(meshes: Path, run: Path, options: TrainOptions, say: Callable[[str], None]) -> Points:
     try:
         from rlacd.learn.paper.train import train
     except ModuleNotFoundError as error:
         raise MissingExtraError("training needs an extra: run  pip install 'rlacd[train]'  and try again.") from error
 
-    finished = run / "policy.onnx"
+    finished = run / "finished"
     if not finished.exists():
         train(meshes, run, options, resume=(run / "checkpoint").exists(), say=say)
+        finished.touch()
     return [json.loads(line) for line in (run / "curves.jsonl").read_text(encoding="utf-8").splitlines()]
 
 
-def _last_validations(curves: Mapping[str, list[dict[str, float]]]) -> Table:
-    keys = ("parts_ratio", "merged_ratio", "deployed_parts_ratio", "deployed_merged_ratio")
-    lines = []
-    for label, points in curves.items():
-        last = next((p for p in reversed(points) if "validation_merged_ratio" in p), {})
-        cells = [f"{last[f'validation_{key}']:.2f}" if f"validation_{key}" in last else "–" for key in keys]
-        loss = next((f"{p['loss']:.3g}" for p in reversed(points) if "loss" in p), "–")
-        lines.append([label, *cells, loss, f"{points[-1]['seconds']:.0f}" if points else "–"])
+def _mean_curve(label: str, runs: list[Points], key: str) -> Curve:
+    """Average the runs' curves of `key` at the points of the first."""
+    seen = [[(p["cuts"], p[key]) for p in points if key in p] for points in runs]
+    if not all(seen):
+        return Curve(label, [], [])
+    x = [cuts for cuts, _ in seen[0]]
+    y = np.mean([np.interp(x, *zip(*points, strict=True)) for points in seen], axis=0)
+    return Curve(label, x, y.tolist())
+
+
+def _last_validations(curves: Mapping[str, list[Points]]) -> Table:
+    ratios = ("parts_ratio", "merged_ratio", "deployed_parts_ratio", "deployed_merged_ratio")
+    cells = [*((f"validation_{key}", ".2f") for key in ratios), ("loss", ".3g"), ("seconds", ".0f")]
+    lines = [[label, *(_over_seeds(runs, key, form) for key, form in cells)] for label, runs in curves.items()]
     header = ["arm", "parts ×", "merged ×", "deployed: parts ×", "deployed: merged ×", "loss", "seconds"]
     return Table(header, lines)
+
+
+def _over_seeds(runs: list[Points], key: str, form: str) -> str:
+    """Format the mean of the runs' last values, and their deviation if there are several."""
+    last = [next((p[key] for p in reversed(points) if key in p), None) for points in runs]
+    known = [value for value in last if value is not None]
+    if not known:
+        return "–"
+    spread = Spread.of(known)
+    return f"{spread.mean:{form}}" + (f" ± {spread.deviation:{form}}" if len(known) > 1 else "")

@@ -202,14 +202,14 @@ def _trained(name: str, about: str) -> None:
         out: Out,
         preset: Annotated[str, typer.Option(help="Of `rlacd train`.")] = "quick",
         iterations: Annotated[int | None, typer.Option(help="Cuts an arm.", show_default=False)] = None,
-        seed: Annotated[int, typer.Option(min=0)] = 0,
+        seeds: Annotated[int, typer.Option(min=1, help="Each arm is trained so many times.")] = 1,
     ) -> None:
         with exit_codes():
             from rlacd.bench.arms import train_arms
 
             _need_folder(meshes)
             _make_folder(out)
-            _write(train_arms(name, meshes, out, preset, iterations, seed, typer.echo), out, name)
+            _write(train_arms(name, meshes, out, preset, iterations, seeds, typer.echo), out, name)
 
 
 _trained("paper-rewards", "Train with other weights of the two rewards, and without each (4.5.3).")

@@ -41,17 +41,19 @@ class Lookahead:
         return planes[int(self.values(cutting, component, planes).argmax())]
 
     def values(self, cutting: CutProcess, component: Component, planes: list[Plane]) -> FloatArray:
-        """Values [N] of planes: the sum of those of the unfinished pieces they leave; -inf for planes that miss."""
+        """Values [N] of planes, eq. 8: their reward and the discounted values of what they leave; -inf if they miss."""
         options = self._options
-        outcomes = [cutting.fall_apart(component, plane) for plane in planes]
-        left = [(n, child) for n, (outcome, _) in enumerate(outcomes) for child in outcome.unfinished]
-        total = np.array([0.0 if made else -np.inf for _, made in outcomes])
+        cuts = [cutting.outcome(component, plane) for plane in planes]
+        left = [(n, *child) for n, cut in enumerate(cuts) for child in zip(cut.unfinished, cut.discounts, strict=True)]
+        total = np.array([cut.reward.worth(options) if cut.made else -np.inf for cut in cuts])
         if left:
-            seen = [observe(c, cutting.candidates(c), options.threshold, options.points) for _, c in left]
+            seen = [observe(c, cutting.candidates(c), options.threshold, options.points) for _, c, _ in left]
             features = torch.from_numpy(describe(self._encoder, seen, options.scale_input))
             with torch.inference_mode():
                 worth = self._network(features.to(next(self._network.parameters()).device))[:, 0].double().cpu().numpy()
-            np.add.at(total, [n for n, _ in left], worth)
+            shares = np.array([share for _, _, share in left])
+            discounts = shares if options.discount == "hull" else options.static_discount
+            np.add.at(total, [n for n, _, _ in left], discounts * worth)
         return total
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 from rlacd.criteria import Criterion
 from rlacd.cut import CutCache
+from rlacd.learn.paper.options import TrainOptions
 from rlacd.planes.candidates import Candidates
 from rlacd.policies.observe import candidates_of, valid_planes
 from rlacd.solid.component import Component, Plane
@@ -37,6 +38,11 @@ class Reward:
     share: float
     finished: float
     sides_finished: float
+
+    def worth(self, options: TrainOptions) -> float:
+        """r = lambda_1 r_1 + lambda_2 r_2 less the cost of a cut, as the component's own decision process sees it."""
+        finished = self.finished if options.finish_counts == "solid" else self.sides_finished
+        return options.volume_reward * self.saved + options.finish_reward * finished - options.cut_cost
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,30 +141,31 @@ class CutProcess:
 
     def cut(self, index: int, plane: Plane) -> Cut:
         """Cut component `index` of the frontier by a plane."""
-        component = self.frontier.pop(index)
-        self._candidates.pop(component, None)
-        settled, made = self.fall_apart(component, plane)
-        self.frontier += settled.unfinished
-        self.finished += settled.finished
-        self.stuck += settled.stuck
+        cut = self.outcome(self.frontier[index], plane)
+        self._candidates.pop(self.frontier.pop(index), None)
+        self.frontier += cut.unfinished
+        self.finished += cut.finished
+        self.stuck += cut.stuck
+        return cut
+
+    def outcome(self, component: Component, plane: Plane) -> Cut:
+        """Work out what cutting a component of the frontier by a plane would leave and earn."""
+        sides = self._cache.sides(component, plane)
+        made = bool(sides)
+        settled = _together([self._settle(side) for side in sides]) if made else CutResult(stuck=[component])
         own, children = component.hull.volume, [child.hull.volume for child in settled.all] if made else []
+        all_finished = len(settled.finished) == len(settled.all)
+        last = all_finished and len(self.frontier) == 1 and not self.stuck
         reward = Reward(
             saved=(own - sum(children)) / own if made else 0.0,
             share=own / self._volume,
-            finished=terminal_reward(self.count) if self.terminal else 0.0,
-            sides_finished=terminal_reward(len(children)) if made and len(settled.finished) == len(children) else 0.0,
+            finished=terminal_reward(len(self.finished) + len(settled.finished)) if last else 0.0,
+            sides_finished=terminal_reward(len(children)) if all_finished else 0.0,
         )
         # Hulls of connected pieces may overlap (two links of a chain, say); discounts must not add up to more than 1.
         whole = max(own, sum(children))
         discounts = [child.hull.volume / whole for child in settled.unfinished]
         return Cut(reward, settled.unfinished, discounts, settled.finished, settled.stuck, made)
-
-    def fall_apart(self, component: Component, plane: Plane) -> tuple[CutResult, bool]:
-        """Return what a cut would leave of a component of the frontier, and whether the plane cuts it at all."""
-        sides = self._cache.sides(component, plane)
-        if not sides:
-            return CutResult(stuck=[component]), False
-        return _together([self._settle(side) for side in sides]), True
 
     def _settle(self, component: Component) -> CutResult:
         """Evaluate a component, split it if it has to be cut, and evaluate its pieces."""

@@ -54,7 +54,7 @@ class TrainOptions:
     lookahead: int = option(
         0,
         "The network values components, not planes (not paper): this many planes of least hull sum are cut, and "
-        "the one whose sides are worth most is taken. 0: it values the planes.",
+        "the one whose reward and sides are worth most is taken. 0: it values the planes.",
         least=0,
         most=150,
     )
@@ -104,10 +104,8 @@ class TrainOptions:
         check_fields(self)
         if self.discount == "hull" and not math.isfinite(self.volume_reward + self.finish_reward):
             raise OptionError("volume_reward and finish_reward have to be finite.")
-        if self.lookahead and (self.volume_reward or self.finish_reward or not self.cut_cost):
-            raise OptionError(
-                "lookahead counts cuts: volume_reward and finish_reward have to be 0, cut_cost more than 0."
-            )
+        if self.volume_reward == self.finish_reward == self.cut_cost == 0:
+            raise OptionError("volume_reward, finish_reward and cut_cost are all 0; there is nothing to learn from.")
 
     @property
     def unit(self) -> float:

@@ -54,9 +54,9 @@ class QNetwork(nn.Module):
 
     @classmethod
     def of(cls, inputs: int, options: TrainOptions) -> QNetwork:
-        """Make the network of a training: values of planes, or the cost of a component."""
-        counts = options.lookahead > 0
-        return cls(inputs, options.unit, outputs=1 if counts else PLANES, costs=counts)
+        """Make the network of a training: values of planes, or the value of a component."""
+        only_costs = options.lookahead > 0 and options.volume_reward == options.finish_reward == 0
+        return cls(inputs, options.unit, outputs=1 if options.lookahead else PLANES, costs=only_costs)
 
     @torch.no_grad()
     def copy_from(self, other: QNetwork) -> None:

@@ -29,7 +29,6 @@ from rlacd.learn.encoders import AnyEncoder, I2PMAEEncoder, make_encoder
 from rlacd.learn.meshes import MeshList, Solids, list_once
 from rlacd.learn.paper.export import export_policy
 from rlacd.learn.paper.loss import bellman_loss, cost_loss, dual_state_target, soft_value
-from rlacd.learn.paper.mdp import Reward
 from rlacd.learn.paper.options import TrainOptions
 from rlacd.learn.paper.qnetwork import QNetwork
 from rlacd.learn.paper.record import Record, whole_returns
@@ -185,7 +184,7 @@ class Training:
         """Add an episode to the replay buffer cut by cut, and learn after each."""
         rows, options = self._keep(record), self.options
         cuts = record.transitions(options.static_discount if options.discount == "static" else None)
-        rewards = [self.reward(record.reward(k)) for k in range(record.cuts)]
+        rewards = [record.reward(k).worth(options) for k in range(record.cuts)]
         targets = list(zip(rewards, [cut.children for cut in cuts], strict=True))
         if options.returns == "monte-carlo":
             targets = whole_returns(cuts, rewards)
@@ -203,12 +202,6 @@ class Training:
         if record.cuts:
             self._add("episode_parts", float(record.parts))
         self._add(f"ended_{record.how}", 1.0)
-
-    def reward(self, terms: Reward) -> float:
-        """r = lambda_1 r_1 + lambda_2 r_2, as the component's own decision process sees it."""
-        finished = terms.finished if self.options.finish_counts == "solid" else terms.sides_finished
-        earned = self.options.volume_reward * terms.saved + self.options.finish_reward * finished
-        return earned - self.options.cut_cost
 
     def learn(self) -> None:
         """Take a gradient step on the dual-state Bellman loss of one batch."""
