@@ -30,8 +30,9 @@ from rlacd.policies import make_policy
 from rlacd.repair.repair import repair
 from rlacd.search.budget import SearchBudget
 from rlacd.search.context import SearchContext, by_score
-from rlacd.search.levels import LEVELS, Level, cost, level, search
+from rlacd.search.levels import BOUNDED_PATIENCE, LEVELS, Level, cost, level, search
 from rlacd.search.neighbourhood import Neighbourhood
+from rlacd.search.operators import BATCH
 from rlacd.search.part_graph import PartGraph
 from rlacd.search.recut import Exchange, recut
 from rlacd.solid.component import Component, Part, Plane
@@ -149,6 +150,20 @@ def test_the_state_of_a_search_is_always_feasible() -> None:
             assert sum(own.volume for part in state.parts for own in part.members) == pytest.approx(
                 root.volume, rel=1e-6
             )
+
+
+def test_a_bounded_search_gives_up_after_a_few_trials_per_part(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried: list[Any] = []
+    monkeypatch.setattr(Neighbourhood, "_try", lambda state, trial, clock: tried.append(trial))
+    root = Component(frame())
+    with Workers(1) as workers:
+        parts = first_pass(root, workers)
+        found, account = search(SearchContext(root, CRITERION, workers), parts, LEVELS["balanced"], Clock())
+        assert (account.exhausted, account.parts) == (True, len(found))
+        assert BOUNDED_PATIENCE * len(found) <= len(tried) < BOUNDED_PATIENCE * len(found) + BATCH
+        tried.clear()
+        search(SearchContext(root, CRITERION, workers), parts, Level("balanced", 10_000, None), Clock())
+        assert len(tried) > 2 * BOUNDED_PATIENCE * len(found)
 
 
 def cubes(*places: tuple[float, float, float]) -> list[Part]:

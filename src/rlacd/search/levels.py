@@ -37,6 +37,9 @@ ANOTHER_PASS = 1.5
 FEW = 20
 """With more parts than this, searching around the first pass gains more per unit of work than another pass."""
 
+BOUNDED_PATIENCE = 4
+"""A bounded search gives up after this many trials per part without a gain (docs/research/search.md)."""
+
 ROUNDS = 3
 """If time allows, the search starts this many times from every pass of the portfolio, each time with another seed."""
 
@@ -177,7 +180,11 @@ def search(
         a_pass = _seconds_of_a_pass(clock)
         starts = _portfolio(context, parts, opening, budget, a_pass, ANOTHER_PASS * first_pass)
         from_portfolio = len(starts[0])
-        outcome = _from_all(context, starts, budget, steps)
+        if bounded:
+            state = Neighbourhood(context, starts[0], BOUNDED_PATIENCE)
+            outcome = state.run(budget, steps)
+        else:
+            outcome = _from_all(context, starts, budget, steps)
         if bounded and level.seconds is not None:
             budget.hurry()
             starts = _portfolio(context, outcome.parts, others[len(opening) :], budget, a_pass)

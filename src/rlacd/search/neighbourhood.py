@@ -55,7 +55,8 @@ STEPS_PER_PART = 2
 """Steps per part between two attempts to eliminate all parts."""
 
 PATIENCE = 24
-"""The search also ends after this many trials per part without a gain: transfer always finds something new to try."""
+"""By default, the search also ends after this many trials per part without a gain: transfer always finds something new
+to try."""
 
 
 @dataclass(frozen=True)
@@ -93,10 +94,13 @@ class Neighbourhood:
     context : SearchContext
     parts : sequence of Part
         Made of components with disjoint interiors.
+    patience : int
+        The search is exhausted after this many trials per part without a gain.
     """
 
-    def __init__(self, context: SearchContext, parts: Sequence[Part]) -> None:
+    def __init__(self, context: SearchContext, parts: Sequence[Part], patience: int = PATIENCE) -> None:
         self._context = context
+        self._patience = patience
         self._policies = [ranking(context.near_sweeps) for ranking in context.rankings]
         self._random = np.random.default_rng(context.seed)
         self._graph = PartGraph(parts, context.criterion, context.workers)
@@ -133,7 +137,7 @@ class Neighbourhood:
     def _walk(self, budget: SearchBudget, most: float, enough: int) -> bool:
         """Make random trials until `most` steps are made in total; whether the search is exhausted."""
         graph = self._graph
-        while self._dry < DRY and self._without_gain < PATIENCE * len(graph.parts) and len(graph.parts) > 1:
+        while self._dry < DRY and not self._gave_up and len(graph.parts) > 1:
             if (
                 not budget.step(self._steps, None, len(graph.parts))
                 or self._steps >= most
@@ -149,12 +153,21 @@ class Neighbourhood:
             budget.steps += len(batch)
         return True
 
+    @property
+    def _gave_up(self) -> bool:
+        return self._without_gain >= self._patience * len(self._graph.parts)
+
     def redistribute_all(self, budget: SearchBudget, enough: int = 1, share: float = 1.0) -> None:
         """Try to eliminate each part, or the smallest share of them, smallest first, until `enough` parts are left."""
         graph = self._graph
         waiting = sorted(graph.parts, key=lambda i: (graph.parts[i].hull.volume, i))
         waiting = waiting[: math.ceil(share * len(waiting))]
-        while waiting and len(graph.parts) > enough and budget.step(self._steps, None, len(graph.parts)):
+        while (
+            waiting
+            and not self._gave_up
+            and len(graph.parts) > enough
+            and budget.step(self._steps, None, len(graph.parts))
+        ):
             batch, waiting = waiting[:BATCH], waiting[BATCH:]
             trials = [
                 giving_away(Operator.REDISTRIBUTE, graph, i, self._random, self._near)
