@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from manifold3d import Manifold
 
 pytest.importorskip("torch", reason="needs the extra train")
 
@@ -21,6 +22,7 @@ from rlacd.learn.paper.options import TrainOptions
 from rlacd.learn.paper.tabular import Node, all_nodes, grow, middle_planes, process_of, q_learning
 from rlacd.learn.paper.torch_policy import load_policy
 from rlacd.learn.paper.train import train
+from rlacd.policies import Policy
 from rlacd.policies.observe import candidates_of, observe, valid_planes
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component, Plane
@@ -130,8 +132,8 @@ LIMIT = Concavity(0.07)
 
 
 @pytest.fixture
-def u_shape(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Component:
-    """A "u" with arms of different height, and only two planes to cut a component by: 31 components in all."""
+def two_planes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave only two planes to cut a component by."""
 
     def two(component: Component, candidates: object = None) -> np.ndarray:
         allowed = np.isin(np.arange(150), TWO)
@@ -144,11 +146,33 @@ def u_shape(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Component:
         monkeypatch.setattr(f"rlacd.{module}.valid_planes", two)
     for module in ("lookahead", "player"):
         monkeypatch.setattr(f"rlacd.learn.paper.{module}.promising", both)
-    mesh = from_manifold(box((0, 0, 0), (3, 1, 0.4)) + box((0, 0, 0), (0.4, 1, 2)) + box((2.6, 0, 0), (3, 1, 1)))
-    (tmp_path / "meshes").mkdir()
-    trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(tmp_path / "meshes" / "u.ply")
-    solid = Solids(tmp_path / "meshes").get("u.ply")
-    assert solid is not None
+
+
+def saved(folder: Path, name: str, solid: Manifold) -> Component:
+    """Write a solid to a folder and read it as training does."""
+    folder.mkdir(exist_ok=True)
+    mesh = from_manifold(solid)
+    trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(folder / name)
+    read = Solids(folder).get(name)
+    assert read is not None
+    return read
+
+
+@pytest.fixture
+def u_shape(tmp_path: Path, two_planes: None) -> Component:
+    """A "u" with arms of different height: 31 components in all."""
+    arms = box((0, 0, 0), (0.4, 1, 2)) + box((2.6, 0, 0), (3, 1, 1))
+    return saved(tmp_path / "meshes", "u.ply", box((0, 0, 0), (3, 1, 0.4)) + arms)
+
+
+def skyline(seed: int) -> Manifold:
+    """A plate with two or three towers."""
+    rng = np.random.default_rng(seed)
+    solid = box((0, 0, 0), (3, 1, 0.4))
+    for _ in range(2 + int(rng.integers(2))):
+        width = rng.uniform(0.3, 0.8)
+        x = rng.uniform(0, 3 - width)
+        solid += box((x, 0, 0), (x + width, 1, rng.uniform(0.8, 2.2)))
     return solid
 
 
@@ -228,13 +252,36 @@ def test_networks_reach_the_optimum_of_their_objective(
         }
     )
     train(tmp_path / "meshes", tmp_path / "run", options, say=lambda line: None)
-    policy, cutting, made = load_policy(tmp_path / "run"), CutProcess(u_shape, LIMIT), 0
+    policy = load_policy(tmp_path / "run")
     if value is not None:
         seen = observe(u_shape, candidates_of(u_shape), LIMIT.threshold, 256)
         assert policy._values(seen)[TWO].max() == pytest.approx(value, abs=tolerance)  # type: ignore[attr-defined]
-    while cutting.frontier and made < 20:
+    made = cuts_by(policy, u_shape)
+    assert made == cuts if cuts is not None else 3 <= made <= 10
+
+
+def cuts_by(policy: Policy, solid: Component) -> int:
+    """Number of cuts that a policy needs, at most 40."""
+    cutting, made = CutProcess(solid, LIMIT), 0
+    while cutting.frontier and made < 40:
         plane = policy.choose(cutting.frontier[0])
         assert plane is not None
         cutting.cut(0, plane)
         made += 1
-    assert made == cuts if cuts is not None else 3 <= made <= 10
+    return made
+
+
+@pytest.mark.nightly
+def test_one_network_counts_the_cuts_of_many_solids(tmp_path: Path, two_planes: None) -> None:
+    seeds = (1, 6, 9, 13, 17, 21, 23, 24, 27, 29)  # greedy needs more cuts than the fewest, and trees are small
+    solids = [saved(tmp_path / "meshes", f"{seed:02d}.ply", skyline(seed)) for seed in seeds]
+    small = {"threshold": LIMIT.threshold, "points": 256, "rotate": False, "validation": 0, "environments": 1}
+    quick = {"iterations": 2000, "warmup": 100, "batch": 32, "learning_rate": 1e-3, "epsilon": 0.3, "lookahead": 2}
+    train(tmp_path / "meshes", tmp_path / "run", TrainOptions.preset("counting", **small, **quick), say=lambda _: None)
+    roots = [grow(solid, LIMIT, TWO, depth=9)[0] for solid in solids]
+    optimal = [fewest(root) for root in roots]
+    made = [cuts_by(load_policy(tmp_path / "run"), solid) for solid in solids]
+    assert sum(optimal) == 44
+    assert sum(cuts_of(root, lambda o: o.saved) for root in roots) > 60  # greedy
+    assert sum(a == b for a, b in zip(made, optimal, strict=True)) >= 9
+    assert sum(made) <= 46

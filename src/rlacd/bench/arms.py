@@ -73,7 +73,7 @@ TITLES = {
     "paper-curves": "Training curves by discount (Fig. 7)",
 }
 
-VALIDATIONS = 4
+VALIDATIONS = 2
 """Number of validations of each arm."""
 
 
