@@ -164,12 +164,10 @@ def _train(meshes: Path, run: Path, options: TrainOptions, say: Callable[[str], 
 
 def _mean_curve(label: str, runs: list[Points], key: str) -> Curve:
     """Average the runs' curves of `key` at the points of the first."""
-    seen = [[(p["cuts"], p[key]) for p in points if key in p] for points in runs]
-    if not all(seen):
-        return Curve(label, [], [])
-    x = [cuts for cuts, _ in seen[0]]
-    y = np.mean([np.interp(x, *zip(*points, strict=True)) for points in seen], axis=0)
-    return Curve(label, x, y.tolist())
+    seen = [np.array([(p["cuts"], p[key]) for p in points if key in p]).reshape(-1, 2).T for points in runs]
+    x = seen[0][0] if all(points.size for points in seen) else np.empty(0)
+    y = np.mean([np.interp(x, *points) for points in seen], axis=0) if len(x) else x
+    return Curve(label, x.tolist(), y.tolist())
 
 
 def _last_validations(curves: Mapping[str, list[Points]]) -> Table:
