@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from manifold3d import Manifold
 
-from rlacd.merge.slivers import drop_slivers, inradius, is_film, is_sliver
+from rlacd.merge.slivers import drop_slivers, is_film, is_sliver
 from rlacd.planes.candidates import OFFSETS_PER_AXIS, axis_and_principal
 from rlacd.policies import SCORES, Greedy
 from rlacd.solid.component import Component, Plane
@@ -70,11 +70,6 @@ def test_greedy_cuts_a_dumbbell_at_its_bar(score: str) -> None:
     assert plane is not None
     assert abs(plane.normal[0]) > 0.99
     assert abs(plane.offset) < 0.7
-
-
-def test_inradius_of_known_bodies() -> None:
-    assert inradius(box(2, 3, 4).hull) == pytest.approx(1)
-    assert inradius(Component(Manifold.tetrahedron()).hull) == pytest.approx(1 / np.sqrt(3))
 
 
 def test_slivers_are_distinguished_from_thin_but_sound_parts() -> None:

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, QhullError
 
 from rlacd import _native
@@ -153,3 +154,49 @@ def test_points_that_are_not_finite_are_refused(bad: float) -> None:
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, bad]], dtype=float)
     with pytest.raises(ValueError, match="finite"):
         Hull.of(points)
+
+
+def inradius(hull: Hull) -> float:
+    """The radius of the largest ball in a hull, by another solver."""
+    corners = hull.vertices[hull.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    offsets = np.einsum("ij,ij->i", normals, corners[:, 0])
+    rows = np.column_stack([normals, np.ones(len(normals))])
+    return float(linprog([0, 0, 0, -1], A_ub=rows, b_ub=offsets, bounds=[(None, None)] * 4).x[3])
+
+
+@given(st.integers(0, 10**6), st.integers(4, 200), st.sampled_from([1e-6, 1.0, 1e6]))
+@settings(max_examples=60, deadline=None)
+def test_a_ball_fits_up_to_the_inradius(seed: int, count: int, scale: float) -> None:
+    random = np.random.default_rng(seed)
+    points = random.normal(size=(count, 3)) * random.uniform(0.05, 1, 3) + random.normal(size=3)
+    hull = Hull.of(points)
+    assert hull is not None
+    radius = inradius(hull)
+    vertices = hull.vertices * scale
+    assert _native.holds_ball(vertices, hull.faces, radius * scale * (1 - 1e-6))
+    assert not _native.holds_ball(vertices, hull.faces, radius * scale * (1 + 1e-6))
+
+
+@given(st.integers(0, 10**6), st.integers(3, 60), st.booleans())
+@settings(max_examples=100, deadline=None)
+def test_outlines_are_those_of_qhull(seed: int, count: int, on_a_grid: bool) -> None:
+    random = np.random.default_rng(seed)
+    points = random.integers(0, 6, (count, 2)).astype(float) if on_a_grid else random.normal(size=(count, 2))
+    corners = _native.outline(points)
+    try:
+        expected = ConvexHull(points)
+    except QhullError:
+        assert len(corners) < 3
+        return
+    assert {tuple(points[i]) for i in corners} == {tuple(points[i]) for i in expected.vertices}
+    x, y = points[corners].T
+    assert np.roll(y, -1) @ x - np.roll(x, -1) @ y == pytest.approx(2 * expected.volume)
+
+
+@pytest.mark.parametrize("points", [np.zeros((0, 2)), np.zeros((1, 2)), np.ones((9, 2)), np.arange(12.0).reshape(6, 2)])
+def test_what_lies_on_a_line_has_no_outline(points: np.ndarray) -> None:
+    assert len(_native.outline(points)) < 3
+    with pytest.raises(ValueError, match="not finite"):
+        _native.outline(np.full((3, 2), np.nan))

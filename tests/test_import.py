@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import trimesh
 
 import rlacd
 
@@ -45,6 +46,30 @@ def test_a_decomposition_loads_no_network_runtime() -> None:
     faces = "[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]"
     loaded = modules_after(f"import rlacd\nrlacd.decompose(({vertices}, {faces}))")
     assert not loaded & {"onnxruntime", "torch", "typer", "rich"}
+
+
+@pytest.mark.slow
+def test_meshes_of_every_format_need_no_scipy(tmp_path: Path) -> None:
+    """trimesh uses it where it is installed; rlacd does not require it."""
+    chair = trimesh.creation.box().difference(trimesh.creation.icosphere(2, 0.6))
+    files = [tmp_path / f"chair.{kind}" for kind in ("obj", "stl", "ply", "off", "glb", "dae", "3mf")]
+    for file in files:
+        chair.export(file)
+    files += [tmp_path / "open.ply", tmp_path / "scene.glb"]
+    trimesh.Trimesh(chair.vertices, chair.faces[5:], process=False).export(files[-2])
+    trimesh.Scene([chair, chair.copy().apply_translation([3, 0, 0])]).export(files[-1])
+    program = f"""
+import sys
+sys.modules["scipy"] = None
+import rlacd
+for file in {[str(file) for file in files]}:
+    hulls = rlacd.decompose(file, primitives=True)
+    hulls.save(file + ".glb")
+    assert len(hulls) > 3, file
+assert len(rlacd.decompose(file, criterion=rlacd.NavigableSpace())) > 0
+assert sys.modules["scipy"] is None
+"""
+    subprocess.run([sys.executable, "-c", program], check=True)
 
 
 def test_every_public_name_is_there_and_listed() -> None:

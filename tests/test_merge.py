@@ -9,7 +9,8 @@ from manifold3d import Manifold
 from rlacd.clock import Clock
 from rlacd.criteria import Concavity
 from rlacd.criteria.navigable import Navigable, NavigableSpace
-from rlacd.merge import merge_parts, merge_to_count
+from rlacd.merge import boxes, merge_parts, merge_to_count
+from rlacd.merge.boxes import Boxes
 from rlacd.solid.balls import Balls
 from rlacd.solid.component import Component, Part, Plane
 from rlacd.workers import Workers
@@ -137,3 +138,28 @@ def test_merging_to_a_count_gives_up_when_it_gets_too_bad(workers) -> None:
     assert merge_to_count(boxes, 1, Concavity(0.05), workers, Clock(), worst=0.1) is None
     with pytest.raises(ValueError, match="one part"):
         merge_to_count(boxes, 0, Concavity(0.05), workers, Clock())
+
+
+@pytest.mark.parametrize("at_once", [1, 7, boxes.AT_ONCE])
+@pytest.mark.parametrize("across", [False, True])
+def test_pairs_of_nearby_boxes(at_once: int, across: bool, monkeypatch) -> None:
+    monkeypatch.setattr(boxes, "AT_ONCE", at_once)
+    random = np.random.default_rng(0)
+    for count in (1, 2, 30):
+        places = random.uniform(0, 4, (count, 3))
+        parts = {7 * i: Component(Manifold.cube(tuple(random.uniform(0.1, 1, 3))).translate(tuple(places[i])))
+                 for i in range(count)}  # fmt: skip
+        corners = {i: part.box for i, part in parts.items()}
+
+        def near(i: int, j: int, corners=corners) -> bool:
+            gap = np.maximum(np.maximum(corners[i][0] - corners[j][1], corners[j][0] - corners[i][1]), 0)
+            return bool(np.linalg.norm(gap) <= 0.2)
+
+        new = [7 * i for i in range(0, count, 3)]
+        expected = {
+            (min(i, j), max(i, j))
+            for i in new
+            for j in parts
+            if i != j and (near(i, j) or (across and any(near(i, k) and near(k, j) for k in parts)))
+        }
+        assert Boxes(parts).pairs(new, 0.2, across).tolist() == [list(pair) for pair in sorted(expected)]

@@ -7,14 +7,15 @@ from itertools import product
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
+from scipy.spatial import cKDTree
 
 from rlacd import _native
 from rlacd.repair.distance import SurfaceQuery, shared_faces
 from rlacd.repair.repair import _inside_by_balls
-from rlacd.repair.voxels import _grown
+from rlacd.repair.voxels import Reach, _grown, _steps_away
 from rlacd.solid.topology import Edges
 
 BALL = trimesh.creation.icosphere(3)
@@ -139,3 +140,56 @@ def test_shared_faces_are_found_whatever_their_order_and_winding() -> None:
     expected = ~(turned == 0).any(axis=1)
     np.testing.assert_array_equal(others, expected[:1000])
     np.testing.assert_array_equal(mine[::-1], expected & (np.arange(len(FACES)) < 1000))
+
+
+@given(st.integers(0, 10**6), st.integers(0, 400), st.floats(0.0, 0.5))
+@settings(max_examples=40, deadline=None)
+def test_points_in_a_ball(seed: int, count: int, radius: float) -> None:
+    random = np.random.default_rng(seed)
+    points = random.uniform(size=(count, 3)).round(random.integers(1, 4))  # some in one place
+    centres = random.uniform(-0.2, 1.2, (20, 3))
+    radii = np.full(20, radius) * random.uniform(size=20)
+    counts, found = _native.PointTree(points).within(centres, radii)
+    expected = cKDTree(points).query_ball_point(centres, radii, return_sorted=True)
+    assert counts.tolist() == [len(own) for own in expected]
+    assert found.tolist() == [int(i) for own in expected for i in own]
+
+
+def test_a_search_for_points_ends_at_its_limit() -> None:
+    points = np.zeros((100, 3))
+    _, found = _native.PointTree(points).within(points, np.ones(100), 250)
+    assert len(found) == 300
+    with pytest.raises(ValueError, match="not finite"):
+        _native.PointTree(np.full((1, 3), np.inf))
+    with pytest.raises(ValueError, match="one radius"):
+        _native.PointTree(points).within(points, np.ones(3))
+
+
+@given(st.integers(0, 10**6), st.floats(0.05, 0.95))
+@settings(max_examples=40, deadline=None)
+def test_connected_cells_and_steps_to_them(seed: int, share: float) -> None:
+    random = np.random.default_rng(seed)
+    cells = random.uniform(size=random.integers(1, 12, 3)) < share
+    label = _native.label_cells(cells).reshape(cells.shape)
+    expected, count = ndimage.label(cells)
+    assert len(np.unique(label[cells])) == count
+    assert len(set(zip(label[cells].tolist(), expected[cells].tolist(), strict=True))) == count
+    assert (label[~cells] == 0).all()
+    if cells.any():
+        assert (_steps_away(cells) == ndimage.distance_transform_cdt(~cells, "taxicab")).all()
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=40, deadline=None)
+def test_the_nearest_room(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    room = np.where(random.uniform(size=(9, 10, 11)) < 0.02, random.integers(1, 4, (9, 10, 11)), 0)
+    none = np.zeros(room.shape, dtype=bool)
+    reach = Reach(np.zeros(3), 1.0, 1.5, none, none, room)
+    points = np.argwhere(~none).astype(float)
+    found = reach.rooms_near(points)
+    away = ndimage.distance_transform_edt(room == 0) if room.any() else np.full(room.shape, np.inf)
+    assert ((found > 0) == (away.ravel() <= 3.5)).all()
+    for label in np.unique(found[found > 0]):  # the room is as near as any
+        own = ndimage.distance_transform_edt(room != label).ravel()
+        assert (own[found == label] == away.ravel()[found == label]).all()

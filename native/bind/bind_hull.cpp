@@ -8,10 +8,14 @@
 #include "base/mesh_measures.hpp"
 #include "base/parallel.hpp"
 #include "hull/hull.hpp"
+#include "hull/inscribed_ball.hpp"
+#include "hull/outline.hpp"
 
 namespace rlacd {
 
 namespace {
+
+using PlanePointsIn = nb::ndarray<const double, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
 
 constexpr std::size_t kPairsAThread = 8;  // starting a thread takes as long as a few joint hulls of small parts
 
@@ -37,6 +41,30 @@ void bind_hull(nb::module_& m) {
       "Convex hull of points [N, 3]: (indices [H] into points, faces [F, 3] into those H points, rank).\n\n"
       "Every index is an extreme point, the facets are exactly convex (no rounding in the decisions) and outward\n"
       "oriented. rank < 3 (all points coplanar): no indices, no faces.");
+  m.def(
+      "holds_ball",
+      [](const PointsIn& vertices, const FacesIn& faces, double radius) {
+        const Mesh hull = to_finite_mesh(vertices, faces);
+        nb::gil_scoped_release release;
+        return holds_ball(hull, radius);
+      },
+      nb::arg("vertices"), nb::arg("faces"), nb::arg("radius"),
+      "Whether a ball of this radius fits into a convex hull.");
+  m.def(
+      "outline",
+      [](const PlanePointsIn& array) {
+        std::vector<std::array<double, 2>> points(array.shape(0));
+        for (std::size_t i = 0; i < points.size(); ++i) {
+          points[i] = {array(i, 0), array(i, 1)};
+          if (!std::isfinite(points[i][0]) || !std::isfinite(points[i][1]))
+            throw std::invalid_argument("a point is not finite");
+        }
+        return to_array<std::int32_t>(outline(points));
+      },
+      nb::arg("points"),
+      "The corners of the convex hull of points [N, 2] of the plane as indices, counter-clockwise; fewer than three if "
+      "the\n"
+      "points lie on a line up to rounding.");
   m.def(
       "joint_hull_volumes",
       [](const std::vector<PointsIn>& groups,

@@ -10,6 +10,7 @@
 #include "mesh/edges.hpp"
 #include "mesh/least_bent.hpp"
 #include "mesh/point_bodies.hpp"
+#include "mesh/point_tree.hpp"
 #include "mesh/spread_points.hpp"
 #include "mesh/wedges.hpp"
 #include "mesh/weld.hpp"
@@ -272,6 +273,39 @@ void bind_mesh(nb::module_& m) {
       "The body [V] of each vertex of a mesh of any quality, numbered from 0 by their first faces, -1 for those of "
       "none:\n"
       "faces hang together where they share a corner, or have corners in one place.");
+  nb::class_<PointTree>(m, "PointTree", "Finds those of some points [N, 3] that lie in a ball.")
+      .def(
+          "__init__",
+          [](PointTree* self, const PointsIn& array) {
+            std::vector<Vec3> points = to_points(array);
+            require_finite(points);
+            nb::gil_scoped_release release;
+            new (self) PointTree(std::move(points));
+          },
+          nb::arg("points"))
+      .def(
+          "within",
+          [](const PointTree& self, const PointsIn& array, const VectorIn& radii, std::size_t most) {
+            const std::vector<Vec3> centres = to_points(array);
+            require_finite(centres);
+            if (radii.shape(0) != centres.size()) throw std::invalid_argument("one radius a centre");
+            std::vector<std::int64_t> counts(centres.size());
+            std::vector<std::int32_t> found;
+            {
+              nb::gil_scoped_release release;
+              for (std::size_t i = 0; i < centres.size() && found.size() <= most; ++i) {
+                if (i % kBetweenPolls == 0) poll_stop();
+                const std::size_t before = found.size();
+                self.within(centres[i], radii(i), found);
+                counts[i] = static_cast<std::int64_t>(found.size() - before);
+              }
+            }
+            return nb::make_tuple(to_array<std::int64_t>(std::move(counts)), to_array<std::int32_t>(std::move(found)));
+          },
+          nb::arg("centres"), nb::arg("radii"), nb::arg("most") = std::numeric_limits<std::size_t>::max(),
+          "How many points [M] are at most radii [M] away from each centre [M, 3]; their indices, one centre after "
+          "the\n"
+          "other, ascending. The search ends once more than `most` are found.");
 }
 
 }  // namespace rlacd

@@ -2,6 +2,7 @@
 #include <nanobind/nanobind.h>
 
 namespace rlacd {
+void bind_cells(nanobind::module_& m);
 void bind_concave_edges(nanobind::module_& m);
 void bind_concavity(nanobind::module_& m);
 void bind_distance(nanobind::module_& m);
@@ -24,6 +25,7 @@ NB_MODULE(_native, m) {
   // A thread still at work when Python exits holds objects: that is not a leak, and nothing to warn a user about.
   nanobind::set_leak_warnings(false);
 #endif
+  rlacd::bind_cells(m);
   rlacd::bind_concave_edges(m);
   rlacd::bind_concavity(m);
   rlacd::bind_distance(m);

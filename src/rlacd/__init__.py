@@ -57,7 +57,7 @@ __all__ = [
 ]
 
 # Where each public name lives. Its module is imported when the name is first used (PEP 562), so that `rlacd --help`
-# and programs that only might decompose do not wait for trimesh and scipy. No module may be called like a public name:
+# and programs that only might decompose do not wait for trimesh and numpy. No module may be called like a public name:
 # importing it would hide that.
 _HOME = {
     "NavigableSpace": "criteria",

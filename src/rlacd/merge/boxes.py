@@ -7,7 +7,6 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from rlacd._native import poll_stop
 from rlacd.solid.arrays import BoolArray, FloatArray, IntArray
@@ -68,16 +67,25 @@ class Boxes:
         count = len(self.ids)
         if not np.isfinite(reach):
             return np.repeat(rows, count), np.tile(np.arange(count), len(rows))
-        first = _matrix(*self._near(rows, np.arange(count), reach), count)
-        between = np.flatnonzero(first.sum(axis=0))
-        hops = self._boxes[between]
-        around = np.array([hops[:, 0].min(axis=0) - reach, hops[:, 1].max(axis=0) + reach]) if len(hops) else None
-        if around is None:
+        from_row, hop = self._near(rows, np.arange(count), reach)
+        between = np.unique(hop)
+        if not len(between):
             return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+        hops = self._boxes[between]
+        around = np.array([hops[:, 0].min(axis=0) - reach, hops[:, 1].max(axis=0) + reach])
         met = (self._boxes[:, 0] <= around[1]).all(axis=1) & (self._boxes[:, 1] >= around[0]).all(axis=1)
-        second = _matrix(*self._near(between, np.flatnonzero(met), reach), count)
-        row, other = (first @ second).nonzero()
-        return row, other
+        from_hop, other = self._near(between, np.flatnonzero(met), reach)
+        other = other[np.argsort(from_hop, kind="stable")]
+        begin = np.searchsorted(np.sort(from_hop), hop)
+        counts = np.searchsorted(np.sort(from_hop), hop, side="right") - begin
+        found = np.zeros(0, dtype=np.int64)  # row * count + other
+        bounds = np.searchsorted(np.cumsum(counts), np.arange(0, counts.sum() + AT_ONCE, AT_ONCE)[1:-1], side="right")
+        for chunk in np.split(np.arange(len(hop)), np.unique(bounds)):
+            poll_stop()
+            step = np.arange(counts[chunk].sum()) - np.repeat(np.cumsum(counts[chunk]) - counts[chunk], counts[chunk])
+            beyond = other[np.repeat(begin[chunk], counts[chunk]) + step]
+            found = np.union1d(found, np.repeat(from_row[chunk], counts[chunk]) * count + beyond)
+        return found // count, found % count
 
     def _near(self, some: Places, others: Places, reach: float) -> tuple[Places, Places]:
         """Pairs of indices, one from `some` and one from `others`, whose boxes are within reach."""
@@ -103,10 +111,6 @@ class Boxes:
             near = _within(self._boxes[some[row]], self._boxes[others[column]], reach)
             found.append((some[row[near]], others[column[near]]))
         return np.concatenate([a for a, _ in found]), np.concatenate([b for _, b in found])
-
-
-def _matrix(rows: Places, columns: Places, count: int) -> csr_array:
-    return csr_array((np.ones(len(rows), dtype=np.int32), (rows, columns)), shape=(count, count))
 
 
 def _within(a: FloatArray, b: FloatArray, reach: float) -> BoolArray:

@@ -7,8 +7,8 @@ from collections.abc import Collection, Iterator
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
+from rlacd import _native
 from rlacd.criteria import Criterion
 from rlacd.primitive_kinds import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.solid.arrays import FloatArray
@@ -165,23 +165,22 @@ class _Shadow:
     area, length : float
     """
 
-    def __init__(self, points: FloatArray, axes: FloatArray, seen: ConvexHull) -> None:
+    def __init__(self, points: FloatArray, axes: FloatArray) -> None:
         self._axes = axes
         self._points = points @ axes
-        self.outline: FloatArray = self._points[seen.vertices, :2]
-        self.area = float(seen.volume)
+        seen = np.ascontiguousarray(self._points[:, :2])
+        self.outline: FloatArray = seen[_native.outline(seen)]
+        x, y = (self.outline - seen[0]).T
+        self.area = float(np.roll(y, -1) @ x - np.roll(x, -1) @ y) / 2
         along = self._points[:, 2]
         self._middle = float(along.min() + along.max()) / 2
         self.length = float(np.ptp(along))
 
     @classmethod
     def of(cls, points: FloatArray, axis: FloatArray) -> _Shadow | None:
-        """None if the projection is too thin for its convex hull to be computed."""
-        axes = _axes_along(axis)
-        try:
-            return cls(points, axes, ConvexHull((points @ axes)[:, :2]))
-        except QhullError:
-            return None
+        """None if the projection is a line up to rounding."""
+        shadow = cls(points, _axes_along(axis))
+        return shadow if len(shadow.outline) > 2 else None
 
     def box(self) -> Primitive:
         """The smallest box with edges along the axis: a side of its base lies along one of the outline."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import linprog
 
 from rlacd import _native
 from rlacd.solid.component import Part
@@ -65,24 +64,7 @@ def is_sliver(hull: Hull) -> bool:
     ratio = hull.volume / _native.mesh_area(hull.vertices, hull.faces)
     if ratio > THIN * extent:
         return False
-    return 3 * ratio < THIN * extent or inradius(hull) < THIN * extent
-
-
-def inradius(hull: Hull) -> float:
-    """Radius of the largest ball inside the hull (the Chebyshev ball, by linear programming)."""
-    corners = hull.vertices[hull.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(normals, axis=1)
-    normals = normals[lengths > 0] / lengths[lengths > 0, None]
-    offsets = (hull.vertices @ normals.T).max(axis=0)
-    ball = linprog(
-        [0, 0, 0, -1],
-        A_ub=np.column_stack([normals, np.ones(len(normals))]),
-        b_ub=offsets,
-        bounds=[(None, None)] * 3 + [(0, None)],
-        method="highs",
-    )
-    return float(ball.x[3]) if ball.x is not None else 0.0
+    return 3 * ratio < THIN * extent or not _native.holds_ball(hull.vertices, hull.faces, THIN * extent)
 
 
 def _near(part: Part, sliver: Part) -> bool:

@@ -10,9 +10,8 @@ from collections.abc import Sequence
 
 import mapbox_earcut
 import numpy as np
-from scipy.spatial import cKDTree
 
-from rlacd._native import least_bent, poll_stop
+from rlacd._native import PointTree, least_bent, poll_stop
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.topology import BoolArray, Edges, IntArray, components, first_of_doubled, nondegenerate
 
@@ -21,9 +20,8 @@ _EXACT_LOOP = 60
 LONGEST_EXACT_LOOP = 250
 """Loops of more edges than this are not triangulated optimally."""
 
-# Edges processed between two polls of the stop.
-_AT_ONCE = 1000
-
+MOST_NEAR = 50_000_000
+"""Pairs of a free edge and a free vertex near it; where there are more, none is split."""
 
 # Tracing loops is the one repair step that walks edge by edge; a soup with more free edges is not a scan with holes.
 MOST_FREE_EDGES = 500_000
@@ -59,12 +57,10 @@ def weld_free_vertices(vertices: FloatArray, faces: IntArray, tolerance: float) 
     """
     free = free_edges(faces, len(vertices))
     ends = np.unique(free)
-    pairs = (
-        cKDTree(vertices[ends]).query_pairs(tolerance, output_type="ndarray") if len(ends) else np.empty((0, 2), int)
-    )
-    if len(pairs) == 0:
+    counts, near = PointTree(vertices[ends]).within(vertices[ends], np.full(len(ends), tolerance))
+    if len(near) == len(ends):  # each is near itself only
         return faces
-    _, label = components(len(ends), pairs[:, 0], pairs[:, 1])
+    _, label = components(len(ends), np.repeat(np.arange(len(ends)), counts), near.astype(np.int64))
     _, first = np.unique(label, return_index=True)
     target = np.arange(len(vertices))
     target[ends] = ends[first[label]]
@@ -90,19 +86,13 @@ def split_at_free_vertices(vertices: FloatArray, faces: IntArray, tolerance: flo
     a, b, c = faces[face, corner], faces[face, (corner + 1) % 3], faces[face, (corner + 2) % 3]
     span = vertices[b] - vertices[a]
     length = np.linalg.norm(span, axis=1)
-    tree = cKDTree(vertices[free])
-    found: list[list[int]] = []
-    for begin in range(0, len(a), _AT_ONCE):
-        poll_stop()
-        some = slice(begin, begin + _AT_ONCE)
-        middle, reach = (vertices[a[some]] + vertices[b[some]]) / 2, length[some] / 2 + tolerance
-        found += list(tree.query_ball_point(middle, reach, return_sorted=True))
-    count = np.array([len(x) for x in found])
-    if count.sum() > 50_000_000 or count.sum() == 0:
+    tree = PointTree(vertices[free])
+    count, near = tree.within((vertices[a] + vertices[b]) / 2, length / 2 + tolerance, MOST_NEAR)
+    if len(near) > MOST_NEAR or len(near) == 0:
         return none
     poll_stop()
     edge = np.repeat(np.arange(len(halfedge)), count)
-    vertex = free[np.concatenate([np.asarray(x, dtype=np.int64) for x in found])]
+    vertex = free[near]
     offset = vertices[vertex] - vertices[a[edge]]
     along = np.einsum("ij,ij->i", offset, span[edge]) / np.maximum(length[edge] ** 2, np.finfo(float).tiny)
     away = np.linalg.norm(offset - along[:, None] * span[edge], axis=1)

@@ -21,10 +21,9 @@ from functools import cached_property
 
 import numpy as np
 from manifold3d import Manifold
-from scipy.spatial import cKDTree
 
 from rlacd import _native
-from rlacd._native import poll_stop
+from rlacd._native import PointTree, poll_stop
 from rlacd.errors import EmptyMeshError
 from rlacd.memory import BYTES_REPAIRED, require_memory
 from rlacd.repair.caps import FLAPS, close_holes
@@ -563,11 +562,11 @@ def _inside_by_balls(solid: SurfaceQuery, points: FloatArray, distance: FloatArr
     """
     ball = np.full(len(points), -1, dtype=np.int64)
     centers: list[int] = []
-    tree = cKDTree(points)
+    tree = PointTree(points)
     for i in np.argsort(-distance, kind="stable").tolist():
         if ball[i] < 0:
-            poll_stop()
-            ball[tree.query_ball_point(points[i], 0.99 * distance[i])] = len(centers)
+            _, near = tree.within(points[i : i + 1], 0.99 * distance[i : i + 1])
+            ball[near] = len(centers)
             centers.append(i)
     return solid.inside(points[centers])[ball]
 

@@ -9,13 +9,10 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy import ndimage
 
-from rlacd._native import poll_stop
+from rlacd._native import label_cells, nearest_labels, poll_stop
 from rlacd.repair.distance import SurfaceQuery, points_covering
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.topology import BoolArray, IntArray
@@ -62,7 +59,7 @@ class Reach:
         occupied = np.zeros(cell.max(axis=0) + 1 + margin, dtype=bool)
         occupied[tuple(cell.T)] = True
         poll_stop()
-        label, _ = ndimage.label(~_grown(occupied, radius / pitch))
+        label = label_cells(~_grown(occupied, radius / pitch)).reshape(occupied.shape)
         outside = label == label[0, 0, 0]
         reached = _grown(outside, radius / pitch)
         room = np.where(outside, 0, label)
@@ -82,25 +79,18 @@ class Reach:
         labels = labels[labels > 0]
         if len(labels) == 0:
             return labels
-        deepest = ndimage.maximum_position(ndimage.distance_transform_cdt(~self.occupied, "taxicab"), self.room, labels)
-        centers = self.origin + np.array(deepest) * self.pitch
+        depth = _steps_away(self.occupied)
+        cells = np.flatnonzero(self.room)
+        deepest_first = cells[np.argsort(-depth.ravel()[cells], kind="stable")]
+        _, first = np.unique(self.room.ravel()[deepest_first], return_index=True)
+        deepest = np.stack(np.unravel_index(deepest_first[first], self.room.shape), axis=1)
+        centers = self.origin + deepest * self.pitch
         return labels[~solid.inside(centers)]
 
     def rooms_near(self, points: FloatArray) -> IntArray:
         """Return ``[N]`` the label of a room whose walls may contain each point, 0 for none."""
-        reach = self.radius + 2 * self.pitch
-        away, index = self._nearest_room
         cell = np.clip(np.rint((points - self.origin) / self.pitch).astype(np.int64), 0, np.array(self.room.shape) - 1)
-        at = tuple(cell.T)
-        nearest = self.room[tuple(index[(slice(None), *at)])]
-        label: IntArray = np.where(away[at] * self.pitch <= reach, nearest, 0)
-        return label
-
-    @cached_property
-    def _nearest_room(self) -> tuple[FloatArray, NDArray[np.int32]]:
-        """``[X, Y, Z], [3, X, Y, Z]`` the distance to the nearest cell of a room, and which it is, in cells."""
-        away, index = ndimage.distance_transform_edt(self.room == 0, return_indices=True)
-        return away, index
+        return nearest_labels(self.room, cell, self.radius / self.pitch + 2 + _ROUNDING)
 
     def around_rooms(self, rooms: IntArray) -> BoolArray:
         """Return ``[X, Y, Z]`` the unreachable cells of some rooms and of their walls."""
@@ -128,6 +118,17 @@ class Reach:
         points[attached] = (closest + np.minimum(step, 1)[:, None] * away)[attached]
         _smooth(points, quads, ~attached)
         return points, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def _steps_away(cells: BoolArray) -> IntArray:
+    """Count ``[X, Y, Z]`` the steps along the axes from each cell to the nearest of `cells`."""
+    steps = np.where(cells, 0, sum(cells.shape))
+    for axis, count in enumerate(cells.shape):
+        at = np.arange(count).reshape(np.roll([count, 1, 1], axis))
+        from_below = np.minimum.accumulate(steps - at, axis=axis) + at
+        from_above = np.flip(np.minimum.accumulate(np.flip(steps + at, axis), axis=axis), axis) - at
+        steps = np.minimum(from_below, from_above)
+    return steps
 
 
 def _grown(cells: BoolArray, radius: float) -> BoolArray:

@@ -7,7 +7,6 @@ import itertools
 import numpy as np
 from manifold3d import Manifold
 from numpy.typing import NDArray
-from scipy.spatial import HalfspaceIntersection, QhullError
 
 from rlacd import _native
 from rlacd._native import Stopped
@@ -17,7 +16,8 @@ from rlacd.solid.component import Part
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.input_mesh import InputMesh
-from rlacd.solid.solid import Solid
+from rlacd.solid.manifold import to_manifold
+from rlacd.solid.solid import Solid, surface_of
 
 MOST_HULLS = 2000
 """If there are more bodies, neighbours along a space-filling curve share a hull."""
@@ -132,12 +132,11 @@ def _touching(points: FloatArray) -> Hull:
     reach = np.full(len(_DIRECTIONS), -np.inf)
     for first in range(0, len(points), _AT_ONCE):
         np.maximum(reach, (points[first : first + _AT_ONCE] @ _DIRECTIONS.T).max(axis=0), out=reach)
-    reach += 2 * _WIDER
-    try:
-        corners = HalfspaceIntersection(np.column_stack([_DIRECTIONS, -reach]), points.mean(axis=0)).intersections
-    except QhullError:  # flat
-        return _box(points)
-    return Hull.of(np.ascontiguousarray(corners[np.isfinite(corners).all(axis=1)])) or _box(points)
+    box = _box(points)
+    body = to_manifold(box.vertices, box.faces)
+    for direction, offset in zip(_DIRECTIONS, reach + 2 * _WIDER, strict=True):
+        body = body.trim_by_plane(-direction, -offset / np.linalg.norm(direction))
+    return Hull.of(surface_of(body)[0]) or box
 
 
 def _box(points: FloatArray) -> Hull:

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
+from rlacd._native import PointTree
 from rlacd.errors import OutputError
 from rlacd.fields import checked, integer, path_like, read
 from rlacd.io.write import check_file, write_file
@@ -173,13 +173,13 @@ def caption(decomposition: Result) -> str:
 def apart(balls: Balls) -> Balls:
     """Choose balls that do not overlap, smallest first; all of them together would look like one cloud."""
     order = np.argsort(balls.radii, kind="stable")
-    tree = cKDTree(balls.centres)
+    tree = PointTree(balls.centres)
     hidden = np.zeros(len(balls), dtype=bool)
     shown: list[int] = []
     for i in order:
         if not hidden[i]:
             shown.append(int(i))
-            near = np.array(tree.query_ball_point(balls.centres[i], balls.radii[i] + balls.radii.max()))
+            _, near = tree.within(balls.centres[i : i + 1], balls.radii[i : i + 1] + balls.radii.max())
             away = np.linalg.norm(balls.centres[near] - balls.centres[i], axis=1)
             hidden[near[away < balls.radii[near] + balls.radii[i]]] = True
     return Balls(balls.centres[shown], balls.radii[shown])
