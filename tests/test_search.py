@@ -31,7 +31,7 @@ from rlacd.repair.repair import repair
 from rlacd.search.budget import SearchBudget
 from rlacd.search.context import SearchContext, by_score
 from rlacd.search.levels import BOUNDED_PATIENCE, LEVELS, Level, cost, level, search
-from rlacd.search.neighbourhood import Neighbourhood
+from rlacd.search.neighbourhood import LEAST_TRIALS, Neighbourhood
 from rlacd.search.operators import BATCH
 from rlacd.search.part_graph import PartGraph
 from rlacd.search.recut import Exchange, recut
@@ -160,10 +160,11 @@ def test_a_bounded_search_gives_up_after_a_few_trials_per_part(monkeypatch: pyte
         parts = first_pass(root, workers)
         found, account = search(SearchContext(root, CRITERION, workers), parts, LEVELS["balanced"], Clock())
         assert (account.exhausted, account.parts) == (True, len(found))
-        assert BOUNDED_PATIENCE * len(found) <= len(tried) < BOUNDED_PATIENCE * len(found) + BATCH
+        patience = max(BOUNDED_PATIENCE * len(found), LEAST_TRIALS)
+        assert patience <= len(tried) < patience + BATCH
         tried.clear()
         search(SearchContext(root, CRITERION, workers), parts, Level("balanced", 10_000, None), Clock())
-        assert len(tried) > 2 * BOUNDED_PATIENCE * len(found)
+        assert len(tried) > 2 * patience
 
 
 def cubes(*places: tuple[float, float, float]) -> list[Part]:

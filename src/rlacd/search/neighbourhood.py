@@ -58,6 +58,9 @@ PATIENCE = 24
 """By default, the search also ends after this many trials per part without a gain: transfer always finds something new
 to try."""
 
+LEAST_TRIALS = 32
+"""But not before so many trials without a gain: where parts are few, trials cost little."""
+
 
 @dataclass(frozen=True)
 class SearchOutcome:
@@ -155,7 +158,7 @@ class Neighbourhood:
 
     @property
     def _gave_up(self) -> bool:
-        return self._without_gain >= self._patience * len(self._graph.parts)
+        return self._without_gain >= max(self._patience * len(self._graph.parts), LEAST_TRIALS)
 
     def redistribute_all(self, budget: SearchBudget, enough: int = 1, share: float = 1.0) -> None:
         """Try to eliminate each part, or the smallest share of them, smallest first, until `enough` parts are left."""
