@@ -337,6 +337,7 @@ def test_balls_come_with_navigable_space(seen: Watched) -> None:
 def test_another_axis_can_point_up(seen: Watched) -> None:
     page = seen.page
     assert page.locator("#up input:checked").get_attribute("value") == "z"
+    assert page.locator("#up legend").inner_text() == "Up (a guess)"
     looks = [pixels(page)]
     for axis in "xyz":
         page.check(f"#up input[value={axis}]")

@@ -29,7 +29,7 @@ def view(
         str | None,
         typer.Option(
             metavar="AXIS",
-            help="The axis of the mesh that points up. [dim]\\[default: y for glb and gltf, else z][/dim]",
+            help="The axis of the mesh that points up. [dim]\\[default: what the file says, else a guess][/dim]",
             show_default=False,
         ),
     ] = None,

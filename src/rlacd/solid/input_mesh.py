@@ -12,6 +12,8 @@ from rlacd.output_options import Axis
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.topology import IntArray
 
+_UNITS = {1e-6: "µm", 1e-3: "mm", 1e-2: "cm", 1.0: "m", 0.0254: "in", 0.3048: "ft"}
+
 
 @dataclass(frozen=True)
 class SourceNode:
@@ -94,6 +96,11 @@ class InputMesh:
     node_of: IntArray | None = None
     asset: Asset | None = None
     factor: float = 1.0
+
+    @property
+    def unit(self) -> str:
+        """The short name of the unit of length; empty if the input does not say it, or if it has none."""
+        return "" if self.metres is None else _UNITS.get(self.metres, "")
 
     def scaled(self, factor: float) -> InputMesh:
         """Multiply all coordinates."""

@@ -84,8 +84,7 @@ def report_page(decomposition: Result, *, up: str | None = None, picture: bool =
     """Build the text of the report; see `save_report_page`. The unit is the input's, unless it is given."""
     up = decomposition.up_axis(up)
     if unit is None:
-        metres = decomposition.input is not None and decomposition.input.metres == 1.0
-        unit = "m" if metres else ""
+        unit = "" if decomposition.input is None else decomposition.input.unit
     data: dict[str, Any] = {
         **scene(decomposition, up, unit=unit),
         "heat": heat_scene(heat_map(decomposition, triangles=HEAT_TRIANGLES)),

@@ -76,6 +76,8 @@ class Subject:
         The unit of length if the format defines one; else empty.
     mesh : InputMesh
         The mesh as first read.
+    up_is_guess : bool
+        Whether nobody says which axis points up.
     """
 
     path: Path
@@ -83,3 +85,4 @@ class Subject:
     up: str
     unit: str
     mesh: InputMesh
+    up_is_guess: bool = False

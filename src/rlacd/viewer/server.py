@@ -170,12 +170,12 @@ class ViewServer(BoundedServer):
     def scene(self) -> bytes:
         """Return the scene as JSON; computed once per subject or result."""
         subject, result = self.subject, self.session.result
+        guess = {"upIsGuess": subject.up_is_guess}
         if result is None:
             mesh = subject.mesh
-            return to_json(
-                input_scene(subject.name, mesh.vertices, mesh.faces, subject.up, unit=subject.unit), indent=None
-            ).encode()
-        return self._once("scene", result[0], lambda: scene(result[1], subject.up, unit=subject.unit))
+            bare = input_scene(subject.name, mesh.vertices, mesh.faces, subject.up, unit=subject.unit)
+            return to_json(bare | guess, indent=None).encode()
+        return self._once("scene", result[0], lambda: scene(result[1], subject.up, unit=subject.unit) | guess)
 
     def heat(self, version: int, decomposition: Decomposition) -> bytes:
         """Return the error heat map as JSON; computed once per decomposition."""

@@ -21,6 +21,7 @@ from rlacd.view.picture import check_up
 from rlacd.viewer.controls import Subject, ViewerControls
 from rlacd.viewer.server import ViewServer
 from rlacd.viewer.session import AT_EXIT, Session
+from rlacd.viewer.up import SAY_NOTHING, guessed_up
 
 LEAVING = 0.8  # seconds for current work to end when the viewer is closed
 
@@ -45,7 +46,7 @@ def open_viewer(
     options : dict, optional
         Initial values of the page's controls: fields of `ViewerControls`.
     up : {"x", "y", "z"}, optional
-        The axis of the mesh that points up; by default y for glTF and z otherwise.
+        The axis of the mesh that points up; by default what the file or its format says, else a guess.
     port : int, optional
         Port to listen on; 8765, or any free one, by default.
     threads : int, optional
@@ -136,7 +137,9 @@ def read_subject(mesh: str | os.PathLike[str], up: str | None = None) -> Subject
         The file cannot be read or holds nothing usable.
     """
     read = load_mesh(mesh)
-    return Subject(Path(mesh), Path(read.name).stem, up or read.up, "m" if read.metres == 1.0 else "", read)
+    guess = up is None and Path(mesh).suffix.lower() in SAY_NOTHING
+    axis = up or (guessed_up(read) if guess else read.up)
+    return Subject(Path(mesh), Path(read.name).stem, axis, read.unit, read, up_is_guess=guess)
 
 
 def read_controls(given: dict[str, Any]) -> ViewerControls:

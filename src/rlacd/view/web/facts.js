@@ -131,7 +131,8 @@ export function optionTable({ options = {}, version }) {
 
 const words = (name) => name.replaceAll("_", " ");
 const plain = (value) =>
-  value !== null && typeof value === "object"
+  Array.isArray(value) && value.length === 0 ? "none"
+  : value !== null && typeof value === "object"
     ? Object.entries(value).filter(([, each]) => each != null).map(([name, each]) => `${words(name)} ${plain(each)}`).join(", ")
     : typeof value === "number"
       ? digits(value, 4)

@@ -1,6 +1,6 @@
 // The list of parts. Hovering highlights, clicking shows one part alone; arrow keys walk through it.
 import { HINTS } from "page/facts";
-import { digits, make } from "page/widgets";
+import { column, make } from "page/widgets";
 
 export class PartList {
   constructor({ onHover, onPick }) {
@@ -90,8 +90,8 @@ export class PartList {
       { "aria-selected": "false", "data-part": part.index },
       make("td", {}, swatch, String(part.index).padStart(3, "0")),
       make("td", {}, String(part.faces)),
-      make("td", {}, `${digits(100 * part.share, 2)}\u00a0%`),
-      make("td", { class: "error" }, part.error == null ? "–" : this.asShare ? `${digits(100 * part.error, 2)}\u00a0%` : digits(part.error / this.scene.scale, 2), this.limit ? make("span", { class: "track" }, gauge) : null),
+      make("td", {}, `${column(100 * part.share)}\u00a0%`),
+      make("td", { class: "error" }, part.error == null ? "–" : this.asShare ? `${column(100 * part.error)}\u00a0%` : column(part.error / this.scene.scale), this.limit ? make("span", { class: "track" }, gauge) : null),
     );
     row.number = part.index;
     return row;

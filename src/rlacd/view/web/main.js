@@ -55,6 +55,7 @@ function pick(index) {
 function show(scene, { draft = false } = {}) {
   const other = !shown || shown.name !== scene.name || shown.up !== scene.up || !scene.report;
   if (other) look.up.choose(scene.up, { silently: true });
+  tellUp(scene.upIsGuess);
   shown = scene;
   picked = null;
   heatOf = null;
@@ -76,6 +77,15 @@ function show(scene, { draft = false } = {}) {
     look.balls.dataset.hint = `${some < of ? `${some} of the ` : ""}${plural(of, "ball")} that no hull touches, none over another (B).`;
   } else look.balls.set(false);
   if (look.heat.getAttribute("aria-pressed") === "true") showHeat(true);
+}
+
+/** Formats such as OBJ do not say which axis points up. */
+function tellUp(isGuess) {
+  const legend = look.up.querySelector("legend");
+  legend.textContent = isGuess ? "Up (a guess)" : "Up";
+  legend.classList.toggle("term", Boolean(isGuess));
+  if (isGuess) legend.dataset.hint = "The file does not say which axis points up: y if the mesh stands on y = 0 and not on z = 0, else z.";
+  else delete legend.dataset.hint;
 }
 
 function tell(scene) {

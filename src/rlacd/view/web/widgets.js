@@ -49,6 +49,10 @@ export function toggle(id, text, on, hint, onChange) {
 export const digits = (value, count = 3) =>
   value == null ? "–" : value === 0 ? "0" : Math.abs(value) < 1e-4 ? "< 0.0001" : String(+value.toPrecision(count));
 
+/** A number of a column: the same number of digits in every row. */
+export const column = (value, count = 2) =>
+  value === 0 || Math.abs(value) < 1e-4 ? digits(value) : Math.abs(value) >= 10 ** count ? value.toFixed(0) : value.toPrecision(count);
+
 /** A length of the frame in the input's unit, in plain words: "0.0226 m", or "0.0226 units" where nobody says which. */
 export const measure = (value, { scale, unit }, count = 3) =>
   value == null ? "–" : `${value / scale < 1e-4 && value > 0 ? (value / scale).toExponential(1) : digits(value / scale, count)}\u00a0${unit || "units"}`;
