@@ -195,6 +195,8 @@ WRONG_OPTIONS = {
     "max_hulls": [0, -1, 2.5, "2", True, NAN],
     "max_vertices": [3, 0, -8, 4.5, "8"],
     "max_faces": [3, 0, 12.0, "x"],
+    "overlap": [-0.01, NAN, 0.6, "a", None, True],
+    "overlap_abs": [0, -1, NAN, INFINITE, "a", 1e9],
     "merge": [None, "no", 0, 2],
     "policy": ["", None, 3, "GREEDY", "greedy-", ["greedy"]],
     "resolution": [0, -1, 19, 401, 2.5, "3", None, 10**6],

@@ -102,6 +102,8 @@ def test_every_option_reaches_the_decomposition(mesh: Path, stand_in: StandIn) -
     options = {
         "threshold": 0.1,
         "threshold_abs": 0.2,
+        "overlap": 0.01,
+        "overlap_abs": 0.02,
         "max_hulls": 5,
         "max_vertices": 32,
         "max_faces": 60,

@@ -30,10 +30,12 @@ from rlacd.merge import (
     limit_roughly,
     merge_lifted,
     merge_to_count,
+    overlap_parts,
     primitive_part,
     simple_part,
     with_limits,
 )
+from rlacd.merge.overlap import Seams
 from rlacd.merge.primitives import SLACK
 from rlacd.options import (
     CONCAVITY,
@@ -92,6 +94,8 @@ def decompose(
     max_faces: int | None = None,
     detail: DetailName = SIMPLE,
     primitives: bool | Sequence[PrimitiveKind] = (),
+    overlap: float = 0.0,
+    overlap_abs: float | None = None,
     merge: bool = True,
     policy: str | Policy = "greedy",
     resolution: int = DEFAULT_RESOLUTION,
@@ -144,6 +148,13 @@ def decompose(
         threshold: the simplest whose volume is within a quarter of the least. Only those named; True allows all. Its
         hull is then a convex polyhedron around the primitive, and ``Decomposition.primitives`` describes it. Models
         (MJCF, URDF, SDF, USD) hold primitives in place of such hulls.
+    overlap : float
+        Hulls that touch overlap by this much, in the same frame as `threshold`, so that nothing thin slips between
+        them: one takes in a layer of the other. The threshold still holds; where it leaves no room, hulls overlap by
+        less, and ``report["warnings"]`` says at how many seams. At most 0.5. With `per_node`, hulls of different nodes
+        do not overlap.
+    overlap_abs : float, optional
+        The same in the input's unit; replaces `overlap`.
     merge : bool
         Unite parts whose joint hull still meets the threshold.
     policy : str or Policy
@@ -283,14 +294,14 @@ def _finished(reached: _Reached, workers: Workers, clock: Clock) -> _Done:
     solid, goal = reached.solid, reached.goal
     with clock.stage("finish"):
         limits = reached.options.max_vertices, reached.options.max_faces
-        parts = clock.if_in_time(
+        parts, seams = clock.if_in_time(
             lambda: _cleaned(reached, *limits, workers),
-            lambda: [limit_roughly(part, *limits) for part in reached.parts],
+            lambda: ([limit_roughly(part, *limits) for part in reached.parts], None),
         )
         with clock.shielded():
             hulls = workers.map(lambda part: in_input(part.hull, solid.frame, *limits), parts)
     with clock.stage("measure"):
-        report = make_report(solid, parts, hulls, reached.options, goal, workers, clock)
+        report = make_report(solid, parts, hulls, reached.options, goal, seams, workers, clock)
         unknown: list[int] | list[None] = [None] * len(hulls)
         bodies = clock.if_in_time(lambda: _bodies(solid, hulls), lambda: unknown)
     for hull, body in zip(hulls, bodies, strict=True):
@@ -318,6 +329,7 @@ class _Reached(NamedTuple):
     goal: Criterion
     parts: list[Part]
     found: SearchSummary | None = None
+    root: Component | None = None
 
 
 def in_metres(source: InputMesh, options: Options) -> InputMesh:
@@ -337,8 +349,10 @@ def in_metres(source: InputMesh, options: Options) -> InputMesh:
     return source if factor == 1.0 else source.scaled(factor)
 
 
-def _cleaned(reached: _Reached, max_vertices: int | None, max_faces: int | None, workers: Workers) -> list[Part]:
-    """The parts without slivers, as primitives or with simple hulls inside the limits."""
+def _cleaned(
+    reached: _Reached, max_vertices: int | None, max_faces: int | None, workers: Workers
+) -> tuple[list[Part], Seams | None]:
+    """The parts without slivers, overlapping if asked for, as primitives or with simple hulls inside the limits."""
     kinds, goal = cast("tuple[PrimitiveKind, ...]", reached.options.primitives), reached.goal
     slack = SLACK + 8 * reached.solid.frame.resolution
 
@@ -351,7 +365,10 @@ def _cleaned(reached: _Reached, max_vertices: int | None, max_faces: int | None,
             part = simple_part(part, goal, max_vertices, max_faces)
         return limit_part(part, max_vertices, max_faces, goal)
 
-    return workers.map(cleaned, drop_slivers(reached.parts, workers))
+    parts, seams = drop_slivers(reached.parts, workers), None
+    if reached.options.overlap > 0 and reached.root is not None:
+        parts, seams = overlap_parts(parts, reached.root, goal, reached.options.overlap)
+    return workers.map(cleaned, parts), seams
 
 
 def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Clock) -> _Reached:
@@ -379,7 +396,7 @@ def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Cl
     if proxy is not None:
         return _through_proxy(solid, root, proxy, goal, options, workers, clock)
     parts, goal, found = _cut_and_searched(root, goal, options, workers, clock)
-    return _Reached(solid, options, goal, parts, found)
+    return _Reached(solid, options, goal, parts, found, root)
 
 
 def _proxy(root: Component, goal: Criterion, options: Options, clock: Clock) -> Proxy | None:
@@ -408,7 +425,7 @@ def _through_proxy(
         if options.merge and clock.stopped_by is None:  # the margin may have kept some apart
             rehearsal = goal.scaled(1 + MARGIN * share)
             parts = merge_lifted(parts, proxy.component, rehearsal, lift.confirmed, workers, clock)
-    return _Reached(solid, options, goal, parts, found)
+    return _Reached(solid, options, goal, parts, found, root)
 
 
 def _cut_and_searched(

@@ -43,6 +43,9 @@ class Decomposition(Result):
         ``primitives`` : dict
             With the option `primitives`: how many parts became a ``sphere``, ``capsule``, ``box`` or ``cylinder``, and
             how many stayed a ``hull``. `primitives` of the result says what each part is.
+        ``overlap`` : dict
+            With the option `overlap`: ``seams``, how many pairs of hulls touched, and ``short``, how many of them
+            overlap by less than asked for. Both are None where there was no time.
         ``concavity`` : dict
             ``per_part`` lists the concavity of each hull's part in the order of ``hulls``; ``max`` is the worst. Both
             are None where there was no time to measure them; so are the distances below. ``warnings`` says so.

@@ -40,6 +40,9 @@ MIN_THRESHOLD = 0.001
 MAX_THRESHOLD = 2.0
 """A hull that lies farther from its part than that does not fit into the frame."""
 
+MAX_OVERLAP = 0.5
+"""Hulls that overlap by more than a quarter of the longest side are hardly parts of it."""
+
 RESOLUTIONS = (20, 400)
 """The grid that repair looks for rooms on has this number cubed of cells: with fewer than 20 along a side, a wrap drawn
 onto the surface folds over itself; more than 400 would take over 4 GB."""
@@ -167,6 +170,20 @@ class Options:
         panel=LIMITS,
         metavar="all|box,sphere,…",
         usual="none",
+    )
+    overlap: float = option(
+        0.0,
+        "Hulls that touch overlap by this much, so that nothing thin slips between them; as --threshold, also a share "
+        "of the longest side (0.5%) or a length (2mm).",
+        number(0.0, MAX_OVERLAP, typed=str),
+        panel=LIMITS,
+        metavar="NUMBER",
+    )
+    overlap_abs: float | None = option(
+        None,
+        "The same as a length in the mesh's own unit.",
+        number(above=0, rule="a positive length in the input's unit"),
+        panel=LIMITS,
     )
     merge: bool = option(
         True,
@@ -310,25 +327,28 @@ class Options:
         return plain | {"policy": policy_name(self.policy), "primitives": [*plain["primitives"]]}
 
     def at_scale(self, scale: float) -> Options:
-        """Get the same options with the threshold in the frame, of which one of the input's units takes `scale`.
+        """Get the same options with lengths in the frame, of which one of the input's units takes `scale`.
 
         Raises
         ------
         OptionError
-            `threshold_abs` is too small or too large for the object.
+            `threshold_abs` or `overlap_abs` is too small or too large for the object.
         """
-        if self.threshold_abs is None:
-            return self
-        threshold = self.threshold_abs * scale
-        if not MIN_THRESHOLD <= threshold <= MAX_THRESHOLD:
-            raise OptionError(
-                f"threshold_abs is {self.threshold_abs!r}; for this object it has to be between "
-                f"{MIN_THRESHOLD / scale:.4g} and {MAX_THRESHOLD / scale:.4g} (0.05 % and 100 % of its longest side)."
-            )
-        return dataclasses.replace(self, threshold=threshold)
+        lengths = {}
+        for name, least, most in (("threshold", MIN_THRESHOLD, MAX_THRESHOLD), ("overlap", 0.0, MAX_OVERLAP)):
+            given = getattr(self, f"{name}_abs")
+            if given is None:
+                continue
+            lengths[name] = given * scale
+            if not least <= lengths[name] <= most:
+                raise OptionError(
+                    f"{name}_abs is {given!r}; for this object it has to be between {least / scale:.4g} and "
+                    f"{most / scale:.4g} ({50 * least:g} % and {50 * most:g} % of its longest side)."
+                )
+        return dataclasses.replace(self, **lengths) if lengths else self
 
     def for_node(self, scene: float, node: float) -> Options:
-        """Get the same options with the threshold in the frame of a node.
+        """Get the same options with lengths in the frame of a node.
 
         Parameters
         ----------
@@ -338,14 +358,13 @@ class Options:
         Raises
         ------
         OptionError
-            `threshold_abs` is too small or too large for the scene.
+            `threshold_abs` or `overlap_abs` is too small or too large for the scene.
         """
-        if self.relative_to == "node" and self.threshold_abs is None:
-            return self
-        threshold = self.at_scale(scene).threshold * node / scene
-        return dataclasses.replace(
-            self, threshold=min(max(threshold, MIN_THRESHOLD), MAX_THRESHOLD), threshold_abs=None
-        )
+        of_scene, lengths = self.at_scale(scene), {}
+        for name, least, most in (("threshold", MIN_THRESHOLD, MAX_THRESHOLD), ("overlap", 0.0, MAX_OVERLAP)):
+            if self.relative_to == "scene" or getattr(self, f"{name}_abs") is not None:
+                lengths[name] = min(max(getattr(of_scene, name) * node / scene, least), most)
+        return dataclasses.replace(self, threshold_abs=None, overlap_abs=None, **lengths)
 
 
 OPTION_NAMES = tuple(field.name for field in dataclasses.fields(Options))

@@ -12,6 +12,7 @@ import trimesh
 from rlacd._version import __version__
 from rlacd.clock import Clock
 from rlacd.criteria import Criterion
+from rlacd.merge.overlap import Seams
 from rlacd.merge.slivers import is_sliver
 from rlacd.options import Options
 from rlacd.presets import Preset, find_preset
@@ -37,6 +38,7 @@ def make_report(
     hulls: Sequence[trimesh.Trimesh],
     options: Options,
     criterion: Criterion,
+    seams: Seams | None,
     workers: Workers,
     clock: Clock,
 ) -> dict[str, Any]:
@@ -62,6 +64,7 @@ def make_report(
         "faces": sum(len(hull.faces) for hull in hulls),
         "vertices": sum(len(hull.vertices) for hull in hulls),
         **({"primitives": _primitives(parts)} if options.primitives else {}),
+        **({"overlap": _seams(seams)} if options.overlap > 0 else {}),
         **summary.entries,
         "hausdorff": {"over": over, "under": under},
         "scale": solid.frame.scale,
@@ -77,6 +80,7 @@ def make_report(
                 if has_surface and over is None
                 else []
             ),
+            *(_shallow(seams, options.overlap / solid.frame.scale) if options.overlap > 0 else []),
             *summary.warnings,
             *_shortcomings(
                 [part.hull for part in parts],
@@ -99,6 +103,22 @@ def _primitives(parts: Sequence[Part]) -> dict[str, int]:
     """How many parts are of each kind; those that stayed hulls last."""
     kinds = [None if part.hull.primitive is None else part.hull.primitive.kind for part in parts]
     return {kind: kinds.count(kind) for kind in PRIMITIVE_KINDS} | {"hull": kinds.count(None)}
+
+
+def _seams(seams: Seams | None) -> dict[str, int | None]:
+    """How many seams were found, and how many of them are short of the overlap; None if there was no time."""
+    return {"seams": None, "short": None} if seams is None else {"seams": seams.count, "short": seams.short}
+
+
+def _shallow(seams: Seams | None, overlap_abs: float) -> list[str]:
+    if seams is None:
+        return ["There was no time to make hulls overlap."]
+    if seams.short == 0:
+        return []
+    return [
+        f"{seams.short} of {seams.count} seams between hulls overlap by less than {overlap_abs:.4g}: more would break "
+        "the criterion. A smaller overlap or a larger threshold helps."
+    ]
 
 
 def joint_report(reports: Sequence[tuple[str, dict[str, Any]]], scale: float) -> dict[str, Any]:
@@ -131,6 +151,7 @@ def joint_report(reports: Sequence[tuple[str, dict[str, Any]]], scale: float) ->
         "complete": stopped["complete"],
         "stopped_by": stopped["stopped_by"],
         **({"primitives": _added([r["primitives"] for _, r, _ in each])} if "primitives" in first else {}),
+        **({"overlap": _joint_seams([r["overlap"] for _, r, _ in each])} if "overlap" in first else {}),
         **{what: sum(report[what] for _, report, _ in each) for what in ("parts", "faces", "vertices")},
         criterion: first[criterion] | {"per_part": per_part, "max": None if per_part is None else max(per_part)},
         "hausdorff": {side: None if None in far[side] else max(far[side]) for side in sides},  # type: ignore[type-var]
@@ -148,6 +169,13 @@ def joint_report(reports: Sequence[tuple[str, dict[str, Any]]], scale: float) ->
 
 def _times(length: float | None, factor: float) -> float | None:
     return None if length is None else length * factor
+
+
+def _joint_seams(seams: Sequence[dict[str, int | None]]) -> dict[str, int | None]:
+    return {
+        what: None if any(one[what] is None for one in seams) else sum(one[what] or 0 for one in seams)
+        for what in ("seams", "short")
+    }
 
 
 def _added(counts: Sequence[dict[str, int]]) -> dict[str, int]:

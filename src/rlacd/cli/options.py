@@ -103,7 +103,7 @@ def _renamed(given: dict[str, Any], warn: Callable[[str], None]) -> dict[str, An
 def _lengths(given: dict[str, Any], metres: bool) -> dict[str, Any]:
     """Parse lengths: a number, a share of the longest side (5%), or metres (0.05m)."""
     taken = dict(given)
-    for name, of_longest in (("threshold", 2.0), ("radius", 1.0), ("tolerance", 1.0)):
+    for name, of_longest in (("threshold", 2.0), ("overlap", 2.0), ("radius", 1.0), ("tolerance", 1.0)):
         word = taken.get(name)
         if not isinstance(word, str):
             continue

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from rlacd.compat.unused import warn_unused
 from rlacd.decompose_mesh import decompose
 from rlacd.fields import flag, integer, number, one_of, read
-from rlacd.options import DEFAULT_THRESHOLD, MIN_THRESHOLD
+from rlacd.options import DEFAULT_THRESHOLD, MAX_OVERLAP, MIN_THRESHOLD
 
 __all__ = ["Mesh", "run_coacd", "set_log_level"]
 
@@ -26,8 +26,6 @@ _UNUSED = {
     "mcts_iterations": "there is no tree search; rlacd.decompose(quality='best') searches",
     "mcts_max_depth": "there is no tree search; rlacd.decompose(quality='best') searches",
     "pca": "planes along the principal axes are among the candidates anyway",
-    "extrude": "hulls may overlap, and parts are not grown",
-    "extrude_margin": "hulls may overlap, and parts are not grown",
 }
 
 
@@ -77,10 +75,12 @@ def run_coacd(
         Convex hulls, or the axis-parallel boxes around them.
     seed : int
         The same seed gives the same bytes.
+    extrude, extrude_margin
+        With `extrude`, hulls that touch overlap by twice `extrude_margin` (the longest side is 2), as far as the
+        threshold allows: CoACD grows both by the margin, here one takes in a layer of the other.
     real_metric : bool
         Whether `threshold` is in the mesh's unit.
-    preprocess_mode, preprocess_resolution, resolution, mcts_nodes, mcts_iterations, mcts_max_depth, pca, extrude, \
-extrude_margin
+    preprocess_mode, preprocess_resolution, resolution, mcts_nodes, mcts_iterations, mcts_max_depth, pca
         Accepted but unused; a warning explains this once.
 
     Returns
@@ -101,12 +101,14 @@ extrude_margin
     threshold = read(number(above=0), "threshold", threshold)
     most_hulls = read(integer(-(2**31)), "max_convex_hull", max_convex_hull)
     decimate, real_metric = read(flag(), "decimate", decimate), read(flag(), "real_metric", real_metric)
+    extrude, margin = read(flag(), "extrude", extrude), read(number(0.0), "extrude_margin", extrude_margin)
     result = decompose(
         (mesh.vertices, mesh.indices),
         threshold=DEFAULT_THRESHOLD if real_metric else max(threshold, MIN_THRESHOLD),
         threshold_abs=threshold if real_metric else None,
         max_hulls=None if most_hulls < 1 else most_hulls,
         max_vertices=max_ch_vertex if decimate else None,
+        overlap=min(2 * margin, MAX_OVERLAP) if extrude else 0.0,
         merge=merge,
         seed=seed,
     )

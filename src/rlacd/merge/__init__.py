@@ -1,8 +1,9 @@
-"""Merging parts, fitting primitives, limiting vertices and faces of hulls, and dropping slivers."""
+"""Merging parts, overlapping hulls, fitting primitives, limiting vertices and faces of hulls, and dropping slivers."""
 
 from rlacd.merge.in_input import in_input
 from rlacd.merge.limited import limit_part, limit_roughly, with_limits
 from rlacd.merge.merge import merge_lifted, merge_parts, merge_to_count
+from rlacd.merge.overlap import overlap_parts
 from rlacd.merge.primitives import primitive_part
 from rlacd.merge.simple import simple_part
 from rlacd.merge.slivers import drop_slivers
@@ -15,6 +16,7 @@ __all__ = [
     "merge_lifted",
     "merge_parts",
     "merge_to_count",
+    "overlap_parts",
     "primitive_part",
     "simple_part",
     "with_limits",

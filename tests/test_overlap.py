@@ -1,0 +1,247 @@
+"""`overlap`: hulls overlap where they touch, so that needles pushed at a seam do not slip between them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import trimesh
+from manifold3d import Manifold
+
+import rlacd
+from rlacd import _native
+from rlacd.cli.options import decompose_options
+from rlacd.compat import coacd
+from rlacd.criteria import Concavity
+from rlacd.errors import OptionError
+from rlacd.io.write import save
+from rlacd.merge.overlap import overlap_parts
+from rlacd.options import Options
+from rlacd.result import Result
+from rlacd.solid.component import Component, Plane
+from tests.hulls import assert_convex_hull
+
+Array = npt.NDArray[np.float64]
+
+OVERLAP = 0.04
+
+
+def ell() -> trimesh.Trimesh:
+    """An L whose longest side is 2: it is cut in two."""
+    return solid(Manifold.cube((2.0, 0.6, 0.5)) + Manifold.cube((0.5, 0.6, 1.5)))
+
+
+def stool() -> trimesh.Trimesh:
+    """A seat on four legs, with a rail that crosses two of them."""
+    legs = [Manifold.cube((0.2, 0.2, 1.5)).translate((x, y, 0.0)) for x in (0.0, 1.8) for y in (0.0, 1.0)]
+    rail = Manifold.cube((1.7, 0.1, 0.2)).translate((0.15, 0.05, 0.5))
+    seat = Manifold.cube((2.0, 1.2, 0.2)).translate((0.0, 0.0, 1.5))
+    return solid(legs[0] + legs[1] + legs[2] + legs[3] + rail + seat)
+
+
+def solid(shape: Manifold) -> trimesh.Trimesh:
+    mesh = shape.to_mesh64()
+    return trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts, process=False)
+
+
+def depths(hulls: list[trimesh.Trimesh], points: Array) -> Array:
+    """How deep points lie in each hull [H, N], from the planes of its triangles."""
+    each = []
+    for hull in hulls:
+        normals = hull.face_normals[hull.area_faces > 1e-12 * hull.area]  # slivers have no direction
+        each.append(((hull.vertices @ normals.T).max(axis=0) - points @ normals.T).min(axis=1))
+    return np.array(each)
+
+
+def needles(mesh: trimesh.Trimesh, hulls: list[trimesh.Trimesh], far: float) -> tuple[Array, Array]:
+    """Places on seams [N, 3], on two hulls and inside none, and how deep each lies in the solid, at least `far`."""
+    places = np.concatenate([trimesh.sample.sample_surface(hull, 2000, seed=1)[0] for hull in hulls])
+    deepest = np.sort(depths(hulls, places), axis=0)
+    places = np.ascontiguousarray(places[(deepest[-2] > -1e-6) & (deepest[-1] < 1e-6)])
+    inside = _native.Surface(np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, np.int32))
+    deep = inside.distance(places)
+    return places[deep >= far], deep[deep >= far]
+
+
+def slips(hulls: list[trimesh.Trimesh], places: Array, deep: Array, overlap: float) -> float:
+    """The share of needles that no hull pushes back: where the nearest way out of every hull is sideways."""
+    return float((depths(hulls, places).max(axis=0) < 0.5 * np.minimum(deep, overlap / 2)).mean())
+
+
+OPTIONS: list[dict[str, Any]] = [
+    {},
+    {"max_vertices": 8},
+    {"primitives": True},
+    {"detail": "full"},
+    {"criterion": "volume", "volume_tolerance": 0.1},
+    {"criterion": rlacd.NavigableSpace(radius=0.2, tolerance=0.05)},
+    {"max_hulls": 4},
+]
+
+
+@pytest.mark.parametrize("options", OPTIONS, ids=lambda given: "+".join(given) or "default")
+def test_no_needle_slips_between_hulls_that_overlap(options: dict[str, Any]) -> None:
+    mesh = stool()
+    flush = rlacd.decompose(mesh, quality="fast", threads=1, **options)
+    result = rlacd.decompose(mesh, quality="fast", threads=1, overlap=OVERLAP, **options)
+    overlap = OVERLAP / result.report["scale"]
+    places, deep = needles(mesh, flush.hulls, overlap / 10)
+    assert len(places) > 100
+    assert slips(flush.hulls, places, deep, overlap) > 0.9
+    assert slips(result.hulls, places, deep, overlap) == 0.0
+    assert result.report["overlap"]["short"] == 0
+    assert result.report["overlap"]["seams"] >= 3
+    assert result.report["warnings"] == flush.report["warnings"]
+    for hull in result:
+        assert_convex_hull(hull)
+        assert len(hull.vertices) <= options.get("max_vertices", np.inf)
+
+
+def test_the_threshold_holds_and_each_hull_contains_its_own() -> None:
+    flush, result = (rlacd.decompose(stool(), quality="fast", threads=1, overlap=depth) for depth in (0.0, OVERLAP))
+    assert len(flush) == len(result)
+    assert result.report["concavity"]["max"] <= 0.05
+    assert result.report["hausdorff"]["over"] <= 0.05
+    for before, after in zip(flush, result, strict=True):
+        assert depths([after], before.vertices).min() > -1e-9
+    assert sum(hull.volume for hull in result) > sum(hull.volume for hull in flush)
+
+
+def halves(height: float = 1.0) -> tuple[Component, list[Component]]:
+    """A box two units wide, cut in its middle."""
+    box = Component(Manifold.cube((2.0, 1.0, height), center=True))
+    below, above = box.cut(Plane((1.0, 0.0, 0.0), 0.0))
+    assert below is not None
+    assert above is not None
+    return box, [below, above]
+
+
+@pytest.mark.parametrize("overlap", [0.001, 0.02, 0.3])
+def test_two_halves_of_a_box_overlap_by_exactly_that_much(overlap: float) -> None:
+    box, parts = halves()
+    grown, seams = overlap_parts(parts, box, Concavity(0.05), overlap)
+    assert (seams.count, seams.short) == (1, 0)
+    reach = grown[0].hull.box[1, 0] - grown[1].hull.box[0, 0]
+    assert reach == pytest.approx(overlap, abs=1e-9)
+    assert sum(part.hull.volume for part in grown) == pytest.approx(2.0 + overlap, abs=1e-9)
+
+
+def test_parts_that_do_not_touch_or_share_only_an_edge_stay_as_they_are() -> None:
+    first = Manifold.cube((1.0, 1.0, 1.0))
+    for apart in ((1.5, 0.0, 0.0), (1.0, 1.0, 0.0)):
+        second = first.translate(apart)
+        parts = [Component(first), Component(second)]
+        grown, seams = overlap_parts(parts, Component(first + second.translate((1e-3, 0, 0))), Concavity(0.05), 0.1)
+        assert seams.count == 0
+        assert all(before is after for before, after in zip(parts, grown, strict=True))
+
+
+def test_a_seam_without_room_is_told() -> None:
+    """Two blocks of a stair: what either takes in of the other spans the step between them."""
+    mesh = solid(Manifold.cube((1.0, 1.0, 1.0)) + Manifold.cube((1.0, 1.0, 1.0)).translate((1.0, 0.5, 0.5)))
+    result = rlacd.decompose(mesh, threshold=0.003, overlap=0.2, quality="fast", threads=1)
+    overlap = result.report["overlap"]
+    assert overlap["short"] > 0
+    (told,) = (warning for warning in result.report["warnings"] if "seams" in warning)
+    assert f"{overlap['short']} of {overlap['seams']} seams" in told
+    assert result.report["concavity"]["max"] <= 0.003
+
+
+def test_nodes_that_move_do_not_overlap_each_other() -> None:
+    scene = trimesh.Scene()
+    scene.add_geometry(ell(), node_name="frame", geom_name="frame")
+    door = trimesh.creation.box(bounds=[(0.5, 0.0, 0.5), (2.0, 0.6, 1.5)])  # lies on the frame
+    scene.add_geometry(door, node_name="door", geom_name="door")
+    result = rlacd.decompose(scene, per_node=True, overlap_abs=0.04, quality="fast", threads=1)
+    (own,) = (hull for hull in result if hull.metadata["node"] == "door")
+    np.testing.assert_allclose(own.bounds, door.bounds, atol=1e-9)
+    frame = [hull for hull in result if hull.metadata["node"] == "frame"]
+    flush = rlacd.decompose(ell(), quality="fast", threads=1)
+    assert sum(hull.volume for hull in frame) > sum(hull.volume for hull in flush)
+    assert result.report["overlap"] == {"seams": 1, "short": 0}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "least"), [("lamp.ply", 0.03), ("ob_chair_gothic.ply", 0.03), ("al.ply", 0.15)])
+def test_few_needles_slip_between_hulls_of_real_objects(corpus: Path, name: str, least: float) -> None:
+    """Those that do slip at seams that are told to be short."""
+    mesh = corpus / "test" / "vhacd" / name
+    flush = rlacd.decompose(mesh, quality="fast", threads=1, detail="full")
+    result = rlacd.decompose(mesh, quality="fast", threads=1, overlap=0.02)
+    overlap = 0.02 / result.report["scale"]
+    places, deep = needles(flush.source, flush.hulls, overlap / 10)
+    assert slips(flush.hulls, places, deep, overlap) > 0.9
+    assert slips(result.hulls, places, deep, overlap) < least
+    assert result.report["concavity"]["max"] <= 0.05
+
+
+FORCE = 100.0
+"""Newtons on each needle."""
+
+
+def pushed(path: Path, places: Array, way: Array, radius: float, far: float) -> Array:
+    """How far thin capsules go that MuJoCo pushes along their own lines at a fixed body, at most `far`."""
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    spec = mujoco.MjSpec.from_file(str(path))
+    (body,) = spec.worldbody.bodies
+    for joint in body.joints:
+        spec.delete(joint)
+    spec.option.gravity, spec.option.timestep = (FORCE * way).tolist(), 0.001
+    for place in places:
+        needle = spec.worldbody.add_body(pos=(place - way * 2 * radius).tolist())
+        needle.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=way.tolist(), damping=FORCE / 0.05)
+        needle.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+            size=[radius, 0, 0],
+            fromto=[*(-0.2 * way), 0, 0, 0],
+            mass=1.0,
+            contype=2,
+            conaffinity=1,
+        )
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    for _ in range(round(1.5 * far / 0.05 / 0.001)):
+        mujoco.mj_step(model, data)
+    return np.minimum(np.array(data.qpos), far)
+
+
+@pytest.mark.parametrize("radius", [0.0002, 0.0005])
+def test_in_mujoco_a_needle_enters_the_seam_of_flush_hulls_only(tmp_path: Path, radius: float) -> None:
+    box, parts = halves(0.5)
+    whole = rlacd.decompose(trimesh.creation.box((0.2, 0.1, 0.05)), quality="fast", threads=1)
+    overlapping, _ = overlap_parts(parts, box, Concavity(0.05), OVERLAP)
+    goes = []
+    for name, some in (("flush", parts), ("overlapping", overlapping)):
+        hulls = [trimesh.Trimesh(0.1 * part.hull.vertices, part.hull.faces, process=False) for part in some]
+        path = save(Result(hulls, whole.report, whole.source), tmp_path / f"{name}.xml")
+        places = np.array([[x, y, 0.025] for x in (0.0, 1e-5) for y in (-0.04, 0.001, 0.013)])
+        goes.append(pushed(path, places, np.array([0.0, 0.0, -1.0]), radius, far=0.02))
+    assert goes[0].min() > 0.005, "needles slip between flush hulls"
+    assert goes[1].max() < 0.002, "none goes deeper than the contact yields"
+
+
+def test_coacd_extrudes_the_same_way() -> None:
+    mesh = ell()
+    flush = coacd.run_coacd(coacd.Mesh(mesh.vertices, mesh.faces))
+    grown = coacd.run_coacd(coacd.Mesh(mesh.vertices, mesh.faces), extrude=True, extrude_margin=0.02)
+    volumes = [sum(trimesh.Trimesh(*hull).volume for hull in hulls) for hulls in (flush, grown)]
+    assert len(flush) == len(grown) == 2
+    assert volumes[1] > volumes[0] + 0.5 * 0.04 * 0.3
+
+
+def test_lengths_are_given_like_the_threshold() -> None:
+    assert Options(overlap_abs=0.5).at_scale(0.1).overlap == pytest.approx(0.05)
+    assert Options(overlap=0.1).for_node(1.0, 2.0).overlap == pytest.approx(0.2)
+    assert Options(overlap=0.1, relative_to="node").for_node(1.0, 2.0).overlap == 0.1
+    assert Options(overlap_abs=0.1, relative_to="node").for_node(1.0, 2.0).overlap == pytest.approx(0.2)
+    assert decompose_options({"overlap": "1%"}) == {"overlap": 0.02}
+    assert decompose_options({"overlap": "2mm"}, metres=True) == {"overlap_abs": 0.002}
+    assert decompose_options({"overlap": "0.01"}) == {"overlap": 0.01}
+    with pytest.raises(OptionError, match="overlap_abs"):
+        rlacd.decompose(trimesh.creation.box(), overlap_abs=0.3)
+    for wrong in (-0.1, 0.6, float("nan"), "thick", None):
+        with pytest.raises(OptionError, match="overlap"):
+            Options(overlap=wrong)  # type: ignore[arg-type]
