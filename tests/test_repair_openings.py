@@ -5,9 +5,10 @@ import pytest
 import trimesh
 
 from fuzz.flaws import FAMILIES
+from rlacd.io.read.load import load_mesh
 from rlacd.repair.caps import HOLE
 from rlacd.repair.distance import SurfaceQuery
-from rlacd.repair.repair import GAP, HALF_THICKNESS
+from rlacd.repair.repair import GAP, HALF_THICKNESS, repair
 from rlacd.repair.union import to_arrays
 from tests.repaired import BOX, join, moved, solid_of, steps, volume, with_hole, without
 
@@ -102,8 +103,14 @@ WINE_BOTTLE = ((0, 0), (0.3, 0), (0.3, 1.3), (0.06, 1.6), (0.06, 2))
 CUP = ((0, 0), (0.4, 0), (0.5, 1))
 
 
-@pytest.mark.parametrize(("profile", "sections"), [(BOTTLE, 24), (BOTTLE, 8), (WINE_BOTTLE, 24), (CUP, 24), (CUP, 8)])
-def test_a_bottle_and_a_cup_stay_hollow_unless_they_shall_be_solid(profile, sections):
+LAMPSHADE = ((0.6, 0), (0.3, 0.8))
+
+
+HOLLOW = [(BOTTLE, 24), (BOTTLE, 8), (WINE_BOTTLE, 24), (CUP, 24), (CUP, 8), (LAMPSHADE, 24), (LAMPSHADE, 8)]
+
+
+@pytest.mark.parametrize(("profile", "sections"), HOLLOW)
+def test_a_bottle_a_cup_and_a_lampshade_stay_hollow_unless_they_shall_be_solid(profile, sections):
     mesh = revolved(*profile, sections=sections)
     hollow = solid_of(mesh)
     assert steps(hollow) == ["slab"]
@@ -114,6 +121,14 @@ def test_a_bottle_and_a_cup_stay_hollow_unless_they_shall_be_solid(profile, sect
     thin = solid_of(mesh, open_bodies="thin")
     assert thin.manifold.volume() == hollow.manifold.volume()
     assert not thin.warnings
+
+
+def test_a_car_is_solid(corpus):
+    """Two of its seven bodies are open, where nothing can get inside."""
+    solid = repair(load_mesh(corpus / "test/gazebo_models/hatchback__hatchback.ply"))
+    assert set(steps(solid)) == {"closed", "capped"}
+    assert not solid.warnings
+    assert solid.manifold.volume() > 0.5 * solid.manifold.hull().volume()
 
 
 def test_a_neck_that_no_ball_passes_is_no_opening():
