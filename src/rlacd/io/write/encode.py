@@ -16,7 +16,7 @@ import trimesh
 from rlacd.errors import OutputError
 from rlacd.io.write.glb import Placed, glb
 from rlacd.io.write.palette import hull_colors, linear_from_srgb
-from rlacd.io.write.single_precision import placed_hull, placed_mesh, rounded_hull
+from rlacd.io.write.single_precision import Triangulated, placed_hull, placed_mesh, rounded_hull
 
 GENERATOR = "rlacd"
 
@@ -85,7 +85,7 @@ def encode_obj(
     return ("\n".join(lines) + "\n").encode()
 
 
-def encode_plain_obj(mesh: trimesh.Trimesh) -> bytes:
+def encode_plain_obj(mesh: Triangulated) -> bytes:
     """One mesh as Wavefront OBJ that every reader accepts: no object, no colours, every digit."""
     lines = [f"# {GENERATOR}"]
     lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist()]
@@ -131,7 +131,7 @@ def encode_stl(hulls: Sequence[trimesh.Trimesh]) -> bytes:
     represent.
     """
     if len(hulls) == 1 and (rounded := rounded_hull(hulls[0])) is not None:
-        return bytes(rounded.export(file_type="stl"))
+        return bytes(trimesh.Trimesh(*rounded, process=False).export(file_type="stl"))
     solids = []
     for index, hull in enumerate(hulls):
         named = trimesh.Trimesh(hull.vertices, hull.faces, process=False, metadata={"name": hull_name(index)})

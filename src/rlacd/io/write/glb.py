@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-import trimesh
+
+from rlacd.io.write.single_precision import Triangles
 
 ROUGHNESS = 0.8
 
@@ -37,7 +38,7 @@ class Placed(NamedTuple):
     """
 
     name: str
-    mesh: trimesh.Trimesh
+    mesh: Triangles
     shift: npt.NDArray[np.float64]
     color: npt.NDArray[np.float64]
 
@@ -71,7 +72,7 @@ def glb(solids: Iterable[Placed], generator: str) -> bytes:
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 
-def packed(meshes: Sequence[trimesh.Trimesh], first_view: int) -> tuple[tuple[bytes, bytes], list[dict[str, Any]]]:
+def packed(meshes: Sequence[Triangles], first_view: int) -> tuple[tuple[bytes, bytes], list[dict[str, Any]]]:
     """All positions and all indices, and the accessors of each mesh into views of the two."""
     positions = [np.asarray(mesh.vertices).astype("<f4") for mesh in meshes]
     indices = [np.asarray(mesh.faces).astype("<u4") for mesh in meshes]

@@ -23,7 +23,7 @@ from rlacd.io.read.gltf import MAGIC, split
 from rlacd.io.write.converted import converted, nodes_of
 from rlacd.io.write.glb import ATTRIBUTES, BINARY_CHUNK, INDICES, JSON_CHUNK, Placed, chunk, material, packed
 from rlacd.io.write.palette import hull_colors, linear_from_srgb
-from rlacd.io.write.single_precision import placed_hull
+from rlacd.io.write.single_precision import Triangles, placed_hull
 from rlacd.result import Result
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import InputMesh
@@ -81,7 +81,7 @@ def _local(hull: trimesh.Trimesh, factor: float, inverse: FloatArray | None, nam
         points = points @ inverse[:3, :3].T + inverse[:3, 3]
         if np.linalg.det(inverse[:3, :3]) < 0:
             faces = faces[:, ::-1]
-    placed = placed_hull(trimesh.Trimesh(points, faces, process=False))
+    placed = placed_hull(Triangles(points, faces))
     if placed is None:
         raise OutputError(
             f"cannot write {name} as GLB: it is too thin for single precision; "

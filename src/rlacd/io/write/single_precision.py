@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple, TypeAlias
+
 import numpy as np
 import numpy.typing as npt
 import trimesh
@@ -16,7 +18,17 @@ STEP = 1e-4
 """Of a visible mesh's size."""
 
 
-def rounded_hull(hull: trimesh.Trimesh, shift: npt.ArrayLike = (0.0, 0.0, 0.0)) -> trimesh.Trimesh | None:
+class Triangles(NamedTuple):
+    """A mesh without looks. Making a `trimesh.Trimesh` takes longer than rounding a hull."""
+
+    vertices: npt.NDArray[np.float64]
+    faces: npt.NDArray[np.integer]
+
+
+Triangulated: TypeAlias = "trimesh.Trimesh | Triangles"
+
+
+def rounded_hull(hull: Triangulated, shift: npt.ArrayLike = (0.0, 0.0, 0.0)) -> Triangles | None:
     """Round the vertices of ``hull - shift`` to float32 and recompute their convex hull.
 
     Rounding moves vertices by different amounts, which can dent a hull along its flat regions or fold a thin triangle.
@@ -24,14 +36,14 @@ def rounded_hull(hull: trimesh.Trimesh, shift: npt.ArrayLike = (0.0, 0.0, 0.0)) 
 
     Parameters
     ----------
-    hull : trimesh.Trimesh
+    hull : trimesh.Trimesh or Triangles
         A convex hull.
     shift : array-like [3]
         Subtracted, in float64, before rounding.
 
     Returns
     -------
-    trimesh.Trimesh or None
+    Triangles or None
         Vertices are float64 numbers that float32 holds exactly. None if float32 cannot hold the shape here.
     """
     with np.errstate(over="ignore"):
@@ -45,33 +57,33 @@ def rounded_hull(hull: trimesh.Trimesh, shift: npt.ArrayLike = (0.0, 0.0, 0.0)) 
     before, after = _volume(hull.vertices, hull.faces), _volume(vertices, faces)
     if abs(after - before) > VOLUME_TOLERANCE * before:
         return None
-    return trimesh.Trimesh(vertices, faces, process=False, validate=False)
+    return Triangles(vertices, faces)
 
 
-def placed_hull(hull: trimesh.Trimesh) -> tuple[trimesh.Trimesh, npt.NDArray[np.float64]] | None:
+def placed_hull(hull: Triangulated) -> tuple[Triangles, npt.NDArray[np.float64]] | None:
     """Round a hull to float32 in place or, if that would ruin it, about its own centre.
 
     Returns
     -------
-    (trimesh.Trimesh, shift [3]) or None
+    (Triangles, shift [3]) or None
         The hull is the mesh moved by the shift, which is zero wherever that suffices. None if it is too thin for its
         size even about its own centre.
     """
     shift = np.zeros(3)
     rounded = rounded_hull(hull)
     if rounded is None:
-        shift = hull.bounds.mean(axis=0)
+        shift = (hull.vertices.min(axis=0) + hull.vertices.max(axis=0)) / 2
         rounded = rounded_hull(hull, shift)
     return None if rounded is None else (rounded, shift)
 
 
-def placed_mesh(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, npt.NDArray[np.float64]]:
+def placed_mesh(mesh: Triangulated) -> tuple[Triangles, npt.NDArray[np.float64]]:
     """Do the same for a visible mesh, where a change below `STEP` of its size cannot be seen."""
     used = mesh.vertices[np.unique(mesh.faces)]
     lower, upper = used.min(axis=0), used.max(axis=0)
     step = np.abs([lower, upper]).max() * np.finfo(np.float32).eps
     shift = np.zeros(3) if step <= STEP * (upper - lower).max() else lower / 2 + upper / 2
-    return trimesh.Trimesh(mesh.vertices - shift, mesh.faces, process=False), shift
+    return Triangles(np.asarray(mesh.vertices - shift), np.asarray(mesh.faces)), shift
 
 
 def _volume(vertices: npt.NDArray[np.float64], faces: npt.NDArray[np.integer]) -> float:

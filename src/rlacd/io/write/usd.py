@@ -8,13 +8,12 @@ import unicodedata
 from typing import Any
 
 import numpy as np
-import trimesh
 
 from rlacd.errors import MissingExtraError, OutputError
 from rlacd.io.write.encode import hull_name
 from rlacd.io.write.model import Model
 from rlacd.io.write.palette import hull_colors, linear_from_srgb
-from rlacd.io.write.single_precision import placed_hull, placed_mesh
+from rlacd.io.write.single_precision import Triangulated, placed_hull, placed_mesh
 from rlacd.solid.primitive import Primitive
 
 
@@ -91,7 +90,7 @@ def identifier(name: str) -> str:
     return plain if re.match(r"[^\W\d]", plain) else f"_{plain}"
 
 
-def _mesh(stage: Any, path: Any, mesh: trimesh.Trimesh, shift: np.ndarray[Any, Any]) -> Any:
+def _mesh(stage: Any, path: Any, mesh: Triangulated, shift: np.ndarray[Any, Any]) -> Any:
     from pxr import Gf, UsdGeom, Vt
 
     prim = UsdGeom.Mesh.Define(stage, path)
