@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 import rlacd
 from rlacd.bench import simulate
+from rlacd.bench.handle import handle_in_mujoco
 from rlacd.bench.physics import OURS
 from rlacd.cli.main import app
 
@@ -41,6 +42,28 @@ def test_balls_pass_the_hole_of_a_cup_and_rest_in_it_as_hulls_but_not_as_one(dec
     assert one.rested == 0
 
 
+@pytest.mark.slow
+def test_a_mug_hangs_by_its_handle_and_is_grasped_at_its_wall_as_hulls_but_not_as_one() -> None:
+    from examples.mug import mug  # needs MuJoCo
+
+    mesh = mug()
+    mesh.apply_scale(simulate.SIZE / mesh.extents.max())
+    mesh.apply_translation(-mesh.bounds.mean(axis=0))
+    handling = handle_in_mujoco(rlacd.decompose(mesh, quality="fast", threads=1))
+    assert (handling.pegs, handling.hung) == (1, 1)
+    assert handling.held >= 0.9 * handling.grasps > 0
+    one = handle_in_mujoco(rlacd.decompose(mesh, max_hulls=1, quality="fast", threads=1))
+    assert (one.pegs, one.grasps) == (handling.pegs, handling.grasps)
+    assert (one.hung, one.held) == (0, 0)
+
+
+def test_a_box_is_held_wherever_it_is_grasped_and_has_no_hole_to_hang_by() -> None:
+    box = rlacd.decompose(trimesh.creation.box((0.2, 0.1, 0.06)), quality="fast", threads=1)
+    handling = handle_in_mujoco(box)
+    assert handling.held == handling.grasps > 0
+    assert handling.pegs == 0
+
+
 def test_a_convex_body_has_neither_holes_nor_hollows() -> None:
     box = rlacd.decompose(trimesh.creation.box((0.2, 0.1, 0.1)), quality="fast", threads=1)
     assert simulate.drops_in_mujoco(box) == simulate.Drops(0, 0, 0, 0)
@@ -52,7 +75,7 @@ def test_exact_depths_are_those_of_a_ball_over_a_box() -> None:
     surface = simulate._native.Surface(np.asarray(box.vertices), np.asarray(box.faces, dtype=np.int32))
     radius = simulate.BALL * simulate.SIZE
     starts = np.array([[0.0, 0.0, 0.2], [0.1 + radius / 2, 0.0, 0.2], [0.1 + 2 * radius, 0.0, 0.2]])
-    found = simulate._exact_depths(surface, starts, np.array([0.0, 0.0, -1.0]), 0.5)
+    found = simulate.exact_depths(surface, starts, np.array([0.0, 0.0, -1.0]), 0.5)
     beside = 0.1 - radius * np.sqrt(3) / 2
     assert found == pytest.approx([0.1 - radius, beside, 0.5], abs=5e-5)
 

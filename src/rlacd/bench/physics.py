@@ -12,6 +12,7 @@ import numpy as np
 import trimesh
 
 from rlacd.bench.compare import machine
+from rlacd.bench.handle import Handling, handle_in_mujoco
 from rlacd.bench.methods import make_method
 from rlacd.bench.page import Heading, Page, Text
 from rlacd.bench.runner import Bench
@@ -43,6 +44,7 @@ OURS: dict[str, dict[str, Any]] = {
     "fast:64": {"quality": "fast", "max_vertices": 64},
     "fast:32": {"quality": "fast", "max_vertices": 32},
     "fast:16": {"quality": "fast", "max_vertices": 16},
+    "fast:overlap": {"quality": "fast", "overlap": 0.02},
     "fast:primitives": {"quality": "fast", "primitives": True},
 }
 """The options of each way to use rlacd; a number is the most vertices a hull may have."""
@@ -68,6 +70,7 @@ class Outcome:
     over : float or None
         How far the hulls reach beyond the input, where the longest side is 2; None for other tools.
     drops : Drops
+    handling : Handling
     mujoco, bullet : Pile
         None if PyBullet is not installed.
     """
@@ -79,6 +82,7 @@ class Outcome:
     size: int
     over: float | None
     drops: Drops
+    handling: Handling
     mujoco: Pile
     bullet: Pile | None
 
@@ -113,7 +117,7 @@ def physics_page(
     for mesh in bench.names:
         for way, result in _decompositions(bench, mesh, ways, failed):
             try:
-                drops, mujoco = drops_in_mujoco(result), pile_in_mujoco(result)
+                drops, handling, mujoco = drops_in_mujoco(result), handle_in_mujoco(result), pile_in_mujoco(result)
                 in_bullet = _in_bullet(result) if bullet else None
             except (RlacdError, ValueError) as error:
                 if isinstance(error, MissingExtraError):
@@ -123,9 +127,10 @@ def physics_page(
             corners = statistics.fmean(len(hull.vertices) for hull in result.hulls)
             over = result.report["hausdorff"]["over"] if way in OURS else None
             outcomes.append(
-                Outcome(mesh, way, len(result), corners, model_size(result), over, drops, mujoco, in_bullet)
+                Outcome(mesh, way, len(result), corners, model_size(result), over, drops, handling, mujoco, in_bullet)
             )
-            say(f"{mesh}  {way}: {len(result)} parts, {mujoco.steps_per_second:.0f} steps/s, {asdict(drops)}")
+            found = asdict(drops) | asdict(handling)
+            say(f"{mesh}  {way}: {len(result)} parts, {mujoco.steps_per_second:.0f} steps/s, {found}")
     page = Page(
         "Physics",
         [
@@ -182,7 +187,7 @@ def _summary(outcomes: list[Outcome]) -> Table:
         rows = [by_way[way][mesh] for mesh in shared]
         if not rows:
             continue
-        drops = [row.drops for row in rows]
+        drops, handling = [row.drops for row in rows], [row.handling for row in rows]
         bullet = [row.bullet for row in rows if row.bullet is not None]
         lines.append(
             (
@@ -193,6 +198,8 @@ def _summary(outcomes: list[Outcome]) -> Table:
                 "–" if rows[0].over is None else f"{statistics.fmean(row.over or 0.0 for row in rows):.3f}",
                 _share(sum(d.passed for d in drops), sum(d.holes for d in drops)),
                 _share(sum(d.rested for d in drops), sum(d.hollows for d in drops)),
+                _share(sum(h.held for h in handling), sum(h.grasps for h in handling)),
+                _share(sum(h.hung for h in handling), sum(h.pegs for h in handling)),
                 *_cells([row.mujoco for row in rows]),
                 *(_cells(bullet) if bullet else ("–",) * 5),
             )
@@ -200,7 +207,7 @@ def _summary(outcomes: list[Outcome]) -> Table:
     pile = ("steps/s", "contacts", "depth, %", "drift, W/kg", "rest, s")
     return Table(
         (
-            *("", "parts", "vertices a hull", "kB", "over", "holes", "hollows"),
+            *("", "parts", "vertices a hull", "kB", "over", "holes", "hollows", "grasps", "pegs"),
             *(f"MuJoCo {word}" for word in pile),
             *(f"Bullet {word}" for word in pile),
         ),
@@ -209,7 +216,9 @@ def _summary(outcomes: list[Outcome]) -> Table:
         "its collision meshes. Over: how far the hulls reach beyond the input (longest side: 2). Holes: of the balls "
         "that pass through by the exact mesh, how many pass. Hollows: of those that come to rest inside the convex "
         f"hull, how many rest within {100 * NEAR:g} % of the longest side of that place; both where a ball wider by as "
-        "much does the same. Depth: of the deepest contact, in percent of the longest side. Drift: change of energy in "
+        "much does the same. Grasps: of the places where two fingertips meet the exact mesh squarely, how many hold "
+        "the object with the fingertips as far apart. Pegs: of the holes that the exact mesh encloses, by how many the "
+        "object hangs. Depth: of the deepest contact, in percent of the longest side. Drift: change of energy in "
         "the last half second. Rest: median seconds until nothing moves faster than 0.05 m/s.",
     )
 
@@ -227,7 +236,17 @@ def _cells(piles: list[Pile]) -> tuple[str, ...]:
 
 def _details(outcomes: list[Outcome]) -> Table:
     return Table(
-        ("object, way", "parts", "vertices a hull", "holes", "hollows", "MuJoCo steps/s", "Bullet steps/s"),
+        (
+            "object, way",
+            "parts",
+            "vertices a hull",
+            "holes",
+            "hollows",
+            "grasps",
+            "pegs",
+            "MuJoCo steps/s",
+            "Bullet steps/s",
+        ),
         [
             (
                 f"{o.mesh}, {o.way}",
@@ -235,6 +254,8 @@ def _details(outcomes: list[Outcome]) -> Table:
                 f"{o.vertices:.0f}",
                 f"{o.drops.passed} of {o.drops.holes}",
                 f"{o.drops.rested} of {o.drops.hollows}",
+                f"{o.handling.held} of {o.handling.grasps}",
+                f"{o.handling.hung} of {o.handling.pegs}",
                 f"{o.mujoco.steps_per_second:.0f}",
                 "–" if o.bullet is None else f"{o.bullet.steps_per_second:.0f}",
             )

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import trimesh
 from lxml import etree
 
 from rlacd import _native
@@ -98,7 +99,7 @@ def model_size(result: Result) -> int:
 
 def pile_in_mujoco(result: Result) -> Pile:
     """Drop copies of a body whose longest side is `SIZE` into a bin, in MuJoCo."""
-    mujoco = _mujoco()
+    mujoco = get_mujoco()
     with tempfile.TemporaryDirectory(prefix="rlacd-") as folder:
         path = save(result, Path(folder) / "body.xml")
         root = etree.parse(str(path)).getroot()
@@ -180,19 +181,14 @@ def pile_in_bullet(result: Result) -> Pile:
 
 def drops_in_mujoco(result: Result) -> Drops:
     """Drop balls onto a fixed body whose longest side is `SIZE`, from all six sides, in MuJoCo."""
-    surface = _native.Surface(
-        np.ascontiguousarray(result.source.vertices, dtype=np.float64),
-        np.ascontiguousarray(result.source.faces, dtype=np.int32),
-    )
-    outside = result.source.convex_hull
-    around = _native.Surface(np.asarray(outside.vertices, dtype=np.float64), np.asarray(outside.faces, dtype=np.int32))
+    surface, around = surface_of(result.source), surface_of(result.source.convex_hull)
     counts = np.zeros(4, dtype=int)
     for axis in range(3):
         for sign in (-1.0, 1.0):
-            starts, way, far = _above(result.source.bounds, axis, sign)
-            true = _exact_depths(surface, starts, way, far)
-            wide = _exact_depths(surface, starts, way, far, BALL + NEAR)
-            met = _exact_depths(around, starts, way, far)
+            starts, way, far = above(result.source.bounds, axis, sign)
+            true = exact_depths(surface, starts, way, far)
+            wide = exact_depths(surface, starts, way, far, BALL + NEAR)
+            met = exact_depths(around, starts, way, far)
             found = _depths_in_mujoco(result, starts, axis, sign, far)
             holes = (met < far) & (wide >= far)
             hollows = (true < far) & (true > met + NEAR * SIZE) & (wide > true - 2 * NEAR * SIZE)
@@ -204,7 +200,7 @@ def drops_in_mujoco(result: Result) -> Drops:
 
 def _depths_in_mujoco(result: Result, starts: FloatArray, axis: int, sign: float, far: float) -> FloatArray:
     """How far balls fall; each slides along its own line, slowed so that it does not tunnel through anything."""
-    mujoco = _mujoco()
+    mujoco = get_mujoco()
     with tempfile.TemporaryDirectory(prefix="rlacd-") as folder:
         path = save(result, Path(folder) / "body.xml")
         spec = mujoco.MjSpec.from_file(str(path))
@@ -229,12 +225,18 @@ def _depths_in_mujoco(result: Result, starts: FloatArray, axis: int, sign: float
     return fallen
 
 
-def _above(bounds: FloatArray, axis: int, sign: float) -> tuple[FloatArray, FloatArray, float]:
+def surface_of(mesh: trimesh.Trimesh) -> _native.Surface:
+    """Make the surface of a mesh, which measures exact distances."""
+    vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int32)
+    return _native.Surface(np.ascontiguousarray(vertices), np.ascontiguousarray(faces))
+
+
+def above(bounds: FloatArray, axis: int, sign: float, grid: int = GRID) -> tuple[FloatArray, FloatArray, float]:
     """Where balls start [N, 3], outside the box; the way they fall [3]; and how far it is to the other side."""
     low, high = np.asarray(bounds)
     others = [other for other in range(3) if other != axis]
-    lines = [np.linspace(low[other], high[other], GRID + 2)[1:-1] for other in others]
-    starts = np.zeros((GRID**2, 3))
+    lines = [np.linspace(low[other], high[other], grid + 2)[1:-1] for other in others]
+    starts = np.zeros((grid**2, 3))
     starts[:, others] = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 2)
     clearance = 1.5 * BALL * SIZE
     starts[:, axis] = (low if sign > 0 else high)[axis] - sign * clearance
@@ -243,7 +245,7 @@ def _above(bounds: FloatArray, axis: int, sign: float) -> tuple[FloatArray, Floa
     return starts, way, float((high - low)[axis] + 2 * clearance)
 
 
-def _exact_depths(
+def exact_depths(
     surface: _native.Surface, starts: FloatArray, way: FloatArray, far: float, ball: float = BALL
 ) -> FloatArray:
     """How far balls fall until they touch a surface, by sphere tracing; `far` if they do not."""
@@ -281,7 +283,8 @@ def _places() -> list[tuple[FloatArray, FloatArray]]:
     return [(SIZE * np.array([x, y, 1.0 + 1.2 * z]), turn) for (x, y, z), turn in zip(grid, turns, strict=True)]
 
 
-def _mujoco() -> Any:
+def get_mujoco() -> Any:
+    """Import MuJoCo, or say how to install it."""
     try:
         import mujoco
     except ImportError as error:

@@ -116,13 +116,13 @@ def physics(
         str | None,
         typer.Option(
             help="Separated by commas: coacd, vhacdx:hulls, one-hull, balanced, fast, fast:full (exact hulls), "
-            "fast:64, fast:32, fast:16 (most vertices), fast:primitives; default: all.",
+            "fast:64, fast:32, fast:16 (most vertices), fast:primitives, fast:overlap (by 1 %); default: all.",
             show_default=False,
         ),
     ] = None,
     bullet: Annotated[bool, typer.Option("--bullet/--no-bullet", help="Also simulate in PyBullet.")] = True,
 ) -> Page:
-    """Simulate the hulls: a pile that settles, and balls dropped into every hole; needs rlacd[sim].
+    """Simulate the hulls: a pile, balls dropped into every hole, grasps and pegs; needs rlacd[sim].
 
     \b
     [bold]Example[/bold]
