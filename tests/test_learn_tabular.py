@@ -161,8 +161,8 @@ def saved(folder: Path, name: str, solid: Manifold) -> Component:
 @pytest.fixture
 def u_shape(tmp_path: Path, two_planes: None) -> Component:
     """A "u" with arms of different height: 31 components in all."""
-    arms = box((0, 0, 0), (0.4, 1, 2)) + box((2.6, 0, 0), (3, 1, 1))
-    return saved(tmp_path / "meshes", "u.ply", box((0, 0, 0), (3, 1, 0.4)) + arms)
+    solid = box((0, 0, 0), (3, 1, 0.4)) + box((0, 0, 0), (0.4, 1, 2)) + box((2.6, 0, 0), (3, 1, 1))
+    return saved(tmp_path / "meshes", "u.ply", solid)
 
 
 def skyline(seed: int) -> Manifold:
