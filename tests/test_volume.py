@@ -96,12 +96,27 @@ def test_the_command_line_takes_a_share(tmp_path: Path) -> None:
         ({"threshold": 0.02}, "threshold"),
         ({"volume_tolerance": 0}, "volume_tolerance"),
         ({"volume_of": "all"}, "volume_of"),
-        ({"primitives": True}, "primitives"),
     ],
 )
 def test_options_that_do_not_go_with_it(options: dict[str, object], named: str) -> None:
     with pytest.raises(OptionError, match=named):
         rlacd.decompose(torus(), criterion="volume", **options)  # type: ignore[arg-type]
+
+
+def test_primitives_add_no_more_volume_than_hulls_may() -> None:
+    legs = [trimesh.creation.box((0.1, 0.1, 1.0)).apply_translation((x, y, 0.0)) for x in (0, 1) for y in (0, 1)]
+    top = trimesh.creation.box((1.3, 1.3, 0.1)).apply_translation((0.5, 0.5, 0.5))
+    pole = trimesh.creation.cylinder(0.1, 1.0, sections=24).apply_translation((0.5, 0.5, 1.0))
+    mesh = trimesh.boolean.union([*legs, top, pole])
+    hulls = rlacd.decompose(mesh, criterion="volume", volume_tolerance=0.05, threads=1)
+    result = rlacd.decompose(mesh, criterion="volume", volume_tolerance=0.05, primitives=True, threads=1)
+    assert result.report["volume"]["max"] <= 0.05
+    assert result.report["primitives"]["box"] >= 5
+    assert result.report["primitives"]["cylinder"] == 1
+    for hull, primitive in zip(hulls, result.primitives, strict=True):
+        if primitive is not None:
+            assert primitive.volume <= 1.05 * hull.volume + 1e-9
+            assert primitive.beyond(hull.vertices) <= 1e-9
 
 
 def test_v_hacds_own_word_for_it_counts() -> None:

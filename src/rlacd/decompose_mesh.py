@@ -145,9 +145,9 @@ def decompose(
         criterion. ``full``: the exact hulls of the parts.
     primitives : bool or sequence of str
         A part becomes a ``"sphere"``, ``"capsule"``, ``"box"`` or ``"cylinder"`` if one contains its hull and meets the
-        threshold: the simplest whose volume is within a quarter of the least. Only those named; True allows all. Its
-        hull is then a convex polyhedron around the primitive, and ``Decomposition.primitives`` describes it. Models
-        (MJCF, URDF, SDF, USD) hold primitives in place of such hulls.
+        criterion, concavity or volume: the simplest whose volume is within a quarter of the least. Only those named;
+        True allows all. Its hull is then a convex polyhedron around the primitive, and ``Decomposition.primitives``
+        describes it. Models (MJCF, URDF, SDF, USD) hold primitives in place of such hulls.
     overlap : float
         Hulls that touch overlap by this much, in the same frame as `threshold`, so that nothing thin slips between
         them: one takes in a layer of the other. The threshold still holds; where it leaves no room, hulls overlap by

@@ -162,7 +162,7 @@ class Options:
     )
     primitives: bool | Sequence[PrimitiveKind] = option(
         (),
-        "Parts become a box, sphere, capsule or cylinder where one meets the threshold; written as such to MJCF, URDF, "
+        "Parts become a box, sphere, capsule or cylinder where one meets the criterion; written as such to MJCF, URDF, "
         "SDF, USD and Unreal, else as meshes.",
         custom(
             f"all (True), or some of {', '.join(PRIMITIVE_KINDS)}", read_primitives, f"all {' '.join(PRIMITIVE_KINDS)}"
@@ -304,7 +304,6 @@ class Options:
             unused = self.threshold_abs is not None or self.threshold != DEFAULT_THRESHOLD
             rule = "left out: the criterion volume has a volume_tolerance"
             _require(not unused, "threshold", self.threshold_abs or self.threshold, rule)
-            _require(not self.primitives, "primitives", self.primitives, "left out with the criterion volume")
         if isinstance(self.criterion, SpaceOptions):
             unused = self.threshold_abs is not None or self.threshold != DEFAULT_THRESHOLD
             _require(
