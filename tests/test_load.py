@@ -373,8 +373,6 @@ def test_text_ply_gives_what_its_parser_gives(kind: str, tail: bytes, tmp_path: 
         ("chair.fbx", b"Kaydara FBX Binary  \x00", "import it into Blender"),
         ("chair.step", b"ISO-10303-21;", "FreeCAD"),
         ("chair.STP", b"ISO-10303-21;", "FreeCAD"),
-        ("chair.usda", b"#usda 1.0", "import it into Blender"),
-        ("chair.usdz", b"PK\x03\x04" + bytes(40), "import it into Blender"),
     ],
 )
 def test_files_that_people_have_are_refused_with_the_way_out(tmp_path, name, content, advice):

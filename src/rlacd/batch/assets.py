@@ -15,7 +15,7 @@ from rlacd.errors import MeshFileError
 from rlacd.io.read.companions import mesh_files
 from rlacd.io.write.folder import listed_hulls
 
-ENDINGS = (".obj", ".stl", ".ply", ".off", ".glb", ".gltf", ".vrm", ".dae", ".3mf")
+ENDINGS = (".obj", ".stl", ".ply", ".off", ".glb", ".gltf", ".vrm", ".dae", ".3mf", ".usd", ".usda", ".usdc", ".usdz")
 """File endings that count as meshes, in upper or lower case."""
 
 EVERYTHING = "**"

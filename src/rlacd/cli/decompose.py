@@ -39,7 +39,7 @@ Ctrl-C once stops and writes the result so far; twice quits at once.
 
 MESH = typer.Argument(
     metavar="IN",
-    help="The mesh: obj, stl, ply, off, glb, gltf, vrm, dae, 3mf. It need not be closed or clean. "
+    help="The mesh: obj, stl, ply, off, glb, gltf, vrm, dae, 3mf, usd. It need not be closed or clean. "
     "Or a robot, .urdf or .xml (MJCF), whose collision meshes are to be replaced.",
 )
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from typing import Any
 
+from rlacd.io.read.usd import METRES as STATED_METRES
+from rlacd.io.read.usd import UP, USD
 from rlacd.output_options import Axis
 
 HEAD = 1 << 16
@@ -46,6 +48,8 @@ def stated(extension: str, content: bytes, scene: Any) -> tuple[Axis, float | No
     if extension == "3mf":  # always z up, in millimetres unless it says otherwise
         said = {str(getattr(one, "metadata", {}).get("units", "")) for one in scene.geometry.values()}
         return "z", next((METRES[unit] for unit in sorted(said) if unit in METRES), METRES["millimeter"])
+    if extension in USD:
+        return scene.metadata[UP], scene.metadata[STATED_METRES]
     return "z", None
 
 

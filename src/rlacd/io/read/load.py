@@ -18,7 +18,7 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
-from rlacd.errors import EmptyMeshError, MeshDataError, MeshFileError
+from rlacd.errors import EmptyMeshError, MeshDataError, MeshFileError, MissingExtraError
 from rlacd.io.read.beside import FolderFiles
 from rlacd.io.read.conventions import stated
 from rlacd.io.read.gltf import node_names, plain_gltf
@@ -27,6 +27,7 @@ from rlacd.io.read.looks import has_looks
 from rlacd.io.read.off import is_off, plain_off
 from rlacd.io.read.open_file import read_file
 from rlacd.io.read.text import check_text, declared_triangles, plain_obj, plain_ply, plain_stl
+from rlacd.io.read.usd import USD, usd_scene
 from rlacd.io.read.xml import check_3mf, collada_of
 from rlacd.memory import BYTES_READ, require_memory
 from rlacd.solid.frame import FloatArray
@@ -35,12 +36,12 @@ from rlacd.solid.topology import BoolArray, IntArray
 
 Source: TypeAlias = str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]
 
-FORMATS = ("obj", "stl", "ply", "off", "glb", "gltf", "vrm", "dae", "zae", "3mf", "xyz")
+FORMATS = ("obj", "stl", "ply", "off", "glb", "gltf", "vrm", "dae", "zae", "3mf", "xyz", *USD)
 """The formats that are read. trimesh parses more, but those parsers have not been reviewed against hostile files."""
 
 CONVERTERS = {
     "blend": "export it from Blender (File > Export > glTF 2.0)",
-    **dict.fromkeys(("fbx", "usd", "usda", "usdc", "usdz"), "import it into Blender and export it as glTF 2.0"),
+    "fbx": "import it into Blender and export it as glTF 2.0",
     **dict.fromkeys(("step", "stp", "iges", "igs"), "export it from a CAD program, such as FreeCAD, as stl or obj"),
 }
 """What to do with files that people have and that are not read."""
@@ -52,7 +53,7 @@ def load_mesh(source: Source) -> InputMesh:
     Parameters
     ----------
     source
-        A path (obj, stl, ply, off, glb, gltf, vrm, dae, zae, 3mf, xyz), a mesh or scene of trimesh, or vertices
+        A path (obj, stl, ply, off, glb, gltf, vrm, dae, zae, 3mf, xyz, usd), a mesh or scene of trimesh, or vertices
         ``[V, 3]`` with faces ``[F, 3]`` (or quads ``[F, 4]``). Scenes are baked: every instance of a geometry is placed
         by its transform. Paths and curves are ignored; point clouds give vertices without faces.
 
@@ -69,6 +70,8 @@ def load_mesh(source: Source) -> InputMesh:
         The arrays have the wrong shape, indices are out of range, or no face is finite.
     EmptyMeshError
         There are no points at all.
+    MissingExtraError
+        A USD file, and the extra ``usd`` is not installed.
     """
     if isinstance(source, str | os.PathLike):
         return _from_file(Path(source))
@@ -90,6 +93,8 @@ def _from_file(path: Path) -> InputMesh:
     mesh = _clean(_bake(scene, path.name), path.name)
     up, metres = stated(extension, content, scene)
     mesh = replace(mesh, up=up, metres=metres)
+    if extension in USD:
+        return replace(mesh, asset=Asset(scene) if len(mesh.nodes) > 1 else None)
     if extension not in ("glb", "gltf"):
         return replace(
             mesh, asset=Asset(content, path, extension) if has_looks(content, extension, len(mesh.nodes)) else None
@@ -127,6 +132,8 @@ def _read(path: Path) -> tuple[bytes, str, trimesh.Scene]:
         raise MeshFileError(f"{path} is empty: export the mesh again")
     extension = path.suffix.lower().lstrip(".")
     holds = _format_of(content)
+    if extension == "usdz" and holds == "3mf":  # both are archives
+        holds = extension
     if extension not in FORMATS:
         renamed = f"rename it to .{holds}, which it seems to hold" if holds else None
         hint = CONVERTERS.get(extension) or renamed or "convert it to glb, obj, stl or ply"
@@ -137,18 +144,11 @@ def _read(path: Path) -> tuple[bytes, str, trimesh.Scene]:
     beside = FolderFiles(path.parent)
     try:
         plain, extension = _checked(path, content, extension, beside)
-        scene = trimesh.load_scene(
-            io.BytesIO(plain),
-            file_type=extension,
-            resolver=beside,
-            allow_remote=False,
-            process=False,
-            skip_materials=True,
-        )
+        scene = usd_scene(path) if extension in USD else _parsed(plain, extension, beside)
     except Exception as error:  # parsers may raise anything on damaged files
         if holds and holds != extension:
             raise MeshFileError(f"{path} is not {extension} but {holds}: rename it to .{holds}") from error
-        if isinstance(error, MeshFileError):
+        if isinstance(error, MeshFileError | MissingExtraError):
             raise
         if isinstance(error, MemoryError):
             raise MeshFileError(f"{path} takes more memory than there is: simplify the mesh first") from error
@@ -162,6 +162,17 @@ def _read(path: Path) -> tuple[bytes, str, trimesh.Scene]:
     if holds and holds != extension and not scene.geometry:
         raise MeshFileError(f"{path} is not {extension} but {holds}: rename it to .{holds}")
     return plain if extension == "dae" else content, extension, scene
+
+
+def _parsed(content: bytes, extension: str, beside: FolderFiles) -> trimesh.Scene:
+    return trimesh.load_scene(
+        io.BytesIO(content),
+        file_type=extension,
+        resolver=beside,
+        allow_remote=False,
+        process=False,
+        skip_materials=True,
+    )
 
 
 def _checked(path: Path, content: bytes, extension: str, beside: FolderFiles) -> tuple[bytes, str]:
@@ -181,7 +192,7 @@ def _checked(path: Path, content: bytes, extension: str, beside: FolderFiles) ->
             return plain_obj(path, content), extension
         case "off":
             return plain_off(path, content), extension
-        case _:
+        case _ if extension not in USD:
             check_text(path, content)
     return content, extension
 
@@ -194,7 +205,7 @@ def _format_of(content: bytes) -> str | None:
     if head.startswith(b"ply\n") or head.startswith(b"ply\r"):
         return "ply"
     if head.startswith(b"PK\x03\x04"):
-        return "zae" if b".dae" in content else "3mf"
+        return "usdz" if b".usd" in head else "zae" if b".dae" in content else "3mf"
     if is_off(head):
         return "off"
     if head.startswith(b"<") and b"COLLADA" in head:

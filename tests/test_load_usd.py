@@ -1,0 +1,153 @@
+"""USD files as input, against what OpenUSD itself says of them."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+import rlacd
+from rlacd.errors import MeshFileError, MissingExtraError
+from rlacd.io.read.load import load_mesh
+
+Usd = pytest.importorskip("pxr.Usd", reason="the extra usd is not installed")
+from pxr import Gf, Sdf, UsdGeom, UsdUtils, Vt  # noqa: E402
+
+
+def add_mesh(stage: Any, path: str, shape: trimesh.Trimesh) -> Any:
+    mesh = UsdGeom.Mesh.Define(stage, path)
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.asarray(shape.vertices, dtype=np.float32)))
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray([3] * len(shape.faces)))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray(shape.faces.ravel().tolist()))
+    return mesh
+
+
+def cupboard(path: Path) -> Path:
+    """A box, turned and moved below its parent, with a quad on it, and things that are not rendered."""
+    stage = Usd.Stage.CreateNew(str(path))
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+    UsdGeom.SetStageMetersPerUnit(stage, 0.01)
+    top = UsdGeom.Xform.Define(stage, "/Cupboard")
+    top.AddTranslateOp().Set(Gf.Vec3d(1, 2, 3))
+    top.AddRotateZOp().Set(90.0)
+    add_mesh(stage, "/Cupboard/box", trimesh.creation.box((2, 4, 6))).AddTranslateOp().Set(Gf.Vec3d(10, 0, 0))
+    quad = UsdGeom.Mesh.Define(stage, "/Cupboard/door")
+    quad.CreatePointsAttr([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
+    quad.CreateFaceVertexCountsAttr([4])
+    quad.CreateFaceVertexIndicesAttr([0, 1, 2, 3])
+    quad.CreateOrientationAttr(UsdGeom.Tokens.leftHanded)
+    add_mesh(stage, "/Cupboard/hidden", trimesh.creation.box()).CreateVisibilityAttr(UsdGeom.Tokens.invisible)
+    add_mesh(stage, "/Cupboard/guide", trimesh.creation.box()).CreatePurposeAttr(UsdGeom.Tokens.guide)
+    stage.Save()
+    return path
+
+
+@pytest.mark.parametrize("ending", ["usd", "usda", "usdc", "usdz"])
+def test_what_is_rendered_is_read_where_it_stands(tmp_path: Path, ending: str) -> None:
+    path = cupboard(tmp_path / f"cupboard.{ending if ending != 'usdz' else 'usdc'}")
+    if ending == "usdz":
+        assert UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(path)), str(tmp_path / "cupboard.usdz"))
+        path = tmp_path / "cupboard.usdz"
+    mesh = load_mesh(path)
+    assert [node.name for node in mesh.nodes] == ["box", "door"]
+    assert (mesh.up, mesh.metres, mesh.unit) == ("y", 0.01, "cm")
+    assert len(mesh.faces) == 12 + 2
+    box = mesh.of_node(0).vertices
+    assert np.allclose([box.min(axis=0), box.max(axis=0)], [[1 - 2, 2 + 9, 0], [1 + 2, 2 + 11, 6]], atol=1e-6)
+    solid = trimesh.Trimesh(box, mesh.of_node(0).faces)
+    assert solid.volume == pytest.approx(48)
+    door = trimesh.Trimesh(mesh.of_node(1).vertices, mesh.of_node(1).faces, process=False)
+    assert np.allclose(door.face_normals, (0, 0, -1))
+
+
+@pytest.mark.parametrize("axis", "XYZ")
+def test_primitives_are_read_as_meshes(tmp_path: Path, axis: str) -> None:
+    path = tmp_path / "shapes.usda"
+    stage = Usd.Stage.CreateNew(str(path))
+    for index, kind in enumerate(("Cube", "Sphere", "Cylinder", "Capsule", "Cone")):
+        shape = getattr(UsdGeom, kind).Define(stage, f"/{kind}")
+        if kind in ("Cylinder", "Capsule", "Cone"):
+            shape.CreateAxisAttr(axis)
+            shape.CreateHeightAttr(3.0)
+            shape.CreateRadiusAttr(0.5)
+        shape.AddTranslateOp().Set(Gf.Vec3d(10.0 * index, 0, 0))
+    stage.Save()
+    mesh = load_mesh(path)
+    cache = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_])
+    for index, node in enumerate(mesh.nodes):
+        bounds = cache.ComputeWorldBound(stage.GetPrimAtPath(f"/{node.name}")).ComputeAlignedRange()
+        points = mesh.of_node(index).vertices
+        assert np.allclose([points.min(axis=0), points.max(axis=0)], [bounds.GetMin(), bounds.GetMax()], atol=0.01)
+        assert trimesh.Trimesh(points, mesh.of_node(index).faces).is_volume
+
+
+def test_hulls_that_were_written_are_not_read_again(tmp_path: Path) -> None:
+    box = trimesh.creation.box((1, 2, 3))
+    path = rlacd.decompose(box, quality="fast", threads=1).save(tmp_path / "box.usda", up="y")
+    again = load_mesh(path)
+    assert len(again.nodes) == 1
+    assert again.up == "y"
+    assert np.allclose(np.ptp(again.vertices, axis=0), (1, 2, 3))
+
+
+def test_instances_are_read_each_where_it_stands(tmp_path: Path) -> None:
+    add = Usd.Stage.CreateNew(str(tmp_path / "wheel.usda"))
+    add_mesh(add, "/Wheel/tyre", trimesh.creation.box())
+    add.SetDefaultPrim(add.GetPrimAtPath("/Wheel"))
+    add.Save()
+    stage = Usd.Stage.CreateNew(str(tmp_path / "cart.usda"))
+    for index in range(3):
+        place = UsdGeom.Xform.Define(stage, f"/wheel_{index}")
+        place.GetPrim().GetReferences().AddReference("./wheel.usda")
+        place.GetPrim().SetInstanceable(True)
+        place.AddTranslateOp().Set(Gf.Vec3d(5.0 * index, 0, 0))
+    stage.Save()
+    mesh = load_mesh(tmp_path / "cart.usda")
+    assert len(mesh.nodes) == 3
+    assert np.allclose(np.ptp(mesh.vertices, axis=0), (11, 1, 1))
+
+
+@pytest.mark.parametrize("named", ["../secret.usda", "{folder}/secret.usda", "./nowhere.usda"])
+def test_files_outside_the_folder_or_missing_are_named(tmp_path: Path, named: str) -> None:
+    cupboard(tmp_path / "secret.usda")
+    (tmp_path / "in").mkdir()
+    path = tmp_path / "in" / "cart.usda"
+    stage = Usd.Stage.CreateNew(str(path))
+    stage.DefinePrim("/A").GetReferences().AddReference(named.format(folder=tmp_path), "/Cupboard")
+    stage.Save()
+    with pytest.raises(MeshFileError, match=r"outside its folder|cannot be opened"):
+        load_mesh(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [("a.usda", b"#usda 1.0\n((("), ("a.usdc", b"PXR-USDC" + b"\xff" * 200), ("a.usdz", b"PK\x03\x04" + bytes(60))],
+)
+def test_damaged_files_are_refused_in_one_sentence(tmp_path: Path, name: str, content: bytes) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(MeshFileError, match="export it again"):
+        load_mesh(tmp_path / name)
+
+
+def test_faces_that_do_not_fit_are_refused(tmp_path: Path) -> None:
+    for number, (counts, corners) in enumerate([([3], [0, 1]), ([-3, 6], [0, 1, 2]), ([3], [0, 1, 9])]):
+        path = tmp_path / f"{number}.usda"
+        stage = Usd.Stage.CreateNew(str(path))
+        mesh = UsdGeom.Mesh.Define(stage, "/m")
+        mesh.CreatePointsAttr([(0, 0, 0), (1, 0, 0), (0, 1, 0)])
+        mesh.CreateFaceVertexCountsAttr(counts)
+        mesh.CreateFaceVertexIndicesAttr(corners)
+        stage.Save()
+        with pytest.raises(MeshFileError, match="export it again"):
+            load_mesh(path)
+
+
+def test_without_the_extra_it_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = cupboard(tmp_path / "cupboard.usda")
+    monkeypatch.setitem(sys.modules, "pxr", None)
+    with pytest.raises(MissingExtraError, match=r"rlacd\[usd\]"):
+        load_mesh(path)
