@@ -294,6 +294,7 @@ def test_a_real_run_in_a_pipe(mesh: Path) -> None:
     assert "\x1b" not in run.stderr, "no colours or bars in a pipe"
 
 
+@pytest.mark.slow
 def test_a_real_missing_file(tmp_path: Path) -> None:
     run = shell("decompose", tmp_path / "nothing.glb")
     assert run.returncode == 2
@@ -310,6 +311,7 @@ def test_a_real_odd_name(name: str, tmp_path: Path) -> None:
     assert run.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_a_real_bad_option(mesh: Path) -> None:
     run = shell("decompose", mesh, "--threshold", "-1")
     assert run.returncode == 2
@@ -317,6 +319,7 @@ def test_a_real_bad_option(mesh: Path) -> None:
     assert [path.name for path in mesh.parent.iterdir()] == ["ell.stl"]
 
 
+@pytest.mark.slow
 def test_a_real_timeout_still_writes_hulls(mesh: Path) -> None:
     run = shell("decompose", mesh, "--timeout", "1e-6", "--report", "-")
     assert run.returncode == 4, run.stderr

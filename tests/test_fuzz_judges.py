@@ -24,6 +24,8 @@ from rlacd.options import Options
 from rlacd.pool import ProcessLimits
 from tests.shapes import Closed, box, from_manifold, point_to_triangles
 
+pytestmark = pytest.mark.slow
+
 ELL = from_manifold(box((0, 0, 0), (4, 1, 1)) + box((0, 0, 0), (1, 1, 4)))
 
 

@@ -67,6 +67,7 @@ def test_what_only_looks_hostile_is_read(name: str, tmp_path: Path) -> None:
     assert extent == 0.5
 
 
+@pytest.mark.slow
 def test_a_file_that_is_named_ten_thousand_times_is_read_once(tmp_path: Path) -> None:
     """Ten thousand times a megabyte would not fit."""
     assert bounded(load, named_often(tmp_path)) == (12, 0.0)
@@ -187,6 +188,7 @@ def test_a_mass_that_is_no_number_is_refused(tmp_path: Path) -> None:
     check_refused(MeshFileError, "mass", rewrite_robot, path, tmp_path / "out.xml")
 
 
+@pytest.mark.slow
 def test_a_robot_with_ten_thousand_parts_in_one_line_is_rewritten(tmp_path: Path) -> None:
     """What each costs must not grow with the length of the file before it."""
     path = robot(tmp_path, "<robot>" + COLLISION.format("box.stl") * 10_000 + "<!--" + " " * 10**7 + "--></robot>")

@@ -32,6 +32,8 @@ from rlacd.solid.component import Component
 from tests.encoding import TINY, clouds, tiny_encoder, write_tiny_weights
 from tests.learning import small_solids, write_meshes
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="session")
 def reference() -> Path:

@@ -35,6 +35,8 @@ from rlacd.policies.q_network import OnnxQ
 from rlacd.policies.qpolicy import QPolicy
 from tests.encoding import write_tiny_weights
 
+pytestmark = pytest.mark.slow
+
 SHORT: dict[str, Any] = {
     "encoder": "i2p-mae",
     "iterations": 60,

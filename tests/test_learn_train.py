@@ -352,6 +352,7 @@ def test_a_checkpoint_half_written_leaves_the_one_before(meshes: Path, tmp_path:
     assert weights(tmp_path / "whole") == weights(cut_short)
 
 
+@pytest.mark.slow
 def test_lookahead_is_trained_and_leaves_a_policy(meshes: Path, tmp_path: Path) -> None:
     counted = {"volume_reward": 0.0, "finish_reward": 0.0, "cut_cost": 1.0, "discount": "static"}
     counted |= {"static_discount": 1.0, "returns": "monte-carlo", "lookahead": 2, "iterations": 60}

@@ -80,6 +80,7 @@ def test_any_hull_within_any_limit(cloud: np.ndarray, most: int) -> None:
     check(hull, max_faces=most)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=100)
 @given(points, st.integers(4, 12), hnp.arrays(np.float64, 3, elements=st.floats(-8, 0)))
 def test_needles_and_plates(cloud: np.ndarray, most: int, exponents: np.ndarray) -> None:

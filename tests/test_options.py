@@ -137,6 +137,7 @@ def result() -> rlacd.Decomposition:
     return rlacd.decompose(creation.box(), quality="fast")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("odd", ODD.values(), ids=ODD.keys())
 def test_options_of_what_is_written_are_checked(odd: Any, result: rlacd.Decomposition, tmp_path: Path) -> None:
     for name in ("file_format", "density", "up", "one_mesh"):
