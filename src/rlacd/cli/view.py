@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import webbrowser
 from pathlib import Path
 from typing import Annotated
@@ -60,7 +61,8 @@ def view(
 
         chosen = {"threshold": threshold, "criterion": criterion, "quality": quality, "max_hulls": max_hulls}
         given = {name: value for name, value in chosen.items() if value is not None}
-        with open_viewer(mesh, given, up=up, port=port, threads=threads) as server:
+        viewer = open_viewer(mesh, given, up=up, port=port, threads=threads)
+        with viewer as server, contextlib.suppress(KeyboardInterrupt):  # which may come before the wait begins
             typer.echo(f"{mesh.name} is shown at {server.address} (Ctrl-C ends)", err=True)
             if browser:
                 webbrowser.open(server.address)
