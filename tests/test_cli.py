@@ -109,6 +109,7 @@ def test_every_option_reaches_the_decomposition(mesh: Path, stand_in: StandIn) -
         "max_faces": 60,
         "policy": "greedy",
         "resolution": 80,
+        "gap": 0.05,
         "seed": 7,
         "threads": 1,
         "timeout": 2.5,

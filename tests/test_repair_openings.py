@@ -52,6 +52,19 @@ def test_a_wide_mouth_stays_open():
     assert volume(solid) < 0.01 * full
 
 
+@pytest.mark.parametrize(("gap", "filled"), [(0.1, False), (0.2, True)])
+def test_a_ball_that_does_not_pass_a_hole_decides(gap, filled):
+    mesh, full = with_hole(0.2)
+    assert volume(solid_of(mesh, gap=gap)) / full == pytest.approx(1.0 if filled else 0.0, abs=0.01)
+
+
+@pytest.mark.parametrize(("gap", "filled"), [(0.015, False), (GAP, True)])
+def test_a_small_ball_rolls_on_a_grid_fine_enough(gap, filled):
+    box = without(BOX, *np.flatnonzero(BOX.face_normals[:, 2] > 0.9))
+    lid = trimesh.Trimesh([[-1, -1, 1.05], [1, -1, 1.05], [1, 1, 1.05], [-1, 1, 1.05]], [[0, 1, 2], [0, 2, 3]])
+    assert (volume(solid_of(join(box, lid), gap=gap)) > 7) == filled
+
+
 def inverted(mesh):
     return trimesh.Trimesh(mesh.vertices, mesh.faces[:, ::-1], process=False)
 

@@ -100,6 +100,7 @@ def decompose(
     policy: str | Policy = "greedy",
     resolution: int = DEFAULT_RESOLUTION,
     open: OpenName = "auto",
+    gap: float = 0.03,
     seed: int = 0,
     threads: int | None = None,
     timeout: float | None = None,
@@ -166,6 +167,8 @@ def decompose(
         How to treat bodies with openings, such as cups and damaged scans. ``auto``: solid if nothing can get inside or
         if the openings look like missing faces; otherwise a shell as thin as its faces. ``solid``: hollows are filled.
         ``thin``: nothing is filled.
+    gap : float
+        Radius of a ball, where the longest side is 2: what it cannot get into through the openings counts as closed.
     seed : int
         Seed of all random choices; the same input, options and seed give the same bytes.
     threads : int, optional
@@ -379,6 +382,7 @@ def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Cl
                 source,
                 resolution=options.resolution,
                 open_bodies=options.open,
+                gap=options.gap,
                 threads=workers.threads,
                 keep_cavities=isinstance(options.criterion, NavigableSpace) and options.criterion.sees_cavities,
             )

@@ -47,6 +47,9 @@ RESOLUTIONS = (20, 400)
 """The grid that repair looks for rooms on has this number cubed of cells: with fewer than 20 along a side, a wrap drawn
 onto the surface folds over itself; more than 400 would take over 4 GB."""
 
+GAPS = (0.01, 0.3)
+"""Smaller balls would need more than `RESOLUTIONS` cells, larger ones close what a body is made of."""
+
 OpenName = Literal["auto", "solid", "thin"]
 
 OPEN: tuple[OpenName, ...] = get_args(OpenName)
@@ -216,6 +219,12 @@ class Options:
         one_of(OPEN),
         panel=METHOD,
         metavar="|".join(OPEN),
+    )
+    gap: float = option(
+        0.03,
+        "Radius of a ball: what it cannot get into through the openings counts as closed (the longest side is 2).",
+        number(*GAPS),
+        panel=METHOD,
     )
     seed: int = option(0, "The same seed, input and options give the same bytes.", integer(0, MAX_SEED), panel=RUN)
     threads: int | None = option(

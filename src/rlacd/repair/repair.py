@@ -17,6 +17,7 @@ turns a dozen exact faces into tens of thousands of approximate ones; steps 3 to
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 
 import numpy as np
@@ -67,10 +68,15 @@ HALF_THICKNESS = 1e-3
 """Half the thickness of the slab a sheet becomes, in frame units."""
 
 GAP = 0.03
-"""Greatest distance of a cap from the input's surface, and the radius of the ball a gap must stop, in frame units."""
+"""Greatest distance of a cap from the input's surface, and the radius of the ball a gap must stop, in frame units, by
+default."""
 
-# Widest slit between caps that is filled, and the distance up to which a cap is part of the solid's surface.
-_SLIT, _ON_SURFACE = GAP / 4, 1e-6
+CELLS_ACROSS = 1.5
+"""A ball has a radius of at least so many cells of the grid that it rolls on."""
+
+# Widest slit between caps that is filled, as a share of the gap, and the distance up to which a cap is part of the
+# solid's surface.
+_SLIT, _ON_SURFACE = 1 / 4, 1e-6
 
 _WELDS = (2e-5, 5e-4)
 _WRAP_ERROR = 4e-3
@@ -91,6 +97,7 @@ def repair(
     *,
     resolution: int = 100,
     open_bodies: str = "auto",
+    gap: float = GAP,
     threads: int | None = None,
     keep_cavities: bool = False,
 ) -> Solid:
@@ -106,6 +113,9 @@ def repair(
         ``auto``: a body with openings is solid if nothing can get inside, or if the openings look like damage; else it
         is a shell as thin as its faces. ``solid``: every body is filled that has an inside once its openings are
         closed. ``thin``: open bodies stay shells.
+    gap
+        Radius of a ball, where the longest side is 2: what it cannot get through is closed. Small balls roll on a finer
+        grid than `resolution` asks for.
     threads
         Number of threads that measure distances; all cores by default. The result does not depend on it.
     keep_cavities
@@ -150,17 +160,18 @@ def repair(
         return Solid(solid, surface, frame, (body,), tuple(warnings))
 
     query = SurfaceQuery(vertices, faces, threads)
-    work = _Repair(query, frame, resolution, keep_cavities, open_bodies)
+    cells = max(resolution, math.ceil(2 * CELLS_ACROSS / gap)) if gap < GAP else resolution
+    work = _Repair(query, frame, cells, gap, keep_cavities, open_bodies)
     bend = 1.0
     if work.lost > _LOST:
         # A cap that bends little can cross the body's own faces, which turns some of it inside out: try small caps.
-        other = _Repair(query, frame, resolution, keep_cavities, open_bodies, bend=0.0)
+        other = _Repair(query, frame, cells, gap, keep_cavities, open_bodies, bend=0.0)
         if other.lost < work.lost:
             work, bend = other, 0.0
     doubted = work.doubted()
     if len(doubted):
         # If faces of one body cross each other, they may be joined into a wrong skin: try them as sheets.
-        other = _Repair(query, frame, resolution, keep_cavities, open_bodies, doubted, bend)
+        other = _Repair(query, frame, cells, gap, keep_cavities, open_bodies, doubted, bend)
         if other.deviation.max() < work.deviation.max():
             work = other
     return Solid(work.solid, surface, frame, work.report(), tuple(warnings + work.warnings), body_of=work.body_of_input)
@@ -213,6 +224,7 @@ class _Repair:
         surface: SurfaceQuery,
         frame: Frame,
         resolution: int,
+        gap: float,
         keep_cavities: bool,
         open_bodies: str,
         as_sheets: IntArray | None = None,
@@ -221,6 +233,7 @@ class _Repair:
         self.input = surface
         self.frame = frame
         self.resolution = resolution
+        self.gap = gap
         self.keep_cavities = keep_cavities
         self.open_bodies = open_bodies
         self.mouths: dict[int, FloatArray] = {}  # of hollow bodies, the centre of their widest opening
@@ -292,8 +305,8 @@ class _Repair:
 
     @cached_property
     def reach(self) -> Reach:
-        """Where a ball of radius `GAP` can go around the input."""
-        return Reach.of(self.input.vertices, self.input.faces, radius=GAP, resolution=self.resolution)
+        """Where a ball of radius `gap` can go around the input."""
+        return Reach.of(self.input.vertices, self.input.faces, radius=self.gap, resolution=self.resolution)
 
     def _is_oriented(self, soup: Soup) -> bool:
         """Whether every edge joins two faces that run along it in opposite directions, and no body is flat."""
@@ -361,7 +374,7 @@ class _Repair:
         if free == 0 or free > MOST_FREE_EDGES or self.open_bodies == "thin":
             return soup
         fill = self.open_bodies == "solid"
-        closed = close_holes(soup, self.bodies, self.input, self._covers, GAP, HALF_THICKNESS / 2, fill, self.bend)
+        closed = close_holes(soup, self.bodies, self.input, self._covers, self.gap, HALF_THICKNESS / 2, fill, self.bend)
         if closed is None:
             return soup
         self.mouths = dict(zip(closed.hollow.tolist(), closed.mouths, strict=True))
@@ -459,7 +472,7 @@ class _Repair:
         return to_manifold(*self.reach.wrap(cells, self.input, HALF_THICKNESS)).simplify(error)
 
     def _build_or_wrap(self, soup: Soup) -> list[tuple[Manifold, int]]:
-        """Build every body, but wrap crowds of sheets (leaves, feathers) as one, as a ball of radius `GAP` sees it."""
+        """Build every body, but wrap crowds of sheets (leaves, feathers) as one, as a ball of radius `gap` sees it."""
         walls, sheets = self._walls_and_sheets(soup)
         is_slab = self.step == STEPS.index("slab")
         crowded = is_slab.sum() > _CROWD
@@ -483,11 +496,11 @@ class _Repair:
         return [*((part, body) for part, body in parts if not is_slab[body]), (wrap, first)]
 
     def _wrap_rooms(self, soup: Soup, parts: list[tuple[Manifold, int]]) -> None:
-        """Close rooms that sheets enclose except for gaps too narrow for a ball of radius `GAP`."""
+        """Close rooms that sheets enclose except for gaps too narrow for a ball of radius `gap`."""
         is_slab = self.step == STEPS.index("slab")
         slabs = soup.only(is_slab[soup.body])
         around = soup.only((is_slab | self.by_room)[soup.body])
-        if around.area.sum() < 4 * np.pi * GAP**2 or volume_of(self.solid) == 0:
+        if around.area.sum() < 4 * np.pi * self.gap**2 or volume_of(self.solid) == 0:
             return
         rooms = self.reach.rooms_outside(SurfaceQuery(*to_arrays(self.solid)))
         if len(rooms) == 0:
@@ -523,7 +536,7 @@ class _Repair:
             return
         solid = SurfaceQuery(*to_arrays(self.solid), self.input.threads)
         bare = solid.distance(self.hidden) < _ON_SURFACE
-        points, step = self.hidden[bare], _SLIT * self.across[bare]
+        points, step = self.hidden[bare], _SLIT * self.gap * self.across[bare]
         points = points[solid.inside(points + step) & solid.inside(points - step)]
         if len(points) == 0:
             return
