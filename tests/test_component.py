@@ -119,3 +119,11 @@ def test_a_plane_beside_a_component_leaves_it_whole() -> None:
     for normal in ((0.0, 1.0, 0.0), (0.6, 0.0, 0.8)):
         assert component.cut(Plane(normal, 5.0))[1] is None
         assert component.cut(Plane(normal, -5.0))[0] is None
+
+
+def test_arrays_that_cannot_be_written_make_a_solid() -> None:
+    """Such come from manifold3d, which does not take them back."""
+    whole = box(1, 2, 3)
+    vertices, faces = whole.vertices.copy(), whole.faces.copy()
+    vertices.flags.writeable = faces.flags.writeable = False
+    assert Component((vertices, faces)).manifold.volume() == pytest.approx(6)

@@ -2,7 +2,7 @@
 
 Every hull takes in what of the solid's surface it misses (`Filling.uncovered`), so that together the hulls cover the
 solid; its part is then the solid clipped to it. Each part is tested on the solid itself. One that fails is cut again:
-on the proxy under a tighter criterion, at last on the solid.
+on the proxy under a tighter criterion, at last, or where the proxy cannot be cut, on the solid.
 """
 
 from __future__ import annotations
@@ -109,8 +109,9 @@ class Lift:
             for i in reversed(failing):
                 origin = origins[i]
                 assert origin is not None
-                new = self._on_proxy(origin, criterion) if round_ < ROUNDS else self._on_solid(lifted[i])
-                origins[i : i + 1] = [None] * len(new) if round_ == ROUNDS else new
+                on_proxy = round_ < ROUNDS and self.on_proxy.is_met(origin)  # else the proxy could not be cut there
+                new = self._on_proxy(origin, criterion) if on_proxy else self._on_solid(lifted[i])
+                origins[i : i + 1] = new if on_proxy else [None] * len(new)
                 hulls[i : i + 1] = [limit_hull(part.hull, tolerance=SMOOTH) for part in new]
             hulls = self._covering(hulls)
         return lifted
@@ -139,10 +140,9 @@ class Lift:
         return Part(vertices, faces, max(0.0, _native.mesh_volume(vertices, faces)), hull)
 
     def _failing(self, lifted: dict[int, Part], origins: Sequence[Part | None]) -> list[int]:
-        """Indices of the parts that fail on the solid, although they met their criterion on the proxy."""
+        """Indices of the parts that fail on the solid, but for those that were cut there before."""
         verdicts = self.workers.map(self.goal.is_met, lifted.values())
-        failing = [i for i, met in zip(lifted, verdicts, strict=True) if not met]
-        return [i for i in failing if (origin := origins[i]) is not None and self.on_proxy.is_met(origin)]
+        return [i for i, met in zip(lifted, verdicts, strict=True) if not met and origins[i] is not None]
 
     def _on_proxy(self, part: Part, criterion: Criterion) -> list[Part]:
         whole = reunite(part.members)

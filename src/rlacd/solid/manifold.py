@@ -42,7 +42,7 @@ def to_manifold(vertices: FloatArray, faces: Faces) -> Manifold:
 
 def _taken_over(vertices: FloatArray, faces: Faces) -> Manifold:
     require_time_for(len(faces))
-    mesh = Mesh64(np.ascontiguousarray(vertices, dtype=np.float64), np.ascontiguousarray(faces, dtype=np.uint64))
+    mesh = Mesh64(np.require(vertices, np.float64, ["C", "W"]), np.require(faces, np.uint64, ["C", "W"]))
     manifold = Manifold(mesh)
     return manifold if manifold.status() == Error.NoError else Manifold()
 
