@@ -283,6 +283,24 @@ def test_noise_is_refused(tmp_path, extension):
         load_mesh(path)
 
 
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("nodes", "ab"),
+        ("nodes", ["x"]),
+        ("nodes", [None]),
+        ("meshes", "ab"),
+        ("scenes", "s"),
+    ],
+)
+def test_what_is_no_object_in_gltf_is_damage(box, tmp_path, key, value):
+    write(box, tmp_path, "gltf")
+    path = tmp_path / "mesh.gltf"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {key: value}))
+    with pytest.raises(MeshFileError, match="damaged"):
+        load_mesh(path)
+
+
 def gltf_of(box, folder, uri):
     write(box, folder, "gltf")
     tree = json.loads((folder / "mesh.gltf").read_text())

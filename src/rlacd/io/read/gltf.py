@@ -81,8 +81,9 @@ def node_names(path: Path, content: bytes) -> list[str]:
 
     def named(index: int, node: Json) -> str:
         own = node.get("name")
-        if not own and "mesh" in node:
-            own = meshes[node["mesh"]].get("name")
+        mesh = node.get("mesh")
+        if not own and isinstance(mesh, int) and 0 <= mesh < len(meshes):
+            own = meshes[mesh].get("name")
         return own if own and isinstance(own, str) else f"node_{index}"
 
     return [named(index, node) for index, node in enumerate(header.get("nodes", []))]
@@ -135,6 +136,8 @@ def _plain_primitive(primitive: Json) -> Json:
 
 
 def _only(item: Json, fields: tuple[str, ...]) -> Json:
+    if not isinstance(item, dict):  # the fields' names may be in a string, too
+        raise TypeError(f"{item!s:.40} is no object")
     return {field: item[field] for field in fields if field in item}
 
 
