@@ -48,6 +48,14 @@ def test_a_decomposition_loads_no_network_runtime() -> None:
     assert not loaded & {"onnxruntime", "torch", "typer", "rich"}
 
 
+def test_no_module_imports_scipy() -> None:
+    """It is installed for the tests, so nothing else would notice."""
+    files = list(Path(rlacd.__file__).parent.rglob("*.py"))
+    assert len(files) > 100
+    imports = ("import scipy", "from scipy")
+    assert not [file for file in files if any(line.strip().startswith(imports) for line in file.open(encoding="utf-8"))]
+
+
 @pytest.mark.slow
 def test_meshes_of_every_format_need_no_scipy(tmp_path: Path) -> None:
     """trimesh uses it where it is installed; rlacd does not require it."""

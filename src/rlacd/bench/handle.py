@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy import ndimage
 
 from rlacd import _native
 from rlacd.bench.simulate import BALL, NEAR, SIZE, above, exact_depths, get_mujoco, surface_of
@@ -97,14 +96,16 @@ def _spread(some: list[Any], most: int) -> list[Any]:
 
 def _enclosed(free: BoolArray) -> list[int]:
     """The middle of each region of free cells [N, N] that no path of free cells joins to the border, by its place."""
-    regions, count = ndimage.label(np.pad(free, 1, constant_values=True))
+    regions = _native.label_cells(np.pad(free, 1, constant_values=True)[..., None]).reshape(len(free) + 2, -1)
     inner = regions[1:-1, 1:-1]
-    depth = ndimage.distance_transform_edt(free)
-    return [
-        int(np.where(inner == region, depth, -1.0).argmax())
-        for region in range(1, count + 1)
-        if region != regions[0, 0]
-    ]
+    blocked = np.argwhere(~free)
+    middles = []
+    for region in range(1, int(regions.max()) + 1):
+        if region != regions[0, 0]:
+            cells = np.argwhere(inner == region)
+            away = np.linalg.norm(cells[:, None] - blocked[None], axis=2).min(axis=1)
+            middles.append(int(np.ravel_multi_index(tuple(cells[away.argmax()]), free.shape)))
+    return middles
 
 
 def _is_square(surface: _native.Surface, tip: FloatArray, way: FloatArray) -> bool:
