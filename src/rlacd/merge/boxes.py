@@ -75,9 +75,10 @@ class Boxes:
         around = np.array([hops[:, 0].min(axis=0) - reach, hops[:, 1].max(axis=0) + reach])
         met = (self._boxes[:, 0] <= around[1]).all(axis=1) & (self._boxes[:, 1] >= around[0]).all(axis=1)
         from_hop, other = self._near(between, np.flatnonzero(met), reach)
-        other = other[np.argsort(from_hop, kind="stable")]
-        begin = np.searchsorted(np.sort(from_hop), hop)
-        counts = np.searchsorted(np.sort(from_hop), hop, side="right") - begin
+        order = np.argsort(from_hop, kind="stable")
+        from_hop, other = from_hop[order], other[order]
+        begin = np.searchsorted(from_hop, hop)
+        counts = np.searchsorted(from_hop, hop, side="right") - begin
         found = np.zeros(0, dtype=np.int64)  # row * count + other
         bounds = np.searchsorted(np.cumsum(counts), np.arange(0, counts.sum() + AT_ONCE, AT_ONCE)[1:-1], side="right")
         for chunk in np.split(np.arange(len(hop)), np.unique(bounds)):
