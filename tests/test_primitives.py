@@ -22,6 +22,7 @@ from rlacd.primitive_kinds import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.solid.hull import Hull
 from tests.hulls import assert_convex_hull
 from tests.models import TABLE_VOLUME, fall_in_bullet, fall_in_drake, fall_in_mujoco, table
+from tests.shapes import point_to_triangles
 
 Array = npt.NDArray[np.float64]
 
@@ -246,9 +247,62 @@ def test_what_is_no_primitive_is_refused_in_one_sentence(wrong: Any) -> None:
         rlacd.decompose(table(), primitives=wrong)
 
 
-def test_primitives_need_the_concavity_criterion() -> None:
-    with pytest.raises(OptionError, match="primitives"):
-        rlacd.decompose(table(), criterion=rlacd.NavigableSpace(), primitives=True)
+def distances(primitive: rlacd.Primitive, points: Array) -> Array:
+    """How far points lie from a primitive, 0 inside."""
+    own = np.abs((points - primitive.centre) @ primitive.axes)
+    around = np.hypot(own[:, 0], own[:, 1])
+    if primitive.kind == "box":
+        return np.asarray(np.linalg.norm(np.maximum(own - np.array(primitive.size) / 2, 0), axis=1))
+    radius, length = (*primitive.size, 0.0)[:2]
+    along = np.maximum(own[:, 2] - length / 2, 0)
+    if primitive.kind == "cylinder":
+        return np.hypot(np.maximum(around - radius, 0), along)
+    return np.maximum(np.hypot(around, along) - radius, 0)
+
+
+def stool() -> trimesh.Trimesh:
+    """A round seat on three slanted, round legs."""
+    parts = [trimesh.creation.cylinder(0.5, 0.1, sections=48).apply_translation([0, 0, 0.9])]
+    for turn in 2 * np.pi / 3 * np.arange(3):
+        foot, top = (np.array([r * math.cos(turn), r * math.sin(turn), z]) for r, z in ((0.45, 0.0), (0.3, 0.9)))
+        parts.append(trimesh.creation.cylinder(0.05, segment=[foot, top], sections=32))
+    return trimesh.util.concatenate(parts)
+
+
+def test_primitives_leave_navigable_space_free(tmp_path: Path) -> None:
+    """The true shapes touch no ball, by their textbook distances and in MuJoCo."""
+    space = rlacd.NavigableSpace(radius=0.06, tolerance=0.02)
+    result = rlacd.decompose(stool(), criterion=space, primitives=True, quality="fast", threads=1)
+    found, balls = primitives_of(result), result.balls
+    assert "cylinder" in {each.kind for each in found}
+    assert balls is not None
+    for primitive in found:
+        assert (distances(primitive, balls.centres) >= balls.radii - 1e-8).all()
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    path = result.save(tmp_path / "stool.xml")
+    for wider, touched in ((-1e-5, False), (0.04, True)):
+        spec = mujoco.MjSpec.from_file(str(path))
+        for centre, radius in zip(balls.centres, balls.radii + wider, strict=True):
+            spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, pos=centre.tolist(), size=[radius, 0, 0])
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        assert bool((data.contact.dist < 0).any()) == touched
+
+
+def test_primitives_of_navigable_space_stay_near_the_convex_hull() -> None:
+    """No ball stands beside a convex solid, so that a cylinder around half a ball, 0.4 off at its rim, blocks none."""
+    dome = trimesh.creation.icosphere(subdivisions=3).slice_plane([0, 0, 0], [0, 0, 1], cap=True)
+    drum = trimesh.creation.cylinder(1.0, 1.0, sections=24)
+    for mesh, kinds in ((dome, set[str]()), (drum, {"cylinder"})):
+        space = rlacd.NavigableSpace(radius=0.2, tolerance=0.02)
+        result = rlacd.decompose(mesh, criterion=space, primitives=True, quality="fast", threads=1)
+        assert result.balls is not None
+        assert len(result.balls) == 0
+        assert {each.kind for each in primitives_of(result)} == kinds
+        for each in primitives_of(result):
+            away = point_to_triangles(samples_on(each), np.asarray(mesh.vertices), np.asarray(mesh.faces))
+            assert away.max() <= 0.04
 
 
 # --- programs that read them ------------------------------------------------------------------------------------------

@@ -146,7 +146,7 @@ def decompose(
         criterion. ``full``: the exact hulls of the parts.
     primitives : bool or sequence of str
         A part becomes a ``"sphere"``, ``"capsule"``, ``"box"`` or ``"cylinder"`` if one contains its hull and meets the
-        criterion, concavity or volume: the simplest whose volume is within a quarter of the least. Only those named;
+        criterion: the simplest whose volume is within a quarter of the least. Only those named;
         True allows all. Its hull is then a convex polyhedron around the primitive, and ``Decomposition.primitives``
         describes it. Models (MJCF, URDF, SDF, USD) hold primitives in place of such hulls.
     overlap : float

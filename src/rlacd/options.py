@@ -318,7 +318,6 @@ class Options:
             _require(
                 not unused, "threshold", self.threshold_abs or self.threshold, "left out: a NavigableSpace has none"
             )
-            _require(not self.primitives, "primitives", self.primitives, "left out with a NavigableSpace")
             _require(not self.per_node, "per_node", True, "left out: the space around a scene is that of all its nodes")
         if self.quality is None:  # searching means merging
             object.__setattr__(self, "quality", "balanced" if self.merge else "fast")

@@ -137,7 +137,7 @@ class NavigableSpace(SpaceOptions):
                     threads,
                 )
             )
-        return Navigable(self, radius, tolerance, balls, tuple(warnings))
+        return Navigable(self, radius, tolerance, balls, tuple(warnings), hull=hull)
 
     def unprepared(self, scale: float) -> Navigable:
         """Make the criterion for a solid whose space there was no time to find: it has no balls.
@@ -191,6 +191,8 @@ class Navigable:
         Sentences for the user.
     conflicts : Conflicts
         Changes that `settled` made to the balls.
+    hull : Hull or None
+        Of the solid. Primitives may reach beyond it by the tolerance; without it there are none.
     """
 
     def __init__(
@@ -201,6 +203,7 @@ class Navigable:
         balls: Balls,
         warnings: tuple[str, ...] = (),
         conflicts: Conflicts | None = None,
+        hull: Hull | None = None,
     ) -> None:
         self.space = space
         self.radius = radius
@@ -209,6 +212,7 @@ class Navigable:
         self.allowance = 0.0
         self.warnings = warnings
         self.conflicts = conflicts or Conflicts()
+        self.hull = hull
         self._intrusions = _Intrusions(balls)
 
     def __repr__(self) -> str:
@@ -263,8 +267,11 @@ class Navigable:
     def is_met(self, part: Part) -> bool:
         """Whether the hull reaches no deeper than the allowance into balls larger than that, or the part is small.
 
-        Small is a part whose hull is smaller than half the sum of tolerance and allowance.
+        Small is a part whose hull is smaller than half the sum of tolerance and allowance. A primitive must also stay
+        within the tolerance of the solid's hull, in which other hulls lie anyway: hardly any ball stands beyond it.
         """
+        if part.hull.primitive is not None and not self._stays_around(part.hull):
+            return False
         if self._is_small(part) or len(self.balls) == 0:
             return True
         if not self._intrusions.any_beyond(part, max(self.allowance, TOUCH)):
@@ -309,6 +316,7 @@ class Navigable:
             Balls(self.balls.centres[kept], radii[kept]),
             self.warnings,
             conflicts,
+            self.hull,
         )
         settled.allowance = self.allowance
         return settled
@@ -316,6 +324,14 @@ class Navigable:
     def _is_small(self, part: Part) -> bool:
         small = (self.tolerance + self.allowance) / 2
         return part.hull.volume < small**3 and bool(np.ptp(part.hull.vertices, axis=0).max() < small)
+
+    def _stays_around(self, hull: Hull) -> bool:
+        """Whether a hull lies within the tolerance of the solid's, decided at its corners: the distance is convex."""
+        if self.hull is None:
+            return False
+        around = _native.Surface(self.hull.vertices, self.hull.faces)
+        away = hull.vertices[around.distance(hull.vertices, threads=1) > self.tolerance]
+        return len(away) == 0 or bool((around.winding(away, accuracy=4.0, threads=1) > 0.5).all())
 
     def _deepest(self, part: Part, least_radius: float) -> float:
         """Deepest intrusion into a ball larger than `least_radius`."""
