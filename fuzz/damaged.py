@@ -24,7 +24,8 @@ import uuid
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import count
+from importlib.util import find_spec
+from itertools import chain, count
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -73,7 +74,8 @@ def seeds_of(meshes: Path) -> dict[str, list[Seed]]:
     with open(meshes / "index.csv", encoding="utf-8", newline="") as listing:
         small = [row["file"] for row in csv.DictReader(listing) if 8 < int(row["faces"]) < 150]
     for name in small[:: max(1, len(small) // SMALL_MESHES)][:SMALL_MESHES]:
-        for kind, seed in written(trimesh.load_mesh(meshes / name, process=False)):
+        mesh = trimesh.load_mesh(meshes / name, process=False)
+        for kind, seed in chain(written(mesh), written_by_extras(mesh)):
             found.setdefault(kind, []).append(seed)
     found["onnx"] = [Seed(q_network())]
     return found
@@ -98,6 +100,29 @@ def written(mesh: trimesh.Trimesh) -> Iterator[tuple[str, Seed]]:
     yield "xyz", Seed("\n".join(" ".join(map(str, row)) for row in mesh.vertices.tolist()).encode())
     files = scene.export(file_type="gltf")
     yield "gltf", Seed(files.pop("model.gltf"), files)
+
+
+def written_by_extras(mesh: trimesh.Trimesh) -> Iterator[tuple[str, Seed]]:
+    """Write a mesh in the formats that need an extra which is installed: Draco, and USD as text, binary and packed."""
+    if find_spec("DracoPy"):
+        yield "glb", Seed(trimesh.Scene(mesh).export(file_type="glb", extension_draco=True))
+    if not find_spec("pxr"):
+        return
+    from pxr import Sdf, Usd, UsdGeom, UsdUtils, Vt
+
+    with TemporaryDirectory(prefix="rlacd-fuzz-") as scratch:
+        for kind in ("usda", "usdc"):
+            path = Path(scratch) / f"mesh.{kind}"
+            stage = Usd.Stage.CreateNew(str(path))
+            shape = UsdGeom.Mesh.Define(stage, "/top/mesh")
+            shape.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(mesh.vertices.astype(np.float32)))
+            shape.CreateFaceVertexCountsAttr(Vt.IntArray([3] * len(mesh.faces)))
+            shape.CreateFaceVertexIndicesAttr(Vt.IntArray(mesh.faces.ravel().tolist()))
+            stage.Save()
+            yield kind, Seed(path.read_bytes())
+        packed = Path(scratch) / "mesh.usdz"
+        UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(path)), str(packed))
+        yield "usdz", Seed(packed.read_bytes())
 
 
 def off_variant(mesh: trimesh.Trimesh, letters: str) -> bytes:

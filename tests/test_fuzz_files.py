@@ -11,13 +11,16 @@ import trimesh
 from trimesh import creation
 
 from fuzz import mutations
-from fuzz.damaged import written
+from fuzz.damaged import written, written_by_extras
 from rlacd.errors import RlacdError
 from rlacd.io.read.load import load_mesh
 from rlacd.io.robots import rewrite_robot
 from tests.bounded import bounded
 
 INPUTS = 60
+
+APART = {"draco": "glb", "usda": "usda", "usdc": "usdc", "usdz": "usdz"}
+"""What is read in a process of its own, and how its files end."""
 
 URDF = (
     '<?xml version="1.0"?>\n<robot name="r">\n<link name="a">\n<collision name="c">\n<origin xyz="0 0 1"/>\n'
@@ -38,12 +41,13 @@ def shape() -> trimesh.Trimesh:
 
 def damaged(kind: str, number: int, folder: Path) -> Path:
     """The file of a number."""
-    seeds: list[Any] = [seed for of, seed in written(shape()) if of == kind]
+    write = written_by_extras if kind in APART else written
+    seeds: list[Any] = [seed for of, seed in write(shape()) if of == APART.get(kind, kind)]
     seeds += [mutations.Seed({"urdf": URDF, "xml": MJCF}[kind].encode())] if kind in ("urdf", "xml") else []
     rng = np.random.default_rng([7, number])
     seed = seeds[rng.integers(len(seeds))]
-    path = folder / f"mesh.{kind}"
-    path.write_bytes(mutations.mutated(kind, seed, seeds, rng))
+    path = folder / f"mesh.{APART.get(kind, kind)}"
+    path.write_bytes(mutations.mutated(APART.get(kind, kind), seed, seeds, rng))
     for name, content in seed.beside.items():
         (folder / name).write_bytes(content)
     return path
@@ -71,6 +75,13 @@ def untyped(kind: str, folder: Path) -> dict[int, str]:
 def test_a_damaged_file_is_read_or_refused(kind: str, tmp_path: Path) -> None:
     creation.box().export(tmp_path / "box.stl")
     assert bounded(untyped, kind, tmp_path, seconds=300) == {}
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(("kind", "module"), [(kind, "DracoPy" if kind == "draco" else "pxr") for kind in APART])
+def test_a_damaged_file_that_is_read_apart_is_read_or_refused(kind: str, module: str, tmp_path: Path) -> None:
+    pytest.importorskip(module)
+    assert untyped(kind, tmp_path) == {}
 
 
 def test_a_number_always_makes_the_same_file(tmp_path: Path) -> None:

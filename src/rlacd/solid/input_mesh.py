@@ -43,7 +43,7 @@ class Asset:
     content
         The bytes of a file, or a scene or mesh of trimesh.
     path
-        Of the file, whose folder holds the files that it refers to; None for a scene or mesh from memory.
+        Of the file, whose folder holds the files that it refers to; None if `content` is all of it.
     extension
         Of its format, without the dot; empty for a scene or mesh from memory.
     """

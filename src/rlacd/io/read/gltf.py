@@ -25,8 +25,9 @@ ITEM_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 
 ITEMS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
-UNREAD = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
-"""Extensions that encode the triangles: without the decoder, the file holds zeros in their place."""
+UNREAD = ("EXT_meshopt_compression", "KHR_meshopt_compression", "KHR_draco_mesh_compression")
+"""Extensions that encode the triangles: without the decoder, the file holds zeros in their place. Draco is decoded
+before (`gltf_encoded.py`), so that its name is gone."""
 
 KEPT = {
     "buffers": ("byteLength", "uri"),
@@ -66,7 +67,12 @@ def plain_gltf(path: Path, content: bytes, beside: Callable[[str], bytes]) -> by
     except (TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:
         reason = f"{type(error).__name__}: {error!s:.100}"
         raise MeshFileError(f"{path} {UNREADABLE} ({reason}); export it again") from error
-    text = json.dumps(plain).encode()
+    return joined(plain, rest)
+
+
+def joined(header: Json, rest: bytes | None) -> bytes:
+    """Put together what `split` took apart."""
+    text = json.dumps(header).encode()
     if rest is None:
         return text
     text += b" " * (-len(text) % 4)
@@ -116,8 +122,8 @@ def _plain(path: Path, header: Json) -> Json:
     hidden = [name for name in UNREAD if name in header.get("extensionsRequired", [])]
     if hidden:
         raise MeshFileError(
-            f"{path} hides its triangles by {hidden[0]}: export it again without compression, for which Blender can "
-            "import it"
+            f"{path} hides its triangles by {hidden[0]}, which is not read: export it again without that compression, "
+            "or run  npx @gltf-transform/cli copy IN.glb OUT.glb"
         )
     plain: Json = {key: header[key] for key in ("scene",) if key in header}
     plain["asset"] = {"version": header.get("asset", {}).get("version", "2.0")}

@@ -22,6 +22,7 @@ from rlacd.errors import EmptyMeshError, MeshDataError, MeshFileError, MissingEx
 from rlacd.io.read.beside import FolderFiles
 from rlacd.io.read.conventions import stated
 from rlacd.io.read.gltf import node_names, plain_gltf
+from rlacd.io.read.gltf_encoded import decoded_gltf
 from rlacd.io.read.limits import MOST_TRIANGLES
 from rlacd.io.read.looks import has_looks
 from rlacd.io.read.off import is_off, plain_off
@@ -71,7 +72,7 @@ def load_mesh(source: Source) -> InputMesh:
     EmptyMeshError
         There are no points at all.
     MissingExtraError
-        A USD file, and the extra ``usd`` is not installed.
+        A USD file or one that Draco compressed, and the extra ``usd`` or ``draco`` is not installed.
     """
     if isinstance(source, str | os.PathLike):
         return _from_file(Path(source))
@@ -94,7 +95,8 @@ def _from_file(path: Path) -> InputMesh:
     up, metres = stated(extension, content, scene)
     mesh = replace(mesh, up=up, metres=metres)
     if extension in USD:
-        return replace(mesh, asset=Asset(scene) if len(mesh.nodes) > 1 else None)
+        kept = len(mesh.nodes) > 1 or any(one.visual.defined for one in scene.geometry.values())
+        return replace(mesh, asset=Asset(scene, extension=extension) if kept else None)
     if extension not in ("glb", "gltf"):
         return replace(
             mesh, asset=Asset(content, path, extension) if has_looks(content, extension, len(mesh.nodes)) else None
@@ -179,7 +181,7 @@ def _checked(path: Path, content: bytes, extension: str, beside: FolderFiles) ->
     """Return the content to parse, in a form that is safe for the parser; raises MeshFileError."""
     match extension:
         case "gltf" | "glb":
-            return plain_gltf(path, content, beside.get), extension
+            return plain_gltf(path, decoded_gltf(path, content, beside.get), beside.get), extension
         case "3mf":
             check_3mf(path, content)
         case "dae" | "zae":

@@ -33,13 +33,12 @@ def converted(mesh: InputMesh, name: str) -> bytes:
     """
     asset = mesh.asset
     assert asset is not None
-    is_file = asset.path is not None
     scene = _scene(mesh, name)
     header, rest = split(Path(f"{name}.glb"), bytes(scene.export(file_type="glb")))
-    if is_file:
+    if asset.extension:
         _tell_materials(header)
-        if len(mesh.nodes) < 2:
-            _join(header, name)
+    if asset.path is not None and len(mesh.nodes) < 2:
+        _join(header, name)
     text = json.dumps(header, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
     chunks = chunk(JSON_CHUNK, text + b" " * (-len(text) % 4)) + (rest or b"")
     return struct.pack("<4sII", MAGIC, 2, 12 + len(chunks)) + chunks

@@ -1,0 +1,47 @@
+"""Decoders written in C++ that a damaged file may crash: they run in a process of their own, which may die instead."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rlacd.errors import MeshFileError
+from rlacd.memory import memory_left
+from rlacd.pool import Answer, Blobs, ProcessLimits, Request, WorkerDiedError
+from rlacd.pool.request import Values
+from rlacd.pool.worker import Worker
+
+SECONDS, MEMORY = 600.0, 8 * 2**30
+"""Limits of one file."""
+
+
+def answer_of(server: str, path: Path, kind: str, values: Values, blobs: Blobs) -> Answer:
+    """Ask a new process, which ends with its answer.
+
+    Parameters
+    ----------
+    server : str
+        ``module:name`` of a factory, as of `rlacd.pool.request.MakeServer`.
+    path : Path
+        Of the file, for messages.
+    kind : str
+        What it is read as, for messages.
+    values, blobs
+        The request.
+
+    Raises
+    ------
+    MeshFileError
+        The process died, or took more than `SECONDS` or `MEMORY`.
+    RlacdError
+        Raised by the server.
+    """
+    worker = Worker()
+    limits = ProcessLimits(SECONDS, max(min(MEMORY, memory_left()), 1))
+    try:
+        return worker.ask(Request(server, values, blobs, limits=limits))
+    except WorkerDiedError as error:
+        raise MeshFileError(
+            f"{path} cannot be read as {kind}: it is damaged or cut off ({error.reason}); export it again"
+        ) from error
+    finally:
+        worker.close()

@@ -1,0 +1,195 @@
+"""The meshes and primitives of a USD stage that are rendered, where they stand; runs in a process of its own.
+
+A stage may name other files. They are read only from the folder of the file or below it, and named if they are missing.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rlacd.errors import MeshFileError, MissingExtraError
+from rlacd.io.read.limits import MOST_PLACES, MOST_TRIANGLES
+from rlacd.io.read.open_file import read_file
+from rlacd.pool import Blobs, Shared
+from rlacd.pool.request import Values
+from rlacd.solid.arrays import FloatArray
+
+SERVER = "rlacd.io.read.usd_stage:StageReader"
+
+PRIMITIVES = {
+    "Cube": ("size",),
+    "Sphere": ("radius",),
+    "Cylinder": ("radius", "height"),
+    "Capsule": ("radius", "height"),
+    "Cone": ("radius", "height"),
+}
+"""The primitives that are read, and their measures."""
+
+_LOOK = {"diffuseColor": 3, "emissiveColor": 3, "opacity": 1, "metallic": 1, "roughness": 1}
+"""The inputs of a UsdPreviewSurface that are read where they are no pictures, and their numbers."""
+
+
+class StageReader:
+    """The server of a process that reads stages (see `rlacd.pool.request.Server`)."""
+
+    def __init__(self, folder: Path) -> None:
+        os.environ["TMPDIR"] = str(folder)  # OpenUSD writes a report of a crash there
+
+    def __call__(self, values: Values, blobs: Blobs, shared: Mapping[str, Shared]) -> tuple[Values, dict[str, bytes]]:
+        """Read the stage at `values`' path: ``INDEX.points`` and ``INDEX.faces`` of every node, and its description."""
+        try:
+            from pxr import Tf
+        except ImportError as error:
+            raise MissingExtraError("USD needs an extra: run  pip install 'rlacd[usd]'  and try again.") from error
+        path = Path(values["path"])
+        try:
+            return _stage(path)
+        except Tf.ErrorException as error:
+            raise MeshFileError(f"{path} cannot be read as USD: it is damaged or cut off; export it again") from error
+
+
+def _stage(path: Path) -> tuple[Values, dict[str, bytes]]:
+    from pxr import Usd, UsdGeom
+
+    _check_files(path)
+    stage = Usd.Stage.Open(str(path))
+    cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
+    nodes: list[Values] = []
+    arrays: dict[str, bytes] = {}
+    names: set[str] = set()
+    count = 0
+    for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)):
+        if len(nodes) > MOST_PLACES:
+            raise MeshFileError(f"{path} places more than {MOST_PLACES} meshes: join them first")
+        if prim.IsA(UsdGeom.PointInstancer):
+            raise MeshFileError(f"{path} has a point instancer, which is not read: make its instances real first")
+        if not _is_rendered(prim):
+            continue
+        primitive = _primitive(prim)
+        if prim.IsA(UsdGeom.Mesh):
+            points, faces = _mesh(path, prim)
+            count += len(faces)
+            if count > MOST_TRIANGLES:
+                raise MeshFileError(f"{path} places more than {MOST_TRIANGLES} triangles: simplify it first")
+            arrays |= {f"{len(nodes)}.points": points.tobytes(), f"{len(nodes)}.faces": faces.tobytes()}
+        elif primitive is None:
+            continue
+        name = prim.GetName() if prim.GetName() not in names else str(prim.GetPath())
+        names.add(name)
+        to_world = np.array(cache.GetLocalToWorldTransform(prim), dtype=np.float64).T
+        node = {"name": name, "transform": to_world.ravel().tolist(), "look": _look(prim)}
+        nodes.append(node | {"primitive": primitive})
+    up = str(UsdGeom.GetStageUpAxis(stage)).lower()
+    return {"nodes": nodes, "up": up, "metres": float(UsdGeom.GetStageMetersPerUnit(stage))}, arrays
+
+
+def _look(prim: Any) -> dict[str, list[float]] | None:
+    """The colours and surface of a prim, as UsdPreviewSurface names them; None if it says nothing."""
+    from pxr import UsdGeom, UsdShade
+
+    material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
+    shader = material.ComputeSurfaceSource()[0] if material else None
+    if shader and shader.GetShaderId() == "UsdPreviewSurface":
+        read = {name: _numbers(shader.GetInput(name), count) for name, count in _LOOK.items()}
+        return {name: value for name, value in read.items() if value is not None}
+    tints = UsdGeom.Gprim(prim).GetDisplayColorAttr().Get()
+    return {"diffuseColor": list(map(float, tints[0]))} if tints and len(tints) == 1 else None
+
+
+def _numbers(value: Any, count: int) -> list[float] | None:
+    """The numbers of an input of a shader; None if it has none, or a picture."""
+    from pxr import UsdShade
+
+    attributes = UsdShade.Utils.GetValueProducingAttributes(value) if value else []
+    if not attributes or UsdShade.Shader(attributes[0].GetPrim()).GetShaderId() == "UsdUVTexture":
+        return None
+    found = attributes[0].Get()
+    numbers = np.ravel(np.asarray(found if found is not None else [], dtype=np.float64))
+    return numbers.tolist() if len(numbers) == count and np.isfinite(numbers).all() else None
+
+
+def _check_files(path: Path) -> None:
+    """Refuse a file that names others outside its folder, or missing ones, before any of them is composed."""
+    from pxr import Sdf
+
+    folder = path.parent.resolve()
+    known, waiting = set(), [str(path)]
+    while waiting:
+        layer = Sdf.Layer.FindOrOpen(waiting.pop())
+        if layer is None:
+            raise MeshFileError(f"{path} cannot be read as USD: it is damaged or cut off; export it again")
+        for named in layer.GetCompositionAssetDependencies():
+            found = layer.ComputeAbsolutePath(named)
+            if found in known:
+                continue
+            known.add(found)
+            file = Path(found.split("[", 1)[0])
+            if not file.resolve().is_relative_to(folder):
+                raise MeshFileError(f"{path} refers to {named!r:.200}, outside its folder, which is not read")
+            try:
+                read_file(file)
+            except (OSError, ValueError) as error:
+                raise MeshFileError(f"{path} refers to {named!r:.200}, which cannot be opened") from error
+            waiting.append(found)
+
+
+def _is_rendered(prim: Any) -> bool:
+    from pxr import UsdGeom
+
+    shown = UsdGeom.Imageable(prim)
+    if not prim.IsA(UsdGeom.Gprim) or shown.ComputeVisibility() == UsdGeom.Tokens.invisible:
+        return False
+    return shown.ComputePurpose() in (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
+
+
+def _mesh(path: Path, prim: Any) -> tuple[FloatArray, np.ndarray[Any, Any]]:
+    """The points and triangles of a mesh, in its own coordinates."""
+    from pxr import UsdGeom
+
+    mesh = UsdGeom.Mesh(prim)
+    points, counts, corners = (
+        np.asarray(_value(attribute) or (), dtype=kind)
+        for attribute, kind in (
+            (mesh.GetPointsAttr(), np.float64),
+            (mesh.GetFaceVertexCountsAttr(), np.int64),
+            (mesh.GetFaceVertexIndicesAttr(), np.int64),
+        )
+    )
+    if (counts < 0).any() or counts.sum() != len(corners):
+        raise MeshFileError(f"{path} has faces at {prim.GetPath()} that do not add up: export it again")
+    if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
+        raise MeshFileError(f"{path} has faces at {prim.GetPath()} with points that are not there: export it again")
+    faces = _triangles(counts, corners)
+    if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
+        faces = faces[:, ::-1]
+    return np.asarray(points.reshape(-1, 3), dtype=np.float64), faces
+
+
+def _value(attribute: Any) -> Any:
+    """The value of an attribute, at its first moment if it is animated."""
+    from pxr import Usd
+
+    return attribute.Get(Usd.TimeCode.EarliestTime())
+
+
+def _triangles(counts: np.ndarray[Any, Any], corners: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Fans of triangles, ``[F, 3]``, for polygons with given numbers of corners."""
+    pieces = np.maximum(counts - 2, 0)
+    first = np.repeat(np.cumsum(counts) - counts, pieces)
+    step = np.arange(len(first)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    return np.asarray(corners[np.stack([first, first + step + 1, first + step + 2], axis=1)])
+
+
+def _primitive(prim: Any) -> Values | None:
+    """The kind of a primitive and its measures; None for anything else."""
+    kind = str(prim.GetTypeName())
+    if kind not in PRIMITIVES:
+        return None
+    measures = {name: float(_value(prim.GetAttribute(name))) for name in PRIMITIVES[kind]}
+    axis = prim.GetAttribute("axis")
+    return {"kind": kind, "axis": str(_value(axis)) if axis else "Z", **measures}

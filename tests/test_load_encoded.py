@@ -1,0 +1,209 @@
+"""glTF files whose positions are encoded: Draco's streams and integers."""
+
+from __future__ import annotations
+
+import base64
+import copy
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+import rlacd
+from rlacd.errors import MeshFileError, MissingExtraError
+from rlacd.io.read.apart import answer_of
+from rlacd.io.read.gltf_encoded import DECODER
+from rlacd.io.read.load import load_mesh
+from rlacd.pool import Request, WorkerDiedError
+from rlacd.pool.worker import Worker
+from tests.assets import read_glb
+from tests.hostile.gltf import gltf_tree
+
+DRACO = "KHR_draco_mesh_compression"
+
+
+def ring_scene() -> trimesh.Scene:
+    scene = trimesh.Scene()
+    ring = trimesh.creation.annulus(1, 2, 1)
+    for index, name in enumerate(("left", "right")):
+        place = trimesh.transformations.translation_matrix((5.0 * index, 0, 0))
+        scene.add_geometry(ring, node_name=name, geom_name="ring", transform=place)
+    return scene
+
+
+@pytest.fixture
+def compressed(tmp_path: Path) -> Path:
+    pytest.importorskip("DracoPy")
+    path = tmp_path / "rings.glb"
+    path.write_bytes(ring_scene().export(file_type="glb", extension_draco=True))
+    return path
+
+
+def test_draco_gives_the_triangles_that_were_compressed(compressed: Path) -> None:
+    plain = compressed.with_name("plain.glb")
+    plain.write_bytes(ring_scene().export(file_type="glb"))
+    read, wanted = load_mesh(compressed), load_mesh(plain)
+    for name in ("left", "right"):
+        one, other = (
+            trimesh.Trimesh(node.vertices, node.faces)
+            for mesh in (read, wanted)
+            for node in [mesh.of_node([node.name for node in mesh.nodes].index(name))]
+        )
+        assert one.is_volume
+        assert one.volume == pytest.approx(other.volume, rel=1e-3)
+        assert np.allclose(one.bounds, other.bounds, atol=1e-3)  # Draco rounds to 14 bits
+
+
+def test_a_draco_file_is_kept_as_it_is(compressed: Path) -> None:
+    result = rlacd.decompose(compressed, quality="fast", threads=1, per_node=True)
+    out = result.save(compressed.with_name("out.glb"), keep_input=True)
+    (before, stored, _), (after, binary, _) = read_glb(compressed), read_glb(out)
+    assert binary[: len(stored)] == stored
+    assert after["extensionsRequired"] == before["extensionsRequired"] == [DRACO]
+    for kind in ("meshes", "accessors", "bufferViews"):
+        assert after[kind][: len(before[kind])] == before[kind]
+    again = load_mesh(out)
+    assert len(again.nodes) == 2 + len(result)
+    assert np.allclose(again.of_node(0).vertices, load_mesh(compressed).of_node(0).vertices)
+
+
+def test_triangles_that_are_stored_plainly_as_well_need_no_draco(
+    compressed: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    box = trimesh.creation.box()
+    tree = gltf_tree(extensionsUsed=[DRACO])
+    tree["meshes"][0]["primitives"][0]["extensions"] = {DRACO: {"bufferView": 0, "attributes": {"POSITION": 0}}}
+    path = compressed.with_name("both.gltf")
+    path.write_text(json.dumps(tree))
+    monkeypatch.setitem(sys.modules, "DracoPy", None)
+    assert len(load_mesh(path).faces) == len(box.faces)
+
+
+def test_without_the_extra_it_is_named(compressed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "DracoPy", None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'rlacd\[draco\]'"):
+        load_mesh(compressed)
+
+
+def edited(path: Path, edit: Any) -> Path:
+    """Change the JSON or the bytes of a file, written with its buffer as text."""
+    header, binary, _ = read_glb(path)
+    header, binary = copy.deepcopy(header), bytearray(binary)
+    edit(header, binary)
+    uri = "data:application/octet-stream;base64," + base64.b64encode(binary).decode()
+    header["buffers"] = [{"byteLength": len(binary), "uri": uri}]
+    out = path.with_suffix(".gltf")
+    out.write_text(json.dumps(header))
+    return out
+
+
+def primitive(header: dict[str, Any]) -> dict[str, Any]:
+    return dict(header["meshes"][0]["primitives"][0]["extensions"][DRACO])
+
+
+DAMAGES = {
+    "zeros": lambda header, binary: binary.__setitem__(slice(0, 64), bytes(64)),
+    "no such attribute": lambda header, binary: primitive(header)["attributes"].update(POSITION=7),
+    "no such view": lambda header, binary: header["meshes"][0]["primitives"][0]["extensions"][DRACO].update(
+        bufferView=99
+    ),
+    "a view that is too long": lambda header, binary: header["bufferViews"][0].update(byteLength=10**9),
+    "a view that begins before the buffer": lambda header, binary: header["bufferViews"][0].update(byteOffset=-8),
+    "a view of nothing": lambda header, binary: header["bufferViews"][0].update(byteLength=0),
+    "no list of attributes": lambda header, binary: primitive(header)["attributes"].clear(),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_damaged_draco_is_refused_in_one_sentence(compressed: Path, damage: str) -> None:
+    path = edited(compressed, DAMAGES[damage])
+    with pytest.raises(MeshFileError, match=r"rings\.gltf.*export it again"):
+        load_mesh(path)
+
+
+@pytest.mark.slow
+def test_hundreds_of_damaged_streams_end_in_arrays_or_our_error(compressed: Path) -> None:
+    import DracoPy
+
+    ball = trimesh.creation.icosphere(1)
+    seeds = [
+        DracoPy.encode(ball.vertices.astype("f4"), ball.faces.astype("u4"), compression_level=level) for level in (1, 7)
+    ]
+    rng = np.random.default_rng(0)
+    worker, ends = Worker(), {"read": 0, "refused": 0, "died": 0}
+    try:
+        for number in range(400):
+            stream = bytearray(seeds[number % 2])
+            for _ in range(rng.integers(1, 5)):
+                stream[rng.integers(len(stream))] = rng.integers(256)
+            values = {"path": "a.glb", "attributes": {"a": 0}, "normalized": {"a": False}}
+            try:
+                answer = worker.ask(Request(DECODER, values, {"a": bytes(stream[: rng.integers(1, 2 * len(stream))])}))
+                corners = np.frombuffer(answer.blobs["a.corners"], "<u4")
+                assert len(corners) == 0 or corners.max() < len(answer.blobs["a.points"]) // 12
+                ends["read"] += 1
+            except MeshFileError:
+                ends["refused"] += 1
+            except WorkerDiedError:  # what the reader makes an error of ours
+                ends["died"] += 1
+    finally:
+        worker.close()
+    assert ends["read"] > 10
+    assert ends["refused"] > 100
+
+
+class Aborts:
+    """A decoder that a file crashes."""
+
+    def __init__(self, folder: Path) -> None:
+        pass
+
+    def __call__(self, *_: Any) -> Any:
+        os.abort()
+
+
+def test_a_decoder_that_crashes_is_an_error_of_ours() -> None:
+    with pytest.raises(MeshFileError, match=r"a\.glb cannot be read as glTF: it is damaged.*export it again"):
+        answer_of("tests.test_load_encoded:Aborts", Path("a.glb"), "glTF", {}, {})
+
+
+@pytest.mark.parametrize("kind", [np.int8, np.int16, np.uint8, np.uint16])
+@pytest.mark.parametrize("normalized", [True, False])
+def test_integers_are_lengths_as_the_specification_says(tmp_path: Path, kind: Any, normalized: bool) -> None:
+    """KHR_mesh_quantization: a normalised integer is a share of the largest, any other is its own value."""
+    box = trimesh.creation.box((2, 2, 2))
+    signed = np.issubdtype(kind, np.signedinteger)
+    most = np.iinfo(kind).max
+    corners = np.where(box.vertices > 0, most, -most if signed else 0).astype(kind)
+    padded = np.zeros((8, 4), kind)  # rows of positions begin at multiples of four bytes
+    padded[:, :3] = corners
+    data = padded.tobytes() + box.faces.astype("<u2").tobytes()
+    uri = "data:application/octet-stream;base64," + base64.b64encode(data).decode()
+    component = {np.int8: 5120, np.uint8: 5121, np.int16: 5122, np.uint16: 5123}[kind]
+    tree = gltf_tree(
+        extensionsUsed=["KHR_mesh_quantization"],
+        extensionsRequired=["KHR_mesh_quantization"],
+        buffers=[{"byteLength": len(data), "uri": uri}],
+        bufferViews=[
+            {"buffer": 0, "byteLength": padded.nbytes, "byteStride": padded.strides[0]},
+            {"buffer": 0, "byteOffset": padded.nbytes, "byteLength": 72},
+        ],
+        accessors=[
+            {"bufferView": 0, "componentType": component, "count": 8, "type": "VEC3", "normalized": normalized},
+            {"bufferView": 1, "componentType": 5123, "count": 36, "type": "SCALAR"},
+        ],
+        nodes=[{"mesh": 0, "scale": [2.0, 2.0, 2.0]}],
+    )
+    path = tmp_path / "box.gltf"
+    path.write_text(json.dumps(tree))
+    mesh = load_mesh(path)
+    low, high = (-1.0 if signed else 0.0), 1.0
+    expected = np.array([low, high]) * 2 * (1 if normalized else most)
+    assert np.allclose([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)], expected[:, None])
+    assert len(mesh.faces) == 12
