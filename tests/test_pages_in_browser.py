@@ -334,6 +334,27 @@ def test_balls_come_with_navigable_space(seen: Watched) -> None:
 
 
 @pytest.mark.nightly
+def test_parts_become_primitives_and_overlap(seen: Watched, viewer: Viewer) -> None:
+    page = seen.page
+    page.check("#shapes input[value=primitives]")
+    wait_for_run(page, 2)
+    assert "5 primitives" in page.locator("#summary").inner_text()
+    assert page.locator("#parts tbody td:nth-child(2)").all_inner_texts() == ["box"] * 5
+    assert "none" in page.locator(".length:has(#overlap)").inner_text()
+    page.locator("#overlap").focus()
+    page.keyboard.press("End")
+    wait_for_run(page, 3)
+    assert viewer.session.result is not None
+    assert viewer.session.result[1].report["options"]["overlap"] == pytest.approx(0.2)
+    page.keyboard.press("Home")
+    wait_for_run(page, 4)
+    assert viewer.session.result[1].report["options"]["overlap"] == 0
+    page.check("#shapes input[value=hulls]")
+    wait_for_run(page, 5)
+    assert "primitives" not in page.locator("#summary").inner_text()
+
+
+@pytest.mark.nightly
 def test_another_axis_can_point_up(seen: Watched) -> None:
     page = seen.page
     assert page.locator("#up input:checked").get_attribute("value") == "z"

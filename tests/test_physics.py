@@ -99,6 +99,26 @@ def test_a_pile_settles_alike_in_both_engines(monkeypatch: pytest.MonkeyPatch) -
         assert pile.drift < 0.1
 
 
+def test_hulls_beside_primitives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a box and a ball, both parts become primitives, within the threshold and in fewer bytes."""
+    monkeypatch.setattr(simulate, "SECONDS", 0.05)
+    monkeypatch.setattr(simulate, "COPIES", 4)
+    trimesh.creation.box((1, 2, 3)).export(tmp_path / "box.ply")
+    trimesh.creation.icosphere(4).export(tmp_path / "ball.ply")
+    given = ["bench", "primitives", str(tmp_path), "--out", str(tmp_path / "run"), "--piles", "2"]
+    done = CliRunner().invoke(app, given)
+    assert done.exit_code == 0, done.output
+    lines = (tmp_path / "run" / "primitives.md").read_text().splitlines()
+    cells = {line.split(" | ")[0].strip("| "): line.strip("| ").split(" | ")[1:] for line in lines if " | " in line}
+    assert cells["parts"] == ["2", "2"]
+    assert cells["of these primitives"] == ["0", "2 (1 sphere, 1 box)"]
+    hulls, others = (int(value.replace(",", "")) for value in cells["bytes"])
+    assert others < hulls
+    assert max(map(float, cells["worst concavity"])) <= 0.05
+    assert float(cells["steps/s"][0]) > 0
+    assert cells["box.ply"][:2] == ["1", "1"]
+
+
 @pytest.mark.slow
 def test_the_command_writes_a_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(simulate, "SECONDS", 0.1)

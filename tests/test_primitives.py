@@ -170,6 +170,19 @@ def test_a_table_is_five_boxes_of_the_right_size() -> None:
     assert result.report["mass"]["volume_abs"] == pytest.approx(TABLE_VOLUME, rel=1e-9)
 
 
+def test_what_a_cut_at_an_angle_left_out_of_a_box_is_solid_so_that_it_may_be_a_box() -> None:
+    """Two beams of an L are cut along the mitre; the other beam fills what each lacks."""
+    bounds = [((0, 0, 0), (2, 0.4, 0.4)), ((0, 0, 0), (0.4, 0.4, 2))]
+    ell = trimesh.util.concatenate([trimesh.creation.box(bounds=each) for each in bounds])
+    hulls = rlacd.decompose(ell, quality="fast", threads=1)
+    assert sum(hull.volume for hull in hulls) == pytest.approx(0.576, rel=1e-6), "the cut no longer shares the corner"
+    result = rlacd.decompose(ell, primitives=True, quality="fast", threads=1)
+    for box, extents in zip(primitives_of(result), (bounds[0][1], bounds[1][1]), strict=True):
+        assert sorted(box.size) == pytest.approx(sorted(extents), abs=1e-6)
+    assert_true(result)
+    assert result.report["hausdorff"]["over"] < 5e-3
+
+
 def test_without_the_option_nothing_changes_and_the_report_counts_none() -> None:
     plain = rlacd.decompose(table(), threads=1)
     assert plain.primitives == [None] * len(plain)

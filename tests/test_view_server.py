@@ -323,6 +323,8 @@ def test_files_come_from_the_own_page_only(viewer: Viewer) -> None:
         ({"threshold": 0.02, "quality": "best"}, ["--threshold 0.02", "--quality best"]),
         ({"preset": "mujoco", "max_hulls": 9}, ["--preset mujoco", "--max-hulls 9"]),
         ({"criterion": "navigable", "radius": 0.07}, ["--criterion navigable", "--radius 0.07"]),
+        ({"primitives": True, "overlap": 0.02}, ["--primitives all", "--overlap 0.02"]),
+        ({"primitives": ["box", "sphere"], "overlap": 0.0}, ["--primitives box,sphere"]),
     ],
 )
 def test_the_options_are_a_command(viewer: Viewer, mesh: Path, wanted: dict[str, Any], says: list[str]) -> None:
@@ -335,15 +337,39 @@ def test_the_options_are_a_command(viewer: Viewer, mesh: Path, wanted: dict[str,
     assert len(words) == 5 + sum(len(said.split()) for said in says)
 
 
-def test_the_command_gives_the_hulls_that_are_shown(viewer: Viewer, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "wanted",
+    [
+        {"threshold": 0.03, "quality": "fast", "max_vertices": 12},
+        {"quality": "fast", "overlap": 0.04, "primitives": True},
+    ],
+)
+def test_the_command_gives_the_hulls_that_are_shown(viewer: Viewer, tmp_path: Path, wanted: dict[str, Any]) -> None:
     settled(viewer, run=1)
-    wanted = {"threshold": 0.03, "quality": "fast", "max_vertices": 12}
     events_of_a_run(viewer, wanted)
     words = shlex.split(ask(viewer, "POST", "/command", wanted).json["command"])
     place = tmp_path / words[-1]
     run = CliRunner().invoke(app, [*words[1:-1], str(place)])
     assert run.exit_code == 0, run.output
     assert ask(viewer, "GET", "/download?format=glb").body == place.read_bytes()
+
+
+def test_parts_are_primitives_and_overlap_when_asked_for(viewer: Viewer) -> None:
+    """An L of two flush beams: two boxes, or two hulls of which one reaches into the other."""
+    settled(viewer, run=1)
+    apart = ask(viewer, "GET", "/scene").json["parts"]
+    assert [part["primitive"] for part in apart] == [None, None]
+    events_of_a_run(viewer, {"quality": "fast", "primitives": True})
+    scene = ask(viewer, "GET", "/scene").json
+    assert [part["primitive"] for part in scene["parts"]] == ["box", "box"]
+    assert scene["report"]["primitives"]["box"] == 2
+    events_of_a_run(viewer, {"quality": "fast", "overlap": 0.04})
+    deeper = ask(viewer, "GET", "/scene").json["parts"]
+    assert sum(part["volume"] for part in deeper) > sum(part["volume"] for part in apart) + 1e-3
+    for wrong, says in (({"primitives": ["cone"]}, "primitives is"), ({"overlap": 3.0}, "overlap is 3.0")):
+        answer = ask(viewer, "POST", "/decompose", wrong)
+        assert answer.status == 400
+        assert says in answer.json["error"]
 
 
 def test_what_is_not_there_is_reported(viewer: Viewer, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -497,7 +523,8 @@ def test_the_command_tells_its_address_and_ends_with_ctrl_c(mesh: Path) -> None:
 
 def test_the_controls_hold_the_defaults_of_the_command_line() -> None:
     controls, usual, space = ViewerControls(), Options(), NavigableSpace()
-    for name in ("criterion", "threshold", "quality", "max_hulls", "max_vertices"):
+    for name in ("criterion", "threshold", "quality", "max_hulls", "max_vertices", "overlap"):
         assert getattr(controls, name) == getattr(usual, name)
+    assert bool(controls.primitives) == bool(usual.primitives)
     assert (controls.radius, controls.tolerance) == (space.radius, space.tolerance)
     assert read_controls({}) == controls

@@ -361,7 +361,7 @@ def _cleaned(
 
     def cleaned(part: Part) -> Part:
         if kinds:
-            shaped = primitive_part(part, goal, kinds, max_vertices, max_faces, slack)
+            shaped = primitive_part(part, goal, kinds, max_vertices, max_faces, slack, reached.root)
             if shaped is not part:
                 return shaped
         if reached.options.detail == SIMPLE:

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import numpy as np
 import trimesh
 
 from rlacd.bench.compare import machine
@@ -28,12 +27,12 @@ from rlacd.bench.simulate import (
     model_size,
     pile_in_bullet,
     pile_in_mujoco,
+    scaled_source,
 )
 from rlacd.bench.store import BenchTask, load_hulls
 from rlacd.bench.tables import Table
 from rlacd.decompose_mesh import decompose
 from rlacd.errors import MissingExtraError, OptionError, RlacdError
-from rlacd.io.read.load import load_mesh
 from rlacd.result import Result
 
 OURS: dict[str, dict[str, Any]] = {
@@ -150,11 +149,7 @@ def physics_page(
 
 
 def _decompositions(bench: Bench, mesh: str, ways: Sequence[str], failed: list[str]) -> Iterator[tuple[str, Result]]:
-    source = load_mesh(bench.meshes / mesh)
-    used = source.vertices[np.unique(source.faces)]
-    low, high = used.min(axis=0), used.max(axis=0)
-    factor, centre = SIZE / float((high - low).max()), (low + high) / 2
-    scaled = (source.vertices - centre) * factor, source.faces
+    scaled, factor, centre = scaled_source(bench.meshes / mesh)
     mass = decompose(scaled, threads=bench.limits.threads, **OURS["one-hull"]).report["mass"]
     for way in ways:
         if way in OURS:

@@ -15,9 +15,10 @@ from lxml import etree
 
 from rlacd import _native
 from rlacd.errors import MissingExtraError
+from rlacd.io.read.load import load_mesh
 from rlacd.io.write import save
 from rlacd.result import Result
-from rlacd.solid.arrays import BoolArray, FloatArray
+from rlacd.solid.arrays import BoolArray, FloatArray, IntArray
 
 SIZE = 0.2
 """Longest side of every object in metres; simulators are tuned for things that a hand can hold."""
@@ -97,8 +98,17 @@ def model_size(result: Result) -> int:
         return sum(path.stat().st_size for path in files if "_visual" not in path.name)
 
 
-def pile_in_mujoco(result: Result) -> Pile:
-    """Drop copies of a body whose longest side is `SIZE` into a bin, in MuJoCo."""
+def scaled_source(path: Path) -> tuple[tuple[FloatArray, IntArray], float, FloatArray]:
+    """Read a mesh, centred and scaled to `SIZE`: its vertices and faces, the factor, and what was its centre."""
+    source = load_mesh(path)
+    used = source.vertices[np.unique(source.faces)]
+    low, high = used.min(axis=0), used.max(axis=0)
+    factor, centre = SIZE / float((high - low).max()), (low + high) / 2
+    return ((source.vertices - centre) * factor, source.faces.astype(np.int32)), factor, centre
+
+
+def pile_in_mujoco(result: Result, seed: int = 0) -> Pile:
+    """Drop copies of a body whose longest side is `SIZE`, turned by the seed, into a bin, in MuJoCo."""
     mujoco = get_mujoco()
     with tempfile.TemporaryDirectory(prefix="rlacd-") as folder:
         path = save(result, Path(folder) / "body.xml")
@@ -106,7 +116,7 @@ def pile_in_mujoco(result: Result) -> Pile:
         world = root.find("worldbody")
         (body,) = world.findall("body")
         world.remove(body)
-        for index, (place, turn) in enumerate(_places()):
+        for index, (place, turn) in enumerate(_places(seed)):
             other = copy.deepcopy(body)
             for named in other.iter():
                 if "name" in named.attrib:
@@ -275,9 +285,9 @@ def _settled(
     )
 
 
-def _places() -> list[tuple[FloatArray, FloatArray]]:
+def _places(seed: int = 0) -> list[tuple[FloatArray, FloatArray]]:
     """Where the copies begin: on a grid above the bin, each turned at random."""
-    random = np.random.default_rng(0)
+    random = np.random.default_rng(seed)
     grid = [(x, y, z) for z in range(COPIES) for x in (-0.7, 0.7) for y in (-0.7, 0.7)][:COPIES]
     turns = random.normal(size=(COPIES, 4))
     turns /= np.linalg.norm(turns, axis=1)[:, None]

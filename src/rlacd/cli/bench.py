@@ -134,6 +134,23 @@ def physics(
     return physics_page(bench, chosen, bullet, typer.echo)
 
 
+@experiment("primitives")
+def primitives(
+    bench: Bench,
+    threshold: Threshold = 0.05,
+    piles: Annotated[int, typer.Option(min=1, help="Piles of each object, turned differently.")] = 1,
+) -> Page:
+    """Hulls beside primitives: parts, bytes, distances, and steps a second in a pile; needs rlacd[sim].
+
+    \b
+    [bold]Example[/bold]
+      rlacd bench primitives meshes/ --list meshes/quick.txt --out run/
+    """
+    from rlacd.bench.primitives import primitives_page
+
+    return primitives_page(bench, piles, threshold, typer.echo)
+
+
 @experiment("paper-table-1")
 def table_1(bench: Bench, methods: Methods = None, at: MeanError = None, close: Close = 0.02) -> Page:
     """Tune every method to the same mean D_h, then compare (4.4.1)."""

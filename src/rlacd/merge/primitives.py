@@ -12,7 +12,7 @@ from rlacd import _native
 from rlacd.criteria import Criterion
 from rlacd.primitive_kinds import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.component import Part
+from rlacd.solid.component import LOST, Component, Part
 from rlacd.solid.hull import Hull
 from rlacd.solid.primitive import Primitive
 
@@ -43,12 +43,14 @@ def primitive_part(
     max_vertices: int | None = None,
     max_faces: int | None = None,
     slack: float = SLACK,
+    solid: Component | None = None,
 ) -> Part:
     """Get the part with a primitive for a hull, if one meets the criterion; otherwise the same part.
 
     Of all that meet it, the simplest is taken whose volume is within `SIMPLER` of the least. The hull of the result is
     a convex polyhedron around the primitive, within the limits. The criterion decides on it as strictly as on any hull,
-    except that its volume is the primitive's own.
+    except that its volume is the primitive's own. If it is not met, and `solid` is given, everything the solid fills of
+    the primitive is judged in place of the part: cuts at an angle leave no box, but what they cut off is solid.
 
     Parameters
     ----------
@@ -60,6 +62,8 @@ def primitive_part(
         Limits on the polyhedron's vertices and triangles.
     slack : float
         How much larger a primitive is made than needed, for later rounding.
+    solid : Component, optional
+        The whole solid.
     """
     fitted = [
         primitive.grown(primitive.beyond(part.hull.vertices) + slack) for primitive in fit_primitives(part.hull, kinds)
@@ -70,11 +74,10 @@ def primitive_part(
             hull = Hull.of(np.ascontiguousarray(corners))
             if hull is None or len(hull.vertices) > (max_vertices or np.inf) or len(hull.faces) > (max_faces or np.inf):
                 return None
-            if criterion.screen.excludes(part.volume, primitive.volume):
-                return None
-            candidate = part.with_hull(replace(hull, volume=primitive.volume, primitive=primitive))
-            if criterion.is_met(candidate):
-                return candidate
+            around = replace(hull, volume=primitive.volume, primitive=primitive)
+            for candidate in _candidates(part, around, solid, criterion):
+                if criterion.is_met(candidate):
+                    return candidate
         return None
 
     fitted.sort(key=lambda primitive: primitive.volume)
@@ -89,6 +92,19 @@ def primitive_part(
         ]
         return next((better for better in map(judged, sorted(simpler, key=_rank)) if better is not None), found)
     return part
+
+
+def _candidates(part: Part, hull: Hull, solid: Component | None, criterion: Criterion) -> Iterator[Part]:
+    """The part with another hull, and all that the solid fills of it, unless either certainly fails the criterion."""
+    screen = criterion.screen
+    if not screen.excludes(part.volume, hull.volume):
+        yield part.with_hull(hull)
+    if solid is None or criterion.obstacles is not None or screen.forbids(solid.filling, hull):
+        return
+    vertices, faces = solid.clipped(hull)
+    volume = _native.mesh_volume(vertices, faces) if len(faces) else 0.0
+    if volume >= (1 - LOST) * part.volume and not screen.excludes(volume, hull.volume):  # else the clipping failed
+        yield Part(vertices, faces, volume, hull)
 
 
 def fit_primitives(hull: Hull, kinds: Collection[PrimitiveKind] = PRIMITIVE_KINDS) -> list[Primitive]:

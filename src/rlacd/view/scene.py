@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from rlacd.result import Result
 from rlacd.solid.frame import Frame
+from rlacd.solid.primitive import PRIMITIVE
 from rlacd.view.coloring import color_hulls
 from rlacd.view.heat import HeatMesh, frame_of
 from rlacd.view.picture import apart
@@ -37,9 +38,9 @@ def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, 
     dict
         ``name``; ``up``; ``unit``; ``scale``, frame units per unit of the input; the unchanged ``report``; ``input``,
         ``{vertices, faces}`` or None for a cloud of points; ``parts``, a list of ``{vertices, faces, color, rank,
-        error, volume}`` with ``rank`` the index of the hue, ``error`` the criterion's measurement (or None) and
-        ``volume`` in the normalised frame; ``balls``, ``{centres, radii, shown, of}`` or None, with the numbers of
-        balls shown and in all.
+        error, volume, primitive}`` with ``rank`` the index of the hue, ``error`` the criterion's measurement (or None),
+        ``volume`` in the normalised frame and ``primitive`` its kind (or None); ``balls``, ``{centres, radii, shown,
+        of}`` or None, with the numbers of balls shown and in all.
     """
     frame = frame_of(decomposition)
     source, report = decomposition.source, decomposition.report
@@ -68,6 +69,7 @@ def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, 
                 "rank": int(rank),
                 "error": error,
                 "volume": float(hull.volume) * frame.scale**3,
+                "primitive": hull.metadata.get(PRIMITIVE, {}).get("kind"),
             }
             for hull, color, rank, error in zip(decomposition, colors.rgb, colors.rank, errors, strict=True)
         ],

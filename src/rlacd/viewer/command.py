@@ -39,6 +39,14 @@ def as_command(mesh: str | os.PathLike[str], given: dict[str, Any], usual: Any) 
         if value is not None and value != getattr(usual, field.name):
             words += [
                 f"--{field.name.removeprefix('volume_').replace('_', '-')}",
-                f"{value:g}" if isinstance(value, float) else str(value),
+                _word(value),
             ]
     return shlex.join([*words, "-o", f"{file_stem(Path(mesh).stem)}_hulls{ENDING}"])
+
+
+def _word(value: Any) -> str:
+    if value is True:
+        return "all"
+    if isinstance(value, (list, tuple)):
+        return ",".join(map(str, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)

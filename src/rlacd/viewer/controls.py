@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from rlacd.criteria import NavigableSpace
 from rlacd.errors import OptionError
 from rlacd.options import CONCAVITY, QUALITIES, VOLUME, Options
+from rlacd.primitive_kinds import PrimitiveKind
 from rlacd.solid.input_mesh import InputMesh
 
 NAVIGABLE = "navigable"
@@ -26,6 +28,8 @@ class ViewerControls:
     tolerance: float = _SPACE.tolerance or 0.0
     volume_tolerance: float = _DEFAULTS.volume_tolerance
     quality: str = _DEFAULTS.quality or QUALITIES[0]
+    primitives: bool | Sequence[PrimitiveKind] = False
+    overlap: float = _DEFAULTS.overlap
     max_hulls: int | None = None
     max_vertices: int | None = None
     preset: str | None = None
@@ -48,6 +52,8 @@ class ViewerControls:
         options = {
             **goal,
             "quality": self.quality,
+            "primitives": self.primitives,
+            "overlap": self.overlap,
             "max_hulls": self.max_hulls,
             "max_vertices": self.max_vertices,
             "preset": self.preset,

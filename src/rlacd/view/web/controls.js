@@ -3,7 +3,7 @@ import { choice, make, measure } from "page/widgets";
 
 /** Lengths are shares of the longest side or of the frame; the slider moves by equal ratios. */
 class Length {
-  constructor(id, label, hint, [low, high], value, onChange) {
+  constructor(id, label, hint, [low, high], value, onChange, { orNone = false } = {}) {
     this.low = low;
     this.ratio = high / low;
     this.slider = make("input", { type: "range", id, min: 0, max: 100, step: 1, "aria-label": label });
@@ -12,7 +12,8 @@ class Length {
     this.value = value;
     this.#show();
     this.slider.addEventListener("input", () => {
-      this.value = +(this.low * this.ratio ** (this.slider.value / 100)).toPrecision(2);
+      const none = orNone && this.slider.value === "0";
+      this.value = none ? 0 : +(this.low * this.ratio ** (this.slider.value / 100)).toPrecision(2);
       this.#show({ slider: false });
     });
     this.slider.addEventListener("change", () => onChange());
@@ -33,7 +34,7 @@ class Length {
   }
 
   #show({ slider = true } = {}) {
-    const at = (100 * Math.log(this.value / this.low)) / Math.log(this.ratio);
+    const at = this.value === 0 ? 0 : (100 * Math.log(this.value / this.low)) / Math.log(this.ratio);
     if (slider && Number.isFinite(at)) this.slider.value = at;
     this.box.value = this.value;
     this.slider.setAttribute("aria-valuetext", this.box.value);
@@ -43,7 +44,7 @@ class Length {
   /** Say what the length is in the input's unit; 1 here is `frame` of the frame of `scene`. */
   tell(scene = this.scene, frame = this.frame) {
     [this.scene, this.frame] = [scene, frame];
-    this.note.textContent = scene ? `= ${measure(this.value * frame, scene)}` : "";
+    this.note.textContent = !scene ? "" : this.value === 0 ? "none" : `= ${measure(this.value * frame, scene)}`;
   }
 }
 
@@ -117,6 +118,29 @@ export class Controls {
       },
       "How long to search for a decomposition with fewer hulls. Never looser than the threshold.",
     );
+    this.shapes = choice(
+      "Shapes",
+      "shapes",
+      [
+        ["hulls", "Hulls", "Every part is a convex hull."],
+        ["primitives", "Primitives", "A box, ball, capsule or cylinder where one is tight enough, else a hull. Models for simulators hold them as such: fewer bytes, faster contacts."],
+      ],
+      given.primitives === true || given.primitives?.length ? "primitives" : "hulls",
+      (value) => {
+        this.options.primitives = value === "primitives";
+        this.changed();
+      },
+      "What the parts become.",
+    );
+    this.overlap = new Length(
+      "overlap",
+      "Overlap",
+      "How deep hulls that touch reach into each other, so that nothing thin slips between them. 0.05 is 2.5 % of the longest side, which counts as 2.",
+      [0.002, 0.2],
+      given.overlap,
+      this.changed,
+      { orNone: true },
+    );
     this.hulls = this.#limit("max_hulls", "Hulls, at most", "No more hulls than this. The threshold may then be exceeded.");
     this.corners = this.#limit("max_vertices", "Vertices each", "Corners that each hull may have. Engines have limits, and every corner costs time in a contact.");
     this.element = make(
@@ -128,6 +152,8 @@ export class Controls {
       this.tolerance.element,
       this.volume.element,
       this.quality,
+      this.shapes,
+      this.overlap.element,
       make("div", { class: "limits" }, this.hulls.element, this.corners.element),
     );
     this.#arrange();
@@ -141,7 +167,8 @@ export class Controls {
         : criterion === "volume"
         ? { volume_tolerance: this.volume.value }
         : { threshold: this.threshold.value };
-    return { ...size, criterion, quality, max_hulls: this.hulls.value(), max_vertices: this.corners.value(), preset: this.options.preset ?? null };
+    const limits = { max_hulls: this.hulls.value(), max_vertices: this.corners.value(), preset: this.options.preset ?? null };
+    return { ...size, criterion, quality, primitives: this.options.primitives, overlap: this.overlap.value, ...limits };
   }
 
   /** Take another engine's limits. */
@@ -162,6 +189,7 @@ export class Controls {
     this.threshold.tell(scene, 1);
     this.radius.tell(scene, 2);
     this.tolerance.tell(scene, 2);
+    this.overlap.tell(scene, 1);
   }
 
   #arrange() {

@@ -28,6 +28,7 @@ export const stageName = (stage) => STAGES[stage] ?? stage;
 
 export const HINTS = {
   hull: "A convex body: it has no dents. Physics engines collide these fast and reliably.",
+  primitives: "Parts that are a box, a ball, a capsule or a cylinder, which models for simulators hold as such.",
   triangles: "Of all hulls together. Fewer are faster to collide.",
   concavity:
     "The farthest that a part's surface and its hull's lie apart, anywhere: how much room the worst dent has that a hull fills.",
@@ -51,6 +52,7 @@ export function summary(scene, { draft = false } = {}) {
   const { concavity, volume, navigable, seconds } = report;
   const words = [
     term(plural(parts.length, "hull"), HINTS.hull),
+    report.primitives && term(plural(parts.filter((part) => part.primitive).length, "primitive"), HINTS.primitives),
     term(plural(report.faces ?? parts.length, "triangle"), HINTS.triangles),
     concavity && term(`concavity\u00a0${measure(concavity.max, scene)}`, HINTS.concavity),
     volume?.max != null && term(`${percent(volume.max)} of volume added`, HINTS.added),

@@ -34,13 +34,14 @@ export class PartList {
       index,
       color: part.color,
       faces: part.faces.length ? Math.round(atob(part.faces).length / 12) : 0,
+      primitive: part.primitive,
       share: part.volume / all,
       error: part.error,
     }));
     const unit = scene.unit ? `, ${scene.unit}` : "";
     this.columns = [
       ["index", "Part", "In the order of the file."],
-      ["faces", "Faces", "Triangles of the hull."],
+      ["faces", "Faces", scene.report?.primitives ? "Triangles of the hull, or the primitive that the part is." : "Triangles of the hull."],
       ["share", "Volume", "Share of all hulls' volume."],
       volume ? ["error", "Added", `${HINTS.added} The bar is full at the tolerance.`] : navigable ? ["error", `Intrusion${unit}`, HINTS.intrusion] : ["error", `Concavity${unit}`, `${HINTS.concavity} The bar is full at the threshold.`],
     ];
@@ -89,7 +90,7 @@ export class PartList {
       "tr",
       { "aria-selected": "false", "data-part": part.index },
       make("td", {}, swatch, String(part.index).padStart(3, "0")),
-      make("td", {}, String(part.faces)),
+      make("td", {}, part.primitive ?? String(part.faces)),
       make("td", {}, `${column(100 * part.share)}\u00a0%`),
       make("td", { class: "error" }, part.error == null ? "–" : this.asShare ? `${column(100 * part.error)}\u00a0%` : column(part.error / this.scene.scale), this.limit ? make("span", { class: "track" }, gauge) : null),
     );

@@ -40,7 +40,7 @@ function highlight(index, { scroll = false, x, y } = {}) {
   tip.hidden = index === null || x === undefined || !shown;
   if (tip.hidden) return;
   const part = shown.parts[index];
-  tip.textContent = `hull ${String(index).padStart(3, "0")}${part.error == null ? "" : ` · ${measure(part.error, shown)}`}`;
+  tip.textContent = `${part.primitive ?? "hull"} ${String(index).padStart(3, "0")}${part.error == null ? "" : ` · ${measure(part.error, shown)}`}`;
   const frame = at("stage").getBoundingClientRect();
   tip.style.left = `${x - frame.left + 14}px`;
   tip.style.top = `${y - frame.top + 14}px`;
