@@ -20,7 +20,7 @@ SEED    ?= 0
 MESHES  ?= ../shared/meshes
 SECONDS_TO_FUZZ = $(shell expr 60 \* $(MINUTES))
 
-.PHONY: install demo docs test test-fast test-all nightly lint soak soak-totals fuzz-files fuzz-shapes sanitize sanitize-address sanitize-thread format clean
+.PHONY: install demo docs test test-fast test-all nightly lint soak soak-light soak-totals fuzz-files fuzz-shapes sanitize sanitize-address sanitize-thread format clean
 
 install: $(VENV)/installed
 
@@ -86,6 +86,10 @@ build/sanitize-%/installed: $(NATIVE_SOURCES)
 # Everything at random, as long as you like: files, shapes, real meshes, faults, options. It goes on where it was.
 soak: $(VENV)/test-extras
 	nice -n 19 $(BIN)/python -m fuzz.soak --hours $(HOURS) --seed $(SEED) --workers $(WORKERS) --meshes $(MESHES)
+
+# Many small inputs a second in one warm process: damaged files that are read, small shapes that are decomposed.
+soak-light: $(VENV)/test-extras
+	nice -n 19 $(BIN)/python -m fuzz.soak --light --hours $(HOURS) --seed $(SEED) --workers $(WORKERS) --meshes $(MESHES)
 
 soak-totals: $(VENV)/test-extras
 	$(BIN)/python -m fuzz.soak --totals

@@ -2,20 +2,37 @@
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Callable
 from dataclasses import asdict
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
+from fuzz.mutations import Seed
 from fuzz.recipes import Shape
-from fuzz.trials import Laboratory, Trial
+from fuzz.trials import Trial
 from rlacd import NavigableSpace
 
 Case = dict[str, Any]
 
+SHAPES = ("shape", "mesh", "small")
+"""Kinds of trials that are a shape with options."""
+
 SMALL = 60
 """Maximum number of triangles stored in a case; larger shapes are regenerated from their number."""
+
+
+class AnyLaboratory(Protocol):
+    """What runs trials: `fuzz.trials.Laboratory` or `fuzz.warm.WarmTrials`."""
+
+    seed: int
+
+    def trial(self, number: int) -> Trial: ...
+    def shape(self, number: int) -> tuple[Shape, dict[str, Any]]: ...
+    def retry(self, trial: Trial, shape: Shape, options: dict[str, Any]) -> Trial: ...
+    def reread(self, trial: Trial, kind: str, file: Seed) -> Trial: ...
+    def close(self) -> None: ...
 
 
 def case_of(trial: Trial, shape: Shape | None = None) -> Case:
@@ -28,7 +45,13 @@ def case_of(trial: Trial, shape: Shape | None = None) -> Case:
     return case
 
 
-def inputs(laboratory: Laboratory, case: Case) -> tuple[Shape, dict[str, Any]]:
+def file_of(kind: str, file: Seed) -> Case:
+    """What a case stores of a damaged file."""
+    beside = {name: base64.b64encode(content).decode() for name, content in file.beside.items()}
+    return {"format": kind, "content": base64.b64encode(file.content).decode(), "beside": beside}
+
+
+def inputs(laboratory: AnyLaboratory, case: Case) -> tuple[Shape, dict[str, Any]]:
     """Return the shape and options of a case of the kinds ``shape`` and ``mesh``."""
     if "vertices" in case:
         vertices, faces = np.array(case["vertices"], float), np.array(case["faces"], np.int64)
@@ -38,16 +61,22 @@ def inputs(laboratory: Laboratory, case: Case) -> tuple[Shape, dict[str, Any]]:
     return shape, {name: _lively(name, value) for name, value in case["options"].items()}
 
 
-def try_case(laboratory: Laboratory, case: Case) -> Trial:
+def try_case(laboratory: AnyLaboratory, case: Case) -> Trial:
     """Rerun a case."""
-    if case["kind"] not in ("shape", "mesh"):
+    if "content" in case:
+        beside = {name: base64.b64decode(content) for name, content in case["beside"].items()}
+        trial = Trial(case["seed"], case["number"], case["kind"])
+        return laboratory.reread(trial, case["format"], Seed(base64.b64decode(case["content"]), beside))
+    if case["kind"] not in SHAPES:
         return laboratory.trial(case["number"])
     return laboratory.retry(Trial(case["seed"], case["number"], case["kind"]), *inputs(laboratory, case))
 
 
-def minimised(laboratory: Laboratory, case: Case, tries: int) -> Case:
-    """Remove options and triangles, in ever smaller pieces, as long as the case still fails the same way."""
-    if case["kind"] not in ("shape", "mesh") or case["end"] == "hang":
+def minimised(laboratory: AnyLaboratory, case: Case, tries: int) -> Case:
+    """Remove options and triangles, or bytes, in ever smaller pieces, as long as the case still fails the same way."""
+    if case["end"] != "hang" and "content" in case:
+        return _shorter(laboratory, case, tries)
+    if case["kind"] not in SHAPES or case["end"] == "hang":
         return case
     shape, options = inputs(laboratory, case)
     trial = Trial(case["seed"], case["number"], case["kind"], case["end"], case["said"])
@@ -70,6 +99,25 @@ def minimised(laboratory: Laboratory, case: Case, tries: int) -> Case:
             options = fewer
     _fewer(shape.faces, lambda faces: fails(_only(shape, faces), options))
     return smallest
+
+
+def _shorter(laboratory: AnyLaboratory, case: Case, tries: int) -> Case:
+    """Remove ever smaller pieces of a file."""
+    content = base64.b64decode(case["content"])
+    trial = Trial(case["seed"], case["number"], case["kind"], case["end"], case["said"])
+    step = len(content) // 2
+    while step and tries:
+        at = 0
+        while at < len(content) and tries:
+            tries -= 1
+            less = {**case, "content": base64.b64encode(content[:at] + content[at + step :]).decode()}
+            now = try_case(laboratory, less)
+            if now.end == trial.end and _alike(now, trial):
+                case, content = less, content[:at] + content[at + step :]
+            else:
+                at += step
+        step //= 2
+    return case
 
 
 def _fewer(faces: np.ndarray, fails: Callable[[np.ndarray], bool]) -> None:

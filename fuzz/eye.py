@@ -30,6 +30,9 @@ SEAM = 1e-5
 PROMISING = 64
 """Number of points whose distance is computed exactly; a point cloud selects them."""
 
+FEW_PAIRS = 20_000
+"""Up to this many pairs of points and triangles, all distances are computed exactly."""
+
 LEAST_A_HULL = 60
 """Minimum number of samples per hull, so that small hulls are examined too."""
 
@@ -56,10 +59,14 @@ NOWHERE = Farthest(0.0, np.full(3, np.nan))
 def farthest_from_triangles(points: Floats, corners: Floats, random: np.random.Generator) -> Farthest:
     """Find the point of [N, 3] that is farthest from triangles [F, 3, 3].
 
-    Its distance is exact, but the point is chosen by approximate distances to a cloud on the triangles.
+    Its distance is exact, but among many points it is chosen by approximate distances to a cloud on the triangles.
     """
     if len(points) == 0 or len(corners) == 0:
         return NOWHERE
+    if len(points) * len(corners) <= FEW_PAIRS:
+        distances = distance_to_triangles(points, corners)
+        at = int(np.argmax(distances))
+        return Farthest(float(distances[at]), points[at])
     flat = corners.reshape(-1, 3)
     cloud = sampled(flat, np.arange(len(flat)).reshape(-1, 3), max(20_000, len(corners)), random)
     near = np.asarray(cKDTree(cloud).query(points)[0])  # an upper bound of the distance

@@ -76,11 +76,12 @@ def judge(case: Case, samples: int = SAMPLES) -> list[str]:
         or len(np.unique(case.shape.vertices[np.unique(faces)], axis=0)) < 2
     ):
         return found
+    every_face = faces
     where, faces, hulls = in_frame(case.shape.vertices, faces, case.hulls)
     random = np.random.default_rng(0)
     if len(faces):
         found += coverage(case, where, faces, hulls, random, samples)
-        found += overhang(case, where[faces], hulls, random, samples)
+        found += overhang(case, where[every_face], hulls, random, samples)
     if case.shape.is_closed:
         solid = filled_solid(where, faces)
         if solid is not None:

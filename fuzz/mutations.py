@@ -68,6 +68,24 @@ def mutated(kind: str, seed: Seed, others: list[Seed], rng: Rng) -> bytes:
     return data
 
 
+def nudged(kind: str, seed: Seed, others: list[Seed], rng: Rng) -> bytes:
+    """Change a few values a little, or swap records with another file: damage that gets past the first checks."""
+    data = seed.content
+    for _ in range(rng.integers(1, 4)):
+        data = _nudge_of(kind, data)(data, others[rng.integers(len(others))].content, rng)
+    return data
+
+
+def _nudge_of(kind: str, data: bytes) -> Callable[[bytes, bytes, Rng], bytes]:
+    if kind in ("3mf", "zae"):
+        return in_member_gently
+    if kind in ("glb", "usdc", "usdz"):
+        return in_chunk_gently if kind == "glb" else nudge_bits
+    if b"\0" in data[:200] or b"format binary" in data[:100]:
+        return nudge_bits
+    return nudge_text
+
+
 def _ways(kind: str, data: bytes) -> list[Callable[[bytes, bytes, Rng], bytes]]:
     rough = [flip, cut_off, delete, splice]
     if kind in ("3mf", "zae"):
@@ -137,6 +155,56 @@ def number(data: bytes, _: bytes, rng: Rng) -> bytes:
         word = WORDS[rng.integers(len(WORDS))] if rng.random() < 0.5 else data[slice(*other)]
         data = data[:start] + word + data[end:]
     return data
+
+
+def nudge_text(data: bytes, other: bytes, rng: Rng) -> bytes:
+    """Change digits, signs and exponents of some numbers, or put lines of another file in place of some."""
+    if rng.random() < 0.2:
+        pieces, others = data.split(b"\n"), other.split(b"\n")
+        at, begin, length = (int(rng.integers(count)) for count in (len(pieces), len(others), 6))
+        pieces[at : at + length] = others[begin : begin + length]
+        return b"\n".join(pieces)
+    found = [match.span() for match in NUMBER.finditer(data)]
+    chosen = {int(rng.integers(len(found))) for _ in range(rng.integers(1, 5))} if found else set()
+    for start, end in sorted((found[at] for at in chosen), reverse=True):
+        data = data[:start] + _nudged_number(data[start:end], rng) + data[end:]
+    return data
+
+
+def _nudged_number(word: bytes, rng: Rng) -> bytes:
+    match rng.integers(6):
+        case 0:
+            return word[1:] if word.startswith(b"-") else b"-" + word
+        case 1:
+            return word + str(rng.choice(["0", "e-9", "e5", ".5", "e30", "e-320"])).encode()
+        case 2 if b"." not in word and b"e" not in word.lower():
+            return str(int(word) + int(rng.integers(-2, 3))).encode()
+        case _:
+            digits = [i for i, letter in enumerate(word) if chr(letter).isdigit()]
+            at = digits[rng.integers(len(digits))]
+            return word[:at] + str(rng.integers(10)).encode() + word[at + 1 :]
+
+
+def nudge_bits(data: bytes, other: bytes, rng: Rng) -> bytes:
+    """Change some 4-byte values behind the header a little, as integers or floats, or copy a record over another."""
+    start = data.find(b"end_header\n") + 11 if data.startswith(b"ply") else min(84, len(data) // 3)
+    if len(data) - start < 16:
+        return flip(data, other, rng)
+    changed = bytearray(data)
+    for at in rng.integers(start, len(data) - 12, size=rng.integers(1, 6)).tolist():
+        at -= (at - start) % 4 if rng.random() < 0.7 else 0
+        integer, real = struct.unpack_from("<I", data, at)[0], struct.unpack_from("<f", data, at)[0]
+        match rng.integers(4):
+            case 0:
+                struct.pack_into("<I", changed, at, (integer + int(rng.integers(-2, 3))) % 2**32)
+            case 1:
+                struct.pack_into("<I", changed, at, integer ^ (1 << int(rng.integers(20, 32))))
+            case 2 if np.isfinite(real) and abs(real) < 1e30:
+                struct.pack_into("<f", changed, at, real * float(rng.choice([-1, 0, 2, 1 + 1e-6, 1e6])))
+            case _:
+                source = int(rng.integers(start, len(data) - 12))
+                changed[at : at + 12] = data[source : source + 12]
+    return bytes(changed)
 
 
 def head(data: bytes, other: bytes, rng: Rng) -> bytes:
@@ -217,12 +285,39 @@ def in_chunk(data: bytes, other: bytes, rng: Rng) -> bytes:
         text += b" " * (-len(text) % 4)
     else:
         binary = overwrite(binary, b"", rng)
+    return _glb(text, binary)
+
+
+def in_chunk_gently(data: bytes, other: bytes, rng: Rng) -> bytes:
+    """Nudge numbers in the JSON of a GLB, or values in its buffer, and correct the lengths."""
+    if len(data) < 28 or struct.unpack_from("<I", data, 12)[0] > len(data) - 20:
+        return flip(data, other, rng)
+    end = 20 + struct.unpack_from("<I", data, 12)[0]
+    text, binary = data[20:end], data[end + 8 :]
+    if rng.random() < 0.4:
+        text = nudge_text(text, text, rng)
+        text += b" " * (-len(text) % 4)
+    else:
+        binary = nudge_bits(binary, binary, rng)
+    return _glb(text, binary)
+
+
+def _glb(text: bytes, binary: bytes) -> bytes:
     chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(binary), 0x004E4942) + binary
     return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
 
 
 def in_member(data: bytes, _: bytes, rng: Rng) -> bytes:
     """Change a member of an archive, and repack it."""
+    return _in_member(data, rng, (number, number, tags, tags, lines, flip, delete))
+
+
+def in_member_gently(data: bytes, _: bytes, rng: Rng) -> bytes:
+    """Nudge numbers in a member of an archive, and repack it."""
+    return _in_member(data, rng, (nudge_text,))
+
+
+def _in_member(data: bytes, rng: Rng, ways: tuple[Callable[[bytes, bytes, Rng], bytes], ...]) -> bytes:
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = {name: archive.read(name) for name in archive.namelist()}
@@ -232,17 +327,23 @@ def in_member(data: bytes, _: bytes, rng: Rng) -> bytes:
         return data
     names = list(members)
     name = max(names, key=lambda n: len(members[n])) if rng.random() < 0.8 else names[rng.integers(len(names))]
-    way = (number, number, tags, tags, lines, flip, delete)[rng.integers(7)]
+    way = ways[rng.integers(len(ways))]
     members[name] = way(members[name], b"", rng)
     return repacked(members, data)
 
 
 def repacked(changed: dict[str, bytes], data: bytes) -> bytes:
-    """Repack an archive with some members changed, without dates, so that the bytes are reproducible."""
+    """Repack an archive with some members changed."""
+    with zipfile.ZipFile(io.BytesIO(data)) as old:
+        return packed({name: changed[name] if name in changed else old.read(name) for name in old.namelist()})
+
+
+def packed(members: dict[str, bytes]) -> bytes:
+    """Pack an archive without dates, so that the bytes are reproducible."""
     file = io.BytesIO()
-    with zipfile.ZipFile(io.BytesIO(data)) as old, zipfile.ZipFile(file, "w") as new:
-        for name in old.namelist():
+    with zipfile.ZipFile(file, "w") as archive:
+        for name, content in members.items():
             member = zipfile.ZipInfo(name)
             member.compress_type = zipfile.ZIP_DEFLATED
-            new.writestr(member, changed[name] if name in changed else old.read(name))
+            archive.writestr(member, content)
     return file.getvalue()

@@ -1,13 +1,14 @@
 """Long-running tests: damaged files, random shapes, real meshes, faults and options, judged without the kernels.
 
     python -m fuzz.soak --hours 1                   `make soak HOURS=1`; resumes where it stopped
+    python -m fuzz.soak --hours 1 --light           many small inputs a second in one warm process (`fuzz.light`)
     python -m fuzz.soak --totals                    totals of all runs
     python -m fuzz.soak --again soak/0-1234.json    rerun a failure
     python -m fuzz.soak --minimise CASE.json        reduce it to the options and triangles it needs
 
-A trial is a function of the seed and its number alone (`fuzz.trials`). A failure is written as a case, a small JSON
-file; cases in ``tests/cases`` are rerun by every test run. The ledger holds the sums, one row for every `CHUNK`
-numbers.
+A trial is a function of the seed and its number alone (`fuzz.trials`, `fuzz.light`). A failure is written as a case, a
+small JSON file; cases in ``tests/cases`` are rerun by every test run. The ledger holds the sums, one row for every
+chunk of numbers.
 """
 
 from __future__ import annotations
@@ -23,15 +24,20 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from fuzz.cases import case_of, minimised, try_case
-from fuzz.trials import WELL, Laboratory, Trial
+from fuzz.cases import AnyLaboratory, case_of, file_of, minimised, try_case
+from fuzz.light import KINDS as LIGHT
+from fuzz.light import READ, REFUSED
+from fuzz.trials import WELL, Laboratory, Trial, seeds_from
+from fuzz.warm import WarmTrials
 from rlacd import __version__
 
-CHUNK = 50
-"""Number of trials per row of the ledger."""
+CHUNK, LIGHT_CHUNK = 50, 1000
+"""Number of trials per row of the ledger, and of light trials."""
 
 TRIES = 40
 """Number of smaller inputs tried for every failure."""
+
+MOST_REASONS = 25
 
 Row = dict[str, Any]
 
@@ -50,9 +56,9 @@ class Ledger:
         lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
         self.rows: list[Row] = [json.loads(line) for line in lines if line.endswith("}")]
 
-    def done(self, seed: int) -> set[int]:
+    def done(self, seed: int, is_light: bool) -> set[int]:
         """The first numbers of a seed's finished chunks."""
-        return {row["first"] for row in self.rows if row["seed"] == seed}
+        return {row["first"] for row in self.rows if row["seed"] == seed and row.get("light", False) == is_light}
 
     def add(self, row: Row) -> None:
         """Append a row."""
@@ -61,10 +67,10 @@ class Ledger:
         self.rows.append(row)
 
 
-def do_chunk(laboratory: Laboratory, first: int, until: float, folder: Path) -> Row | None:
+def do_chunk(laboratory: AnyLaboratory, first: int, size: int, until: float, folder: Path) -> Row | None:
     """Run the trials of a chunk; None if time runs out first."""
     ends, counts, cpu = Counter[str](), Counter[str](), 0.0
-    for number in range(first, first + CHUNK):
+    for number in range(first, first + size):
         if time.monotonic() > until:
             return None
         trial = laboratory.trial(number)
@@ -76,6 +82,7 @@ def do_chunk(laboratory: Laboratory, first: int, until: float, folder: Path) -> 
     return {
         "seed": laboratory.seed,
         "first": first,
+        "light": isinstance(laboratory, WarmTrials),
         "version": __version__,
         "cpu": round(cpu, 1),
         "ends": ends,
@@ -83,11 +90,13 @@ def do_chunk(laboratory: Laboratory, first: int, until: float, folder: Path) -> 
     }
 
 
-def report(laboratory: Laboratory, trial: Trial, folder: Path) -> None:
+def report(laboratory: AnyLaboratory, trial: Trial, folder: Path) -> None:
     """Report a failure, and write it as a case, minimised as far as is quickly possible."""
     place = folder / f"{trial.seed}-{trial.number}.json"
     print(f"{trial.kind} {trial.number} {trial.end}: {'; '.join(trial.said)}\n  {place}", flush=True)
     case = case_of(trial)
+    if trial.kind == "read" and isinstance(laboratory, WarmTrials):
+        case |= file_of(*laboratory.damaged(trial.number))
     write_case(place, case)
     write_case(place, minimised(laboratory, case, TRIES))
 
@@ -102,17 +111,18 @@ def soak(args: argparse.Namespace) -> int:
     ledger = Ledger(folder / "ledger.jsonl")
     before = len(list(folder.glob("*.json")))
     until = time.monotonic() + 3600 * args.hours
-    done = ledger.done(args.seed)
-    chunks = (first for first in count(0, CHUNK) if first not in done)
+    size = LIGHT_CHUNK if args.light else CHUNK
+    done = ledger.done(args.seed, args.light)
+    chunks = (first for first in count(0, size) if first not in done)
     lock = threading.Lock()
 
     def work() -> None:
-        laboratory = Laboratory(args.seed, meshes_of(args.meshes))
+        laboratory = laboratory_of(args.seed, args.meshes, args.light)
         try:
             while time.monotonic() < until:
                 with lock:
                     first = next(chunks)
-                row = do_chunk(laboratory, first, until, folder)
+                row = do_chunk(laboratory, first, size, until, folder)
                 if row is not None:
                     ledger.add(row)
         finally:
@@ -123,6 +133,12 @@ def soak(args: argparse.Namespace) -> int:
             worker.result()
     print(totals(ledger.rows))
     return len(list(folder.glob("*.json"))) - before
+
+
+def laboratory_of(seed: int, meshes: Path | None, is_light: bool) -> AnyLaboratory:
+    """What runs the trials of a seed."""
+    meshes = meshes_of(meshes)
+    return WarmTrials(seed, seeds_from(meshes)) if is_light else Laboratory(seed, meshes)
 
 
 def meshes_of(folder: Path | None) -> Path | None:
@@ -142,9 +158,28 @@ def totals(rows: list[Row]) -> str:
     for kind in kinds:
         cells = [ends[f"{kind} {end}"] for end in columns]
         lines.append(f"| {kind} | {sum(cells)} | " + " | ".join(map(str, cells)) + " |")
-    counted = ", ".join(f"{name} {number}" for name, number in counts.most_common())
+    whys = Counter({name: number for name, number in counts.items() if REFUSED in name or name.endswith(READ)})
+    counted = ", ".join(f"{name} {number}" for name, number in counts.most_common() if name not in whys)
     hours = sum(row["cpu"] for row in rows) / 3600
-    return "\n".join([*lines, "", f"{hours:.2f} hours of a processor; {counted}"])
+    return "\n".join([*lines, "", f"{hours:.2f} hours of a processor; {counted}", *reasons(whys)])
+
+
+def reasons(whys: Counter[str]) -> list[str]:
+    """Damaged files by format, and the most frequent reasons of refusals, as Markdown."""
+    if not whys:
+        return []
+    formats = sorted({name.split()[0] for name in whys})
+    lines = ["", "| format | files | read | refused | reasons |", "|---|--:|--:|--:|--:|"]
+    for kind in formats:
+        own = Counter({name: number for name, number in whys.items() if name.split()[0] == kind})
+        read = own.pop(f"{kind}{READ}", 0)
+        lines.append(f"| {kind} | {own.total() + read} | {read} | {own.total()} | {len(own)} |")
+    overall = Counter[str]()
+    for name, number in whys.items():
+        if REFUSED in name:
+            overall[name.split(REFUSED)[1]] += number
+    lines += ["", "| refused | files |", "|---|--:|"]
+    return [*lines, *(f"| {why.replace('|', '/')} | {number} |" for why, number in overall.most_common(MOST_REASONS))]
 
 
 def main() -> int:
@@ -153,6 +188,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=1, help="trials at a time")
     parser.add_argument("--meshes", type=Path, help="folder of real meshes, with its index.csv")
+    parser.add_argument("--light", action="store_true", help="light trials only")
     parser.add_argument("--folder", type=Path, default=Path("soak"), help="for the ledger and the cases")
     parser.add_argument("--totals", action="store_true", help="sums over the ledger")
     parser.add_argument("--again", type=Path, help="a case to try once more")
@@ -163,7 +199,7 @@ def main() -> int:
         return 0
     if args.again or args.minimise:
         case = json.loads((args.again or args.minimise).read_text())
-        laboratory = Laboratory(case["seed"], meshes_of(args.meshes))
+        laboratory = laboratory_of(case["seed"], args.meshes, case["kind"] in LIGHT)
         try:
             trial = try_case(laboratory, case)
             print(json.dumps(case_of(trial), indent=1))

@@ -103,8 +103,9 @@ class Laboratory:
         self.folder = Path(self._scratch.name)
         self._meshes = meshes
         self._small = [] if meshes is None else _small_meshes(meshes)
-        seeds = _simple_seeds() if meshes is None else seeds_of(meshes)
-        self._files = Fuzzer(seeds, seed, self.folder, Watched(ProcessLimits(SECONDS, MEMORY), CPU_SECONDS))
+        self._files = Fuzzer(
+            seeds_from(meshes), seed, self.folder, Watched(ProcessLimits(SECONDS, MEMORY), CPU_SECONDS)
+        )
         self._shapes = Watched(ProcessLimits(4 * SECONDS, 3 * 2**30), SHAPE_SECONDS)
 
     def close(self) -> None:
@@ -153,6 +154,15 @@ class Laboratory:
         end = {"hang": "memory"}.get(row.status, row.status) if "memory" in " ".join(row.said) else row.status
         counts = Counter(decompositions=1 + row.twice, hulls=row.parts, twice=row.twice)
         return replace(trial, end=end, said=row.said, story=row.steps, options=row.options, counts=counts, cpu=row.cpu)
+
+    def reread(self, trial: Trial, kind: str, file: Seed) -> Trial:
+        """Read a file and decompose it."""
+        path = self.folder / f"mesh.{kind}"
+        path.write_bytes(file.content)
+        for name, content in file.beside.items():
+            (self.folder / name).write_bytes(content)
+        row = self._files.result(path)
+        return replace(trial, end=row["end"], said=[row["said"]] if row["said"] and row["end"] != "refused" else [])
 
     def _shape_seed(self, number: int) -> int:
         return self.seed * 10**9 + number
@@ -255,6 +265,11 @@ class Laboratory:
         counts = Counter({"batches": 1, f"batch {fault.name}": 1, "decompositions": 3 * meshes})
         cpu = calm.cpu + first.cpu + again.cpu
         return replace(trial, end="wrong" if found else "done", said=found, counts=counts, cpu=cpu)
+
+
+def seeds_from(meshes: Path | None) -> dict[str, list[Seed]]:
+    """Valid files by format: those of the folder of real meshes, or of a few simple shapes."""
+    return _simple_seeds() if meshes is None else seeds_of(meshes)
 
 
 def words_for(ending: str) -> list[str]:

@@ -86,6 +86,16 @@ def test_a_sliver_goes_only_where_others_stand_for_it() -> None:
         assert drop_slivers([sheet], workers) == [sheet]
 
 
+def test_many_slivers_are_compared_at_once(monkeypatch) -> None:
+    """Tens of thousands of shavings took minutes: the boxes of all parts were looked at again for each of them."""
+    shavings = [box(1, 1, 0.001, (0, 0, 3 * i)) for i in range(40)]
+    looks = []
+    monkeypatch.setattr(type(shavings[0]), "box", property(lambda part: looks.append(part) or part.hull.box))
+    with Workers(1) as workers:
+        assert drop_slivers(shavings, workers) == shavings
+    assert len(looks) <= 2 * len(shavings)
+
+
 def test_films_are_thinner_than_sheets() -> None:
     assert is_film(box(1, 1, 1e-4))
     assert not is_film(box(1, 1, 2e-3))

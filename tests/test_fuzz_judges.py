@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 from trimesh import creation
 
 import rlacd
@@ -58,6 +59,18 @@ def test_hulls_larger_than_promised_are_seen() -> None:
     found = judge(replace(whole, options=good.options, report={**good.report, "parts": 1}))
     assert any("beyond the input" in word for word in found)
     assert any("concave" in word for word in found)
+
+
+def test_hulls_may_extend_to_faces_without_area() -> None:
+    good = case(from_manifold(box((0, 0, 0), (2, 1, 1))), detail="full")
+    vertices = np.concatenate([good.shape.vertices, [[3.0, 0.5, 0.5]]])
+    corner = int(np.argmax(vertices[:8].sum(axis=1)))
+    hull = trimesh.convex.convex_hull(vertices)
+    flat = Shape(vertices, np.concatenate([good.shape.faces, [[corner, 8, corner]]]))
+    larger = replace(good, hulls=[(np.asarray(hull.vertices), np.asarray(hull.faces))])
+    assert any("beyond the input" in word for word in judge(larger))
+    found = judge(replace(larger, shape=flat, report={**good.report, "hausdorff": {"over": 0.3, "under": 0.0}}))
+    assert not any("reach 1 beyond" in word for word in found), "the tip is a point of the input"
 
 
 def test_a_concavity_above_the_threshold_has_to_be_said() -> None:

@@ -342,6 +342,15 @@ def test_nothing_is_fetched(box, tmp_path, monkeypatch):
         load_mesh("http://localhost:1/mesh.stl")
 
 
+def test_what_an_xml_parser_says_on_two_lines_is_one_sentence(box, tmp_path):
+    """Found by the soak: a zero byte in a COLLADA file."""
+    path = tmp_path / "box.dae"
+    path.write_bytes(box.export(file_type="dae").replace(b"<library_geometries>", b"<library_geometries>\0", 1))
+    with pytest.raises(MeshFileError, match="holds XML that is damaged") as said:
+        load_mesh(path)
+    assert "\n" not in str(said.value)
+
+
 def test_paths_in_a_scene_are_ignored(box):
     scene = trimesh.Scene([box, trimesh.load_path(np.array([[0.0, 0, 0], [9, 9, 9]]))])
     assert len(load_mesh(scene).faces) == 12

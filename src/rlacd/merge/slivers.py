@@ -7,9 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from rlacd import _native
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
 from rlacd.solid.distance import hull_union
 from rlacd.solid.hull import Hull
+from rlacd.solid.topology import BoolArray
 from rlacd.workers import Workers
 
 THIN = 0.01
@@ -37,19 +39,25 @@ def drop_slivers(parts: Sequence[Part], workers: Workers, suspects: Sequence[Par
     list of Part
         The remaining parts in the same order.
     """
-    kept = list(parts)
-    suspects = kept if suspects is None else suspects
+    parts = list(parts)
+    suspects = parts if suspects is None else suspects
     thin = workers.map(lambda part: is_film(part) or is_sliver(part.hull), suspects)
+    place = {id(part): i for i, part in enumerate(parts)}
+    boxes = np.array([part.box for part in parts]).reshape(-1, 2, 3)
+    kept = np.ones(len(parts), dtype=bool)
     for sliver in sorted(
         (p for p, is_thin in zip(suspects, thin, strict=True) if is_thin), key=lambda p: p.hull.volume
     ):
-        others = [part for part in kept if part is not sliver and _near(part, sliver)]
+        own = place[id(sliver)]
+        kept[own] = False
+        others = [parts[i] for i in np.flatnonzero(kept & _near(boxes, boxes[own]))]
         if others:
             union = hull_union([part.hull for part in others], workers.threads)
             _, missed = union.under(sliver.vertices, sliver.faces, MISSED / 4, workers.threads)
-            if missed <= MISSED:
-                kept.remove(sliver)
-    return kept
+            kept[own] = missed > MISSED
+        else:
+            kept[own] = True
+    return [parts[i] for i in np.flatnonzero(kept)]
 
 
 def is_film(part: Part) -> bool:
@@ -67,6 +75,7 @@ def is_sliver(hull: Hull) -> bool:
     return 3 * ratio < THIN * extent or not _native.holds_ball(hull.vertices, hull.faces, THIN * extent)
 
 
-def _near(part: Part, sliver: Part) -> bool:
-    gap = np.maximum(part.box[0] - sliver.box[1], sliver.box[0] - part.box[1])
-    return bool((gap <= MISSED).all())
+def _near(boxes: FloatArray, sliver: FloatArray) -> BoolArray:
+    """Which of the boxes [N, 2, 3] are within `MISSED` of a sliver's."""
+    gap = np.maximum(boxes[:, 0] - sliver[1], sliver[0] - boxes[:, 1])
+    return np.asarray((gap <= MISSED).all(axis=1))

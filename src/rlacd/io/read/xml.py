@@ -123,7 +123,7 @@ class _Reads:
                 yield element
         except etree.XMLSyntaxError as error:
             raise MeshFileError(
-                f"{self._path} holds XML that is damaged or cut off ({error}); export it again"
+                f"{self._path} holds XML that is damaged or cut off ({_line_of(error)}); export it again"
             ) from error
 
     def triangles_of(self, name: str) -> int:
@@ -136,6 +136,11 @@ class _Reads:
                 f"{self._path} names {name!r:.80} in it so often that it amounts to {self._asked} bytes"
             )
         return self._triangles[name]
+
+
+def _line_of(error: etree.XMLSyntaxError) -> str:
+    """What the parser says, on one line."""
+    return " ".join(str(error).split())[:200]
 
 
 def collada_of(path: Path, content: bytes, extension: str) -> bytes:
@@ -170,7 +175,9 @@ def check_collada(path: Path, data: bytes) -> None:
     try:
         root = etree.fromstring(data, etree.XMLParser(huge_tree=True, **PARSER))
     except etree.XMLSyntaxError as error:
-        raise MeshFileError(f"{path} holds XML that is damaged or cut off ({error}); export it again") from error
+        raise MeshFileError(
+            f"{path} holds XML that is damaged or cut off ({_line_of(error)}); export it again"
+        ) from error
     parts = {WORLD: XmlPart()}
     for geometry in root.iter("{*}geometry"):
         _check_names(path, geometry, ("id",))

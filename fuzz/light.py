@@ -1,0 +1,255 @@
+"""Light trials: small damaged files read, small shapes decomposed and judged, many a second in one process.
+
+Like the trials of `fuzz.trials`, each is a function of a seed and its number alone. They differ in what they cost: no
+process is started, nothing is supervised (`fuzz.warm` does that), and inputs are small.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import re
+import resource
+import sys
+import time
+import warnings
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import rlacd
+from fuzz.choices import draw_options
+from fuzz.judges import Case, judge
+from fuzz.mutations import Seed, mutated, nudged, packed
+from fuzz.recipes import Shape, make_shape
+from fuzz.trials import Trial
+from rlacd.io.read.load import load_mesh
+from rlacd.solid.input_mesh import InputMesh
+
+KINDS = {"read": 0.91, "small": 0.09}
+"""Relative frequency of each kind of light trial."""
+
+LARGEST_FILE = 10_000
+"""Bytes of the files that are damaged."""
+
+MOST_FACES = 48
+"""Of a small shape."""
+
+SAMPLES = 100
+"""Points of the input and of the hulls that the judges look at."""
+
+DECOMPOSED = 0.03
+"""Share of the damaged files that are decomposed, if they are read and small."""
+
+SPACE_SECONDS = 1.0
+"""The timeout where balls decide: loose triangles and small balls may give tens of thousands of parts."""
+
+LONGEST_SENTENCE = 700
+
+ROOM = 3 * 2**30
+"""Bytes of address space beside what the process has when it begins."""
+
+REFUSED, READ = " refused: ", " read"
+"""Between a format and the reason, and after a format, in the counts of a trial."""
+
+Options = dict[str, Any]
+
+
+class LightTrials:
+    """Runs light trials in this process.
+
+    Parameters
+    ----------
+    seed : int
+    seeds : dict
+        Valid files to damage, by format (`fuzz.damaged.seeds_of`).
+    folder : Path
+        For the damaged files. A file opened elsewhere is a failure.
+    """
+
+    def __init__(self, seed: int, seeds: dict[str, list[Seed]], folder: Path) -> None:
+        self.seed = seed
+        small = {kind: [seed for seed in some if len(seed.content) <= LARGEST_FILE] for kind, some in seeds.items()}
+        self._seeds = {kind: some for kind, some in small.items() if some and kind != "onnx"}
+        if "dae" in self._seeds:
+            self._seeds["zae"] = [Seed(packed({"mesh.dae": seed.content})) for seed in self._seeds["dae"]]
+        self._folder = folder
+        self._eye = _OpenedFiles(folder)
+
+    def kind(self, number: int) -> str:
+        """The kind of trial of a number."""
+        return "read" if np.random.default_rng([self.seed, number, 20]).random() < KINDS["read"] else "small"
+
+    def trial(self, number: int) -> Trial:
+        """Run a trial."""
+        start = time.process_time()
+        trial = Trial(self.seed, number, self.kind(number))
+        trial = self.retry(trial, *self.shape(number)) if trial.kind == "small" else self._read(trial)
+        trial.cpu = time.process_time() - start
+        return trial
+
+    def shape(self, number: int) -> tuple[Shape, Options]:
+        """Shape and options of a trial of the kind ``small``: the first of its shapes that is small enough."""
+        for tries in range(100):
+            shape = make_shape(self.seed * 10**12 + number * 100 + tries)
+            if len(shape.faces) <= MOST_FACES:
+                break
+        return shape, _cheap(draw_options(self.seed * 10**12 + number))
+
+    def retry(self, trial: Trial, shape: Shape, options: Options) -> Trial:
+        """Decompose a shape with these options, and judge the result."""
+        trial = replace(trial, story=list(shape.steps), options=options)
+        end, said, hulls = _decomposed(shape, options)
+        counts = Counter(decompositions=int(hulls > 0), hulls=hulls)
+        return replace(trial, end=end, said=said, counts=counts)
+
+    def damaged(self, number: int) -> tuple[str, Seed]:
+        """The format and content of a trial of the kind ``read``."""
+        random = np.random.default_rng([self.seed, number, 21])
+        kind = list(self._seeds)[int(random.integers(len(self._seeds)))]
+        seeds = self._seeds[kind]
+        seed = seeds[random.integers(len(seeds))]
+        damage = mutated if random.random() < 0.5 else nudged
+        return kind, Seed(damage(kind, seed, seeds, random), seed.beside)
+
+    def _read(self, trial: Trial) -> Trial:
+        return self.reread(trial, *self.damaged(trial.number))
+
+    def reread(self, trial: Trial, kind: str, file: Seed) -> Trial:
+        """Read a file, check what was read, and decompose some of them."""
+        for name, content in file.beside.items():
+            (self._folder / name).write_bytes(content)
+        path = self._folder / f"mesh.{kind}"
+        path.write_bytes(file.content)
+        trial = replace(trial, story=[f"damaged {kind}"], end="loaded", counts=Counter({"files": 1}))
+        try:
+            with self._eye:
+                mesh = load_mesh(path)
+        except rlacd.RlacdError as error:
+            said = str(error)
+            trial.counts[f"{kind}{REFUSED}{_without_details(said, path)}"] += 1
+            is_sentence = said and "\n" not in said and len(said) <= LONGEST_SENTENCE
+            trial.end, trial.said = ("refused", []) if is_sentence else ("wrong", [f"no sentence: {said!r:.900}"])
+        except MemoryError as error:
+            trial.end, trial.said = "memory", [repr(error)]
+        except Exception as error:  # any other is a failure, and is what is looked for
+            trial.end, trial.said = "untyped", [f"{type(error).__name__}: {error!s:.300}"]
+        else:
+            trial.counts[f"{kind}{READ}"] += 1
+            trial.said = wrong_in(mesh)
+            trial.end = "wrong" if trial.said else "loaded"
+            if trial.end == "loaded" and _chosen(trial) and 0 < len(mesh.faces) <= MOST_FACES:
+                trial = self._decompose(trial, mesh)
+        if self._eye.seen:
+            trial.end, trial.said = "wrong", [*trial.said, *sorted(self._eye.seen)]
+        return trial
+
+    def _decompose(self, trial: Trial, mesh: InputMesh) -> Trial:
+        shape = Shape(mesh.vertices, mesh.faces, tuple(trial.story))
+        end, said, hulls = _decomposed(shape, _cheap(draw_options(trial.seed * 10**12 + trial.number)))
+        trial.counts += Counter(decompositions=int(hulls > 0), hulls=hulls)
+        return replace(trial, end="loaded" if end in ("done", "refused") else end, said=said)
+
+
+def wrong_in(mesh: InputMesh) -> list[str]:
+    """What is wrong with a mesh that was read: everything behind the reader relies on these facts."""
+    found = []
+    vertices, faces = mesh.vertices, mesh.faces
+    if vertices.shape[1:] != (3,) or vertices.dtype != np.float64 or not np.isfinite(vertices).all():
+        found.append(f"vertices {vertices.shape} of {vertices.dtype}, not all finite or no points")
+    if faces.shape[1:] != (3,) or faces.dtype != np.int64:
+        found.append(f"faces {faces.shape} of {faces.dtype}")
+    if len(faces) and (faces.min() < 0 or faces.max() >= len(vertices)):
+        found.append(f"faces use vertices {faces.min()} to {faces.max()} of {len(vertices)}")
+    if not len(vertices):
+        found.append("no points")
+    if mesh.node_of is not None and (
+        len(mesh.node_of) != len(faces) or (len(faces) and mesh.node_of.max() >= len(mesh.nodes))
+    ):
+        found.append(f"{len(mesh.node_of)} faces of {len(mesh.nodes)} nodes, but {len(faces)} faces")
+    return found
+
+
+def enter_worker() -> None:
+    """Prepare a process that runs light trials and nothing else: bounded memory, no messages of parsers."""
+    size = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (size + ROOM, size + ROOM))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    logging.disable(logging.CRITICAL)
+    warnings.simplefilter("ignore")
+
+
+def _chosen(trial: Trial) -> bool:
+    return bool(np.random.default_rng([trial.seed, trial.number, 22]).random() < DECOMPOSED)
+
+
+def _cheap(options: Options) -> Options:
+    """Make rarer among random options what takes long even for small shapes; `fuzz.trials` tries that."""
+    if "criterion" in options:
+        options["timeout"] = min(options.get("timeout", math.inf), SPACE_SECONDS)
+    is_rare = options["seed"] % 3 == 0
+    if "criterion" in options and not is_rare:
+        del options["criterion"]
+        options["threshold"] = 0.1
+    if options.get("quality") != "fast" and options.get("merge", True) and not is_rare:
+        options.pop("search_steps", None)
+        options["quality"] = "fast"
+    if options.get("quality", "balanced") != "fast" and options.get("merge", True):
+        options["search_steps"] = min(options.get("search_steps", 7), 7)
+    if "threshold" in options:
+        options["threshold"] = max(options["threshold"], 0.05)
+    return options
+
+
+def _decomposed(shape: Shape, options: Options) -> tuple[str, list[str], int]:
+    """Decompose and judge: how it ended, complaints, and the number of hulls."""
+    try:
+        result = rlacd.decompose((shape.vertices, shape.faces), **options)
+    except (rlacd.MeshDataError, rlacd.EmptyMeshError) as error:
+        usable = np.isfinite(shape.vertices).all(axis=1)[shape.faces].all(axis=1).any()
+        return ("wrong", [f"refused: {error}"], 0) if usable else ("refused", [], 0)
+    except MemoryError as error:
+        return "memory", [repr(error)], 0
+    except Exception as error:
+        return "untyped", [f"{type(error).__name__}: {error!s:.300}"], 0
+    report = {**result.report, "concavity": (result.report.get("concavity") or {}).get("max")}
+    hulls = [(np.array(hull.vertices), np.array(hull.faces)) for hull in result]
+    said = judge(Case(shape, options, hulls, report), SAMPLES)
+    return "wrong" if said else "done", said, len(hulls)
+
+
+def _without_details(said: str, path: Path) -> str:
+    """The reason of a refusal without names, numbers and quotations, to be counted."""
+    said = said.replace(str(path), "it").replace(path.name, "it")
+    said = re.sub(r"'[^']*'|\"[^\"]*\"|\[[^\]]*\]", "…", said)
+    return re.sub(r"[-+]?\d[\w.+-]*|\b(?:nan|inf)\b", "N", said)[:90]
+
+
+class _OpenedFiles:
+    """Notes what is opened, started and connected to in a ``with`` block, if it is none of a reader's business."""
+
+    def __init__(self, folder: Path) -> None:
+        self.seen: set[str] = set()
+        self._is_open = False
+        self._allowed = (str(folder), *(place for place in {sys.prefix, sys.base_prefix, *sys.path} if place))
+        sys.addaudithook(self._look)
+
+    def __enter__(self) -> None:
+        self.seen.clear()
+        self._is_open = True
+
+    def __exit__(self, *_: object) -> None:
+        self._is_open = False
+
+    def _look(self, event: str, given: tuple[Any, ...]) -> None:
+        if not self._is_open:
+            return
+        if event == "open" and isinstance(given[0], str | bytes):
+            path = given[0] if isinstance(given[0], str) else given[0].decode(errors="replace")
+            if not str(Path(path).absolute()).startswith(self._allowed):
+                self.seen.add(f"it opened {path!r:.200}")
+        elif event in ("socket.connect", "socket.getaddrinfo", "subprocess.Popen", "os.system", "os.exec", "os.fork"):
+            self.seen.add(f"it called {event} {given!r:.200}")
