@@ -1,23 +1,18 @@
-// Volume, area and moments of triangle meshes: see mesh_measures.hpp for input and output.
+// Volume, area, axes and mass of triangle meshes: see mesh_measures.hpp for input and output.
 #include "base/mesh_measures.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
 
 namespace rlacd {
 
-double mesh_volume(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
-  if (faces.empty()) return 0;
-  const Vec3 apex = vertices[faces[0][0]];
-  double sum = 0;
-  for (const Triangle& f : faces)
-    sum += dot(vertices[f[0]] - apex, cross(vertices[f[1]] - apex, vertices[f[2]] - apex));
-  return sum / 6;
-}
+namespace {
 
-double mesh_area(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
-  double sum = 0;
-  for (const Triangle& f : faces) sum += norm(cross(vertices[f[1]] - vertices[f[0]], vertices[f[2]] - vertices[f[0]]));
-  return sum / 2;
-}
+constexpr double kRounding = 1e-15;  // entries this small beside the trace are rounding: no axis turns for them
+constexpr int kSweeps = 30;          // five are enough
 
+// Second moments of the surface about its centroid, row-major, up to a positive factor; exact over each triangle.
 std::array<Vec3, 3> mesh_moments(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
   std::vector<double> areas;
   areas.reserve(faces.size());
@@ -42,6 +37,65 @@ std::array<Vec3, 3> mesh_moments(const std::vector<Vec3>& vertices, const std::v
     for (const Vec3 p : {a, b, c, a + b + c}) add(weight, p);
   }
   return moments;
+}
+
+// One rotation of Jacobi's method: in the plane of two axes, to where their joint moment vanishes.
+void rotate(std::array<Vec3, 3>& moments, std::array<Vec3, 3>& axes, int p, int q) {
+  const double theta = (moments[q][q] - moments[p][p]) / (2 * moments[p][q]);
+  const double tangent = std::copysign(1.0, theta) / (std::fabs(theta) + std::sqrt(theta * theta + 1));
+  const double cosine = 1 / std::sqrt(tangent * tangent + 1), sine = tangent * cosine;
+  const auto turn = [cosine, sine](double& a, double& b) {
+    const double before = a;
+    a = cosine * before - sine * b;
+    b = sine * before + cosine * b;
+  };
+  for (int i = 0; i < 3; ++i) turn(moments[i][p], moments[i][q]);
+  for (int i = 0; i < 3; ++i) turn(moments[p][i], moments[q][i]);
+  for (int i = 0; i < 3; ++i) turn(axes[p][i], axes[q][i]);
+}
+
+}  // namespace
+
+double mesh_volume(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
+  if (faces.empty()) return 0;
+  const Vec3 apex = vertices[faces[0][0]];
+  double sum = 0;
+  for (const Triangle& f : faces)
+    sum += dot(vertices[f[0]] - apex, cross(vertices[f[1]] - apex, vertices[f[2]] - apex));
+  return sum / 6;
+}
+
+double mesh_area(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
+  double sum = 0;
+  for (const Triangle& f : faces) sum += norm(cross(vertices[f[1]] - vertices[f[0]], vertices[f[2]] - vertices[f[0]]));
+  return sum / 2;
+}
+
+// Jacobi's method takes sums, products, quotients and square roots alone, which IEEE 754 rounds the same everywhere.
+std::array<Vec3, 3> principal_axes(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
+  std::array<Vec3, 3> moments = mesh_moments(vertices, faces);
+  std::array<Vec3, 3> axes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+  const double negligible = kRounding * (moments[0].x + moments[1].y + moments[2].z);
+  bool turned = true;
+  for (int sweep = 0; turned && sweep < kSweeps; ++sweep) {
+    turned = false;
+    for (const auto& [p, q] : {std::pair{0, 1}, {0, 2}, {1, 2}}) {
+      if (!(std::fabs(moments[p][q]) > negligible)) continue;
+      rotate(moments, axes, p, q);
+      turned = true;
+    }
+  }
+  std::array<int, 3> order{0, 1, 2};
+  std::stable_sort(order.begin(), order.end(), [&moments](int a, int b) { return moments[a][a] > moments[b][b]; });
+  std::array<Vec3, 3> sorted;
+  for (int i = 0; i < 3; ++i) {
+    const Vec3 axis = axes[order[i]];
+    const double most = max_abs(axis);
+    int first = 0;
+    while (std::fabs(axis[first]) < most) ++first;
+    sorted[i] = axis[first] < 0 ? -axis : axis;
+  }
+  return sorted;
 }
 
 // Sums over the tetrahedra between the faces and an apex, all relative to the apex: with corners 0, a, b, c, s = a + b

@@ -97,14 +97,14 @@ void bind_hull(nb::module_& m) {
       },
       nb::arg("vertices"), nb::arg("faces"), "Signed volume of a closed triangle mesh.");
   m.def(
-      "mesh_moments",
+      "principal_axes",
       [](const PointsIn& vertices, const FacesIn& faces) {
         const Mesh mesh = to_mesh(vertices, faces);
-        const std::array<Vec3, 3> rows = mesh_moments(mesh.vertices, mesh.faces);
+        const std::array<Vec3, 3> rows = principal_axes(mesh.vertices, mesh.faces);
         return to_array<double>(std::vector<Vec3>(rows.begin(), rows.end()));
       },
       nb::arg("vertices"), nb::arg("faces"),
-      "Second moments [3, 3] of a surface around its centroid, exact over its triangles but for a positive factor.");
+      "Principal axes [3, 3] of a surface, one per row, longest first, the largest entry of each positive.");
   m.def(
       "mesh_mass",
       [](const PointsIn& vertices, const FacesIn& faces) {

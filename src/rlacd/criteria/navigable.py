@@ -32,6 +32,7 @@ from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.balls import Balls
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
+from rlacd.solid.products import dots, heights
 from rlacd.solid.solid import Solid
 from rlacd.space_options import Point, SpaceOptions
 
@@ -380,7 +381,7 @@ def _planes_in_frame(planes: Sequence[tuple[Point, float]], frame: Frame) -> Flo
     for row, (normal, offset) in zip(rows, planes, strict=True):
         length = math.hypot(*normal)
         row[:3] = np.array(normal) / length
-        row[3] = (offset / length - row[:3] @ frame.center) * frame.scale
+        row[3] = (offset / length - dots(row[:3], frame.center)) * frame.scale
     return rows
 
 
@@ -389,7 +390,7 @@ def _check_seeds(
 ) -> None:
     inside = surface.winding(seeds, accuracy=4.0) > 0.5
     distance = surface.distance(seeds)
-    above = (seeds @ planes[:, :3].T - planes[:, 3]).min(axis=1, initial=np.inf)
+    above = (heights(seeds, planes[:, :3]) - planes[:, 3]).min(axis=1, initial=np.inf)
     for i, seed in enumerate(np.asarray(given)):
         if inside[i]:
             raise OptionError(f"seed {i} at {seed.tolist()} lies inside the solid; put it where a ball can be.")

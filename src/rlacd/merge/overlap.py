@@ -8,7 +8,6 @@ joint hull has to be tested.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -21,6 +20,7 @@ from rlacd.merge.boxes import Boxes
 from rlacd.solid.arrays import BoolArray, FloatArray
 from rlacd.solid.component import LOST, Component, Part
 from rlacd.solid.hull import Hull
+from rlacd.solid.products import dots, heights, length
 
 TOUCH = 1e-6
 """Hulls touch that are no farther apart than this (frame)."""
@@ -189,7 +189,7 @@ class _Body:
         facet = facet.ravel()
         self._normals = units[first]
         # The farthest corner: the inexact normal of a sliver then cuts nothing off.
-        self._offsets = (hull.vertices @ self._normals.T).max(axis=0)
+        self._offsets = (heights(hull.vertices, self._normals)).max(axis=0)
         order = np.argsort(facet, kind="stable")
         bounds = np.searchsorted(facet[order], np.arange(1, len(first)))
         self._corners = [np.unique(hull.faces[some]) for some in np.split(order, bounds)]
@@ -197,7 +197,7 @@ class _Body:
 
     def depths(self, points: FloatArray) -> FloatArray:
         """How deep points [N, 3] lie inside; negative outside."""
-        depths: FloatArray = (self._offsets - points @ self._normals.T).min(axis=1)
+        depths: FloatArray = (self._offsets - heights(points, self._normals)).min(axis=1)
         return depths
 
     def is_near(self, points: FloatArray) -> bool:
@@ -215,8 +215,8 @@ class _Body:
         points = []
         areas = np.zeros(len(self._normals))
         vertices = other.part.hull.vertices
-        beyond = vertices @ self._normals.T - self._offsets  # [V, P]
-        opposed = other._normals @ self._normals.T <= OPPOSED
+        beyond = heights(vertices, self._normals) - self._offsets  # [V, P]
+        opposed = heights(other._normals, self._normals) <= OPPOSED
         for facet in np.flatnonzero(opposed.any(axis=1)):
             corners = other._corners[facet]
             outside = beyond[corners]
@@ -230,7 +230,7 @@ class _Body:
                 if len(polygon) == 0:
                     break
             else:
-                depths = self._offsets[planes] - polygon @ self._normals[planes].T
+                depths = self._offsets[planes] - heights(polygon, self._normals[planes])
                 for plane in planes[depths.min(axis=0) < REACHED * overlap]:
                     near = _cut(polygon, -self._normals[plane], REACHED * overlap - self._offsets[plane])
                     areas[plane] += (area := _area(near))
@@ -240,11 +240,11 @@ class _Body:
 
     def layer(self, other: _Body, facets: BoolArray, depth: float) -> Hull | None:
         """What another body fills of this one with some of its facets moved outwards; None if nothing."""
-        moved = (self._normals @ self._normals[facets].T >= BESIDE).any(axis=1)
+        moved = (heights(self._normals, self._normals[facets]) >= BESIDE).any(axis=1)
         layer: Hull | None = other.part.hull
         for normal, offset in zip(self._normals, self._offsets + depth * moved, strict=True):
             assert layer is not None
-            beyond = layer.vertices @ normal - offset
+            beyond = heights(layer.vertices, normal) - offset
             if beyond.max() <= TOUCH * REACHED:
                 continue
             edges = layer.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
@@ -261,14 +261,14 @@ class _Body:
 def _ordered(points: FloatArray, normal: FloatArray) -> FloatArray:
     """The corners [N, 3] of a convex polygon in their order around a normal."""
     spokes = points - points.mean(axis=0)
-    across = spokes[int(np.einsum("ni,ni->n", spokes, spokes).argmax())]
-    angles = np.arctan2(spokes @ np.cross(normal, across), spokes @ across)
+    across = spokes[int(dots(spokes, spokes).argmax())]
+    angles = np.arctan2(heights(spokes, np.cross(normal, across)), heights(spokes, across))
     return points[np.argsort(angles, kind="stable")]
 
 
 def _cut(polygon: FloatArray, normal: FloatArray, offset: float) -> FloatArray:
     """What of a convex polygon [N, 3] lies in a half-space n.x <= d (Sutherland and Hodgman)."""
-    beyond = polygon @ normal - offset
+    beyond = heights(polygon, normal) - offset
     if beyond.max() <= 0:
         return polygon
     corners = []
@@ -288,4 +288,4 @@ def _area(polygon: FloatArray) -> float:
     spokes = polygon[1:] - polygon[0]
     ahead, behind = spokes[:-1], spokes[1:]
     doubled = (ahead[:, [1, 2, 0]] * behind[:, [2, 0, 1]] - ahead[:, [2, 0, 1]] * behind[:, [1, 2, 0]]).sum(axis=0)
-    return math.sqrt(doubled @ doubled) / 2
+    return length(doubled) / 2

@@ -8,6 +8,7 @@ import numpy as np
 
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
+from rlacd.solid.products import heights
 
 OFFSETS_PER_AXIS = 25
 """25 planes along each of 6 axes make the paper's 150."""
@@ -55,8 +56,8 @@ def axis_and_principal(component: Component, per_axis: int = OFFSETS_PER_AXIS) -
     The planes divide the component's extent along each direction into `per_axis` + 1 equal slabs (the paper, 3.2).
     """
     directions = np.concatenate([np.eye(3), _snapped(component.principal_axes)])
-    heights = component.hull.vertices @ directions.T
-    lower, upper = heights.min(axis=0), heights.max(axis=0)
+    along = heights(component.hull.vertices, directions)
+    lower, upper = along.min(axis=0), along.max(axis=0)
     steps = np.arange(1, per_axis + 1) / (per_axis + 1)
     offsets = lower[:, None] + (upper - lower)[:, None] * steps
     return Candidates(np.ascontiguousarray(directions), np.ascontiguousarray(offsets))

@@ -21,6 +21,7 @@ from rlacd.repair.holes import LONGEST_EXACT_LOOP, cap
 from rlacd.repair.rims import Rims, rims_of
 from rlacd.repair.soup import Soup, crossed_share, face_normals
 from rlacd.solid.frame import FloatArray
+from rlacd.solid.products import dots
 from rlacd.solid.topology import (
     BoolArray,
     IntArray,
@@ -257,7 +258,7 @@ def _smooth_share(soup: Soup, rims: Rims, caps: IntArray, owner: IntArray) -> Fl
     order = np.argsort(key, kind="stable")
     wanted = head * count + tail + loop_of * count**2
     at = np.minimum(np.searchsorted(key[order], wanted), len(key) - 1)
-    cosine = np.einsum("ij,ij->i", rims.normals[np.concatenate(rims.beside)], normal[order[at] // 3])
+    cosine = dots(rims.normals[np.concatenate(rims.beside)], normal[order[at] // 3])
     smooth = (cosine > _SMOOTH) & (key[order][at] == wanted)
     length = np.linalg.norm(soup.vertices[head] - soup.vertices[tail], axis=1)
     share: FloatArray = np.bincount(loop_of, length * smooth) / np.bincount(loop_of, length)

@@ -9,6 +9,7 @@ import numpy as np
 from rlacd import _native
 from rlacd._native import Surface, poll_stop
 from rlacd.solid.frame import FloatArray
+from rlacd.solid.products import dots
 from rlacd.solid.topology import BoolArray, IntArray, first_of_doubled
 
 # An odd number that spreads the bits of a factor over the upper half of the product.
@@ -59,7 +60,7 @@ def points_covering(vertices: FloatArray, faces: IntArray, spacing: float) -> tu
     """
     corners = vertices[faces]
     edges = np.roll(corners, -1, axis=1) - corners
-    small = (np.einsum("...j,...j->...", edges, edges) <= spacing**2).all(axis=1)
+    small = (dots(edges, edges) <= spacing**2).all(axis=1)
     first = np.full(len(vertices), -1, dtype=np.int64)
     numbers = np.flatnonzero(small)
     poll_stop()

@@ -13,6 +13,7 @@ import numpy as np
 
 from rlacd._native import PointTree, least_bent, poll_stop
 from rlacd.solid.frame import FloatArray
+from rlacd.solid.products import dots
 from rlacd.solid.topology import BoolArray, Edges, IntArray, components, first_of_doubled, nondegenerate
 
 # Optimal triangulation considers all triples of corners; longer loops are cut by ears, or up to a length if that fails.
@@ -94,7 +95,7 @@ def split_at_free_vertices(vertices: FloatArray, faces: IntArray, tolerance: flo
     edge = np.repeat(np.arange(len(halfedge)), count)
     vertex = free[near]
     offset = vertices[vertex] - vertices[a[edge]]
-    along = np.einsum("ij,ij->i", offset, span[edge]) / np.maximum(length[edge] ** 2, np.finfo(float).tiny)
+    along = dots(offset, span[edge]) / np.maximum(length[edge] ** 2, np.finfo(float).tiny)
     away = np.linalg.norm(offset - along[:, None] * span[edge], axis=1)
     margin = tolerance / np.maximum(length[edge], tolerance)
     on = (away <= tolerance) & (along > margin) & (along < 1 - margin) & (vertex != c[edge])

@@ -19,6 +19,7 @@ from rlacd._native import poll_stop
 from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.soup import Soup, across
 from rlacd.solid.frame import FloatArray
+from rlacd.solid.products import dots, heights, length
 from rlacd.solid.topology import BoolArray, IntArray, components
 
 # A flap has at most this share of its body's area.
@@ -130,7 +131,7 @@ def _mates(soup: Soup) -> IntArray:
     for number in np.unique(valence[valence > 2]).tolist():
         around = order[valence == number].reshape(-1, number)
         away = across(soup.vertices, soup.faces, around.ravel()).reshape(-1, number, 3)
-        folded = np.einsum("eik,ejk->eij", away, away)
+        folded = dots(away[:, :, None], away[:, None])
         # A flap attached to the others has free edges.
         hanging = 2 * free[around // 3]
         folded += hanging[:, :, None] + hanging[:, None, :]
@@ -180,7 +181,7 @@ def _against_main(soup: Soup, patch: IntArray, left_out: BoolArray, weighted: Fl
     there = main[patch] & ~left_out
     corners = soup.faces[there].copy()
     a, b, c = (soup.vertices[corners[:, i]] for i in range(3))
-    flipped = np.einsum("ij,ij->i", np.cross(b - a, c - a), weighted[there]) < 0
+    flipped = dots(np.cross(b - a, c - a), weighted[there]) < 0
     corners[flipped] = corners[flipped, ::-1]
     query = SurfaceQuery(soup.vertices, corners)
     middle = soup.vertices[soup.faces[island]].mean(axis=1)
@@ -209,10 +210,10 @@ def _followers(
         poll_stop()
         arriving, leaving = ends[first_in[i] : last_in[i]], begins[first_out[i] : last_out[i]]
         here, axis = vertices[vertex[i]], normals[vertex[i]]
-        axis = axis / max(float(np.linalg.norm(axis)), np.finfo(float).tiny)
+        axis = axis / max(length(axis), np.finfo(float).tiny)
         came, goes = vertices[tail[arriving]] - here, vertices[head[leaving]] - here
-        flat = came - np.outer(came @ axis, axis)
-        turn = np.arctan2(np.cross(axis, flat) @ goes.T, flat @ goes.T) % (2 * np.pi)
+        flat = came - np.outer(heights(came, axis), axis)
+        turn = np.arctan2(heights(np.cross(axis, flat), goes), heights(flat, goes)) % (2 * np.pi)
         turn[head_fan[arriving][:, None] == tail_fan[leaving]] += 2 * np.pi  # all the way around
         for _ in range(min(turn.shape)):
             a, b = np.unravel_index(turn.argmin(), turn.shape)

@@ -12,6 +12,7 @@ import numpy as np
 
 from rlacd._native import poll_stop
 from rlacd.solid.frame import FloatArray
+from rlacd.solid.products import dots
 from rlacd.solid.topology import BoolArray, IntArray, Sides, components
 
 # A sharp fold would push its vertex far out to keep the distance to both flanks; stop at this multiple.
@@ -125,7 +126,7 @@ def _fan_offsets(
     for i, (p, q, r) in enumerate(((a, b, c), (b, c, a), (c, a, b))):
         poll_stop()
         along, across = q - p, r - p
-        weight[:, i] = np.arctan2(np.linalg.norm(np.cross(along, across), axis=1), np.einsum("ij,ij->i", along, across))
+        weight[:, i] = np.arctan2(np.linalg.norm(np.cross(along, across), axis=1), dots(along, across))
     poll_stop()
     corner_normal = np.repeat(normal, 3, axis=0)
     total = np.stack([np.bincount(fan, weight.ravel() * corner_normal[:, k], number) for k in range(3)], axis=1)
@@ -133,7 +134,7 @@ def _fan_offsets(
     length = np.linalg.norm(total, axis=1, keepdims=True)
     mean = np.where(length > 1e-6, total / np.maximum(length, np.finfo(float).tiny), 0.0)
     # The miter: far enough along the mean normal to be at distance 1 from the steepest face that has a direction.
-    cosine = np.where(weight.ravel() > 0, np.einsum("ij,ij->i", corner_normal, mean[fan]), 1.0)
+    cosine = np.where(weight.ravel() > 0, dots(corner_normal, mean[fan]), 1.0)
     poll_stop()
     steepest = np.ones(number)
     np.minimum.at(steepest, fan, cosine)

@@ -10,6 +10,7 @@ import numpy as np
 from rlacd._native import poll_stop
 from rlacd.repair.distance import SurfaceQuery
 from rlacd.solid.frame import FloatArray
+from rlacd.solid.products import dots
 from rlacd.solid.topology import (
     BoolArray,
     Edges,
@@ -85,7 +86,7 @@ class Soup:
         halfedge = halfedge[self.edges.valence[self.edges.of_halfedge[halfedge]] == 2].reshape(-1, 2)
         away = [across(self.vertices, self.faces, some) for some in halfedge.T]
         poll_stop()
-        halfedge = halfedge[np.einsum("ij,ij->i", *away) < _FOLD]
+        halfedge = halfedge[dots(*away) < _FOLD]
         count, patch = components(len(self.faces), halfedge[:, 0] // 3, halfedge[:, 1] // 3)
         # Layers of thousands of stacked faces take minutes to unite: there, thin spots are the lesser evil.
         poll_stop()
@@ -112,7 +113,7 @@ def across(vertices: FloatArray, faces: IntArray, halfedges: IntArray) -> FloatA
     a, b, c = (vertices[faces[face, (corner + i) % 3]] for i in range(3))
     poll_stop()
     along = (b - a) / np.maximum(np.linalg.norm(b - a, axis=1, keepdims=True), np.finfo(float).tiny)
-    away = c - a - np.einsum("ij,ij->i", c - a, along)[:, None] * along
+    away = c - a - dots(c - a, along)[:, None] * along
     return np.asarray(away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), np.finfo(float).tiny))
 
 

@@ -20,6 +20,7 @@ from rlacd.search.transfer import exchange_of
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part, Plane
 from rlacd.solid.hull import Hull
+from rlacd.solid.products import heights, length
 from rlacd.work import Work
 
 TAKERS = 6
@@ -87,7 +88,7 @@ def _may_be_taken(part: Part, around: Sequence[Part], uniter: Uniter) -> bool:
     """Whether some other part could take each of the part's extreme vertices by itself: a quick necessary test."""
     corners = part.hull.vertices
     directions = np.concatenate([np.eye(3), -np.eye(3)])
-    outermost = sorted(set(np.argmax(corners @ directions.T, axis=0).tolist()))
+    outermost = sorted(set(np.argmax(heights(corners, directions), axis=0).tolist()))
     return all(
         any(
             uniter.account.pay(work.joining(len(around[i].hull.vertices)) + work.probing(len(around[i].hull.vertices)))
@@ -116,14 +117,14 @@ def _by_growth(parts: Sequence[Part], piece: Part, reach: float, account: Work) 
 def _gap(box: FloatArray, other: FloatArray) -> float:
     """Distance of a box [2, 3] from another, or from a point [3]."""
     low, high = (other[0], other[1]) if other.ndim == 2 else (other, other)
-    return float(np.linalg.norm(np.maximum(np.maximum(low - box[1], box[0] - high), 0.0)))
+    return length(np.maximum(np.maximum(low - box[1], box[0] - high), 0.0))
 
 
 def _halves(piece: Component, random: np.random.Generator) -> list[Component]:
     """Cut across the longest coordinate axis or principal axis, chosen at random; the smaller half first."""
     axes = np.eye(3) if random.random() < 0.5 else piece.principal_axes
-    heights = piece.hull.vertices @ axes.T
-    lower, upper = heights.min(axis=0), heights.max(axis=0)
+    along = heights(piece.hull.vertices, axes)
+    lower, upper = along.min(axis=0), along.max(axis=0)
     longest = int(np.argmax(upper - lower))
     share = random.uniform(0.5 - MIDDLE, 0.5 + MIDDLE)
     x, y, z = (float(c) for c in axes[longest])

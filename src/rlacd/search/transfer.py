@@ -20,6 +20,7 @@ from rlacd.search.recut import Exchange
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part, Plane
 from rlacd.solid.hull import Hull
+from rlacd.solid.products import dots, heights, length
 from rlacd.solid.reunite import reunite
 
 TRIES = 16
@@ -104,20 +105,20 @@ def _direction(part: Part, taker: Part, random: np.random.Generator) -> FloatArr
     largest = max(part.members, key=lambda member: member.volume)
     axes = np.vstack([np.eye(3), largest.principal_axes, away])
     axis: FloatArray = axes[random.integers(len(axes))]
-    axis = axis / max(float(np.linalg.norm(axis)), 1e-12)
-    return -axis if axis @ away < 0 else axis
+    axis = axis / max(length(axis), 1e-12)
+    return -axis if dots(axis, away) < 0 else axis
 
 
 def _largest_bite(part: Part, taker: Part, direction: FloatArray, uniter: Uniter) -> tuple[Part, Part | None] | None:
     """Give the taker as much as it can have: the grown taker and the rest; None if that is at most `LEAST`."""
     corners = np.concatenate([member.hull.vertices for member in part.members])
-    heights = corners @ direction
-    lower, upper = float(heights.min()), float(heights.max())
+    along = heights(corners, direction)
+    lower, upper = float(along.min()), float(along.max())
     offset = lower + FIRST * (upper - lower)
     best = None
     for _ in range(1 + HALVINGS):
         bite = None
-        if not _is_too_much(corners[heights <= offset], taker, uniter):
+        if not _is_too_much(corners[along <= offset], taker, uniter):
             bite = _bite(part, taker, direction, offset, uniter)
         if bite is not None:
             lower, best = offset, bite
@@ -188,10 +189,10 @@ def _divided(
     below: list[Component] = []
     above: list[Component] = []
     for component in components:
-        heights = component.hull.vertices @ direction
-        if heights.max() <= offset:
+        along = heights(component.hull.vertices, direction)
+        if along.max() <= offset:
             below.append(component)
-        elif heights.min() >= offset:
+        elif along.min() >= offset:
             above.append(component)
         else:
             for side, found in zip((below, above), component.cut(Plane((x, y, z), offset)), strict=True):

@@ -262,17 +262,12 @@ class Component(Part):
 
     @cached_property
     def principal_axes(self) -> FloatArray:
-        """Principal axes of the surface [3, 3], one per row, longest first, right-handed.
+        """Principal axes of the surface [3, 3], one per row, longest first.
 
         Eigenvectors of the second moments of the surface (exact over its triangles). Their signs are fixed by making
         the largest entry positive.
         """
-        _, axes = np.linalg.eigh(_native.mesh_moments(self.vertices, self.faces))
-        axes = axes.T[::-1].copy()
-        for axis in axes:
-            largest = int(np.argmax(np.abs(axis)))
-            axis *= np.sign(axis[largest])
-        return axes
+        return _native.principal_axes(self.vertices, self.faces)
 
     def cut(self, plane: Plane) -> tuple[Component | None, Component | None]:
         """Cut by a plane: returns the sides below and above, None for a side without volume."""

@@ -17,6 +17,7 @@ from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.manifold import to_manifold
+from rlacd.solid.products import heights, length
 from rlacd.solid.solid import Solid, surface_of
 
 MOST_HULLS = 2000
@@ -131,11 +132,11 @@ def _touching(points: FloatArray) -> Hull:
     """The polytope of the supporting planes of points [N, 3] in `_DIRECTIONS`."""
     reach = np.full(len(_DIRECTIONS), -np.inf)
     for first in range(0, len(points), _AT_ONCE):
-        np.maximum(reach, (points[first : first + _AT_ONCE] @ _DIRECTIONS.T).max(axis=0), out=reach)
+        np.maximum(reach, heights(points[first : first + _AT_ONCE], _DIRECTIONS).max(axis=0), out=reach)
     box = _box(points)
     body = to_manifold(box.vertices, box.faces)
     for direction, offset in zip(_DIRECTIONS, reach + 2 * _WIDER, strict=True):
-        body = body.trim_by_plane(-direction, -offset / np.linalg.norm(direction))
+        body = body.trim_by_plane(-direction, -offset / length(direction))
     return Hull.of(surface_of(body)[0]) or box
 
 

@@ -33,6 +33,7 @@ from rlacd.io.read.xml import check_3mf, collada_of
 from rlacd.memory import BYTES_READ, require_memory
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.input_mesh import Asset, InputMesh, SourceNode
+from rlacd.solid.products import heights
 from rlacd.solid.topology import BoolArray, IntArray
 
 Source: TypeAlias = str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]
@@ -247,7 +248,7 @@ def _bake(source: trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud, name: st
         if isinstance(geometry, trimesh.Trimesh):
             v, f = _arrays(geometry.vertices, geometry.faces)
             if transform is not None:
-                v = v @ transform[:3, :3].T + transform[:3, 3]
+                v = heights(v, transform[:3, :3]) + transform[:3, 3]
                 if np.linalg.det(transform[:3, :3]) < 0:
                     f = f[:, ::-1]
             if len(f) == 0:
@@ -261,7 +262,7 @@ def _bake(source: trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud, name: st
             count += len(v)
         elif isinstance(geometry, trimesh.PointCloud):
             v, _ = _arrays(geometry.vertices, [])
-            points.append(v if transform is None else v @ transform[:3, :3].T + transform[:3, 3])
+            points.append(v if transform is None else heights(v, transform[:3, :3]) + transform[:3, 3])
     if vertices:
         node_of = np.repeat(np.arange(len(nodes)), [len(f) for f in faces])
         return _Baked(np.concatenate(vertices), np.concatenate(faces), tuple(nodes), node_of)
