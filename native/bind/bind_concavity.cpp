@@ -10,34 +10,41 @@
 namespace rlacd {
 
 void bind_concavity(nb::module_& m) {
+  nb::class_<TreeCache>(m, "TreeCache", "The tree of one part's surface, made by the first test that needs it.")
+      .def(nb::init<>());
   m.def(
       "meets_concavity",
       [](const PointsIn& part_vertices, const FacesIn& part_faces, const PointsIn& hull_vertices,
-         const FacesIn& hull_faces, double part_volume, double hull_volume, double threshold) {
+         const FacesIn& hull_faces, double part_volume, double hull_volume, double threshold, const TreeCache* tree) {
         const Mesh part = to_finite_mesh(part_vertices, part_faces), hull = to_finite_mesh(hull_vertices, hull_faces);
         nb::gil_scoped_release release;
-        return meets_concavity(part, hull, part_volume, hull_volume, threshold);
+        const TreeCache own;
+        return meets_concavity(part, hull, part_volume, hull_volume, threshold, tree ? *tree : own);
       },
       nb::arg("part_vertices"), nb::arg("part_faces"), nb::arg("hull_vertices"), nb::arg("hull_faces"),
-      nb::arg("part_volume"), nb::arg("hull_volume"), nb::arg("threshold"),
+      nb::arg("part_volume"), nb::arg("hull_volume"), nb::arg("threshold"), nb::arg("tree") = nb::none(),
       "Whether the concavity of a closed part with this hull is certainly <= threshold.\n\n"
-      "False when it is larger, or so close (0.1 %) that branch and bound gave up. The hull must hold the part.");
+      "False when it is larger, or so close (0.1 %) that branch and bound gave up. The hull must hold the part.\n"
+      "`tree` is that of the part's surface; without it, one is made and forgotten.");
   m.def(
       "concavity",
       [](const PointsIn& part_vertices, const FacesIn& part_faces, const PointsIn& hull_vertices,
-         const FacesIn& hull_faces, double part_volume, double hull_volume, double tolerance, double floor) {
+         const FacesIn& hull_faces, double part_volume, double hull_volume, double tolerance, double floor,
+         const TreeCache* tree) {
         const Mesh part = to_finite_mesh(part_vertices, part_faces), hull = to_finite_mesh(hull_vertices, hull_faces);
         if (!(tolerance > 0)) throw std::invalid_argument("the tolerance must be positive");
         Concavity c;
         {
           nb::gil_scoped_release release;
-          c = concavity(part, hull, part_volume, hull_volume, tolerance, floor);
+          const TreeCache own;
+          c = concavity(part, hull, part_volume, hull_volume, tolerance, floor, tree ? *tree : own);
         }
         const auto pair = [](const Interval& i) { return nb::make_tuple(i.lower, i.upper); };
         return nb::make_tuple(pair(c.value()), pair(c.part_to_hull), pair(c.hull_to_part), c.volume_radius);
       },
       nb::arg("part_vertices"), nb::arg("part_faces"), nb::arg("hull_vertices"), nb::arg("hull_faces"),
       nb::arg("part_volume"), nb::arg("hull_volume"), nb::arg("tolerance"), nb::arg("floor") = 0.0,
+      nb::arg("tree") = nb::none(),
       "Concavity of a closed part with this hull: (value, part_to_hull, hull_to_part, volume_radius).\n\n"
       "The first three are certified intervals (lower, upper). The value's is at most `tolerance` wide; that of a\n"
       "one-sided distance may be wider below the value, where the others decide it. Values up to `floor` need not be "
@@ -53,6 +60,7 @@ void bind_concavity(nb::module_& m) {
             new (self) Filling(solid);
           },
           nb::arg("vertices"), nb::arg("faces"))
+      .def_prop_ro("surface", &Filling::surface, nb::rv_policy::reference_internal, "The solid's surface.")
       .def(
           "feasibility",
           [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces, double threshold) {

@@ -2,7 +2,6 @@
 
 #include <stdexcept>
 
-#include "distance/bvh.hpp"
 #include "distance/surface_field.hpp"
 #include "hull/convex_planes.hpp"
 
@@ -75,12 +74,11 @@ double volume_radius(double part_volume, double hull_volume) {
 }
 
 Concavity concavity(const Mesh& part, const Mesh& hull, double part_volume, double hull_volume, double tolerance,
-                    double floor) {
+                    double floor, const TreeCache& tree) {
   check(part, hull);
   const ConvexPlanes planes(hull);
   DepthField depth(planes, hull);
-  const Bvh bvh(part);
-  SurfaceField distance(bvh);
+  SurfaceField distance(tree.of(part));
   Concavity result;
   result.volume_radius = volume_radius(part_volume, hull_volume);
   Goal goal;
@@ -92,7 +90,8 @@ Concavity concavity(const Mesh& part, const Mesh& hull, double part_volume, doub
   return result;
 }
 
-bool meets_concavity(const Mesh& part, const Mesh& hull, double part_volume, double hull_volume, double threshold) {
+bool meets_concavity(const Mesh& part, const Mesh& hull, double part_volume, double hull_volume, double threshold,
+                     const TreeCache& tree) {
   check(part, hull);
   if (!(kVolumeWeight * volume_radius(part_volume, hull_volume) <= threshold)) return false;
   const ConvexPlanes planes(hull);
@@ -108,8 +107,7 @@ bool meets_concavity(const Mesh& part, const Mesh& hull, double part_volume, dou
   goal.fail = threshold;
   DepthField depth(planes, hull);
   if (!(maximize(depth, part, goal).upper <= threshold)) return false;
-  const Bvh bvh(part);
-  SurfaceField distance(bvh);
+  SurfaceField distance(tree.of(part));
   return maximize(distance, hull, goal).upper <= threshold;
 }
 

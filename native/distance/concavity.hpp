@@ -11,6 +11,7 @@
 
 #include "base/geometry.hpp"
 #include "distance/branch_and_bound.hpp"
+#include "distance/surface.hpp"
 
 namespace rlacd {
 
@@ -31,11 +32,13 @@ double volume_radius(double part_volume, double hull_volume);
 
 // The interval of the value is at most `tolerance` wide; that of a one-sided distance may be wider below the value,
 // where the other terms decide it. Values up to `floor` need not be resolved: the interval may then be (0, floor).
+// `tree` is the part's, whatever its hull.
 Concavity concavity(const Mesh& part, const Mesh& hull, double part_volume, double hull_volume, double tolerance,
-                    double floor);
+                    double floor, const TreeCache& tree);
 
 // True only if the concavity is certainly <= threshold. False if it is larger, or within 1e-3 of the threshold and
 // undecided.
-bool meets_concavity(const Mesh& part, const Mesh& hull, double part_volume, double hull_volume, double threshold);
+bool meets_concavity(const Mesh& part, const Mesh& hull, double part_volume, double hull_volume, double threshold,
+                     const TreeCache& tree);
 
 }  // namespace rlacd

@@ -34,6 +34,7 @@ class Filling {
  public:
   explicit Filling(const Mesh& solid) : solid_(solid), surface_(solid) {}
 
+  const Surface& surface() const { return surface_; }
   Chance chance(const Mesh& hull, double threshold) const;
   // The same for the joint hull of two hulls that are close enough to their own shares of the solid, and its volume
   // unless the verdict is kNever.

@@ -27,4 +27,17 @@ class Surface {
   mutable std::unique_ptr<Winding> winding_;
 };
 
+// The tree of one surface that several tests may need, made by the first of them.
+class TreeCache {
+ public:
+  const Bvh& of(const Mesh& surface) const {
+    std::call_once(made_, [&] { bvh_ = std::make_unique<Bvh>(surface); });
+    return *bvh_;
+  }
+
+ private:
+  mutable std::once_flag made_;
+  mutable std::unique_ptr<Bvh> bvh_;
+};
+
 }  // namespace rlacd

@@ -122,6 +122,8 @@ def directed_hausdorff(
 
 class Filling:
     def __init__(self, vertices: FloatArray, faces: IntArray) -> None: ...
+    @property
+    def surface(self) -> Surface: ...
     def feasibility(self, hull_vertices: FloatArray, hull_faces: IntArray, threshold: float) -> int: ...  # 0, 1 or 2
     def joint_feasibilities(
         self, groups: Sequence[FloatArray], pairs: IntArray, threshold: float, threads: int = 0
@@ -134,6 +136,9 @@ class Filling:
         self, vertices: list[FloatArray], faces: list[IntArray], reach: float, grain: float, threads: int = 0
     ) -> list[FloatArray]: ...
 
+class TreeCache:
+    def __init__(self) -> None: ...
+
 def meets_concavity(
     part_vertices: FloatArray,
     part_faces: IntArray,
@@ -142,6 +147,7 @@ def meets_concavity(
     part_volume: float,
     hull_volume: float,
     threshold: float,
+    tree: TreeCache | None = None,
 ) -> bool: ...
 def concavity(
     part_vertices: FloatArray,
@@ -152,6 +158,7 @@ def concavity(
     hull_volume: float,
     tolerance: float,
     floor: float = 0.0,
+    tree: TreeCache | None = None,
 ) -> tuple[Interval, Interval, Interval, float]: ...
 
 class Simplifier:

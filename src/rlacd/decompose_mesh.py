@@ -13,6 +13,7 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
+from rlacd import _native
 from rlacd._native import Stopped
 from rlacd.clock import Clock
 from rlacd.criteria import AddedVolume, Concavity, Criterion, NavigableSpace
@@ -304,7 +305,7 @@ def _finished(reached: _Reached, workers: Workers, clock: Clock) -> _Done:
         with clock.shielded():
             hulls = workers.map(lambda part: in_input(part.hull, solid.frame, *limits), parts)
     with clock.stage("measure"):
-        report = make_report(solid, parts, hulls, reached.options, goal, seams, workers, clock)
+        report = make_report(solid, parts, hulls, reached.options, goal, seams, workers, clock, reached.root)
         unknown: list[int] | list[None] = [None] * len(hulls)
         bodies = clock.if_in_time(lambda: _bodies(solid, hulls), lambda: unknown)
     for hull, body in zip(hulls, bodies, strict=True):
@@ -360,6 +361,7 @@ def _cleaned(
     slack = SLACK + 8 * reached.solid.frame.resolution
 
     def cleaned(part: Part) -> Part:
+        part.tree = part.tree or _native.TreeCache()
         if kinds:
             shaped = primitive_part(part, goal, kinds, max_vertices, max_faces, slack, reached.root)
             if shaped is not part:

@@ -17,7 +17,7 @@ from rlacd.merge.slivers import is_sliver
 from rlacd.options import Options
 from rlacd.presets import Preset, find_preset
 from rlacd.primitive_kinds import PRIMITIVE_KINDS
-from rlacd.solid.component import Part, concatenated
+from rlacd.solid.component import Component, Part, concatenated
 from rlacd.solid.distance import hull_distances, hull_union
 from rlacd.solid.hull import Hull
 from rlacd.solid.mass import Mass, joint_mass, mass_of
@@ -41,10 +41,11 @@ def make_report(
     seams: Seams | None,
     workers: Workers,
     clock: Clock,
+    root: Component | None,
 ) -> dict[str, Any]:
     """Measure a finished decomposition; the keys are those of `rlacd.Decomposition` without name, search and seconds.
 
-    Values that there was no time to measure are None.
+    Values that there was no time to measure are None. The component that was cut is None if there was no time for one.
     """
     is_cover = len(solid.faces) == 0  # hulls of an input that was not repaired: the parts in them are unknown
     errors = None if is_cover else clock.if_in_time(lambda: workers.map(criterion.error, parts), lambda: None)
@@ -52,7 +53,9 @@ def make_report(
     over = under = place = None
     has_surface = len(solid.surface[1]) > 0  # a cloud of points has none
     if has_surface:
-        over, under, place = clock.if_in_time(lambda: _distances(solid, parts, workers), lambda: (None, None, None))
+        over, under, place = clock.if_in_time(
+            lambda: _distances(solid, parts, workers, root), lambda: (None, None, None)
+        )
     stands_for_mass = [(part.hull.vertices, part.hull.faces) for part in parts] if is_cover else [solid.mesh]
     mass = mass_of(*concatenated(stands_for_mass), solid.frame)
     return {
@@ -201,10 +204,13 @@ def _mass(mass: Mass) -> dict[str, Any]:
     return now | {"volume_m": volume, "centre_m": centre, "inertia_m": inertia}
 
 
-def _distances(solid: Solid, parts: Sequence[Part], workers: Workers) -> tuple[float, float, str | None]:
+def _distances(
+    solid: Solid, parts: Sequence[Part], workers: Workers, root: Component | None
+) -> tuple[float, float, str | None]:
     """How far the hulls reach out and fall short, and where they fall short most if that is worth a warning."""
     hulls = [part.hull for part in parts]
-    distances = hull_distances(hulls, *solid.surface, threads=workers.threads)
+    known = root.filling.surface if root is not None and solid.is_as_given else None
+    distances = hull_distances(hulls, *solid.surface, threads=workers.threads, surface=known)
     over, under = distances.over[1], distances.under[1]
     if under <= HONEST_WITHIN:
         return over, under, None

@@ -173,7 +173,7 @@ class Concavity:
         """
         hull = part.hull
         return _native.meets_concavity(
-            part.vertices, part.faces, hull.vertices, hull.faces, part.volume, hull.volume, self.threshold
+            part.vertices, part.faces, hull.vertices, hull.faces, part.volume, hull.volume, self.threshold, part.tree
         )
 
     def measure(self, part: Part, tolerance: float = 1e-3, floor: float = 0.0) -> ConcavityValue:
@@ -187,6 +187,14 @@ class Concavity:
         hull = part.hull
         return ConcavityValue(
             *_native.concavity(
-                part.vertices, part.faces, hull.vertices, hull.faces, part.volume, hull.volume, tolerance, floor
+                part.vertices,
+                part.faces,
+                hull.vertices,
+                hull.faces,
+                part.volume,
+                hull.volume,
+                tolerance,
+                floor,
+                part.tree,
             )
         )

@@ -50,6 +50,10 @@ class Part(Protocol):
     def within(self) -> Part | None:
         """The part it was cut from, whose hull contains this one's."""
 
+    @property
+    def tree(self) -> _native.TreeCache | None:
+        """Keeps the tree over the surface from one test to the next."""
+
     def with_hull(self, hull: Hull) -> Part:
         """Get the same solid with another hull."""
 

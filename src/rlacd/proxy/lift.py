@@ -137,7 +137,9 @@ class Lift:
         vertices, faces = self.solid.clipped(hull)
         if not len(faces):
             return Part(hull.vertices, hull.faces, hull.volume, hull)
-        return Part(vertices, faces, max(0.0, _native.mesh_volume(vertices, faces)), hull)
+        part = Part(vertices, faces, max(0.0, _native.mesh_volume(vertices, faces)), hull)
+        part.tree = _native.TreeCache()
+        return part
 
     def _failing(self, lifted: dict[int, Part], origins: Sequence[Part | None]) -> list[int]:
         """Indices of the parts that fail on the solid, but for those that were cut there before."""

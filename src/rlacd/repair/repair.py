@@ -146,7 +146,7 @@ def repair(
     welded_vertices, welded_faces, is_film = _native.weld(points, corners)
     taken = _taken_as_it_is(welded_vertices, welded_faces)
     if taken is not None:
-        return Solid(taken[0], (welded_vertices, welded_faces), frame, (taken[1],), tuple(warnings))
+        return Solid(taken[0], (welded_vertices, welded_faces), frame, (taken[1],), tuple(warnings), is_as_given=True)
     require_memory(len(welded_faces), BYTES_REPAIRED, mesh.name)
     vertices, faces = detach_films(welded_vertices, welded_faces.astype(np.int64), is_film)
     detached = np.asarray(faces[:, 0] >= len(welded_vertices))

@@ -73,6 +73,8 @@ class Part:
     ----------
     within : Part or None
         A part whose hull contains this one's: the one it was cut from.
+    tree : TreeCache or None
+        Keeps the tree over the surface for the tests to come, whatever the hull; None forgets it after each.
     """
 
     def __init__(
@@ -88,6 +90,7 @@ class Part:
         self.hull = hull
         self.piece_hulls = hull.volume if piece_hulls is None else piece_hulls
         self.within: Part | None = None
+        self.tree: _native.TreeCache | None = None
         self._size = len(faces)
 
     def __repr__(self) -> str:
@@ -153,6 +156,7 @@ class _Union(Part):
         self.hull = hull
         self.piece_hulls = first.piece_hulls + second.piece_hulls
         self.within = None
+        self.tree = None
         self._size = first.size + second.size
         self._members = (*first.members, *second.members)
 

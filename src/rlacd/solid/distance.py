@@ -81,6 +81,7 @@ def hull_distances(
     faces: IntArray,
     tolerance: float = TOLERANCE,
     threads: int | None = None,
+    surface: _native.Surface | None = None,
 ) -> HullDistances:
     """Measure the union of convex hulls against a surface.
 
@@ -95,6 +96,8 @@ def hull_distances(
         Width of both intervals.
     threads
         None uses every core.
+    surface
+        The same surface, if it is known: made here otherwise.
 
     Notes
     -----
@@ -109,7 +112,7 @@ def hull_distances(
     """
     _require_positive(tolerance)
     union = hull_union(hulls, threads)
-    surface = _native.Surface(vertices, faces)
+    surface = surface or _native.Surface(vertices, faces)
     return HullDistances(
         union.over(surface, tolerance, GAP, threads or 0), union.under(vertices, faces, tolerance, threads or 0)
     )

@@ -55,6 +55,8 @@ class Solid:
         One sentence for each thing the user should know.
     body_of
         ``[F]``, the body of each face of the surface; None if there is only one.
+    is_as_given
+        Whether the shape is the surface, in another order.
     """
 
     shape: Manifold | tuple[FloatArray, NDArray[np.int32]]
@@ -63,6 +65,7 @@ class Solid:
     bodies: tuple[BodyRepair, ...]
     warnings: tuple[str, ...]
     body_of: NDArray[np.int64] | None = None
+    is_as_given: bool = False
 
     @property
     def vertices(self) -> FloatArray:
