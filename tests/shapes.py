@@ -23,6 +23,7 @@ Ints = npt.NDArray[np.int32]
 class Closed:
     vertices: Floats
     faces: Ints
+    tree: None = None
 
     @property
     def volume(self) -> float:
