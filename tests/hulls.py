@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from fractions import Fraction
 
 import numpy as np
@@ -9,6 +10,8 @@ import numpy.typing as npt
 import trimesh
 
 from rlacd._native import convex_hull
+from rlacd.solid.distance import hull_distances
+from rlacd.solid.hull import Hull
 
 
 def hull_of(points: npt.ArrayLike) -> trimesh.Trimesh:
@@ -42,6 +45,20 @@ def assert_convex_hull(mesh: trimesh.Trimesh) -> None:
         heights = [sum(n * x for n, x in zip(normal, _minus(p, a), strict=True)) for p in points]
         assert max(heights) == 0, "a vertex lies above a face"
         assert min(heights) < 0, "the mesh is flat"
+
+
+def assert_covers(
+    hulls: Iterable[trimesh.Trimesh], vertices: npt.ArrayLike, faces: npt.ArrayLike, within: float = 5e-3
+) -> None:
+    """Every hull is valid, and the input's surface is not farther from them than repair may move it."""
+    points, triangles, valid = np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int32), []
+    for hull in hulls:
+        assert_convex_hull(hull)
+        assert hull.volume > 0
+        valid.append(Hull(np.asarray(hull.vertices), np.asarray(hull.faces, dtype=np.int32), hull.volume))
+    assert valid
+    longest = np.ptp(points, axis=0).max()
+    assert hull_distances(valid, points, triangles, tolerance=1e-3 * longest).under[0] <= within * longest / 2
 
 
 def _minus(p: tuple[Fraction, ...], q: tuple[Fraction, ...]) -> tuple[Fraction, ...]:

@@ -20,10 +20,8 @@ from rlacd import _native, decompose_mesh
 from rlacd.clock import Clock
 from rlacd.io.read.load import load_mesh
 from rlacd.solid.cover import MOST_HULLS, cover
-from rlacd.solid.distance import hull_distances
-from rlacd.solid.hull import Hull
 from rlacd.workers import Workers
-from tests.hulls import assert_convex_hull
+from tests.hulls import assert_covers
 from tests.shapes_large import LARGE, Mesh, boxes, bristles, noisy_ball, screws, sheet, spiked_ball, sponge, terrain
 
 SMALL: dict[str, Mesh] = {
@@ -42,19 +40,6 @@ LONG = {"ball", "sheet", "terrain", "screws"}
 
 PATIENCE = 30.0
 """Seconds beyond the promise that a busy machine may take."""
-
-
-def assert_covers(result: rlacd.Decomposition, mesh: Mesh, within: float = 5e-3) -> None:
-    """Every hull is valid, and the input's surface is not farther from them than repair may move it."""
-    assert len(result) >= 1
-    hulls = []
-    for hull in result:
-        assert_convex_hull(hull)
-        assert hull.volume > 0
-        hulls.append(Hull(np.asarray(hull.vertices), np.asarray(hull.faces, dtype=np.int32), hull.volume))
-    vertices, faces = mesh
-    under = hull_distances(hulls, vertices, faces, tolerance=1e-3 * np.ptp(vertices, axis=0).max()).under[0]
-    assert under <= within * np.ptp(vertices, axis=0).max() / 2
 
 
 @pytest.fixture
@@ -100,7 +85,7 @@ def test_stopped_at_any_poll_the_hulls_cover_the_input(polls: list[int], name: s
             break
         assert not result.report["complete"]
         assert any("early" in sentence for sentence in result.report["warnings"])
-        assert_covers(result, SMALL[name])
+        assert_covers(result, *SMALL[name])
         stages |= {stage for stage in result.report["seconds"]}
     else:
         pytest.fail("it never came to its end")
@@ -146,7 +131,7 @@ def test_stopped_with_options_that_have_stages_of_their_own(polls: list[int], op
         result = rlacd.decompose(mesh, **{"threads": 1, **options})  # type: ignore[arg-type]
         if result.report["stopped_by"] is None:
             break
-        assert_covers(result, mesh)
+        assert_covers(result, *mesh)
         for limit in ("max_vertices", "max_faces"):
             count = max(len(hull.vertices if limit == "max_vertices" else hull.faces) for hull in result)
             assert count <= options.get(limit, count)  # type: ignore[operator]
