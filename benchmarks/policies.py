@@ -82,7 +82,7 @@ ARMS: dict[str, Callable[[float], Policy]] = {
 
 
 def drawn(folder: Path, split: str, faces: int) -> list[str]:
-    """The files of a split with at most so many faces, in a fixed random order."""
+    """The files of a split with at most `faces` faces, in a fixed random order."""
     with (folder / "index.csv").open() as index:
         files = {row["file"]: int(row["faces"]) for row in csv.DictReader(index) if row["split"] == split}
     return shuffled([file for file, number in files.items() if number <= faces], seed=0)
@@ -119,7 +119,7 @@ def run(
     split: str = "test",
     faces: int = 12_000,
     listed: Annotated[Path | None, typer.Option("--list", help="Files in place of a split's.")] = None,
-    first: Annotated[int | None, typer.Option(help="Only so many of them.")] = None,
+    first: Annotated[int | None, typer.Option(help="Only the first of them.")] = None,
     arms: Annotated[
         list[str] | None, typer.Option("--arm", help="A key of ARMS, a policy's name, or a training run.")
     ] = None,

@@ -83,7 +83,7 @@ def train(
     changes = {"iterations": cuts, "warmup": warmup, "validation": 0, "environments": environments}
     options = TrainOptions.preset("two-cores", **changes)
     assets = find_assets(meshes)
-    print("| jobs | cuts | wall s | learner CPU s | players CPU s | cuts/s if nobody else computes |")
+    print("| jobs | cuts | wall s | learner CPU s | players CPU s | cuts/s on an idle machine |")
     print("|---|---|---|---|---|---|")
     for number in jobs or [0, 1, 2]:
         with tempfile.TemporaryDirectory() as folder:

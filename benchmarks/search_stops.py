@@ -102,7 +102,7 @@ def run(
     split: str = "test",
     faces: int = 12_000,
     listed: Annotated[Path | None, typer.Option("--list", help="Files in place of a split's.")] = None,
-    first: Annotated[int | None, typer.Option(help="Only so many of them.")] = None,
+    first: Annotated[int | None, typer.Option(help="Only the first of them.")] = None,
     out: Path = Path("searches.jsonl"),
 ) -> None:
     """Decompose meshes and record their searches."""
@@ -125,7 +125,7 @@ def run(
 
 
 def rules() -> dict[str, Callable[[float, float, float], bool]]:
-    """By name: whether to stop after so many trials per part and so much work without a gain, and so much in all."""
+    """By name: whether to stop, given the trials per part and the work since the last gain, and the work in all."""
     return {
         **{f"bound × {share:g}": lambda _, __, done, share=share: done >= share for share in (0.375, 0.5, 0.75)},
         **{

@@ -4,7 +4,7 @@
 //   FAULT_DISK=N          the disk is full after N bytes
 //   FAULT_RENAME=N        the Nth renaming fails, and all later ones
 //   FAULT_CHANGE=N,SIG    the signal comes before the Nth change on the disk: a write, sync, renaming or removal
-//   FAULT_CPU=MS,SIG,SIG  the signal comes when so many milliseconds of a processor are spent; the second one 100 ms later
+//   FAULT_CPU=MS,SIG,SIG  the signal comes after MS milliseconds of CPU time; the second one 100 ms later
 //   FAULT_NETWORK=1       a connection beyond this machine ends the process
 #define _GNU_SOURCE
 #include <dlfcn.h>

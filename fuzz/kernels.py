@@ -189,7 +189,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--first", type=int, default=0, help="the first seed")
     parser.add_argument("--count", type=int, default=10**9, help="how many")
-    parser.add_argument("--seconds", type=float, default=600.0, help="stop after so many")
+    parser.add_argument("--seconds", type=float, default=600.0, help="stop after this many")
     parser.add_argument("--again", type=int, help="repeat one seed, with the place that fails")
     args = parser.parse_args()
     if args.again is not None:

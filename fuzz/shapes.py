@@ -173,7 +173,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--first", type=int, default=0, help="the first seed")
     parser.add_argument("--count", type=int, default=10**9, help="how many")
-    parser.add_argument("--seconds", type=float, default=600.0, help="stop after so many")
+    parser.add_argument("--seconds", type=float, default=600.0, help="stop after this many")
     parser.add_argument("--limit", type=float, default=180.0, help="seconds a shape may take")
     parser.add_argument("--memory", type=float, default=3.0, help="gigabytes it may take; 0 for no limit")
     parser.add_argument("--here", action="store_true", help="in this process, without limits")

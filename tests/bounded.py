@@ -41,7 +41,7 @@ def bounded(
 ) -> Any:
     """What `function` returns or raises, called in a process that may take `memory` more bytes of address space.
 
-    It may keep a processor busy for so many `seconds`; waiting for one is not counted, nor waiting in vain for long.
+    It may use this many `seconds` of CPU time; time spent waiting for a processor does not count.
     A module that it `needs` is imported before that is counted.
     """
     os.environ["OPENBLAS_NUM_THREADS"] = "1"  # each of its threads reserves memory of its own

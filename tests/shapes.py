@@ -102,7 +102,7 @@ def bent_bar() -> list[Component]:
 
 
 def strangers(components: Sequence[Component]) -> list[Component]:
-    """The same components, of which nobody knows what they were cut from."""
+    """The same components, without what they were cut from."""
     return [Component(component.manifold) for component in components]
 
 

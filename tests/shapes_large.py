@@ -112,7 +112,7 @@ def bristles(count: int = 1000, seed: int = 0) -> Mesh:
 
 
 def noisy_ball(faces: int = 1_000_000, noise: float = 0.01, seed: int = 0) -> Mesh:
-    """A closed ball of about so many triangles, each corner moved along its radius."""
+    """A closed ball of about this many triangles, each corner moved along its radius."""
     rings = max(3, round((faces / 4) ** 0.5))
     around = 2 * rings
     theta = np.pi * np.arange(1, rings) / rings

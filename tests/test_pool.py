@@ -1,4 +1,4 @@
-"""The pool: what is asked is answered, and a process that dies, hangs or is killed is nobody else's trouble."""
+"""The pool: what is asked is answered, and a process that dies, hangs or is killed disturbs no other."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def test_what_is_shared_reaches_a_process_once_and_again_when_it_changes(one: Lo
 
 def test_a_death_is_reported_to_its_request_only(pool: Pool) -> None:
     if isinstance(pool, InProcessPool):
-        pytest.skip("nobody watches this process")
+        pytest.skip("no supervisor watches this process")
     well = [pool.submit(ask(number=n)) for n in range(3)]
     died = pool.submit(ask("die"))
     more = [pool.submit(ask(number=n)) for n in range(3)]

@@ -20,6 +20,7 @@ from rlacd import _native, decompose_mesh
 from rlacd.clock import Clock
 from rlacd.io.read.load import load_mesh
 from rlacd.solid.cover import MOST_HULLS, cover
+from rlacd.solid.distance import hull_distances
 from rlacd.workers import Workers
 from tests.hulls import assert_covers
 from tests.shapes_large import LARGE, Mesh, boxes, bristles, noisy_ball, screws, sheet, spiked_ball, sponge, terrain

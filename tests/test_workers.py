@@ -1,4 +1,4 @@
-"""How many threads run: as many as were asked for, whoever starts them."""
+"""How many threads run: as many as were asked for, in whichever thread or process they start."""
 
 from __future__ import annotations
 

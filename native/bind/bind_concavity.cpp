@@ -66,7 +66,7 @@ void bind_concavity(nb::module_& m) {
           [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces, double threshold) {
             const Mesh hull = to_finite_mesh(hull_vertices, hull_faces);
             nb::gil_scoped_release release;
-            return static_cast<int>(self.chance(hull, threshold));
+            return static_cast<int>(self.feasibility(hull, threshold));
           },
           nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("threshold"),
           "Whether the surfaces of a hull and of the solid's share of it may be as near as the threshold.\n\n"
@@ -83,24 +83,25 @@ void bind_concavity(nb::module_& m) {
               if (g < 0 || g >= static_cast<std::int64_t>(groups.size()))
                 throw std::invalid_argument("pair out of range");
             std::vector<double> volumes(pairs.shape(0));
-            std::vector<std::int32_t> chances(pairs.shape(0));
+            std::vector<std::int32_t> verdicts(pairs.shape(0));
             {
               nb::gil_scoped_release release;
               parallel_for(volumes.size(), resolve_threads(threads), [&](std::size_t i) {
                 const Filling::Joint joint =
-                    self.joint_chance(corners[pair[2 * i]], corners[pair[2 * i + 1]], threshold);
+                    self.joint_feasibility(corners[pair[2 * i]], corners[pair[2 * i + 1]], threshold);
                 volumes[i] = joint.volume;
-                chances[i] = static_cast<std::int32_t>(joint.chance);
+                verdicts[i] = static_cast<std::int32_t>(joint.feasibility);
               });
             }
-            return nb::make_tuple(to_array<double>(std::move(volumes)), to_array<std::int32_t>(std::move(chances)));
+            return nb::make_tuple(to_array<double>(std::move(volumes)), to_array<std::int32_t>(std::move(verdicts)));
           },
           nb::arg("groups"), nb::arg("pairs"), nb::arg("threshold"), nb::arg("threads") = 0,
           "Volumes [P] of the joint hulls of pairs [P, 2] of hulls, given by their corners, a list of arrays [N, 3], "
           "and\n"
-          "the `chance` [P] of each, where the hulls themselves are close enough to their shares of the solid. There "
+          "the `feasibility` [P] of each, where the hulls themselves are close enough to their shares of the solid. "
+          "There "
           "is no\n"
-          "volume (0) where the chance is 2.")
+          "volume (0) where it is 2.")
       .def(
           "comes_deeper",
           [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces, double threshold) {
@@ -109,7 +110,7 @@ void bind_concavity(nb::module_& m) {
             return self.comes_deeper(hull, threshold);
           },
           nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("threshold"),
-          "Whether the solid's surface comes deeper than the threshold inside a hull: `chance` is 2.")
+          "Whether the solid's surface comes deeper than the threshold inside a hull: `feasibility` is 2.")
       .def(
           "clipped",
           [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces) -> nb::object {

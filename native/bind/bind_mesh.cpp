@@ -272,7 +272,7 @@ void bind_mesh(nb::module_& m) {
       nb::arg("vertices"), nb::arg("faces"),
       "The body [V] of each vertex of a mesh of any quality, numbered from 0 by their first faces, -1 for those of "
       "none:\n"
-      "faces hang together where they share a corner, or have corners in one place.");
+      "faces are connected where they share a corner, or have corners in one place.");
   nb::class_<PointTree>(m, "PointTree", "Finds those of some points [N, 3] that lie in a ball.")
       .def(
           "__init__",

@@ -57,7 +57,7 @@ void bind_plane_cut(nb::module_& m) {
         return all;
       },
       nb::arg("vertices"), nb::arg("faces"),
-      "The pieces of a mesh that hang together by edges, each with its own vertices: a list of (vertices, faces).");
+      "The edge-connected pieces of a mesh, each with its own vertices: a list of (vertices, faces).");
 }
 
 }  // namespace rlacd

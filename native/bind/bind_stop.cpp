@@ -30,7 +30,7 @@ void bind_stop(nb::module_& m) {
           "end", [](Stop& self) { self.end(); }, "Watch no longer, and forget `look`.")
       .def(
           "arm", [](Stop& self, double seconds) { self.arm(seconds); }, nb::arg("seconds"),
-          "Trip after so many seconds from now, never after infinity; what was tripped no longer is.")
+          "Trip after this many seconds, never if infinite. A token that has tripped is reset.")
       .def("trip", &Stop::trip, "Make every poll raise from now on.")
       .def("trip_after", &Stop::trip_after, nb::arg("polls"), "Trip at this poll from now on.")
       .def("shield", &Stop::shield, nb::arg("on"), "Whether polls let everything pass for now.")

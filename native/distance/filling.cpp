@@ -10,7 +10,7 @@
 namespace rlacd {
 namespace {
 
-constexpr std::size_t kSome = 40;  // corners; with more than this it pays to test some of them first
+constexpr std::size_t kMaybe = 40;  // corners; with more than this it pays to test some of them first
 
 constexpr double kInside = 0.5, kAccuracy = 2;
 
@@ -116,13 +116,13 @@ struct Cell {
 
 }  // namespace
 
-Chance Filling::chance(const Mesh& hull, double threshold) const {
-  if (comes_deeper(hull, threshold)) return Chance::kNever;
-  return is_missed(hull, hull.faces, threshold, kMostCells) ? Chance::kNone : Chance::kSome;
+Feasibility Filling::feasibility(const Mesh& hull, double threshold) const {
+  if (comes_deeper(hull, threshold)) return Feasibility::kNever;
+  return is_missed(hull, hull.faces, threshold, kMostCells) ? Feasibility::kNo : Feasibility::kMaybe;
 }
 
 HullCorners::HullCorners(std::vector<Vec3> corners) : all(std::move(corners)) {
-  if (all.size() <= kSome) {
+  if (all.size() <= kMaybe) {
     some = all;
     return;
   }
@@ -140,10 +140,10 @@ HullCorners::HullCorners(std::vector<Vec3> corners) : all(std::move(corners)) {
   for (const std::size_t i : chosen) some.push_back(all[i]);
 }
 
-Filling::Joint Filling::joint_chance(const HullCorners& first, const HullCorners& second, double threshold) const {
+Filling::Joint Filling::joint_feasibility(const HullCorners& first, const HullCorners& second, double threshold) const {
   const bool are_all = first.some.size() == first.all.size() && second.some.size() == second.all.size();
   Mesh hull = joint_hull(first.some, second.some);
-  if (!hull.faces.empty() && comes_deeper(hull, threshold)) return {0, Chance::kNever};
+  if (!hull.faces.empty() && comes_deeper(hull, threshold)) return {0, Feasibility::kNever};
   if (!are_all) hull = joint_hull(first.all, second.all);
   std::vector<char> is_new(hull.faces.size(), 1);
   for (const std::vector<Vec3>* own : {&first.all, &second.all}) {
@@ -159,9 +159,9 @@ Filling::Joint Filling::joint_chance(const HullCorners& first, const HullCorners
   for (std::size_t f = 0; f < hull.faces.size(); ++f)
     if (is_new[f]) facets.push_back(hull.faces[f]);
   const double volume = mesh_volume(hull.vertices, hull.faces);
-  if (!are_all && is_missed(hull, facets, threshold, 0)) return {volume, Chance::kNone};
-  if (!are_all && comes_deeper(hull, threshold)) return {volume, Chance::kNever};
-  return {volume, is_missed(hull, facets, threshold, kMostCells) ? Chance::kNone : Chance::kSome};
+  if (!are_all && is_missed(hull, facets, threshold, 0)) return {volume, Feasibility::kNo};
+  if (!are_all && comes_deeper(hull, threshold)) return {volume, Feasibility::kNever};
+  return {volume, is_missed(hull, facets, threshold, kMostCells) ? Feasibility::kNo : Feasibility::kMaybe};
 }
 
 bool Filling::comes_deeper(const Mesh& hull, double threshold) const {

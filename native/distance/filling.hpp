@@ -17,9 +17,9 @@
 
 namespace rlacd {
 
-enum class Chance : std::int32_t {
-  kSome = 0,
-  kNone = 1,   // not for this hull
+enum class Feasibility : std::int32_t {
+  kMaybe = 0,
+  kNo = 1,     // not for this hull
   kNever = 2,  // nor for any hull that contains it
 };
 
@@ -35,14 +35,14 @@ class Filling {
   explicit Filling(const Mesh& solid) : solid_(solid), surface_(solid) {}
 
   const Surface& surface() const { return surface_; }
-  Chance chance(const Mesh& hull, double threshold) const;
+  Feasibility feasibility(const Mesh& hull, double threshold) const;
   // The same for the joint hull of two hulls that are close enough to their own shares of the solid, and its volume
   // unless the verdict is kNever.
   struct Joint {
     double volume;
-    Chance chance;
+    Feasibility feasibility;
   };
-  Joint joint_chance(const HullCorners& first, const HullCorners& second, double threshold) const;
+  Joint joint_feasibility(const HullCorners& first, const HullCorners& second, double threshold) const;
   // Whether the verdict is kNever: much faster than the full verdict.
   bool comes_deeper(const Mesh& hull, double threshold) const;
 

@@ -105,7 +105,7 @@ class Decomposition(Result):
         path : path-like
             ``*.glb``, ``*.obj``, ``*.ply`` or ``*.stl`` for one file with a node, group or solid a hull
             (``hull_000``, ...). An existing folder, text ending in ``/``, or a name without ending given with a
-            `file_format`, for one file a hull. ``*.xml`` (MJCF), ``*.urdf``, ``*.sdf``, ``*.usd``, ``*.usda`` or
+            `file_format`, for one file per hull. ``*.xml`` (MJCF), ``*.urdf``, ``*.sdf``, ``*.usd``, ``*.usda`` or
             ``*.usdc`` for a body with mass, the input to look at and the hulls to collide with; the first three keep
             their meshes in a folder beside them, ``chair_mjcf`` for ``chair.xml``.
         file_format : str, optional

@@ -16,7 +16,11 @@ class Options:
         description="When a hull is tight enough",
         items=[
             ("concavity", "Concavity", "It lies within the threshold of the surface, everywhere"),
-            ("navigable", "Navigable space", "It stays out of where a ball can go; what nobody reaches costs nothing"),
+            (
+                "navigable",
+                "Navigable space",
+                "It stays out of where a ball can go; space that no ball reaches costs nothing",
+            ),
         ],
     )
     threshold: FloatProperty(

@@ -219,7 +219,7 @@ def _trained(name: str, about: str) -> None:
         out: Out,
         preset: Annotated[str, typer.Option(help="Of `rlacd train`.")] = "quick",
         iterations: Annotated[int | None, typer.Option(help="Cuts an arm.", show_default=False)] = None,
-        seeds: Annotated[int, typer.Option(min=1, help="Each arm is trained so many times.")] = 1,
+        seeds: Annotated[int, typer.Option(min=1, help="Training runs of each arm.")] = 1,
     ) -> None:
         with exit_codes():
             from rlacd.bench.arms import train_arms

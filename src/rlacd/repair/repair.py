@@ -72,7 +72,7 @@ GAP = 0.03
 default."""
 
 CELLS_ACROSS = 1.5
-"""A ball has a radius of at least so many cells of the grid that it rolls on."""
+"""Least radius of a ball, in cells of the grid that it rolls on."""
 
 # Widest slit between caps that is filled, as a share of the gap, and the distance up to which a cap is part of the
 # solid's surface.

@@ -59,7 +59,7 @@ PATIENCE = 24
 to try."""
 
 LEAST_TRIALS = 32
-"""But not before so many trials without a gain: where parts are few, trials cost little."""
+"""But not before this many trials without a gain: where parts are few, trials cost little."""
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ DRAWS = 10
 class Operator(Enum):
     """A way to change the parts of a state."""
 
-    RECUT = "a cluster is cut anew by a policy"
+    RECUT = "a cluster is cut again by a policy"
     TRANSFER = "a part gives pieces to those around"
     REDISTRIBUTE = "a part is divided among those around"
 

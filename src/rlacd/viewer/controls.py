@@ -83,7 +83,7 @@ class Subject:
     mesh : InputMesh
         The mesh as first read.
     up_is_guess : bool
-        Whether nobody says which axis points up.
+        Whether the file does not say which axis points up.
     """
 
     path: Path

@@ -53,7 +53,7 @@ export const digits = (value, count = 3) =>
 export const column = (value, count = 2) =>
   value === 0 || Math.abs(value) < 1e-4 ? digits(value) : Math.abs(value) >= 10 ** count ? value.toFixed(0) : value.toPrecision(count);
 
-/** A length of the frame in the input's unit, in plain words: "0.0226 m", or "0.0226 units" where nobody says which. */
+/** A length of the frame in the input's unit, in plain words: "0.0226 m", or "0.0226 units" where the file does not say which. */
 export const measure = (value, { scale, unit }, count = 3) =>
   value == null ? "–" : `${value / scale < 1e-4 && value > 0 ? (value / scale).toExponential(1) : digits(value / scale, count)}\u00a0${unit || "units"}`;
 
