@@ -73,6 +73,9 @@ def test_a_textured_animated_scene_comes_back_node_by_node(
         below = header["scenes"][0] if "skin" in nodes[index] else nodes[index]
         added = [child for child in below.get("children", below.get("nodes", [])) if child >= len(rig.header["nodes"])]
         assert [nodes[child]["name"] for child in added] == [NAMES[file_format].format(called)]
+    if file_format == "unreal":  # the two wheels share a mesh
+        added = [mesh["name"] for mesh in header["meshes"][len(rig.header["meshes"]) :]]
+        assert sorted(added) == ["UCX_axle_00", "UCX_flag_00", "UCX_wheel_00", "UCX_wheel_01"]
 
 
 def test_hulls_lie_around_their_node_wherever_it_goes(tmp_path: Path, cart: Path, apart: rlacd.Decomposition) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import base64
 import json
 import struct
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -30,7 +31,7 @@ from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.primitive import Primitive
 
 Named = Callable[[str, int, Primitive | None], str]
-"""The name of a hull, from that of its node, its number there, and the primitive that it stands for."""
+"""The name of a hull, from that of its node or mesh, its number there, and the primitive that it stands for."""
 
 _MIME = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".webp": "image/webp", ".ktx2": "image/ktx2"}
 
@@ -38,12 +39,15 @@ _MIME = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".web
 def encode_kept(result: Result, named: Named, *, colored: bool) -> bytes:
     """Write the input as GLB, with each hull as a child of the node it belongs to.
 
+    A hull's node is named after that node, and its mesh after the mesh there: some importers look at the one, some at
+    the other.
+
     Parameters
     ----------
     result : Result
         Of an input that has an asset.
     named : callable
-        Names a hull after its node.
+        Names a hull after its node, or its mesh after that of the node.
     colored : bool
         Give every hull a material of its own; otherwise it has none.
 
@@ -59,18 +63,21 @@ def encode_kept(result: Result, named: Named, *, colored: bool) -> bytes:
     is_gltf = mesh.asset.is_gltf
     nodes = mesh.nodes if is_gltf else nodes_of(mesh, result.name)
     factor = mesh.factor if is_gltf else 1.0  # a glTF file stays in its own unit
-    counts: dict[str, int] = {}
+    of_nodes: Counter[str] = Counter()
+    of_meshes: Counter[str] = Counter()
     primitives = result.primitives
     colors = linear_from_srgb(hull_colors(len(result)))
     for index, (hull, color) in enumerate(zip(result.hulls, colors, strict=True)):
         node = nodes[int(hull.metadata.get("node_index", 0))]
-        number = counts.get(node.name, 0)
-        counts[node.name] = number + 1
         at = scene.index_of(node.key)
+        mesh_name = scene.mesh_name(at) or node.name
         inverse = None if scene.is_skinned(at) else _inverse(node.transform)
         primitive = primitives[index] if inverse is None or _keeps_shape(inverse) else None
-        placed = _local(hull, factor, inverse, named(node.name, number, primitive))
-        scene.add(placed._replace(color=color), None if inverse is None else at, colored)
+        placed = _local(hull, factor, inverse, named(node.name, of_nodes[node.name], primitive))
+        called = named(mesh_name, of_meshes[mesh_name], primitive)
+        of_nodes[node.name] += 1
+        of_meshes[mesh_name] += 1
+        scene.add(placed._replace(color=color), called, None if inverse is None else at, colored)
     return scene.encoded()
 
 
@@ -126,8 +133,14 @@ class _Scene:
         """Whether a node's mesh follows a skeleton: engines move such a node away from below its hulls."""
         return index is not None and "skin" in self._header["nodes"][index]
 
-    def add(self, placed: Placed, parent: int | None, colored: bool) -> None:
-        """Add a hull below a node, or at the top."""
+    def mesh_name(self, index: int | None) -> str:
+        """The name of the mesh that a node places; empty if it has none."""
+        mesh = None if index is None else self._header["nodes"][index].get("mesh")
+        name = "" if mesh is None else self._header["meshes"][mesh].get("name", "")
+        return name if isinstance(name, str) else ""
+
+    def add(self, placed: Placed, mesh_name: str, parent: int | None, colored: bool) -> None:
+        """Add a hull below a node, or at the top, with a mesh of that name."""
         header = self._header
         nodes, meshes = header.setdefault("nodes", []), header.setdefault("meshes", [])
         views, accessors = header.setdefault("bufferViews", []), header.setdefault("accessors", [])
@@ -142,7 +155,7 @@ class _Scene:
         node: dict[str, Any] = {"name": placed.name, "mesh": len(meshes)}
         if placed.shift.any():
             node["translation"] = placed.shift.tolist()
-        meshes.append({"name": placed.name, "primitives": [primitive]})
+        meshes.append({"name": mesh_name, "primitives": [primitive]})
         if parent is not None:
             nodes[parent].setdefault("children", []).append(len(nodes))
         else:
