@@ -170,6 +170,32 @@ def test_a_knob_with_doubled_faces_a_few_missing_and_a_fin_is_a_ball(missing):
     assert volume(solid) == pytest.approx(ball.volume, rel=0.01)
 
 
+@pytest.mark.parametrize("long", [1.02, 1.1, 1.3])
+@pytest.mark.parametrize("missing", [7, 10])
+@pytest.mark.parametrize("tilt", [0.0, 0.1])
+def test_a_coarse_knob_with_a_fin_on_the_rim_of_a_hole_is_a_ball(long, missing, tilt):
+    """Seven of 80 faces are missing, one of them beside the fin, so that its edge joins two faces only."""
+    ball = trimesh.creation.icosphere(subdivisions=1)
+    faces = np.delete(ball.faces, np.random.default_rng(1).permutation(len(ball.faces))[:missing], axis=0)
+    a, b = faces[0][:2]
+    n = len(ball.vertices)
+    users = (np.isin(faces, [a, b]).sum(axis=1) == 2).sum()
+    assert users == 1
+    vertices = np.concatenate([ball.vertices, ball.vertices[[a, b]] * long + [0, tilt, 0]])
+    fin = [[a, b, n], [b, n + 1, n]]
+    solid = solid_of(trimesh.Trimesh(vertices, np.concatenate([faces, faces[:, ::-1], fin]), process=False))
+    assert volume(solid) == pytest.approx(ball.volume, rel=0.02)
+
+
+def test_the_side_of_a_plate_that_lost_its_other_sides_is_no_fin():
+    """It hangs by one edge and bends sharply, as a fin does; but there the cap continues it."""
+    plate = trimesh.creation.box((2, 1, 0.05))
+    kept = np.flatnonzero((np.abs(plate.face_normals[:, 2]) > 0.5) | (plate.face_normals[:, 0] > 0.5))
+    assert len(kept) == 6
+    solid = solid_of(plate.submesh([kept], append=True))
+    assert volume(solid) == pytest.approx(plate.volume, rel=1e-3)
+
+
 @pytest.mark.parametrize("share", [0.05, 0.1, 0.2])
 @pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize("name", ["ball", "torus"])

@@ -100,6 +100,7 @@ def close_holes(
     thickness: float,
     fill: bool = False,
     bend: float = 1.0,
+    fins: bool = False,
 ) -> Closed | None:
     """Cap the bodies all of whose holes may be closed.
 
@@ -121,14 +122,16 @@ def close_holes(
         Close every body that has an inside once closed, even if something can get in.
     bend
         Weight of bending in caps; see `cap`.
+    fins
+        Do nothing unless fins hang on rims, and take them for flaps.
 
     Returns
     -------
     Closed or None
         None if there is no hole.
     """
-    rims = rims_of(soup)
-    if not rims.loops:
+    rims = rims_of(soup, fins)
+    if not rims.loops or (fins and not rims.fins):
         return None
     caps, owner = _caps(soup, rims, bend)
     first_body = np.array([soup.body[beside[0]] for beside in rims.beside])

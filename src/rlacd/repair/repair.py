@@ -373,14 +373,22 @@ class _Repair:
         free = int((soup.edges.valence == 1).sum())
         if free == 0 or free > MOST_FREE_EDGES or self.open_bodies == "thin":
             return soup
+        soup = self._close(soup)
+        # What hangs on a rim is rather a side than a fin, unless its body would be hollow.
+        return self._close(soup, fins=True) if self.mouths else soup
+
+    def _close(self, soup: Soup, fins: bool = False) -> Soup:
         fill = self.open_bodies == "solid"
-        closed = close_holes(soup, self.bodies, self.input, self._covers, self.gap, HALF_THICKNESS / 2, fill, self.bend)
+        closed = close_holes(
+            soup, self.bodies, self.input, self._covers, self.gap, HALF_THICKNESS / 2, fill, self.bend, fins
+        )
         if closed is None:
             return soup
         self.mouths = dict(zip(closed.hollow.tolist(), closed.mouths, strict=True))
         self._note(closed.bodies, "capped")
         self.by_room |= closed.by_room
-        self.hidden, self.across = closed.hidden, closed.across
+        self.hidden = np.concatenate([self.hidden, closed.hidden])
+        self.across = np.concatenate([self.across, closed.across])
         if len(closed.far):
             place = self.frame.place(closed.where[closed.far.argmax()])
             self.warnings.append(

@@ -4,7 +4,8 @@ Input: a soup. Output: its flaps, and loops of vertices around its holes; nothin
 
 Faces are mated across edges: if two share an edge, with each other; if more do, those that continue each other best.
 Faces connected by mates form a patch, and all faces of a patch are wound alike, whatever the file says. A small patch
-attached to others by edges that those mate without it is a flap: its free edges bound no hole. At a vertex where
+attached to others by edges that those mate without it is a flap: its free edges bound no hole. On request, nor do those
+of a fin whose edge lies on the rim of a hole, where it is mated with what is left there (`_fins`). At a vertex where
 several holes meet, a loop turns from a free edge to the next one across the hole, so loops never run around existing
 faces. An island that touches its hole's rim at a vertex joins that hole's loop, which visits the vertex twice.
 """
@@ -25,6 +26,9 @@ from rlacd.solid.topology import BoolArray, IntArray, components
 # A flap has at most this share of its body's area.
 _FLAP = 0.05
 
+# A fin on the rim of a hole is at most so many faces long, and bends there by more than 60 degrees (cosine).
+_FIN_FACES, _FIN_BEND = 8, -0.5
+
 _NEXT = np.array([1, 2, 0])
 
 
@@ -44,6 +48,8 @@ class Rims:
         ``[F]``, whether a face is wound the other way.
     flap
         ``[F]``, whether a face belongs to a flap.
+    fins
+        Whether fins on the rims of holes were found; they are flaps.
     """
 
     loops: list[IntArray]
@@ -51,10 +57,14 @@ class Rims:
     normals: FloatArray
     inverted: BoolArray
     flap: BoolArray
+    fins: bool
 
 
-def rims_of(soup: Soup) -> Rims:
-    """Find the flaps of a soup and the loops around its holes."""
+def rims_of(soup: Soup, fins: bool = False) -> Rims:
+    """Find the flaps of a soup and the loops around its holes.
+
+    With `fins`, what hangs on the rim of a hole is a flap; otherwise it is what is left of a side.
+    """
     mate = _mates(soup)
     poll_stop()
     label = _sides(soup, mate)
@@ -65,10 +75,13 @@ def rims_of(soup: Soup) -> Rims:
         wrong = (mate >= 0) & np.repeat(one_sided, 3) & (forward == forward[mate])
         mate[wrong] = -1
         label = _sides(soup, mate)
+    fin = _fins(soup, mate) if fins else np.zeros(len(soup.faces), dtype=bool)
+    if fin.any():
+        label = _sides(soup, mate)
     poll_stop()
     low = np.minimum(label[0::2], label[1::2])
     _, patch = np.unique(low, return_inverse=True)
-    flap = _flaps(soup, patch)
+    flap = _flaps(soup, patch) | fin
     inverted = label[0::2] > low
     poll_stop()
     a, b, c = (soup.vertices[soup.faces[:, i]] for i in range(3))
@@ -93,7 +106,7 @@ def rims_of(soup: Soup) -> Rims:
     loops = [loop for loop in _cycles(follower) if len(loop) > 2 and 2 * free[loop].sum() > len(loop)]
     normals = weighted / np.maximum(np.linalg.norm(weighted, axis=1, keepdims=True), np.finfo(float).tiny)
     beside = [rim[loop] // 3 for loop in loops]
-    return Rims([tail[loop] for loop in loops], beside, normals, inverted, flap)
+    return Rims([tail[loop] for loop in loops], beside, normals, inverted, flap, bool(fin.any()))
 
 
 def _sides(soup: Soup, mate: IntArray) -> IntArray:
@@ -155,6 +168,62 @@ def _flaps(soup: Soup, patch: IntArray) -> BoolArray:
     )
     small = np.bincount(patch, soup.area, count)[patch] <= _FLAP * np.bincount(soup.body, soup.area)[soup.body]
     return np.asarray(small & hangs[patch] & free[patch])
+
+
+def _fins(soup: Soup, mate: IntArray) -> BoolArray:
+    """Return ``[F]`` whether a face belongs to a fin that hangs on the rim of a hole; takes fins out of `mate`.
+
+    Such a fin hangs by one edge, at which it bends sharply, and no other face has its corners. What missing faces left
+    of a surface shares them, or lies flat.
+    """
+    count = len(soup.faces)
+    fin = np.zeros(count, dtype=bool)
+    root, edge = _hanging(mate)
+    hung = np.flatnonzero(root >= 0)
+    if len(hung) == 0:
+        return fin
+    roots, at = np.unique(root[hung], return_inverse=True)
+    small = np.bincount(at, soup.area[hung]) <= _FLAP * np.bincount(soup.body, soup.area)[soup.body[roots]]
+    away = across(soup.vertices, soup.faces, np.stack([edge[roots], mate[edge[roots]]], axis=1).ravel())
+    bends = np.einsum("ij,ij->i", away[0::2], away[1::2]) > _FIN_BEND
+    corners = soup.faces[hung]
+    users = np.bincount(soup.faces.ravel(), minlength=len(soup.vertices))
+    keys, inside = np.unique((at[:, None] * len(users) + corners).ravel(), return_counts=True)
+    tree, vertex = np.divmod(keys, len(users))
+    first = soup.faces.ravel()[edge[roots]]
+    second = soup.faces.ravel()[edge[roots] - edge[roots] % 3 + _NEXT[edge[roots] % 3]]
+    shared = (inside < users[vertex]) & (vertex != first[tree]) & (vertex != second[tree])
+    alone = np.bincount(tree, shared, len(roots)) == 0
+    chosen = small & bends & alone
+    fin[hung[chosen[at]]] = True
+    for side in (mate[edge[roots[chosen]]], edge[roots[chosen]]):
+        mate[side] = -1
+    return fin
+
+
+def _hanging(mate: IntArray) -> tuple[IntArray, IntArray]:
+    """Return ``[F]`` the face nearest the rest of the tree that a face hangs in, -1 for none, and the edge it hangs by.
+
+    Faces with one mate are taken off, again and again: trees that hang on the rest by one edge, not longer than a fin.
+    """
+    count = len(mate) // 3
+    left = np.ones(count, dtype=bool)
+    edge = np.full(count, -1, dtype=np.int64)
+    mated = mate >= 0
+    for _ in range(_FIN_FACES):
+        linked = (mated & np.repeat(left, 3) & left[mate // 3]).reshape(-1, 3)
+        leaf = linked.sum(axis=1) == 1
+        by = 3 * np.arange(count) + linked.argmax(axis=1)
+        leaf &= ~leaf[mate[by] // 3]
+        if not leaf.any():
+            break
+        left[leaf], edge[leaf] = False, by[leaf]
+    root = np.where(left, -1, np.arange(count))
+    hung = np.flatnonzero(~left)
+    for _ in range(_FIN_FACES):
+        above = mate[edge[root[hung]]] // 3
+        root[hung] = np.where(left[above], root[hung], above)
+    return root, edge
 
 
 def _against_main(soup: Soup, patch: IntArray, left_out: BoolArray, weighted: FloatArray) -> BoolArray:
