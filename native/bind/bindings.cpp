@@ -6,6 +6,7 @@ void bind_cells(nanobind::module_& m);
 void bind_concave_edges(nanobind::module_& m);
 void bind_concavity(nanobind::module_& m);
 void bind_distance(nanobind::module_& m);
+void bind_flush(nanobind::module_& m);
 void bind_glue(nanobind::module_& m);
 void bind_hull(nanobind::module_& m);
 void bind_mesh(nanobind::module_& m);
@@ -29,6 +30,7 @@ NB_MODULE(_native, m) {
   rlacd::bind_concave_edges(m);
   rlacd::bind_concavity(m);
   rlacd::bind_distance(m);
+  rlacd::bind_flush(m);
   rlacd::bind_glue(m);
   rlacd::bind_hull(m);
   rlacd::bind_mesh(m);

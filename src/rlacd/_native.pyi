@@ -189,6 +189,12 @@ def navigable_balls(
     threads: int = 0,
 ) -> tuple[FloatArray, FloatArray]: ...  # [B, 3], [B]
 
+class FlushBody:
+    def __init__(self, vertices: FloatArray, faces: IntArray) -> None: ...
+    def depths(self, points: FloatArray) -> FloatArray: ...  # [N]
+    def contact(self, other: FlushBody, depth: float, touch: float) -> tuple[IntArray, FloatArray]: ...  # [S], [N, 3]
+    def layer(self, other: FlushBody, sides: IntArray, depth: float, touch: float) -> FloatArray: ...  # [N, 3]
+
 class BallSet:
     def __init__(self, centres: FloatArray, radii: FloatArray) -> None: ...
     def intrusions(

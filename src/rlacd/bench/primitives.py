@@ -160,7 +160,7 @@ def _summary(pairs: Sequence[_Pair]) -> Table:
 
 def _column(rows: Sequence[Measured]) -> dict[str, str]:
     kinds = sum((row.kinds for row in rows), Counter[str]())
-    named = ", ".join(f"{kinds[kind]} {kind}" for kind in PRIMITIVE_KINDS if kinds[kind])
+    named = ", ".join(_counted(kinds[kind], kind) for kind in PRIMITIVE_KINDS if kinds[kind])
     return {
         "parts": str(sum(row.parts for row in rows)),
         "of these primitives": f"{kinds.total()} ({named})" if named else "0",
@@ -172,6 +172,10 @@ def _column(rows: Sequence[Measured]) -> dict[str, str]:
         "contacts": f"{statistics.fmean(row.contacts for row in rows):.0f}",
         "steps/s": f"{statistics.geometric_mean(rate for row in rows for rate in row.rates):.0f}",
     }
+
+
+def _counted(count: int, kind: str) -> str:
+    return f"{count} {kind}" + ("" if count == 1 else "es" if kind.endswith("x") else "s")
 
 
 def _details(names: Sequence[str], pairs: Sequence[_Pair]) -> Table:

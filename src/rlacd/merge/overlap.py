@@ -10,40 +10,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from rlacd import _native
 from rlacd.criteria import Criterion
 from rlacd.merge.boxes import Boxes
-from rlacd.solid.arrays import BoolArray, FloatArray
+from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import LOST, Component, Part
 from rlacd.solid.hull import Hull
-from rlacd.solid.products import dots, heights, length
 
 TOUCH = 1e-6
 """Hulls touch that are no farther apart than this (frame)."""
 
-OPPOSED = -0.9
-"""Cosine of the angle (154 degrees) between the outward normals of two facets from which on they may form a seam."""
-
-BESIDE = 0.5
-"""Cosine of the angle between a facet of a seam and others that move with it: those nearly parallel would leave its
-layer no room."""
-
-LEAST_AREA = 1e-8
-"""Smaller contacts are no seam: two boxes that share an edge (frame)."""
-
-WITHIN = 0.3
-"""Points of a seam are the corners of contacts, moved by this share towards the middle."""
-
 HELD = 0.7
 """A seam overlaps enough if each of its points lies deep in some hull: as deep as in the solid or by half the overlap,
 whichever is less, times this. On either side of a seam in a bent solid, neither hull is quite as deep as the solid."""
-
-REACHED = 1 - 1e-6
-"""Share of the overlap that counts as all of it, for rounding."""
 
 
 @dataclass(frozen=True)
@@ -97,11 +79,11 @@ def overlap_parts(
     seams: list[FloatArray] = []
     for first, second in pairs:
         _native.poll_stop()
-        contact = bodies[first].contact(bodies[second], overlap)
-        if not contact.facets.any():
+        sides, places = bodies[first].contact(bodies[second], overlap)
+        if len(sides) == 0:
             continue
-        inside = surface.distance(contact.points)
-        seam = np.column_stack([contact.points, HELD * np.minimum(inside, overlap / 2)])
+        inside = surface.distance(places, threads=1)
+        seam = np.column_stack([places, HELD * np.minimum(inside, overlap / 2)])
         seams.append(seam)
         best, most = dict[int, _Body](), -1
         for change in _changes(bodies, near, first, second, overlap):
@@ -116,12 +98,18 @@ def overlap_parts(
                 break
         for place, body in best.items():
             bodies[place] = body
-    return [body.part for body in bodies], Seams(len(seams), sum(_held(bodies, seam) < len(seam) for seam in seams))
+    low, high = np.stack([body.part.box for body in bodies], axis=1) if bodies else np.zeros((2, 0, 3))
+    short = 0
+    for seam in seams:
+        near_it = (seam[:, :3].min(axis=0) <= high).all(axis=1) & (seam[:, :3].max(axis=0) >= low).all(axis=1)
+        short += _held([bodies[i] for i in np.flatnonzero(near_it)], seam) < len(seam)
+    return [body.part for body in bodies], Seams(len(seams), short)
 
 
 def _held(bodies: Sequence[_Body], seam: FloatArray) -> int:
     """How many points of a seam [N, 4] lie as deep in some body as their fourth coordinate asks."""
-    depths = [body.depths(seam[:, :3]) for body in bodies if body.is_near(seam[:, :3])]
+    points = np.ascontiguousarray(seam[:, :3])
+    depths = [body.sides.depths(points) for body in bodies]
     return int((np.max(depths, axis=0, initial=0.0) >= seam[:, 3]).sum())
 
 
@@ -132,8 +120,8 @@ def _changes(
 
     def grown(one: int, other: int, depth: float) -> tuple[float, list[tuple[int, Hull]]] | None:
         body = bodies[one]
-        facets = np.any([body.contact(bodies[place], overlap).facets for place in sorted(near[one])], axis=0)
-        layer = body.layer(bodies[other], facets, depth)
+        sides = np.unique(np.concatenate([body.contact(bodies[place], overlap)[0] for place in near[one]]))
+        layer = Hull.of(body.sides.layer(bodies[other].sides, sides, depth, TOUCH))
         if layer is None:
             return None
         hull = Hull.around(body.part.hull, layer)
@@ -159,133 +147,16 @@ def _judged(part: Part, hull: Hull, solid: Component, criterion: Criterion, tole
     return None
 
 
-class _Contact(NamedTuple):
-    """Where two bodies are flush.
-
-    Attributes
-    ----------
-    facets : bool [P]
-        Facets of the first.
-    points : float64 [N, 3]
-        Places on the second, spread over the contact.
-    """
-
-    facets: BoolArray
-    points: FloatArray
-
-
 class _Body:
-    """A part with the facets of its hull: outward normals [P, 3], offsets [P] of their planes n.x = d, and corners."""
+    """A part with the flat sides of its hull, and where it touches others."""
 
     def __init__(self, part: Part) -> None:
         self.part = part
-        hull = part.hull
-        triangles = hull.vertices[hull.faces]
-        crosses = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        lengths = np.linalg.norm(crosses, axis=1)
-        units = crosses / np.maximum(lengths, np.finfo(float).tiny)[:, None]
-        # Coplanar triangles have equal normals up to rounding.
-        _, first, facet = np.unique(np.round(units, 7), axis=0, return_index=True, return_inverse=True)
-        facet = facet.ravel()
-        self._normals = units[first]
-        # The farthest corner: the inexact normal of a sliver then cuts nothing off.
-        self._offsets = (heights(hull.vertices, self._normals)).max(axis=0)
-        order = np.argsort(facet, kind="stable")
-        bounds = np.searchsorted(facet[order], np.arange(1, len(first)))
-        self._corners = [np.unique(hull.faces[some]) for some in np.split(order, bounds)]
-        self._contacts: dict[_Body, _Contact] = {}
+        self.sides = _native.FlushBody(part.hull.vertices, part.hull.faces)
+        self._contacts: dict[_Body, tuple[IntArray, FloatArray]] = {}
 
-    def depths(self, points: FloatArray) -> FloatArray:
-        """How deep points [N, 3] lie inside; negative outside."""
-        depths: FloatArray = (self._offsets - heights(points, self._normals)).min(axis=1)
-        return depths
-
-    def is_near(self, points: FloatArray) -> bool:
-        """Whether the bounding box of points [N, 3] meets its own."""
-        low, high = self.part.box
-        return bool((points.min(axis=0) <= high).all() and (points.max(axis=0) >= low).all())
-
-    def contact(self, other: _Body, overlap: float) -> _Contact:
-        """Where a facet of another body, turned the other way, lies less deep than the overlap under a facet."""
+    def contact(self, other: _Body, overlap: float) -> tuple[IntArray, FloatArray]:
+        """Sides [S] under which a side of another body lies less deep than the overlap, and places on that [N, 3]."""
         if other not in self._contacts:
-            self._contacts[other] = self._find_contact(other, overlap)
+            self._contacts[other] = self.sides.contact(other.sides, overlap, TOUCH)
         return self._contacts[other]
-
-    def _find_contact(self, other: _Body, overlap: float) -> _Contact:
-        points = []
-        areas = np.zeros(len(self._normals))
-        vertices = other.part.hull.vertices
-        beyond = heights(vertices, self._normals) - self._offsets  # [V, P]
-        opposed = heights(other._normals, self._normals) <= OPPOSED
-        for facet in np.flatnonzero(opposed.any(axis=1)):
-            corners = other._corners[facet]
-            outside = beyond[corners]
-            planes = np.flatnonzero(opposed[facet] & (outside.max(axis=0) > -REACHED * overlap))
-            if len(planes) == 0 or (outside.min(axis=0) > TOUCH).any():
-                continue
-            polygon = _ordered(vertices[corners], other._normals[facet])
-            reach = TOUCH * opposed[facet]  # not sideways, or parts that share an edge would touch
-            for plane in np.flatnonzero(outside.max(axis=0) > reach):
-                polygon = _cut(polygon, self._normals[plane], self._offsets[plane] + reach[plane])
-                if len(polygon) == 0:
-                    break
-            else:
-                depths = self._offsets[planes] - heights(polygon, self._normals[planes])
-                for plane in planes[depths.min(axis=0) < REACHED * overlap]:
-                    near = _cut(polygon, -self._normals[plane], REACHED * overlap - self._offsets[plane])
-                    areas[plane] += (area := _area(near))
-                    if area > LEAST_AREA:
-                        points.append(near + WITHIN * (near.mean(axis=0) - near))
-        return _Contact(areas > LEAST_AREA, np.concatenate(points) if points else np.zeros((0, 3)))
-
-    def layer(self, other: _Body, facets: BoolArray, depth: float) -> Hull | None:
-        """What another body fills of this one with some of its facets moved outwards; None if nothing."""
-        moved = (heights(self._normals, self._normals[facets]) >= BESIDE).any(axis=1)
-        layer: Hull | None = other.part.hull
-        for normal, offset in zip(self._normals, self._offsets + depth * moved, strict=True):
-            assert layer is not None
-            beyond = heights(layer.vertices, normal) - offset
-            if beyond.max() <= TOUCH * REACHED:
-                continue
-            edges = layer.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-            edges = edges[(beyond[edges[:, 0]] > 0) & (beyond[edges[:, 1]] < 0)]
-            out, inside = beyond[edges[:, 0]], beyond[edges[:, 1]]
-            share = (out / (out - inside))[:, None]
-            crossings = (1 - share) * layer.vertices[edges[:, 0]] + share * layer.vertices[edges[:, 1]]
-            layer = Hull.of(np.concatenate([layer.vertices[beyond <= 0], crossings]))
-            if layer is None:
-                return None
-        return layer
-
-
-def _ordered(points: FloatArray, normal: FloatArray) -> FloatArray:
-    """The corners [N, 3] of a convex polygon in their order around a normal."""
-    spokes = points - points.mean(axis=0)
-    across = spokes[int(dots(spokes, spokes).argmax())]
-    angles = np.arctan2(heights(spokes, np.cross(normal, across)), heights(spokes, across))
-    return points[np.argsort(angles, kind="stable")]
-
-
-def _cut(polygon: FloatArray, normal: FloatArray, offset: float) -> FloatArray:
-    """What of a convex polygon [N, 3] lies in a half-space n.x <= d (Sutherland and Hodgman)."""
-    beyond = heights(polygon, normal) - offset
-    if beyond.max() <= 0:
-        return polygon
-    corners = []
-    for place in range(len(polygon)):
-        here, there = beyond[place - 1], beyond[place]
-        if (here > 0) != (there > 0):
-            share = here / (here - there)
-            corners.append((1 - share) * polygon[place - 1] + share * polygon[place])
-        if there <= 0:
-            corners.append(polygon[place])
-    return np.array(corners).reshape(-1, 3)
-
-
-def _area(polygon: FloatArray) -> float:
-    if len(polygon) < 3:
-        return 0.0
-    spokes = polygon[1:] - polygon[0]
-    ahead, behind = spokes[:-1], spokes[1:]
-    doubled = (ahead[:, [1, 2, 0]] * behind[:, [2, 0, 1]] - ahead[:, [2, 0, 1]] * behind[:, [1, 2, 0]]).sum(axis=0)
-    return length(doubled) / 2
