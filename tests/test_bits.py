@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from rlacd.solid.component import Component
-from rlacd.solid.products import dots, heights, length
+from rlacd.solid.products import angles, dots, heights, length
 from tests import bits
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -89,3 +89,11 @@ def test_products_are_those_of_numpy() -> None:
     assert dots(points, points[::-1]) == pytest.approx(np.einsum("ij,ij->i", points, points[::-1]), abs=1e-14)
     assert dots(points, directions[0]) == pytest.approx(points @ directions[0], abs=1e-14)
     assert length(points[0]) == pytest.approx(np.linalg.norm(points[0]))
+
+
+def test_angles_are_those_of_numpy() -> None:
+    turn = np.concatenate([np.linspace(0, np.pi, 1001), [1e-300, 1e-8, np.pi - 1e-8, np.pi / 2]])
+    for long in (1e-100, 1.0, 1e100):
+        sines, cosines = np.abs(long * np.sin(turn)), long * np.cos(turn)
+        assert angles(sines, cosines) == pytest.approx(np.arctan2(sines, cosines), rel=1e-15, abs=0)
+    assert angles(np.array([0.0, 0.0, 2.0]), np.array([0.0, -1.0, 0.0])) == pytest.approx([0, np.pi, np.pi / 2])

@@ -12,7 +12,7 @@ import numpy as np
 
 from rlacd._native import poll_stop
 from rlacd.solid.frame import FloatArray
-from rlacd.solid.products import dots
+from rlacd.solid.products import angles, dots
 from rlacd.solid.topology import BoolArray, IntArray, Sides, components
 
 # A sharp fold would push its vertex far out to keep the distance to both flanks; stop at this multiple.
@@ -126,7 +126,7 @@ def _fan_offsets(
     for i, (p, q, r) in enumerate(((a, b, c), (b, c, a), (c, a, b))):
         poll_stop()
         along, across = q - p, r - p
-        weight[:, i] = np.arctan2(np.linalg.norm(np.cross(along, across), axis=1), dots(along, across))
+        weight[:, i] = angles(np.linalg.norm(np.cross(along, across), axis=1), dots(along, across))
     poll_stop()
     corner_normal = np.repeat(normal, 3, axis=0)
     total = np.stack([np.bincount(fan, weight.ravel() * corner_normal[:, k], number) for k in range(3)], axis=1)
