@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -315,3 +316,24 @@ def test_real_meshes_give_the_same_bytes_with_one_job_and_two(corpus: Path, tmp_
     for jobs in (1, 2):
         assert batch(assets, "-o", tmp_path / f"out{jobs}", "--jobs", jobs).exit_code == 0
     assert tree(tmp_path / "out1", TIMES) == tree(tmp_path / "out2", TIMES)
+
+
+@pytest.mark.slow
+def test_the_bar_of_a_terminal_names_what_is_at_work(tmp_path: Path) -> None:
+    pty = pytest.importorskip("pty", reason="there are no pseudo-terminals here")
+    (tmp_path / "in").mkdir()
+    name = "a_name_that_is_far_too_long_for_a_bar.stl"
+    trimesh.creation.box().export(tmp_path / "in" / name)
+    here, there = pty.openpty()
+    command = [sys.executable, "-m", "rlacd", "batch", str(tmp_path / "in"), "-o", str(tmp_path / "out"), "--jobs", "1"]
+    environment = {**os.environ, "COLUMNS": "120", "TERM": "xterm"}
+    with subprocess.Popen(command, stdin=there, stdout=there, stderr=there, env=environment) as process:
+        os.close(there)
+        shown = b""
+        with suppress(OSError):  # the other end is closed
+            while piece := os.read(here, 4096):
+                shown += piece
+        os.close(here)
+    assert process.returncode == 0
+    bar = shown.decode().split("1 of 1 mesh is done")[0]
+    assert f"…{name[-23:]}" in bar

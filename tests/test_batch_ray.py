@@ -34,6 +34,8 @@ class Counter:
 
     def passed_over(self, asset: Asset) -> None: ...
 
+    def started(self, asset: Asset) -> None: ...
+
     def finished(self, row: dict[str, Any], timing: dict[str, Any]) -> None:
         self.rows.append(timing)
         if len(self.rows) == self._at:

@@ -39,6 +39,9 @@ class Watcher(Protocol):
     def passed_over(self, asset: Asset) -> None:
         """Report a mesh whose result already exists."""
 
+    def started(self, asset: Asset) -> None:
+        """Report a mesh whose turn has come."""
+
     def finished(self, row: Row, timing: Row) -> None:
         """Report a mesh whose row is complete."""
 
@@ -177,6 +180,7 @@ class Batch:
                     seen.append(asset.name)
                     watcher.passed_over(asset)
                 else:
+                    watcher.started(asset)
                     yield task
 
         watcher.begin(len(assets))

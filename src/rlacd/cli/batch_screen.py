@@ -24,6 +24,9 @@ REPORT_EVERY = 30.0
 SHOWN = 10
 """Maximum number of failures listed in the summary."""
 
+NAMED, LONGEST = 2, 24
+"""Meshes at work that the bar names, and characters of each name; the front of longer ones is cut off."""
+
 
 class Screen:
     """Shows the progress of a batch; if quiet, only its failures.
@@ -40,16 +43,18 @@ class Screen:
         self._bars = Bars(
             BarColumn(),
             MofNCompleteColumn(),
-            TextColumn("{task.fields[state]}"),
+            TextColumn("{task.fields[state]}", markup=False),
             TimeElapsedColumn(),
+            TextColumn("{task.fields[running]}", style="dim", markup=False),
             console=console,
             transient=True,
             disable=not self._draws,
         )
-        self._bar = self._bars.add_task("meshes", total=None, state="")
+        self._bar = self._bars.add_task("meshes", total=None, state="", running="")
         self._start = self._reported = time.monotonic()
         self._total = self._passed_over = self._made = 0
         self._status: Counter[str] = Counter()
+        self._running: dict[str, None] = {}  # in the order of their turns
 
     def __enter__(self) -> Screen:
         self._bars.start()
@@ -68,17 +73,30 @@ class Screen:
         self._passed_over += 1
         self._bars.update(self._bar, advance=1)
 
+    def started(self, asset: Asset) -> None:
+        """See `rlacd.batch.Watcher`."""
+        self._running[asset.name] = None
+        self._bars.update(self._bar, running=self._names())
+
     def finished(self, row: Row, timing: Row) -> None:
         """See `rlacd.batch.Watcher`."""
         self._made += 1
         self._status[row["status"]] += 1
-        self._bars.update(self._bar, advance=1, state=self._state())
+        self._running.pop(row["mesh"], None)
+        self._bars.update(self._bar, advance=1, state=self._state(), running=self._names())
         if row["status"] != "done":
             line = printable(failure_line(row))
             self._bars.console.print(line, markup=False, highlight=False) if self._draws else say(line)
         elif not self._draws and not self._quiet and time.monotonic() - self._reported > REPORT_EVERY:
             self._reported = time.monotonic()
             say(f"{self._made + self._passed_over}/{self._total}  {self._state()}")
+
+    def _names(self) -> str:
+        """The meshes at work, the latest first: large ones that had to wait come last."""
+        names = [printable(name) for name in reversed(self._running)]
+        short = [name if len(name) <= LONGEST else f"…{name[1 - LONGEST :]}" for name in names[:NAMED]]
+        more = [f"{len(names) - NAMED} more"] if len(names) > NAMED else []
+        return ", ".join(short + more)
 
     def _state(self) -> str:
         rate = self._made / max(time.monotonic() - self._start, 1e-9)
