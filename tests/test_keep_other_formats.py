@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -186,3 +187,51 @@ def test_a_scene_in_memory_is_not_changed_by_a_scale(tmp_path: Path) -> None:
     assert np.allclose(read.bounds, result.source.bounds, atol=0.01)
     assert np.allclose(scene.bounds, [[-0.5, 4.5, -0.5], [0.5, 5.5, 0.5]])
     assert "crate_hull_000" in read.graph.nodes
+
+
+def plates(folder: Path, *, name: str = "plates.3mf", count: int = 3) -> Path:
+    """Boxes of 3MF: one whose own colour is red, one most of whose triangles are blue, one without a colour."""
+    box = trimesh.creation.box()
+    points = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in box.vertices.tolist())
+    objects, items = "", ""
+    for number, (called, own, each) in enumerate(
+        [("red", 'pid="1" pindex="0"', ""), ("blue", 'pid="1" pindex="0"', 'pid="9" p1="1"'), ("plain", "", "")][:count]
+    ):
+        corners = "".join(
+            f'<triangle v1="{a}" v2="{b}" v3="{c}" {each if index else ""}/>'
+            for index, (a, b, c) in enumerate(box.faces.tolist())
+        )
+        objects += f"""<object id="{10 + number}" type="model" name="{called}" {own}><mesh><vertices>{points}</vertices>
+            <triangles>{corners}</triangles></mesh></object>"""
+        items += f'<item objectid="{10 + number}" transform="1 0 0 0 1 0 0 0 1 {3 * number} 0 0"/>'
+    model = f"""<?xml version="1.0"?><model unit="millimeter"
+        xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+        xmlns:m="http://schemas.microsoft.com/3dmanufacturing/material/2015/02"><resources>
+        <basematerials id="1"><base name="a" displaycolor="#FF0000"/></basematerials>
+        <m:colorgroup id="9"><m:color color="#00FF00FF"/><m:color color="#0000BC80"/></m:colorgroup>
+        {objects}</resources><build>{items}</build></model>"""
+    path = folder / name
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("3D/3dmodel.model", model)
+    return path
+
+
+def test_a_3mf_file_keeps_the_colours_of_its_objects(tmp_path: Path) -> None:
+    header, _, _ = kept(plates(tmp_path), tmp_path / "out.glb")
+    looks = {
+        node["name"]: header["materials"][header["meshes"][node["mesh"]]["primitives"][0]["material"]]
+        for node in header["nodes"]
+        if "mesh" in node and not node["name"].startswith("UCX_")
+    }
+    assert sorted(looks) == ["blue", "plain", "red"]
+    assert looks["red"]["pbrMetallicRoughness"]["baseColorFactor"] == [1.0, 0.0, 0.0, 1.0]
+    blue = looks["blue"]["pbrMetallicRoughness"]["baseColorFactor"]  # BC of sRGB is half the light
+    assert blue == pytest.approx([0.0, 0.0, 0.5, 0.5], abs=0.005)
+    assert looks["blue"]["alphaMode"] == "BLEND"
+    assert {look["pbrMetallicRoughness"]["metallicFactor"] for look in looks.values()} == {0.0}
+
+
+def test_a_single_coloured_object_of_3mf_keeps_its_colour(tmp_path: Path) -> None:
+    header, _, _ = kept(plates(tmp_path, count=1), tmp_path / "out.glb")
+    assert [node["name"] for node in header["nodes"] if "mesh" in node] == ["plates", "UCX_plates_00"]
+    assert colors(header, 0) == [[1.0, 0.0, 0.0, 1.0]]

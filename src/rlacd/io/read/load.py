@@ -100,7 +100,8 @@ def _from_file(path: Path) -> InputMesh:
         return replace(mesh, asset=Asset(scene, extension=extension) if kept else None)
     if extension not in ("glb", "gltf"):
         return replace(
-            mesh, asset=Asset(content, path, extension) if has_looks(content, extension, len(mesh.nodes)) else None
+            mesh,
+            asset=Asset(content, path, extension) if has_looks(path, content, extension, len(mesh.nodes)) else None,
         )
     names = node_names(path, content)
     # The triangles were read from a file without names, whose nodes are therefore called by their index.

@@ -12,10 +12,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import trimesh
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.beside import PICTURES, FolderFiles
+from rlacd.io.read.colors_3mf import Color, colors_3mf, has_colors
 from rlacd.io.read.text import check_text
 from rlacd.io.read.xml import collada_of
 
@@ -29,7 +31,7 @@ MOST_PIXELS = 2**26
 """Of one picture: 8,192 by 8,192."""
 
 
-def has_looks(content: bytes, extension: str, nodes: int) -> bool:
+def has_looks(path: Path, content: bytes, extension: str, nodes: int) -> bool:
     """Whether a file says more than where its triangles are: looks, or several nodes."""
     match extension:
         case "obj":
@@ -42,7 +44,7 @@ def has_looks(content: bytes, extension: str, nodes: int) -> bool:
         case "dae":
             return True
         case _:
-            return extension == "3mf" and nodes > 1
+            return extension == "3mf" and (nodes > 1 or has_colors(path, content))
 
 
 def looks_of(path: Path, content: bytes, extension: str) -> trimesh.Scene | None:
@@ -66,6 +68,8 @@ def looks_of(path: Path, content: bytes, extension: str) -> trimesh.Scene | None
             allow_remote=False,
             process=False,
         )
+        if extension == "3mf":
+            _paint(scene, colors_3mf(path, content))
         for material in _materials(scene):
             _drop_bad_pictures(material)
     except Exception:  # parsers may raise anything on damaged files; the triangles have been read without looks
@@ -82,6 +86,19 @@ def _checked(path: Path, content: bytes, extension: str) -> bytes:
         if len(names) * content.count(b"\nv ") > MOST_IN_TABLES:
             raise MeshFileError(f"{path} has too many materials")
     return content
+
+
+def _paint(scene: trimesh.Scene, colors: dict[str, Color]) -> None:
+    """Give each geometry the colour of its name, which is that of its object."""
+    for name, color in colors.items():
+        if name in scene.geometry:
+            material = trimesh.visual.material.PBRMaterial(
+                baseColorFactor=np.array(color),
+                metallicFactor=0.0,
+                roughnessFactor=0.5,
+                alphaMode="OPAQUE" if color[3] == 1.0 else "BLEND",
+            )
+            scene.geometry[name].visual = trimesh.visual.TextureVisuals(material=material)
 
 
 def _materials(scene: trimesh.Scene) -> Iterator[Any]:
