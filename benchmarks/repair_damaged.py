@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 import time
 from pathlib import Path
 from typing import Any
@@ -67,7 +68,7 @@ def measure(vertices: Any, faces: Any, family: str, share: float) -> dict[str, A
         "hulls": len(hulls),
         "under": float(under),
         "over": over,
-        "located": any(" at (" in warning for warning in result.report["warnings"]),
+        "located": any(re.search(r" (at|near) \(", warning) for warning in result.report["warnings"]),
         "seconds": seconds,
     }
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
+import rlacd
 from fuzz.flaws import FAMILIES
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.caps import HOLE
@@ -256,3 +257,16 @@ def test_a_noisy_slit_between_two_bodies_that_close_each_other_is_filled() -> No
     surface = SurfaceQuery(*to_arrays(solid.manifold))
     assert surface.inside(inner).all()
     assert surface.distance(inner).min() > 0.01
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.05, 0.1, 0.2])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_person_with_fins_loses_nothing(corpus, share, seed):
+    """Fins that lean inwards lost their tips, and booleans cut away up to 0.026 of the body."""
+    mesh = load_mesh(corpus / "test/capod/class13__m155.ply")
+    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64)
+    damaged = FAMILIES["fins"](vertices, faces, share, np.random.default_rng(seed))
+    report = rlacd.decompose(trimesh.Trimesh(*damaged, process=False), quality="fast", threads=1).report
+    assert report["hausdorff"]["under"] <= 0.005
+    assert report["hausdorff"]["over"] <= 0.062

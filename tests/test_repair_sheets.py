@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rlacd.io.read.load import load_mesh
+from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.repair import GAP, HALF_THICKNESS, repair
 from rlacd.repair.union import to_arrays
 from tests.repaired import BOX, join, moved, solid_of, steps, volume, with_hole
@@ -34,6 +35,22 @@ def test_a_sheet_that_hangs_between_two_boxes_stays():
     solid = solid_of(join(left, right, sheet))
     assert solid.bodies[0].deviation < 2 * HALF_THICKNESS
     assert volume(solid) == pytest.approx(16 + 8 * 2 * HALF_THICKNESS / solid.frame.scale, rel=1e-3)
+
+
+@pytest.mark.parametrize("tip", [(1.6, 0.5, 1.7), (1.7, 0.1, 1.8), (2.3, 0.1, 2.2)])
+def test_a_fin_that_leans_into_its_body_is_kept_where_it_comes_out_again(tip):
+    """It begins inside: where another fin did not, fins on a person's scan lost their tips, 0.04 long."""
+    plate = trimesh.creation.box((4, 0.4, 4))
+    corners = [int(np.argmin(np.linalg.norm(plate.vertices - (x, y, 2), axis=1))) for x in (2, -2) for y in (-0.2, 0.2)]
+    fins = [[*corners[:2], 8], [*corners[2:], 9]]
+    mesh = trimesh.Trimesh(
+        np.vstack([plate.vertices, tip, (-2.3, 0, 2)]), np.vstack([plate.faces, fins]), process=False
+    )
+    solid = solid_of(mesh)
+    there = solid.frame.to_frame(mesh.vertices)
+    query = SurfaceQuery(*to_arrays(solid.manifold))
+    assert (query.inside(there) | (query.distance(there) <= 2 * HALF_THICKNESS)).all()
+    assert volume(solid) == pytest.approx(6.4, rel=1e-3)
 
 
 def test_a_pillow_of_two_coplanar_layers_is_a_slab():

@@ -87,6 +87,8 @@ _LOST = 5e-3
 _CROWD, _CROSSINGS = 300, 1000
 # A closed body with less volume per area is flat: there is nothing to cut.
 _FLAT = 1e-6
+# Points of a triangle at which it is looked whether it sticks out of a body: near its corners, its edges, its middle.
+_PROBES = np.array([(18, 1, 1), (1, 18, 1), (1, 1, 18), (9, 9, 2), (9, 2, 9), (2, 9, 9), (7, 7, 6)]) / 20
 # manifold3d collapses edges shorter than 1e-12, and swaps those of faces that are no higher, or folded back onto a
 # neighbour in a plane within 1e-12.
 _THIN = 1e-11
@@ -420,6 +422,7 @@ class _Repair:
         leaky = np.union1d(leaky, self.as_sheets)
         sheet = (sides.sheet & (sides.volume >= -none)[front]) | (flat[front] & flat[back]) | np.isin(soup.body, leaky)
         wall = (solid[front] | solid[back]) & ~sides.sheet & ~sheet
+        sheet |= _poking_out(soup, wall, sides.sheet & ~sheet)
 
         self._note(soup.body[solid[back] & wall], "reoriented")
         self._note(soup.body[~wall & ~sheet], "outer skin")
@@ -574,6 +577,22 @@ class _Repair:
         body = self.body_of_input[changed[on[lost]]]
         np.maximum.at(self.deviation, body, distance[lost])
         self.lost = float(distance[lost].max(initial=0.0, where=self.step[body] == STEPS.index("capped")))
+
+
+def _poking_out(soup: Soup, wall: BoolArray, inner: BoolArray) -> BoolArray:
+    """Which sheets that begin inside a body, such as a fin that leans inwards, lead out of all bodies: ``[F]``."""
+    pokes = np.zeros(len(soup.faces), dtype=bool)
+    if not inner.any() or not wall.any():
+        return pokes
+    triangles = soup.vertices[soup.faces[inner]]
+    points = np.einsum("pk,fkd->fpd", _PROBES, triangles)
+    walls = SurfaceQuery(soup.vertices, soup.faces[wall])
+    apart = (walls.distance(points.reshape(-1, 3)) > 2 * HALF_THICKNESS).reshape(points.shape[:2])
+    outside = np.zeros_like(apart)
+    poll_stop()
+    outside[apart] = np.abs(walls.winding(points[apart])) < 0.5
+    pokes[inner] = outside.any(axis=1)
+    return pokes
 
 
 def _inside_by_balls(solid: SurfaceQuery, points: FloatArray, distance: FloatArray) -> BoolArray:

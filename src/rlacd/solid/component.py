@@ -280,7 +280,9 @@ class Component(Part):
         if max(below_folded, above_folded) > FOLDED and abs(self.manifold.volume() - self.volume) <= LOST * self.volume:
             require_time_for(len(self.faces))
             upper, lower = self.manifold.split_by_plane(plane.normal, plane.offset)
-            return _component(lower, self), _component(upper, self)
+            # Of a solid that overlaps itself by more, a boolean can lose what the two sides with their caps hold.
+            if abs(upper.volume() + lower.volume() - self.volume) <= LOST * self.volume:
+                return _component(lower, self), _component(upper, self)
         return _component(below, self), _component(above, self)
 
     def clipped(self, hull: Hull) -> tuple[FloatArray, IntArray]:
