@@ -173,7 +173,7 @@ def test_a_contact_is_where_two_boxes_share_a_face() -> None:
 def test_two_halves_of_a_box_overlap_by_exactly_that_much(overlap: float) -> None:
     box, parts = halves()
     grown, seams = overlap_parts(parts, box, Concavity(0.05), overlap)
-    assert (seams.count, seams.short) == (1, 0)
+    assert (seams.count, seams.short) == (1, ())
     reach = grown[0].hull.box[1, 0] - grown[1].hull.box[0, 0]
     assert reach == pytest.approx(overlap, abs=1e-9)
     assert sum(part.hull.volume for part in grown) == pytest.approx(2.0 + overlap, abs=1e-9)
@@ -197,7 +197,27 @@ def test_a_seam_without_room_is_told() -> None:
     assert overlap["short"] > 0
     (told,) = (warning for warning in result.report["warnings"] if "seams" in warning)
     assert f"{overlap['short']} of {overlap['seams']} seams" in told
+    assert len(overlap["short_seams"]) == overlap["short"]
+    for seam in overlap["short_seams"]:
+        place = np.array([seam["at_abs"]])
+        between = depths([result[part] for part in seam["parts"]], place)
+        assert between.max() == pytest.approx(seam["depth_abs"], abs=1e-3)
+        assert between.min() > -0.003 / result.report["scale"], "a place on both hulls"
+        assert seam["depth_abs"] < 0.1 / result.report["scale"]
     assert result.report["concavity"]["max"] <= 0.003
+
+
+def test_where_a_layer_at_all_seams_is_too_much_one_at_this_seam_is_taken() -> None:
+    """Four slanted blocks: of 4 seams, 3 were short when a hull always grew at all its seams at once."""
+    random = np.random.default_rng(16)
+    blocks = Manifold()
+    for _ in range(4):
+        low, size = random.integers(0, 8, 3) / 4, random.integers(1, 7, 3) / 4
+        turned = float(random.uniform(-40, 40)), 0.0, float(random.uniform(-40, 40))
+        blocks += Manifold.cube(size.tolist()).rotate(turned).translate(low.tolist())
+    overlap = rlacd.decompose(solid(blocks), overlap=0.1, quality="fast", threads=1).report["overlap"]
+    assert overlap["seams"] >= 4
+    assert overlap["short"] <= 1
 
 
 def test_nodes_that_move_do_not_overlap_each_other() -> None:
@@ -211,7 +231,7 @@ def test_nodes_that_move_do_not_overlap_each_other() -> None:
     frame = [hull for hull in result if hull.metadata["node"] == "frame"]
     flush = rlacd.decompose(ell(), quality="fast", threads=1)
     assert sum(hull.volume for hull in frame) > sum(hull.volume for hull in flush)
-    assert result.report["overlap"] == {"seams": 1, "short": 0}
+    assert result.report["overlap"] == {"seams": 1, "short": 0, "short_seams": []}
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from rlacd.presets import Preset, find_preset
 from rlacd.primitive_kinds import PRIMITIVE_KINDS
 from rlacd.solid.component import Component, Part, concatenated
 from rlacd.solid.distance import hull_distances, hull_union
+from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.mass import Mass, joint_mass, mass_of
 from rlacd.solid.solid import Solid
@@ -67,7 +69,7 @@ def make_report(
         "faces": sum(len(hull.faces) for hull in hulls),
         "vertices": sum(len(hull.vertices) for hull in hulls),
         **({"primitives": _primitives(parts)} if options.primitives else {}),
-        **({"overlap": _seams(seams)} if options.overlap > 0 else {}),
+        **({"overlap": _seams(seams, solid.frame)} if options.overlap > 0 else {}),
         **summary.entries,
         "hausdorff": {"over": over, "under": under},
         "scale": solid.frame.scale,
@@ -108,19 +110,29 @@ def _primitives(parts: Sequence[Part]) -> dict[str, int]:
     return {kind: kinds.count(kind) for kind in PRIMITIVE_KINDS} | {"hull": kinds.count(None)}
 
 
-def _seams(seams: Seams | None) -> dict[str, int | None]:
-    """How many seams were found, and how many of them are short of the overlap; None if there was no time."""
-    return {"seams": None, "short": None} if seams is None else {"seams": seams.count, "short": seams.short}
+def _seams(seams: Seams | None, frame: Frame) -> dict[str, Any]:
+    """How many seams were found, how many of them are short of the overlap, and where; None if there was no time."""
+    if seams is None:
+        return {"seams": None, "short": None, "short_seams": None}
+    places = [
+        {
+            "parts": list(seam.parts),
+            "at_abs": frame.to_input(seam.place[None])[0].tolist(),
+            "depth_abs": seam.depth / frame.scale,
+        }
+        for seam in seams.short
+    ]
+    return {"seams": seams.count, "short": len(places), "short_seams": places}
 
 
 def _shallow(seams: Seams | None, overlap_abs: float) -> list[str]:
     if seams is None:
         return ["There was no time to make hulls overlap."]
-    if seams.short == 0:
+    if not seams.short:
         return []
     return [
-        f"{seams.short} of {seams.count} seams between hulls overlap by less than {overlap_abs:.4g}: more would break "
-        "the criterion. A smaller overlap or a larger threshold helps."
+        f"{len(seams.short)} of {seams.count} seams between hulls overlap by less than {overlap_abs:.4g}: more would "
+        "break the criterion. A smaller overlap or a larger threshold helps."
     ]
 
 
@@ -154,7 +166,7 @@ def joint_report(reports: Sequence[tuple[str, dict[str, Any]]], scale: float) ->
         "complete": stopped["complete"],
         "stopped_by": stopped["stopped_by"],
         **({"primitives": _added([r["primitives"] for _, r, _ in each])} if "primitives" in first else {}),
-        **({"overlap": _joint_seams([r["overlap"] for _, r, _ in each])} if "overlap" in first else {}),
+        **({"overlap": _joint_seams([r for _, r, _ in each])} if "overlap" in first else {}),
         **{what: sum(report[what] for _, report, _ in each) for what in ("parts", "faces", "vertices")},
         criterion: first[criterion] | {"per_part": per_part, "max": None if per_part is None else max(per_part)},
         "hausdorff": {side: None if None in far[side] else max(far[side]) for side in sides},  # type: ignore[type-var]
@@ -174,11 +186,18 @@ def _times(length: float | None, factor: float) -> float | None:
     return None if length is None else length * factor
 
 
-def _joint_seams(seams: Sequence[dict[str, int | None]]) -> dict[str, int | None]:
-    return {
-        what: None if any(one[what] is None for one in seams) else sum(one[what] or 0 for one in seams)
-        for what in ("seams", "short")
-    }
+def _joint_seams(reports: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Of all nodes; parts are numbered through."""
+    seams = [report["overlap"] for report in reports]
+    if any(one["seams"] is None for one in seams):
+        return dict.fromkeys(seams[0])
+    firsts = [0, *accumulate(report["parts"] for report in reports)]
+    places = [
+        {**place, "parts": [first + part for part in place["parts"]]}
+        for first, one in zip(firsts, seams, strict=False)
+        for place in one["short_seams"]
+    ]
+    return {"seams": sum(one["seams"] for one in seams), "short": len(places), "short_seams": places}
 
 
 def _added(counts: Sequence[dict[str, int]]) -> dict[str, int]:

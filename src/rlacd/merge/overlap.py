@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,18 +30,48 @@ whichever is less, times this. On either side of a seam in a bent solid, neither
 
 
 @dataclass(frozen=True)
+class ShortSeam:
+    """A seam where the criterion left no room.
+
+    Attributes
+    ----------
+    parts : tuple of int
+        The two.
+    place : float64 [3]
+        Where the seam is farthest from what was asked for.
+    depth : float
+        How deep that place lies in the hull that it lies deepest in.
+    """
+
+    parts: tuple[int, int]
+    place: FloatArray
+    depth: float
+
+
+@dataclass(frozen=True)
 class Seams:
     """What became of the seams, where two hulls touched with less overlap than asked for.
 
     Attributes
     ----------
     count : int
-    short : int
-        Those that still overlap by less, since the criterion left no room.
+    short : tuple of ShortSeam
+        Those that still overlap by less.
     """
 
     count: int
-    short: int
+    short: tuple[ShortSeam, ...]
+
+
+class _Seam(NamedTuple):
+    parts: tuple[int, int]
+    places: FloatArray  # [N, 3]
+    asked: FloatArray  # [N]: how deep each place should lie in some hull
+
+    def deepest(self, bodies: Sequence[_Body]) -> FloatArray:
+        """How deep each place lies in the body that it lies deepest in [N]; 0 outside all."""
+        depths: FloatArray = np.max([body.sides.depths(self.places) for body in bodies], axis=0, initial=0.0)
+        return depths
 
 
 def overlap_parts(
@@ -76,14 +107,14 @@ def overlap_parts(
         near[first].add(second)
         near[second].add(first)
     surface = _native.Surface(solid.vertices, solid.faces)
-    seams: list[FloatArray] = []
+    seams: list[_Seam] = []
     for first, second in pairs:
         _native.poll_stop()
         sides, places = bodies[first].contact(bodies[second], overlap)
         if len(sides) == 0:
             continue
         inside = surface.distance(places, threads=1)
-        seam = np.column_stack([places, HELD * np.minimum(inside, overlap / 2)])
+        seam = _Seam((first, second), places, HELD * np.minimum(inside, overlap / 2))
         seams.append(seam)
         best, most = dict[int, _Body](), -1
         for change in _changes(bodies, near, first, second, overlap):
@@ -91,48 +122,57 @@ def overlap_parts(
             if any(part is None for part in grown.values()):
                 continue
             changed = {place: _Body(part) for place, part in grown.items() if part is not None}
-            held = _held([changed.get(place, bodies[place]) for place in (first, second)], seam)
+            deepest = seam.deepest([changed.get(place, bodies[place]) for place in seam.parts])
+            held = int(np.count_nonzero(deepest >= seam.asked))
             if held > most:
                 best, most = changed, held
-            if held == len(seam):
+            if held == len(places):
                 break
         for place, body in best.items():
             bodies[place] = body
-    low, high = np.stack([body.part.box for body in bodies], axis=1) if bodies else np.zeros((2, 0, 3))
-    short = 0
+    return [body.part for body in bodies], Seams(len(seams), tuple(_short(bodies, seams)))
+
+
+def _short(bodies: Sequence[_Body], seams: Sequence[_Seam]) -> Iterator[ShortSeam]:
+    """Those of which some place is not as deep in any body as asked for."""
+    if not seams:
+        return
+    low, high = np.stack([body.part.box for body in bodies], axis=1)
     for seam in seams:
-        near_it = (seam[:, :3].min(axis=0) <= high).all(axis=1) & (seam[:, :3].max(axis=0) >= low).all(axis=1)
-        short += _held([bodies[i] for i in np.flatnonzero(near_it)], seam) < len(seam)
-    return [body.part for body in bodies], Seams(len(seams), short)
-
-
-def _held(bodies: Sequence[_Body], seam: FloatArray) -> int:
-    """How many points of a seam [N, 4] lie as deep in some body as their fourth coordinate asks."""
-    points = np.ascontiguousarray(seam[:, :3])
-    depths = [body.sides.depths(points) for body in bodies]
-    return int((np.max(depths, axis=0, initial=0.0) >= seam[:, 3]).sum())
+        near = (seam.places.min(axis=0) <= high).all(axis=1) & (seam.places.max(axis=0) >= low).all(axis=1)
+        deepest = seam.deepest([bodies[i] for i in np.flatnonzero(near).tolist()])
+        worst = int((deepest - seam.asked).argmin())
+        if deepest[worst] < seam.asked[worst]:
+            yield ShortSeam(seam.parts, seam.places[worst], float(deepest[worst]))
 
 
 def _changes(
     bodies: list[_Body], near: list[set[int]], first: int, second: int, overlap: float
 ) -> Iterator[list[tuple[int, Hull]]]:
-    """Ways to make two bodies overlap, each as grown hulls: the one that adds least, the other, half of either."""
+    """Ways to make two bodies overlap, each as grown hulls: the one that adds least, the other, half of either.
 
-    def grown(one: int, other: int, depth: float) -> tuple[float, list[tuple[int, Hull]]] | None:
+    First with all sides of a body moved at which it touches any other, so that its layers join; if that is too much,
+    with those only at which it touches the other one.
+    """
+    both = ((first, second), (second, first))
+
+    def grown(one: int, other: int, depth: float, touched: set[int]) -> tuple[float, tuple[int, Hull]] | None:
         body = bodies[one]
-        sides = np.unique(np.concatenate([body.contact(bodies[place], overlap)[0] for place in near[one]]))
+        sides = np.unique(np.concatenate([body.contact(bodies[place], overlap)[0] for place in sorted(touched)]))
         layer = Hull.of(body.sides.layer(bodies[other].sides, sides, depth, TOUCH))
         if layer is None:
             return None
         hull = Hull.around(body.part.hull, layer)
-        return hull.volume - body.part.hull.volume - layer.volume, [(one, hull)]
+        return hull.volume - body.part.hull.volume - layer.volume, (one, hull)
 
-    whole = [found for pair in ((first, second), (second, first)) if (found := grown(*pair, overlap)) is not None]
-    for _, change in sorted(whole, key=lambda found: found[0]):
-        yield change
-    halves = [grown(*pair, overlap / 2) for pair in ((first, second), (second, first))]
-    if all(half is not None for half in halves):
-        yield [grow for half in halves if half is not None for grow in half[1]]
+    for everywhere in (True, False):
+        ways = [(one, other, near[one] if everywhere else {other}) for one, other in both]
+        whole = [found for one, other, some in ways if (found := grown(one, other, overlap, some)) is not None]
+        for _, change in sorted(whole, key=lambda found: found[0]):
+            yield [change]
+        halves = [half for one, other, some in ways if (half := grown(one, other, overlap / 2, some)) is not None]
+        if len(halves) == len(both):
+            yield [change for _, change in halves]
 
 
 def _judged(part: Part, hull: Hull, solid: Component, criterion: Criterion, tolerated: float | None) -> Part | None:
