@@ -23,6 +23,8 @@ OBJECTS = {
     "vhacd/hornbug.ply": "y",
     "vhacd/lamp.ply": "y",
     "vhacd/teapot.ply": "y",
+    "vhacd/horse_walk.ply": "y",
+    "vhacd/teddy.ply": "y",
     "coacd_examples/Bottle.ply": "y",
     "coacd_examples/Kettle.ply": "y",
     "coacd_examples/SnowFlake.ply": "z",
