@@ -204,22 +204,26 @@ def _fewer(meshes: Mapping[MeshUse, RewrittenMesh], options: Mapping[str, Any]) 
     if not of_meshes or stated or len(meshes) < 2 or hulls < MANY * len(meshes):
         return []
     largest = min(mesh.result.report["scale"] for mesh in meshes.values())
-    length = float(f"{_threshold(meshes) / largest:.1g}")
     quick = {name: value for name, value in options.items() if name not in ("threshold", "budget", "search_steps")}
-    fewer = sum(
-        len(_coarse(mesh.result.source, {**quick, "quality": "fast", "threshold_abs": length}))
-        for mesh in meshes.values()
-    )
-    if fewer > FEWER * hulls:
-        return []
-    return [
-        f"{len(meshes)} meshes became {hulls} hulls, as the threshold is relative to each; --threshold-abs {length:g} "
-        f"gives {fewer} or fewer."
-    ]
+    for times in LARGER:
+        length = float(f"{times * _threshold(meshes) / largest:.1g}")
+        fewer = sum(
+            len(_coarse(mesh.result.source, {**quick, "quality": "fast", "threshold_abs": length}))
+            for mesh in meshes.values()
+        )
+        if fewer <= FEWER * hulls:
+            return [
+                f"{len(meshes)} meshes became {hulls} hulls, as the threshold is relative to each; --threshold-abs "
+                f"{length:g} gives {fewer} or fewer."
+            ]
+    return []
 
 
 MANY, FEWER = 10, 0.7
 """Hulls per mesh from which on fewer are suggested, and the share of them that is worth a word."""
+
+LARGER = (1, 2)
+"""The thresholds that are tried, times that of the largest mesh: a robot is larger than its largest mesh."""
 
 
 def _threshold(meshes: Mapping[MeshUse, RewrittenMesh]) -> float:
