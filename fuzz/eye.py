@@ -30,6 +30,9 @@ SEAM = 1e-5
 PROMISING = 64
 """Number of points whose distance is computed exactly; a point cloud selects them."""
 
+NO_AREA = 2e-11
+"""Twice the area below which a face counts as having none: a needle so thin that rounding decides about it."""
+
 FEW_PAIRS = 20_000
 """Up to this many pairs of points and triangles, all distances are computed exactly."""
 
@@ -135,7 +138,7 @@ def in_frame(
     where[np.unique(faces)] = (used - centre) / size
     corners = where[faces]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    return where, faces[area > 0], [Polytope((points - centre) / size, own) for points, own in hulls]
+    return where, faces[area > NO_AREA], [Polytope((points - centre) / size, own) for points, own in hulls]
 
 
 def main() -> None:

@@ -142,6 +142,9 @@ def overhang(
 def filled_solid(where: Floats, faces: Ints) -> manifold3d.Manifold | None:
     """The closed input as a solid without cavities; None if manifold3d does not accept it."""
     solid = manifold3d.Manifold(manifold3d.Mesh64(np.ascontiguousarray(where), faces.astype(np.uint64)))
+    kept = triangles_of(solid)[0]
+    if len(kept) == 0 or cKDTree(kept).query(where[np.unique(faces)])[0].max() > ROUNDING:
+        return None  # manifold3d drops bodies without volume, which repair turns into slabs
     pieces = solid.decompose()
     if any(abs(piece.volume()) < THIN * piece.surface_area() for piece in pieces):
         return None  # repair turns sheets into slabs

@@ -545,3 +545,14 @@ def test_a_bad_option_of_the_command_line_has_code_2(words: list[str], tmp_path:
     assert done.stderr.startswith("rlacd: ")
     assert is_one_sentence(done.stderr)
     assert [p.name for p in tmp_path.iterdir()] == ["box.stl"]
+
+
+@pytest.mark.parametrize("limits", [{}, {"max_faces": 8}, {"max_vertices": 4}, {"preset": "unreal"}])
+def test_hulls_of_coordinates_near_the_largest_number_stay_finite(limits):
+    """Found by the soak: a hull with few faces reaches beyond its points, and there to infinity."""
+    points = np.array(
+        [[1e308, 0, 4], [-23, 0, 13], [-14, 0, 4], [-14, 0, 13], [-14, 0.1, 13], [1e308, 1.7e308, -1e308]]
+    )
+    faces = [[3, 1, 2], [0, 2, 1], [3, 4, 1], [5, 0, 1], [5, 4, 0]]
+    result = rlacd.decompose((points, faces), threshold=0.2, quality="fast", threads=1, **limits)
+    assert all(np.isfinite(hull.vertices).all() for hull in result)

@@ -16,7 +16,7 @@ from fuzz.choices import draw_options
 from fuzz.eye import farthest_from_triangles, in_frame, outer_points, seen_over, seen_under
 from fuzz.files import read_hulls, write_mesh
 from fuzz.geometry import Polytope, distance_to_triangles, distance_to_union, why_not_convex
-from fuzz.judges import Case, judge
+from fuzz.judges import Case, filled_solid, judge
 from fuzz.kernels import try_seed
 from fuzz.recipes import Shape, make_shape
 from fuzz.shapes import run_seed
@@ -77,6 +77,16 @@ def test_a_concavity_above_the_threshold_has_to_be_said() -> None:
     whole = case(threshold=1.5)
     found = judge(replace(whole, options={"threshold": 0.05}))
     assert any("more than 0.05, and no word of it" in word for word in found)
+
+
+def test_a_body_without_volume_is_no_solid_to_judge_by() -> None:
+    """Found by the soak: manifold3d dropped a flat body, and the hull around it and another looked too concave."""
+    flat = np.array([[6.0, 0, 0], [6, 1, 0], [6, 0, 1], [6, 1, 1]])
+    faces = np.array([[0, 1, 2], [0, 2, 1], [1, 3, 2], [1, 2, 3]]) + len(ELL.vertices)
+    where = np.concatenate([ELL.vertices, flat]).astype(np.float64)
+    both = np.concatenate([ELL.faces, faces]).astype(np.int64)
+    assert filled_solid(where[: -len(flat)], both[: -len(faces)]) is not None
+    assert filled_solid(where, both) is None
 
 
 def test_a_hull_in_the_way_of_a_ball_is_seen() -> None:

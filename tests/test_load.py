@@ -4,6 +4,7 @@ import contextlib
 import io
 import json
 import socket
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -349,6 +350,16 @@ def test_what_an_xml_parser_says_on_two_lines_is_one_sentence(box, tmp_path):
     with pytest.raises(MeshFileError, match="holds XML that is damaged") as said:
         load_mesh(path)
     assert "\n" not in str(said.value)
+
+
+def test_a_damaged_zae_file_is_not_told_to_take_its_own_name(box, tmp_path):
+    """Found by the soak: what is read from it is a dae file."""
+    path = tmp_path / "box.zae"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("box.dae", box.export(file_type="dae").replace(b"</p>", b" x</p>", 1))
+    with pytest.raises(EmptyMeshError, match="holds no points") as said:
+        load_mesh(path)
+    assert "rename" not in str(said.value)
 
 
 def test_paths_in_a_scene_are_ignored(box):

@@ -12,6 +12,8 @@ from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.primitive import PRIMITIVE
 
+_LARGEST = float(np.finfo(np.float64).max)
+
 _BOX_VERTICES, _BOX_FACES = 8, 12
 
 
@@ -33,7 +35,8 @@ def in_input(
     trimesh.Trimesh
         Convex and closed, with positive volume. If the hull stands for a primitive, ``metadata`` describes it.
     """
-    points = frame.to_input(hull.vertices)
+    with np.errstate(over="ignore"):  # a limited hull can reach beyond the input, and so beyond the largest number
+        points = np.clip(frame.to_input(hull.vertices), -_LARGEST, _LARGEST)
     there = Hull.of(points)
     if there is None:
         there = plain_hull(points, max_vertices, max_faces)

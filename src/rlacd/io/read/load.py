@@ -145,12 +145,13 @@ def _read(path: Path) -> tuple[bytes, str, trimesh.Scene]:
     extension = "glb" if extension == "vrm" else extension  # a VRM file is a GLB file
     if (declared := declared_triangles(content, extension)) is not None:
         require_memory(declared, BYTES_READ, path.name)
+    named = extension  # a zae file is unpacked to a dae file
     beside = FolderFiles(path.parent)
     try:
         plain, extension = _checked(path, content, extension, beside)
         scene = usd_scene(path) if extension in USD else _parsed(plain, extension, beside)
     except Exception as error:  # parsers may raise anything on damaged files
-        if holds and holds != extension:
+        if holds and holds not in (extension, named):
             raise MeshFileError(f"{path} is not {extension} but {holds}: rename it to .{holds}") from error
         if isinstance(error, MeshFileError | MissingExtraError):
             raise
@@ -163,7 +164,7 @@ def _read(path: Path) -> tuple[bytes, str, trimesh.Scene]:
         raise MeshFileError(
             f"{path} cannot be read as {extension}: it is damaged or cut off{reason}; export it again"
         ) from error
-    if holds and holds != extension and not scene.geometry:
+    if holds and holds not in (extension, named) and not scene.geometry:
         raise MeshFileError(f"{path} is not {extension} but {holds}: rename it to .{holds}")
     return plain if extension == "dae" else content, extension, scene
 
