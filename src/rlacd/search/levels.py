@@ -37,6 +37,13 @@ ANOTHER_PASS = 1.5
 FEW = 20
 """With more parts than this, searching around the first pass gains more per unit of work than another pass."""
 
+MANY = 1000
+"""With more parts than this, the ranking of the first pass may have failed: there are solids that one breaks into
+thousands of parts and another into tens (docs/research/learning.md). So another pass is made, ..."""
+
+FAR_FEWER = 1 / 4
+"""... and abandoned when it has more pieces than this share of the parts, or takes half of the allowed work."""
+
 BOUNDED_PATIENCE = 4
 """A bounded search gives up after this many trials per part without a gain (docs/research/search.md)."""
 
@@ -176,9 +183,12 @@ def search(
     else:
         # greedy has already used the first score
         others = context.rankings[1:] if first == "greedy" else context.rankings
-        opening = others if not bounded else others[:1] if len(parts) <= FEW else []
+        crowded = bounded and len(parts) > MANY
+        opening = others if not bounded else others[:1] if len(parts) <= FEW or crowded else []
         a_pass = _seconds_of_a_pass(clock)
-        starts = _portfolio(context, parts, opening, budget, a_pass, ANOTHER_PASS * first_pass)
+        most_work = min(ANOTHER_PASS * first_pass, allowed / 2 if crowded else math.inf)
+        pieces = (FAR_FEWER if crowded else HOPELESS) * len(parts)
+        starts = _portfolio(context, parts, opening, budget, a_pass, pieces, most_work)
         from_portfolio = len(starts[0])
         if bounded:
             state = Neighbourhood(context, starts[0], BOUNDED_PATIENCE)
@@ -187,7 +197,8 @@ def search(
             outcome = _from_all(context, starts, budget, steps)
         if bounded and level.seconds is not None:
             budget.hurry()
-            starts = _portfolio(context, outcome.parts, others[len(opening) :], budget, a_pass)
+            pieces = HOPELESS * len(outcome.parts)
+            starts = _portfolio(context, outcome.parts, others[len(opening) :], budget, a_pass, pieces)
             further = replace(context, seed=context.seed + FURTHER)
             outcome = outcome.then(_from_all(further, starts, budget, steps))
     summary = SearchSummary(
@@ -225,11 +236,13 @@ def _portfolio(
     rankings: Sequence[Ranking],
     budget: SearchBudget,
     seconds: float,
+    most: float,
     work: float = math.inf,
 ) -> list[list[Part]]:
     """The given parts and those of further passes, one for each ranking; best first.
 
-    `seconds` is the expected duration of a pass. A pass that needs more than `work` is abandoned.
+    `seconds` is the expected duration of a pass. A pass that has more than `most` pieces or needs more than `work`
+    is abandoned.
     """
     cache = CutCache()
     found = [parts]
@@ -237,7 +250,6 @@ def _portfolio(
         if budget.is_over or len(parts) == 1 or seconds > SHARE * budget.left:
             break
         tree = CutTree(context.root, ranking(context.sweeps), context.workers, cache)
-        most = HOPELESS * len(parts)
         with budget.allowance(work):
             other = cut_and_merge(tree, context.criterion, context.workers, budget, most=most, strict=True)
             if other.unmet or budget.is_over:
