@@ -67,10 +67,24 @@ void check(const Mesh& part, const Mesh& hull) {
   if (hull.faces.empty()) throw std::invalid_argument("the hull has no faces");
 }
 
+// Newton's method: std::cbrt has other last bits in every C library, and the search compares these numbers.
+double cube_root(double x) {
+  if (!(x > 0) || std::isinf(x)) return x;
+  int exponent = 0;
+  double mantissa = std::frexp(x, &exponent);
+  while (exponent % 3 != 0) {
+    mantissa *= 2;
+    --exponent;
+  }
+  double root = 1;
+  for (int i = 0; i < 8; ++i) root -= (root * root * root - mantissa) / (3 * root * root);
+  return std::ldexp(root, exponent / 3);
+}
+
 }  // namespace
 
 double volume_radius(double part_volume, double hull_volume) {
-  return std::cbrt(std::max(0.0, 3 * (hull_volume - part_volume) / (4 * kPi)));
+  return cube_root(std::max(0.0, 3 * (hull_volume - part_volume) / (4 * kPi)));
 }
 
 Concavity concavity(const Mesh& part, const Mesh& hull, double part_volume, double hull_volume, double tolerance,

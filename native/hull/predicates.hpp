@@ -15,6 +15,15 @@
 
 namespace rlacd {
 
+// What rounding took from a product, exactly (Dekker 1971). std::fma(a, b, -product) should be the same, but is a call
+// into the C library where the processor need not have it, and MinGW's rounds wrongly.
+inline double product_error(double a, double b, double product) {
+  constexpr double kHalves = 134217729;  // 2^27 + 1: cuts 53 bits in two
+  const double a_high = kHalves * a - (kHalves * a - a), a_low = a - a_high;
+  const double b_high = kHalves * b - (kHalves * b - b), b_low = b - b_high;
+  return ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low;
+}
+
 // A sum of doubles, non-overlapping, in order of increasing magnitude, without zeros: its sign is its last term's.
 template <int Capacity>
 class Expansion {
@@ -36,7 +45,7 @@ class Expansion {
   // Adds sign * a * b exactly.
   void add_product(double a, double b) {
     const double high = a * b;
-    const double low = std::fma(a, b, -high);
+    const double low = product_error(a, b, high);
     if (low != 0) add(low);
     add(high);
   }
@@ -84,7 +93,7 @@ inline DoubleDouble operator+(DoubleDouble a, DoubleDouble b) {
 
 inline DoubleDouble operator*(DoubleDouble a, DoubleDouble b) {
   const double product = a.high * b.high;
-  return quick_sum(product, std::fma(a.high, b.high, -product) + (a.high * b.low + a.low * b.high));
+  return quick_sum(product, product_error(a.high, b.high, product) + (a.high * b.low + a.low * b.high));
 }
 
 inline DoubleDouble operator-(DoubleDouble a) { return {-a.high, -a.low}; }
