@@ -152,7 +152,9 @@ class WarmTrials:
             while not self._pipe.poll(LOOK):
                 now = _spent(self._process.pid)
                 spent = now if spent is None else spent
-                if now - spent > self._cpu_seconds or time.monotonic() - begun > PATIENCE:
+                if time.monotonic() - begun > PATIENCE:
+                    return self._ended("hang", f"no answer within {PATIENCE:g} s, {now - spent:.1f} of a processor")
+                if now - spent > self._cpu_seconds:
                     return self._ended("hang", f"it took more than {self._cpu_seconds:g} s of a processor")
                 if _resident(self._process.pid) > MEMORY:
                     return self._ended("memory", f"it took more than {MEMORY / 2**30:g} GB")
