@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import trimesh
 
+import rlacd
 from rlacd.bench import Bench, BenchLimits, BenchStore, BenchTask, find_meshes, make_method, tables, tuning
 from rlacd.bench.deployed import Deployment, decompose_as_deployed
 from rlacd.bench.store import load_hulls, save_hulls
@@ -159,9 +160,9 @@ class TestDeployment:
         """With all 150 planes on the shortlist and no edges, what is left is the paper's greedy baseline."""
         mesh = from_manifold(CROSS.rotate((10, 20, 30)))
         deployed = decompose_as_deployed(Deployment("excess", 150, 0), mesh.vertices, mesh.faces, 0.05, 1)
-        greedy = make_method("greedy-hull-sum").run(mesh.vertices, mesh.faces, 0.05, 1)
+        greedy = rlacd.decompose((mesh.vertices, mesh.faces), quality="fast", policy="greedy-hull-sum", detail="full")
         assert len(deployed) == len(greedy)
-        assert sum(len(v) for v, _ in deployed) == sum(len(v) for v, _ in greedy)
+        assert sum(len(v) for v, _ in deployed) == sum(len(hull.vertices) for hull in greedy)
 
 
 class TestStore:
