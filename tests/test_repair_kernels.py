@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from rlacd import _native
 from rlacd.repair.distance import SurfaceQuery, shared_faces
-from rlacd.repair.repair import _inside_by_balls
+from rlacd.repair.measure import inside_by_balls
 from rlacd.repair.voxels import Reach, _grown, _steps_away
 from rlacd.solid.topology import Edges
 
@@ -125,8 +125,8 @@ def test_balls_tell_inside_from_outside() -> None:
     points = np.random.default_rng(2).uniform(-1.4, 1.4, (3000, 3)) * [1, 1, 0.4]
     distance = solid.distance(points)
     points, distance = points[distance > 1e-3], distance[distance > 1e-3]
-    np.testing.assert_array_equal(_inside_by_balls(solid, points, distance), solid.inside(points))
-    assert len(_inside_by_balls(solid, points[:0], distance[:0])) == 0
+    np.testing.assert_array_equal(inside_by_balls(solid, points, distance), solid.inside(points))
+    assert len(inside_by_balls(solid, points[:0], distance[:0])) == 0
 
 
 def test_shared_faces_are_found_whatever_their_order_and_winding() -> None:

@@ -25,6 +25,9 @@ from rlacd.solid.topology import (
 NO_AREA = 1e-14
 """Faces with less area than this, in the frame, are degenerate."""
 
+FLAT = 1e-6
+"""A closed body with less volume per area is flat: there is nothing to cut."""
+
 # Sheets of a body are separated before thickening if there are at most this many, with at most this many faces in all.
 _MOST_PATCHES, _MOST_PATCHED = 100, 4000
 # Cosine of the angle between two faces below which a sheet is folded onto itself (20 degrees).

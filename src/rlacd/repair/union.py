@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
-import manifold3d
 import numpy as np
 from manifold3d import Manifold, OpType
 
@@ -171,20 +170,3 @@ def _united_at_once(solids: list[Manifold], triangles: int) -> Manifold:
         return solids[0]
     require_time_for(triangles)
     return Manifold.batch_boolean(solids, OpType.Add)
-
-
-def hull_of_points(points: FloatArray, half_thickness: float) -> Manifold:
-    """Return the hull of points ``[N, 3]``, thickened along the axes in which they have no extent."""
-    poll_stop()
-    points = np.unique(points, axis=0)
-    middle = points.mean(axis=0)
-    _, _, axes = np.linalg.svd(np.concatenate([points - middle, np.zeros((3, 3))]), full_matrices=False)
-    extent = np.ptp((points - middle) @ axes.T, axis=0)
-    for axis in axes[extent < half_thickness]:
-        points = np.concatenate([points - half_thickness * axis, points + half_thickness * axis])
-    return manifold3d.Manifold.hull_points(points)
-
-
-def slab_of_faces(vertices: FloatArray, faces: IntArray, half_thickness: float) -> Manifold:
-    """Return the union of triangles, each of them thickened."""
-    return as_manifold(unite([hull_of_points(vertices[face], half_thickness) for face in faces]))

@@ -17,6 +17,10 @@ from rlacd.repair.distance import SurfaceQuery, points_covering
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.topology import BoolArray, IntArray
 
+GAP = 0.03
+"""Greatest distance of a cap from the input's surface, and the radius of the ball a gap must stop, in frame units, by
+default."""
+
 # Distances between cells are roots of whole numbers: this much more than a radius adds only rounding.
 _ROUNDING = 1e-9
 

@@ -1,0 +1,217 @@
+"""One attempt to turn the bodies of an input into a solid, each by the least change that works."""
+
+from __future__ import annotations
+
+import numpy as np
+from manifold3d import Manifold
+
+from rlacd._native import poll_stop
+from rlacd.repair.caps import FLAPS, close_holes
+from rlacd.repair.distance import SurfaceQuery
+from rlacd.repair.holes import MOST_FREE_EDGES, close_cracks
+from rlacd.repair.measure import measure
+from rlacd.repair.record import STEPS, Record
+from rlacd.repair.slabs import HALF_THICKNESS, hull_of_points
+from rlacd.repair.soup import FLAT, Soup, hidden_faces
+from rlacd.repair.union import Shape, split_labels, unite, unite_around_cavities, volume_of
+from rlacd.repair.voxels import GAP
+from rlacd.repair.wraps import Wraps
+from rlacd.solid.frame import FloatArray, Frame
+from rlacd.solid.manifold import to_manifold
+from rlacd.solid.topology import BoolArray, Edges, IntArray, bodies_of, is_balanced, signed_tetrahedra
+
+_WELDS = (2e-5, 5e-4)
+
+
+class Attempt:
+    """The steps on one input.
+
+    Bodies are numbered after cracks are welded.
+
+    Parameters
+    ----------
+    surface : SurfaceQuery
+        The input in the normalised frame.
+    frame : Frame
+        From the input's unit.
+    resolution, gap, keep_cavities, open_bodies
+        As for `rlacd.repair.repair.repair`.
+    as_sheets : int64 [N], optional
+        Bodies all of whose faces become slabs.
+    bend : float
+        How much caps may bend; see `rlacd.repair.caps.close_holes`.
+
+    Attributes
+    ----------
+    solid : Manifold or (vertices, faces)
+    record : Record
+        What was done to each body.
+    lost : float
+        How far what a capped body lost lies from the solid.
+    warnings : list of str
+    """
+
+    def __init__(
+        self,
+        surface: SurfaceQuery,
+        frame: Frame,
+        resolution: int,
+        gap: float,
+        keep_cavities: bool,
+        open_bodies: str,
+        as_sheets: IntArray | None = None,
+        bend: float = 1.0,
+    ) -> None:
+        self._input = surface
+        self._frame = frame
+        self._gap = gap
+        self._keep_cavities = keep_cavities
+        self._open_bodies = open_bodies
+        self._mouths: dict[int, FloatArray] = {}  # of hollow bodies, the centre of their widest opening
+        self._bend = bend
+        self.warnings: list[str] = []
+
+        faces, origin = close_cracks(surface.vertices, surface.faces, _WELDS)
+        count, body = bodies_of(faces, Edges.of(faces, len(surface.vertices)))
+        body_of_input = np.zeros(len(surface.faces), dtype=np.int64)
+        body_of_input[origin] = body
+        self.record = Record(count, body_of_input)
+        self.record.note(body[(faces != surface.faces[origin]).any(axis=1)], "welded")
+        self._by_room = np.zeros(count, dtype=bool)  # capped only because nothing can reach the cap
+        self._hidden, self._across = np.empty((2, 0, 3))  # points of such caps, and the normals there
+        sheets = np.empty(0, dtype=np.int64) if as_sheets is None else as_sheets
+        self._wraps = Wraps(surface, self.record, gap, resolution, sheets)
+
+        poll_stop()
+        self.solid = self._solid(Soup(surface.vertices, faces, body))
+        if volume_of(self.solid) == 0:
+            self.warnings.append("the surface could not be closed: the hull of its points stands in for the solid")
+            self.record.step[:] = STEPS.index("hull")
+            self.solid = hull_of_points(surface.vertices)
+        self._warn_of_shells()
+        self.lost = measure(self.record, surface, self.solid)
+
+    def doubted(self) -> IntArray:
+        """Bodies whose skin was chosen among crossing faces and leads away from them."""
+        return np.flatnonzero(self.record.has("outer skin") & (self.record.deviation > GAP))
+
+    def _solid(self, soup: Soup) -> Shape:
+        if self._is_oriented(soup):
+            parts = self._as_they_are(soup)
+        else:
+            soup = self._cap(self._drop_hidden(self._trust_windings(soup)))
+            parts = self._wraps.build_or_wrap(soup)
+        solids = [part for part, _ in parts]
+        if self._keep_cavities:
+            inward = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces), self.record.bodies) < 0
+            return unite_around_cavities(solids, [bool(inward[body]) for _, body in parts])
+        solid = unite(solids)
+        if self._open_bodies == "thin":
+            return solid
+        solid = self._wraps.with_rooms(solid, soup, parts, self._by_room)
+        return self._wraps.with_slits(solid, self._hidden, self._across, self._by_room)
+
+    def _is_oriented(self, soup: Soup) -> bool:
+        """Whether every edge joins two faces that run along it in opposite directions, and no body is flat."""
+        if (soup.edges.valence != 2).any():
+            return False
+        forward = (soup.faces < np.roll(soup.faces, -1, axis=1)).ravel()
+        if (np.bincount(soup.edges.of_halfedge, forward) != 1).any():
+            return False
+        volume = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces))
+        return bool((np.abs(volume) > 2 * FLAT * np.bincount(soup.body, soup.area)).all())
+
+    def _as_they_are(self, soup: Soup) -> list[tuple[Manifold, int]]:
+        """Take closed, oriented bodies as they are: the result of `build_or_wrap` without sorting all sides."""
+        volume = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces))
+        inward = volume < 0
+        faces = np.where(inward[soup.body, None], soup.faces[:, ::-1], soup.faces)
+        self.record.note(np.flatnonzero(inward), "reoriented")
+        self.record.faces_out = np.bincount(soup.body)
+        solids = [to_manifold(v, f) for v, f in split_labels(soup.vertices, faces, soup.body)]
+        return list(zip(solids, range(self.record.bodies), strict=True))
+
+    def _trust_windings(self, soup: Soup) -> Soup:
+        """Trust the windings of closed bodies if the angles between their faces join the inside with the outside.
+
+        Where corners were rounded, slivers fold over and angles around an edge with four faces are wrong.
+        """
+        uneven, crowded = np.zeros((2, self.record.bodies), dtype=bool)
+        uneven[soup.body[soup.at_valence(~is_balanced(soup.faces, soup.edges))]] = True
+        crowded[soup.body[soup.at_valence(soup.edges.valence > 2)]] = True
+        if not (crowded & ~uneven).any():
+            return soup
+        share = soup.sheet_share(self.record.bodies)
+        doubted = crowded & ~uneven & (share > FLAPS)
+        if not doubted.any():
+            return soup
+        trusting = Soup(soup.vertices, soup.faces, soup.body, doubted[soup.body])
+        better = doubted & (trusting.sheet_share(self.record.bodies) < share / 2)
+        return Soup(soup.vertices, soup.faces, soup.body, better[soup.body]) if better.any() else soup
+
+    def _drop_hidden(self, soup: Soup) -> Soup:
+        """Drop faces that lie inside their own body, if they are what keeps the body from having an inside.
+
+        Where parts meet in faces that overlap without matching, the order of faces around an edge is undecided, and one
+        wrong guess joins the inside with the outside. The winding number is not affected.
+        """
+        crowded = np.zeros(self.record.bodies, dtype=bool)
+        crowded[soup.body[soup.at_valence(soup.edges.valence > 2)]] = True
+        if not crowded.any():
+            return soup
+        share = soup.sheet_share(self.record.bodies)
+        hidden = np.zeros(len(soup.faces), dtype=bool)
+        for body in np.flatnonzero(crowded & (share > FLAPS)):
+            poll_stop()
+            some = np.flatnonzero(soup.body == body)
+            hidden[some] = hidden_faces(soup.vertices, soup.faces[some])
+        if not hidden.any():
+            return soup
+        better = soup.only(~hidden).sheet_share(self.record.bodies) < share / 2
+        self.record.note(soup.body[hidden & better[soup.body]], "outer skin")
+        return soup.only(~hidden | ~better[soup.body])
+
+    def _cap(self, soup: Soup) -> Soup:
+        """Cap the bodies all of whose holes may be capped."""
+        free = int((soup.edges.valence == 1).sum())
+        if free == 0 or free > MOST_FREE_EDGES or self._open_bodies == "thin":
+            return soup
+        soup = self._close(soup)
+        # What hangs on a rim is rather a side than a fin, unless its body would be hollow.
+        return self._close(soup, fins=True) if self._mouths else soup
+
+    def _close(self, soup: Soup, fins: bool = False) -> Soup:
+        fill = self._open_bodies == "solid"
+        closed = close_holes(
+            soup, self.record.bodies, self._input, self._covers, self._gap, HALF_THICKNESS / 2, fill, self._bend, fins
+        )
+        if closed is None:
+            return soup
+        self._mouths = dict(zip(closed.hollow.tolist(), closed.mouths, strict=True))
+        self.record.note(closed.bodies, "capped")
+        self._by_room |= closed.by_room
+        self._hidden = np.concatenate([self._hidden, closed.hidden])
+        self._across = np.concatenate([self._across, closed.across])
+        if len(closed.far):
+            place = self._frame.place(closed.where[closed.far.argmax()])
+            self.warnings.append(
+                f"Holes were closed although the caps lead up to {closed.far.max():.3f} (longest side = 2) away from "
+                f"the surface: the widest is at {place}."
+            )
+        return closed.soup
+
+    def _covers(self, points: FloatArray) -> BoolArray:
+        """Whether a ball can reach points; if cavities are kept, everything connected to them is open."""
+        return np.ones(len(points), dtype=bool) if self._keep_cavities else self._wraps.reach.covers(points)
+
+    def _warn_of_shells(self) -> None:
+        is_slab = self.record.has("slab")
+        shells = [body for body in self._mouths if is_slab[body]]
+        if not shells:
+            return
+        place = self._frame.place(self._mouths[shells[0]])
+        if len(shells) == 1:
+            sentence = f"1 open body became a thin shell; --open solid fills it (its widest opening is at {place})."
+        else:
+            sentence = f"{len(shells)} open bodies became thin shells; --open solid fills them (one opens at {place})."
+        self.warnings.append(sentence)

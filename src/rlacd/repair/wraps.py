@@ -1,0 +1,174 @@
+"""Wraps: what only a ball can tell from a solid is closed on a grid and projected onto the surface."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from manifold3d import Manifold
+
+from rlacd._native import poll_stop
+from rlacd.repair.build import skins, walls_and_sheets
+from rlacd.repair.distance import SurfaceQuery, points_covering, spread_points
+from rlacd.repair.record import Record
+from rlacd.repair.slabs import HALF_THICKNESS
+from rlacd.repair.soup import Soup
+from rlacd.repair.union import MOST_UNITED, Shape, as_manifold, to_arrays, unite, volume_of
+from rlacd.repair.voxels import GAP, Reach
+from rlacd.solid.frame import FloatArray
+from rlacd.solid.manifold import to_manifold
+from rlacd.solid.topology import BoolArray, IntArray
+
+_WRAP_ERROR = 4e-3
+# Widest slit between caps that is filled, as a share of the gap, and the distance up to which a cap is part of the
+# solid's surface.
+_SLIT, _ON_SURFACE = 1 / 4, 1e-6
+# More sheets than this are not united one by one: that would take seconds, and cutting the result even longer. Neither
+# are fewer sheets that all cross each other: 40 have 780 crossings (a second or two), 80 have 3,160 (ten seconds).
+_CROWD, _CROSSINGS = 300, 1000
+
+
+class Wraps:
+    """Wraps of an input, as a ball rolls around it.
+
+    Parameters
+    ----------
+    surface : SurfaceQuery
+        The input.
+    record : Record
+        Where steps are recorded.
+    gap : float
+        Radius of the ball.
+    resolution : int
+        Cells along the longest side.
+    as_sheets : int64 [N]
+        Bodies all of whose faces become slabs.
+    """
+
+    def __init__(self, surface: SurfaceQuery, record: Record, gap: float, resolution: int, as_sheets: IntArray) -> None:
+        self._input = surface
+        self._record = record
+        self._gap = gap
+        self._resolution = resolution
+        self._as_sheets = as_sheets
+
+    @cached_property
+    def reach(self) -> Reach:
+        """Where the ball can go."""
+        return Reach.of(self._input.vertices, self._input.faces, radius=self._gap, resolution=self._resolution)
+
+    def build_or_wrap(self, soup: Soup) -> list[tuple[Manifold, int]]:
+        """Build every body, but wrap crowds of sheets (leaves, feathers) as one; returns solids and their bodies."""
+        record = self._record
+        walls, sheets = walls_and_sheets(soup, record, self._as_sheets)
+        is_slab = record.has("slab")
+        crowded = is_slab.sum() > _CROWD
+        if crowded:  # slabs of single faces are most of the work, and not needed
+            parts = skins(walls.only(~is_slab[walls.body]), record)
+        else:
+            parts = skins(walls, record) + skins(sheets.in_patches(), record)
+            boxes = np.array([part.bounding_box() for part, body in parts if is_slab[body]]).reshape(-1, 2, 3)
+            if _crossings(boxes) <= _CROSSINGS:
+                return parts
+        slabs = soup.only(is_slab[soup.body])
+        points, _ = points_covering(slabs.vertices, slabs.faces, self.reach.pitch / 2)
+        wrap = self._wrap(self.reach.around_points(points), HALF_THICKNESS / 2)
+        if wrap.volume() <= 0:
+            slabs_too = (walls.only(is_slab[walls.body]), sheets.in_patches()) if crowded else ()
+            return parts + [part for some in slabs_too for part in skins(some, record)]
+        first = int(slabs.body.min())
+        record.note(slabs.body, "wrapped")
+        record.faces_out[is_slab] = 0
+        record.faces_out[first] = wrap.num_tri()
+        return [*((part, body) for part, body in parts if not is_slab[body]), (wrap, first)]
+
+    def with_rooms(self, solid: Shape, soup: Soup, parts: list[tuple[Manifold, int]], by_room: BoolArray) -> Shape:
+        """Close rooms that sheets enclose except for gaps too narrow for the ball.
+
+        Parameters
+        ----------
+        solid
+            The union of the parts.
+        soup
+            The faces that the parts were built from.
+        parts
+            Solids and their bodies.
+        by_room : bool [bodies]
+            Bodies that were capped only because nothing can reach the caps.
+        """
+        record = self._record
+        is_slab = record.has("slab")
+        slabs = soup.only(is_slab[soup.body])
+        around = soup.only((is_slab | by_room)[soup.body])
+        if around.area.sum() < 4 * np.pi * self._gap**2 or volume_of(solid) == 0:
+            return solid
+        rooms = self.reach.rooms_outside(SurfaceQuery(*to_arrays(solid)))
+        if len(rooms) == 0:
+            return solid
+        rooms = np.intersect1d(rooms, self.reach.rooms_near(spread_points(around.vertices, around.faces, GAP)[0]))
+        if len(rooms) == 0:
+            return solid
+        wrap = self._wrap(self.reach.around_rooms(rooms), _WRAP_ERROR)
+        # The wrap replaces the sheets that are only walls of the rooms; the others stay slabs.
+        points, on = spread_points(slabs.vertices, slabs.faces, GAP)
+        wall = np.bincount(on, ~np.isin(self.reach.rooms_near(points), rooms), len(slabs.faces)) == 0
+        before = record.faces_out.copy()
+        if wall.any() or len(parts) > MOST_UNITED:  # that many overlap in what was made of them
+            record.faces_out[is_slab] = 0
+            others = [part for part, body in parts if not is_slab[body]]
+            rest = walls_and_sheets(slabs.only(~wall), record, self._as_sheets)
+            rebuilt = skins(rest[0], record) + skins(rest[1].in_patches(), record)
+            united = unite([*others, *(part for part, _ in rebuilt), wrap])
+        else:
+            united = unite([as_manifold(solid), wrap])
+        if volume_of(united) <= volume_of(solid):
+            record.faces_out = before
+            return solid
+        wrapped = np.concatenate([slabs.body[wall], np.flatnonzero(by_room)])
+        record.note(wrapped, "wrapped")
+        record.faces_out[wrapped.min(initial=record.bodies - 1)] += wrap.num_tri()
+        return united
+
+    def with_slits(self, solid: Shape, hidden: FloatArray, across: FloatArray, by_room: BoolArray) -> Shape:
+        """Fill the slits between the caps of bodies that close each other, such as a pot and its lid.
+
+        Nothing can reach such caps; where they should coincide, noise leaves slits that would have to be cut around.
+
+        Parameters
+        ----------
+        solid
+            The solid so far.
+        hidden, across : float64 [N, 3]
+            Points of such caps, and the normals there.
+        by_room : bool [bodies]
+            Their bodies.
+        """
+        if len(hidden) == 0 or volume_of(solid) == 0:
+            return solid
+        query = SurfaceQuery(*to_arrays(solid), self._input.threads)
+        bare = query.distance(hidden) < _ON_SURFACE
+        points, step = hidden[bare], _SLIT * self._gap * across[bare]
+        points = points[query.inside(points + step) & query.inside(points - step)]
+        if len(points) == 0:
+            return solid
+        wrap = self._wrap(self.reach.around_points(points), _WRAP_ERROR)
+        united = unite([as_manifold(solid), wrap])
+        if volume_of(united) <= volume_of(solid):
+            return solid
+        self._record.note(np.flatnonzero(by_room), "wrapped")
+        self._record.faces_out[by_room.argmax()] += wrap.num_tri()
+        return united
+
+    def _wrap(self, cells: BoolArray, error: float) -> Manifold:
+        """Return a solid of grid cells, projected onto the input and simplified."""
+        return to_manifold(*self.reach.wrap(cells, self._input, HALF_THICKNESS)).simplify(error)
+
+
+def _crossings(boxes: FloatArray) -> int:
+    """Count the pairs of boxes [N, 2, 3] that meet."""
+    lower, upper = boxes[:, 0], boxes[:, 1]
+    count = 0
+    for i in range(len(boxes)):
+        poll_stop()
+        count += int(((lower[i] <= upper[i + 1 :]) & (lower[i + 1 :] <= upper[i])).all(axis=1).sum())
+    return count
