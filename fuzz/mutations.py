@@ -16,6 +16,8 @@ import numpy as np
 
 Rng = np.random.Generator
 
+Mutation = Callable[[bytes, bytes, Rng], bytes]
+
 TEXT = {"obj", "off", "xyz", "dae", "gltf"}
 
 NUMBER = re.compile(rb"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
@@ -76,7 +78,7 @@ def nudged(kind: str, seed: Seed, others: list[Seed], rng: Rng) -> bytes:
     return data
 
 
-def _nudge_of(kind: str, data: bytes) -> Callable[[bytes, bytes, Rng], bytes]:
+def _nudge_of(kind: str, data: bytes) -> Mutation:
     if kind in ("3mf", "zae"):
         return in_member_gently
     if kind in ("glb", "usdc", "usdz"):
@@ -86,7 +88,7 @@ def _nudge_of(kind: str, data: bytes) -> Callable[[bytes, bytes, Rng], bytes]:
     return nudge_text
 
 
-def _ways(kind: str, data: bytes) -> list[Callable[[bytes, bytes, Rng], bytes]]:
+def _ways(kind: str, data: bytes) -> list[Mutation]:
     rough = [flip, cut_off, delete, splice]
     if kind in ("3mf", "zae"):
         return [*rough, overwrite, double, *[in_member] * 14]
@@ -274,35 +276,27 @@ def _places(tree: Any) -> Any:
         yield from _places(value)
 
 
-def in_chunk(data: bytes, other: bytes, rng: Rng) -> bytes:
+def in_chunk(data: bytes, _: bytes, rng: Rng) -> bytes:
     """Change the JSON or binary chunk of a GLB, and correct the lengths."""
-    if len(data) < 28 or struct.unpack_from("<I", data, 12)[0] > len(data) - 20:
-        return flip(data, other, rng)
-    end = 20 + struct.unpack_from("<I", data, 12)[0]
-    text, binary = data[20:end], data[end + 8 :]
-    if rng.random() < 0.8:
-        text = in_json(text, b"", rng)
-        text += b" " * (-len(text) % 4)
-    else:
-        binary = overwrite(binary, b"", rng)
-    return _glb(text, binary)
+    return _in_chunk(data, rng, in_json, overwrite, 0.8)
 
 
-def in_chunk_gently(data: bytes, other: bytes, rng: Rng) -> bytes:
+def in_chunk_gently(data: bytes, _: bytes, rng: Rng) -> bytes:
     """Nudge numbers in the JSON of a GLB, or values in its buffer, and correct the lengths."""
+    return _in_chunk(data, rng, nudge_text, nudge_bits, 0.4)
+
+
+def _in_chunk(data: bytes, rng: Rng, of_text: Mutation, of_binary: Mutation, share: float) -> bytes:
+    """Change the JSON with a probability of `share`, else the binary chunk."""
     if len(data) < 28 or struct.unpack_from("<I", data, 12)[0] > len(data) - 20:
-        return flip(data, other, rng)
+        return flip(data, b"", rng)
     end = 20 + struct.unpack_from("<I", data, 12)[0]
     text, binary = data[20:end], data[end + 8 :]
-    if rng.random() < 0.4:
-        text = nudge_text(text, text, rng)
+    if rng.random() < share:
+        text = of_text(text, b"", rng)
         text += b" " * (-len(text) % 4)
     else:
-        binary = nudge_bits(binary, binary, rng)
-    return _glb(text, binary)
-
-
-def _glb(text: bytes, binary: bytes) -> bytes:
+        binary = of_binary(binary, b"", rng)
     chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(binary), 0x004E4942) + binary
     return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
 
@@ -317,7 +311,7 @@ def in_member_gently(data: bytes, _: bytes, rng: Rng) -> bytes:
     return _in_member(data, rng, (nudge_text,))
 
 
-def _in_member(data: bytes, rng: Rng, ways: tuple[Callable[[bytes, bytes, Rng], bytes], ...]) -> bytes:
+def _in_member(data: bytes, rng: Rng, ways: tuple[Mutation, ...]) -> bytes:
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = {name: archive.read(name) for name in archive.namelist()}

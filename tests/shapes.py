@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from hypothesis import strategies as st
 from manifold3d import CrossSection, Manifold, Mesh64
 
 from rlacd import _native
@@ -99,6 +100,17 @@ def arc(start: float, end: float) -> Component:
 def bent_bar() -> list[Component]:
     """Stretches of 26, 16 and 26 degrees; 36 degrees is as much as one hull may span."""
     return [arc(0, 26), arc(26, 42), arc(42, 68)]
+
+
+@st.composite
+def stacks(draw: st.DrawFn) -> list[Component]:
+    """Two to five boxes on top of each other."""
+    size = st.tuples(st.floats(0.2, 1), st.floats(0.2, 1), st.floats(0.05, 0.6))
+    stack, floor = [], 0.0
+    for x, y, z in draw(st.lists(size, min_size=2, max_size=5)):
+        stack.append(Component(box((-x / 2, -y / 2, floor), (x / 2, y / 2, floor + z))))
+        floor += z
+    return stack
 
 
 def strangers(components: Sequence[Component]) -> list[Component]:

@@ -19,7 +19,7 @@ from rlacd.search.part_graph import PartGraph
 from rlacd.search.transfer import transfer
 from rlacd.solid.component import Component, Part
 from rlacd.workers import Workers
-from tests.shapes import bent_bar, box, own_volume, together
+from tests.shapes import bent_bar, box, own_volume, stacks, together
 
 CRITERION = Concavity(0.05)
 
@@ -68,16 +68,8 @@ def test_small_parts_take_nothing_from_large_ones() -> None:
 
 
 @settings(max_examples=40, deadline=None)
-@given(
-    st.lists(st.tuples(st.floats(0.2, 1), st.floats(0.2, 1), st.floats(0.05, 0.6)), min_size=2, max_size=5),
-    st.integers(0, 2**32 - 1),
-)
-def test_nothing_is_lost(sizes: list[tuple[float, float, float]], seed: int) -> None:
-    stack: list[Part] = []
-    floor = 0.0
-    for x, y, z in sizes:
-        stack.append(Component(box((-x / 2, -y / 2, floor), (x / 2, y / 2, floor + z))))
-        floor += z
+@given(stacks(), st.integers(0, 2**32 - 1))
+def test_nothing_is_lost(stack: list[Component], seed: int) -> None:
     solid = together(stack)
     giver, *around = sorted(stack, key=lambda part: part.hull.volume)
     exchange = transfer(giver, around, CRITERION, np.random.default_rng(seed), solid)

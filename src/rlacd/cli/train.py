@@ -14,7 +14,7 @@ from rlacd.cli.parameters import REQUIRED, Parameters, chosen, command, option_p
 from rlacd.errors import MissingExtraError, OptionError
 from rlacd.learn.paper.options import PRESETS, TrainOptions
 
-EXTRA = ("torch", "gymnasium", "tensorboard", "safetensors", "onnx", "onnxscript", "onnxruntime")
+EXTRA = ("torch", "tensorboard", "safetensors", "onnx", "onnxscript", "onnxruntime")
 
 DEFAULT_PRESET = "two-cores"
 

@@ -65,9 +65,13 @@ def plain_gltf(path: Path, content: bytes, beside: Callable[[str], bytes]) -> by
         plain = _plain(path, header)
         _check(path, plain, _bytes_given(path, plain, len(content), beside))
     except (TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:
-        reason = f"{type(error).__name__}: {error!s:.100}"
-        raise MeshFileError(f"{path} {UNREADABLE} ({reason}); export it again") from error
+        raise damaged(path, error) from error
     return joined(plain, rest)
+
+
+def damaged(path: Path, error: Exception) -> MeshFileError:
+    """Build the error for a file whose parts are missing or of the wrong type, as an exception tells."""
+    return MeshFileError(f"{path} {UNREADABLE} ({type(error).__name__}: {error!s:.100}); export it again")
 
 
 def joined(header: Json, rest: bytes | None) -> bytes:

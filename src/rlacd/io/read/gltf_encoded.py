@@ -17,7 +17,7 @@ import numpy as np
 
 from rlacd.errors import MeshFileError, MissingExtraError
 from rlacd.io.read.apart import answer_of
-from rlacd.io.read.gltf import ITEM_BYTES, ITEMS, UNREADABLE, Json, joined, split
+from rlacd.io.read.gltf import ITEM_BYTES, ITEMS, Json, damaged, joined, split
 from rlacd.io.read.limits import MOST_TRIANGLES, most_in_memory
 from rlacd.pool import Blobs, Shared
 from rlacd.pool.request import Values
@@ -62,8 +62,7 @@ def decoded_gltf(path: Path, content: bytes, beside: Callable[[str], bytes]) -> 
     except MeshFileError:
         raise
     except (TypeError, KeyError, IndexError, AttributeError, OverflowError, ValueError) as error:
-        reason = f"{type(error).__name__}: {error!s:.100}"
-        raise MeshFileError(f"{path} {UNREADABLE} ({reason}); export it again") from error
+        raise damaged(path, error) from error
 
 
 class DracoDecoder:

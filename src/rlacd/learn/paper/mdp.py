@@ -26,8 +26,6 @@ class Reward:
     saved : float
         Eq. 2, relative to the component's own hull: (|CH(m_i)| - the sum of |CH| over its pieces) / |CH(m_i)|.
         This is the reward of the decision process whose solid is m_i, consistent with the partial observation.
-    share : float
-        |CH(m_i)| / |CH(m)|, m the whole solid: `share` times `saved` is eq. 2 itself.
     finished : float
         Eq. 3: 1 / (1 + log(|M'| - 1)) if this cut leaves every component of the solid finished, else 0.
     sides_finished : float
@@ -35,7 +33,6 @@ class Reward:
     """
 
     saved: float
-    share: float
     finished: float
     sides_finished: float
 
@@ -106,7 +103,6 @@ class CutProcess:
 
     def __init__(self, solid: Component, criterion: Criterion) -> None:
         self._criterion = criterion
-        self._volume = solid.hull.volume
         self._candidates: dict[Component, Candidates] = {}
         self._cache = CutCache()
         settled = self._settle(solid)
@@ -158,7 +154,6 @@ class CutProcess:
         last = all_finished and len(self.frontier) == 1 and not self.stuck
         reward = Reward(
             saved=(own - sum(children)) / own if made else 0.0,
-            share=own / self._volume,
             finished=terminal_reward(len(self.finished) + len(settled.finished)) if last else 0.0,
             sides_finished=terminal_reward(len(children)) if all_finished else 0.0,
         )

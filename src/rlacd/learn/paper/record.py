@@ -64,7 +64,7 @@ class Record:
     index : int64 [T]
         Index in the frontier of the component cut; the cut removes it.
     planes : int64 [T]
-    rewards : float64 [T, 4]
+    rewards : float64 [T, 3]
         The fields of `Reward`.
     values : float64 [T]
         The greatest Q of the component cut, as seen by the player; nan without a network.
@@ -96,7 +96,7 @@ class Record:
             joined=np.zeros(1, np.int64),
             index=ints,
             planes=ints,
-            rewards=np.empty((0, 4)),
+            rewards=np.empty((0, 3)),
             values=floats,
             parts=0,
             ended=ENDED.index(ended),

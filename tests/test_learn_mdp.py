@@ -9,26 +9,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("gymnasium", reason="needs the extra train")
 pytest.importorskip("torch", reason="needs the extra train")
 
-import gymnasium
-from gymnasium.utils.env_checker import check_env
-
-import rlacd.learn.env
 from rlacd.clock import Clock
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.errors import TrainingError
 from rlacd.io.read.load import load_mesh
 from rlacd.learn.encoders import Encoder, describe, make_encoder
-from rlacd.learn.meshes import Solids, list_meshes
-from rlacd.learn.paper.mdp import CutProcess, terminal_reward
+from rlacd.learn.meshes import list_meshes
+from rlacd.learn.paper.mdp import CutProcess, Reward, terminal_reward
 from rlacd.planes.candidates import axis_and_principal
 from rlacd.planes.sweep import sweep
 from rlacd.policies.observe import SCALE_INPUTS, observe, valid_planes
 from rlacd.repair.repair import repair
-from rlacd.solid.component import Component
+from rlacd.solid.component import Component, Plane
 from rlacd.workers import Workers
 from tests.learning import GreedyOverMask, greedy_plane, small_solids, write_meshes
 
@@ -50,17 +45,17 @@ def volumes(components: list[Component]) -> list[tuple[float, float]]:
     return sorted((c.volume, c.hull.volume) for c in components)
 
 
-def cut_greedily(cutting: CutProcess) -> list[float]:
-    """Cut to the end; the rewards r_1 on the way."""
-    saved = []
+def cut_greedily(cutting: CutProcess) -> list[tuple[float, Reward]]:
+    """Cut to the end; the hull volumes of the components cut, and the rewards."""
+    earned = []
     while not cutting.over:
         index = cutting.largest()
         component = cutting.frontier[index]
         number = greedy_plane(component)
         assert number is not None
-        reward = cutting.cut(index, cutting.candidates(component).plane(number)).reward
-        saved.append(reward.share * reward.saved)
-    return saved
+        cut = cutting.cut(index, cutting.candidates(component).plane(number))
+        earned.append((component.hull.volume, cut.reward))
+    return earned
 
 
 def check_same_as_decompose(solid: Component) -> None:
@@ -68,11 +63,13 @@ def check_same_as_decompose(solid: Component) -> None:
         done, left = CutTree(solid, GreedyOverMask(), workers).cut_until(CRITERION, Clock())
     cutting = CutProcess(solid, CRITERION)
     start = sum(c.hull.volume for c in cutting.frontier + cutting.finished + cutting.stuck)
-    saved = cut_greedily(cutting)
+    earned = cut_greedily(cutting)
     assert volumes(cutting.finished) == volumes(done)
     assert volumes(cutting.stuck) == volumes(left)
     end = sum(c.hull.volume for c in cutting.finished + cutting.stuck)
-    assert sum(saved) == pytest.approx((start - end) / solid.hull.volume, abs=1e-9)
+    assert sum(hull * reward.saved for hull, reward in earned) == pytest.approx(start - end, abs=1e-9)
+    paid = terminal_reward(len(cutting.finished)) if earned and cutting.terminal else 0
+    assert sum(reward.finished for _, reward in earned) == paid
 
 
 @pytest.mark.parametrize("name", small_solids())
@@ -89,7 +86,7 @@ def test_the_same_policy_reaches_the_same_components_of_real_meshes(corpus: Path
 def test_reward_of_an_angle_by_hand() -> None:
     solid = Component(small_solids()["angle"])  # two boxes, 2 x 1 x 0.3 and 0.3 x 1 x 1.2 on top of it
     cutting = CutProcess(solid, CRITERION)
-    plane = rlacd.solid.component.Plane((0.0, 0.0, 1.0), 0.3)
+    plane = Plane((0.0, 0.0, 1.0), 0.3)
     cut = cutting.cut(0, plane)
     hull = (2 * 1.5 - (2 - 0.3) * (1.5 - 0.3) / 2) * 1.0
     assert solid.hull.volume == pytest.approx(hull)
@@ -128,54 +125,6 @@ def test_valid_planes_need_no_sweep_and_are_valid_by_it(corpus: Path) -> None:
     assert differ < 0.1 * total
 
 
-def test_the_environment_keeps_gymnasiums_promises(meshes: Path) -> None:
-    env = gymnasium.make("rlacd/Cut-v0", meshes=meshes, points=32, max_parts=12)
-    check_env(env.unwrapped, skip_render_check=True)
-
-
-def test_the_environment_pays_eq_2_and_3_and_ends_with_finished_components(meshes: Path) -> None:
-    env = gymnasium.make("rlacd/Cut-v0", meshes=meshes, points=32, rotate=False)
-    for seed in range(6):
-        observed, info = env.reset(seed=seed)
-        cutting, done, total, paid = env.unwrapped.cutting, False, 0.0, 0.0
-        whole = sum(c.hull.volume for c in cutting.frontier + cutting.finished)
-        while not done:
-            assert observed["taken"].sum() == len(cutting.frontier)
-            number = greedy_plane(cutting.frontier[0])
-            assert info["action_mask"][0, number]
-            observed, reward, terminated, truncated, info = env.step(np.array([0, number]))
-            assert reward == pytest.approx(1000 * info["saved"] + 1000 * info["finished"])
-            total, paid, done = total + info["saved"], paid + info["finished"], terminated or truncated
-        assert info["terminal"]
-        parts = cutting.finished
-        assert info["parts"] == len(parts)
-        assert all(CRITERION.is_met(part) for part in parts)
-        assert paid == terminal_reward(len(parts))
-        share = (whole - sum(p.hull.volume for p in parts)) / Solids(meshes).get(info["mesh"]).hull.volume
-        assert total == pytest.approx(share)
-
-
-def test_masked_actions_cut_nothing_and_episodes_are_capped(meshes: Path) -> None:
-    env = gymnasium.make("rlacd/Cut-v0", meshes=meshes, points=32, max_cuts=3)
-    _, info = env.reset(seed=0)
-    slot, plane = np.argwhere(~info["action_mask"])[-1]
-    for cut in range(3):
-        _, reward, terminated, truncated, after = env.step(np.array([slot, plane]))
-        assert (reward, terminated, after["parts"], after["made"]) == (0, False, info["parts"], False)
-        assert truncated == (cut == 2)
-
-
-def test_the_same_seed_gives_the_same_episode(meshes: Path) -> None:
-    runs = []
-    for _ in range(2):
-        env = gymnasium.make("rlacd/Cut-v0", meshes=meshes, points=32)
-        observed, info = env.reset(seed=5)
-        slot, plane = np.argwhere(info["action_mask"])[7]
-        runs.append([observed, env.step(np.array([slot, plane]))[0]])
-    for one, other in zip(*runs, strict=True):
-        assert all(np.array_equal(one[key], other[key]) for key in one)
-
-
 def test_unreadable_meshes_are_left_out_and_counted(meshes: Path) -> None:
     listed = list_meshes(meshes, max_faces=1000, validation=2, seed=0)
     assert listed.unreadable == 1
@@ -185,12 +134,9 @@ def test_unreadable_meshes_are_left_out_and_counted(meshes: Path) -> None:
     assert list_meshes(meshes, max_faces=12, validation=0, seed=0).training == ("box.ply",)
 
 
-def test_folders_without_anything_to_learn_are_one_clear_error(tmp_path: Path, meshes: Path) -> None:
+def test_folders_without_anything_to_learn_are_one_clear_error(tmp_path: Path) -> None:
     with pytest.raises(TrainingError, match="holds 0 meshes"):
-        gymnasium.make("rlacd/Cut-v0", meshes=tmp_path / "none")
-    env = gymnasium.make("rlacd/Cut-v0", meshes=meshes, max_faces=12)
-    with pytest.raises(TrainingError, match="needs a cut"):
-        env.reset(seed=0)
+        list_meshes(tmp_path / "none", max_faces=1000, validation=0, seed=0)
 
 
 @pytest.mark.parametrize("name", ["profile", "profile-without-hull"])
