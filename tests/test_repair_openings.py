@@ -190,6 +190,79 @@ def test_a_coarse_knob_with_a_fin_on_the_rim_of_a_hole_is_a_ball(long, missing, 
     assert volume(solid) == pytest.approx(ball.volume, rel=0.02)
 
 
+KNOBS = {
+    "ball": trimesh.creation.icosphere(subdivisions=1),
+    "globe": trimesh.creation.uv_sphere(count=[8, 8]),
+    "capsule": trimesh.creation.capsule(0.5, 1, count=[8, 8]),
+    "fine ball": trimesh.creation.icosphere(subdivisions=2),
+}
+
+
+# Here the fin hangs on a face that touches the others only at corners: the two could be a body of their own.
+ISLANDS = {("ball", 9), ("ball", 15)}
+
+
+def random_knob(shape, seed):
+    """Doubled faces, 5 to 8 of them missing, and a fin of two on a rim: upright, slanted or flat over the hole."""
+    rng = np.random.default_rng(seed)
+    drop = rng.permutation(len(shape.faces))[: rng.integers(5, 9)]
+    faces = np.delete(shape.faces, drop, axis=0)
+    sides = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    left = {tuple(sorted(edge)) for edge in sides.tolist()}
+    rims = shape.faces[drop][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).tolist()
+    rims = [edge for edge in rims if tuple(sorted(edge)) in left]
+    a, b = rims[rng.integers(len(rims))]
+    out = shape.vertices[[a, b]] * rng.uniform(1.02, 1.4) + rng.normal(size=3) * 0.05
+    n = len(shape.vertices)
+    fin = [[a, b, n], [b, n + 1, n]]
+    return trimesh.Trimesh(
+        np.concatenate([shape.vertices, out]), np.concatenate([faces, faces[:, ::-1], fin]), process=False
+    )
+
+
+@pytest.mark.parametrize("name", KNOBS)
+@pytest.mark.parametrize("seeds", [range(10), range(10, 20)])
+def test_random_knobs_with_a_fin_on_a_rim_are_solid(name, seeds):
+    for seed in seeds:
+        solid = solid_of(random_knob(KNOBS[name], seed))
+        if (name, seed) in ISLANDS:
+            assert "--open solid fills it" in solid.warnings[0]
+        else:
+            assert volume(solid) == pytest.approx(KNOBS[name].volume, rel=0.03), seed
+
+
+def test_a_fin_on_a_face_that_hangs_itself_is_a_fin():
+    """All but one neighbour of the face that carries the fin are missing; the face's far corner has others."""
+    ball = KNOBS["fine ball"]
+    neighbours = [{*pair} - {0} for pair in ball.face_adjacency.tolist() if 0 in pair]
+    (carrier,), (gone,) = neighbours[0], neighbours[1]
+    around = [{*pair} - {carrier} for pair in ball.face_adjacency.tolist() if carrier in pair]
+    missing = [0, gone, *next(face for face in around if face != {0})]
+    a, b = set(ball.faces[0]) & set(ball.faces[carrier])
+    faces = np.delete(ball.faces, missing, axis=0)
+    n = len(ball.vertices)
+    vertices = np.concatenate([ball.vertices, ball.vertices[[a, b]] * 1.2])
+    knob = np.concatenate([faces, faces[:, ::-1], [[a, b, n], [b, n + 1, n]]])
+    solid = solid_of(trimesh.Trimesh(vertices, knob, process=False))
+    assert volume(solid) == pytest.approx(ball.volume, rel=0.02)
+
+
+@pytest.mark.parametrize("count", [4, 8])
+@pytest.mark.parametrize("way", [(0, 0, 0.4), (0.25, 0.25, 0.3), (0.6, 0.6, 0), (-0.3, -0.3, 0)])
+def test_a_cup_with_flaps_on_its_rim_stays_hollow(count, way):
+    """They lie flat on its side, lean outwards or inwards, or point at the middle; what they leave is still a mouth."""
+    cup = revolved(*CUP, sections=8)
+    top = cup.vertices[:, 2].max()
+    rim = np.flatnonzero(cup.vertices[:, 2] > top - 1e-9)
+    edges = [edge for edge in cup.edges_unique.tolist() if set(edge) <= set(rim.tolist())][:count]
+    n = len(cup.vertices)
+    tips = cup.vertices[edges].mean(axis=1)
+    tips = tips + np.array(way) * np.column_stack([np.sign(tips[:, :2]), np.ones(len(tips))])
+    faces = np.concatenate([cup.faces, [[a, b, n + i] for i, (a, b) in enumerate(edges)]])
+    solid = solid_of(trimesh.Trimesh(np.concatenate([cup.vertices, tips]), faces, process=False))
+    assert volume(solid) < 0.1 * trimesh.convex.convex_hull(cup).volume
+
+
 def test_the_side_of_a_plate_that_lost_its_other_sides_is_no_fin():
     """It hangs by one edge and bends sharply, as a fin does; but there the cap continues it."""
     plate = trimesh.creation.box((2, 1, 0.05))

@@ -26,8 +26,8 @@ from rlacd.solid.topology import BoolArray, IntArray, components
 # A flap has at most this share of its body's area.
 _FLAP = 0.05
 
-# A fin on the rim of a hole is at most so many faces long, and bends there by more than 60 degrees (cosine).
-_FIN_FACES, _FIN_BEND = 8, -0.5
+# A fin on the rim of a hole is at most so many faces long.
+_FIN_FACES = 8
 
 _NEXT = np.array([1, 2, 0])
 
@@ -173,36 +173,36 @@ def _flaps(soup: Soup, patch: IntArray) -> BoolArray:
 def _fins(soup: Soup, mate: IntArray) -> BoolArray:
     """Return ``[F]`` whether a face belongs to a fin that hangs on the rim of a hole; takes fins out of `mate`.
 
-    Such a fin hangs by one edge, at which it bends sharply, and no other face has its corners. What missing faces left
-    of a surface shares them, or lies flat.
+    Such a fin hangs by one edge, and no other face has its corners. What missing faces left of a surface shares them.
     """
-    count = len(soup.faces)
-    fin = np.zeros(count, dtype=bool)
-    root, edge = _hanging(mate)
-    hung = np.flatnonzero(root >= 0)
-    if len(hung) == 0:
-        return fin
-    roots, at = np.unique(root[hung], return_inverse=True)
-    small = np.bincount(at, soup.area[hung]) <= _FLAP * np.bincount(soup.body, soup.area)[soup.body[roots]]
-    away = across(soup.vertices, soup.faces, np.stack([edge[roots], mate[edge[roots]]], axis=1).ravel())
-    bends = np.einsum("ij,ij->i", away[0::2], away[1::2]) > _FIN_BEND
-    corners = soup.faces[hung]
+    fin = np.zeros(len(soup.faces), dtype=bool)
+    edge = _hanging(mate)
     users = np.bincount(soup.faces.ravel(), minlength=len(soup.vertices))
-    keys, inside = np.unique((at[:, None] * len(users) + corners).ravel(), return_counts=True)
-    tree, vertex = np.divmod(keys, len(users))
-    first = soup.faces.ravel()[edge[roots]]
-    second = soup.faces.ravel()[edge[roots] - edge[roots] % 3 + _NEXT[edge[roots] % 3]]
-    shared = (inside < users[vertex]) & (vertex != first[tree]) & (vertex != second[tree])
-    alone = np.bincount(tree, shared, len(roots)) == 0
-    chosen = small & bends & alone
+    # A fin may hang on a face that hangs itself: take off what shares corners from the near end.
+    for _ in range(_FIN_FACES):
+        root = _roots(edge, mate)
+        hung = np.flatnonzero(root >= 0)
+        if len(hung) == 0:
+            return fin
+        roots, at = np.unique(root[hung], return_inverse=True)
+        keys, inside = np.unique((at[:, None] * len(users) + soup.faces[hung]).ravel(), return_counts=True)
+        tree, vertex = np.divmod(keys, len(users))
+        first, second = (soup.faces.ravel()[h[roots]] for h in (edge, edge - edge % 3 + _NEXT[edge % 3]))
+        shared = (inside < users[vertex]) & (vertex != first[tree]) & (vertex != second[tree])
+        bound = np.bincount(tree, shared, len(roots)) > 0
+        if not bound.any():
+            break
+        edge[roots[bound]] = -1
+    small = np.bincount(at, soup.area[hung]) <= _FLAP * np.bincount(soup.body, soup.area)[soup.body[roots]]
+    chosen = small & ~bound
     fin[hung[chosen[at]]] = True
     for side in (mate[edge[roots[chosen]]], edge[roots[chosen]]):
         mate[side] = -1
     return fin
 
 
-def _hanging(mate: IntArray) -> tuple[IntArray, IntArray]:
-    """Return ``[F]`` the face nearest the rest of the tree that a face hangs in, -1 for none, and the edge it hangs by.
+def _hanging(mate: IntArray) -> IntArray:
+    """Return ``[F]`` the edge by which a face hangs on the rest, -1 for none.
 
     Faces with one mate are taken off, again and again: trees that hang on the rest by one edge, not longer than a fin.
     """
@@ -218,12 +218,17 @@ def _hanging(mate: IntArray) -> tuple[IntArray, IntArray]:
         if not leaf.any():
             break
         left[leaf], edge[leaf] = False, by[leaf]
-    root = np.where(left, -1, np.arange(count))
-    hung = np.flatnonzero(~left)
+    return edge
+
+
+def _roots(edge: IntArray, mate: IntArray) -> IntArray:
+    """Return ``[F]`` the face nearest the rest of the tree that a face hangs in, -1 for none."""
+    root = np.where(edge < 0, -1, np.arange(len(edge)))
+    hung = np.flatnonzero(edge >= 0)
     for _ in range(_FIN_FACES):
         above = mate[edge[root[hung]]] // 3
-        root[hung] = np.where(left[above], root[hung], above)
-    return root, edge
+        root[hung] = np.where(edge[above] < 0, root[hung], above)
+    return root
 
 
 def _against_main(soup: Soup, patch: IntArray, left_out: BoolArray, weighted: FloatArray) -> BoolArray:
