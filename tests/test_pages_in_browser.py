@@ -232,6 +232,19 @@ def test_nothing_covers_the_model_on_a_phone(viewer: Viewer, browser: Any) -> No
 
 
 @pytest.mark.nightly
+def test_no_button_of_the_toolbar_stands_alone(seen: Watched) -> None:
+    page = seen.page
+    page.evaluate("document.getElementById('balls').hidden = false")  # the widest that it gets
+    bottoms = "[...document.getElementById('toolbar').children].map(one => Math.round(one.getBoundingClientRect().bottom))"
+    for width, one_row in [(1440, True), (1280, True), (1180, False), (1024, False), (900, False), (390, False)]:
+        page.set_viewport_size({"width": width, "height": 800})
+        settle(page)
+        found = page.evaluate(bottoms)
+        assert min(map(found.count, found)) > 1, width
+        assert not one_row or len(set(found)) == 1, width
+
+
+@pytest.mark.nightly
 def test_hulls_that_share_a_face_do_not_flicker(browser: Any, tmp_path: Path) -> None:
     beams = [trimesh.creation.box(size) for size in ((2, 0.5, 0.2), (0.5, 2, 0.2))]
     trimesh.boolean.union(beams, engine="manifold").export(tmp_path / "cross.ply")

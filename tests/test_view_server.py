@@ -277,6 +277,8 @@ def test_another_mesh_is_opened(viewer: Viewer) -> None:
     folder = viewer.folder
     assert folder is not None
     assert [path.name for path in folder.iterdir()] == ["a ball.glb"]
+    command = shlex.split(ask(viewer, "POST", "/command", {}).json["command"])
+    assert command[2] == "a ball.glb", "the folder goes with the viewer"
     assert post_file(viewer, "cube.stl", trimesh.creation.box().export(file_type="stl")).status == 202
     assert not folder.exists(), "one file is kept at a time"
     settled(viewer, run=3)

@@ -264,7 +264,9 @@ class _Handler(BoundedHandler):
     def _command(self, given: dict[str, Any]) -> str:
         controls = self.server.accept(given)
         controls.options()
-        return as_command(self.server.subject.path, asdict(controls), ViewerControls())
+        # An uploaded mesh has no place but the copy kept here, which goes with the viewer.
+        path = self.server.subject.path
+        return as_command(path if self.server.folder is None else path.name, asdict(controls), ViewerControls())
 
     @contextlib.contextmanager
     def _answered(self) -> Iterator[None]:

@@ -184,7 +184,7 @@ at("toolbar").append(
   look.input,
   look.hulls,
   look.up,
-  make("label", { class: "explode" }, make("span", {}, "Pull apart"), explode),
+  make("label", { class: "explode", "data-hint": "Move the hulls away from each other, to see between them ([ and ])." }, make("span", {}, "Pull apart"), explode),
   make("span", { class: "toggles" }, look.edges, look.grid, look.heat, look.balls),
   make("button", { type: "button", id: "fit", "data-hint": "Show all (F).", onclick: () => stage?.fit() }, "Fit"),
   make("button", { type: "button", id: "keys", "data-hint": "Keyboard and mouse (?).", "aria-label": "Keyboard and mouse", onclick: () => at("help").showModal() }, "?"),
