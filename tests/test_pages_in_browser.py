@@ -235,7 +235,8 @@ def test_nothing_covers_the_model_on_a_phone(viewer: Viewer, browser: Any) -> No
 def test_no_button_of_the_toolbar_stands_alone(seen: Watched) -> None:
     page = seen.page
     page.evaluate("document.getElementById('balls').hidden = false")  # the widest that it gets
-    bottoms = "[...document.getElementById('toolbar').children].map(one => Math.round(one.getBoundingClientRect().bottom))"
+    each = "[...document.getElementById('toolbar').children]"
+    bottoms = f"{each}.map(one => Math.round(one.getBoundingClientRect().bottom))"
     for width, one_row in [(1440, True), (1280, True), (1180, False), (1024, False), (900, False), (390, False)]:
         page.set_viewport_size({"width": width, "height": 800})
         settle(page)

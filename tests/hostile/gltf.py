@@ -200,6 +200,19 @@ def _() -> bytes:
     return gltf(extensionsRequired=["EXT_meshopt_compression"])
 
 
+@refused("quantized views that only meshopt reads, in a buffer without bytes.gltf", "EXT_meshopt_compression")
+def _() -> bytes:
+    """As gltfpack and glTF-Transform write them."""
+    return gltf(
+        extensionsRequired=["EXT_meshopt_compression", "KHR_mesh_quantization"],
+        buffers=[{"byteLength": 800, "extensions": {"EXT_meshopt_compression": {"fallback": True}}}],
+        accessors=[
+            {"bufferView": 0, "componentType": 5122, "count": 4, "type": "VEC3", "normalized": True},
+            {"bufferView": 0, "componentType": 5125, "count": 3, "type": "SCALAR"},
+        ],
+    )
+
+
 @harmless("a name of a megabyte and ten thousand primitives.gltf")
 def _() -> bytes:
     primitives = many(10_000, {"attributes": {"POSITION": 0}, "indices": 1, "mode": 0})

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -25,7 +25,8 @@ ITEM_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 
 ITEMS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
-UNREAD = ("EXT_meshopt_compression", "KHR_meshopt_compression", "KHR_draco_mesh_compression")
+DRACO = "KHR_draco_mesh_compression"
+UNREAD = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 """Extensions that encode the triangles: without the decoder, the file holds zeros in their place. Draco is decoded
 before (`gltf_encoded.py`), so that its name is gone."""
 
@@ -122,13 +123,18 @@ def split(path: Path, content: bytes) -> tuple[Json, bytes | None]:
     return header, rest
 
 
+def refuse_hidden(path: Path, header: Json, extensions: Sequence[str] = UNREAD) -> None:
+    """Refuse a file that requires one of these extensions to find its triangles."""
+    for name in extensions:
+        if name in header.get("extensionsRequired", []):
+            raise MeshFileError(
+                f"{path} hides its triangles by {name}, which is not read: export it again without that compression, "
+                "or run  npx @gltf-transform/cli copy IN.glb OUT.glb"
+            )
+
+
 def _plain(path: Path, header: Json) -> Json:
-    hidden = [name for name in UNREAD if name in header.get("extensionsRequired", [])]
-    if hidden:
-        raise MeshFileError(
-            f"{path} hides its triangles by {hidden[0]}, which is not read: export it again without that compression, "
-            "or run  npx @gltf-transform/cli copy IN.glb OUT.glb"
-        )
+    refuse_hidden(path, header, (*UNREAD, DRACO))
     plain: Json = {key: header[key] for key in ("scene",) if key in header}
     plain["asset"] = {"version": header.get("asset", {}).get("version", "2.0")}
     for key, fields in KEPT.items():

@@ -17,12 +17,10 @@ import numpy as np
 
 from rlacd.errors import MeshFileError, MissingExtraError
 from rlacd.io.read.apart import answer_of
-from rlacd.io.read.gltf import ITEM_BYTES, ITEMS, Json, damaged, joined, split
+from rlacd.io.read.gltf import DRACO, ITEM_BYTES, ITEMS, Json, damaged, joined, refuse_hidden, split
 from rlacd.io.read.limits import MOST_TRIANGLES, most_in_memory
 from rlacd.pool import Blobs, Shared
 from rlacd.pool.request import Values
-
-DRACO = "KHR_draco_mesh_compression"
 
 DECODER = "rlacd.io.read.gltf_encoded:DracoDecoder"
 
@@ -55,6 +53,7 @@ def decoded_gltf(path: Path, content: bytes, beside: Callable[[str], bytes]) -> 
         return content
     header, rest = split(path, content)
     try:
+        refuse_hidden(path, header)
         file = _File(path, header, rest, len(content), beside)
         changed = file.decode_draco()
         changed |= file.spread_integers()
