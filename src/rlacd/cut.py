@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from rlacd import _native, work
 from rlacd._native import Stopped
@@ -18,6 +18,10 @@ FILM = 2e-4
 
 MISSED = 1e-3
 """No point of a shaving is farther than this from the solid across the cut."""
+
+DOUBTFUL, DOUBTFUL_PER_FACE = 1e6, 150
+"""Units of work, and units per triangle of the solid, after which it is asked whether the solid can be cut at all. Of
+181 real meshes none took more than 0.79 of it."""
 
 
 class CutCache:
@@ -70,10 +74,20 @@ class CutTree:
         Runs the kernels.
     cache : CutCache, optional
         Cuts shared with other trees.
+    doubt : callable, optional
+        Called once if cutting takes much work; may raise an error for a solid that cannot be cut as it is.
     """
 
-    def __init__(self, root: Component, policy: Policy, workers: Workers, cache: CutCache | None = None) -> None:
+    def __init__(
+        self,
+        root: Component,
+        policy: Policy,
+        workers: Workers,
+        cache: CutCache | None = None,
+        doubt: Callable[[], None] | None = None,
+    ) -> None:
         self.root = root
+        self._doubt = doubt
         self._policy = policy
         self._workers = workers
         self._cache = cache or CutCache()
@@ -99,11 +113,13 @@ class CutTree:
         done: list[Component] = []
         left: list[Component] = []
         frontier = [self.root]
+        begin = clock.work.done
         while frontier:
             if not clock.work.pay(sum(work.judging(c.size, len(c.hull.faces)) for c in frontier)):
                 return done, left + frontier
             unmet = frontier
             try:
+                self._ask_after(clock.work.done - begin)
                 verdicts = self._workers.map(criterion.is_met, frontier)
                 done += [c for c, met in zip(frontier, verdicts, strict=True) if met]
                 unmet = [c for c, met in zip(frontier, verdicts, strict=True) if not met]
@@ -124,6 +140,12 @@ class CutTree:
                 if not self._children[component]:
                     left.append(component)
         return done, left
+
+    def _ask_after(self, units: float) -> None:
+        """Ask once whether the solid can be cut, if cutting has taken much work."""
+        if self._doubt is not None and units > DOUBTFUL + DOUBTFUL_PER_FACE * self.root.size:
+            doubt, self._doubt = self._doubt, None
+            doubt()
 
     def _divide(self, components: Sequence[Component]) -> None:
         """Split components into their connected pieces, and cut those that are connected."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeAlias, cast
 
@@ -61,6 +62,7 @@ from rlacd.progress import ProgressCallback
 from rlacd.proxy import FEW, Lift, Proxy, simplify
 from rlacd.renamed import with_former
 from rlacd.repair.repair import repair
+from rlacd.repair.tangles import TangledError, refuse_tangles
 from rlacd.report import joint_report, make_report
 from rlacd.search import SearchContext, eliminate_parts, level, search
 from rlacd.search.levels import SearchSummary
@@ -71,6 +73,7 @@ from rlacd.solid.frame import Frame
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.provenance import owners
 from rlacd.solid.solid import Solid
+from rlacd.solid.topology import IntArray
 from rlacd.workers import Workers
 
 MeshLike: TypeAlias = "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]"
@@ -379,6 +382,22 @@ def _cleaned(
 def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Clock) -> _Reached:
     """Repair, cut, merge and search, until done or stopped by the clock."""
     try:
+        return _repaired_and_cut(source, options, workers, clock, None)
+    except TangledError as tangle:
+        return _repaired_and_cut(source, options, workers, clock, tangle.bodies)
+
+
+def _repaired_and_cut(
+    source: InputMesh, options: Options, workers: Workers, clock: Clock, tangled: IntArray | None
+) -> _Reached:
+    """The same in one attempt.
+
+    Raises
+    ------
+    TangledError
+        Some bodies cannot be cut as they are; never if `tangled` names any.
+    """
+    try:
         with clock.stage("repair"):
             solid = repair(
                 source,
@@ -387,6 +406,7 @@ def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Cl
                 gap=options.gap,
                 threads=workers.threads,
                 keep_cavities=isinstance(options.criterion, NavigableSpace) and options.criterion.sees_cavities,
+                tangled=tangled,
             )
         options = options.at_scale(solid.frame.scale)
         goal = _prepared(options, solid, workers, clock)
@@ -398,10 +418,11 @@ def _decomposed(source: InputMesh, options: Options, workers: Workers, clock: Cl
         return _Reached(solid, options, _unprepared(options, solid), parts)
     if options.max_hulls is None:  # otherwise the threshold may be exceeded anyway
         goal = with_limits(goal, options.max_vertices, options.max_faces)
+    doubt = None if tangled is not None else partial(refuse_tangles, solid, workers.threads)
     proxy = _proxy(root, goal, options, clock)
     if proxy is not None:
-        return _through_proxy(solid, root, proxy, goal, options, workers, clock)
-    parts, goal, found = _cut_and_searched(root, goal, options, workers, clock)
+        return _through_proxy(solid, root, proxy, goal, options, workers, clock, doubt)
+    parts, goal, found = _cut_and_searched(root, goal, options, workers, clock, doubt)
     return _Reached(solid, options, goal, parts, found, root)
 
 
@@ -418,12 +439,19 @@ def _proxy(root: Component, goal: Criterion, options: Options, clock: Clock) -> 
 
 
 def _through_proxy(
-    solid: Solid, root: Component, proxy: Proxy, goal: Criterion, options: Options, workers: Workers, clock: Clock
+    solid: Solid,
+    root: Component,
+    proxy: Proxy,
+    goal: Criterion,
+    options: Options,
+    workers: Workers,
+    clock: Clock,
+    doubt: Callable[[], None] | None,
 ) -> _Reached:
     """Decompose a proxy under a tighter criterion, and carry the parts to the solid."""
     share = proxy.deviation / options.threshold
     on_proxy = goal.scaled(1 - MARGIN * share)
-    parts, _, found = _cut_and_searched(proxy.component, on_proxy, options, workers, clock)
+    parts, _, found = _cut_and_searched(proxy.component, on_proxy, options, workers, clock, doubt)
     policy = make_policy(options.policy, SweepCache(), _scale(goal))
     with clock.stage("lift"):
         lift = Lift(root, proxy.deviation, goal, on_proxy, policy, workers, clock)
@@ -435,11 +463,16 @@ def _through_proxy(
 
 
 def _cut_and_searched(
-    root: Component, goal: Criterion, options: Options, workers: Workers, clock: Clock
+    root: Component,
+    goal: Criterion,
+    options: Options,
+    workers: Workers,
+    clock: Clock,
+    doubt: Callable[[], None] | None,
 ) -> tuple[list[Part], Criterion, SearchSummary | None]:
     """The parts of a solid, the criterion as settled on them, and a summary of the search."""
     sweeps = SweepCache()
-    tree = CutTree(root, make_policy(options.policy, sweeps, _scale(goal)), workers)
+    tree = CutTree(root, make_policy(options.policy, sweeps, _scale(goal)), workers, doubt=doubt)
     parts, goal = _parts(tree, goal, options, workers, clock)
     policy = options.policy if isinstance(options.policy, str) else ""
     may_be_divided = options.merge and goal.obstacles is not None and policy not in AS_PUBLISHED

@@ -271,12 +271,13 @@ def _early_end(clock: Clock) -> list[str]:
 
 
 def _cut_short(clock: Clock) -> list[str]:
-    if "merge" not in clock.cut_short:
-        return []
-    return [
-        "There were so many parts that merging stopped at its bound of work: all hulls are valid, but fewer may do. A "
-        "larger threshold leaves less to merge."
-    ]
+    said = {
+        "cut": "There were so many components that cutting stopped at its bound of work: the hulls cover the solid "
+        "but are coarser than asked for.",
+        "merge": "There were so many parts that merging stopped at its bound of work: all hulls are valid, but fewer "
+        "may do. A larger threshold leaves less to merge.",
+    }
+    return [sentence for stage, sentence in said.items() if stage in clock.cut_short]
 
 
 def _shortcomings(

@@ -36,6 +36,8 @@ class Attempt:
         From the input's unit.
     resolution, gap, keep_cavities, open_bodies
         As for `rlacd.repair.repair.repair`.
+    tangled : int64 [N]
+        Bodies whose solids would cross themselves: they are built another way.
     as_sheets : int64 [N], optional
         Bodies all of whose faces become slabs.
     bend : float
@@ -59,6 +61,7 @@ class Attempt:
         gap: float,
         keep_cavities: bool,
         open_bodies: str,
+        tangled: IntArray,
         as_sheets: IntArray | None = None,
         bend: float = 1.0,
     ) -> None:
@@ -80,7 +83,8 @@ class Attempt:
         self._by_room = np.zeros(count, dtype=bool)  # capped only because nothing can reach the cap
         self._hidden, self._across = np.empty((2, 0, 3))  # points of such caps, and the normals there
         sheets = np.empty(0, dtype=np.int64) if as_sheets is None else as_sheets
-        self._wraps = Wraps(surface, self.record, gap, resolution, sheets)
+        self._tangled = tangled
+        self._wraps = Wraps(surface, self.record, gap, resolution, sheets, tangled)
 
         poll_stop()
         self.solid = self._solid(Soup(surface.vertices, faces, body))
@@ -96,16 +100,18 @@ class Attempt:
         return np.flatnonzero(self.record.has("outer skin") & (self.record.deviation > GAP))
 
     def _solid(self, soup: Soup) -> Shape:
-        if self._is_oriented(soup):
+        if len(self._tangled) == 0 and self._is_oriented(soup):
             parts = self._as_they_are(soup)
         else:
-            soup = self._cap(self._drop_hidden(self._trust_windings(soup)))
-            parts = self._wraps.build_or_wrap(soup)
-        solids = [part for part, _ in parts]
+            is_tangled = np.isin(soup.body, self._tangled)
+            tangles = self._cap(soup.only(is_tangled))
+            soup = self._cap(self._drop_hidden(self._trust_windings(soup.only(~is_tangled))))
+            parts = self._wraps.build_or_wrap(soup) if len(soup.faces) else []
+            parts += self._wraps.untangled(tangles)
         if self._keep_cavities:
             inward = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces), self.record.bodies) < 0
-            return unite_around_cavities(solids, [bool(inward[body]) for _, body in parts])
-        solid = unite(solids)
+            return unite_around_cavities([part for part, _ in parts], [bool(inward[body]) for _, body in parts])
+        solid = unite([part for part, _ in parts])
         if self._open_bodies == "thin":
             return solid
         solid = self._wraps.with_rooms(solid, soup, parts, self._by_room)

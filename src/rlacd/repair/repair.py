@@ -18,6 +18,9 @@ turns a dozen exact faces into tens of thousands of approximate ones; steps 3 to
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -54,6 +57,7 @@ def repair(
     gap: float = GAP,
     threads: int | None = None,
     keep_cavities: bool = False,
+    tangled: IntArray | None = None,
 ) -> Solid:
     """Turn a mesh into one closed, oriented solid.
 
@@ -75,6 +79,9 @@ def repair(
     keep_cavities
         Keep sealed rooms empty: those that a union encloses, and closed bodies wound opposite to the body around them.
         A closed sheet without thickness still becomes a solid.
+    tangled
+        Numbers of bodies that cross themselves (`rlacd.repair.tangles`): what their faces enclose becomes solid,
+        whatever their windings.
 
     Returns
     -------
@@ -98,7 +105,7 @@ def repair(
     points = frame.to_frame(points)
     poll_stop()
     welded_vertices, welded_faces, is_film = _native.weld(points, corners)
-    taken = _taken_as_it_is(welded_vertices, welded_faces)
+    taken = _taken_as_it_is(welded_vertices, welded_faces) if tangled is None else None
     if taken is not None:
         return Solid(taken[0], (welded_vertices, welded_faces), frame, (taken[1],), tuple(warnings), is_as_given=True)
     require_memory(len(welded_faces), BYTES_REPAIRED, mesh.name)
@@ -115,19 +122,12 @@ def repair(
 
     query = SurfaceQuery(vertices, faces, threads)
     cells = max(resolution, math.ceil(2 * CELLS_ACROSS / gap)) if gap < GAP else resolution
-    work = Attempt(query, frame, cells, gap, keep_cavities, open_bodies)
-    bend = 1.0
-    if work.lost > _LOST:
-        # A cap that bends little can cross the body's own faces, which turns some of it inside out: try small caps.
-        other = Attempt(query, frame, cells, gap, keep_cavities, open_bodies, bend=0.0)
-        if other.lost < work.lost:
-            work, bend = other, 0.0
-    doubted = work.doubted()
-    if len(doubted):
-        # If faces of one body cross each other, they may be joined into a wrong skin: try them as sheets.
-        other = Attempt(query, frame, cells, gap, keep_cavities, open_bodies, doubted, bend)
-        if other.record.deviation.max() < work.record.deviation.max():
-            work = other
+    if tangled is not None:
+        bodies = "1 body crosses" if len(tangled) == 1 else f"{len(tangled)} bodies cross"
+        warnings.append(
+            f"{bodies} too much of the own surface to be cut: what the faces enclose was taken to be solid."
+        )
+    work = _attempted(partial(Attempt, query, frame, cells, gap, keep_cavities, open_bodies), tangled)
     return Solid(
         work.solid,
         surface,
@@ -136,6 +136,24 @@ def repair(
         tuple(warnings + work.warnings),
         body_of=work.record.body_of_input,
     )
+
+
+def _attempted(attempt: Callable[..., Attempt], tangled: IntArray | None) -> Attempt:
+    """The best of a few attempts; most inputs need one."""
+    how: dict[str, Any] = {"tangled": np.empty(0, dtype=np.int64) if tangled is None else tangled}
+    work = attempt(**how)
+    if work.lost > _LOST:
+        # A cap that bends little can cross the body's own faces, which turns some of it inside out: try small caps.
+        other = attempt(**how, bend=0.0)
+        if other.lost < work.lost:
+            work, how = other, how | {"bend": 0.0}
+    doubted = work.doubted()
+    if len(doubted):
+        # If faces of one body cross each other, they may be joined into a wrong skin: try them as sheets.
+        other = attempt(**how, as_sheets=doubted)
+        if other.record.deviation.max() < work.record.deviation.max():
+            work = other
+    return work
 
 
 def _used(mesh: InputMesh) -> tuple[FloatArray, IntArray]:

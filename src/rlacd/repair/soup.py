@@ -138,7 +138,7 @@ def on_repeated_edge(faces: IntArray, count: int) -> BoolArray:
 
 def hidden_faces(vertices: FloatArray, faces: IntArray) -> BoolArray:
     """Return ``[F]`` which faces of one body it winds around on both sides."""
-    beside = _winding_beside(vertices, faces)
+    beside = winding_beside(vertices, faces)
     # On a skin the sides have 0 and 1; a wall inside has 0.5 and 1.5. A skin that lies double has 0 and 2.
     result: BoolArray = (beside.mean(axis=0) > 0.75) & (beside.min(axis=0) > 0.25)
     return result
@@ -146,13 +146,13 @@ def hidden_faces(vertices: FloatArray, faces: IntArray) -> BoolArray:
 
 def crossed_share(vertices: FloatArray, faces: IntArray) -> float:
     """Return the share of the area of one closed body that lies inside it, or bounds what is inside out."""
-    front, back = _winding_beside(vertices, faces)
+    front, back = winding_beside(vertices, faces)
     area = face_areas(vertices, faces)
     wrong = (np.abs(front) > 0.25) | (np.abs(back - 1) > 0.25)
     return float(area[wrong].sum() / max(area.sum(), NO_AREA))
 
 
-def _winding_beside(vertices: FloatArray, faces: IntArray) -> FloatArray:
+def winding_beside(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return ``[2, F]`` how often faces wind around a point before each face and one behind; positive inside."""
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     normal = face_normals(vertices, faces)

@@ -11,7 +11,7 @@ from rlacd._native import poll_stop
 from rlacd.repair.build import skins, walls_and_sheets
 from rlacd.repair.distance import SurfaceQuery, points_covering, spread_points
 from rlacd.repair.record import Record
-from rlacd.repair.slabs import HALF_THICKNESS
+from rlacd.repair.slabs import HALF_THICKNESS, slab_of_faces
 from rlacd.repair.soup import Soup
 from rlacd.repair.union import MOST_UNITED, Shape, as_manifold, to_arrays, unite, volume_of
 from rlacd.repair.voxels import GAP, Reach
@@ -43,14 +43,20 @@ class Wraps:
         Cells along the longest side.
     as_sheets : int64 [N]
         Bodies all of whose faces become slabs.
+    tangled : int64 [N]
+        Bodies that `untangled` builds.
     """
 
-    def __init__(self, surface: SurfaceQuery, record: Record, gap: float, resolution: int, as_sheets: IntArray) -> None:
+    def __init__(
+        self, surface: SurfaceQuery, record: Record, gap: float, resolution: int, as_sheets: IntArray, tangled: IntArray
+    ) -> None:
         self._input = surface
         self._record = record
         self._gap = gap
         self._resolution = resolution
         self._as_sheets = as_sheets
+        self._is_tangled = np.zeros(record.bodies, dtype=bool)
+        self._is_tangled[tangled] = True
 
     @cached_property
     def reach(self) -> Reach:
@@ -82,6 +88,24 @@ class Wraps:
         record.faces_out[first] = wrap.num_tri()
         return [*((part, body) for part, body in parts if not is_slab[body]), (wrap, first)]
 
+    def untangled(self, soup: Soup) -> list[tuple[Manifold, int]]:
+        """Build bodies that cross themselves from the place of their faces alone; returns solids and their bodies.
+
+        A few faces become a slab each. Where they are many, what the ball cannot reach from outside the body is solid.
+        Both enclose what the faces enclose, whatever their windings.
+        """
+        parts = []
+        for body in np.unique(soup.body).tolist():
+            poll_stop()
+            own = soup.only(soup.body == body)
+            corners = own.vertices[own.faces]
+            is_few = len(corners) <= _CROWD and _crossings(np.stack([corners.min(1), corners.max(1)], 1)) <= _CROSSINGS
+            solid = slab_of_faces(own.vertices, own.faces) if is_few else self._wrapped(own)
+            self._record.note(own.body, "slab" if is_few else "wrapped")
+            self._record.faces_out[body] = solid.num_tri()
+            parts.append((solid, body))
+        return parts
+
     def with_rooms(self, solid: Shape, soup: Soup, parts: list[tuple[Manifold, int]], by_room: BoolArray) -> Shape:
         """Close rooms that sheets enclose except for gaps too narrow for the ball.
 
@@ -97,7 +121,7 @@ class Wraps:
             Bodies that were capped only because nothing can reach the caps.
         """
         record = self._record
-        is_slab = record.has("slab")
+        is_slab = record.has("slab") & ~self._is_tangled
         slabs = soup.only(is_slab[soup.body])
         around = soup.only((is_slab | by_room)[soup.body])
         if around.area.sum() < 4 * np.pi * self._gap**2 or volume_of(solid) == 0:
@@ -158,6 +182,12 @@ class Wraps:
         self._record.note(np.flatnonzero(by_room), "wrapped")
         self._record.faces_out[by_room.argmax()] += wrap.num_tri()
         return united
+
+    def _wrapped(self, soup: Soup) -> Manifold:
+        """What the ball cannot reach from outside some faces."""
+        reach = Reach.of(soup.vertices, soup.faces, radius=self._gap, resolution=self._resolution)
+        faces = SurfaceQuery(soup.vertices, soup.faces, self._input.threads)
+        return to_manifold(*reach.wrap(~reach.reached, faces, HALF_THICKNESS)).simplify(HALF_THICKNESS / 2)
 
     def _wrap(self, cells: BoolArray, error: float) -> Manifold:
         """Return a solid of grid cells, projected onto the input and simplified."""

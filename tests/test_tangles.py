@@ -1,0 +1,156 @@
+"""Closed bodies that cross themselves: inside out in places, they cannot be cut as they are."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import trimesh
+from scipy import ndimage
+from scipy.spatial import cKDTree
+
+import rlacd
+import rlacd.cut
+import rlacd.cut_and_merge
+from rlacd.io.read.load import load_mesh
+from rlacd.repair.repair import repair
+from rlacd.repair.tangles import TangledError, refuse_tangles, tangled_bodies
+from rlacd.solid.solid import Solid
+
+Mesh = tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]
+
+BOX = trimesh.creation.box()
+
+
+def tangle(seed: int = 0) -> Mesh:
+    """An icosahedron whose corners were shuffled: closed, oriented, and hardly a face that no other crosses."""
+    shape = trimesh.creation.icosahedron()
+    return np.random.default_rng(seed).permutation(shape.vertices), np.array(shape.faces)
+
+
+def repaired(mesh: Mesh, tangled: bool = False) -> Solid:
+    return repair(load_mesh(mesh), tangled=np.zeros(1, dtype=np.int64) if tangled else None)
+
+
+def beside(mesh: Mesh, other: Mesh) -> Mesh:
+    """Both, the other to the right."""
+    return np.concatenate([mesh[0], other[0] + [4, 0, 0]]), np.concatenate([mesh[1], other[1] + len(mesh[0])])
+
+
+def enclosed(mesh: Mesh, cells: int = 40) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Points that faces shut in, and points that they do not, found on a grid; none near the faces."""
+    vertices, faces = mesh
+    surface = trimesh.sample.sample_surface(trimesh.Trimesh(vertices, faces, process=False), 40_000, seed=0)[0]
+    axes = [np.linspace(low - 0.1, high + 0.1, cells) for low, high in zip(*_box(vertices), strict=True)]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    free = (cKDTree(surface).query(grid.reshape(-1, 3))[0] > 0.06).reshape(grid.shape[:3])
+    rooms, _ = ndimage.label(free)
+    return grid[free & (rooms != rooms[0, 0, 0])], grid[rooms == rooms[0, 0, 0]]
+
+
+def winding(solid: Solid, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """How often a solid's surface winds around points: the sum of the solid angles of its triangles."""
+    a, b, c = (solid.vertices[solid.faces[:, i]][None] - points[:, None] for i in range(3))
+    x, y, z = (np.linalg.norm(corner, axis=2) for corner in (a, b, c))
+    volume = np.einsum("pfk,pfk->pf", a, np.cross(b, c))
+    dots = [np.einsum("pfk,pfk->pf", u, v) for u, v in ((a, b), (b, c), (c, a))]
+    angle = 2 * np.arctan2(volume, x * y * z + dots[0] * z + dots[1] * x + dots[2] * y)
+    return np.asarray(angle.sum(axis=1) / (4 * np.pi))
+
+
+def _box(points: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    return points.min(axis=0), points.max(axis=0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_the_faces_of_a_tangle_enclose_is_solid(seed: int) -> None:
+    mesh = tangle(seed)
+    assert tangled_bodies(repaired(mesh)).tolist() == [0]
+    solid = repaired(mesh, tangled=True)
+    assert len(tangled_bodies(solid)) == 0
+    (body,) = solid.bodies
+    assert (body.step, body.faces_in) == ("slab", 20)
+    assert body.deviation < 2e-3
+    inside, outside = (solid.frame.to_frame(points[::7]) for points in enclosed(mesh))
+    assert len(inside) > 20
+    assert trimesh.Trimesh(*solid.mesh, process=False).is_watertight
+    wound = winding(solid, inside)  # the grid shuts passages narrower than a cell
+    assert (np.abs(wound - 1) < 1e-6).mean() > 0.95
+    np.testing.assert_allclose(winding(solid, outside[::10]), 0, atol=1e-6)
+
+
+@pytest.mark.slow
+def test_a_tangle_of_many_faces_is_wrapped() -> None:
+    vertices, faces = tangle()
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    for _ in range(3):
+        mesh = mesh.subdivide()
+    many = np.array(mesh.vertices), np.array(mesh.faces)
+    assert tangled_bodies(repaired(many)).tolist() == [0]
+    solid = repaired(many, tangled=True)
+    (body,) = solid.bodies
+    assert body.step == "wrapped"
+    assert body.deviation < 0.045  # 1.5 radii of the ball
+    assert len(tangled_bodies(solid)) == 0
+
+
+def test_other_bodies_stay_as_they_are() -> None:
+    mesh = beside((np.array(BOX.vertices), np.array(BOX.faces)), tangle())
+    solid = repaired(mesh)
+    assert tangled_bodies(solid).tolist() == [1]
+    again = repair(load_mesh(mesh), tangled=np.array([1]))
+    assert [body.step for body in again.bodies] == ["closed", "slab"]
+    assert again.bodies[0].faces_out == 12
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.3, 1.0])
+def test_bodies_that_cross_each_other_are_no_tangle(apart: float) -> None:
+    vertices, faces = np.array(BOX.vertices), np.array(BOX.faces)
+    mesh = np.concatenate([vertices, vertices * [3, 0.3, 0.3] + [apart, 0, 0]]), np.concatenate([faces, faces + 8])
+    assert len(tangled_bodies(repaired(mesh))) == 0
+    refuse_tangles(repaired(mesh))
+
+
+def test_it_is_asked_once_and_after_much_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rlacd.cut, "DOUBTFUL", 1e4)
+    monkeypatch.setattr(rlacd.cut, "DOUBTFUL_PER_FACE", 0)
+    asked = []
+
+    def ask(solid: Solid, threads: int | None = None) -> None:
+        asked.append(solid)
+        refuse_tangles(solid, threads)
+
+    monkeypatch.setattr("rlacd.decompose_mesh.refuse_tangles", ask)
+    torus = trimesh.creation.torus(1, 0.4, major_sections=16, minor_sections=8)
+    first = rlacd.decompose(torus, quality="fast", threads=1)
+    assert len(asked) == 1
+    monkeypatch.undo()
+    second = rlacd.decompose(torus, quality="fast", threads=1)
+    assert [hull.vertices.tolist() for hull in first] == [hull.vertices.tolist() for hull in second]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_tangle_takes_bounded_work(seed: int) -> None:
+    mesh = tangle(seed)
+    with pytest.raises(TangledError):
+        refuse_tangles(repaired(mesh))
+    result = rlacd.decompose(mesh, threads=2)
+    assert result.report["complete"]
+    assert len(result) < 60
+    assert result.report["hausdorff"]["under"] < 1e-3
+    assert result.report["hausdorff"]["over"] < 0.055
+    assert result.report["concavity"]["max"] <= 0.05
+    assert "1 body crosses" in result.report["warnings"][0]
+
+
+@pytest.mark.slow
+def test_cutting_stops_at_its_bound_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    torus = trimesh.creation.torus(1, 0.4, major_sections=32, minor_sections=16)
+    monkeypatch.setattr(rlacd.cut_and_merge, "MOST_CUTTING", 2e4)
+    monkeypatch.setattr(rlacd.cut_and_merge, "MOST_PER_FACE", 0)
+    one, two = (rlacd.decompose(torus, quality="fast", threads=threads) for threads in (1, 2))
+    assert "cutting stopped at its bound" in " ".join(one.report["warnings"])
+    assert one.report["complete"]
+    assert one.report["hausdorff"]["under"] < 1e-6
+    assert [hull.vertices.tolist() for hull in one] == [hull.vertices.tolist() for hull in two]
