@@ -28,10 +28,9 @@ from rlacd.merge import merge_parts
 from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import make_policy
 from rlacd.repair.repair import repair
-from rlacd.search import levels
 from rlacd.search.budget import SearchBudget
 from rlacd.search.context import SearchContext, by_score
-from rlacd.search.levels import BOUNDED_PATIENCE, FEW, LEVELS, Level, cost, level, search
+from rlacd.search.levels import BOUNDED_PATIENCE, LEVELS, Level, cost, level, search
 from rlacd.search.neighbourhood import LEAST_TRIALS, Neighbourhood
 from rlacd.search.operators import BATCH
 from rlacd.search.part_graph import PartGraph
@@ -111,18 +110,6 @@ def test_most_neighbours_can_be_reunited_without_a_wall_between_them(real: Compo
         assert solid.volume == pytest.approx(first.volume + second.volume, rel=1e-6)
     assert failed <= 0.1 * tried
     assert reunited == pytest.approx(glued, rel=1e-2)
-
-
-@pytest.mark.parametrize("many", [FEW, 1000])
-def test_where_the_first_pass_left_too_many_parts_another_is_made(many: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(levels, "MANY", many)
-    slabs: list[Part] = [Component(box((i, 0, 0), (i + 1, 9, 9))) for i in range(FEW + 1)]
-    root, clock = Component(box((0, 0, 0), (FEW + 1, 9, 9))), Clock()
-    clock.work.pay(1e6)
-    with Workers(1) as workers:
-        _, account = search(SearchContext(root, CRITERION, workers), slabs, LEVELS["balanced"], clock, first="greedy")
-    assert account.first_pass == len(slabs)
-    assert account.portfolio == (1 if many < len(slabs) else len(slabs))
 
 
 @pytest.mark.nightly

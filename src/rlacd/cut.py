@@ -23,6 +23,16 @@ DOUBTFUL, DOUBTFUL_PER_FACE = 1e6, 150
 """Units of work, and units per triangle of the solid, after which it is asked whether the solid can be cut at all. Of
 181 real meshes none took more than 0.79 of it."""
 
+MANY = 1000
+"""With more components than this, the policy may have failed: there are solids that one breaks into thousands of parts
+and another into tens (docs/research/learning.md). So a second one is tried, ..."""
+
+FAR_FEWER = 1 / 2
+"""... and abandoned at this share of the components, or of the work done for them."""
+
+AGAIN = 4
+"""The second policy is tried again each time there are this many times as many components."""
+
 
 class CutCache:
     """Pieces and sides of components, each cut made once: several trees of cuts share their first levels."""
@@ -62,7 +72,7 @@ class CutTree:
     """The tree of cuts that a policy makes of a solid, computed on demand.
 
     Which plane cuts a component does not depend on the criterion's threshold, so a coarser criterion only stops higher
-    up in the same tree.
+    up in the same tree. Only where there are more than `MANY` components, a second policy may take over for good.
 
     Parameters
     ----------
@@ -76,6 +86,8 @@ class CutTree:
         Cuts shared with other trees.
     doubt : callable, optional
         Called once if cutting takes much work; may raise an error for a solid that cannot be cut as it is.
+    second : Policy, optional
+        Takes over if it leaves far fewer components than thousands.
     """
 
     def __init__(
@@ -85,6 +97,7 @@ class CutTree:
         workers: Workers,
         cache: CutCache | None = None,
         doubt: Callable[[], None] | None = None,
+        second: Policy | None = None,
     ) -> None:
         self.root = root
         self._doubt = doubt
@@ -92,9 +105,10 @@ class CutTree:
         self._workers = workers
         self._cache = cache or CutCache()
         self._children: dict[Component, list[Component]] = {}
+        self._second = None if second is None else CutTree(root, second, workers, self._cache)
 
     def cut_until(
-        self, criterion: Criterion, clock: Clock, most: float = math.inf
+        self, criterion: Criterion, clock: Clock, most: float = math.inf, units: float = math.inf
     ) -> tuple[list[Component], list[Component]]:
         """Cut the solid until each component meets the criterion.
 
@@ -102,6 +116,8 @@ class CutTree:
         ----------
         most : float
             Stop as soon as it is clear that there will be more components than this.
+        units : float
+            Stop after a round in which more units of work than this have been done (see `rlacd.work`).
 
         Returns
         -------
@@ -110,10 +126,10 @@ class CutTree:
         left : list of Component
             Components that do not: no plane cuts them, the clock stopped, or there would be more than `most`.
         """
+        begin, many = clock.work.done, MANY
         done: list[Component] = []
         left: list[Component] = []
         frontier = [self.root]
-        begin = clock.work.done
         while frontier:
             if not clock.work.pay(sum(work.judging(c.size, len(c.hull.faces)) for c in frontier)):
                 return done, left + frontier
@@ -125,8 +141,13 @@ class CutTree:
                 unmet = [c for c, met in zip(frontier, verdicts, strict=True) if not met]
                 if not clock.step(len(done), None, len(done) + len(left) + len(unmet)):
                     return done, left + unmet
-                if len(done) + len(left) + 2 * len(unmet) > most:  # each becomes at least two
+                count, spent = len(done) + len(left) + 2 * len(unmet), clock.work.done - begin  # each becomes two
+                if count > most or spent > units:
                     return done, left + unmet
+                if unmet and count > many:
+                    if (parts := self._by_second(criterion, clock, FAR_FEWER * count, FAR_FEWER * spent)) is not None:
+                        return parts, []
+                    many = AGAIN * count
                 new = [c for c in unmet if c not in self._children]
                 if not clock.work.pay(sum(work.choosing(c.size) + work.cutting(c.size) for c in new)):
                     return done, left + unmet
@@ -140,6 +161,17 @@ class CutTree:
                 if not self._children[component]:
                     left.append(component)
         return done, left
+
+    def _by_second(self, criterion: Criterion, clock: Clock, most: float, units: float) -> list[Component] | None:
+        """Cut by the second policy, which takes over if it finishes within the limits; None if it does not."""
+        second = self._second
+        if second is None:
+            return None
+        done, left = second.cut_until(criterion, clock, most, units)
+        if left:
+            return None
+        self._policy, self._children, self._second = second._policy, second._children, None
+        return done
 
     def _ask_after(self, units: float) -> None:
         """Ask once whether the solid can be cut, if cutting has taken much work."""

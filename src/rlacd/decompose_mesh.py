@@ -55,7 +55,7 @@ from rlacd.options import (
     VolumeOf,
 )
 from rlacd.planes.sweep_cache import SweepCache
-from rlacd.policies import AS_PUBLISHED, Policy, make_policy
+from rlacd.policies import AS_PUBLISHED, Greedy, Policy, make_policy
 from rlacd.presets import PresetName
 from rlacd.primitive_kinds import PrimitiveKind
 from rlacd.progress import ProgressCallback
@@ -472,7 +472,8 @@ def _cut_and_searched(
 ) -> tuple[list[Part], Criterion, SearchSummary | None]:
     """The parts of a solid, the criterion as settled on them, and a summary of the search."""
     sweeps = SweepCache()
-    tree = CutTree(root, make_policy(options.policy, sweeps, _scale(goal)), workers, doubt=doubt)
+    second = Greedy("hull-sum", sweeps=sweeps) if options.policy == "greedy" else None
+    tree = CutTree(root, make_policy(options.policy, sweeps, _scale(goal)), workers, doubt=doubt, second=second)
     parts, goal = _parts(tree, goal, options, workers, clock)
     policy = options.policy if isinstance(options.policy, str) else ""
     may_be_divided = options.merge and goal.obstacles is not None and policy not in AS_PUBLISHED

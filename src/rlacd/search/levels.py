@@ -37,13 +37,6 @@ ANOTHER_PASS = 1.5
 FEW = 20
 """With more parts than this, searching around the first pass gains more per unit of work than another pass."""
 
-MANY = 1000
-"""With more parts than this, the ranking of the first pass may have failed: there are solids that one breaks into
-thousands of parts and another into tens (docs/research/learning.md). So another pass is made, ..."""
-
-FAR_FEWER = 1 / 4
-"""... and abandoned when it has more pieces than this share of the parts, or takes half of the allowed work."""
-
 BOUNDED_PATIENCE = 4
 """A bounded search gives up after this many trials per part without a gain (docs/research/search.md)."""
 
@@ -183,12 +176,10 @@ def search(
     else:
         # greedy has already used the first score
         others = context.rankings[1:] if first == "greedy" else context.rankings
-        crowded = bounded and len(parts) > MANY
-        opening = others if not bounded else others[:1] if len(parts) <= FEW or crowded else []
+        opening = others if not bounded else others[:1] if len(parts) <= FEW else []
         a_pass = _seconds_of_a_pass(clock)
-        most_work = min(ANOTHER_PASS * first_pass, allowed / 2 if crowded else math.inf)
-        pieces = (FAR_FEWER if crowded else HOPELESS) * len(parts)
-        starts = _portfolio(context, parts, opening, budget, a_pass, pieces, most_work)
+        pieces = HOPELESS * len(parts)
+        starts = _portfolio(context, parts, opening, budget, a_pass, pieces, ANOTHER_PASS * first_pass)
         from_portfolio = len(starts[0])
         if bounded:
             state = Neighbourhood(context, starts[0], BOUNDED_PATIENCE)

@@ -1,0 +1,96 @@
+"""The tree of cuts: a second policy takes over where the first leaves thousands of components."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from rlacd import cut
+from rlacd.clock import Clock
+from rlacd.criteria import Concavity
+from rlacd.cut import CutTree
+from rlacd.decompose_mesh import decompose
+from rlacd.policies import Greedy
+from rlacd.solid.component import Component, Plane
+from rlacd.workers import Workers
+from tests.shapes import box, from_manifold
+
+CRITERION = Concavity(0.02)
+
+
+class Slices:
+    """A policy that fails: cuts 4 % off the lower end, whatever the shape."""
+
+    def choose(self, component: Component, threads: int = 1) -> Plane:
+        lower, upper = component.box[:, 0].tolist()
+        return Plane((1.0, 0.0, 0.0), lower + 0.04 * (upper - lower))
+
+
+def cross() -> Component:
+    arms = [box((-1, -0.1, -0.1), (1, 0.1, 0.1)), box((-0.1, -1, -0.1), (0.1, 1, 0.1))]
+    return Component(arms[0] + arms[1])
+
+
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cut, "MANY", 12)
+
+
+def cut_by(tree: CutTree, criterion: Concavity = CRITERION) -> list[Component]:
+    done, left = tree.cut_until(criterion, Clock())
+    assert not left
+    assert all(criterion.is_met(part) for part in done)
+    return done
+
+
+@pytest.mark.usefixtures("few")
+def test_where_one_policy_fails_the_other_takes_over_for_good() -> None:
+    solid = cross()
+    with Workers(1) as workers:
+        sliced = len(cut_by(CutTree(solid, Slices(), workers)))
+        alone = cut_by(CutTree(solid, Greedy(), workers))
+        tree = CutTree(solid, Slices(), workers, second=Greedy())
+        both = cut_by(tree)
+        assert len(alone) < 12 < sliced
+        assert [part.volume for part in both] == [part.volume for part in alone]
+        coarser = Concavity(2 * CRITERION.threshold)
+        assert len(cut_by(tree, coarser)) == len(cut_by(CutTree(solid, Greedy(), workers), coarser))
+
+
+@pytest.mark.usefixtures("few")
+def test_a_second_policy_that_is_no_better_changes_nothing() -> None:
+    solid = cross()
+    with Workers(1) as workers:
+        alone = cut_by(CutTree(solid, Slices(), workers))
+        both = cut_by(CutTree(solid, Slices(), workers, second=Slices()))
+    assert [part.volume for part in both] == [part.volume for part in alone]
+
+
+def test_below_the_limit_the_second_policy_is_not_asked() -> None:
+    class Never:
+        def choose(self, component: Component, threads: int = 1) -> Plane:
+            raise AssertionError
+
+    with Workers(1) as workers:
+        cut_by(CutTree(cross(), Slices(), workers, second=Never()))
+
+
+@pytest.mark.parametrize("units", [0.0, 3e3])
+def test_work_ends_the_cutting(units: float) -> None:
+    with Workers(1) as workers:
+        clock = Clock()
+        _, left = CutTree(cross(), Slices(), workers).cut_until(CRITERION, clock, math.inf, units)
+    assert left
+    assert clock.work.done > units
+
+
+def test_limits_on_parts_see_the_same_tree(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The default policy, made to fail, is replaced in `decompose` too; a chosen one is not."""
+    monkeypatch.setattr(cut, "MANY", 12)
+    monkeypatch.setattr("rlacd.decompose_mesh.make_policy", lambda *_: Slices())
+    solid = from_manifold(box((-1, -0.1, -0.1), (1, 0.1, 0.1)) + box((-0.1, -1, -0.1), (0.1, 1, 0.1)))
+    options = {"quality": "fast", "merge": False, "threshold": 0.02, "threads": 1}
+    mesh = solid.vertices, solid.faces
+    assert len(decompose(mesh, **options)) <= 7
+    assert len(decompose(mesh, policy="greedy-excess-norm", **options)) > 12
