@@ -1,10 +1,13 @@
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from rlacd.merge import in_input
 from rlacd.solid.frame import Frame
+from rlacd.solid.hull import Hull
 
 finite = st.floats(-1e3, 1e3, allow_nan=False, width=64)
 
@@ -33,3 +36,18 @@ def test_single_point_keeps_the_unit():
 def test_extreme_sizes_stay_finite(size):
     frame = Frame.of(np.array([[-size, 0, 0], [size, 0, 0]]))
     assert np.isfinite(frame.to_frame(np.array([[size, 0, 0]]))).all()
+
+
+@pytest.mark.parametrize("turn", [0, 1, 2])
+def test_a_hull_thinner_than_the_coordinates_resolve_keeps_its_outline(turn):
+    corners = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1e-9)], dtype=float)
+    hull = Hull.of(np.roll(corners, turn, axis=1))
+    frame = Frame(center=np.full(3, 1e9), scale=1.0)
+    there = in_input(hull, frame)
+    outline = there.vertices - 1e9
+    assert there.is_watertight
+    assert 0 < trimesh.Trimesh(outline, there.faces).volume < 1e-6
+    assert outline.min() >= -1e-6
+    assert outline.sum(axis=1).max() <= 1 + 1e-6
+    few = in_input(hull, frame, max_vertices=4)
+    assert len(few.vertices) == 4

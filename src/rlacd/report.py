@@ -58,50 +58,51 @@ def make_report(
         over, under, place = clock.if_in_time(
             lambda: _distances(solid, parts, workers, root), lambda: (None, None, None)
         )
-    stands_for_mass = [(part.hull.vertices, part.hull.faces) for part in parts] if is_cover else [solid.mesh]
-    mass = mass_of(*concatenated(stands_for_mass), solid.frame)
-    return {
-        "version": __version__,
-        "options": _options(options),
-        "complete": clock.stopped_by is None,
-        "stopped_by": clock.stopped_by,
-        "parts": len(hulls),
-        "faces": sum(len(hull.faces) for hull in hulls),
-        "vertices": sum(len(hull.vertices) for hull in hulls),
-        **({"primitives": _primitives(parts)} if options.primitives else {}),
-        **({"overlap": _seams(seams, solid.frame)} if options.overlap > 0 else {}),
-        **summary.entries,
-        "hausdorff": {"over": over, "under": under},
-        "scale": solid.frame.scale,
-        "mass": _mass(mass),
-        "repair": [{**vars(body)} for body in solid.bodies],
-        "warnings": [
-            *solid.warnings,
-            *_coarse(solid),
-            *_early_end(clock),
-            *_cut_short(clock),
-            *(
-                ["There was no time to measure how far hulls and input are apart."]
-                if has_surface and over is None
-                else []
-            ),
-            *(_shallow(seams, options.overlap / solid.frame.scale) if options.overlap > 0 else []),
-            *summary.warnings,
-            *_shortcomings(
-                [part.hull for part in parts],
-                over,
-                under,
-                place,
-                options,
-                criterion.overhang if not summary.warnings else math.inf,
-            ),
-            *(
-                _out_of_the_box([part.hull for part in parts], solid)
-                if criterion.obstacles is not None and not is_cover
-                else []
-            ),
-        ],
-    }
+    with clock.shielded():  # nothing below takes long
+        stands_for_mass = [(part.hull.vertices, part.hull.faces) for part in parts] if is_cover else [solid.mesh]
+        mass = mass_of(*concatenated(stands_for_mass), solid.frame)
+        return {
+            "version": __version__,
+            "options": _options(options),
+            "complete": clock.stopped_by is None,
+            "stopped_by": clock.stopped_by,
+            "parts": len(hulls),
+            "faces": sum(len(hull.faces) for hull in hulls),
+            "vertices": sum(len(hull.vertices) for hull in hulls),
+            **({"primitives": _primitives(parts)} if options.primitives else {}),
+            **({"overlap": _seams(seams, solid.frame)} if options.overlap > 0 else {}),
+            **summary.entries,
+            "hausdorff": {"over": over, "under": under},
+            "scale": solid.frame.scale,
+            "mass": _mass(mass),
+            "repair": [{**vars(body)} for body in solid.bodies],
+            "warnings": [
+                *solid.warnings,
+                *_coarse(solid),
+                *_early_end(clock),
+                *_cut_short(clock),
+                *(
+                    ["There was no time to measure how far hulls and input are apart."]
+                    if has_surface and over is None
+                    else []
+                ),
+                *(_shallow(seams, options.overlap / solid.frame.scale) if options.overlap > 0 else []),
+                *summary.warnings,
+                *_shortcomings(
+                    [part.hull for part in parts],
+                    over,
+                    under,
+                    place,
+                    options,
+                    criterion.overhang if not summary.warnings else math.inf,
+                ),
+                *(
+                    _out_of_the_box([part.hull for part in parts], solid)
+                    if criterion.obstacles is not None and not is_cover
+                    else []
+                ),
+            ],
+        }
 
 
 def _primitives(parts: Sequence[Part]) -> dict[str, int]:

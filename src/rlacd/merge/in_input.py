@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 
 import numpy as np
 import trimesh
@@ -39,9 +40,20 @@ def in_input(
         points = np.clip(frame.to_input(hull.vertices), -_LARGEST, _LARGEST)
     there = Hull.of(points)
     if there is None:
-        there = plain_hull(points, max_vertices, max_faces)
+        there = _thickened(points, max_vertices, max_faces) or plain_hull(points, max_vertices, max_faces)
     metadata = {} if hull.primitive is None else {PRIMITIVE: hull.primitive.in_input(frame).as_plain()}
     return trimesh.Trimesh(there.vertices, there.faces, process=False, metadata=metadata)
+
+
+def _thickened(points: FloatArray, max_vertices: int | None, max_faces: int | None) -> Hull | None:
+    """The hull of flat points [N, 3], thick enough to have a volume; None if that is not within the limits."""
+    step = _step(points)
+    lower, upper = np.maximum(points, step - _LARGEST) - step, np.minimum(points, _LARGEST - step) + step
+    corners = itertools.product(*zip(lower.T, upper.T, strict=True))
+    hull = Hull.of(np.concatenate([np.stack(corner, axis=1) for corner in corners]))
+    if hull is None or len(hull.vertices) > (max_vertices or math.inf) or len(hull.faces) > (max_faces or math.inf):
+        return None
+    return hull
 
 
 def plain_hull(points: FloatArray, max_vertices: int | None, max_faces: int | None) -> Hull:
@@ -57,11 +69,16 @@ def _box_around(points: FloatArray) -> FloatArray:
 
     One floating-point step along an axis may vanish next to a large coordinate on another axis.
     """
-    limits = np.finfo(np.float64)
-    step = np.abs(points).max() * limits.eps + limits.smallest_subnormal
-    lower = np.maximum(points.min(axis=0), step - limits.max) - step
-    upper = np.minimum(points.max(axis=0), limits.max - step) + step
+    step = _step(points)
+    lower = np.maximum(points.min(axis=0), step - _LARGEST) - step
+    upper = np.minimum(points.max(axis=0), _LARGEST - step) + step
     return np.array(list(itertools.product(*zip(lower, upper, strict=True))))
+
+
+def _step(points: FloatArray) -> float:
+    """The resolution of the points' largest coordinate."""
+    limits = np.finfo(np.float64)
+    return float(np.abs(points).max() * limits.eps + limits.smallest_subnormal)
 
 
 def _tetrahedron_around(points: FloatArray) -> FloatArray:
