@@ -247,6 +247,21 @@ def test_a_fin_on_a_face_that_hangs_itself_is_a_fin():
     assert volume(solid) == pytest.approx(ball.volume, rel=0.02)
 
 
+@pytest.mark.parametrize("reach", [0.1, 0.5, 2.0])
+@pytest.mark.parametrize("tilt", [0.2, 1.0, 1.9])
+def test_a_lid_that_stands_open_on_a_closed_box_is_kept(reach, tilt):
+    """One of more than 5 % of the area was capped by itself, and lost."""
+    corners = BOX.vertices[(BOX.vertices[:, 2] > 0) & (BOX.vertices[:, 0] > 0)]
+    tips = corners + reach * np.array([-np.cos(tilt), 0, np.sin(tilt)])
+    hinge = [int(np.flatnonzero((BOX.vertices == corner).all(axis=1))[0]) for corner in corners]
+    lid = [[*hinge, 8], [hinge[1], 9, 8]]
+    box = trimesh.Trimesh(np.concatenate([BOX.vertices, tips]), np.concatenate([BOX.faces, lid]), process=False)
+    solid = solid_of(box)
+    assert volume(solid) == pytest.approx(8, rel=0.01)
+    points = solid.frame.to_frame(tips)
+    assert SurfaceQuery(*to_arrays(solid.manifold)).distance(points).max() < 2 * HALF_THICKNESS
+
+
 @pytest.mark.parametrize("count", [4, 8])
 @pytest.mark.parametrize("way", [(0, 0, 0.4), (0.25, 0.25, 0.3), (0.6, 0.6, 0), (-0.3, -0.3, 0)])
 def test_a_cup_with_flaps_on_its_rim_stays_hollow(count, way):

@@ -4,10 +4,11 @@ Input: a soup. Output: its flaps, and loops of vertices around its holes; nothin
 
 Faces are mated across edges: if two share an edge, with each other; if more do, those that continue each other best.
 Faces connected by mates form a patch, and all faces of a patch are wound alike, whatever the file says. A small patch
-attached to others by edges that those mate without it is a flap: its free edges bound no hole. On request, nor do those
-of a fin whose edge lies on the rim of a hole, where it is mated with what is left there (`_fins`). At a vertex where
-several holes meet, a loop turns from a free edge to the next one across the hole, so loops never run around existing
-faces. An island that touches its hole's rim at a vertex joins that hole's loop, which visits the vertex twice.
+attached to others by edges that those mate without it is a flap, as is a flat one of any size with one loop around it:
+its free edges bound no hole. On request, nor do those of a fin whose edge lies on the rim of a hole, where it is mated
+with what is left there (`_fins`). At a vertex where several holes meet, a loop turns from a free edge to the next one
+across the hole, so loops never run around existing faces. An island that touches its hole's rim at a vertex joins that
+hole's loop, which visits the vertex twice.
 """
 
 from __future__ import annotations
@@ -25,6 +26,9 @@ from rlacd.solid.topology import BoolArray, IntArray, components
 
 # A flap has at most this share of its body's area.
 _FLAP = 0.05
+
+# A lid is flat if its faces turn by less than this (cosine).
+_FLAT_LID = 1 - 1e-6
 
 # A fin on the rim of a hole is at most so many faces long.
 _FIN_FACES = 8
@@ -105,6 +109,9 @@ def rims_of(soup: Soup, fins: bool = False) -> Rims:
     free = soup.edges.valence[soup.edges.of_halfedge[rim]] == 1
     loops = [loop for loop in _cycles(follower) if len(loop) > 2 and 2 * free[loop].sum() > len(loop)]
     normals = weighted / np.maximum(np.linalg.norm(weighted, axis=1, keepdims=True), np.finfo(float).tiny)
+    lid = _lids(soup, patch, normals, rim, loops)
+    loops = [loop for loop in loops if not lid[patch[rim[loop[0]] // 3]]]
+    flap |= lid[patch]
     beside = [rim[loop] // 3 for loop in loops]
     return Rims([tail[loop] for loop in loops], beside, normals, inverted, flap, bool(fin.any()))
 
@@ -168,6 +175,23 @@ def _flaps(soup: Soup, patch: IntArray) -> BoolArray:
     )
     small = np.bincount(patch, soup.area, count)[patch] <= _FLAP * np.bincount(soup.body, soup.area)[soup.body]
     return np.asarray(small & hangs[patch] & free[patch])
+
+
+def _lids(soup: Soup, patch: IntArray, normals: FloatArray, rim: IntArray, loops: list[IntArray]) -> BoolArray:
+    """Return for each patch whether it is flat, hangs on others, and one loop runs all around it.
+
+    So hangs a lid that stands open: a cap of that loop would lie on the lid itself, and close nothing.
+    """
+    count = int(patch.max(initial=-1)) + 1
+    lid = np.zeros(count, dtype=bool)
+    hangs = np.bincount(patch[soup.at_valence(soup.edges.valence > 2)], minlength=count) > 0
+    edges = np.bincount(patch[rim // 3], minlength=count)
+    for loop in loops:
+        on = patch[rim[loop] // 3]
+        if (on == on[0]).all() and hangs[on[0]] and edges[on[0]] == len(loop):
+            some = normals[patch == on[0]]
+            lid[on[0]] = bool((some @ some[0] > _FLAT_LID).all())
+    return lid
 
 
 def _fins(soup: Soup, mate: IntArray) -> BoolArray:
