@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -154,3 +156,21 @@ def test_cutting_stops_at_its_bound_and_says_so(monkeypatch: pytest.MonkeyPatch)
     assert one.report["complete"]
     assert one.report["hausdorff"]["under"] < 1e-6
     assert [hull.vertices.tolist() for hull in one] == [hull.vertices.tolist() for hull in two]
+
+
+@pytest.mark.parametrize("steps", [2, 8, 12])
+def test_stopped_while_a_tangle_is_cut_the_hulls_cover_it(steps: int) -> None:
+    cuts = itertools.count()
+
+    def cancel(progress: rlacd.Progress) -> bool:
+        return progress.stage != "cut" or next(cuts) < steps
+
+    mesh = tangle(1)
+    result = rlacd.decompose(mesh, quality="fast", threads=1, progress=cancel)
+    assert result.report["stopped_by"] == "cancel"
+    points = trimesh.sample.sample_surface(trimesh.Trimesh(*mesh, process=False), 500, seed=0)[0]
+    covered = np.zeros(len(points), dtype=bool)
+    for hull in result:
+        offset = np.einsum("fj,fj->f", hull.face_normals, hull.triangles[:, 0])
+        covered |= (points @ hull.face_normals.T <= offset + 1e-9).all(axis=1)
+    assert covered.all()

@@ -62,7 +62,7 @@ from rlacd.progress import ProgressCallback
 from rlacd.proxy import FEW, Lift, Proxy, simplify
 from rlacd.renamed import with_former
 from rlacd.repair.repair import repair
-from rlacd.repair.tangles import TangledError, refuse_tangles
+from rlacd.repair.tangles import TangledError, refuse_tangles, tangled_bodies
 from rlacd.report import joint_report, make_report
 from rlacd.search import SearchContext, eliminate_parts, level, search
 from rlacd.search.levels import SearchSummary
@@ -80,6 +80,9 @@ MeshLike: TypeAlias = "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene 
 
 COARSER = 1.5
 """With `max_hulls`, thresholds that grow by this factor are tried, and the best decomposition is kept."""
+
+FEW_TO_DOUBT = 2000
+"""Solids of at most this many triangles are looked at for tangles when a stop ends cutting: that takes milliseconds."""
 
 MARGIN = 1.5
 """Parts of a proxy have to be tighter by this share of its deviation: their hulls still have to grow to the solid."""
@@ -423,7 +426,18 @@ def _repaired_and_cut(
     if proxy is not None:
         return _through_proxy(solid, root, proxy, goal, options, workers, clock, doubt)
     parts, goal, found = _cut_and_searched(root, goal, options, workers, clock, doubt)
+    if doubt is not None and _lost_in_cuts(solid, clock):
+        solid, parts = cover(source, clock)
+        return _Reached(solid, options, _unprepared(options, solid), parts)
     return _Reached(solid, options, goal, parts, found, root)
+
+
+def _lost_in_cuts(solid: Solid, clock: Clock) -> bool:
+    """Whether cutting was stopped early on a small solid that is inside out in places: its pieces may not cover it."""
+    if clock.stopped_by is None or clock.stopped_in != "cut" or len(solid.faces) > FEW_TO_DOUBT:
+        return False
+    with clock.shielded():
+        return len(tangled_bodies(solid)) > 0
 
 
 def _proxy(root: Component, goal: Criterion, options: Options, clock: Clock) -> Proxy | None:
