@@ -26,32 +26,6 @@ def test_cut_keeps_the_volume() -> None:
     assert (below.vertices @ [0.6, 0, 0.8]).max() == pytest.approx(0.3)
 
 
-def test_a_boolean_that_loses_volume_does_not_decide(monkeypatch) -> None:
-    """Of solids that overlap themselves, a boolean cut lost up to 0.4 of the volume."""
-
-    class Losing:
-        def __init__(self, solid: Manifold, share: float) -> None:
-            self.solid, self.share = solid, share
-
-        def volume(self) -> float:
-            return self.solid.volume()
-
-        def split_by_plane(self, normal, offset):
-            upper, lower = self.solid.split_by_plane(normal, offset)
-            return upper, lower.trim_by_plane((0, 0, 1), self.share)
-
-    monkeypatch.setattr("rlacd.solid.component.FOLDED", -1.0)  # as if all caps were folded: a boolean is asked
-    cube = Manifold.cube((1, 1, 1))
-    for share, lost in ((0.0, False), (0.3, True)):
-        component = Component(cube)
-        component.manifold = Losing(cube, share)
-        below, above = component.cut(Plane((1.0, 0.0, 0.0), 0.5))
-        assert below is not None
-        assert above is not None
-        assert below.volume == pytest.approx(0.5), lost
-        assert above.volume == pytest.approx(0.5)
-
-
 def test_cut_that_misses_leaves_one_side() -> None:
     below, above = box(1, 1, 1).cut(Plane((1.0, 0.0, 0.0), 2.0))
     assert below is not None

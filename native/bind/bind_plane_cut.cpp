@@ -1,7 +1,10 @@
 // Python bindings of plane cuts and of the pieces they leave.
+#include <nanobind/stl/vector.h>
+
 #include "base/arrays.hpp"
 #include "cut/bodies.hpp"
 #include "cut/plane_cut.hpp"
+#include "cut/uncross.hpp"
 
 namespace rlacd {
 
@@ -21,6 +24,44 @@ nb::tuple as_tuple(OpenSide&& side, Vec3 outward) {
   }
   return nb::make_tuple(to_array<double>(std::move(side.mesh.vertices)),
                         to_array<std::int32_t>(std::move(side.mesh.faces)), rims, outlines);
+}
+
+using RimsIn = std::vector<nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>>;
+using OutlinesIn = std::vector<nb::ndarray<const double, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>>;
+
+std::vector<std::vector<std::int32_t>> to_rims(const RimsIn& arrays, std::size_t vertices) {
+  std::vector<std::vector<std::int32_t>> rims;
+  for (const auto& array : arrays) {
+    rims.emplace_back(array.data(), array.data() + array.shape(0));
+    for (const std::int32_t i : rims.back())
+      if (i < 0 || static_cast<std::size_t>(i) >= vertices) throw std::invalid_argument("rim index out of range");
+  }
+  return rims;
+}
+
+std::vector<std::vector<PlanePoint>> to_outlines(const OutlinesIn& arrays,
+                                                 const std::vector<std::vector<std::int32_t>>& rims) {
+  std::vector<std::vector<PlanePoint>> outlines;
+  for (const auto& array : arrays) {
+    outlines.emplace_back(array.shape(0));
+    for (std::size_t i = 0; i < array.shape(0); ++i) outlines.back()[i] = {array(i, 0), array(i, 1)};
+  }
+  if (outlines.size() != rims.size()) throw std::invalid_argument("as many outlines as rims are needed");
+  for (std::size_t r = 0; r < rims.size(); ++r)
+    if (outlines[r].size() != rims[r].size()) throw std::invalid_argument("an outline has as many points as its rim");
+  return outlines;
+}
+
+nb::tuple as_tuple(UncrossedSide&& side) {
+  nb::list regions;
+  for (RimRegion& region : side.regions) {
+    nb::list rims, outlines;
+    for (auto& rim : region.rims) rims.append(to_array<std::int32_t>(std::move(rim)));
+    for (auto& outline : region.outlines) outlines.append(to_array<double>(std::move(outline)));
+    regions.append(nb::make_tuple(region.winding, rims, outlines));
+  }
+  return nb::make_tuple(to_array<double>(std::move(side.mesh.vertices)),
+                        to_array<std::int32_t>(std::move(side.mesh.faces)), regions);
 }
 
 }  // namespace
@@ -43,6 +84,22 @@ void bind_plane_cut(nb::module_& m) {
       "3],\n"
       "faces [F, 3], the cap's rims as loops of vertices, a list of [R], and as points [R, 2] of the plane, counter-\n"
       "clockwise from outside.");
+  m.def(
+      "uncross",
+      [](const PointsIn& vertices, const FacesIn& faces, const RimsIn& rims, const OutlinesIn& outlines) {
+        OpenSide side{to_finite_mesh(vertices, faces), {}};
+        side.rims = to_rims(rims, side.mesh.vertices.size());
+        const std::vector<std::vector<PlanePoint>> points = to_outlines(outlines, side.rims);
+        UncrossedSide uncrossed;
+        {
+          nb::gil_scoped_release release;
+          uncrossed = uncross(std::move(side), points);
+        }
+        return as_tuple(std::move(uncrossed));
+      },
+      nb::arg("vertices"), nb::arg("faces"), nb::arg("rims"), nb::arg("outlines"),
+      "One side of a cut whose rims cross, with a vertex at every crossing: vertices [V, 3], faces [F, 3] and a list\n"
+      "of regions (winding number, rims, outlines) bounded by loops that do not cross, each to the left of its loops.");
   m.def(
       "bodies",
       [](const PointsIn& vertices, const FacesIn& faces) {

@@ -65,6 +65,9 @@ def outward_where_touching(
 def cut_by_plane(
     vertices: FloatArray, faces: IntArray, x: float, y: float, z: float, offset: float
 ) -> tuple[_OpenSide, _OpenSide]: ...
+def uncross(
+    vertices: FloatArray, faces: IntArray, rims: list[IntArray], outlines: list[FloatArray]
+) -> tuple[FloatArray, IntArray, list[tuple[int, list[IntArray], list[FloatArray]]]]: ...
 def weld(vertices: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray, IntArray, NDArray[np.bool_]]: ...
 def edges(
     faces: NDArray[np.int64], count: int

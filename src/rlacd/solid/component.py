@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from manifold3d import Manifold, Mesh64, triangulate
+from manifold3d import Manifold
 
 from rlacd import _native
 from rlacd.solid.arrays import FloatArray, IntArray
-from rlacd.solid.boolean_time import require_time_for
+from rlacd.solid.caps import Surface, capped, section_caps
 from rlacd.solid.hull import Hull
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import surface_of
@@ -23,26 +23,7 @@ NEGLIGIBLE_VOLUME = 1e-12
 """Solids below this volume (the frame's box has 8) are rounding left over by a cut."""
 
 LOST = 1e-6
-"""Share of a solid's volume that may be lost in a boolean, or as shavings (see `rlacd.cut`)."""
-
-
-FOLDED = 1e-2
-"""Share of a cap's area that may be upside down. It is larger where a solid overlaps itself by a hair: rims cross each
-other, and triangles between them may lead far out of the solid. A boolean then decides better what is inside."""
-
-
-NEGLIGIBLE_FOLD = 1e-9
-"""A share smaller than this is rounding."""
-
-
-MARGIN = 1e-3
-"""Margin around a box when the solid is cropped to it, so that no cap touches what lies inside the box."""
-
-FEW_FACES = 400
-"""A boolean of this few faces takes no longer than cropping them first."""
-
-MANY_FACES = 2000
-"""Solids with more faces are halved before they are cropped to a box."""
+"""Share of a solid's volume that may be lost as shavings (see `rlacd.cut`)."""
 
 
 @dataclass(frozen=True)
@@ -275,77 +256,21 @@ class Component(Part):
 
     def cut(self, plane: Plane) -> tuple[Component | None, Component | None]:
         """Cut by a plane: returns the sides below and above, None for a side without volume."""
-        open_sides = _native.cut_by_plane(self.vertices, self.faces, *plane.normal, plane.offset)
-        (below, below_folded), (above, above_folded) = (_capped(*side) for side in open_sides)
-        if max(below_folded, above_folded) > FOLDED and abs(self.manifold.volume() - self.volume) <= LOST * self.volume:
-            require_time_for(len(self.faces))
-            upper, lower = self.manifold.split_by_plane(plane.normal, plane.offset)
-            # Of a solid that overlaps itself by more, a boolean can lose what the two sides with their caps hold.
-            if abs(upper.volume() + lower.volume() - self.volume) <= LOST * self.volume:
-                return _component(lower, self), _component(upper, self)
-        return _component(below, self), _component(above, self)
+        below, above = _native.cut_by_plane(self.vertices, self.faces, *plane.normal, plane.offset)
+        return _component(capped(*below), self), _component(capped(*above), self)
 
-    def clipped(self, hull: Hull) -> tuple[FloatArray, IntArray]:
+    def clipped(self, hull: Hull) -> Surface:
         """Return the surface of the solid inside a hull, closed by caps on the hull's facets; empty if none is."""
         found = self.filling.clipped(hull.vertices, hull.faces)
         if found is not None:
             vertices, faces, sections = found
-            caps, folded = _caps(sections)
-            if folded <= FOLDED:
+            caps = section_caps(sections)
+            if caps is not None:
                 return vertices, np.ascontiguousarray(np.concatenate([faces, caps]), dtype=np.int32)
-        require_time_for(len(self.faces))
-        return surface_of(self.around(hull.box) ^ Manifold(Mesh64(hull.vertices, hull.faces.astype(np.uint64))))
-
-    def around(self, box: FloatArray) -> Manifold:
-        """Return the solid cropped to a box [2, 3] and a margin around it, for booleans with what lies in the box.
-
-        Returns the whole solid if it is small, or if it cannot be cut cleanly.
-        """
-        surface = self._cell(box)
-        room = np.stack([box[0] - self.box[0], self.box[1] - box[1]])  # beyond each side of the box
-        for side, axis in sorted(np.argwhere(room > MARGIN).tolist(), key=lambda at: -room[at[0], at[1]]):
-            if len(surface[1]) <= FEW_FACES:
-                break
-            kept = _halves(surface, axis, float(box[side, axis] + (MARGIN if side else -MARGIN)))[1 - side]
-            if kept is None:
-                return self.manifold
-            surface = kept
-        if surface[1] is self.faces:
-            return self.manifold
-        clipped = Manifold(Mesh64(surface[0], surface[1].astype(np.uint64)))
-        volume = _native.mesh_volume(*surface) if len(surface[1]) else 0.0
-        return clipped if abs(clipped.volume() - volume) <= NEGLIGIBLE_VOLUME + LOST * volume else self.manifold
-
-    def _cell(self, box: FloatArray) -> tuple[FloatArray, IntArray]:
-        """Return the smallest cell of the solid that holds a box, by repeatedly halving it across its longest side.
-
-        Cells are cached: otherwise every crop would go through all faces.
-        """
-        cell, place = self.box, ""
         surface = self.vertices, self.faces
-        while len(surface[1]) > MANY_FACES:
-            axis = int(np.argmax(cell[1] - cell[0]))
-            middle = float(cell[:, axis].mean())
-            if box[1, axis] + MARGIN <= middle:
-                side = 0
-            elif box[0, axis] - MARGIN >= middle:
-                side = 1
-            else:
-                break
-            if place not in self._cells:
-                self._cells[place] = _halves(surface, axis, middle)
-            half = self._cells[place][side]
-            if half is None:
-                break
-            surface = half
-            cell = cell.copy()
-            cell[1 - side, axis] = middle
-            place += str(side)
+        for normal, offset in _facet_planes(hull):
+            surface = capped(*_native.cut_by_plane(*surface, *normal, offset)[0])
         return surface
-
-    @cached_property
-    def _cells(self) -> dict[str, tuple[tuple[FloatArray, IntArray] | None, ...]]:
-        return {}
 
     def pieces(self) -> list[Component]:
         """Connected pieces, cavities kept inside the piece that encloses them; ``[self]`` if it is connected."""
@@ -359,72 +284,13 @@ class Component(Part):
         return [piece for surface in surfaces if (piece := _component(surface, self)) is not None]
 
 
-def _halves(
-    surface: tuple[FloatArray, IntArray], axis: int, offset: float
-) -> tuple[tuple[FloatArray, IntArray] | None, ...]:
-    """Cut a closed surface across a coordinate axis: the sides below and above, None if it cannot be cut cleanly."""
-    x, y, z = np.eye(3)[axis].tolist()
-    sides = (_capped(*side) for side in _native.cut_by_plane(*surface, x, y, z, offset))
-    return tuple(side if folded <= NEGLIGIBLE_FOLD else None for side, folded in sides)
-
-
-def _capped(
-    vertices: FloatArray, faces: IntArray, rims: list[IntArray], outlines: list[FloatArray]
-) -> tuple[tuple[FloatArray, IntArray], float]:
-    """Close one side of a cut in the plane; also returns the share of the cap that is upside down."""
-    if not rims:
-        return (vertices, faces), 0.0
-    triangles, folded = _triangulated(outlines)
-    surface = np.concatenate([faces, np.concatenate(rims)[triangles]])
-    return (vertices, np.ascontiguousarray(surface, dtype=np.int32)), folded
-
-
-def _triangulated(outlines: list[FloatArray]) -> tuple[IntArray, float]:
-    """Triangles [T, 3] of loops in a plane, [R, 2] each, and the share of their area that is upside down.
-
-    Where loops cross each other, how far triangles fold depends on chance and on the direction of the loops.
-    """
-    points = np.concatenate(outlines)
-    triangles = triangulate(outlines)
-    folded = _share_upside_down(points, triangles)
-    if folded > NEGLIGIBLE_FOLD:
-        mirrored = triangulate([outline[::-1, ::-1] for outline in outlines])
-        ends = np.cumsum([len(outline) for outline in outlines])
-        back = np.concatenate([np.arange(end - 1, end - 1 - len(o), -1) for end, o in zip(ends, outlines, strict=True)])
-        other = back[mirrored][:, ::-1]
-        if (share := _share_upside_down(points, other)) < folded:
-            return other, share
-    return triangles, folded
-
-
-def _caps(sections: list[tuple[list[IntArray], list[FloatArray]]]) -> tuple[IntArray, float]:
-    """Triangles [T, 3] that close sections, each of rims and their outlines [R, 2], and the share of their area that is
-    upside down.
-
-    Side by side in one plane they are triangulated together, which is quicker.
-    """
-    rims = [rim for own, _ in sections for rim in own]
-    if not rims:
-        return np.empty((0, 3), np.int32), 0.0
-    x, beside = 0.0, []
-    for _, outlines in sections:
-        left, right = min(o[:, 0].min() for o in outlines), max(o[:, 0].max() for o in outlines)
-        beside += [outline + np.array([x - left, 0.0]) for outline in outlines]
-        x += 1.1 * (right - left)
-    triangles, folded = _triangulated(beside)
-    if folded > NEGLIGIBLE_FOLD:
-        each = [_triangulated(outlines)[0] for _, outlines in sections]
-        sizes = [sum(map(len, own)) for own, _ in sections]
-        triangles = np.concatenate([own + first for own, first in zip(each, np.cumsum([0, *sizes[:-1]]), strict=True)])
-        folded = _share_upside_down(np.concatenate(beside), triangles)
-    return np.concatenate(rims)[triangles], folded
-
-
-def _share_upside_down(points: FloatArray, triangles: IntArray) -> float:
-    a, b, c = (points[corner] for corner in triangles.T)
-    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    total = np.abs(area).sum()
-    return float(-area[area < 0].sum() / total) if total > 0 else 0.0
+def _facet_planes(hull: Hull) -> list[tuple[list[float], float]]:
+    """Normals and offsets of a hull's facets, one for all triangles of a facet."""
+    a, b, c = (hull.vertices[corner] for corner in hull.faces.T)
+    normals = np.cross(b - a, c - a)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    _, first = np.unique(np.round(normals, 6), axis=0, return_index=True)
+    return [(normals[i].tolist(), float(normals[i] @ a[i])) for i in first]
 
 
 def _component(solid: Manifold | tuple[FloatArray, IntArray], within: Component) -> Component | None:
