@@ -90,16 +90,17 @@ void bind_plane_cut(nb::module_& m) {
         OpenSide side{to_finite_mesh(vertices, faces), {}};
         side.rims = to_rims(rims, side.mesh.vertices.size());
         const std::vector<std::vector<PlanePoint>> points = to_outlines(outlines, side.rims);
-        UncrossedSide uncrossed;
+        std::optional<UncrossedSide> uncrossed;
         {
           nb::gil_scoped_release release;
           uncrossed = uncross(std::move(side), points);
         }
-        return as_tuple(std::move(uncrossed));
+        return uncrossed ? nb::object(as_tuple(std::move(*uncrossed))) : nb::none();
       },
       nb::arg("vertices"), nb::arg("faces"), nb::arg("rims"), nb::arg("outlines"),
       "One side of a cut whose rims cross, with a vertex at every crossing: vertices [V, 3], faces [F, 3] and a list\n"
-      "of regions (winding number, rims, outlines) bounded by loops that do not cross, each to the left of its loops.");
+      "of regions (winding number, rims, outlines) bounded by loops that do not cross, each to the left of its loops;\n"
+      "None if there are too many crossings.");
   m.def(
       "bodies",
       [](const PointsIn& vertices, const FacesIn& faces) {

@@ -13,7 +13,8 @@ namespace rlacd {
 
 namespace {
 
-constexpr double kNoise = 1e-10;  // of the greatest coordinate
+constexpr double kNoise = 1e-10;           // of the greatest coordinate
+constexpr std::size_t kMostCrossings = 4;  // for each corner
 
 // A number in [-1, 1) that looks random and is the same everywhere (the finalizer of splitmix64).
 double noise(std::uint64_t i) {
@@ -54,8 +55,8 @@ class Tangle {
       for (const int c : {0, 1}) point_[i][c] += kNoise * greatest * noise(2 * vertex_[i] + c);
   }
 
-  UncrossedSide uncrossed() {
-    find_crossings();
+  std::optional<UncrossedSide> uncrossed() {
+    if (!find_crossings()) return std::nullopt;
     insert_crossings();
     split_faces();
     std::map<int, RimRegion> regions;
@@ -89,7 +90,8 @@ class Tangle {
     std::size_t node;
   };
 
-  void find_crossings() {
+  // Returns whether there are few enough.
+  bool find_crossings() {
     std::vector<std::size_t> by_left(corners_), active;
     std::iota(by_left.begin(), by_left.end(), 0);
     const auto left = [&](std::size_t i) { return std::min(point_[i][0], point_[next_[i]][0]); };
@@ -103,7 +105,9 @@ class Tangle {
                    active.end());
       for (const std::size_t j : active) cross(i, j);
       active.push_back(i);
+      if (crossings_.size() > kMostCrossings * corners_) return false;
     }
+    return true;
   }
 
   void cross(std::size_t i, std::size_t j) {
@@ -237,7 +241,7 @@ class Tangle {
 
 }  // namespace
 
-UncrossedSide uncross(OpenSide side, const std::vector<std::vector<PlanePoint>>& outlines) {
+std::optional<UncrossedSide> uncross(OpenSide side, const std::vector<std::vector<PlanePoint>>& outlines) {
   return Tangle(std::move(side), outlines).uncrossed();
 }
 

@@ -14,6 +14,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "base/geometry.hpp"
@@ -34,7 +35,8 @@ struct UncrossedSide {
   std::vector<RimRegion> regions;
 };
 
-// Outlines: of the side's rims, by `on_plane`.
-UncrossedSide uncross(OpenSide side, const std::vector<std::vector<PlanePoint>>& outlines);
+// Outlines: of the side's rims, by `on_plane`. Nothing if there are more than four crossings for each corner of the
+// rims: that many come from surfaces that lie on each other in many layers, and would multiply from cut to cut.
+std::optional<UncrossedSide> uncross(OpenSide side, const std::vector<std::vector<PlanePoint>>& outlines);
 
 }  // namespace rlacd

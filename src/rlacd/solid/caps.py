@@ -22,7 +22,8 @@ def capped(vertices: FloatArray, faces: IntArray, rims: list[IntArray], outlines
     """Close one side of a cut.
 
     Rims cross where a solid overlaps itself; triangles between them would lead out of the solid. They are taken apart
-    into loops that do not cross, which close the solid exactly as often as it overlaps itself.
+    into loops that do not cross, which close the solid exactly as often as it overlaps itself, unless
+    there are too many crossings.
 
     Parameters
     ----------
@@ -44,32 +45,54 @@ def capped(vertices: FloatArray, faces: IntArray, rims: list[IntArray], outlines
     triangles = triangulate(outlines)
     caps = [np.concatenate(rims)[triangles]]
     if _share_upside_down(np.concatenate(outlines), triangles) > NEGLIGIBLE_FOLD:
-        vertices, faces, regions = _native.uncross(vertices, faces, rims, outlines)
-        caps = [
-            np.concatenate(loops)[triangulate(points)[:, :: 1 if winding > 0 else -1]]
-            for winding, loops, points in regions
-            for _ in range(abs(winding))
-        ]
+        uncrossed = _native.uncross(vertices, faces, rims, outlines)
+        if uncrossed is not None:
+            vertices, faces, regions = uncrossed
+            caps = [
+                np.concatenate(loops)[triangulate(points)[:, :: 1 if winding > 0 else -1]]
+                for winding, loops, points in regions
+                for _ in range(abs(winding))
+            ]
     return vertices, np.ascontiguousarray(np.concatenate([faces, *caps]), dtype=np.int32)
 
 
-def section_caps(sections: list[tuple[list[IntArray], list[FloatArray]]]) -> IntArray | None:
-    """Triangles [T, 3] that close sections in several planes, each of rims and their outlines [R, 2].
+def section_caps(sections: list[tuple[list[IntArray], list[FloatArray]]]) -> tuple[IntArray, float]:
+    """Triangles [T, 3] that close sections in several planes, and the share of their area that is upside down.
 
-    Returns None where rims cross. Side by side in one plane sections are triangulated together, which is quicker.
+    Each section consists of rims and their outlines [R, 2]. Side by side in one plane they are triangulated together,
+    which is quicker. Rims that cross stay as they are, since sections share edges.
     """
     rims = [rim for own, _ in sections for rim in own]
     if not rims:
-        return np.empty((0, 3), np.int32)
+        return np.empty((0, 3), np.int32), 0.0
     x, beside = 0.0, []
     for _, outlines in sections:
         left, right = min(o[:, 0].min() for o in outlines), max(o[:, 0].max() for o in outlines)
         beside += [outline + np.array([x - left, 0.0]) for outline in outlines]
         x += 1.1 * (right - left)
-    triangles = triangulate(beside)
-    if _share_upside_down(np.concatenate(beside), triangles) > NEGLIGIBLE_FOLD:
-        return None
-    return np.concatenate(rims)[triangles]
+    points, triangles = np.concatenate(beside), triangulate(beside)
+    folded = _share_upside_down(points, triangles)
+    if folded > NEGLIGIBLE_FOLD:
+        each = [_least_folded(outlines) for _, outlines in sections]
+        sizes = [sum(map(len, own)) for own, _ in sections]
+        triangles = np.concatenate([own + first for own, first in zip(each, np.cumsum([0, *sizes[:-1]]), strict=True)])
+        folded = _share_upside_down(points, triangles)
+    return np.concatenate(rims)[triangles], folded
+
+
+def _least_folded(outlines: list[FloatArray]) -> IntArray:
+    """Triangles of loops that may cross: how far they fold depends on chance and on the direction of the loops."""
+    points = np.concatenate(outlines)
+    triangles: IntArray = triangulate(outlines)
+    folded = _share_upside_down(points, triangles)
+    if folded > NEGLIGIBLE_FOLD:
+        mirrored = triangulate([outline[::-1, ::-1] for outline in outlines])
+        ends = np.cumsum([len(outline) for outline in outlines])
+        back = np.concatenate([np.arange(end - 1, end - 1 - len(o), -1) for end, o in zip(ends, outlines, strict=True)])
+        other: IntArray = back[mirrored][:, ::-1]
+        if _share_upside_down(points, other) < folded:
+            return other
+    return triangles
 
 
 def _share_upside_down(points: FloatArray, triangles: IntArray) -> float:

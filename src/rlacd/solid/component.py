@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from manifold3d import Manifold
+from manifold3d import Manifold, Mesh64
 
 from rlacd import _native
 from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.boolean_time import require_time_for
 from rlacd.solid.caps import Surface, capped, section_caps
 from rlacd.solid.hull import Hull
 from rlacd.solid.manifold import to_manifold
@@ -23,7 +24,21 @@ NEGLIGIBLE_VOLUME = 1e-12
 """Solids below this volume (the frame's box has 8) are rounding left over by a cut."""
 
 LOST = 1e-6
-"""Share of a solid's volume that may be lost as shavings (see `rlacd.cut`)."""
+"""Share of a solid's volume that may be lost in a boolean, or as shavings (see `rlacd.cut`)."""
+
+
+FOLDED = 1e-2
+"""Share of caps' area that may be upside down where a solid that overlaps itself is clipped to a hull; beyond it a
+boolean clips."""
+
+MARGIN = 1e-3
+"""Margin around a box when the solid is cropped to it, so that no cap touches what lies inside the box."""
+
+FEW_FACES = 400
+"""A boolean of this few faces takes no longer than cropping them first."""
+
+MANY_FACES = 2000
+"""Solids with more faces are halved before they are cropped to a box."""
 
 
 @dataclass(frozen=True)
@@ -264,13 +279,56 @@ class Component(Part):
         found = self.filling.clipped(hull.vertices, hull.faces)
         if found is not None:
             vertices, faces, sections = found
-            caps = section_caps(sections)
-            if caps is not None:
+            caps, folded = section_caps(sections)
+            if folded <= FOLDED:
                 return vertices, np.ascontiguousarray(np.concatenate([faces, caps]), dtype=np.int32)
+        require_time_for(len(self.faces))
+        return surface_of(self.around(hull.box) ^ Manifold(Mesh64(hull.vertices, hull.faces.astype(np.uint64))))
+
+    def around(self, box: FloatArray) -> Manifold:
+        """Return the solid cropped to a box [2, 3] and a margin around it, for booleans with what lies in the box.
+
+        Returns the whole solid if it is small, or if it cannot be cut cleanly.
+        """
+        surface = self._cell(box)
+        room = np.stack([box[0] - self.box[0], self.box[1] - box[1]])  # beyond each side of the box
+        for side, axis in sorted(np.argwhere(room > MARGIN).tolist(), key=lambda at: -room[at[0], at[1]]):
+            if len(surface[1]) <= FEW_FACES:
+                break
+            surface = _halves(surface, axis, float(box[side, axis] + (MARGIN if side else -MARGIN)))[1 - side]
+        if surface[1] is self.faces:
+            return self.manifold
+        clipped = Manifold(Mesh64(surface[0], surface[1].astype(np.uint64)))
+        volume = _native.mesh_volume(*surface) if len(surface[1]) else 0.0
+        return clipped if abs(clipped.volume() - volume) <= NEGLIGIBLE_VOLUME + LOST * volume else self.manifold
+
+    def _cell(self, box: FloatArray) -> tuple[FloatArray, IntArray]:
+        """Return the smallest cell of the solid that holds a box, by repeatedly halving it across its longest side.
+
+        Cells are cached: otherwise every crop would go through all faces.
+        """
+        cell, place = self.box, ""
         surface = self.vertices, self.faces
-        for normal, offset in _facet_planes(hull):
-            surface = capped(*_native.cut_by_plane(*surface, *normal, offset)[0])
+        while len(surface[1]) > MANY_FACES:
+            axis = int(np.argmax(cell[1] - cell[0]))
+            middle = float(cell[:, axis].mean())
+            if box[1, axis] + MARGIN <= middle:
+                side = 0
+            elif box[0, axis] - MARGIN >= middle:
+                side = 1
+            else:
+                break
+            if place not in self._cells:
+                self._cells[place] = _halves(surface, axis, middle)
+            surface = self._cells[place][side]
+            cell = cell.copy()
+            cell[1 - side, axis] = middle
+            place += str(side)
         return surface
+
+    @cached_property
+    def _cells(self) -> dict[str, tuple[Surface, Surface]]:
+        return {}
 
     def pieces(self) -> list[Component]:
         """Connected pieces, cavities kept inside the piece that encloses them; ``[self]`` if it is connected."""
@@ -284,13 +342,11 @@ class Component(Part):
         return [piece for surface in surfaces if (piece := _component(surface, self)) is not None]
 
 
-def _facet_planes(hull: Hull) -> list[tuple[list[float], float]]:
-    """Normals and offsets of a hull's facets, one for all triangles of a facet."""
-    a, b, c = (hull.vertices[corner] for corner in hull.faces.T)
-    normals = np.cross(b - a, c - a)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    _, first = np.unique(np.round(normals, 6), axis=0, return_index=True)
-    return [(normals[i].tolist(), float(normals[i] @ a[i])) for i in first]
+def _halves(surface: Surface, axis: int, offset: float) -> tuple[Surface, Surface]:
+    """Cut a closed surface across a coordinate axis: the sides below and above."""
+    x, y, z = np.eye(3)[axis].tolist()
+    below, above = _native.cut_by_plane(*surface, x, y, z, offset)
+    return capped(*below), capped(*above)
 
 
 def _component(solid: Manifold | tuple[FloatArray, IntArray], within: Component) -> Component | None:
