@@ -14,6 +14,10 @@ from rlacd.solid.arrays import FloatArray, IntArray
 NEGLIGIBLE_FOLD = 1e-9
 """A share of a cap's area that may be upside down: rounding."""
 
+FOLDED = 1e-2
+"""A share that may be upside down where a solid overlaps itself by a hair: vertices at crossings would pile up there,
+cut after cut."""
+
 Surface = tuple[FloatArray, IntArray]
 """Vertices float64 [V, 3] and triangles int32 [F, 3]."""
 
@@ -42,9 +46,9 @@ def capped(vertices: FloatArray, faces: IntArray, rims: list[IntArray], outlines
     """
     if not rims:
         return vertices, faces
-    triangles = triangulate(outlines)
+    triangles = _least_folded(outlines)
     caps = [np.concatenate(rims)[triangles]]
-    if _share_upside_down(np.concatenate(outlines), triangles) > NEGLIGIBLE_FOLD:
+    if _share_upside_down(np.concatenate(outlines), triangles) > FOLDED:
         uncrossed = _native.uncross(vertices, faces, rims, outlines)
         if uncrossed is not None:
             vertices, faces, regions = uncrossed
