@@ -13,7 +13,7 @@ from rlacd.solid.hull import Hull
 
 
 def cut(surface: Surface, normal: tuple[float, float, float], offset: float) -> list[Surface]:
-    return [capped(*side) for side in _native.cut_by_plane(*surface, *normal, offset)]
+    return [capped(*side)[0] for side in _native.cut_by_plane(*surface, *normal, offset)]
 
 
 def together(*solids: Surface) -> Surface:

@@ -16,18 +16,20 @@ NEGLIGIBLE_FOLD = 1e-9
 
 FOLDED = 1e-2
 """A share that may be upside down where a solid overlaps itself by a hair: vertices at crossings would pile up there,
-cut after cut."""
+cut after cut. It is also the most that a solid clipped to a hull may have; beyond it a boolean clips."""
 
 Surface = tuple[FloatArray, IntArray]
 """Vertices float64 [V, 3] and triangles int32 [F, 3]."""
 
 
-def capped(vertices: FloatArray, faces: IntArray, rims: list[IntArray], outlines: list[FloatArray]) -> Surface:
+def capped(
+    vertices: FloatArray, faces: IntArray, rims: list[IntArray], outlines: list[FloatArray]
+) -> tuple[Surface, float]:
     """Close one side of a cut.
 
-    Rims cross where a solid overlaps itself; triangles between them would lead out of the solid. They are taken apart
-    into loops that do not cross, which close the solid exactly as often as it overlaps itself, unless
-    there are too many crossings.
+    Rims cross where a solid overlaps itself; triangles between them may lead out of the solid. If more than `FOLDED` of
+    the cap does, rims are taken apart into loops that do not cross, which close the solid exactly as often as it
+    overlaps itself, unless there are too many crossings.
 
     Parameters
     ----------
@@ -40,24 +42,26 @@ def capped(vertices: FloatArray, faces: IntArray, rims: list[IntArray], outlines
 
     Returns
     -------
-    vertices : float64 [W, 3]
-        The same, followed by one for each crossing of rims.
-    faces : int32 [G, 3]
+    surface : (float64 [W, 3], int32 [G, 3])
+        The same vertices, followed by one for each crossing of rims that were taken apart, and the closed surface.
+    folded : float
+        Share of the cap's area that is upside down because rims cross.
     """
     if not rims:
-        return vertices, faces
-    triangles = _least_folded(outlines)
+        return (vertices, faces), 0.0
+    triangles, folded = _least_folded(outlines)
     caps = [np.concatenate(rims)[triangles]]
-    if _share_upside_down(np.concatenate(outlines), triangles) > FOLDED:
+    if folded > FOLDED:
         uncrossed = _native.uncross(vertices, faces, rims, outlines)
         if uncrossed is not None:
             vertices, faces, regions = uncrossed
+            folded = 0.0
             caps = [
                 np.concatenate(loops)[triangulate(points)[:, :: 1 if winding > 0 else -1]]
                 for winding, loops, points in regions
                 for _ in range(abs(winding))
             ]
-    return vertices, np.ascontiguousarray(np.concatenate([faces, *caps]), dtype=np.int32)
+    return (vertices, np.ascontiguousarray(np.concatenate([faces, *caps]), dtype=np.int32)), folded
 
 
 def section_caps(sections: list[tuple[list[IntArray], list[FloatArray]]]) -> tuple[IntArray, float]:
@@ -77,26 +81,29 @@ def section_caps(sections: list[tuple[list[IntArray], list[FloatArray]]]) -> tup
     points, triangles = np.concatenate(beside), triangulate(beside)
     folded = _share_upside_down(points, triangles)
     if folded > NEGLIGIBLE_FOLD:
-        each = [_least_folded(outlines) for _, outlines in sections]
+        each = [_least_folded(outlines)[0] for _, outlines in sections]
         sizes = [sum(map(len, own)) for own, _ in sections]
         triangles = np.concatenate([own + first for own, first in zip(each, np.cumsum([0, *sizes[:-1]]), strict=True)])
         folded = _share_upside_down(points, triangles)
     return np.concatenate(rims)[triangles], folded
 
 
-def _least_folded(outlines: list[FloatArray]) -> IntArray:
-    """Triangles of loops that may cross: how far they fold depends on chance and on the direction of the loops."""
+def _least_folded(outlines: list[FloatArray]) -> tuple[IntArray, float]:
+    """Triangles of loops, and the share of their area that is upside down.
+
+    Where loops cross, how far triangles fold depends on chance and on the direction of the loops.
+    """
     points = np.concatenate(outlines)
-    triangles: IntArray = triangulate(outlines)
+    triangles = triangulate(outlines)
     folded = _share_upside_down(points, triangles)
     if folded > NEGLIGIBLE_FOLD:
         mirrored = triangulate([outline[::-1, ::-1] for outline in outlines])
         ends = np.cumsum([len(outline) for outline in outlines])
         back = np.concatenate([np.arange(end - 1, end - 1 - len(o), -1) for end, o in zip(ends, outlines, strict=True)])
-        other: IntArray = back[mirrored][:, ::-1]
-        if _share_upside_down(points, other) < folded:
-            return other
-    return triangles
+        other = back[mirrored][:, ::-1]
+        if (share := _share_upside_down(points, other)) < folded:
+            return other, share
+    return triangles, folded
 
 
 def _share_upside_down(points: FloatArray, triangles: IntArray) -> float:

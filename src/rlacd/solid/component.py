@@ -15,7 +15,7 @@ from manifold3d import Manifold, Mesh64
 from rlacd import _native
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.boolean_time import require_time_for
-from rlacd.solid.caps import Surface, capped, section_caps
+from rlacd.solid.caps import FOLDED, NEGLIGIBLE_FOLD, Surface, capped, section_caps
 from rlacd.solid.hull import Hull
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import surface_of
@@ -26,10 +26,6 @@ NEGLIGIBLE_VOLUME = 1e-12
 LOST = 1e-6
 """Share of a solid's volume that may be lost in a boolean, or as shavings (see `rlacd.cut`)."""
 
-
-FOLDED = 1e-2
-"""Share of caps' area that may be upside down where a solid that overlaps itself is clipped to a hull; beyond it a
-boolean clips."""
 
 MARGIN = 1e-3
 """Margin around a box when the solid is cropped to it, so that no cap touches what lies inside the box."""
@@ -271,8 +267,9 @@ class Component(Part):
 
     def cut(self, plane: Plane) -> tuple[Component | None, Component | None]:
         """Cut by a plane: returns the sides below and above, None for a side without volume."""
-        below, above = _native.cut_by_plane(self.vertices, self.faces, *plane.normal, plane.offset)
-        return _component(capped(*below), self), _component(capped(*above), self)
+        sides = _native.cut_by_plane(self.vertices, self.faces, *plane.normal, plane.offset)
+        (below, _), (above, _) = (capped(*side) for side in sides)
+        return _component(below, self), _component(above, self)
 
     def clipped(self, hull: Hull) -> Surface:
         """Return the surface of the solid inside a hull, closed by caps on the hull's facets; empty if none is."""
@@ -295,7 +292,10 @@ class Component(Part):
         for side, axis in sorted(np.argwhere(room > MARGIN).tolist(), key=lambda at: -room[at[0], at[1]]):
             if len(surface[1]) <= FEW_FACES:
                 break
-            surface = _halves(surface, axis, float(box[side, axis] + (MARGIN if side else -MARGIN)))[1 - side]
+            kept = _halves(surface, axis, float(box[side, axis] + (MARGIN if side else -MARGIN)))[1 - side]
+            if kept is None:
+                return self.manifold
+            surface = kept
         if surface[1] is self.faces:
             return self.manifold
         clipped = Manifold(Mesh64(surface[0], surface[1].astype(np.uint64)))
@@ -320,14 +320,17 @@ class Component(Part):
                 break
             if place not in self._cells:
                 self._cells[place] = _halves(surface, axis, middle)
-            surface = self._cells[place][side]
+            half = self._cells[place][side]
+            if half is None:
+                break
+            surface = half
             cell = cell.copy()
             cell[1 - side, axis] = middle
             place += str(side)
         return surface
 
     @cached_property
-    def _cells(self) -> dict[str, tuple[Surface, Surface]]:
+    def _cells(self) -> dict[str, tuple[Surface | None, ...]]:
         return {}
 
     def pieces(self) -> list[Component]:
@@ -342,11 +345,11 @@ class Component(Part):
         return [piece for surface in surfaces if (piece := _component(surface, self)) is not None]
 
 
-def _halves(surface: Surface, axis: int, offset: float) -> tuple[Surface, Surface]:
-    """Cut a closed surface across a coordinate axis: the sides below and above."""
+def _halves(surface: Surface, axis: int, offset: float) -> tuple[Surface | None, ...]:
+    """Cut a closed surface across a coordinate axis: the sides below and above, None if it cannot be cut cleanly."""
     x, y, z = np.eye(3)[axis].tolist()
-    below, above = _native.cut_by_plane(*surface, x, y, z, offset)
-    return capped(*below), capped(*above)
+    sides = (capped(*side) for side in _native.cut_by_plane(*surface, x, y, z, offset))
+    return tuple(side if folded <= NEGLIGIBLE_FOLD else None for side, folded in sides)
 
 
 def _component(solid: Manifold | tuple[FloatArray, IntArray], within: Component) -> Component | None:
