@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.repair import repair
-from rlacd.repair.slabs import HALF_THICKNESS
 from rlacd.repair.union import to_arrays
 from rlacd.repair.voxels import GAP
+from rlacd.solid.thickness import HALF_THICKNESS
 from tests.repaired import BOX, join, moved, solid_of, steps, volume, with_hole
 
 

@@ -11,13 +11,14 @@ from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.holes import MOST_FREE_EDGES, close_cracks
 from rlacd.repair.measure import measure
 from rlacd.repair.record import STEPS, Record
-from rlacd.repair.slabs import HALF_THICKNESS, hull_of_points
+from rlacd.repair.slabs import hull_of_points
 from rlacd.repair.soup import FLAT, Soup, hidden_faces
 from rlacd.repair.union import Shape, split_labels, unite, unite_around_cavities, volume_of
 from rlacd.repair.voxels import GAP
 from rlacd.repair.wraps import Wraps
 from rlacd.solid.frame import FloatArray, Frame
 from rlacd.solid.manifold import to_manifold
+from rlacd.solid.thickness import HALF_THICKNESS
 from rlacd.solid.topology import BoolArray, Edges, IntArray, bodies_of, is_balanced, signed_tetrahedra
 
 _WELDS = (2e-5, 5e-4)

@@ -9,11 +9,12 @@ from rlacd._native import poll_stop
 from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.record import Record
 from rlacd.repair.skin import skin
-from rlacd.repair.slabs import HALF_THICKNESS, slab_of_faces
+from rlacd.repair.slabs import slab_of_faces
 from rlacd.repair.soup import FLAT, Soup, on_repeated_edge
 from rlacd.repair.union import split_labels
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.manifold import to_manifold
+from rlacd.solid.thickness import HALF_THICKNESS
 from rlacd.solid.topology import BoolArray, IntArray
 
 # Points of a triangle at which it is looked whether it sticks out of a body: near its corners, its edges, its middle.

@@ -7,10 +7,10 @@ import numpy as np
 from rlacd._native import PointTree, poll_stop
 from rlacd.repair.distance import SurfaceQuery, points_covering, shared_faces
 from rlacd.repair.record import STEPS, Record
-from rlacd.repair.slabs import HALF_THICKNESS
 from rlacd.repair.union import Shape, to_arrays
 from rlacd.repair.voxels import GAP
 from rlacd.solid.frame import FloatArray
+from rlacd.solid.thickness import HALF_THICKNESS
 from rlacd.solid.topology import BoolArray
 
 

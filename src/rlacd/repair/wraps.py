@@ -11,12 +11,13 @@ from rlacd._native import poll_stop
 from rlacd.repair.build import skins, walls_and_sheets
 from rlacd.repair.distance import SurfaceQuery, points_covering, spread_points
 from rlacd.repair.record import Record
-from rlacd.repair.slabs import HALF_THICKNESS, slab_of_faces
+from rlacd.repair.slabs import slab_of_faces
 from rlacd.repair.soup import Soup
 from rlacd.repair.union import MOST_UNITED, Shape, as_manifold, to_arrays, unite, volume_of
 from rlacd.repair.voxels import GAP, Reach
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.manifold import to_manifold
+from rlacd.solid.thickness import HALF_THICKNESS
 from rlacd.solid.topology import BoolArray, IntArray
 
 _WRAP_ERROR = 4e-3

@@ -19,6 +19,7 @@ from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.products import heights, length
 from rlacd.solid.solid import Solid, surface_of
+from rlacd.solid.thickness import HALF_THICKNESS, thickened
 
 MOST_HULLS = 2000
 """If there are more bodies, neighbours along a space-filling curve share a hull."""
@@ -28,9 +29,6 @@ SECONDS = 0.3
 
 FEW = 10_000
 """After that time, bodies with fewer points than this get their box only."""
-
-HALF_THICKNESS = 1e-3
-"""Flat bodies are made as thick as repair makes sheets."""
 
 _WIDER = 1e-9
 _DIRECTIONS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
@@ -115,17 +113,7 @@ def _hull(points: FloatArray, clock: Clock) -> Hull:
         with clock.shielded():
             return _touching(points) if len(points) > FEW else _box(points)
     with clock.shielded():
-        return Hull.of(_thickened(points)) or _box(points)
-
-
-def _thickened(points: FloatArray) -> FloatArray:
-    """Points [N, 3], with offset copies along the axes in which they have no extent."""
-    middle = points.mean(axis=0)
-    _, _, axes = np.linalg.svd(np.concatenate([points - middle, np.zeros((3, 3))]), full_matrices=False)
-    extent = np.ptp((points - middle) @ axes.T, axis=0)
-    for axis in axes[extent < HALF_THICKNESS]:
-        points = np.concatenate([points - HALF_THICKNESS * axis, points + HALF_THICKNESS * axis])
-    return np.ascontiguousarray(points)
+        return Hull.of(thickened(points)) or _box(points)
 
 
 def _touching(points: FloatArray) -> Hull:
