@@ -55,6 +55,16 @@ def test_a_fin_that_leans_into_its_body_is_kept_where_it_comes_out_again(tip):
     assert volume(solid) == pytest.approx(6.4, rel=1e-3)
 
 
+def test_a_film_that_begins_inside_its_body_is_kept_where_it_leads_out():
+    """Its middle is inside: the whole film was dropped for that, and its tip missed by 0.33 without a word."""
+    corners = [int(np.argmin(np.linalg.norm(BOX.vertices - at, axis=1))) for at in ((-1, -1, -1), (1, -1, -1))]
+    film = [[*corners, 8], [*corners[::-1], 8]]
+    tip = np.array([[0.0, 0.9, 2.0]])
+    solid = solid_of((np.vstack([BOX.vertices, tip]), np.vstack([BOX.faces, film])))
+    assert SurfaceQuery(*to_arrays(solid.manifold)).distance(solid.frame.to_frame(tip)) <= 2 * HALF_THICKNESS
+    assert volume(solid) == pytest.approx(8, rel=0.01)
+
+
 def test_a_pillow_of_two_coplanar_layers_is_a_slab():
     square = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]]
     solid = solid_of((square, [[0, 1, 2], [0, 2, 3], [1, 0, 3], [1, 3, 2]]))

@@ -6,7 +6,7 @@ import numpy as np
 from manifold3d import Manifold
 
 from rlacd._native import poll_stop
-from rlacd.repair.distance import SurfaceQuery
+from rlacd.repair.distance import SurfaceQuery, probes
 from rlacd.repair.record import Record
 from rlacd.repair.skin import skin
 from rlacd.repair.slabs import slab_of_faces
@@ -16,9 +16,6 @@ from rlacd.solid.frame import FloatArray
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.thickness import HALF_THICKNESS
 from rlacd.solid.topology import BoolArray, IntArray
-
-# Points of a triangle at which it is looked whether it sticks out of a body: near its corners, its edges, its middle.
-_PROBES = np.array([(18, 1, 1), (1, 18, 1), (1, 1, 18), (9, 9, 2), (9, 2, 9), (2, 9, 9), (7, 7, 6)]) / 20
 
 
 def walls_and_sheets(soup: Soup, record: Record, as_sheets: IntArray) -> tuple[Soup, Soup]:
@@ -98,8 +95,7 @@ def _poking_out(soup: Soup, wall: BoolArray, inner: BoolArray) -> BoolArray:
     pokes = np.zeros(len(soup.faces), dtype=bool)
     if not inner.any() or not wall.any():
         return pokes
-    triangles = soup.vertices[soup.faces[inner]]
-    points = np.einsum("pk,fkd->fpd", _PROBES, triangles)
+    points = probes(soup.vertices, soup.faces[inner])
     walls = SurfaceQuery(soup.vertices, soup.faces[wall])
     apart = (walls.distance(points.reshape(-1, 3)) > 2 * HALF_THICKNESS).reshape(points.shape[:2])
     outside = np.zeros_like(apart)

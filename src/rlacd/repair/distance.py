@@ -15,6 +15,8 @@ from rlacd.solid.topology import BoolArray, IntArray, first_of_doubled
 # An odd number that spreads the bits of a factor over the upper half of the product.
 _MIX = np.uint64(0x9E3779B97F4A7C15)
 _HALF = np.uint64(32)
+# Points of a triangle at which it is looked whether it lies inside a body: near its corners, its edges, its middle.
+_PROBES = np.array([(18, 1, 1), (1, 18, 1), (1, 1, 18), (9, 9, 2), (9, 2, 9), (2, 9, 9), (7, 7, 6)]) / 20
 
 
 class SurfaceQuery:
@@ -51,6 +53,11 @@ class SurfaceQuery:
         """Return ``[N]`` whether the faces, a closed outward surface, wind around each point."""
         result: BoolArray = self.winding(points) > 0.5
         return result
+
+
+def probes(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return seven points of every face ``[F, 7, 3]``: a face may begin inside a body and lead out of it."""
+    return np.asarray(np.einsum("pk,fkd->fpd", _PROBES, vertices[faces]))
 
 
 def points_covering(vertices: FloatArray, faces: IntArray, spacing: float) -> tuple[FloatArray, IntArray]:

@@ -29,7 +29,7 @@ from rlacd._native import poll_stop
 from rlacd.errors import EmptyMeshError
 from rlacd.memory import BYTES_REPAIRED, require_memory
 from rlacd.repair.attempt import Attempt
-from rlacd.repair.distance import SurfaceQuery
+from rlacd.repair.distance import SurfaceQuery, probes
 from rlacd.repair.slabs import hull_of_points
 from rlacd.repair.soup import FLAT, NO_AREA
 from rlacd.repair.voxels import GAP
@@ -187,6 +187,7 @@ def _is_inside(vertices: FloatArray, faces: IntArray, film: BoolArray, threads: 
     """Return ``[F]`` which films lie inside the other faces: where two bodies touch."""
     inside = film.copy()
     if film.any():
-        middle = vertices[faces[film]].mean(axis=1)
-        inside[film] = np.abs(SurfaceQuery(vertices, faces[~film], threads).winding(middle)) > 0.75
+        points = probes(vertices, faces[film])
+        winding = SurfaceQuery(vertices, faces[~film], threads).winding(points.reshape(-1, 3))
+        inside[film] = (np.abs(winding) > 0.75).reshape(points.shape[:2]).all(axis=1)
     return inside
