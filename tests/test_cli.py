@@ -151,14 +151,16 @@ def test_a_concavity_above_the_threshold_is_reported(mesh: Path, stand_in: Stand
 @pytest.mark.parametrize(
     ("words", "code", "says"),
     [
-        (["-o", "{dir}/out.fbx"], 3, ".glb, .obj, .ply, .stl"),
+        (["-o", "{dir}/out.fbx"], 2, ".glb, .obj, .ply, .stl"),
         (["-o", "{dir}/ell.stl/out.glb"], 3, "is a file, not a folder"),
         (["-o", "-"], 2, "stdout"),
         (["-o", "{dir}/ell.stl"], 2, "overwrite the input"),
         (["--report", "{dir}/ell.stl/r.json"], 3, "is a file, not a folder"),
         (["--report", "{dir}"], 3, "it is a folder"),
         (["--report", "{dir}/ell_hulls.glb"], 2, "overwrite what -o writes"),
-        (["--picture", "{dir}/p.jpg"], 3, ".png"),
+        (["--picture", "{dir}/p.jpg"], 2, ".png"),
+        (["--criterion", "navigable", "--balls", "{dir}/b.ply"], 2, ".csv or .glb"),
+        (["-o", ""], 2, "no name"),
         (["--picture", "{dir}/p.png", "--up", "w"], 2, "x, y or z"),
         (["-o", "{dir}/out.glb", "--format", "obj"], 2, "contradicts"),
         (["--threshold", "tight"], 2, "--threshold"),
@@ -268,11 +270,20 @@ def test_ctrl_c_twice_quits_and_writes_nothing(mesh: Path, stand_in: StandIn) ->
 def test_help_names_every_exit_code_and_version_is_printed() -> None:
     run = rlacd("decompose", "--help")
     assert run.exit_code == 0
-    for code in ("0 ", "1 ", "2 ", "3 ", "4 ", "130 "):
+    for code in ("0 ", "1 ", "2 ", "3 ", "4 ", "5 ", "130 "):
         assert f"  {code}" in run.output
     import rlacd as package
 
     assert rlacd("--version").stdout == f"rlacd {package.__version__}\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "extra"),
+    [("decompose", "view"), ("decompose", "learned"), ("bench physics", "sim"), ("bench primitives", "sim")],
+)
+def test_help_names_extras_as_pip_takes_them(words: str, extra: str) -> None:
+    """In help, brackets begin markup, which swallows what it does not know."""
+    assert f"rlacd[{extra}]" in rlacd(*words.split(), "--help").output
 
 
 # --- the real thing ---------------------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ import trimesh
 
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
-from rlacd.errors import OutputError
+from rlacd.errors import OptionError
 from tests.hulls import random_hull
 
 SOURCE = trimesh.creation.box()
@@ -94,5 +94,5 @@ def test_it_saves_to_a_file_and_to_a_folder_named_after_the_mesh(tmp_path: Path)
     assert len(trimesh.load_scene(tmp_path / "cup.glb").geometry) == 2
     folder = cup.save(f"{tmp_path}/parts/", file_format="ply")
     assert sorted(path.name for path in folder.glob("*.ply")) == ["cup_000.ply", "cup_001.ply"]
-    with pytest.raises(OutputError):
+    with pytest.raises(OptionError):
         cup.save(tmp_path / "cup.doc")

@@ -174,7 +174,7 @@ def test_colours_of_neighbours_in_the_list_differ() -> None:
 
 @pytest.mark.parametrize("name", ["hulls.fbx", "hulls", "hulls.glb.zip", ".glb"])
 def test_an_unknown_ending_is_refused_with_the_known_ones(tmp_path: Path, name: str) -> None:
-    with pytest.raises(OutputError, match=r"\.glb, \.obj, \.ply, \.stl"):
+    with pytest.raises(OptionError, match=r"\.glb, \.obj, \.ply, \.stl"):
         save_hulls(THREE, tmp_path / name)
 
 
@@ -201,7 +201,7 @@ def test_places_that_cannot_be_written_are_refused(tmp_path: Path) -> None:
         hull_target(f"{tmp_path}/file/")
     with pytest.raises(OutputError, match="is a file, not a folder"):
         hull_target(tmp_path / "file" / "out.glb")
-    with pytest.raises(OutputError, match="no name"):
+    with pytest.raises(OptionError, match="no name"):
         hull_target("")
     with pytest.raises(OutputError, match="no hulls"):
         save_hulls([], tmp_path / "out.glb")

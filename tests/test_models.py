@@ -314,7 +314,7 @@ def test_usd_without_its_extra_is_one_sentence_before_any_work(
         ("table.xml", {"density": float("nan")}, OptionError, "density"),
         ("table.xml", {"up": "w"}, OptionError, "x, y or z"),
         ("table.xml", {"one_mesh": True}, OptionError, r"one mesh for all hulls is for \.urdf"),
-        ("table.blend", {}, OutputError, r"\.xml, \.urdf, \.sdf, \.usd"),
+        ("table.blend", {}, OptionError, r"\.xml, \.urdf, \.sdf, \.usd"),
     ],
 )
 def test_mistakes_are_one_sentence(
@@ -328,7 +328,7 @@ def test_mistakes_are_one_sentence(
 @pytest.mark.parametrize("name", ["tab\tle", "ta\x01ble", "ta\udc80ble"])
 def test_names_of_files_that_xml_cannot_hold_are_refused(tmp_path: Path, wooden: Decomposition, name: str) -> None:
     for ending in ("xml", "urdf", "sdf"):
-        with pytest.raises(OutputError, match="XML cannot hold"):
+        with pytest.raises(OptionError, match="XML cannot hold"):
             wooden.save(tmp_path / f"{name}.{ending}")
     assert list(tmp_path.iterdir()) == []
 

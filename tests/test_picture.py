@@ -97,7 +97,7 @@ def test_the_caption_tells_the_numbers_that_are_known() -> None:
 
 
 def test_bad_places_and_options_are_refused_before_drawing(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match=r"must end in \.png"):
+    with pytest.raises(OptionError, match=r"must end in \.png"):
         check_picture(tmp_path / "out.jpg")
     (tmp_path / "file").write_text("mine")
     with pytest.raises(OutputError, match="is a file, not a folder"):

@@ -19,7 +19,7 @@ from typer.testing import CliRunner
 import rlacd
 from rlacd.cli.main import app
 from rlacd.decomposition import Decomposition
-from rlacd.errors import OptionError, OutputError
+from rlacd.errors import OptionError
 from rlacd.view import check_report_page, save_report_page
 from rlacd.view.html_report import report_page
 from rlacd.view.page import MODULES
@@ -192,7 +192,7 @@ def test_the_command_checks_the_report_before_the_work(tmp_path: Path) -> None:
 
 
 def test_bad_places_and_axes_are_refused(result: Decomposition, tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match=r"must end in \.html"):
+    with pytest.raises(OptionError, match=r"must end in \.html"):
         check_report_page(tmp_path / "out.pdf")
     with pytest.raises(OptionError, match="x, y or z"):
         save_report_page(result, tmp_path / "out.html", up="w")

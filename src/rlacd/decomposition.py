@@ -8,7 +8,7 @@ from pathlib import Path
 
 import trimesh
 
-from rlacd.errors import OutputError
+from rlacd.errors import OptionError
 from rlacd.output_options import Axis
 from rlacd.result import Result
 
@@ -136,10 +136,11 @@ class Decomposition(Result):
         Raises
         ------
         OutputError
-            The ending is unknown, the place cannot be written to, or a hull is too thin for single precision where the
-            format knows nothing else.
+            The place cannot be written to, or a hull is too thin for single precision where the format knows nothing
+            else.
         OptionError
-            `file_format` is unknown or does not go with `path`; `density`, `mass` or `up` is out of range.
+            The ending or `file_format` is unknown, or the two contradict each other; `density`, `mass` or `up` is out
+            of range.
         MissingExtraError
             USD was asked for and the extra ``usd`` is not installed.
         """
@@ -172,13 +173,15 @@ class Decomposition(Result):
 
         Raises
         ------
+        OptionError
+            The criterion was not `NavigableSpace`, or the ending is unknown.
         OutputError
-            The criterion was not `NavigableSpace`, the ending is unknown, or the place cannot be written to.
+            The place cannot be written to.
         """
         from rlacd.io.write import save_balls
 
         if self.balls is None:
-            raise OutputError("there are no balls to write; decompose with a NavigableSpace.")
+            raise OptionError("there are no balls to write; decompose with a NavigableSpace.")
         return save_balls(self.balls, path)
 
     def picture(self, path: str | os.PathLike[str], *, width: int = 1600, up: Axis | None = None) -> Path:
@@ -205,7 +208,7 @@ class Decomposition(Result):
         OutputError
             The place cannot be written to.
         OptionError
-            `width` or `up` is none of those above.
+            `path`, `width` or `up` is none of those above.
         """
         from rlacd.view import draw_picture
 
@@ -231,7 +234,7 @@ class Decomposition(Result):
         OutputError
             The place cannot be written to.
         OptionError
-            `up` is none of those above.
+            `path` or `up` is none of those above.
         """
         from rlacd.view import save_report_page
 

@@ -243,8 +243,8 @@ class Options:
     )
     quality: QualityName | None = option(
         None,
-        "How long to search for fewer hulls: fast not at all, balanced about twice as long as fast takes, best until "
-        "--budget ends.",
+        "How long to search for fewer hulls: fast not at all, balanced about three times as long as fast takes, best "
+        "until --budget ends.",
         one_of(QUALITIES),
         panel=METHOD,
         usual="balanced; fast with --no-merge",

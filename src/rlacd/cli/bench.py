@@ -122,7 +122,7 @@ def physics(
     ] = None,
     bullet: Annotated[bool, typer.Option("--bullet/--no-bullet", help="Also simulate in PyBullet.")] = True,
 ) -> Page:
-    """Simulate the hulls: a pile, balls dropped into every hole, grasps and pegs; needs rlacd[sim].
+    """Simulate the hulls: a pile, balls dropped into every hole, grasps and pegs; needs rlacd\\[sim].
 
     \b
     [bold]Example[/bold]
@@ -140,7 +140,7 @@ def primitives(
     threshold: Threshold = 0.05,
     piles: Annotated[int, typer.Option(min=1, help="Piles of each object, turned differently.")] = 1,
 ) -> Page:
-    """Hulls beside primitives: parts, bytes, distances, and steps a second in a pile; needs rlacd[sim].
+    """Hulls beside primitives: parts, bytes, distances, and steps a second in a pile; needs rlacd\\[sim].
 
     \b
     [bold]Example[/bold]

@@ -39,6 +39,7 @@ EPILOG = """\b
   2    bad input or bad option
   3    the output cannot be written
   4    stopped early by --timeout or Ctrl-C; a valid decomposition was written
+  5    batch only: some meshes failed or were given their convex hull
   130  interrupted at once; no file is left half-written
 """
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rlacd._version import __version__
-from rlacd.errors import MissingExtraError, OutputError
+from rlacd.errors import MissingExtraError, OptionError
 from rlacd.fields import path_like, read
 from rlacd.io.write import check_file, write_file
 from rlacd.result import Result
@@ -33,14 +33,14 @@ def check_report_page(path: str | os.PathLike[str], up: str | None = None) -> Pa
 
     Raises
     ------
-    OutputError
-        The name does not end in ``.html``, or the place is not writable.
     OptionError
-        `up` is not an axis.
+        The name does not end in ``.html``, or `up` is not an axis.
+    OutputError
+        The place is not writable.
     """
     place = Path(read(path_like(), "path", path))
     if not is_html(place):
-        raise OutputError(f"cannot write the report {place}: it must end in .html; rename it.")
+        raise OptionError(f"cannot write the report {place}: it must end in .html; rename it.")
     check_up(up)
     check_file(place)
     return place

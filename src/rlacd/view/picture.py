@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rlacd._native import PointTree
-from rlacd.errors import OutputError
+from rlacd.errors import OptionError
 from rlacd.fields import checked, integer, path_like, read
 from rlacd.io.write import check_file, write_file
 from rlacd.io.write.palette import linear_from_srgb
@@ -38,17 +38,17 @@ def check_picture(path: str | os.PathLike[str], up: str | None = None) -> Path:
 
     Raises
     ------
+    OptionError
+        The name does not end in ``.png``, or `up` is not an axis.
     OutputError
-        The name does not end in ``.png``, or the place is not writable.
+        The place is not writable.
     MissingExtraError
         The extra ``view`` is not installed.
-    OptionError
-        `up` is not an axis.
     """
     place = Path(read(path_like(), "path", path))
     check_up(up)
     if place.suffix.lower() != ".png":
-        raise OutputError(f"cannot write the picture {place}: it must end in .png; rename it.")
+        raise OptionError(f"cannot write the picture {place}: it must end in .png; rename it.")
     check_file(place)
     for module in ("mitsuba", "PIL"):
         require_extra(module)
@@ -95,7 +95,7 @@ def draw_picture(
     OutputError
         The place is not writable.
     OptionError
-        `width`, `samples` or `up` is out of range.
+        The name does not end in ``.png``, or `width`, `samples` or `up` is out of range.
     """
     place = check_picture(path, up=up)
     write_file(place, picture_bytes(decomposition, width=width, samples=samples, up=up))

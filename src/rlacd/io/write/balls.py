@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from rlacd.errors import OutputError
+from rlacd.errors import OptionError
 from rlacd.fields import path_like, read
 from rlacd.io.write.atomic import write_file
 from rlacd.io.write.target import check_file
@@ -22,12 +22,14 @@ def check_balls(path: str | os.PathLike[str]) -> Path:
 
     Raises
     ------
+    OptionError
+        The ending is unknown.
     OutputError
-        The ending is unknown, or the place cannot be written to.
+        The place cannot be written to.
     """
     place = Path(read(path_like(), "path", path))
     if place.suffix.lower() not in _ENCODERS:
-        raise OutputError(f"cannot write the balls {place}: the name must end in {' or '.join(_ENCODERS)}; rename it.")
+        raise OptionError(f"cannot write the balls {place}: the name must end in {' or '.join(_ENCODERS)}; rename it.")
     check_file(place)
     return place
 
@@ -37,7 +39,7 @@ def save_balls(balls: Balls, path: str | os.PathLike[str]) -> Path:
 
     Raises
     ------
-    OutputError
+    OptionError, OutputError
         As for `check_balls`, and if the disk fails while writing.
     """
     place = check_balls(path)

@@ -83,9 +83,10 @@ def hull_target(
     Raises
     ------
     OutputError
-        Unknown ending, no permission, or a folder where a file is expected or the reverse.
+        No permission, or a folder where a file is expected or the reverse.
     OptionError
-        `file_format` is unknown, or given for a single file with another ending; or `one_mesh` for anything but URDF,
+        There is no name, or its ending is unknown; `file_format` is unknown, or given for a single file with another
+        ending; or `one_mesh` for anything but URDF,
         `keep_input` for anything but GLB, or `scene` for anything but MJCF.
     """
     file_format = checked(OutputOptions, "file_format", file_format)
@@ -102,7 +103,7 @@ def hull_target(
 
 def _target(text: str, file_format: str | None) -> Target:
     if not text:
-        raise OutputError("the output has no name; give a file such as hulls.glb, or a folder such as hulls/.")
+        raise OptionError("the output has no name; give a file such as hulls.glb, or a folder such as hulls/.")
     place = Path(text)
     ending = place.suffix.lower().lstrip(".")
     wanted = None if file_format is None else file_format.lower().lstrip(".")
@@ -124,7 +125,7 @@ def _target(text: str, file_format: str | None) -> Target:
     if ending not in FORMATS:
         known = ", ".join(f".{name}" for name in (*FORMATS, *_MODEL_OF))
         said = f"the ending .{ending} of {place}" if ending else f"{place} without an ending"
-        raise OutputError(f"cannot write {said}; use one of {known}, or end the name with / for a folder.")
+        raise OptionError(f"cannot write {said}; use one of {known}, or end the name with / for a folder.")
     if wanted not in (None, ending):
         raise OptionError(f"the format {wanted} contradicts the name {place}; give one of the two, or a folder.")
     check_file(place)
@@ -140,9 +141,9 @@ def mesh_folder(path: Path, file_format: str) -> Path:
 
 
 def check_name(path: Path) -> None:
-    """Raise OutputError if a file's name cannot be written in XML, since its mesh folder is named after it."""
+    """Raise OptionError if a file's name cannot be written in XML, since its mesh folder is named after it."""
     if _UNWRITABLE.search(path.name):
-        raise OutputError(f"cannot write {str(path)!r}: XML cannot hold some marks of its name; choose another name.")
+        raise OptionError(f"cannot write {str(path)!r}: XML cannot hold some marks of its name; choose another name.")
 
 
 def _model_target(text: str, file_format: str) -> Target:
