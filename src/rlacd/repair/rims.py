@@ -271,12 +271,12 @@ def _against_main(soup: Soup, patch: IntArray, left_out: BoolArray, weighted: Fl
     main = np.zeros(count, dtype=bool)
     main[largest[np.unique(cluster_of[largest], return_index=True)[1]]] = True
     island = np.flatnonzero(~main[patch] & ~left_out)
-    if len(island) == 0:
+    there = main[patch] & ~left_out
+    if len(island) == 0 or not there.any():  # faces without an area may leave nothing but flaps to compare with
         return turned
     # The largest face of each island represents it.
     island = island[np.lexsort((-soup.area[island], patch[island]))]
     island = island[np.unique(patch[island], return_index=True)[1]]
-    there = main[patch] & ~left_out
     corners = soup.faces[there].copy()
     a, b, c = (soup.vertices[corners[:, i]] for i in range(3))
     flipped = dots(np.cross(b - a, c - a), weighted[there]) < 0
