@@ -10,9 +10,9 @@ from rlacd.io.read.load import load_mesh
 from rlacd.repair.caps import HOLE
 from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.repair import repair
-from rlacd.repair.slabs import HALF_THICKNESS
 from rlacd.repair.union import to_arrays
 from rlacd.repair.voxels import GAP
+from rlacd.solid.thickness import HALF_THICKNESS
 from tests.repaired import BOX, join, moved, solid_of, steps, volume, with_hole, without
 
 
@@ -122,11 +122,15 @@ CUP = ((0, 0), (0.4, 0), (0.5, 1))
 LAMPSHADE = ((0.6, 0), (0.3, 0.8))
 
 
-HOLLOW = [(BOTTLE, 24), (BOTTLE, 8), (WINE_BOTTLE, 24), (CUP, 24), (CUP, 8), (LAMPSHADE, 24), (LAMPSHADE, 8)]
+# Two mouths with a lip in their plane: caps would continue it smoothly.
+PIPE = ((0.3, 0), (0.5, 0), (0.5, 2), (0.3, 2))
+
+
+HOLLOW = [(PIPE, 8), (BOTTLE, 24), (BOTTLE, 8), (WINE_BOTTLE, 24), (CUP, 24), (CUP, 8), (LAMPSHADE, 24), (LAMPSHADE, 8)]
 
 
 @pytest.mark.parametrize(("profile", "sections"), HOLLOW)
-def test_a_bottle_a_cup_and_a_lampshade_stay_hollow_unless_they_shall_be_solid(profile, sections):
+def test_a_pipe_a_bottle_a_cup_and_a_lampshade_stay_hollow_unless_they_shall_be_solid(profile, sections):
     mesh = revolved(*profile, sections=sections)
     hollow = solid_of(mesh)
     assert steps(hollow) == ["slab"]

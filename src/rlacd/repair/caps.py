@@ -38,7 +38,7 @@ with a few holes is meant as a solid, a cup is not. The caps are reported."""
 
 # Limits on a wound's edges and on its share of the area of its body; larger where it is a single missing face.
 _WOUND_EDGES, _WOUND, _MISSING_FACE = 12, 0.1, 0.2
-# A single ring of more edges than this is a mouth, not a wound, if its corners lie on a circle to this accuracy.
+# A ring of more edges than this is a mouth, not a wound, if its corners lie on a circle to this accuracy.
 _RING, _ROUND = 6, 0.1
 # Along at least this share of its rim, the cap turns by less than this from the adjacent faces (cosine of 45 degrees).
 _SMOOTH_SHARE, _SMOOTH = 0.3, 0.7
@@ -280,7 +280,7 @@ def _wounds(rims: Rims, smooth: BoolArray, ring: BoolArray, part: FloatArray, de
     if wound.sum() >= max(_DAMAGED, _DAMAGED_SHARE * len(wound)):
         small = (part <= HOLE_SHARE) | (depth <= HOLE) | (smooth & (part <= _DAMAGED_WOUND))
         return wound | ((number <= _DAMAGED_EDGES) & small)
-    return wound & ~ring if wound.sum() == 1 else wound
+    return wound & ~ring
 
 
 def _is_round(points: FloatArray) -> bool:
