@@ -9,7 +9,7 @@ from typing import Any
 
 from rlacd._version import __version__
 from rlacd.errors import MissingExtraError, OptionError
-from rlacd.fields import path_like, read
+from rlacd.fields import path_like, read, shown
 from rlacd.io.write import check_file, write_file
 from rlacd.result import Result
 from rlacd.view.heat import heat_map
@@ -40,7 +40,7 @@ def check_report_page(path: str | os.PathLike[str], up: str | None = None) -> Pa
     """
     place = Path(read(path_like(), "path", path))
     if not is_html(place):
-        raise OptionError(f"cannot write the report {place}: it must end in .html; rename it.")
+        raise OptionError(f"cannot write the report {shown(str(place))}: it must end in .html; rename it.")
     check_up(up)
     check_file(place)
     return place

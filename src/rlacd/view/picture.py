@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from rlacd._native import PointTree
 from rlacd.errors import OptionError
-from rlacd.fields import checked, integer, path_like, read
+from rlacd.fields import checked, integer, path_like, read, shown
 from rlacd.io.write import check_file, write_file
 from rlacd.io.write.palette import linear_from_srgb
 from rlacd.output_options import OutputOptions
@@ -48,7 +48,7 @@ def check_picture(path: str | os.PathLike[str], up: str | None = None) -> Path:
     place = Path(read(path_like(), "path", path))
     check_up(up)
     if place.suffix.lower() != ".png":
-        raise OptionError(f"cannot write the picture {place}: it must end in .png; rename it.")
+        raise OptionError(f"cannot write the picture {shown(str(place))}: it must end in .png; rename it.")
     check_file(place)
     for module in ("mitsuba", "PIL"):
         require_extra(module)

@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 
 from rlacd.errors import OptionError
-from rlacd.fields import path_like, read
+from rlacd.fields import path_like, read, shown
 from rlacd.io.write.atomic import write_file
 from rlacd.io.write.target import check_file
 from rlacd.solid.balls import Balls
@@ -29,7 +29,9 @@ def check_balls(path: str | os.PathLike[str]) -> Path:
     """
     place = Path(read(path_like(), "path", path))
     if place.suffix.lower() not in _ENCODERS:
-        raise OptionError(f"cannot write the balls {place}: the name must end in {' or '.join(_ENCODERS)}; rename it.")
+        raise OptionError(
+            f"cannot write the balls {shown(str(place))}: the name must end in {' or '.join(_ENCODERS)}; rename it."
+        )
     check_file(place)
     return place
 

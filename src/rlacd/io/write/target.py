@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rlacd.errors import OptionError, OutputError
-from rlacd.fields import checked, flag, path_like, read
+from rlacd.fields import checked, flag, path_like, read, shown
 from rlacd.io.write.atomic import output_errors
 from rlacd.io.write.usd import require_usd
 from rlacd.output_options import OutputOptions
@@ -124,10 +124,12 @@ def _target(text: str, file_format: str | None) -> Target:
 
     if ending not in FORMATS:
         known = ", ".join(f".{name}" for name in (*FORMATS, *_MODEL_OF))
-        said = f"the ending .{ending} of {place}" if ending else f"{place} without an ending"
+        said = f"the ending .{ending} of {shown(str(place))}" if ending else f"{shown(str(place))} without an ending"
         raise OptionError(f"cannot write {said}; use one of {known}, or end the name with / for a folder.")
     if wanted not in (None, ending):
-        raise OptionError(f"the format {wanted} contradicts the name {place}; give one of the two, or a folder.")
+        raise OptionError(
+            f"the format {wanted} contradicts the name {shown(str(place))}; give one of the two, or a folder."
+        )
     check_file(place)
     return Target(place, ending, is_folder=False)
 
