@@ -450,6 +450,17 @@ def test_an_output_that_cannot_be_written_has_code_3(output: str, says: str, tmp
     assert sorted(tmp_path.iterdir()) == before
 
 
+def test_an_output_without_an_ending_has_code_2_and_leaves_what_is_there(tmp_path: Path) -> None:
+    path, taken = tmp_path / "box.stl", tmp_path / "taken"
+    creation.box().export(path)
+    taken.write_text("mine")
+    result = run(path, "-o", taken)
+    assert result.exit_code == 2, result.stderr
+    assert "cannot write" in result.stderr
+    assert is_one_sentence(result.stderr)
+    assert taken.read_text() == "mine"
+
+
 def test_the_library_refuses_names_that_no_file_can_have(tmp_path: Path) -> None:
     result = rlacd.decompose(BOX)
     for name in ("\0.glb", "y" * 300 + ".stl"):
