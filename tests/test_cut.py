@@ -1,10 +1,12 @@
-"""The tree of cuts: a second policy takes over where the first leaves thousands of components."""
+"""The tree of cuts: a second policy takes over where the first leaves thousands of components; films are halved."""
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
+from manifold3d import CrossSection
 
 from rlacd import cut
 from rlacd.clock import Clock
@@ -94,3 +96,38 @@ def test_limits_on_parts_see_the_same_tree(monkeypatch: pytest.MonkeyPatch) -> N
     mesh = solid.vertices, solid.faces
     assert len(decompose(mesh, **options)) <= 7
     assert len(decompose(mesh, policy="greedy-excess-norm", **options)) > 12
+
+
+def gutter(thickness: float) -> Component:
+    """Half a pipe without ends."""
+    half = CrossSection.circle(0.5, 64) - CrossSection.circle(0.5 - thickness, 64)
+    half ^= CrossSection.square((1, 0.5)).translate((-0.5, 0))
+    return Component(half.extrude(1.0))
+
+
+class Never:
+    """A policy that finds no plane."""
+
+    def choose(self, component: Component, threads: int = 1) -> None:
+        return None
+
+
+def test_a_film_that_no_plane_cuts_is_halved_until_it_is_done() -> None:
+    with Workers(1) as workers:
+        film = gutter(1e-4)
+        parts = cut_by(CutTree(film, Never(), workers))
+        assert 4 <= len(parts) <= 64
+        assert sum(part.volume for part in parts) == pytest.approx(film.volume, rel=1e-6)
+        corners = np.concatenate([part.vertices for part in parts])
+        assert np.allclose([corners.min(axis=0), corners.max(axis=0)], film.box, atol=1e-12)
+
+
+def test_a_film_inside_out_is_halved_and_a_body_is_left_as_it_is() -> None:
+    with Workers(1) as workers:
+        film = gutter(1e-4)
+        turned = Component((film.vertices, np.ascontiguousarray(film.faces[:, ::-1])))
+        assert turned.volume < 0
+        below, above = cut.halves(turned)
+        assert below.volume + above.volume == pytest.approx(turned.volume, rel=1e-6)
+        body = gutter(0.1)
+        assert CutTree(body, Never(), workers).cut_until(CRITERION, Clock()) == ([], [body])

@@ -18,7 +18,7 @@ from rlacd import _native
 from rlacd.errors import OptionError
 from rlacd.solid.distance import HullDistances, directed_hausdorff, hull_distances, hull_union
 from rlacd.solid.hull import Hull
-from tests.shapes import Closed, Floats, box, depth_in, from_manifold, to_manifold
+from tests.shapes import Closed, Floats, box, depth_in, from_manifold, point_to_triangles, to_manifold
 
 TOLERANCE = 1e-3
 BRICK = ((0, 0, 0), (2, 1, 1))
@@ -247,6 +247,23 @@ def test_hulls_of_cut_meshes(corpus: Path) -> None:
         assert found.over[1] - found.over[0] <= 2e-3 + 1e-12
         assert found.under[1] - found.under[0] <= 2e-3 + 1e-12
     assert done > 30
+
+
+@pytest.mark.parametrize("squeezed", [(1, 1, 1e-10), (1, 1, 1e-7), (1, 1e-6, 1e-6), (1, 1e-4, 1e-10), (1, 1e-8, 1e-8)])
+def test_nothing_beyond_the_rim_of_a_flat_hull_or_the_tip_of_a_needle_is_inside(squeezed: tuple[float, ...]) -> None:
+    random = np.random.default_rng(4)
+    for turn in trimesh.transformations.random_rotation_matrix(random.random((3, 10))).transpose(2, 0, 1)[:, :3, :3]:
+        thin = np.vstack([random.normal(size=(6, 3)), (4, 0, 0), (-4, 0, 0)]) * squeezed
+        hull = Hull.of(thin @ turn.T)
+        if hull is None:
+            continue  # rounded to a plane
+        points = random.normal(size=(200, 3)) * 2 * (np.array(squeezed) > 1e-3) @ turn.T
+        expected = point_to_triangles(points, hull.vertices, hull.faces)
+        np.testing.assert_allclose(hull_union([hull]).distance(points), expected, atol=2e-5)
+        corners = np.ascontiguousarray(points[:120])
+        faces = np.arange(120, dtype=np.int32).reshape(-1, 3)
+        lower, upper = hull_union([hull]).under(corners, faces, 1e-4)
+        assert lower - 2e-5 <= expected[:120].max() <= upper + 2e-5
 
 
 def test_hausdorff_of_a_shifted_box() -> None:

@@ -12,6 +12,14 @@ namespace {
 // the two changes a depth by at most this times the hull's diameter, and only upwards.
 constexpr double kSameNormal = 1e-9;
 
+// A hull is thin if its mean thickness is below this share of its extent. The planes of its facets then meet at such
+// small angles, or have such uncertain normals, that they hold far more than the hull: beyond the rim of a flat one,
+// beyond the tip of a needle.
+constexpr double kThin = 3e-4;
+
+// Planes that touch a hull in an edge touch both its ends within this share of the extent.
+constexpr double kTouching = 1e-12;
+
 // Pushes planes out until they touch a point.
 RLACD_WIDE void push_out(double* h, const double* x, const double* y, const double* z, std::size_t count, Vec3 p) {
   for (std::size_t i = 0; i < count; ++i) {
@@ -20,15 +28,62 @@ RLACD_WIDE void push_out(double* h, const double* x, const double* y, const doub
   }
 }
 
+struct Facet {
+  std::array<std::int64_t, 3> key;
+  double area;
+  Vec3 normal;
+  Facet(double a, Vec3 n)
+      : key{std::llround(n.x / kSameNormal), std::llround(n.y / kSameNormal), std::llround(n.z / kSameNormal)},
+        area(a),
+        normal(n) {}
+  bool operator<(const Facet& other) const { return key != other.key ? key < other.key : area > other.area; }
+};
+
+double extent_of(const Mesh& hull) {
+  Box box;
+  for (const Triangle& face : hull.faces)
+    for (const std::int32_t corner : face) box.extend(hull.vertices[corner]);
+  return norm(box.upper - box.lower);
+}
+
+bool is_thin(const Mesh& hull, double extent) {
+  double volume = 0, area = 0;  // six times and twice
+  const Vec3 origin = hull.vertices[hull.faces[0][0]];
+  for (const Triangle& face : hull.faces) {
+    const Vec3 a = hull.vertices[face[0]], b = hull.vertices[face[1]], c = hull.vertices[face[2]];
+    const Vec3 product = cross(b - a, c - a);
+    volume += dot(a - origin, product);
+    area += norm(product);
+  }
+  return 2 * volume / 3 <= kThin * extent * area;
+}
+
+// The planes around a thin hull: those across the largest facet that touch an edge, and those of its box.
+void add_around(const Mesh& hull, double extent, std::vector<Facet>& facets) {
+  const auto is_smaller = [](const Facet& a, const Facet& b) { return a.area < b.area; };
+  const Vec3 flat = std::max_element(facets.begin(), facets.end(), is_smaller)->normal;
+  std::vector<Facet> around;
+  for (const Triangle& face : hull.faces)
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 from = hull.vertices[face[k]], to = hull.vertices[face[(k + 1) % 3]];
+      const Vec3 across = normalized(cross(to - from, flat));
+      if (!(std::fabs(norm2(across) - 1) < 1e-12)) continue;
+      const double least = std::min(dot(across, from), dot(across, to)) + kTouching * extent;
+      if (std::all_of(hull.vertices.begin(), hull.vertices.end(), [&](Vec3 p) { return dot(across, p) <= least; }))
+        around.emplace_back(0, across);
+    }
+  facets.insert(facets.end(), around.begin(), around.end());
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double sign : {-1.0, 1.0}) {
+      Vec3 along;
+      along[axis] = sign;
+      facets.emplace_back(0, along);
+    }
+}
+
 }  // namespace
 
 ConvexPlanes::ConvexPlanes(const Mesh& hull) {
-  struct Facet {
-    std::array<std::int64_t, 3> key;
-    double area;
-    Vec3 normal;
-    bool operator<(const Facet& other) const { return key != other.key ? key < other.key : area > other.area; }
-  };
   std::vector<Facet> facets;
   facets.reserve(hull.faces.size());
   for (const Triangle& face : hull.faces) {
@@ -38,10 +93,10 @@ ConvexPlanes::ConvexPlanes(const Mesh& hull) {
     if (!(area > 0)) continue;
     const Vec3 n = (1 / area) * product;
     if (!(std::fabs(norm2(n) - 1) < 1e-12)) continue;  // underflow
-    facets.push_back(
-        {{std::llround(n.x / kSameNormal), std::llround(n.y / kSameNormal), std::llround(n.z / kSameNormal)}, area, n});
+    facets.emplace_back(area, n);
   }
   if (facets.empty()) throw std::invalid_argument("the hull has no facet with an area");
+  if (const double extent = extent_of(hull); is_thin(hull, extent)) add_around(hull, extent, facets);
   std::sort(facets.begin(), facets.end());
   facets.erase(std::unique(facets.begin(), facets.end(), [](const Facet& a, const Facet& b) { return a.key == b.key; }),
                facets.end());

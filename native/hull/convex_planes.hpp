@@ -4,7 +4,8 @@
 // Out: unit normals n_i and offsets h_i with n_i . x <= h_i for every corner x, one plane per flat side.
 // A sliver's computed normal can point anywhere. Every plane is therefore pushed out until it touches the hull's
 // farthest corner: it then supports the hull whatever its normal, and the distance from an inner point to it is never
-// less than the distance to the hull's surface.
+// less than the distance to the hull's surface. Thin hulls get supporting planes around their rims and ends as well:
+// the planes of their facets alone hold points far beyond them.
 #pragma once
 
 #include <array>

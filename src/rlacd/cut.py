@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from rlacd import _native, work
 from rlacd._native import Stopped
 from rlacd.clock import Clock
@@ -181,13 +183,35 @@ class CutTree:
 
     def _divide(self, components: Sequence[Component]) -> None:
         """Split components into their connected pieces, and cut those that are connected."""
-        pieces = [self._cache.pieces(component) for component in components]
+        pieces = [self._cache.pieces(component) or [component] for component in components]
         whole = [c for c, own in zip(components, pieces, strict=True) if own == [c]]
         threads = self._workers.share(len(whole))
         planes = self._workers.map(lambda c: self._policy.choose(c, threads), whole)
         self._children.update((c, own) for c, own in zip(components, pieces, strict=True) if own != [c])
         for component, plane in zip(whole, planes, strict=True):
-            self._children[component] = [] if plane is None else self._cache.sides(component, plane)
+            if plane is not None:
+                self._children[component] = self._cache.sides(component, plane)
+            else:
+                self._children[component] = halves(component) if is_film(component) else []
+
+
+def halves(film: Component) -> list[Component]:
+    """Cut a film across the middle of its longest side; an empty list if it is too small or one side would be empty.
+
+    A side without volume is kept: what is inside out has none, but its hull covers the surface.
+    """
+    lower, upper = film.box
+    axis = int(np.argmax(upper - lower))
+    if upper[axis] - lower[axis] <= MISSED:
+        return []
+    normal = (float(axis == 0), float(axis == 1), float(axis == 2))
+    below, above = film.cut(Plane(normal, float(lower[axis] + upper[axis]) / 2), least=-math.inf)
+    return [] if below is None or above is None else [below, above]
+
+
+def is_film(piece: Component) -> bool:
+    """Whether a piece is as thin as a shaving on average; what is inside out is too."""
+    return 2 * piece.volume <= FILM * _native.mesh_area(piece.vertices, piece.faces)
 
 
 def is_shaving(piece: Component, across: Component) -> bool:
@@ -196,7 +220,7 @@ def is_shaving(piece: Component, across: Component) -> bool:
     Films have ragged outlines that take very many cuts to become convex. They can be dropped because every point of a
     shaving is within `MISSED` of the solid across the cut.
     """
-    if 2 * piece.volume > FILM * _native.mesh_area(piece.vertices, piece.faces):
+    if not is_film(piece):
         return False
     surface = _native.Surface(across.vertices, across.faces)
     _, farthest = _native.directed_hausdorff(piece.vertices, piece.faces, surface, MISSED / 4, 1)

@@ -265,11 +265,11 @@ class Component(Part):
         """
         return _native.principal_axes(self.vertices, self.faces)
 
-    def cut(self, plane: Plane) -> tuple[Component | None, Component | None]:
-        """Cut by a plane: returns the sides below and above, None for a side without volume."""
+    def cut(self, plane: Plane, least: float = NEGLIGIBLE_VOLUME) -> tuple[Component | None, Component | None]:
+        """Cut by a plane: returns the sides below and above, None for a side of no more than the least volume."""
         sides = _native.cut_by_plane(self.vertices, self.faces, *plane.normal, plane.offset)
         (below, _), (above, _) = (capped(*side) for side in sides)
-        return _component(below, self), _component(above, self)
+        return _component(below, self, least), _component(above, self, least)
 
     def clipped(self, hull: Hull) -> Surface:
         """Return the surface of the solid inside a hull, closed by caps on the hull's facets; empty if none is."""
@@ -352,11 +352,13 @@ def _halves(surface: Surface, axis: int, offset: float) -> tuple[Surface | None,
     return tuple(side if folded <= NEGLIGIBLE_FOLD else None for side, folded in sides)
 
 
-def _component(solid: Manifold | tuple[FloatArray, IntArray], within: Component) -> Component | None:
+def _component(
+    solid: Manifold | tuple[FloatArray, IntArray], within: Component, least: float = NEGLIGIBLE_VOLUME
+) -> Component | None:
     if isinstance(solid, Manifold):
-        is_empty = solid.is_empty() or solid.volume() <= NEGLIGIBLE_VOLUME
+        is_empty = solid.is_empty() or solid.volume() <= least
     else:
-        is_empty = not len(solid[1]) or _native.mesh_volume(*solid) <= NEGLIGIBLE_VOLUME
+        is_empty = not len(solid[1]) or _native.mesh_volume(*solid) <= least
     if is_empty:
         return None
     try:
