@@ -25,6 +25,9 @@ void bind_union(nb::module_& m) {
           },
           nb::arg("vertices"), nb::arg("faces"), nb::arg("threads") = 0)
       .def(
+          "only", [](const HullUnion& self, const std::vector<std::int32_t>& some) { return self.only(some); },
+          nb::arg("some"), "The union of the hulls with these numbers, which are not prepared again.")
+      .def(
           "exposed",
           [=](const HullUnion& self, double gap, int threads) {
             require_positive(1, gap);

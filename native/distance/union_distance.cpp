@@ -105,7 +105,13 @@ double HullUnion::Member::distance(Vec3 p, double enough) const {
 
 HullUnion::HullUnion(std::vector<Mesh> hulls, int threads) : members_(hulls.size()) {
   parallel_for(hulls.size(), hulls.size() < 8 ? 1 : threads,
-               [&](std::size_t i) { members_[i] = std::make_unique<Member>(std::move(hulls[i])); });
+               [&](std::size_t i) { members_[i] = std::make_shared<const Member>(std::move(hulls[i])); });
+}
+
+HullUnion HullUnion::only(const std::vector<std::int32_t>& some) const {
+  HullUnion result;
+  for (const std::int32_t i : some) result.members_.push_back(members_.at(i));
+  return result;
 }
 
 double HullUnion::distance(Vec3 p) const {
@@ -134,7 +140,7 @@ class HullField {
   double from(std::int32_t hull, Vec3 p) const { return members_[hull]->distance(p, kInfinity); }
 
  private:
-  const std::vector<std::unique_ptr<HullUnion::Member>>& members_;
+  const std::vector<std::shared_ptr<const HullUnion::Member>>& members_;
 };
 
 HullUnion::Exposed HullUnion::exposed(double gap, int threads) const {

@@ -25,8 +25,9 @@ namespace rlacd {
 class HullUnion {
  public:
   HullUnion(std::vector<Mesh> hulls, int threads);
-  HullUnion(const HullUnion&) = delete;
-  HullUnion& operator=(const HullUnion&) = delete;
+
+  // The union of some of the hulls, which are shared, not prepared again.
+  HullUnion only(const std::vector<std::int32_t>& some) const;
 
   // The surface of the union as triangles. Cracks between hulls narrower than `gap` count as closed; next to inner
   // corners of the surface, strips narrower than about `gap` are lost. A facet inside so many hulls that cutting it was
@@ -56,10 +57,12 @@ class HullUnion {
   };
   friend class HullField;
 
+  HullUnion() = default;
+
   // Which faces have all their corners in one of the hulls.
   std::vector<char> held_faces(const Mesh& surface, int threads) const;
 
-  std::vector<std::unique_ptr<Member>> members_;
+  std::vector<std::shared_ptr<const Member>> members_;
 };
 
 }  // namespace rlacd

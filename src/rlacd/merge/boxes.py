@@ -79,14 +79,24 @@ class Boxes:
         from_hop, other = from_hop[order], other[order]
         begin = np.searchsorted(from_hop, hop)
         counts = np.searchsorted(from_hop, hop, side="right") - begin
-        found = np.zeros(0, dtype=np.int64)  # row * count + other
+        begins = np.flatnonzero(np.diff(from_row, prepend=-1))
+        found = [
+            self._beyond(other, begin[a:b], counts[a:b]) for a, b in zip(begins, [*begins[1:], len(hop)], strict=True)
+        ]
+        return np.repeat(from_row[begins], [len(some) for some in found]), np.concatenate(found)
+
+    def _beyond(self, other: Places, begin: Places, counts: Places) -> Places:
+        """The boxes within reach of any hop, whose own are `other[begin : begin + count]`; ascending."""
+        poll_stop()
+        is_beyond = np.zeros(len(self.ids), dtype=bool)
         bounds = np.searchsorted(np.cumsum(counts), np.arange(0, counts.sum() + AT_ONCE, AT_ONCE)[1:-1], side="right")
-        for chunk in np.split(np.arange(len(hop)), np.unique(bounds)):
-            poll_stop()
-            step = np.arange(counts[chunk].sum()) - np.repeat(np.cumsum(counts[chunk]) - counts[chunk], counts[chunk])
-            beyond = other[np.repeat(begin[chunk], counts[chunk]) + step]
-            found = np.union1d(found, np.repeat(from_row[chunk], counts[chunk]) * count + beyond)
-        return found // count, found % count
+        for chunk in np.split(np.arange(len(begin)), np.unique(bounds)):
+            some = counts[chunk]
+            step = np.arange(some.sum()) - np.repeat(np.cumsum(some) - some, some)
+            is_beyond[other[np.repeat(begin[chunk], some) + step]] = True
+            if is_beyond.all():  # in a heap of boxes every hop leads everywhere
+                break
+        return np.flatnonzero(is_beyond)
 
     def _near(self, some: Places, others: Places, reach: float) -> tuple[Places, Places]:
         """Pairs of indices, one from `some` and one from `others`, whose boxes are within reach."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import compress
 
 import numpy as np
 
@@ -43,21 +44,26 @@ def drop_slivers(parts: Sequence[Part], workers: Workers, suspects: Sequence[Par
     suspects = parts if suspects is None else suspects
     thin = workers.map(lambda part: is_film(part) or is_sliver(part.hull), suspects)
     place = {id(part): i for i, part in enumerate(parts)}
+    slivers = [place[id(part)] for part, is_thin in zip(suspects, thin, strict=True) if is_thin]
     boxes = np.array([part.box for part in parts]).reshape(-1, 2, 3)
+    concerned = np.zeros(len(parts), dtype=bool)
+    for own in slivers:
+        concerned |= _near(boxes, boxes[own])
+    union = hull_union([part.hull for part in compress(parts, concerned)], workers.threads)
+    number = np.cumsum(concerned, dtype=np.int32) - 1
     kept = np.ones(len(parts), dtype=bool)
-    for sliver in sorted(
-        (p for p, is_thin in zip(suspects, thin, strict=True) if is_thin), key=lambda p: p.hull.volume
-    ):
-        own = place[id(sliver)]
+    for own in sorted(slivers, key=lambda i: parts[i].hull.volume):
         kept[own] = False
-        others = [parts[i] for i in np.flatnonzero(kept & _near(boxes, boxes[own]))]
-        if others:
-            union = hull_union([part.hull for part in others], workers.threads)
-            _, missed = union.under(sliver.vertices, sliver.faces, MISSED / 4, workers.threads)
-            kept[own] = missed > MISSED
-        else:
-            kept[own] = True
+        others = np.flatnonzero(kept & _near(boxes, boxes[own]))
+        kept[own] = len(others) == 0 or _misses(union.only(number[others]), parts[own], workers.threads)
     return [parts[i] for i in np.flatnonzero(kept)]
+
+
+def _misses(union: _native.HullUnion, sliver: Part, threads: int) -> bool:
+    """Whether some point of a sliver is too far from other hulls; most are told by their corners."""
+    if (union.distance(sliver.vertices[np.unique(sliver.faces)], threads) > MISSED).any():
+        return True
+    return union.under(sliver.vertices, sliver.faces, MISSED / 4, threads)[1] > MISSED
 
 
 def is_film(part: Part) -> bool:
