@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from rlacd.errors import OptionError, OutputError
 from rlacd.io.write import FORMATS, hull_target, save_hulls
 from rlacd.io.write.palette import hull_colors
+from tests.assets import read_glb
 from tests.hulls import assert_convex_hull, hull_of, moved, random_hull
 
 THREE = [moved(random_hull(seed), 0.3, (seed, 0.1, -0.7)) for seed in range(3)]
@@ -52,6 +53,16 @@ def test_every_hull_comes_back_under_its_name(tmp_path: Path, ending: str) -> No
         assert_convex_hull(mesh)
         assert len(mesh.faces) == len(hull.faces)
         assert same_points(mesh.vertices, hull.vertices, 1e-6 if ending == "glb" else 0.0)
+
+
+def test_a_glb_view_that_accessors_share_has_a_stride(tmp_path: Path) -> None:
+    """glTF 2.0, 3.6.2.4: it must be defined where more than one vertex attribute is in a view."""
+    written, _, _ = read_glb(save_hulls(THREE, tmp_path / "out.glb"))
+    attributes = [at for mesh in written["meshes"] for one in mesh["primitives"] for at in one["attributes"].values()]
+    views = [written["accessors"][at]["bufferView"] for at in attributes]
+    shared = {view for view in views if views.count(view) > 1}
+    assert shared
+    assert {written["bufferViews"][view].get("byteStride") for view in shared} == {12}
 
 
 def test_ply_keeps_hulls_apart_exact_and_coloured(tmp_path: Path) -> None:

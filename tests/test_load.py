@@ -404,6 +404,13 @@ def test_text_ply_gives_what_its_parser_gives(kind: str, tail: bytes, tmp_path: 
     assert np.array_equal(quick.faces, slow.faces)
 
 
+def zipped(name):
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w") as file:
+        file.writestr(name, b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    return archive.getvalue()
+
+
 @pytest.mark.parametrize(
     ("name", "content", "advice"),
     [
@@ -411,12 +418,22 @@ def test_text_ply_gives_what_its_parser_gives(kind: str, tail: bytes, tmp_path: 
         ("chair.fbx", b"Kaydara FBX Binary  \x00", "import it into Blender"),
         ("chair.step", b"ISO-10303-21;", "FreeCAD"),
         ("chair.STP", b"ISO-10303-21;", "FreeCAD"),
+        ("chair.obj.gz", b"\x1f\x8b\x08", "unpack it"),
+        ("chair.zip", zipped("chair.obj"), "unpack it"),
+        ("chair.7z", b"7z\xbc\xaf\x27\x1c", "unpack it"),
     ],
 )
 def test_files_that_people_have_are_refused_with_the_way_out(tmp_path, name, content, advice):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(MeshFileError, match=advice):
         load_mesh(tmp_path / name)
+
+
+def test_an_archive_of_an_obj_is_not_told_to_be_a_3mf(tmp_path):
+    (tmp_path / "chair.obj").write_bytes(zipped("chair.obj"))
+    with pytest.raises(MeshFileError) as error:
+        load_mesh(tmp_path / "chair.obj")
+    assert "3mf" not in str(error.value)
 
 
 def test_a_vrm_is_a_glb_under_another_name(box, tmp_path):

@@ -5,8 +5,9 @@ from __future__ import annotations
 from tests.hostile.gltf import gltf
 from tests.hostile.registry import refused
 
-for ending in ("xaml", "3dxml", "xdmf", "h5", "vtk", "msh", "binvox", "zip", "dxf"):
+for ending in ("xaml", "3dxml", "xdmf", "h5", "vtk", "msh", "binvox", "dxf"):
     refused(f"another format.{ending}", "convert it")(lambda: b"anything")
+refused("another format.zip", "unpack it")(lambda: b"anything")
 for ending in ("step", "stp"):
     refused(f"another format.{ending}", "export it from a CAD program")(lambda: b"anything")
 

@@ -44,6 +44,7 @@ FORMATS = ("obj", "stl", "ply", "off", "glb", "gltf", "vrm", "dae", "zae", "3mf"
 CONVERTERS = {
     "blend": "export it from Blender (File > Export > glTF 2.0)",
     "fbx": "import it into Blender and export it as glTF 2.0",
+    **dict.fromkeys(("zip", "gz", "bz2", "xz", "zst", "7z", "rar", "tar", "tgz"), "unpack it, and give the mesh in it"),
     **dict.fromkeys(("step", "stp", "iges", "igs"), "export it from a CAD program, such as FreeCAD, as stl or obj"),
 }
 """What to do with files that people have and that are not read."""
@@ -210,7 +211,8 @@ def _format_of(content: bytes) -> str | None:
     if head.startswith(b"ply\n") or head.startswith(b"ply\r"):
         return "ply"
     if head.startswith(b"PK\x03\x04"):
-        return "usdz" if b".usd" in head else "zae" if b".dae" in content else "3mf"
+        known = {"usdz": b".usd" in head, "zae": b".dae" in content, "3mf": b".model" in content}
+        return next((name for name, held in known.items() if held), None)
     if is_off(head):
         return "off"
     if head.startswith(b"<") and b"COLLADA" in head:

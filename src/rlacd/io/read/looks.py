@@ -18,7 +18,8 @@ import trimesh
 from rlacd.errors import MeshFileError
 from rlacd.io.read.beside import PICTURES, FolderFiles
 from rlacd.io.read.colors_3mf import Color, colors_3mf, has_colors
-from rlacd.io.read.text import check_text
+from rlacd.io.read.polygons import obj_without_folds
+from rlacd.io.read.text import check_text, spaced_obj
 from rlacd.io.read.xml import collada_of
 
 _COLORED = re.compile(rb"^v(?:[ \t]+[^\s#]+){6,}", re.MULTILINE)
@@ -85,6 +86,7 @@ def _checked(path: Path, content: bytes, extension: str) -> bytes:
         names = {line.split(None, 1)[-1] for line in content.splitlines() if line.startswith(b"usemtl")}
         if len(names) * content.count(b"\nv ") > MOST_IN_TABLES:
             raise MeshFileError(f"{path} has too many materials")
+        return obj_without_folds(spaced_obj(content))
     return content
 
 

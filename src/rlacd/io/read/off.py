@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from rlacd.errors import MeshFileError
+from rlacd.io.read.polygons import triangles_of
 from rlacd.io.read.text import check_text, count_in
 
 KEYWORD = re.compile(rb"((?:ST|[CN4n])*)OFF(?![A-Za-z])|off(?![A-Za-z])")
@@ -58,7 +59,7 @@ def plain_off(path: Path, content: bytes) -> bytes:
         )
     if b"4" in letters:
         body[:vertices] = _divided(path, body[:vertices])
-    triangles = _fans(path, body[vertices : vertices + faces])
+    triangles = _triangles(path, body[:vertices], body[vertices : vertices + faces])
     return b"\n".join([b"OFF", b"%d %d 0" % (vertices, len(triangles)), *body[:vertices], *triangles, b""])
 
 
@@ -93,17 +94,25 @@ def _divided(path: Path, lines: list[bytes]) -> list[bytes]:
     return [b"%r %r %r" % (x, y, z) for x, y, z in positions.tolist()]
 
 
-def _fans(path: Path, lines: list[bytes]) -> list[bytes]:
-    """Lines of triangles: a fan for each polygon, nothing for edges and points."""
-    triangles: list[bytes] = []
-    for line in lines:
-        if line.startswith((b"3 ", b"3\t")):
-            triangles.append(line)
-            continue
-        number, *corners = line.split()
-        count = count_in(path, number)
-        if len(corners) < count:
-            raise MeshFileError(f"{path} is cut off: a face of {count} corners has {len(corners)}; export it again")
-        first = corners[0] if corners else b""
-        triangles += [b"3 %b %b %b" % (first, corners[i], corners[i + 1]) for i in range(1, count - 1)]
-    return triangles
+def _triangles(path: Path, vertices: list[bytes], faces: list[bytes]) -> list[bytes]:
+    """Lines of triangles: those of each polygon, nothing for edges and points."""
+    if all(line.startswith((b"3 ", b"3\t")) for line in faces):
+        return faces
+    rings = [_corners(path, line) for line in faces]
+    try:
+        points = np.array([line.split(None, 3)[:3] for line in vertices], dtype=np.float64).reshape(-1, 3)
+        corners = np.array([corner for ring in rings for corner in ring], dtype=np.int64)
+    except (ValueError, OverflowError) as error:
+        raise MeshFileError(f"{path} cannot be read as off: it is damaged ({error}); export it again") from error
+    if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
+        raise MeshFileError(f"{path} has faces with points that are not there: export it again")
+    counts = np.array([len(ring) for ring in rings], dtype=np.int64)
+    return [b"3 %d %d %d" % (a, b, c) for a, b, c in triangles_of(points, counts, corners).tolist()]
+
+
+def _corners(path: Path, line: bytes) -> list[bytes]:
+    number, *corners = line.split()
+    count = count_in(path, number)
+    if len(corners) < count:
+        raise MeshFileError(f"{path} is cut off: a face of {count} corners has {len(corners)}; export it again")
+    return corners[:count]

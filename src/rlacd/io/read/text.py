@@ -14,6 +14,10 @@ import numpy as np
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.limits import MOST_TRIANGLES
+from rlacd.io.read.polygons import obj_without_folds
+from rlacd.io.read.polygons_ply import triangles_ply
+
+OBJ_BLANKS = re.compile(rb"^[ \t]*(v[nt]?|f)[ \t]+", re.MULTILINE)
 
 MOST_FIELDS = 2000
 """Lines of a PLY file's header: the parser revisits all earlier properties for every list among them."""
@@ -65,9 +69,19 @@ def declared_triangles(content: bytes, extension: str) -> int | None:
 
 
 def plain_obj(path: Path, content: bytes) -> bytes:
-    """Remove the materials of faces: each would make a separate mesh with a table as long as all vertices."""
+    """Remove the materials of faces: each would make a separate mesh with a table as long as all vertices.
+
+    Concave faces become triangles, as the parser makes fans.
+    """
     check_text(path, content)
-    return content.replace(b"usemtl ", b"# ")
+    return obj_without_folds(spaced_obj(content).replace(b"usemtl ", b"# "))
+
+
+def spaced_obj(content: bytes) -> bytes:
+    """Take blanks from before the words of an OBJ file, and tabs from behind them: the parser skips such lines."""
+    if any(mark in content for mark in (b"\n ", b"\n\t", b"\nv\t", b"\nf\t", b"\nvt\t", b"\nvn\t")):
+        return OBJ_BLANKS.sub(rb"\1 ", content)
+    return content
 
 
 def plain_stl(path: Path, content: bytes) -> bytes:
@@ -85,7 +99,7 @@ def plain_stl(path: Path, content: bytes) -> bytes:
 
 
 def plain_ply(path: Path, content: bytes) -> bytes:
-    """Check a text file's lines against the counts in its header, and drop empty lines.
+    """Check a text file's lines against the counts in its header, and drop empty lines; take polygons apart.
 
     The parser itself checks binary files, except for negative counts.
     """
@@ -98,9 +112,11 @@ def plain_ply(path: Path, content: bytes) -> bytes:
         raise MeshFileError(f"{path} has a header of {fields} lines, more than {MOST_FIELDS}: export it again")
     counts = [count_in(path, word) for _, word in PLY_ELEMENT.findall(header)]
     if b"ascii" not in header.lower().split(b"\n", 2)[1]:
-        return content
+        return triangles_ply(header, content[end.end() :]) or content
     check_text(path, content)
     if (plain := binary_ply(header, content[end.end() :])) is not None:
+        return plain
+    if (plain := triangles_ply(header, content[end.end() :])) is not None:
         return plain
     body = EMPTY_LINES.sub(b"\n", content[end.end() :].strip())
     if body.count(b"\n") + bool(body) < sum(counts):

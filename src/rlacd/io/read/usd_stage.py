@@ -15,6 +15,7 @@ import numpy as np
 from rlacd.errors import MeshFileError, MissingExtraError
 from rlacd.io.read.limits import MOST_PLACES, MOST_TRIANGLES
 from rlacd.io.read.open_file import read_file
+from rlacd.io.read.polygons import triangles_of
 from rlacd.pool import Blobs, Shared
 from rlacd.pool.request import Values
 from rlacd.solid.arrays import FloatArray
@@ -164,10 +165,11 @@ def _mesh(path: Path, prim: Any) -> tuple[FloatArray, np.ndarray[Any, Any]]:
         raise MeshFileError(f"{path} has faces at {prim.GetPath()} that do not add up: export it again")
     if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
         raise MeshFileError(f"{path} has faces at {prim.GetPath()} with points that are not there: export it again")
-    faces = _triangles(counts, corners)
+    positions = np.asarray(points.reshape(-1, 3), dtype=np.float64)
+    faces = triangles_of(positions, np.asarray(counts, dtype=np.int64), np.asarray(corners, dtype=np.int64))
     if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
         faces = faces[:, ::-1]
-    return np.asarray(points.reshape(-1, 3), dtype=np.float64), faces
+    return positions, faces
 
 
 def _value(attribute: Any) -> Any:
@@ -175,14 +177,6 @@ def _value(attribute: Any) -> Any:
     from pxr import Usd
 
     return attribute.Get(Usd.TimeCode.EarliestTime())
-
-
-def _triangles(counts: np.ndarray[Any, Any], corners: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    """Fans of triangles, ``[F, 3]``, for polygons with given numbers of corners."""
-    pieces = np.maximum(counts - 2, 0)
-    first = np.repeat(np.cumsum(counts) - counts, pieces)
-    step = np.arange(len(first)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-    return np.asarray(corners[np.stack([first, first + step + 1, first + step + 2], axis=1)])
 
 
 def _primitive(prim: Any) -> Values | None:

@@ -62,7 +62,8 @@ def glb(solids: Iterable[Placed], generator: str) -> bytes:
         "materials": [material(solid) for solid in solids],
         "accessors": accessors,
         "bufferViews": [
-            {"buffer": 0, "byteOffset": 0, "byteLength": len(positions), "target": ATTRIBUTES},
+            # glTF demands a stride where accessors share a view.
+            {"buffer": 0, "byteOffset": 0, "byteLength": len(positions), "byteStride": 12, "target": ATTRIBUTES},
             {"buffer": 0, "byteOffset": len(positions), "byteLength": len(indices), "target": INDICES},
         ],
         "buffers": [{"byteLength": len(positions) + len(indices)}],

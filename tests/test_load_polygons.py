@@ -1,0 +1,208 @@
+"""Faces with more than three corners: prisms over concave outlines keep their area and volume in every format."""
+
+from __future__ import annotations
+
+import contextlib
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import rlacd
+from rlacd.errors import MeshError
+from rlacd.io.read.load import load_mesh
+from rlacd.io.read.polygons import MOST_CORNERS, obj_without_folds, triangles_of
+
+L = [(0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3)]
+"""An outline whose fan around any but two of its corners folds over."""
+
+Prism = tuple[np.ndarray, list[list[int]]]
+
+
+def prism(outline, turn: np.ndarray | None = None, height: float = 1.0, first: int = 0) -> Prism:
+    """Points and outward polygons of a prism over an outline, which starts at the given corner."""
+    flat = np.roll(np.asarray(outline, dtype=np.float64), -first, axis=0)
+    count = len(flat)
+    points = np.concatenate([np.c_[flat, np.zeros(count)], np.c_[flat, np.full(count, height)]])
+    sides = [[i, (i + 1) % count, count + (i + 1) % count, count + i] for i in range(count)]
+    polygons = [list(range(count))[::-1], list(range(count, 2 * count)), *sides]
+    return points if turn is None else points @ turn.T, polygons
+
+
+def area_and_perimeter(outline) -> tuple[float, float]:
+    """By the shoelace formula."""
+    x, y = np.asarray(outline, dtype=np.float64).T
+    area = (x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2
+    return area, np.hypot(np.roll(x, -1) - x, np.roll(y, -1) - y).sum()
+
+
+def assert_is_prism(mesh: trimesh.Trimesh, outline, height: float = 1.0) -> None:
+    area, around = area_and_perimeter(outline)
+    assert mesh.volume == pytest.approx(area * height, rel=1e-5)
+    assert mesh.area == pytest.approx(2 * area + around * height, rel=1e-5)  # folded triangles add to it
+    assert mesh.is_watertight
+
+
+def obj(solid: Prism, name=lambda corner: str(corner + 1)) -> bytes:
+    points, polygons = solid
+    lines = ["v " + " ".join(map(repr, p)) for p in points.tolist()]
+    lines += ["f " + " ".join(name(corner) for corner in polygon) for polygon in polygons]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def off(solid: Prism) -> bytes:
+    points, polygons = solid
+    lines = ["OFF", f"{len(points)} {len(polygons)} 0", *(" ".join(map(repr, p)) for p in points.tolist())]
+    return "\n".join([*lines, *(" ".join(map(str, [len(p), *p])) for p in polygons), ""]).encode()
+
+
+def ply(solid: Prism, order: str) -> bytes:
+    """As Blender and others write it: other fields beside the positions, and a field of its own on each face."""
+    points, polygons = solid
+    kind = {"": "ascii", "<": "binary_little_endian", ">": "binary_big_endian"}[order]
+    head = f"ply\nformat {kind} 1.0\nelement vertex {len(points)}\nproperty uchar red\n"
+    head += "".join(f"property double {axis}\n" for axis in "xyz")
+    head += f"element face {len(polygons)}\nproperty uchar flags\nproperty list uchar uint vertex_indices\nend_header\n"
+    if not order:
+        rows = [" ".join(map(str, [7, *p])) for p in points.tolist()]
+        rows += [" ".join(map(str, [1, len(p), *p])) for p in polygons]
+        return (head + "\n".join(rows) + "\n").encode()
+    body = b"".join(struct.pack(order + "B3d", 7, *p) for p in points.tolist())
+    return head.encode() + body + b"".join(struct.pack(f"{order}BB{len(p)}I", 1, len(p), *p) for p in polygons)
+
+
+WRITERS = {
+    "obj": obj,
+    "off": off,
+    "ascii.ply": lambda solid: ply(solid, ""),
+    "little.ply": lambda solid: ply(solid, "<"),
+    "big.ply": lambda solid: ply(solid, ">"),
+}
+
+
+def read(path: Path, content: bytes) -> trimesh.Trimesh:
+    path.write_bytes(content)
+    mesh = load_mesh(path)
+    return trimesh.Trimesh(mesh.vertices, mesh.faces)
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+@pytest.mark.parametrize("first", range(len(L)))
+def test_an_l_is_an_l_in_every_format(tmp_path: Path, kind: str, first: int) -> None:
+    turn = trimesh.transformations.random_rotation_matrix(np.array([0.2, 0.5, 0.9]))[:3, :3]
+    assert_is_prism(read(tmp_path / f"l.{kind}", WRITERS[kind](prism(L, turn, first=first))), L)
+
+
+def test_an_l_of_usd(tmp_path: Path) -> None:
+    Usd = pytest.importorskip("pxr.Usd", reason="the extra usd is not installed")
+    from pxr import UsdGeom
+
+    points, polygons = prism(L, first=3)
+    stage = Usd.Stage.CreateNew(str(tmp_path / "l.usda"))
+    mesh = UsdGeom.Mesh.Define(stage, "/l")
+    mesh.CreatePointsAttr(points.tolist())
+    mesh.CreateFaceVertexCountsAttr([len(p) for p in polygons])
+    mesh.CreateFaceVertexIndicesAttr([corner for p in polygons for corner in p])
+    stage.Save()
+    loaded = load_mesh(tmp_path / "l.usda")
+    assert_is_prism(trimesh.Trimesh(loaded.vertices, loaded.faces), L)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    radii=st.lists(st.floats(0.2, 2), min_size=4, max_size=30),
+    kind=st.sampled_from(sorted(WRITERS)),
+    seed=st.integers(0, 2**32 - 1),
+    size=st.sampled_from([1e-3, 1.0, 1e4]),
+)
+def test_prisms_over_stars_keep_area_and_volume(tmp_path_factory, radii, kind, seed, size) -> None:
+    angles = np.linspace(0, 2 * np.pi, len(radii), endpoint=False)
+    outline = size * np.array(radii)[:, None] * np.c_[np.cos(angles), np.sin(angles)]
+    turn = trimesh.transformations.random_rotation_matrix(np.random.default_rng(seed).random(3))[:3, :3]
+    folder = tmp_path_factory.mktemp("star")
+    assert_is_prism(read(folder / f"star.{kind}", WRITERS[kind](prism(outline, turn, size))), outline, size)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        lambda corner: f"{corner + 1}/{corner + 1}/1",
+        lambda corner: f"{corner + 1}//1",
+        lambda corner: str(corner - 2 * len(L)),
+    ],
+    ids=["point/texture/normal", "point//normal", "counted from the end"],
+)
+def test_corners_of_an_obj_are_named_in_every_way(tmp_path: Path, name) -> None:
+    content = obj(prism(L, first=3), name)
+    assert_is_prism(read(tmp_path / "l.obj", content), L)
+    dressed = content.replace(b"\nf ", b"\n  f\t").replace(b" 12", b" \\\n 12").replace(b"\n", b"\r\n")
+    assert_is_prism(read(tmp_path / "dressed.obj", dressed), L)
+    assert_is_prism(read(tmp_path / "said.obj", content.replace(b"\n  f", b" # a face\n  f")), L)
+
+
+def test_looks_stay_on_the_triangles_of_a_concave_face(tmp_path: Path) -> None:
+    content = obj(prism(L, first=3), lambda corner: f"{corner + 1}/{corner + 1}")
+    textures = b"".join(b"vt %f %f\n" % (i / 12, i / 12) for i in range(12))
+    (tmp_path / "l.obj").write_bytes(textures + content)
+    rlacd.decompose(tmp_path / "l.obj", quality="fast").save(tmp_path / "out.glb", keep_input=True)
+    kept = [one for name, one in trimesh.load_scene(tmp_path / "out.glb").geometry.items() if "hull" not in name]
+    assert kept[0].visual.uv is not None
+    assert sum(one.area for one in kept) == pytest.approx(2 * 5 + 12, rel=1e-5)
+
+
+def test_convex_faces_are_fans_as_ever(tmp_path: Path) -> None:
+    hexagon = [(np.cos(a), np.sin(a)) for a in np.linspace(0, 2 * np.pi, 6, endpoint=False)]
+    content = obj(prism(hexagon))
+    assert obj_without_folds(content) is content
+    points, polygons = prism(hexagon)
+    found = triangles_of(points, np.array([len(p) for p in polygons]), np.concatenate(polygons))
+    fans = [[p[0], p[i], p[i + 1]] for p in polygons for i in range(1, len(p) - 1)]
+    assert found.tolist() == fans
+
+
+ODD = {
+    "crosses itself": [(0, 0), (2, 2), (2, 0), (0, 2)],
+    "on a line": [(0, 0), (1, 0), (3, 0), (2, 0)],
+    "a point": [(1, 1)] * 5,
+    "touches itself": [(0, 0), (4, 0), (4, 4), (2, 0), (0, 4)],
+    "there and back": [(0, 0), (2, 0), (2, 2), (2, 0), (1, 0), (0, 2)],
+    "not finite": [(0, 0), (2, 0), (np.nan, 1), (np.inf, 2), (0, 2)],
+    "huge": [(0, 0), (1e308, 0), (1e307, 1e307), (0, 1e308)],
+}
+
+
+@pytest.mark.parametrize("outline", ODD.values(), ids=ODD)
+def test_odd_faces_give_as_many_triangles_as_a_fan(outline) -> None:
+    points, polygons = prism(outline)
+    counts = np.array([len(p) for p in polygons])
+    found = triangles_of(points, counts, np.concatenate(polygons))
+    assert len(found) == (counts - 2).clip(0).sum()
+    owner = np.repeat(np.arange(len(polygons)), (counts - 2).clip(0))
+    assert all(set(face) <= set(polygons[i]) for face, i in zip(found.tolist(), owner.tolist(), strict=True))
+
+
+def test_edges_points_and_very_long_outlines() -> None:
+    assert triangles_of(np.zeros((3, 3)), np.array([1, 2, 0]), np.array([0, 1, 2])).shape == (0, 3)
+    assert triangles_of(np.zeros((0, 3)), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)).shape == (0, 3)
+    count = MOST_CORNERS + 2
+    radii = np.where(np.arange(count) % 2, 1.0, 2.0)
+    angles = np.linspace(0, 2 * np.pi, count, endpoint=False)
+    comb = np.c_[radii * np.cos(angles), radii * np.sin(angles), np.zeros(count)]
+    assert len(triangles_of(comb, np.array([count]), np.arange(count))) == count - 2
+
+
+@settings(max_examples=150, deadline=None)
+@given(kind=st.sampled_from(sorted(WRITERS)), data=st.data())
+def test_damaged_polygons_are_refused_or_read(tmp_path_factory, kind, data) -> None:
+    content = bytearray(WRITERS[kind](prism(L, first=3)))
+    for _ in range(data.draw(st.integers(1, 4))):
+        place = data.draw(st.integers(0, len(content) - 1))
+        content[place] = data.draw(st.one_of(st.integers(0, 255), st.sampled_from(b"0123456789-/ \n#\\ef.")))
+    path = tmp_path_factory.mktemp("damaged") / f"l.{kind}"
+    path.write_bytes(bytes(content[: data.draw(st.integers(1, len(content)))]))
+    with contextlib.suppress(MeshError):
+        load_mesh(path)
