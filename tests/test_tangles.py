@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 import rlacd
 import rlacd.cut
 import rlacd.cut_and_merge
+from fuzz.geometry import Polytope, distance_to_union
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
 from rlacd.repair.tangles import TangledError, refuse_tangles, tangled_bodies
@@ -168,9 +169,31 @@ def test_stopped_while_a_tangle_is_cut_the_hulls_cover_it(steps: int) -> None:
     mesh = tangle(1)
     result = rlacd.decompose(mesh, quality="fast", threads=1, progress=cancel)
     assert result.report["stopped_by"] == "cancel"
+    assert farthest(mesh, result) < 1e-9
+
+
+# The caps of these five triangles cross them: little of the solid is inside out, but pieces of it are lost.
+CORNERS = [-2.071, -0.031, 0.537, 0.208, -0.802, 0.736, -0.297, 0.851, 1.704]
+CORNERS += [-0.136, -0.907, 0.201, -0.694, -0.291, -0.14, -1.065, -0.263, 0.706]
+CROSSING = np.reshape(CORNERS, (6, 3)), np.array([(0, 4, 3), (4, 5, 2), (2, 3, 0), (1, 2, 0), (5, 1, 0)])
+
+
+@pytest.mark.parametrize("steps", [9, 15])
+def test_stopped_while_pockets_are_cut_the_hulls_cover_them(steps: int) -> None:
+    cuts = itertools.count()
+
+    def cancel(progress: rlacd.Progress) -> bool:
+        return progress.stage != "cut" or next(cuts) < steps
+
+    result = rlacd.decompose(
+        CROSSING, threshold=0.1, quality="fast", policy="greedy-max-excess", threads=1, progress=cancel
+    )
+    assert result.report["stopped_by"] == "cancel"
+    assert farthest(CROSSING, result) < 5e-3
+
+
+def farthest(mesh: tuple[np.ndarray, np.ndarray], result: rlacd.Decomposition) -> float:
+    """How far sampled points of a mesh are from the hulls, at most."""
     points = trimesh.sample.sample_surface(trimesh.Trimesh(*mesh, process=False), 500, seed=0)[0]
-    covered = np.zeros(len(points), dtype=bool)
-    for hull in result:
-        offset = np.einsum("fj,fj->f", hull.face_normals, hull.triangles[:, 0])
-        covered |= (points @ hull.face_normals.T <= offset + 1e-9).all(axis=1)
-    assert covered.all()
+    hulls = [Polytope(np.array(hull.vertices), np.array(hull.faces)) for hull in result]
+    return float(distance_to_union(points, hulls).max())

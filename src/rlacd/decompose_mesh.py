@@ -62,13 +62,14 @@ from rlacd.progress import ProgressCallback
 from rlacd.proxy import FEW, Lift, Proxy, simplify
 from rlacd.renamed import with_former
 from rlacd.repair.repair import repair
-from rlacd.repair.tangles import TangledError, refuse_tangles, tangled_bodies
-from rlacd.report import joint_report, make_report
+from rlacd.repair.tangles import TangledError, refuse_tangles
+from rlacd.report import HONEST_WITHIN, joint_report, make_report
 from rlacd.search import SearchContext, eliminate_parts, level, search
 from rlacd.search.levels import SearchSummary
 from rlacd.solid.balls import Balls
 from rlacd.solid.component import Component, Part
 from rlacd.solid.cover import cover
+from rlacd.solid.distance import hull_union
 from rlacd.solid.frame import Frame
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.provenance import owners
@@ -82,7 +83,7 @@ COARSER = 1.5
 """With `max_hulls`, thresholds that grow by this factor are tried, and the best decomposition is kept."""
 
 FEW_TO_DOUBT = 2000
-"""Solids of at most this many triangles are looked at for tangles when a stop ends cutting: that takes milliseconds."""
+"""Solids of at most this many triangles are sampled at as many points after a stop: do the hulls cover them?"""
 
 MARGIN = 1.5
 """Parts of a proxy have to be tighter by this share of its deviation: their hulls still have to grow to the solid."""
@@ -426,18 +427,21 @@ def _repaired_and_cut(
     if proxy is not None:
         return _through_proxy(solid, root, proxy, goal, options, workers, clock, doubt)
     parts, goal, found = _cut_and_searched(root, goal, options, workers, clock, doubt)
-    if doubt is not None and _lost_in_cuts(solid, clock):
+    if _lost_in_cuts(solid, parts, workers, clock):
         solid, parts = cover(source, clock)
         return _Reached(solid, options, _unprepared(options, solid), parts)
     return _Reached(solid, options, goal, parts, found, root)
 
 
-def _lost_in_cuts(solid: Solid, clock: Clock) -> bool:
-    """Whether cutting was stopped early on a small solid that is inside out in places: its pieces may not cover it."""
-    if clock.stopped_by is None or clock.stopped_in != "cut" or len(solid.faces) > FEW_TO_DOUBT:
+def _lost_in_cuts(solid: Solid, parts: Sequence[Part], workers: Workers, clock: Clock) -> bool:
+    """Whether a stop leaves parts that miss some of a small solid, as happens to one that crosses itself."""
+    if clock.stopped_by is None or len(solid.faces) > FEW_TO_DOUBT:
         return False
     with clock.shielded():
-        return len(tangled_bodies(solid)) > 0
+        inner, _ = _native.sample_surface(solid.vertices, solid.faces, FEW_TO_DOUBT, 0)
+        hulls = hull_union([part.hull for part in parts], workers.threads)
+        away = hulls.distance(np.concatenate([solid.vertices, inner]), workers.threads)
+        return bool(away.max() > HONEST_WITHIN)
 
 
 def _proxy(root: Component, goal: Criterion, options: Options, clock: Clock) -> Proxy | None:
