@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import ast
+import os
 import re
+import shutil
+import subprocess
+import sys
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 import trimesh
+from typer.testing import CliRunner
 
+import rlacd
 from fuzz.faults import Fault, command, tree
+from rlacd.cli.exit_codes import ExitCode
+from rlacd.cli.main import app
 
 ROOT = Path(__file__).resolve().parent.parent
 TEST = re.compile(r"`(tests/\w+\.py)::(\w+)`")
@@ -98,3 +107,88 @@ def test_the_faults_are_real(mesh: Path) -> None:
 def test_the_source_is_python_3_10() -> None:
     for path in (ROOT / "src").rglob("*.py"):
         ast.parse(path.read_text(encoding="utf-8"), path.name, feature_version=(3, 10))
+
+
+ELL = [trimesh.creation.box((2, 0.4, 0.4)), trimesh.creation.box((0.4, 0.4, 2))]
+REPORTS: list[dict[str, Any]] = [
+    {},
+    {"criterion": "volume"},
+    {"criterion": rlacd.NavigableSpace(radius=0.1, tolerance=0.05)},
+    {"primitives": True, "overlap": 0.01},
+    {"per_node": True},
+]
+
+
+def rows(page: str) -> list[list[str]]:
+    """The names in the first column of the table of a page, row by row."""
+    lines = (ROOT / "docs" / page).read_text(encoding="utf-8").splitlines()
+    cells = [line.split("|")[1].strip() for line in lines if line.startswith("| ")][1:]
+    return [re.findall(r"`([^`]+)`", cell) or [cell] for cell in cells]
+
+
+def test_the_reference_names_every_key_of_a_report_and_no_other() -> None:
+    documented = set()
+    for names in rows("reference/report.md"):
+        documented |= {names[0].partition(".")[0] + name if name.startswith(".") else name for name in names}
+    found = set()
+    for options in REPORTS:
+        report = rlacd.decompose(trimesh.Scene(ELL), quality="fast", threads=1, **options).report
+        for key, value in report.items():
+            parts = {f"{key}.{part}" for part in value if not part.endswith("_m")} if isinstance(value, dict) else set()
+            found |= parts if any(name.startswith(f"{key}.") for name in documented) else {key}
+    assert found == documented
+
+
+def test_the_reference_names_every_exit_code() -> None:
+    assert [int(code) for (code,) in rows("reference/exit_codes.md")] == sorted(ExitCode)
+
+
+def test_extras_are_those_that_the_project_has() -> None:
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    section = text.split("[project.optional-dependencies]")[1].split("\n[")[0]
+    extras = set(re.findall(r"^(\w+) = \[", section, re.MULTILINE))
+    named = {name for row in rows("start.md") for name in re.findall(r"^rlacd\[(\w+)\]$", row[0])}
+    assert named == extras
+    sources = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "src").rglob("*.py"))
+    assert set(re.findall(r"rlacd\[(\w+)\]", sources)) <= extras
+
+
+@pytest.mark.parametrize(
+    ("hidden", "extra", "words"),
+    [
+        ("ray", "fleet", "batch FOLDER -o OUT --ray local"),
+        ("fsspec", "fleet", "batch FOLDER -o memory://out"),
+        ("torch", "train", "train FOLDER --run OUT --preset quick"),
+        ("mujoco", "sim", "bench physics FOLDER -o OUT"),
+    ],
+)
+def test_a_command_without_its_extra_names_it(
+    hidden: str, extra: str, words: str, mesh: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in [name for name in sys.modules if name.partition(".")[0] == hidden or name.startswith("rlacd.learn.")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, hidden, None)
+    folder, out = mesh.parent, mesh.parent / "out"
+    done = CliRunner().invoke(app, [{"FOLDER": str(folder), "OUT": str(out)}.get(word, word) for word in words.split()])
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert f"pip install 'rlacd[{extra}]'" in done.stderr
+    assert done.stderr.strip().count("\n") == 0
+    assert not out.exists()
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash")
+def test_bash_completes_commands_and_options(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bash runs the script that `--show-completion` prints."""
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    monkeypatch.setenv("_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION", "1")
+    start = "import sys; sys.argv[0] = 'rlacd'; from rlacd.cli.main import main; main()"
+    (tmp_path / "rlacd").write_text(f'#!/bin/sh\nexec \'{sys.executable}\' -c "{start}" "$@"\n', encoding="utf-8")
+    (tmp_path / "rlacd").chmod(0o755)
+    ask = 'COMP_WORDS=({}); COMP_CWORD={}; _rlacd_completion rlacd; echo "${{COMPREPLY[*]}}"\n'
+    script = 'eval "$(rlacd --show-completion bash)"\n' + ask.format("rlacd dec", 1)
+    script += ask.format("rlacd decompose --thre", 2)
+    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, timeout=120)
+    command, options = done.stdout.splitlines()
+    assert command == "decompose"
+    assert {"--threshold", "--threads"} <= set(options.split())
+    assert all(option.startswith("--thre") for option in options.split())

@@ -68,8 +68,19 @@ Runs: Parameters = {
 """Options of every command that runs methods on meshes: name to default and annotation."""
 
 
-def experiment(name: str) -> Callable[[Callable[..., Page]], Callable[..., Page]]:
-    """Make a command of a function that takes a `Bench` and its own options, and returns a page."""
+def _require_simulator() -> None:
+    from rlacd.bench.simulate import get_mujoco
+
+    get_mujoco()
+
+
+def experiment(
+    name: str, first: Callable[[], None] = lambda: None
+) -> Callable[[Callable[..., Page]], Callable[..., Page]]:
+    """Make a command of a function that takes a `Bench` and its own options, and returns a page.
+
+    What may be missing is asked for `first`, before a file is read or written.
+    """
 
     def register(make_page: Callable[..., Page]) -> Callable[..., Page]:
         hints = get_type_hints(make_page, {**globals(), "Bench": Any, "Page": Any}, include_extras=True)
@@ -78,8 +89,10 @@ def experiment(name: str) -> Callable[[Callable[..., Page]], Callable[..., Page]
 
         def run(**given: Any) -> None:
             chosen = {key: given.pop(key) for key in own}
-            with exit_codes(), _open(**given) as opened:
-                _save(opened, make_page(opened, **chosen), name)
+            with exit_codes():
+                first()
+                with _open(**given) as opened:
+                    _save(opened, make_page(opened, **chosen), name)
 
         app.command(name)(command(run, inspect.getdoc(make_page) or "", parameters))
         return make_page
@@ -109,7 +122,7 @@ def compare(
     return compare_page(bench, "Side by side", entries, pictures, up)
 
 
-@experiment("physics")
+@experiment("physics", _require_simulator)
 def physics(
     bench: Bench,
     ways: Annotated[
@@ -134,7 +147,7 @@ def physics(
     return physics_page(bench, chosen, bullet, typer.echo)
 
 
-@experiment("primitives")
+@experiment("primitives", _require_simulator)
 def primitives(
     bench: Bench,
     threshold: Threshold = 0.05,
