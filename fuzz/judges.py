@@ -82,7 +82,7 @@ def judge(case: Case, samples: int = SAMPLES) -> list[str]:
     if len(faces):
         found += coverage(case, where, faces, hulls, random, samples)
         found += overhang(case, where[every_face], hulls, random, samples)
-    if case.shape.is_closed:
+    if case.shape.is_closed and len(faces) == len(every_face):  # a part may reach out to faces without area
         solid = filled_solid(where, faces)
         if solid is not None:
             found += concavity(case, solid, hulls, random, samples)
