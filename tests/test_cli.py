@@ -16,6 +16,8 @@ import trimesh
 from typer.testing import CliRunner, Result
 
 from rlacd.cli.main import app
+from rlacd.cli.terminal import summary
+from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError, OptionError, OutputError
 from rlacd.progress import Progress, ProgressCallback
@@ -124,6 +126,20 @@ def test_a_report_on_stdout_is_json_and_nothing_else(mesh: Path, stand_in: Stand
     report = json.loads(run.stdout)
     assert report["parts"] == 1
     assert report["hausdorff"]["under"] is None, "NaN is not JSON"
+
+
+def test_what_else_is_written_is_named(mesh: Path, stand_in: StandIn) -> None:
+    words = ["decompose", mesh, "--report", mesh.with_name("ell.json")]
+    assert f"report: {mesh.with_name('ell.json')}" in rlacd(*words).stderr
+    assert rlacd(*words, "-q").stderr == ""
+
+
+def test_the_summary_counts_primitives_by_kind() -> None:
+    boxes = [trimesh.creation.box((1, 2, 3)), trimesh.creation.box((1, 1, 1))]
+    boxes[1].apply_translation((5, 0, 0))
+    result = decompose(trimesh.util.concatenate(boxes), primitives=True, quality="fast", threads=1)
+    assert "of them 2 boxes\n" in summary(result, "out.xml") + "\n"
+    assert "of them" not in summary(decompose(boxes[0], quality="fast", threads=1), "out.xml")
 
 
 @pytest.mark.slow

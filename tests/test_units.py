@@ -113,6 +113,18 @@ def test_an_implausible_body_is_doubted(tmp_path: Path, ending: str) -> None:
     assert "400 m long" in said.output
 
 
+@pytest.mark.parametrize(
+    ("factor", "says"),
+    [(1000, "--unit mm or --unit cm converts"), (1e4, "--unit mm converts"), (1e7, "--scale"), (1e-3, "--scale")],
+)
+def test_a_doubt_suggests_what_would_help(tmp_path: Path, factor: float, says: str) -> None:
+    """A table of 0.4 m, in other units; none makes one of a body of 0.4 mm."""
+    result = rlacd.decompose(table().apply_scale(factor), threads=1, quality="fast")
+    with pytest.warns(rlacd.ImplausibleBodyWarning) as doubts:
+        result.save(tmp_path / "table.xml")
+    assert f"in metres: {says}" in str(doubts[0].message)
+
+
 def test_a_hollow_shell_is_doubted_unless_its_mass_is_given(tmp_path: Path) -> None:
     """A box of faces without its lid: repair makes its walls a thousandth of its longest side thick."""
     walls = trimesh.creation.box((0.2, 0.2, 0.2))

@@ -73,14 +73,14 @@ def _decompose(mesh: Path, asked: OutputOptions, how: dict[str, Any]) -> None:
 
 def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any]) -> bool:
     """Decompose a mesh and write all requested files; returns whether it is complete."""
-    from rlacd.cli.terminal import Watch, say, summary
+    from rlacd.cli.terminal import Watch, say, summary, writing
     from rlacd.decompose_mesh import decompose
     from rlacd.io.write import write_file
     from rlacd.plain_json import to_json
     from rlacd.view import draw_picture, is_html, save_report_page
 
-    up = wanted.up
-    with Watch(quiet=bool(wanted.quiet)) as watch:
+    up, quiet = wanted.up, bool(wanted.quiet)
+    with Watch(quiet=quiet) as watch:
         result = decompose(mesh, **options, progress=watch)
     place = str(wanted.output)
     names = ("file_format", "density", "mass", "one_mesh", "keep_input", "scene")
@@ -88,26 +88,30 @@ def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any]) -> bool:
     with warnings.catch_warnings(record=True) as doubts:
         warnings.simplefilter("always", ImplausibleBodyWarning)
         result.save(place, up=up, **written)
-    if not wanted.quiet:
+    if not quiet:
         say(summary(result, place))
     for doubt in doubts:
         say(f"  warning: {doubt.message}")
     if wanted.report == STDOUT:
         typer.echo(to_json(result.report), nl=False)
-    elif wanted.report is not None and is_html(wanted.report):
-        save_report_page(result, wanted.report, up=up)
     elif wanted.report is not None:
-        write_file(Path(wanted.report), to_json(result.report).encode())
+        with writing("report", wanted.report, quiet=quiet):
+            if is_html(wanted.report):
+                save_report_page(result, wanted.report, up=up)
+            else:
+                write_file(Path(wanted.report), to_json(result.report).encode())
     if wanted.balls is not None:
-        result.save_balls(wanted.balls)
+        with writing("balls", wanted.balls, quiet=quiet):
+            result.save_balls(wanted.balls)
     if wanted.picture is not None:
-        draw_picture(result, wanted.picture, up=up)
+        with writing("picture", wanted.picture, quiet=quiet):
+            draw_picture(result, wanted.picture, up=up)
     return bool(result.report.get("complete", True))
 
 
 def _rewrite(robot: Path, wanted: OutputOptions, options: dict[str, Any]) -> bool:
     """Replace the collision meshes of a robot; returns whether all are complete."""
-    from rlacd.cli.terminal import Watch, rewrite_summary, say
+    from rlacd.cli.terminal import Watch, rewrite_summary, say, writing
     from rlacd.io.robots import rewrite_robot
     from rlacd.io.write import write_file
     from rlacd.plain_json import to_json
@@ -121,7 +125,8 @@ def _rewrite(robot: Path, wanted: OutputOptions, options: dict[str, Any]) -> boo
     if wanted.report == STDOUT:
         typer.echo(measured, nl=False)
     elif wanted.report is not None:
-        write_file(Path(wanted.report), measured.encode())
+        with writing("report", wanted.report, quiet=bool(wanted.quiet)):
+            write_file(Path(wanted.report), measured.encode())
     return done.complete
 
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import signal
 import threading
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from types import FrameType, TracebackType
 from typing import TYPE_CHECKING, Any
 
@@ -75,12 +78,23 @@ class Watch:
         say("stopping; the result so far will be written (Ctrl-C again to quit at once)")
 
 
+@contextmanager
+def writing(what: str, path: str, *, quiet: bool) -> Iterator[None]:
+    """Show on a terminal that another file is being made, then print where it is."""
+    console = Console(stderr=True)
+    with console.status(f"{what} ...") if console.is_terminal and not quiet else nullcontext():
+        yield
+    if not quiet:
+        say(f"  {what}: {path}")
+
+
 def summary(result: Decomposition, written: str) -> str:
     """Summarise the result in a few lines: its size, its quality, and any warnings."""
     report = result.report
     triangles = sum(len(hull.faces) for hull in result)
     lines = [f"{written}: {_count(len(result))}, {triangles} triangles{_time(report)}"]
     lines += [f"  {fit}" for fit in [_fit(report)] if fit]
+    lines += [f"  of them {kinds}" for kinds in [_primitives(result)] if kinds]
     lines += [f"  warning: {warning}" for warning in report.get("warnings", [])]
     return "\n".join(lines)
 
@@ -97,6 +111,16 @@ def rewrite_summary(done: Rewritten) -> str:
 def counted(count: int, one: str, many: str) -> str:
     """Format a count with the singular or plural noun."""
     return f"{count} {one if count == 1 else many}"
+
+
+def _primitives(result: Decomposition) -> str:
+    """How many parts are primitives, by kind."""
+    kinds = Counter(shape.kind for shape in result.primitives if shape is not None)
+    words = [counted(kinds[kind], kind, PLURALS.get(kind, f"{kind}s")) for kind in sorted(kinds)]
+    return ", ".join(words)
+
+
+PLURALS = {"box": "boxes"}
 
 
 def _count(hulls: int) -> str:

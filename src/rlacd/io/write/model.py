@@ -13,6 +13,7 @@ import trimesh
 
 from rlacd.errors import OutputError
 from rlacd.fields import about, checked, read
+from rlacd.io.read.conventions import UNITS
 from rlacd.io.write.encode import encode_obj, encode_plain_obj, hull_name
 from rlacd.io.write.single_precision import placed_hull, placed_mesh
 from rlacd.output_options import DENSITY, OutputOptions
@@ -121,9 +122,11 @@ def implausible(model: Model) -> str | None:
     mass = model.mass.volume_abs
     if LENGTHS[0] <= size <= LENGTHS[1] and MASSES[0] <= mass <= MASSES[1]:
         return None
+    units = [f"--unit {unit}" for unit in ("mm", "cm") if PREFERRED[0] <= size * UNITS[unit] <= PREFERRED[1]]
+    way = f"{' or '.join(units)} converts" if units and size > LENGTHS[0] else "--scale multiplies"
     return (
         f"the body of {model.name} is {size:.3g} m long and weighs {mass:.3g} kg, as simulators take lengths to be in "
-        "metres: unit='mm' (--unit mm) converts it, mass= (--mass) sets its mass."
+        f"metres: {way} them, --mass sets its mass (unit=, scale=, mass= in Python)."
     )
 
 
@@ -141,6 +144,9 @@ def hollow(result: Result) -> str | None:
 
 SHEET, SHEET_THICKNESS = "slab", 2e-3
 """The step of repair that gives sheets a thickness, and that thickness, where the longest side is 2."""
+
+PREFERRED = (5e-3, 5.0)
+"""Metres: a unit is suggested if the body is as long in it."""
 
 LENGTHS, MASSES = (1e-3, 50.0), (1e-6, 1e6)
 """What is plausible for a body: metres, and kilograms."""
