@@ -51,6 +51,22 @@ def assets(tmp_path: Path) -> Path:
 
 
 @pytest.mark.slow
+def test_no_result_goes_over_a_mesh(tmp_path: Path) -> None:
+    """The results' folder holds the meshes', which holds one of its own name."""
+    inner = tmp_path / "in" / "in"
+    inner.mkdir(parents=True)
+    trimesh.creation.box().export(inner.parent / "x.glb")
+    trimesh.creation.box().export(inner / "x.stl")
+    before = tree(tmp_path)
+    for out in (tmp_path, inner.parent):
+        for glob in ("**/*", "*.stl"):
+            refused = batch(inner.parent, "-o", out, "--glob", glob)
+            assert refused.exit_code == 2
+            assert "overwrite the input" in refused.stderr or "among the meshes" in refused.stderr
+            assert tree(tmp_path) == before
+    assert batch(inner.parent, "-o", tmp_path, "--glob", "x.glb", "--dry-run").exit_code == 0
+
+
 def test_every_mesh_gets_hulls_and_a_row_and_is_not_done_again(assets: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     run = batch(assets, "-o", out, "--jobs", 2)

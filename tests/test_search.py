@@ -38,7 +38,7 @@ from rlacd.search.recut import Exchange, recut
 from rlacd.solid.component import Component, Part, Plane
 from rlacd.solid.reunite import reunite, touch
 from rlacd.workers import Workers
-from tests.shapes import box, strangers
+from tests.shapes import box, from_manifold, strangers
 
 SHAPES = ("test/coacd_examples/SnowFlake.ply", "test/vhacd/ob_chess_table.ply", "test/capod/class8__m85.ply")
 CRITERION = Concavity(0.05)
@@ -245,6 +245,18 @@ def test_the_same_hulls_for_any_number_of_threads(name: str, options: dict[str, 
     for a, b in zip(one, four, strict=True):
         assert (a.vertices == b.vertices).all()
         assert (a.faces == b.faces).all()
+
+
+@pytest.mark.slow
+def test_no_level_makes_more_hulls_than_the_one_before() -> None:
+    for solid in (frame(), frame() + frame().rotate([0, 90, 0])):
+        shape = from_manifold(solid)
+        fast, balanced, best = (
+            rlacd.decompose((shape.vertices, shape.faces), threads=1, **options)
+            for options in ({"quality": "fast"}, {}, {"quality": "best", "search_steps": 16})
+        )
+        assert len(best) <= len(fast) >= len(balanced)
+        assert balanced.report["search"]["steps"] > 0
 
 
 @pytest.mark.nightly

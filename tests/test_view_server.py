@@ -406,6 +406,7 @@ def test_pages_of_other_sites_are_turned_away(viewer: Viewer) -> None:
 def test_no_other_machine_can_reach_it(viewer: Viewer) -> None:
     port = int(urllib.parse.urlsplit(viewer.address).port or 0)
     assert urllib.parse.urlsplit(viewer.address).hostname == "127.0.0.1"
+    assert viewer._server.socket.getsockname() == ("127.0.0.1", port)
     outward = [info[4][0] for info in socket.getaddrinfo(socket.gethostname(), port, socket.AF_INET)]
     for address in outward:
         if not address.startswith("127."):
