@@ -206,3 +206,44 @@ def test_godot_makes_a_static_body_of_every_hull(tmp_path: Path, apart: rlacd.De
     apart.save(tmp_path / "cart.glb", file_format="godot")
     godot.edit(tmp_path, until=".import/cart.glb-*.md5")
     assert f"bodies {len(apart)} wheel True" in godot.play(tmp_path, "count.gd")
+
+
+@pytest.mark.parametrize("file_format", NAMES)
+def test_hulls_of_an_earlier_run_give_way_to_new_ones(
+    tmp_path: Path, apart: rlacd.Decomposition, file_format: str | None
+) -> None:
+    """Bodies and files are those of the first run, as if its hulls had never been there."""
+    keep = file_format is None
+    first = apart.save(tmp_path / "first.glb", file_format=file_format, keep_input=keep)
+    again = rlacd.decompose(first, per_node=True, threads=1)
+    assert [hull.metadata["node"] for hull in again] == [hull.metadata["node"] for hull in apart]
+    assert all(np.array_equal(a.vertices, b.vertices) for a, b in zip(again, apart, strict=True))
+    assert f"{len(apart)} of {len(apart) + 4} nodes, hulls of an engine" in again.report["warnings"][0]
+
+    second = again.save(tmp_path / "second.glb", file_format=file_format, keep_input=keep)
+    before, after = (trimesh.load_scene(path, process=False) for path in (first, second))
+    assert set(after.graph.nodes_geometry) == set(before.graph.nodes_geometry)
+    assert after.area == pytest.approx(before.area, rel=1e-6)
+    header, _, _ = read_glb(second)
+    assert not any(node.get("children") == [] for node in header["nodes"])
+    named = [node["name"] for node in header["nodes"] if "name" in node]
+    assert len(named) == len(set(named))
+
+
+def test_hulls_of_a_scene_in_memory_and_of_other_files_give_way(tmp_path: Path) -> None:
+    post, old = trimesh.creation.box((1, 1, 3)), trimesh.creation.box((5, 5, 5))
+    scene = trimesh.Scene({"post": post, "UCX_post_00": old})
+    (tmp_path / "post.3mf").write_bytes(scene.export(file_type="3mf"))
+    for source in (scene, tmp_path / "post.3mf"):
+        result = rlacd.decompose(source, threads=1, quality="fast")
+        assert [hull.volume for hull in result] == pytest.approx([3.0])
+        read = trimesh.load_scene(result.save(tmp_path / "out.glb", file_format="unreal"), process=False)
+        assert read.extents.max() == pytest.approx(3.0)
+        assert len(read.graph.nodes_geometry) == 2
+
+
+def test_a_file_of_hulls_alone_is_decomposed() -> None:
+    scene = trimesh.Scene({f"UCX_post_0{number}": trimesh.creation.box((1, 1, number + 1)) for number in range(2)})
+    result = rlacd.decompose(scene, threads=1, quality="fast")
+    assert result.report["warnings"] == []
+    assert max(hull.extents.max() for hull in result) == pytest.approx(2.0)

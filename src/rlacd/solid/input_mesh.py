@@ -84,6 +84,8 @@ class InputMesh:
         The input itself, if it is a scene that can be kept.
     factor
         What the input's coordinates were multiplied by.
+    left_out
+        Nodes of the asset whose triangles were left out: hulls for an engine, which new ones replace.
     """
 
     vertices: FloatArray
@@ -96,6 +98,7 @@ class InputMesh:
     node_of: IntArray | None = None
     asset: Asset | None = None
     factor: float = 1.0
+    left_out: tuple[SourceNode, ...] = ()
 
     @property
     def unit(self) -> str:

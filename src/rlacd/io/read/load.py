@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 from rlacd.errors import EmptyMeshError, MeshDataError, MeshFileError, MissingExtraError
 from rlacd.io.read.beside import FolderFiles
 from rlacd.io.read.conventions import stated
+from rlacd.io.read.engine_hulls import without_engine_hulls
 from rlacd.io.read.gltf import node_names, plain_gltf
 from rlacd.io.read.gltf_encoded import decoded_gltf
 from rlacd.io.read.limits import MOST_TRIANGLES
@@ -58,7 +59,8 @@ def load_mesh(source: Source) -> InputMesh:
     source
         A path (obj, stl, ply, off, glb, gltf, vrm, dae, zae, 3mf, xyz, usd), a mesh or scene of trimesh, or vertices
         ``[V, 3]`` with faces ``[F, 3]`` (or quads ``[F, 4]``). Scenes are baked: every instance of a geometry is placed
-        by its transform. Paths and curves are ignored; point clouds give vertices without faces.
+        by its transform. Paths and curves are ignored; point clouds give vertices without faces. Nodes of a scene that
+        are hulls for an engine, by their names, are left out with a warning if there are others.
 
     Returns
     -------
@@ -77,12 +79,12 @@ def load_mesh(source: Source) -> InputMesh:
         A USD file or one that Draco compressed, and the extra ``usd`` or ``draco`` is not installed.
     """
     if isinstance(source, str | os.PathLike):
-        return _from_file(Path(source))
+        return without_engine_hulls(_from_file(Path(source)))
     if isinstance(source, trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud):
         kind = type(source).__name__
         baked = _bake(source, kind)
         looks = isinstance(source, trimesh.Scene) or (isinstance(source, trimesh.Trimesh) and source.visual.defined)
-        return replace(_clean(baked, kind), asset=Asset(source) if looks else None)
+        return without_engine_hulls(replace(_clean(baked, kind), asset=Asset(source) if looks else None))
     if isinstance(source, tuple) and len(source) == 2:
         return _clean(_Baked(*_arrays(*source)), "arrays")
     raise MeshDataError(

@@ -37,7 +37,7 @@ def converted(mesh: InputMesh, name: str) -> bytes:
     header, rest = split(Path(f"{name}.glb"), bytes(scene.export(file_type="glb")))
     if asset.extension:
         _tell_materials(header)
-    if asset.path is not None and len(mesh.nodes) < 2:
+    if asset.path is not None and len(mesh.nodes) + len(mesh.left_out) < 2:
         _join(header, name)
     text = json.dumps(header, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
     chunks = chunk(JSON_CHUNK, text + b" " * (-len(text) % 4)) + (rest or b"")
@@ -49,7 +49,7 @@ def nodes_of(mesh: InputMesh, name: str) -> tuple[SourceNode, ...]:
     assert mesh.asset is not None
     if not mesh.nodes:
         return (SourceNode(name, name, np.eye(4)),)
-    renamed = mesh.asset.path is not None and len(mesh.nodes) == 1
+    renamed = mesh.asset.path is not None and len(mesh.nodes) + len(mesh.left_out) == 1
     nodes = []
     for node in mesh.nodes:
         transform = node.transform.copy()

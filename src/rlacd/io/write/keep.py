@@ -1,8 +1,9 @@
 """The input's own scene with hulls added under the nodes they belong to: glTF in, glTF out, nothing lost.
 
 The JSON of a glTF file is edited and its binary chunk appended to; no index that it holds changes. So nodes,
-transforms, materials, textures, skins, animations, extensions and whatever else is unknown here stay as they are. Files
-that it refers to are put into it, so that the binary file stands alone. Anything else is converted first.
+transforms, materials, textures, skins, animations, extensions and whatever else is unknown here stay as they are; only
+hulls for an engine, which were not decomposed, give way to the new ones. Files that it refers to are put into it, so
+that the binary file stands alone. Anything else is converted first.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import base64
 import json
 import struct
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -124,6 +125,7 @@ class _Scene:
         self._added: list[bytes] = []
         self._take_in(FolderFiles(asset.path.parent, DATA | IMAGES) if asset.is_gltf and asset.path else None)
         self._nodes = {node.get("name"): index for index, node in enumerate(header.get("nodes", []))}
+        self._take_off([self.index_of(node.key) for node in mesh.left_out])
 
     def index_of(self, key: int | str) -> int | None:
         """The index of a source node."""
@@ -184,6 +186,28 @@ class _Scene:
             chunks += chunk(BINARY_CHUNK, binary)
         chunks += self._others
         return struct.pack("<4sII", MAGIC, 2, 12 + len(chunks)) + chunks
+
+    def _take_off(self, hulls: Iterable[int | None]) -> None:
+        """Take the meshes off nodes, and the nodes off the scene unless there is something below them.
+
+        They stay in their lists, nameless, so that all other indices stay too.
+        """
+        nodes, meshes = self._header.get("nodes", []), self._header.get("meshes", [])
+        off = [index for index in hulls if index is not None]
+        unplaced = {nodes[index].get("mesh") for index in off}
+        for index in off:
+            for of_mesh in ("mesh", "skin", "weights", "name"):
+                nodes[index].pop(of_mesh, None)
+        for mesh in unplaced - {None, *(node.get("mesh") for node in nodes)}:
+            meshes[mesh].pop("name", None)
+        ends = {index for index in off if not nodes[index].get("children")}
+        holders = [(node, "children") for node in nodes]
+        holders += [(scene, "nodes") for scene in self._header.get("scenes", [])]
+        for holder, below in holders:
+            if not ends.isdisjoint(holder.get(below, ())):
+                holder[below] = [index for index in holder[below] if index not in ends]
+                if not holder[below]:
+                    del holder[below]  # no list is empty in glTF
 
     def _append(self, data: bytes, target: int | None) -> dict[str, Any]:
         """Add bytes, and return the view of them."""
