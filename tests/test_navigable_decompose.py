@@ -220,12 +220,18 @@ def mesh(tmp_path: Path) -> Path:
 def test_the_command_writes_the_balls(mesh: Path, tmp_path: Path) -> None:
     words = ["decompose", mesh, "-o", tmp_path / "out.glb", "--criterion", "navigable"]
     for ending in ("csv", "glb"):
-        assert run(*words, "--balls", tmp_path / f"balls.{ending}").exit_code == 0
+        report = tmp_path / "report.json"
+        assert run(*words, "--balls", tmp_path / f"balls.{ending}", "--report", report).exit_code == 0
     with (tmp_path / "balls.csv").open() as file:
         rows = list(csv.DictReader(file))
     spheres = trimesh.load(tmp_path / "balls.glb").to_geometry()
     assert len(rows) == len(spheres.split())
     assert all(float(row["radius"]) > 0 for row in rows)
+    assert len(rows) == json.loads(report.read_text(encoding="utf-8"))["navigable"]["balls"] > 0
+    places = np.array([[float(row[name]) for name in "xyz"] for row in rows])
+    hulls = trimesh.load_scene(tmp_path / "out.glb").to_mesh().split()
+    reach = np.min([np.abs(trimesh.proximity.closest_point(hull, places)[1]) for hull in hulls], axis=0)
+    assert (reach >= np.array([float(row["radius"]) for row in rows]) - 1e-4).all(), "a hull reaches into a ball"
 
 
 def test_the_command_takes_seeds_and_planes(mesh: Path, tmp_path: Path) -> None:
