@@ -143,6 +143,47 @@ def test_a_pipe_a_bottle_a_cup_and_a_lampshade_stay_hollow_unless_they_shall_be_
     assert not thin.warnings
 
 
+def bent_tube(radii, sections=8):
+    """A tube along half a circle of radius 1, open at both ends, with these radii along its way."""
+    turn = np.linspace(0, 2 * np.pi, sections, endpoint=False)
+    way = np.linspace(0, np.pi, len(radii))
+    out = 1 + np.multiply.outer(radii, np.cos(turn))
+    up = np.multiply.outer(radii, np.sin(turn))
+    points = np.stack([out * np.cos(way)[:, None], out * np.sin(way)[:, None], up], axis=-1).reshape(-1, 3)
+    i, j = (a.ravel() for a in np.mgrid[: len(radii) - 1, :sections])
+    a, b = sections * i + j, sections * i + (j + 1) % sections
+    return trimesh.Trimesh(
+        points, np.concatenate([np.stack([a, b, b + sections], 1), np.stack([a, b + sections, a + sections], 1)])
+    )
+
+
+@pytest.mark.parametrize(("bulge", "step"), [(0.0, "capped"), (0.3, "slab")])
+def test_the_ends_of_a_tube_are_closed_and_the_necks_of_a_flask_are_not(bulge, step):
+    """Both have the same two round openings, as far from a point of the surface and as small beside the body."""
+    solid = solid_of(bent_tube(0.055 + bulge * np.sin(np.linspace(0, np.pi, 25)) ** 2))
+    assert steps(solid) == [step]
+    assert ("Holes were closed" if step == "capped" else "--open solid fills it") in solid.warnings[0]
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.3])
+def test_a_hole_in_which_a_basin_hangs_is_not_closed(shift):
+    """A box whose top has a hole; a basin that does not hang in the hole, but below it, leaves it a wound."""
+    half = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    top = np.vstack([np.c_[half, np.ones(4)], np.c_[0.5 * half, np.ones(4)]])
+    ring = [[a, (a + 1) % 4, 4 + b] for a in range(4) for b in (a, (a + 1) % 4)]
+    ring = [[a, b, c] if c == 4 + (a + 1) % 4 else [a, 4 + (a + 1) % 4, 4 + a] for a, b, c in ring]
+    counter = join(without(BOX, *np.flatnonzero(BOX.face_normals[:, 2] > 0.9)), trimesh.Trimesh(top, ring))
+    counter.merge_vertices()
+    basin = trimesh.creation.box(extents=(1.04, 1.04, 0.8))
+    basin = moved(without(basin, *np.flatnonzero(basin.face_normals[:, 2] > 0.9)), 0, 0, 0.62 - shift)
+    alone = solid_of(counter)
+    assert steps(alone) == ["capped"]
+    assert volume(alone) == pytest.approx(8, rel=1e-3)
+    solid = solid_of(join(counter, basin))
+    inside = SurfaceQuery(*to_arrays(solid.manifold)).inside(solid.frame.to_frame(np.array([[0.0, 0.0, 0.6]])))
+    assert inside.all() == (shift > 0)
+
+
 def test_a_car_is_solid(corpus):
     """Two of its seven bodies are open, where nothing can get inside."""
     solid = repair(load_mesh(corpus / "test/gazebo_models/hatchback__hatchback.ply"))

@@ -6,6 +6,7 @@ A body is closed only if every one of its holes may be closed: a cap that leaves
 sheet. A hole may be closed if its cap stays near the surface, if the ball cannot reach it, if it is small relative to
 the body, or if it is a wound: few edges, and a cap that smoothly continues the faces around it, as at missing faces.
 Around the mouth of a bottle, faces turn away from the cap. A body with many wounds gets its other small holes closed.
+A hole with another body all along its rim, such as a counter's with a basin in it, is no wound.
 """
 
 from __future__ import annotations
@@ -40,6 +41,8 @@ with a few holes is meant as a solid, a cup is not. The caps are reported."""
 _WOUND_EDGES, _WOUND, _MISSING_FACE = 12, 0.1, 0.2
 # A ring of more edges than this is a mouth, not a wound, if its corners lie on a circle to this accuracy.
 _RING, _ROUND = 6, 0.1
+# A body with at most this many radii of a ring as volume per area is a tube that ends there, no bottle with a neck.
+_TUBE = 0.7
 # Along at least this share of its rim, the cap turns by less than this from the adjacent faces (cosine of 45 degrees).
 _SMOOTH_SHARE, _SMOOTH = 0.3, 0.7
 # If there are this many wounds, and at least this share of all holes, then all holes within these limits are wounds.
@@ -159,8 +162,16 @@ def close_holes(
     smooth = _smooth_share(soup, rims, caps, owner) >= _SMOOTH_SHARE
     ring = np.array([len(loop) > _RING and _is_round(soup.vertices[loop]) for loop in rims.loops])
     wound = _wounds(rims, smooth, ring, by_loop / body_area[loop_body], depth)
+    wound &= ~_plugged(soup, rims, body, loop_body, wound & (depth > gap), gap)
     wound &= (cap_area * wound[owner]).sum() <= _WOUNDS * soup.area.sum()
-    hole = nearly_closed[loop_body] & (smooth | ~ring)
+    # The volume that all caps together would enclose, by the windings found.
+    sign = np.where(rims.inverted, -1, 1) * ~rims.flap
+    enclosed = np.bincount(body, sign * signed_tetrahedra(soup.vertices, soup.faces), bodies)
+    enclosed += np.bincount(loop_body[owner], signed_tetrahedra(soup.vertices, caps), bodies)
+    # A tube has half its radius of volume per area; a bottle, which is wider than its neck, has more.
+    radius = np.sqrt(by_loop / np.pi)
+    tube = np.abs(enclosed / np.maximum(body_area, np.finfo(float).tiny))[loop_body] <= _TUBE * radius
+    hole = nearly_closed[loop_body] & (smooth | ~ring | tube)
     excused = wound[place] | (hole[place] & (distance <= HOLE))
     chosen = np.zeros(bodies, dtype=bool)
     chosen[loop_body] = True
@@ -193,10 +204,6 @@ def close_holes(
     by_room = np.zeros(bodies, dtype=bool)
     by_room[loop_body[place[unreachable & ~excused]]] = True
     wide = far & chosen[loop_body[place]]
-    # The volume that all caps together would enclose, by the windings found.
-    sign = np.where(rims.inverted, -1, 1) * ~rims.flap
-    enclosed = np.bincount(body, sign * signed_tetrahedra(soup.vertices, soup.faces), bodies)
-    enclosed += np.bincount(loop_body[owner], signed_tetrahedra(soup.vertices, caps), bodies)
     hollow = refused[np.abs(enclosed[refused]) > _ROOMY * body_area[refused]]
     widest = [np.flatnonzero(loop_body == one)[by_loop[loop_body == one].argmax()] for one in hollow.tolist()]
     mouths = np.array([soup.vertices[rims.loops[loop]].mean(axis=0) for loop in widest]).reshape(-1, 3)
@@ -281,6 +288,22 @@ def _wounds(rims: Rims, smooth: BoolArray, ring: BoolArray, part: FloatArray, de
         small = (part <= HOLE_SHARE) | (depth <= HOLE) | (smooth & (part <= _DAMAGED_WOUND))
         return wound | ((number <= _DAMAGED_EDGES) & small)
     return wound & ~ring
+
+
+def _plugged(soup: Soup, rims: Rims, body: IntArray, loop_body: IntArray, asked: BoolArray, gap: float) -> BoolArray:
+    """Return ``[L]`` which of the loops asked for have another body, such as a basin in a counter, all along them."""
+    plugged = np.zeros(len(loop_body), dtype=bool)
+    for one in np.unique(loop_body[asked]).tolist():
+        others = soup.faces[body != one]
+        if len(others) == 0:
+            continue
+        query = SurfaceQuery(soup.vertices, others)
+        for loop in np.flatnonzero(asked & (loop_body == one)).tolist():
+            poll_stop()
+            corners = soup.vertices[rims.loops[loop]]
+            middles = (corners + np.roll(corners, -1, axis=0)) / 2
+            plugged[loop] = (query.distance(np.concatenate([corners, middles])) <= gap).all()
+    return plugged
 
 
 def _is_round(points: FloatArray) -> bool:
