@@ -22,7 +22,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rlacd.cli.main import app
-from rlacd.errors import MissingExtraError, OptionError, TrainingError
+from rlacd.errors import OptionError, TrainingError
 from rlacd.learn.paper.options import PRESETS, TrainOptions
 from rlacd.pool import Answer, InProcessPool, LocalPool, Pool, Request, WorkerDiedError
 from tests.learning import write_meshes
@@ -134,18 +134,6 @@ def test_every_option_has_help_and_the_command_line_shows_it() -> None:
     for option in dataclasses.fields(TrainOptions):
         assert f"--{option.name.replace('_', '-')}" in shown.output
         assert option.metadata["option"].help.split(";")[0][:30] in shown.output
-
-
-def test_without_the_extra_the_command_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in list(sys.modules):
-        if name.startswith("rlacd.learn.paper.train"):
-            monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, "torch", None)
-    result = CliRunner().invoke(app, ["train", str(tmp_path), "--run", str(tmp_path / "run")])
-    assert result.exit_code == 2
-    assert "rlacd[train]" in result.output
-    assert "Traceback" not in result.output
-    assert issubclass(MissingExtraError, ImportError)
 
 
 def test_the_main_job_does_not_load_torch() -> None:

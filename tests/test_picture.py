@@ -113,8 +113,9 @@ def test_a_missing_extra_is_one_sentence_with_the_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: str
 ) -> None:
     monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(MissingExtraError, match=r"pip install 'rlacd\[view\]'"):
+    with pytest.raises(MissingExtraError, match=r"pip install 'rlacd\[view\]'") as raised:
         towers().picture(tmp_path / "out.png")
+    assert isinstance(raised.value, ImportError)
 
 
 def test_an_extra_that_does_not_load_is_told_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
