@@ -98,6 +98,18 @@ def distance_to_union(points: Floats, hulls: list[Polytope]) -> Floats:
     return best
 
 
+def winding_number(points: Floats, corners: Floats) -> Floats:
+    """How often triangles [F, 3, 3] wind around points [N, 3]: the sum of their solid angles (Van Oosterom)."""
+    total = np.zeros(len(points))
+    for triangle in corners:
+        a, b, c = (corner - points for corner in triangle)
+        la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+        across = np.einsum("ij,ij->i", a, np.cross(b, c))
+        along = la * lb * lc + (a * b).sum(axis=1) * lc + (a * c).sum(axis=1) * lb + (b * c).sum(axis=1) * la
+        total += np.arctan2(across, along)
+    return total / (2 * np.pi)
+
+
 def why_not_convex(vertices: Floats, faces: Ints) -> str | None:
     """Explain what is wrong with a hull; None if it is closed, outward oriented and convex.
 

@@ -5,6 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+import rlacd
 from rlacd.merge import in_input
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
@@ -51,3 +52,26 @@ def test_a_hull_thinner_than_the_coordinates_resolve_keeps_its_outline(turn):
     assert outline.sum(axis=1).max() <= 1 + 1e-6
     few = in_input(hull, frame, max_vertices=4)
     assert len(few.vertices) == 4
+
+
+@pytest.mark.parametrize("limits", [{"max_vertices": 4}, {"max_faces": 4}, {"max_vertices": 5}, {"max_faces": 8}])
+def test_a_flat_hull_within_limits_stays_near_its_outline(limits):
+    corners = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0.2, 0.9, 0), (0, 0, 1e-9)], dtype=float)
+    there = in_input(Hull.of(corners), Frame(center=np.full(3, 1e9), scale=1.0), **limits)
+    assert len(there.vertices) <= limits.get("max_vertices", 9)
+    assert len(there.faces) <= limits.get("max_faces", 99)
+    assert np.ptp(there.vertices, axis=0).max() <= 4 + 1e-5
+    outside = trimesh.proximity.signed_distance(trimesh.Trimesh(there.vertices - 1e9, there.faces), corners)
+    assert outside.min() >= -1e-6
+
+
+def test_what_is_delivered_is_what_is_measured():
+    """Far from the origin, rounding moves corners: the report's distances are those of the hulls in the result."""
+    vertices = np.array([[2133474.422051975, -1227970.982897935, -2822809.689823566]] * 3)
+    vertices[1:] += [[-2.8e-10, -1.04e-9, -9.1e-10], [-2.1e-10, -4.7e-11, -9.8e-10]]
+    mesh = trimesh.Trimesh(vertices, [[0, 1, 2]], process=False)
+    result = rlacd.decompose(mesh, max_vertices=4)
+    lower, upper = vertices.min(axis=0), vertices.max(axis=0)
+    scale = 2 / (upper - lower).max()
+    beyond = max((hull.vertices - upper).max() for hull in result) * scale
+    assert result.report["hausdorff"]["over"] >= beyond - 1e-5

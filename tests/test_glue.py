@@ -40,3 +40,11 @@ def test_coplanar_faces_on_the_same_side_stay() -> None:
     right = Component(Manifold.cube((1, 1, 1)).translate((2, 0, 0)))
     glued = Part.glued(left, right)
     assert _native.mesh_area(glued.vertices, glued.faces) == pytest.approx(12)
+
+
+def test_parts_that_are_all_film_keep_their_surfaces() -> None:
+    """Every face of such a part touches the other one: without a surface there would be nothing to measure."""
+    below = Component(Manifold.cube((1, 1, 2e-9)))
+    above = Component(Manifold.cube((1, 1, 2e-9)).translate((0, 0, 2e-9)))
+    glued = Part.glued(below, above)
+    assert len(glued.faces) == len(below.faces) + len(above.faces)

@@ -17,12 +17,68 @@ import rlacd.cut_and_merge
 from fuzz.geometry import Polytope, distance_to_union
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
-from rlacd.repair.tangles import TangledError, refuse_tangles, tangled_bodies
+from rlacd.repair.tangles import INSIDE_OUT_IF_FAILING, TangledError, refuse_tangles, tangled_bodies
 from rlacd.solid.solid import Solid
 
 Mesh = tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]
 
 BOX = trimesh.creation.box()
+
+
+FAULTY_BRACKET: Mesh = (
+    np.array(
+        [
+            [0.0, 0.0, 0.0],
+            [0.0, 0.0, 68.31],
+            [0.0, 71.4, 0.0],
+            [0.0, 71.4, 35.91],
+            [8.64, 12.66, 8.64],
+            [8.64, 12.66, 59.67],
+            [8.64, 71.4, 8.64],
+            [8.64, 71.4, 59.67],
+            [59.99, 12.66, 8.64],
+            [59.99, 12.66, 0.0],
+            [59.99, 71.4, 8.64],
+            [59.99, 71.4, 59.67],
+            [68.63, 0.0, 0.0],
+            [68.63, 0.0, 68.31],
+            [68.63, 71.4, 0.0],
+            [68.63, 71.4, 68.31],
+        ],
+        dtype=float,
+    ),
+    np.array(
+        [
+            [12, 13, 1],
+            [5, 9, 8],
+            [8, 4, 5],
+            [1, 13, 15],
+            [15, 3, 1],
+            [13, 12, 14],
+            [14, 15, 13],
+            [12, 0, 2],
+            [2, 14, 12],
+            [0, 1, 3],
+            [3, 2, 0],
+            [3, 15, 11],
+            [11, 7, 3],
+            [15, 14, 10],
+            [10, 11, 15],
+            [14, 2, 6],
+            [6, 10, 14],
+            [2, 3, 7],
+            [7, 6, 2],
+            [7, 11, 9],
+            [9, 5, 7],
+            [11, 10, 8],
+            [8, 9, 11],
+            [10, 6, 4],
+            [4, 8, 10],
+            [6, 7, 5],
+            [5, 4, 6],
+        ]
+    ),
+)
 
 
 def tangle(seed: int = 0) -> Mesh:
@@ -68,9 +124,9 @@ def _box(points: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], npt.
 @pytest.mark.parametrize("seed", range(4))
 def test_what_the_faces_of_a_tangle_enclose_is_solid(seed: int) -> None:
     mesh = tangle(seed)
-    assert tangled_bodies(repaired(mesh)).tolist() == [0]
+    assert tangled_bodies(repaired(mesh), share=INSIDE_OUT_IF_FAILING).tolist() == [0]
     solid = repaired(mesh, tangled=True)
-    assert len(tangled_bodies(solid)) == 0
+    assert len(tangled_bodies(solid, share=0)) == 0
     (body,) = solid.bodies
     assert (body.step, body.faces_in) == ("slab", 20)
     assert body.deviation < 2e-3
@@ -111,25 +167,36 @@ def test_bodies_that_cross_each_other_are_no_tangle(apart: float) -> None:
     vertices, faces = np.array(BOX.vertices), np.array(BOX.faces)
     mesh = np.concatenate([vertices, vertices * [3, 0.3, 0.3] + [apart, 0, 0]]), np.concatenate([faces, faces + 8])
     assert len(tangled_bodies(repaired(mesh))) == 0
-    refuse_tangles(repaired(mesh))
+    refuse_tangles(repaired(mesh), None, failing=True)
 
 
-def test_it_is_asked_once_and_after_much_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rlacd.cut, "DOUBTFUL", 1e4)
+def test_it_is_asked_after_much_work_and_again_after_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rlacd.cut, "DOUBTFUL", 3e3)
     monkeypatch.setattr(rlacd.cut, "DOUBTFUL_PER_FACE", 0)
     asked = []
 
-    def ask(solid: Solid, threads: int | None = None) -> None:
-        asked.append(solid)
-        refuse_tangles(solid, threads)
+    def ask(solid: Solid, threads: int | None, failing: bool) -> None:
+        asked.append(failing)
+        refuse_tangles(solid, threads, failing)
 
     monkeypatch.setattr("rlacd.decompose_mesh.refuse_tangles", ask)
     torus = trimesh.creation.torus(1, 0.4, major_sections=16, minor_sections=8)
     first = rlacd.decompose(torus, quality="fast", threads=1)
-    assert len(asked) == 1
+    assert asked == [False, True]
     monkeypatch.undo()
     second = rlacd.decompose(torus, quality="fast", threads=1)
     assert [hull.vertices.tolist() for hull in first] == [hull.vertices.tolist() for hull in second]
+
+
+@pytest.mark.slow
+def test_a_body_with_large_faces_that_is_inside_out_here_and_there_is_a_tangle() -> None:
+    """A bracket of 28 triangles, one of them gone and two with a wrong corner: it used to end as 927 hulls."""
+    mesh = FAULTY_BRACKET
+    with pytest.raises(TangledError):
+        refuse_tangles(repaired(mesh), None, failing=True)
+    result = rlacd.decompose(mesh, threads=2, quality="fast")
+    assert len(result) < 30
+    assert result.report["hausdorff"]["under"] < 1e-3
 
 
 @pytest.mark.slow
@@ -137,7 +204,7 @@ def test_it_is_asked_once_and_after_much_work(monkeypatch: pytest.MonkeyPatch) -
 def test_a_tangle_takes_bounded_work(seed: int) -> None:
     mesh = tangle(seed)
     with pytest.raises(TangledError):
-        refuse_tangles(repaired(mesh))
+        refuse_tangles(repaired(mesh), None, failing=False)
     result = rlacd.decompose(mesh, threads=2)
     assert result.report["complete"]
     assert len(result) < 60

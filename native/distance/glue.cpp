@@ -174,6 +174,12 @@ void append_untouched(Mesh& out, const Mesh& a, const Mesh& b, const Box& common
   }
 }
 
+void append(Mesh& out, const Mesh& mesh) {
+  const auto base = static_cast<std::int32_t>(out.vertices.size());
+  out.vertices.insert(out.vertices.end(), mesh.vertices.begin(), mesh.vertices.end());
+  for (const Triangle& face : mesh.faces) out.faces.push_back({face[0] + base, face[1] + base, face[2] + base});
+}
+
 }  // namespace
 
 Mesh glue(const Mesh& a, const Mesh& b) {
@@ -186,6 +192,10 @@ Mesh glue(const Mesh& a, const Mesh& b) {
   Mesh out;
   append_untouched(out, a, b, common);
   append_untouched(out, b, a, common);
+  if (!out.faces.empty()) return out;
+  // Films thinner than kCoincident touch everywhere; what bounds them still has to be measured.
+  out = a;
+  append(out, b);
   return out;
 }
 

@@ -25,6 +25,9 @@ DOUBTFUL, DOUBTFUL_PER_FACE = 1e6, 150
 """Units of work, and units per triangle of the solid, after which it is asked whether the solid can be cut at all. Of
 181 real meshes none took more than 0.90 of it."""
 
+FAILING = 3
+"""Multiple of that after which cutting seems to fail."""
+
 MANY = 1000
 """With more components than this, the policy may have failed: there are solids that one breaks into thousands of parts
 and another into tens (docs/research/learning.md). So a second one is tried, ..."""
@@ -87,7 +90,8 @@ class CutTree:
     cache : CutCache, optional
         Cuts shared with other trees.
     doubt : callable, optional
-        Called once if cutting takes much work; may raise an error for a solid that cannot be cut as it is.
+        Called with False if cutting takes much work, and with True if it takes `FAILING` times as much; may raise an
+        error for a solid that cannot be cut as it is.
     second : Policy, optional
         Takes over if it leaves far fewer components than thousands.
     """
@@ -98,11 +102,12 @@ class CutTree:
         policy: Policy,
         workers: Workers,
         cache: CutCache | None = None,
-        doubt: Callable[[], None] | None = None,
+        doubt: Callable[[bool], None] | None = None,
         second: Policy | None = None,
     ) -> None:
         self.root = root
         self._doubt = doubt
+        self._doubtful = DOUBTFUL + DOUBTFUL_PER_FACE * root.size
         self._policy = policy
         self._workers = workers
         self._cache = cache or CutCache()
@@ -176,10 +181,14 @@ class CutTree:
         return done
 
     def _ask_after(self, units: float) -> None:
-        """Ask once whether the solid can be cut, if cutting has taken much work."""
-        if self._doubt is not None and units > DOUBTFUL + DOUBTFUL_PER_FACE * self.root.size:
-            doubt, self._doubt = self._doubt, None
-            doubt()
+        """Ask whether the solid can be cut, once if cutting has taken much work, and again if it seems to fail."""
+        if self._doubt is None or units <= self._doubtful:
+            return
+        failing = self._doubtful > DOUBTFUL + DOUBTFUL_PER_FACE * self.root.size
+        self._doubtful *= FAILING
+        self._doubt(failing)
+        if failing:
+            self._doubt = None
 
     def _divide(self, components: Sequence[Component]) -> None:
         """Split components into their connected pieces, and cut those that are connected."""

@@ -26,6 +26,7 @@ from rlacd.fields import check_callback
 from rlacd.io.read.conventions import UNITS
 from rlacd.io.read.load import load_mesh
 from rlacd.merge import (
+    as_carried,
     drop_slivers,
     in_input,
     limit_part,
@@ -311,6 +312,7 @@ def _finished(reached: _Reached, workers: Workers, clock: Clock) -> _Done:
         )
         with clock.shielded():
             hulls = workers.map(lambda part: in_input(part.hull, solid.frame, *limits), parts)
+            parts = [as_carried(part, hull, solid.frame) for part, hull in zip(parts, hulls, strict=True)]
     with clock.stage("measure"):
         report = make_report(solid, parts, hulls, reached.options, goal, seams, workers, clock, reached.root)
         unknown: list[int] | list[None] = [None] * len(hulls)
@@ -464,7 +466,7 @@ def _through_proxy(
     options: Options,
     workers: Workers,
     clock: Clock,
-    doubt: Callable[[], None] | None,
+    doubt: Callable[[bool], None] | None,
 ) -> _Reached:
     """Decompose a proxy under a tighter criterion, and carry the parts to the solid."""
     share = proxy.deviation / options.threshold
@@ -486,7 +488,7 @@ def _cut_and_searched(
     options: Options,
     workers: Workers,
     clock: Clock,
-    doubt: Callable[[], None] | None,
+    doubt: Callable[[bool], None] | None,
 ) -> tuple[list[Part], Criterion, SearchSummary | None]:
     """The parts of a solid, the criterion as settled on them, and a summary of the search."""
     sweeps = SweepCache()
@@ -537,6 +539,8 @@ def _parts(
     tree: CutTree, criterion: Criterion, options: Options, workers: Workers, clock: Clock
 ) -> tuple[list[Part], Criterion]:
     """The parts, and the criterion as settled on them."""
+    if options.max_hulls == 1:
+        return [tree.root], criterion.settled([tree.root])
     parts, criterion = _one_pass(tree, criterion, options, workers, clock)
     if options.max_hulls is None or len(parts) <= options.max_hulls:
         return parts, criterion

@@ -81,11 +81,7 @@ def make_report(
                 *_coarse(solid),
                 *_early_end(clock),
                 *_cut_short(clock),
-                *(
-                    ["There was no time to measure how far hulls and input are apart."]
-                    if has_surface and over is None
-                    else []
-                ),
+                *(_unmeasured(solid) if has_surface and over is None else []),
                 *(_shallow(seams, options.overlap / solid.frame.scale) if options.overlap > 0 else []),
                 *summary.warnings,
                 *_shortcomings(
@@ -239,6 +235,14 @@ def _distances(
     points = np.ascontiguousarray(points[:: 1 + len(points) // PLACES])
     away = hull_union(hulls, workers.threads).distance(points)
     return over, under, solid.frame.place(points[away.argmax()])
+
+
+def _unmeasured(solid: Solid) -> list[str]:
+    sentences = ["There was no time to measure how far hulls and input are apart."]
+    moved = max((body.deviation for body in solid.bodies), default=0.0)
+    if moved > HONEST_WITHIN:
+        sentences.append(f"Some of the input's surface may lie {moved:.4g} from the hulls: repair moved it that far.")
+    return sentences
 
 
 def _coarse(solid: Solid) -> list[str]:

@@ -1,6 +1,6 @@
 """Merging parts, overlapping hulls, fitting primitives, limiting vertices and faces of hulls, and dropping slivers."""
 
-from rlacd.merge.in_input import in_input
+from rlacd.merge.in_input import as_carried, in_input
 from rlacd.merge.limited import limit_part, limit_roughly, with_limits
 from rlacd.merge.merge import merge_lifted, merge_parts, merge_to_count
 from rlacd.merge.overlap import overlap_parts
@@ -9,6 +9,7 @@ from rlacd.merge.simple import simple_part
 from rlacd.merge.slivers import drop_slivers
 
 __all__ = [
+    "as_carried",
     "drop_slivers",
     "in_input",
     "limit_part",

@@ -8,7 +8,10 @@ import math
 import numpy as np
 import trimesh
 
+from rlacd.merge.limits import limit_hull
 from rlacd.solid.arrays import FloatArray
+from rlacd.solid.component import Part
+from rlacd.solid.distance import hull_union
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.primitive import PRIMITIVE
@@ -16,6 +19,9 @@ from rlacd.solid.primitive import PRIMITIVE
 _LARGEST = float(np.finfo(np.float64).max)
 
 _BOX_VERTICES, _BOX_FACES = 8, 12
+
+UNSEEN = 1e-6
+"""How far, in the frame, a hull may move on its way to the input's unit before it has to be measured again."""
 
 
 def in_input(
@@ -40,20 +46,58 @@ def in_input(
         points = np.clip(frame.to_input(hull.vertices), -_LARGEST, _LARGEST)
     there = Hull.of(points)
     if there is None:
-        there = _thickened(points, max_vertices, max_faces) or plain_hull(points, max_vertices, max_faces)
+        there = _thickened(points, max_vertices, max_faces)
     metadata = {} if hull.primitive is None else {PRIMITIVE: hull.primitive.in_input(frame).as_plain()}
     return trimesh.Trimesh(there.vertices, there.faces, process=False, metadata=metadata)
 
 
-def _thickened(points: FloatArray, max_vertices: int | None, max_faces: int | None) -> Hull | None:
-    """The hull of flat points [N, 3], thick enough to have a volume; None if that is not within the limits."""
+def as_carried(part: Part, there: trimesh.Trimesh, frame: Frame) -> Part:
+    """Get the part with the hull that `in_input` made of its own, in the frame: what has to be measured.
+
+    The same part if no vertex moved by more than `UNSEEN`, as always unless the coordinates resolve little.
+    """
+    if part.hull.primitive is not None:
+        return part
+    points = frame.to_frame(there.vertices)
+    if points.shape == part.hull.vertices.shape and np.abs(points - part.hull.vertices).max() <= UNSEEN:
+        return part
+    if all(np.abs(part.hull.vertices - point).max(axis=1).min() <= UNSEEN for point in points):
+        return part
+    hull = Hull.of(points)
+    return part if hull is None else part.with_hull(hull)
+
+
+def _thickened(points: FloatArray, max_vertices: int | None, max_faces: int | None) -> Hull:
+    """A hull of flat points [N, 3] that has a volume and is within the limits."""
     step = _step(points)
     lower, upper = np.maximum(points, step - _LARGEST) - step, np.minimum(points, _LARGEST - step) + step
     corners = itertools.product(*zip(lower.T, upper.T, strict=True))
     hull = Hull.of(np.concatenate([np.stack(corner, axis=1) for corner in corners]))
-    if hull is None or len(hull.vertices) > (max_vertices or math.inf) or len(hull.faces) > (max_faces or math.inf):
+    if hull is not None and _fits(hull, max_vertices, max_faces):
+        return hull
+    plain = plain_hull(points, max_vertices, max_faces)
+    limited = None if hull is None else _limited(hull, max_vertices, max_faces, 2 * step)
+    return plain if limited is None else min(limited, plain, key=lambda hull: float(np.ptp(hull.box, axis=0).max()))
+
+
+def _limited(hull: Hull, max_vertices: int | None, max_faces: int | None, slack: float) -> Hull | None:
+    """A hull within the limits around one in the input's unit; None if rounding leaves more than `slack` outside."""
+    near = Frame.of(hull.vertices)
+    full = Hull.of(near.to_frame(hull.vertices))
+    if full is None:
         return None
-    return hull
+    points = near.to_input(limit_hull(full, max_vertices, max_faces).vertices)
+    limited = Hull.of(points) if np.isfinite(points).all() else None
+    if limited is None or not _fits(limited, max_vertices, max_faces):
+        return None
+    in_frame = Hull.of(near.to_frame(limited.vertices))
+    if in_frame is None or np.max(hull_union([in_frame]).distance(full.vertices)) > slack * near.scale:
+        return None
+    return limited
+
+
+def _fits(hull: Hull, max_vertices: int | None, max_faces: int | None) -> bool:
+    return len(hull.vertices) <= (max_vertices or math.inf) and len(hull.faces) <= (max_faces or math.inf)
 
 
 def plain_hull(points: FloatArray, max_vertices: int | None, max_faces: int | None) -> Hull:

@@ -25,6 +25,8 @@ FEW = 100
 """Up to this many parts, any pair may be united across other parts; with more, only pairs near each other or near a
 common third part."""
 
+MEASURING = 5e6
+"""Work spent on measuring pairs where parts are united down to a number."""
 
 AT_ONCE = 512
 """Number of pairs tested against the solid between two checks of the clock."""
@@ -387,7 +389,7 @@ def merge_to_count(
     """Unite parts, always the pair whose union has the least error, until at most `count` are left.
 
     Errors are measured only for pairs whose lower bound could make them the best (lazy best-first search), first among
-    neighbours, then among all parts.
+    neighbours, then among all parts. After `MEASURING` units of work, bounds stand in for errors.
 
     Parameters
     ----------
@@ -413,10 +415,11 @@ def merge_to_count(
     origin = {i: i for i in alive}
     newest = len(parts)
     reach = criterion.screen.reach
+    account = Work(MEASURING)
     try:
         queue = _bounded_pairs(alive, list(alive), reach, criterion, workers)
         while len(alive) > count and clock.step(len(parts) - len(alive), len(parts) - count, len(alive)):
-            pair = _pop_least(queue, alive, criterion)
+            pair = _pop_least(queue, alive, criterion, account)
             if pair is None:
                 if reach == np.inf:
                     break
@@ -429,16 +432,15 @@ def merge_to_count(
             del alive[pair.first], alive[pair.second]
             origin[newest] = min(origin[pair.first], origin[pair.second])
             alive[newest] = union
-            queue += _bounded_pairs(alive, [newest], reach, criterion, workers)
-            heapq.heapify(queue)
+            for bounded in _bounded_pairs(alive, [newest], reach, criterion, workers):
+                heapq.heappush(queue, bounded)
             newest += 1
     except Stopped:  # between two unions
         clock.note_stop()
     return [alive[i] for i in sorted(alive, key=origin.__getitem__)]
 
 
-@dataclass(order=True, frozen=True)
-class _BoundedPair:
+class _BoundedPair(NamedTuple):
     error: float  # of the union: a lower bound, or the value if `measured`
     first: int
     second: int
@@ -457,13 +459,15 @@ def _bounded_pairs(
     return queue
 
 
-def _pop_least(queue: list[_BoundedPair], alive: dict[int, Part], criterion: Criterion) -> _BoundedPair | None:
+def _pop_least(
+    queue: list[_BoundedPair], alive: dict[int, Part], criterion: Criterion, account: Work
+) -> _BoundedPair | None:
     """Pop the pair whose union has the least error; None if no pair is left."""
     while queue:
         pair = heapq.heappop(queue)
         if pair.first not in alive or pair.second not in alive:
             continue
-        if pair.measured:
+        if pair.measured or not account.pay(price_of_gluing(alive[pair.first], alive[pair.second])):
             return pair
         error = criterion.error(Part.glued(alive[pair.first], alive[pair.second]))
         heapq.heappush(queue, _BoundedPair(max(error, pair.error), pair.first, pair.second, True))

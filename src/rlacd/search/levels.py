@@ -31,6 +31,10 @@ TIMES_FIRST_PASS = 4
 LEAST_WORK, MOST_WORK = 0.15e6, 6e6
 """Absolute limits on that limit, in units: about 0.15 and 6 seconds of one core."""
 
+TIMES_STEPPED, WORK_OF_A_STEP = 3, 1e5
+"""The work allowed beyond that where only the number of steps is limited, for the passes and eliminations that are not
+counted as steps, and for each step: far more than most take."""
+
 ANOTHER_PASS = 1.5
 """A pass is abandoned when it exceeds this multiple of the work of the first."""
 
@@ -165,7 +169,9 @@ def search(
     at_a_limit = most_parts is not None and not all(context.workers.map(context.criterion.is_met, parts))
     first_pass = clock.work.done
     bounded = level.bounded and not (at_a_limit and level.seconds is not None)
-    allowed = min(max(TIMES_FIRST_PASS * first_pass, LEAST_WORK), MOST_WORK) if bounded else math.inf
+    allowed = TIMES_STEPPED * first_pass + MOST_WORK + WORK_OF_A_STEP * steps if level.seconds is None else math.inf
+    if bounded:
+        allowed = min(max(TIMES_FIRST_PASS * first_pass, LEAST_WORK), MOST_WORK)
     budget = SearchBudget(clock, level.seconds, len(parts), patient=bounded, work=Work(allowed))
     if most_parts is not None and at_a_limit:
         if len(parts) <= most_parts:
