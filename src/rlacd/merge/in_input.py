@@ -23,6 +23,9 @@ _BOX_VERTICES, _BOX_FACES = 8, 12
 UNSEEN = 1e-6
 """How far, in the frame, a hull may move on its way to the input's unit before it has to be measured again."""
 
+_BEYOND = 1e100
+"""Coordinates of the frame with which no distance is computed: those of a speck far from the origin."""
+
 
 def in_input(
     hull: Hull, frame: Frame, max_vertices: int | None = None, max_faces: int | None = None
@@ -56,9 +59,9 @@ def as_carried(part: Part, there: trimesh.Trimesh, frame: Frame) -> Part:
 
     The same part if no vertex moved by more than `UNSEEN`, as always unless the coordinates resolve little.
     """
-    if part.hull.primitive is not None:
-        return part
     points = frame.to_frame(there.vertices)
+    if part.hull.primitive is not None or np.abs(points).max() > _BEYOND:
+        return part
     if points.shape == part.hull.vertices.shape and np.abs(points - part.hull.vertices).max() <= UNSEEN:
         return part
     if all(np.abs(part.hull.vertices - point).max(axis=1).min() <= UNSEEN for point in points):
