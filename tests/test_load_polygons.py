@@ -75,7 +75,33 @@ def ply(solid: Prism, order: str) -> bytes:
     return head.encode() + body + b"".join(struct.pack(f"{order}BB{len(p)}I", 1, len(p), *p) for p in polygons)
 
 
+def dae(solid: Prism, one_list: bool = True) -> bytes:
+    """With a normal for each corner, before its point; polygons in one list, or each in an element of its own."""
+    points, polygons = solid
+    rings = [" ".join(f"0 {corner}" for corner in p) for p in polygons]
+    listed = f"<vcount>{' '.join(str(len(p)) for p in polygons)}</vcount><p>{' '.join(rings)}</p>"
+    kind, inside = ("polylist", listed) if one_list else ("polygons", "".join(f"<p>{ring}</p>" for ring in rings))
+    return f"""<?xml version="1.0" encoding="utf-8"?>
+        <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+        <asset><unit meter="1"/><up_axis>Z_UP</up_axis></asset>
+        <library_geometries><geometry id="g"><mesh>
+        <source id="n"><float_array id="n-a" count="3">0 0 1</float_array><technique_common>
+        <accessor source="#n-a" count="1" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
+        <param name="Z" type="float"/></accessor></technique_common></source>
+        <source id="p"><float_array id="p-a" count="{points.size}">{" ".join(map(repr, points.ravel().tolist()))}
+        </float_array><technique_common><accessor source="#p-a" count="{len(points)}" stride="3">
+        <param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/></accessor>
+        </technique_common></source>
+        <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+        <{kind} count="{len(polygons)}"><input semantic="NORMAL" source="#n" offset="0"/>
+        <input semantic="VERTEX" source="#v" offset="1"/>{inside}</{kind}></mesh></geometry></library_geometries>
+        <library_visual_scenes><visual_scene id="s"><node><instance_geometry url="#g"/></node></visual_scene>
+        </library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>""".encode()
+
+
 WRITERS = {
+    "dae": dae,
+    "polygons.dae": lambda solid: dae(solid, one_list=False),
     "obj": obj,
     "off": off,
     "ascii.ply": lambda solid: ply(solid, ""),

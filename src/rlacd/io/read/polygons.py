@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -42,17 +43,23 @@ def triangles_of(points: FloatArray, counts: IntArray, corners: IntArray) -> Int
         not overlap.
     """
     fans, owner = _fans(counts, corners)
-    folded = _folded(points, fans, owner, len(counts))
-    if not len(folded):
-        return fans
-    ends = np.cumsum(counts)
     begins = np.searchsorted(owner, np.arange(len(counts) + 1))
-    for polygon in folded.tolist():
-        ring = corners[ends[polygon] - counts[polygon] : ends[polygon]]
-        apart = _apart(points[ring])
-        if apart is not None:
-            fans[begins[polygon] : begins[polygon + 1]] = ring[apart]
+    first = np.cumsum(counts) - counts
+    for polygon, apart in where_folded(points, counts, corners):
+        fans[begins[polygon] : begins[polygon + 1]] = corners[first[polygon] + apart]
     return fans
+
+
+def where_folded(points: FloatArray, counts: IntArray, corners: IntArray) -> Iterator[tuple[int, IntArray]]:
+    """Each polygon whose fan folds over, in order, and its triangles ``[N - 2, 3]`` as places in its ring of corners.
+
+    Those that cannot be taken apart are left out. Arguments as for `triangles_of`.
+    """
+    first = np.cumsum(counts) - counts
+    for polygon in _folded(points, *_fans(counts, corners), len(counts)).tolist():
+        apart = _apart(points[corners[first[polygon] : first[polygon] + counts[polygon]]])
+        if apart is not None:
+            yield polygon, apart
 
 
 def _fans(counts: IntArray, corners: IntArray) -> tuple[IntArray, IntArray]:
@@ -117,15 +124,12 @@ def obj_without_folds(content: bytes) -> bytes:
     if not len(corners) or corners.min() < 0 or corners.max() >= len(points):
         return content
     kept, done = [], 0
-    ends = np.cumsum(counts)
-    for polygon in _folded(points, *_fans(counts, corners), len(counts)).tolist():
-        apart = _apart(points[corners[ends[polygon] - counts[polygon] : ends[polygon]]])
-        if apart is not None:
-            begin, end = lines[polygon].tolist()
-            words = text[begin:end].split()[1:]
-            faces = b"\n".join(b"f " + b" ".join(words[corner] for corner in face) for face in apart)
-            kept += [text[done:begin], faces]
-            done = end
+    for polygon, apart in where_folded(points, counts, corners):
+        begin, end = lines[polygon].tolist()
+        words = text[begin:end].split()[1:]
+        faces = b"\n".join(b"f " + b" ".join(words[corner] for corner in face) for face in apart)
+        kept += [text[done:begin], faces]
+        done = end
     return b"".join([*kept, text[done:]]) if kept else content
 
 

@@ -22,6 +22,7 @@ from lxml import etree
 from rlacd.errors import MeshFileError
 from rlacd.io.read.archive import open_archive, unpack
 from rlacd.io.read.limits import DEEPEST, LONGEST_NAME, MOST_ITEMS, MOST_PLACES, MOST_TRIANGLES, most_in_memory
+from rlacd.io.read.polygons_dae import collada_without_folds
 
 WORLD = ""
 """The root part that all others are placed in; no identifier is empty."""
@@ -144,7 +145,7 @@ def _line_of(error: etree.XMLSyntaxError) -> str:
 
 
 def collada_of(path: Path, content: bytes, extension: str) -> bytes:
-    """Return the XML of a COLLADA file, unpacked if it is a ``zae``, and check it.
+    """Return the XML of a COLLADA file, unpacked if it is a ``zae``, checked, and with concave polygons taken apart.
 
     Raises
     ------
@@ -159,12 +160,12 @@ def collada_of(path: Path, content: bytes, extension: str) -> bytes:
         content = unpack(path, archive, names[0])
     if is_zipfile(io.BytesIO(content)):
         raise MeshFileError(f"{path} has an archive in the place of its XML: rename it to .zae, or export it again")
-    check_collada(path, content)
-    return content
+    root = checked_collada(path, content)
+    return etree.tostring(root, xml_declaration=True, encoding="utf-8") if collada_without_folds(root) else content
 
 
-def check_collada(path: Path, data: bytes) -> None:
-    """Refuse a COLLADA file that would expand or multiply to more than is reasonable.
+def checked_collada(path: Path, data: bytes) -> Any:
+    """Return the document of a COLLADA file; refuse one that would expand or multiply to more than is reasonable.
 
     Raises
     ------
@@ -191,6 +192,7 @@ def check_collada(path: Path, data: bytes) -> None:
             if node.get("id") is not None:
                 parts[f"node {node.get('id')}"] = XmlPart(parts=_placed(node))
     check_instances(path, parts)
+    return root
 
 
 PRIMITIVES = ("{*}triangles", "{*}polylist", "{*}polygons", "{*}tristrips", "{*}trifans")
