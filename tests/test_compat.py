@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import warnings
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -54,6 +55,30 @@ def test_run_coacd_gives_the_originals_kind_of_result() -> None:
         assert len(ours) <= len(theirs)
         for vertices, faces in ours:
             assert_convex_hull(trimesh.Trimesh(vertices, faces, process=False))
+
+
+def test_a_program_written_for_coacd_runs_with_another_import(tmp_path: Path) -> None:
+    """Load, decompose, colour and export, as CoACD's users do."""
+    table().export(tmp_path / "table.obj")
+    program = """
+import coacd
+import trimesh
+
+mesh = trimesh.load(folder / "table.obj", force="mesh")
+mesh = coacd.Mesh(mesh.vertices, mesh.faces)
+parts = coacd.run_coacd(mesh)
+
+scene = trimesh.Scene()
+for vertices, faces in parts:
+    part = trimesh.Trimesh(vertices, faces)
+    part.visual.vertex_colors = trimesh.visual.random_color()
+    scene.add_geometry(part)
+scene.export(folder / "parts.glb")
+"""
+    exec(program.replace("import coacd\n", "from rlacd.compat import coacd\n"), {"folder": tmp_path})
+    parts = trimesh.load_scene(tmp_path / "parts.glb").geometry.values()
+    assert len(parts) > 1
+    assert sum(part.volume for part in parts) == pytest.approx(table().volume, rel=0.01)
 
 
 def test_run_coacd_is_decompose() -> None:
@@ -124,10 +149,13 @@ def test_compute_vhacd_gives_the_originals_kind_of_result() -> None:
         assert_convex_hull(trimesh.Trimesh(vertices, triangles.astype(np.int64), process=False))
 
 
-def test_both_forms_of_faces_are_taken() -> None:
+def test_all_forms_of_faces_are_taken() -> None:
+    """Rows, and what vhacdx takes and what its README promises: numbers with a 3 before each triangle, or without."""
     mesh = table()
-    flat, rows = (compute_vhacd(mesh.vertices, faces) for faces in (triangles_with_threes(mesh), mesh.faces))
-    assert all(np.array_equal(a, b) for a, b in zip([v for v, _ in flat], [v for v, _ in rows], strict=True))
+    forms = mesh.faces, triangles_with_threes(mesh), np.array(mesh.faces, dtype=np.uint32).ravel()
+    rows, *flat = (compute_vhacd(mesh.vertices, faces) for faces in forms)
+    for other in flat:
+        assert all(np.array_equal(a, b) for (a, _), (b, _) in zip(rows, other, strict=True))
     with pytest.raises(MeshDataError, match="triangulate"):
         compute_vhacd(mesh.vertices, [4, 0, 1, 2, 3])
 

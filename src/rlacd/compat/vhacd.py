@@ -49,7 +49,8 @@ def compute_vhacd(
     points : array-like [V, 3]
         Vertices.
     faces : array-like [F, 3] or flat
-        Triangles; or, as vhacdx takes them, one row of numbers ``3, a, b, c, 3, a, b, c, ...``.
+        Triangles; or one row of numbers: ``3, a, b, c, 3, a, b, c, ...`` as vhacdx takes them, or ``a, b, c, a, b, c,
+        ...`` as its README says (0.1.1 itself makes nothing useful of these).
     maxConvexHulls : int
         Maximum number of hulls.
     maxNumVerticesPerCH : int
@@ -90,8 +91,12 @@ def compute_vhacd(
 
 def _triangles(faces: Any) -> npt.NDArray[np.int64]:
     array = np.asarray(faces)
-    if array.ndim == 1:
-        if len(array) % 4 or (array[::4] != 3).any():
-            raise MeshDataError("flat faces are not of the form 3, a, b, c, 3, ...: triangulate the polygons first.")
+    if array.ndim == 1 and len(array) % 4 == 0 and (array[::4] == 3).all():
         array = array.reshape(-1, 4)[:, 1:]
+    elif array.ndim == 1 and len(array) % 3 == 0:
+        array = array.reshape(-1, 3)
+    elif array.ndim == 1:
+        raise MeshDataError(
+            "flat faces are neither 3, a, b, c, 3, ... nor a, b, c, a, ...: triangulate the polygons first."
+        )
     return array.astype(np.int64)
