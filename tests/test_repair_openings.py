@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 import trimesh
+from manifold3d import Manifold
 
 import rlacd
 from fuzz.flaws import FAMILIES
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.caps import HOLE
 from rlacd.repair.distance import SurfaceQuery
+from rlacd.repair.repair import _attempted as attempted
 from rlacd.repair.repair import repair
 from rlacd.repair.union import to_arrays
 from rlacd.repair.voxels import GAP
@@ -405,3 +407,34 @@ def test_a_person_with_fins_loses_nothing(corpus, share, seed):
     report = rlacd.decompose(trimesh.Trimesh(*damaged, process=False), quality="fast", threads=1).report
     assert report["hausdorff"]["under"] <= 0.005
     assert report["hausdorff"]["over"] <= 0.062
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name", ["test/gazebo_models/speed_limit_sign__speed_limit_sign", "train/kenney_cc0/space_kit__spaceCraft1"]
+)
+def test_what_closing_would_lose_stays_open(corpus, name):
+    """A body that caps turn inside out in places, and one of films that a wrap cuts off."""
+    path = corpus / f"{name}.ply"
+    result = rlacd.decompose(path, quality="fast")
+    assert result.report["hausdorff"]["under"] < 1e-3
+    assert "became thin shells" in result.report["warnings"][0]
+    filled = rlacd.decompose(path, quality="fast", open="solid")
+    assert not any("became thin shells" in warning for warning in filled.report["warnings"])
+
+
+@pytest.mark.parametrize(("left", "taken"), [(0.9, "thin"), (0.1, "auto")])
+def test_nothing_is_left_open_that_would_be_emptied(left, taken):
+    class Fake:
+        def __init__(self, open_bodies, tangled, bend=1.0):
+            self.open_bodies, self.warnings = open_bodies, []
+            self.lost = 0.0 if open_bodies == "thin" else 0.1
+            self.solid = Manifold.cube((1, 1, left if open_bodies == "thin" else 1.0))
+
+        def doubted(self):
+            return np.empty(0, dtype=np.int64)
+
+    work = attempted(Fake, "auto", None)
+    assert work.open_bodies == taken
+    assert len(work.warnings) == (taken == "thin")
+    assert attempted(Fake, "solid", None).open_bodies == "solid"

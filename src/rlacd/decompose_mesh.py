@@ -83,6 +83,9 @@ MeshLike: TypeAlias = "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene 
 COARSER = 1.5
 """With `max_hulls`, thresholds that grow by this factor are tried, and the best decomposition is kept."""
 
+MOST_COARSER = 8e6
+"""Units of work after which no coarser pass is tried any more, if the hulls are few enough: those of a tangle only."""
+
 FEW_TO_DOUBT = 2000
 """Solids of at most this many triangles are sampled at as many points after a stop: do the hulls cover them?"""
 
@@ -546,7 +549,7 @@ def _parts(
         return parts, criterion
     best: list[Part] = []
     least = np.inf
-    coarser = criterion
+    coarser, begin = criterion, clock.work.done
     while True:
         with clock.stage("merge"):
             few = merge_to_count(parts, options.max_hulls, criterion, workers, clock, worst=least)
@@ -557,7 +560,8 @@ def _parts(
                 error = np.inf
         if few and (not best or (len(few) <= options.max_hulls and error < least)):
             best, least = few, error
-        if len(parts) <= options.max_hulls or clock.stopped_by is not None:
+        enough = len(best) <= options.max_hulls and clock.work.done - begin > MOST_COARSER
+        if len(parts) <= options.max_hulls or clock.stopped_by is not None or enough:
             return best, criterion
         coarser = coarser.scaled(COARSER)
         parts, _ = _one_pass(tree, coarser, options, workers, clock)

@@ -50,7 +50,7 @@ class Attempt:
     record : Record
         What was done to each body.
     lost : float
-        How far what a capped body lost lies from the solid.
+        How far what a capped body lost lies from the solid, or a wrapped one beyond what wraps may lose.
     warnings : list of str
     """
 

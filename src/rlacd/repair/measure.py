@@ -17,7 +17,7 @@ from rlacd.solid.topology import BoolArray
 def measure(record: Record, surface: SurfaceQuery, shape: Shape) -> float:
     """Record, for the changed bodies, how far the solid and the input deviate from each other.
 
-    Returns how far what a capped body lost lies from the solid.
+    Returns how far what a capped body lost lies from the solid, or a wrapped one if that is more than two balls' radii.
     """
     if record.step.max() < STEPS.index("outer skin"):
         return 0.0
@@ -35,7 +35,8 @@ def measure(record: Record, surface: SurfaceQuery, shape: Shape) -> float:
     lost = lost[~inside_by_balls(solid, points[lost], distance[lost])]
     body = record.body_of_input[changed[on[lost]]]
     np.maximum.at(record.deviation, body, distance[lost])
-    return float(distance[lost].max(initial=0.0, where=record.step[body] == STEPS.index("capped")))
+    is_capped, is_wrapped = (record.step[body] == STEPS.index(step) for step in ("capped", "wrapped"))
+    return float(distance[lost].max(initial=0.0, where=is_capped | (is_wrapped & (distance[lost] > 2 * GAP))))
 
 
 def inside_by_balls(solid: SurfaceQuery, points: FloatArray, distance: FloatArray) -> BoolArray:

@@ -32,6 +32,7 @@ from rlacd.repair.attempt import Attempt
 from rlacd.repair.distance import SurfaceQuery, probes
 from rlacd.repair.slabs import hull_of_points
 from rlacd.repair.soup import FLAT, NO_AREA
+from rlacd.repair.union import volume_of
 from rlacd.repair.voxels import GAP
 from rlacd.solid.arrays import IntArray as Indices
 from rlacd.solid.frame import FloatArray, Frame
@@ -42,8 +43,10 @@ from rlacd.solid.topology import BoolArray, IntArray, detach_films, face_areas
 CELLS_ACROSS = 1.5
 """Least radius of a ball, in cells of the grid that it rolls on."""
 
-# What a capped body may lose before its caps are made another way.
+# What a capped body may lose before its caps are made another way, or none.
 _LOST = 5e-3
+# Share of the volume that is left where no hole is closed, below which bodies were emptied.
+_FILLED = 0.4
 # manifold3d collapses edges shorter than 1e-12, and swaps those of faces that are no higher, or folded back onto a
 # neighbour in a plane within 1e-12.
 _THIN = 1e-11
@@ -127,7 +130,7 @@ def repair(
         warnings.append(
             f"{bodies} too much of the own surface to be cut: what the faces enclose was taken to be solid."
         )
-    work = _attempted(partial(Attempt, query, frame, cells, gap, keep_cavities, open_bodies), tangled)
+    work = _attempted(partial(Attempt, query, frame, cells, gap, keep_cavities), open_bodies, tangled)
     return Solid(
         work.solid,
         surface,
@@ -138,15 +141,27 @@ def repair(
     )
 
 
-def _attempted(attempt: Callable[..., Attempt], tangled: IntArray | None) -> Attempt:
+def _attempted(attempt: Callable[..., Attempt], open_bodies: str, tangled: IntArray | None) -> Attempt:
     """The best of a few attempts; most inputs need one."""
-    how: dict[str, Any] = {"tangled": np.empty(0, dtype=np.int64) if tangled is None else tangled}
+    how: dict[str, Any] = {
+        "open_bodies": open_bodies,
+        "tangled": np.empty(0, dtype=np.int64) if tangled is None else tangled,
+    }
     work = attempt(**how)
     if work.lost > _LOST:
         # A cap that bends little can cross the body's own faces, which turns some of it inside out: try small caps.
         other = attempt(**how, bend=0.0)
         if other.lost < work.lost:
             work, how = other, how | {"bend": 0.0}
+    if work.lost > _LOST and open_bodies == "auto":
+        # Caps or wraps lose something: leave everything open, unless that empties a body.
+        other = attempt(**how | {"open_bodies": "thin"})
+        if other.lost < work.lost and volume_of(other.solid) > _FILLED * volume_of(work.solid):
+            other.warnings.append(
+                f"Some of the surface lay up to {work.lost:.4g} from the solid once holes were closed, so open bodies "
+                "became thin shells; --open solid fills them."
+            )
+            work, how = other, how | {"open_bodies": "thin"}
     doubted = work.doubted()
     if len(doubted):
         # If faces of one body cross each other, they may be joined into a wrong skin: try them as sheets.
