@@ -144,6 +144,15 @@ def test_a_request_that_trickles_in_is_ended(viewer: Viewer, trickle: bytes, mon
         (head("/decompose", "Content-Type: application/json", "Content-Length: -1", method="POST"), 411),
         (head("/decompose", "Content-Type: application/json", "Content-Length: many", method="POST"), 411),
         (head("/decompose", "Content-Type: application/json", "Transfer-Encoding: chunked", method="POST"), 411),
+        (
+            head(
+                "/open?name=a.stl",
+                "Content-Type: application/octet-stream",
+                f"Content-Length: {2**28 + 1}",
+                method="POST",
+            ),
+            413,
+        ),
         (head("/", method="DELETE"), 501),
         (head("/", "Host: 127.0.0.1"), 403),
         (b"GET / HTTP/1.1\r\n\r\n", 403),
