@@ -23,7 +23,7 @@ ADDR_NO_RANDOMIZE = 0x0040000
 
 NATIVE_TESTS = (
     *("hull", "sweep", "glue", "surface", "distance", "concavity", "concave_edges", "limits", "component", "metrics"),
-    *("plane_cut", "bridges", "least_excess", "shift", "dissolve", "fuzz_found"),
+    *("plane_cut", "bridges", "least_excess", "overlap", "redistribute", "caps", "frame", "tangles", "fuzz_found"),
     *("convex_clip", "proxy", "topology", "repair_kernels", "repair_openings", "repair_sheets", "stop"),
     *("navigable", "navigable_decompose", "merge", "repair", "decompose", "search", "networks", "fuzz", "bad_input"),
 )

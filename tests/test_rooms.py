@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import runpy
+
 from tests.rooms import ANY, NATIVE, PICTURE, ROOT, SHARED, homes, imported_rooms, picture, table, walk
 
 PACKAGE = ROOT / "src" / "rlacd"
@@ -44,3 +46,8 @@ def test_the_way_of_a_mesh_leads_down_only() -> None:
 
 def test_the_picture_is_that_of_the_code() -> None:
     assert picture(PACKAGE, table()) == PICTURE.read_text(encoding="utf-8"), "run  python -m tests.rooms"
+
+
+def test_the_sanitizers_are_given_tests_that_exist() -> None:
+    names = runpy.run_path(str(ROOT / "sanitizers" / "run.py"))["NATIVE_TESTS"]
+    assert [name for name in names if not (ROOT / "tests" / f"test_{name}.py").exists()] == []
