@@ -22,7 +22,8 @@ std::uint32_t spread(std::uint32_t v) {
 std::uint32_t place_on_curve(Vec3 p, const Box& box) {
   std::uint32_t place = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    const double share = (p[axis] - box.lower[axis]) / (box.upper[axis] - box.lower[axis]);
+    const double extent = box.upper[axis] - box.lower[axis];
+    const double share = extent > 0 ? (p[axis] - box.lower[axis]) / extent : 0;
     const double cell = std::min(1023.0, std::max(0.0, 1024.0 * share));
     place |= spread(static_cast<std::uint32_t>(cell)) << (2 - axis);
   }
