@@ -39,7 +39,8 @@ OPTIONS = {
     "UBSAN_OPTIONS": "print_stacktrace=1:halt_on_error=1",
     # What libraries without instrumentation do to memory is invisible but for their calls of malloc and memcpy, which
     # would look like races because the locks and atomics around them are not seen either.
-    "TSAN_OPTIONS": "ignore_noninstrumented_modules=1:halt_on_error=0:second_deadlock_stack=1:exitcode=66",
+    "TSAN_OPTIONS": "allocator_may_return_null=1:ignore_noninstrumented_modules=1:halt_on_error=0:"
+    "second_deadlock_stack=1:exitcode=66",
 }
 
 
