@@ -1,5 +1,6 @@
 // Python bindings of the simplification of a closed mesh.
 #include "base/arrays.hpp"
+#include "base/parallel.hpp"
 #include "proxy/simplifier.hpp"
 
 namespace rlacd {
@@ -15,8 +16,9 @@ void bind_simplifier(nb::module_& m) {
           },
           nb::arg("vertices"), nb::arg("faces"))
       .def(
-          "reduce", [](Simplifier& self, std::size_t count) { self.reduce(count); }, nb::arg("count"),
-          nb::call_guard<nb::gil_scoped_release>(),
+          "reduce",
+          [](Simplifier& self, std::size_t count, int threads) { self.reduce(count, resolve_threads(threads)); },
+          nb::arg("count"), nb::arg("threads") = 1, nb::call_guard<nb::gil_scoped_release>(),
           "Collapse edges until at most `count` triangles are left, or hardly any edge can be collapsed.")
       .def(
           "mesh",

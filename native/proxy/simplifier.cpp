@@ -1,12 +1,20 @@
 #include "proxy/simplifier.hpp"
 
 #include <cmath>
+#include <cstring>
 
+#include "base/parallel.hpp"
 #include "base/stop.hpp"
 
 namespace rlacd {
 namespace {
 
+// More faces than this are reduced in sweeps. One collapses only the cheapest edges, one in this many of all, so that
+// flat regions are swept again before features are touched.
+constexpr std::size_t kLarge = 12'000, kOneIn = 3;
+// Sweeps that remove less than one face in this many have run out of edges.
+constexpr std::size_t kHardlyAny = 50;
+constexpr std::size_t kChunk = 4096;  // faces whose edges one thread prices at a time
 // Edges drawn for each collapse: few while there are many faces, and more as each collapse matters more.
 constexpr std::size_t kFewChoices = 6, kMostChoices = 150, kChoicesTimesFaces = 400'000;
 // Moving along a flat surface costs nothing: this share of a quadric's trace holds points near the middle of the edge.
@@ -15,9 +23,16 @@ constexpr double kFarthest = 1;           // a point moves at most this many len
 constexpr double kTurned = 0.3;           // least cosine of the angle by which a collapse may turn a face
 constexpr std::size_t kMostFailures = 3;  // draws for each face left without an edge that can be collapsed
 constexpr std::size_t kFewest = 4;
-// Of more faces than this, edges are drawn from a window that moves along: the memory they are in is then near.
-constexpr std::size_t kLarge = 30'000, kWindow = 512, kAlong = 37;
 constexpr std::size_t kBetweenPolls = 1024;
+
+// Costs are ranked by their exponent and the first four bits of their mantissa.
+constexpr std::uint16_t kRanks = 1 << 15;
+std::uint16_t rank_of(double cost) {
+  if (!(cost > 0)) return 0;
+  std::uint64_t bits;
+  std::memcpy(&bits, &cost, sizeof bits);
+  return static_cast<std::uint16_t>(bits >> 48);
+}
 
 Vec3 face_normal(Vec3 a, Vec3 b, Vec3 c) { return cross(b - a, c - a); }
 
@@ -91,15 +106,61 @@ Simplifier::Simplifier(const Mesh& mesh)
   }
 }
 
-void Simplifier::reduce(std::size_t count) {
+void Simplifier::reduce(std::size_t count, int threads) {
+  for (std::size_t before = 0; size() > std::max(count, kLarge) && size() != before;) {
+    before = size();
+    sweep(std::max(count, kLarge), threads);
+    if (before - size() < before / kHardlyAny) break;
+  }
+  collapse_drawn(count);
+}
+
+// Collapses the cheap edges until at most `count` faces are left, in the order of the faces: their memory is then near.
+// Costs are those before the sweep, so no vertex takes part twice.
+void Simplifier::sweep(std::size_t count, int threads) {
+  std::vector<char> has_moved(points_.size(), 0);
+  std::size_t steps = 0;
+  for (const std::int32_t corner : cheap_edges(threads)) {
+    if (++steps % kBetweenPolls == 0) poll_stop();
+    if (size() <= count) return;
+    const Triangle& face = faces_[corner / 3];
+    const std::int32_t from = face[corner % 3], to = face[(corner + 1) % 3];
+    if (has_moved[from] || has_moved[to] || !collapse(priced(from, to))) continue;
+    has_moved[from] = has_moved[to] = 1;
+  }
+}
+
+// The cheapest edges, about one in `kOneIn`, as the corner 3 f + k they start from.
+std::vector<std::int32_t> Simplifier::cheap_edges(int threads) const {
+  std::vector<std::uint16_t> ranks(3 * faces_.size(), kRanks);  // of the edges, by corner
+  const std::size_t chunks = (faces_.size() + kChunk - 1) / kChunk;
+  parallel_for(chunks, threads, [&](std::size_t chunk) {
+    for (std::size_t f = chunk * kChunk; f < std::min(faces_.size(), (chunk + 1) * kChunk); ++f) {
+      if (place_[f] < 0) continue;
+      const Triangle& face = faces_[f];
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::int32_t from = face[k], to = face[(k + 1) % 3];
+        if (from < to) ranks[3 * f + k] = rank_of(priced(from, to).cost);
+      }
+    }
+  });
+  std::vector<std::size_t> of_rank(kRanks + 1, 0);
+  for (const std::uint16_t rank : ranks) ++of_rank[rank];
+  std::size_t wanted = (ranks.size() - of_rank[kRanks]) / kOneIn, dearest = 0;
+  for (; dearest + 1 < kRanks && of_rank[dearest] < wanted; ++dearest) wanted -= of_rank[dearest];
+  std::vector<std::int32_t> cheap;
+  for (std::size_t corner = 0; corner < ranks.size(); ++corner)
+    if (ranks[corner] <= dearest) cheap.push_back(static_cast<std::int32_t>(corner));
+  return cheap;
+}
+
+void Simplifier::collapse_drawn(std::size_t count) {
   std::size_t failures = 0, steps = 0;
   while (size() > std::max(count, kFewest) && failures < kMostFailures * size()) {
     if (++steps % kBetweenPolls == 0) poll_stop();
     candidates_.clear();
     const std::size_t choices = std::clamp(kChoicesTimesFaces / size(), kFewChoices, kMostChoices);
-    const std::size_t window = std::min(size(), kWindow);
-    window_ = size() > kLarge ? (window_ + kAlong) % size() : 0;
-    for (std::size_t k = 0; k < choices; ++k) candidates_.push_back(random_edge(size() > kLarge ? window : size()));
+    for (std::size_t k = 0; k < choices; ++k) candidates_.push_back(random_edge());
     // Cheap edges that cannot be collapsed would be drawn again and again.
     std::sort(candidates_.begin(), candidates_.end(),
               [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
@@ -135,20 +196,25 @@ std::uint64_t Simplifier::draw() {
   return z ^ (z >> 31);
 }
 
-Simplifier::Candidate Simplifier::random_edge(std::size_t window) {
+Simplifier::Candidate Simplifier::random_edge() {
   const std::uint64_t number = draw();
-  const Triangle& face = faces_[alive_[(window_ + static_cast<std::size_t>(number >> 8) % window) % alive_.size()]];
+  const Triangle& face = faces_[alive_[static_cast<std::size_t>(number >> 8) % alive_.size()]];
   const auto k = static_cast<std::size_t>(number % 3);
+  return priced(face[k], face[(k + 1) % 3]);
+}
+
+// The collapse of an edge to the best point, and what it costs.
+Simplifier::Candidate Simplifier::priced(std::int32_t from, std::int32_t to) const {
   Candidate edge;
-  edge.from = face[k];
-  edge.to = face[(k + 1) % 3];
-  Quadric both = quadrics_[edge.from];
-  both.add(quadrics_[edge.to]);
-  const Vec3 middle = 0.5 * (points_[edge.from] + points_[edge.to]);
+  edge.from = from;
+  edge.to = to;
+  Quadric both = quadrics_[from];
+  both.add(quadrics_[to]);
+  const Vec3 middle = 0.5 * (points_[from] + points_[to]);
   edge.point = both.least_near(middle);
-  if (norm2(edge.point - middle) > kFarthest * kFarthest * norm2(points_[edge.to] - points_[edge.from])) {
+  if (norm2(edge.point - middle) > kFarthest * kFarthest * norm2(points_[to] - points_[from])) {
     edge.point = middle;
-    for (const std::int32_t end : {edge.from, edge.to})
+    for (const std::int32_t end : {from, to})
       if (both.at(points_[end]) < both.at(edge.point)) edge.point = points_[end];
   }
   edge.cost = both.at(edge.point);

@@ -2,12 +2,13 @@
 //
 // In:  a closed, oriented manifold mesh; the number of triangles wanted.
 // Out: a closed, oriented manifold mesh whose faces lie in the middle of those they replace, so that noise averages
-// out. How: Edges are collapsed to the point of least squared distance to the planes of all faces they replace (Garland
-// and
-//      Heckbert, "Surface Simplification Using Quadric Error Metrics", 1997). Of a few edges drawn at random the
-//      cheapest is collapsed: nearly as good as the cheapest of all, without keeping them sorted (Wu and Kobbelt, "Fast
-//      Mesh Decimation by Multiple-Choice Techniques", 2002). The numbers drawn are the same every time.
-//      A collapse must not change the topology or turn a face over.
+//      out.
+// How: Edges are collapsed to the point of least squared distance to the planes of all faces they replace (Garland and
+//      Heckbert, "Surface Simplification Using Quadric Error Metrics", 1997). While there are many faces, sweeps price
+//      every edge once and collapse the cheap ones, cheapest first, each vertex at most once. Then, of a few edges
+//      drawn at random, the cheapest is collapsed: nearly as good as the cheapest of all, without keeping them sorted
+//      (Wu and Kobbelt, "Fast Mesh Decimation by Multiple-Choice Techniques", 2002). The numbers drawn are the same
+//      every time. A collapse must not change the topology or turn a face over.
 #pragma once
 
 #include <array>
@@ -22,8 +23,9 @@ class Simplifier {
  public:
   explicit Simplifier(const Mesh& mesh);
 
-  // Collapses edges until at most `count` faces are left, or hardly any edge can be collapsed.
-  void reduce(std::size_t count);
+  // Collapses edges until at most `count` faces are left, or hardly any edge can be collapsed. The result does not
+  // depend on the number of threads.
+  void reduce(std::size_t count, int threads = 1);
   std::size_t size() const { return alive_.size(); }
   Mesh mesh() const;
 
@@ -45,8 +47,12 @@ class Simplifier {
     double cost = 0;
   };
 
+  void sweep(std::size_t count, int threads);
+  std::vector<std::int32_t> cheap_edges(int threads) const;
+  void collapse_drawn(std::size_t count);
   std::uint64_t draw();
-  Candidate random_edge(std::size_t window);  // of the faces from `window_` on
+  Candidate random_edge();
+  Candidate priced(std::int32_t from, std::int32_t to) const;
   bool collapse(const Candidate& edge);
   void gather(std::int32_t vertex, std::vector<std::int32_t>& faces);
   bool turns_over(const std::vector<std::int32_t>& faces, std::int32_t vertex, std::int32_t other, Vec3 point) const;
@@ -61,7 +67,6 @@ class Simplifier {
   std::vector<std::int32_t> around_from_, around_to_, mark_;
   std::vector<Candidate> candidates_;
   std::int32_t stamp_ = 0;
-  std::size_t window_ = 0;
   std::uint64_t state_ = 0;
 };
 

@@ -428,7 +428,7 @@ def _repaired_and_cut(
     if options.max_hulls is None:  # otherwise the threshold may be exceeded anyway
         goal = with_limits(goal, options.max_vertices, options.max_faces)
     doubt = None if tangled is not None else partial(refuse_tangles, solid, workers.threads)
-    proxy = _proxy(root, goal, options, clock)
+    proxy = _proxy(root, goal, options, workers, clock)
     if proxy is not None:
         return _through_proxy(solid, root, proxy, goal, options, workers, clock, doubt)
     parts, goal, found = _cut_and_searched(root, goal, options, workers, clock, doubt)
@@ -449,13 +449,13 @@ def _lost_in_cuts(solid: Solid, parts: Sequence[Part], workers: Workers, clock: 
         return bool(away.max() > HONEST_WITHIN)
 
 
-def _proxy(root: Component, goal: Criterion, options: Options, clock: Clock) -> Proxy | None:
+def _proxy(root: Component, goal: Criterion, options: Options, workers: Workers, clock: Clock) -> Proxy | None:
     """A simpler solid to decompose in place of a dense one."""
     if not math.isfinite(goal.overhang) or len(root.faces) < FEW:
         return None
     try:
         with clock.stage("simplify"):
-            return simplify(root, options.threshold)
+            return simplify(root, options.threshold, workers.threads)
     except Stopped:
         clock.note_stop()
         return None

@@ -67,22 +67,24 @@ class Proxy:
     deviation: float
 
 
-def simplify(solid: Component, threshold: float) -> Proxy | None:
+def simplify(solid: Component, threshold: float, threads: int = 1) -> Proxy | None:
     """Make the smallest proxy that is near enough for a threshold; None if none is worthwhile."""
     looked_at = solid.vertices[_samples(solid)]
     for largest in (max(FEW, len(solid.faces) // TYPICAL), WORTHWHILE * len(solid.faces)):
-        proxy = _smallest(solid, looked_at, threshold, largest)
+        proxy = _smallest(solid, looked_at, threshold, largest, threads)
         if proxy is not None:
             return proxy
     return None
 
 
-def _smallest(solid: Component, looked_at: FloatArray, threshold: float, largest: float) -> Proxy | None:
+def _smallest(
+    solid: Component, looked_at: FloatArray, threshold: float, largest: float, threads: int
+) -> Proxy | None:
     """The smallest proxy that is near enough, if one with at most `largest` triangles is."""
     mesh = solid.vertices, solid.faces
     best: Proxy | None = None
     while (count := math.floor((STEP if len(mesh[1]) <= largest else LARGE_STEP) * len(mesh[1]))) >= COARSEST:
-        mesh = _reduced(mesh, count)
+        mesh = _reduced(mesh, count, threads)
         if len(mesh[1]) <= largest:
             near = _as_proxy(mesh, solid, looked_at, threshold)
             if near is None:
@@ -101,9 +103,9 @@ def _samples(solid: Component) -> IntArray:
     return np.concatenate([firsts, others]).astype(np.int32)
 
 
-def _reduced(mesh: tuple[FloatArray, IntArray], count: int) -> tuple[FloatArray, IntArray]:
+def _reduced(mesh: tuple[FloatArray, IntArray], count: int, threads: int) -> tuple[FloatArray, IntArray]:
     simplifier = _native.Simplifier(*mesh)
-    simplifier.reduce(count)
+    simplifier.reduce(count, threads)
     return simplifier.mesh()
 
 
