@@ -21,7 +21,7 @@ from rlacd._native import poll_stop
 from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.soup import Soup, across
 from rlacd.solid.frame import FloatArray
-from rlacd.solid.products import dots, heights, length
+from rlacd.solid.products import dots
 from rlacd.solid.topology import BoolArray, IntArray, components
 
 # A flap has at most this share of its body's area.
@@ -32,6 +32,9 @@ _FLAT_LID = 1 - 1e-6
 
 # A fin on the rim of a hole is at most so many faces long.
 _FIN_FACES = 8
+
+# Edges that meet at vertices are paired for so many pairs at once.
+_PAIRS_AT_ONCE = 1_000_000
 
 _NEXT = np.array([1, 2, 0])
 
@@ -304,20 +307,34 @@ def _followers(
     first_out, last_out = (np.searchsorted(tail[begins], vertex, side=side) for side in ("left", "right"))
     single = (last_in - first_in == 1) & (last_out - first_out == 1)
     follower[ends[first_in[single]]] = begins[first_out[single]]
-    for i in np.flatnonzero(~single & (last_out > first_out)):
+    several = np.flatnonzero(~single & (last_out > first_out))
+    ways_in, ways_out = last_in - first_in, last_out - first_out
+    batch = np.cumsum(ways_in[several] * ways_out[several]) // _PAIRS_AT_ONCE
+    free = np.ones(len(tail), dtype=bool)
+    for some in np.split(several, np.flatnonzero(np.diff(batch)) + 1):
         poll_stop()
-        arriving, leaving = ends[first_in[i] : last_in[i]], begins[first_out[i] : last_out[i]]
-        here, axis = vertices[vertex[i]], normals[vertex[i]]
-        axis = axis / max(length(axis), np.finfo(float).tiny)
-        came, goes = vertices[tail[arriving]] - here, vertices[head[leaving]] - here
-        flat = came - np.outer(heights(came, axis), axis)
-        turn = np.arctan2(heights(np.cross(axis, flat), goes), heights(flat, goes)) % (2 * np.pi)
-        turn[head_fan[arriving][:, None] == tail_fan[leaving]] += 2 * np.pi  # all the way around
-        for _ in range(min(turn.shape)):
-            a, b = np.unravel_index(turn.argmin(), turn.shape)
-            follower[arriving[a]] = leaving[b]
-            turn[a], turn[:, b] = np.inf, np.inf
+        # All pairs of an edge that arrives at a vertex and one that leaves it, vertex by vertex.
+        pairs = ways_in[some] * ways_out[some]
+        at = np.repeat(some, pairs)
+        place = np.arange(len(at)) - np.repeat(np.cumsum(pairs) - pairs, pairs)
+        arriving = ends[first_in[at] + place // ways_out[at]]
+        leaving = begins[first_out[at] + place % ways_out[at]]
+        turn = _turns(vertices, normals[vertex[at]], tail[arriving], vertex[at], head[leaving])
+        turn[head_fan[arriving] == tail_fan[leaving]] += 2 * np.pi  # all the way around
+        order = np.lexsort((turn, at))
+        for edge, next_edge in zip(arriving[order].tolist(), leaving[order].tolist(), strict=True):
+            if follower[edge] < 0 and free[next_edge]:
+                follower[edge] = next_edge
+                free[next_edge] = False
     return follower
+
+
+def _turns(vertices: FloatArray, axes: FloatArray, tail: IntArray, here: IntArray, head: IntArray) -> FloatArray:
+    """Angles [N] around axes [N, 3], from 0 to 2 pi, from where an edge came to where another goes."""
+    axes = axes / np.maximum(np.sqrt(dots(axes, axes)), np.finfo(float).tiny)[:, None]
+    came, goes = vertices[tail] - vertices[here], vertices[head] - vertices[here]
+    flat = came - dots(came, axes)[:, None] * axes
+    return np.arctan2(dots(np.cross(axes, flat), goes), dots(flat, goes)) % (2 * np.pi)
 
 
 def _cycles(follower: IntArray) -> list[IntArray]:
