@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 
-from rlacd import _native
 from rlacd.clock import Clock
 from rlacd.criteria import Concavity
 from rlacd.criteria.screen import Feasibility
@@ -56,8 +55,7 @@ def count_clusters(root: Component, parts: list[Part], criterion: Concavity) -> 
                 larger |= {cluster | {other} for i in cluster for other in near[i] - cluster}
             if criterion.screen.feasibility(root.filling, hull) is not Feasibility.MAYBE:
                 continue
-            vertices, faces = root.clipped(hull)
-            union = Part(vertices, faces, _native.mesh_volume(vertices, faces), hull)
+            union = root.inside(hull)
             found[size, "hulls"] += criterion.is_met(union)
             found[size, "primitives"] += primitive_part(union, criterion, PRIMITIVE_KINDS) is not union
         clusters = larger

@@ -7,8 +7,8 @@ import pytest
 import trimesh
 from manifold3d import Manifold, Mesh64
 
-from rlacd import _native
-from rlacd.solid.component import Component
+from rlacd.criteria import Concavity
+from rlacd.solid.component import Component, Part
 from rlacd.solid.distance import hull_union
 from rlacd.solid.hull import Hull
 
@@ -65,10 +65,11 @@ def test_clipping_agrees_with_a_boolean(name: str) -> None:
     undecided = 0
     for hull in hulls(mesh):
         undecided += solid.filling.clipped(hull.vertices, hull.faces) is None
-        vertices, faces = solid.clipped(hull)
+        part = solid.inside(hull)
+        vertices, faces = part.vertices, part.faces
         assert is_closed(faces)
         boolean = solid.manifold ^ Manifold(Mesh64(hull.vertices, hull.faces.astype(np.uint64)))
-        assert _native.mesh_volume(vertices, faces) == pytest.approx(boolean.volume(), abs=1e-6)
+        assert part.volume == pytest.approx(boolean.volume(), abs=1e-6)
         if len(faces):
             planes = hull.vertices[hull.faces]
             normals = np.cross(planes[:, 1] - planes[:, 0], planes[:, 2] - planes[:, 0])
@@ -84,10 +85,26 @@ def test_the_result_does_not_depend_on_threads_or_on_earlier_calls() -> None:
     first, second = component(mesh), component(mesh)
     some = hulls(mesh, 5)
     for hull in some:
-        second.clipped(hull)
+        second.inside(hull)
     for hull in some:
-        for a, b in zip(first.clipped(hull), second.clipped(hull), strict=True):
-            assert a.tobytes() == b.tobytes()
+        one, other = first.inside(hull), second.inside(hull)
+        assert one.vertices.tobytes() == other.vertices.tobytes()
+        assert one.faces.tobytes() == other.faces.tobytes()
+
+
+@pytest.mark.parametrize("name", solids())
+def test_a_clipped_part_measures_alike_with_its_ready_tree_and_without(name: str) -> None:
+    mesh = solids()[name]
+    solid = component(mesh)
+    for hull in hulls(mesh, 5):
+        part = solid.inside(hull)
+        if not part.size:
+            continue
+        plain = Part(part.vertices, part.faces, part.volume, hull)
+        measured, again = (Concavity().measure(one, tolerance=1e-4) for one in (part, plain))
+        assert measured.value == pytest.approx(again.value, abs=1e-4)
+        for one, other in ((measured.hull_to_part, again.hull_to_part), (measured.part_to_hull, again.part_to_hull)):
+            assert max(one[0], other[0]) <= min(one[1], other[1])
 
 
 def test_a_hull_around_everything_changes_nothing_and_one_inside_is_filled() -> None:
@@ -96,8 +113,8 @@ def test_a_hull_around_everything_changes_nothing_and_one_inside_is_filled() -> 
     inside = Hull.of(0.5 * np.array(trimesh.creation.box((1, 1, 1)).vertices))
     assert around is not None
     assert inside is not None
-    assert len(ball.clipped(around)[1]) == len(ball.faces)
-    assert _native.mesh_volume(*ball.clipped(inside)) == pytest.approx(inside.volume, abs=1e-6)
+    assert ball.inside(around).size == len(ball.faces)
+    assert ball.inside(inside).volume == pytest.approx(inside.volume, abs=1e-6)
 
 
 @pytest.mark.parametrize("name", ["ring", "bumpy ball", "two boxes"])

@@ -133,14 +133,16 @@ void bind_concavity(nb::module_& m) {
               sections.append(nb::make_tuple(rims, outlines));
             }
             return nb::make_tuple(to_array<double>(std::move(clip->mesh.vertices)),
-                                  to_array<std::int32_t>(std::move(clip->mesh.faces)), sections);
+                                  to_array<std::int32_t>(std::move(clip->mesh.faces)), sections,
+                                  new TreeCache(std::move(clip->shape)));
           },
           nb::arg("hull_vertices"), nb::arg("hull_faces"),
-          "The solid clipped to a convex hull, without the caps on the hull's facets: vertices [V, 3], faces [F, 3] "
-          "and\n"
+          "The solid clipped to a convex hull, without the caps on the hull's facets: vertices [V, 3], faces [F, 3],\n"
           "for each facet that cuts the solid the rims as loops of vertices, a list of [R], and as points [R, 2] of "
           "the\n"
-          "plane, counter-clockwise from outside. None where rounding makes the result uncertain.")
+          "plane, counter-clockwise from outside; and what makes the tree of the surface with the caps added to its "
+          "faces.\n"
+          "None where rounding makes the result uncertain.")
       .def(
           "uncovered",
           [](const Filling& self, const std::vector<PointsIn>& vertices, const std::vector<FacesIn>& faces,

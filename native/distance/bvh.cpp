@@ -13,6 +13,7 @@ constexpr int kBins = 8;
 // of the 31 bits, every traversal fits in a stack of fixed size.
 constexpr int kDeepestHeuristicSplit = 48;
 constexpr int kStack = 96;
+constexpr std::size_t kBetweenPolls = 1024;
 
 double distance2_to_box(const Box& box, Vec3 p) {
   const double x = std::max(std::max(box.lower.x - p.x, p.x - box.upper.x), 0.0);
@@ -126,24 +127,28 @@ Halves split(Items first, Items last, const Ends& centres, int depth) {
   return halves;
 }
 
-}  // namespace
-
-Bvh::Bvh(const Mesh& mesh) {
-  std::vector<Item> items(mesh.faces.size());
-  for (std::size_t f = 0; f < items.size(); ++f) {
-    for (const std::int32_t corner : mesh.faces[f]) items[f].ends.extend(Ends(mesh.vertices[corner]));
-    items[f].face = static_cast<std::int32_t>(f);
+std::vector<Item> items_of(const Mesh& mesh, std::size_t first) {
+  std::vector<Item> items(mesh.faces.size() - first);
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    for (const std::int32_t corner : mesh.faces[first + i]) items[i].ends.extend(Ends(mesh.vertices[corner]));
+    items[i].face = static_cast<std::int32_t>(first + i);
   }
+  return items;
+}
 
+// Appends the nodes of a tree over some items, which are sorted into the order of its leaves; the first item gets the
+// slot `first_slot`.
+void grow(std::vector<Bvh::Node>& nodes, std::vector<Item>& items, std::int32_t first_slot) {
   struct Range {
     Items first, last;
     std::int32_t node;
     int depth;
     Ends centres;
   };
-  nodes_.reserve(items.size() / 2 + 1);
-  nodes_.emplace_back();
-  std::vector<Range> open = {{items.begin(), items.end(), 0, 0, bounds(items.begin(), items.end()).centres}};
+  nodes.reserve(nodes.size() + items.size() / 2 + 1);
+  std::vector<Range> open = {{items.begin(), items.end(), static_cast<std::int32_t>(nodes.size()), 0,
+                              bounds(items.begin(), items.end()).centres}};
+  nodes.emplace_back();
   while (!open.empty()) {
     poll_stop();
     const Range range = open.back();
@@ -154,26 +159,74 @@ Bvh::Bvh(const Mesh& mesh) {
     const Items ends[3] = {range.first, halves.middle, range.last};
     for (int side = 0; side < 2; ++side) {
       const auto count = static_cast<std::int32_t>(ends[side + 1] - ends[side]);
-      Node& node = nodes_[range.node];
+      Bvh::Node& node = nodes[range.node];
       node.box[side] = halves.bounds[side].box.box();
       if (count <= kLeafSize) {
-        node.child[side] = ~static_cast<std::int32_t>(ends[side] - items.begin());
+        node.child[side] = ~(first_slot + static_cast<std::int32_t>(ends[side] - items.begin()));
         node.leaf_size[side] = count;
       } else {
-        node.child[side] = static_cast<std::int32_t>(nodes_.size());
+        node.child[side] = static_cast<std::int32_t>(nodes.size());
         open.push_back({ends[side], ends[side + 1], node.child[side], range.depth + 1, halves.bounds[side].centres});
-        nodes_.emplace_back();
+        nodes.emplace_back();
       }
     }
   }
+}
 
+Box box_around(const Bvh::Node& node) {
+  Box box = node.box[0];
+  if (!node.box[1].is_empty()) box.extend(node.box[1]);
+  return box;
+}
+
+}  // namespace
+
+Bvh::Bvh(const Mesh& mesh) {
+  std::vector<Item> items = items_of(mesh, 0);
+  grow(nodes_, items, 0);
   triangles_.reserve(items.size());
   faces_.reserve(items.size());
-  for (const Item& item : items) {
-    const Triangle& face = mesh.faces[item.face];
-    triangles_.emplace_back(mesh.vertices[face[0]], mesh.vertices[face[1]], mesh.vertices[face[2]]);
-    faces_.push_back(item.face);
+  for (const Item& item : items) hold(mesh, item.face);
+}
+
+Bvh::Bvh(const Mesh& mesh, const TreeShape& shape) {
+  std::vector<Item> others = items_of(mesh, shape.faces);
+  triangles_.reserve(mesh.faces.size());
+  faces_.reserve(mesh.faces.size());
+  if (!others.empty()) {
+    nodes_.emplace_back();  // joins the two trees
+    nodes_[0].child[0] = 1;
+    nodes_[0].child[1] = static_cast<std::int32_t>(1 + shape.nodes.size());
   }
+  const auto root = static_cast<std::int32_t>(nodes_.size());
+  nodes_.resize(nodes_.size() + shape.nodes.size());
+  for (std::size_t i = shape.nodes.size(); i-- > 0;) {  // children before their parents
+    if (i % kBetweenPolls == 0) poll_stop();
+    Node& node = nodes_[root + static_cast<std::int32_t>(i)];
+    for (int side = 0; side < 2; ++side) {
+      node.child[side] = shape.nodes[i].child[side];
+      node.leaf_size[side] = shape.nodes[i].leaf_size[side];
+      if (node.child[side] >= 0) {
+        node.child[side] += root;
+        node.box[side] = box_around(nodes_[node.child[side]]);
+      }
+      for (std::int32_t k = 0; k < node.leaf_size[side]; ++k)
+        for (const std::int32_t corner : mesh.faces[~node.child[side] + k])
+          node.box[side].extend(mesh.vertices[corner]);
+    }
+  }
+  for (std::size_t f = 0; f < shape.faces; ++f) hold(mesh, static_cast<std::int32_t>(f));
+  if (others.empty()) return;
+  grow(nodes_, others, static_cast<std::int32_t>(shape.faces));
+  for (const Item& item : others) hold(mesh, item.face);
+  for (int side = 0; side < 2; ++side) nodes_[0].box[side] = box_around(nodes_[nodes_[0].child[side]]);
+}
+
+// Puts a face into the next slot.
+void Bvh::hold(const Mesh& mesh, std::int32_t face) {
+  const auto [a, b, c] = mesh.faces[face];
+  triangles_.emplace_back(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]);
+  faces_.push_back(face);
 }
 
 Bvh::Hit Bvh::closest(Vec3 p, std::int32_t hint, double enough, double within) const {

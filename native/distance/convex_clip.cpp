@@ -99,15 +99,17 @@ constexpr std::int32_t kNone = -1;
 class Clip {
  public:
   Clip(const Mesh& solid, const Surface& surface, Polytope polytope)
-      : solid_(solid), surface_(surface), polytope_(std::move(polytope)) {
+      : solid_(solid),
+        surface_(surface),
+        polytope_(std::move(polytope)),
+        numbers_of_vertices_(solid.vertices.size(), kNone) {
     crossings_.resize(polytope_.edges.size());
     paths_.resize(polytope_.facets.size());
   }
 
   std::optional<ConvexClip> run() {
-    Group all(polytope_.facets.size());
-    for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<std::int32_t>(i);
-    visit(0, all);
+    for (std::size_t i = 0; i < polytope_.facets.size(); ++i) crossing_.push_back(static_cast<std::int32_t>(i));
+    finish_shape(visit(0, 0));
     if (is_contradictory_ || !find_states() || !add_edges() || !link()) return std::nullopt;
     return std::move(result_);
   }
@@ -128,37 +130,86 @@ class Clip {
     std::int32_t side;
   };
 
-  void visit(std::int32_t at, const Group& crossing) {
+  // A child of a tree's node: a node, or a leaf of the faces made so far, empty if nothing is inside.
+  struct Child {
+    std::int32_t node = -1;
+    std::int32_t leaf_size = 0;
+    bool is_empty() const { return node < 0 && leaf_size == 0; }
+  };
+
+  // Clips all below a node of the solid's tree. The facets that cross it are crossing_[first, ...).
+  Child visit(std::int32_t at, std::size_t first) {
     poll_stop();
     const Bvh::Node& node = surface_.bvh().nodes()[at];
+    const std::size_t last = crossing_.size();
+    Child below[2];
     for (int side = 0; side < 2; ++side) {
       const Box& box = node.box[side];
       if (box.is_empty()) continue;
       const Vec3 middle = 0.5 * (box.lower + box.upper), half = 0.5 * (box.upper - box.lower);
-      Group left;
       bool is_outside = false;
-      for (const std::int32_t facet : crossing) {
+      for (std::size_t i = first; i < last && !is_outside; ++i) {
+        const std::int32_t facet = crossing_[i];
         const Vec3 n = polytope_.facets[facet].normal;
         const double depth = polytope_.facets[facet].depth(middle);
         // Rounding may only make a box cross.
         const double reach = std::fabs(n.x) * half.x + std::fabs(n.y) * half.y + std::fabs(n.z) * half.z + 1e-12;
-        if ((is_outside = depth < -reach)) break;
-        if (depth < reach) left.push_back(facet);
+        is_outside = depth < -reach;
+        if (depth < reach) crossing_.push_back(facet);
       }
-      if (is_outside) continue;
-      if (node.child[side] >= 0) {
-        visit(node.child[side], left);
-      } else {
-        for (std::int32_t k = 0; k < node.leaf_size[side]; ++k) clip(surface_.bvh().face(~node.child[side] + k), left);
-      }
+      if (!is_outside)
+        below[side] = node.child[side] >= 0 ? visit(node.child[side], last)
+                                            : clip_leaf(~node.child[side], node.leaf_size[side], last);
+      crossing_.resize(last);
     }
+    if (below[0].is_empty()) return below[1];
+    if (below[1].is_empty()) return below[0];
+    TreeShape::Node made;
+    for (int side = 0; side < 2; ++side)
+      made.child[side] = below[side].node, made.leaf_size[side] = below[side].leaf_size;
+    result_.shape.nodes.push_back(made);
+    return {static_cast<std::int32_t>(result_.shape.nodes.size()) - 1, 0};
   }
 
-  void clip(std::int32_t f, const Group& crossing) {
+  Child clip_leaf(std::int32_t slot, std::int32_t count, std::size_t first) {
+    const auto before = static_cast<std::int32_t>(result_.mesh.faces.size());
+    for (std::int32_t k = 0; k < count; ++k) {
+      const std::int32_t face = surface_.bvh().face(slot + k);
+      if (first == crossing_.size())
+        keep(solid_.faces[face]);
+      else
+        clip(face, first);
+    }
+    return {~before, static_cast<std::int32_t>(result_.mesh.faces.size()) - before};
+  }
+
+  // The nodes were made after their children; they come before them.
+  void finish_shape(Child root) {
+    TreeShape& shape = result_.shape;
+    shape.faces = result_.mesh.faces.size();
+    if (root.node < 0 && root.leaf_size > 0) shape.nodes = {{{root.node, -1}, {root.leaf_size, 0}}};
+    if (root.node < 0) return;
+    const auto last = static_cast<std::int32_t>(shape.nodes.size()) - 1;
+    std::reverse(shape.nodes.begin(), shape.nodes.end());
+    for (TreeShape::Node& node : shape.nodes)
+      for (std::int32_t& child : node.child)
+        if (child >= 0) child = last - child;
+  }
+
+  // A face of the solid that no facet crosses.
+  void keep(const Triangle& face) {
+    Triangle numbered;
+    for (int k = 0; k < 3; ++k) numbered[k] = number_of_vertex(face[k]);
+    if (numbered[0] != numbered[1] && numbered[1] != numbered[2] && numbered[2] != numbered[0])
+      result_.mesh.faces.push_back(numbered);
+  }
+
+  void clip(std::int32_t f, std::size_t first) {
     const Triangle& face = solid_.faces[f];
     polygon_.clear();
     for (int k = 0; k < 3; ++k) polygon_.push_back({solid_.vertices[face[k]], {face[k], kNone, kNone}, ~k});
-    for (const std::int32_t facet : crossing) {
+    for (std::size_t i = first; i < crossing_.size(); ++i) {
+      const std::int32_t facet = crossing_[i];
       depths_.clear();
       for (const Corner& corner : polygon_) depths_.push_back(polytope_.facets[facet].depth(corner.point));
       if (std::all_of(depths_.begin(), depths_.end(), [](double depth) { return depth >= 0; })) continue;
@@ -218,7 +269,17 @@ class Clip {
     }
   }
 
+  std::int32_t number_of_vertex(std::int32_t vertex) {
+    std::int32_t& number = numbers_of_vertices_[vertex];
+    if (number < 0) {
+      number = static_cast<std::int32_t>(result_.mesh.vertices.size());
+      result_.mesh.vertices.push_back(solid_.vertices[vertex]);
+    }
+    return number;
+  }
+
   std::int32_t number_of(const Key& key, Vec3 point) {
+    if (std::get<0>(key) >= 0 && std::get<1>(key) == kNone) return number_of_vertex(std::get<0>(key));
     const auto [at, is_new] = numbers_by_key_.try_emplace(key, static_cast<std::int32_t>(result_.mesh.vertices.size()));
     if (is_new) result_.mesh.vertices.push_back(point);
     return at->second;
@@ -367,9 +428,11 @@ class Clip {
   std::vector<std::vector<std::pair<std::int32_t, std::int32_t>>> paths_;  // on its facets
   std::vector<std::int32_t> states_;                                       // 1 for its corners inside the solid
   bool is_contradictory_ = false;
+  Group crossing_;  // the facets that cross the nodes on the way from the root, one group after the other
   std::vector<Corner> polygon_, kept_;
   std::vector<double> depths_;
   std::vector<std::int32_t> numbers_;
+  std::vector<std::int32_t> numbers_of_vertices_;  // of the solid, -1 for those not met yet
   std::unordered_map<Key, std::int32_t, KeyHash> numbers_by_key_;
   ConvexClip result_;
 };

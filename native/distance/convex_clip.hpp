@@ -23,7 +23,8 @@ struct ConvexClip {
     Vec3 normal;                                  // of the facet, outwards
     std::vector<std::vector<std::int32_t>> rims;  // loops of vertices, counter-clockwise around what is inside
   };
-  Mesh mesh;  // without the caps
+  Mesh mesh;        // without the caps
+  TreeShape shape;  // of a tree over its faces, the same as the solid's
   std::vector<Section> sections;
 };
 

@@ -177,11 +177,9 @@ def _changes(
 
 def _judged(part: Part, hull: Hull, solid: Component, criterion: Criterion, tolerated: float | None) -> Part | None:
     """All that the solid fills of a grown hull, if it meets the criterion or is no worse than the worst part."""
-    vertices, faces = solid.clipped(hull)
-    volume = _native.mesh_volume(vertices, faces) if len(faces) else 0.0
-    if volume < (1 - LOST) * part.volume:  # the clipping failed
+    candidate = solid.inside(hull)
+    if candidate.volume < (1 - LOST) * part.volume:  # the clipping failed
         return None
-    candidate = Part(vertices, faces, volume, hull)
     if criterion.is_met(candidate) or (tolerated is not None and criterion.error(candidate) <= tolerated):
         return candidate
     return None

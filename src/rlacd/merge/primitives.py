@@ -101,10 +101,9 @@ def _candidates(part: Part, hull: Hull, solid: Component | None, criterion: Crit
         yield part.with_hull(hull)
     if solid is None or criterion.obstacles is not None or screen.forbids(solid.filling, hull):
         return
-    vertices, faces = solid.clipped(hull)
-    volume = _native.mesh_volume(vertices, faces) if len(faces) else 0.0
-    if volume >= (1 - LOST) * part.volume and not screen.excludes(volume, hull.volume):  # else the clipping failed
-        yield Part(vertices, faces, volume, hull)
+    inside = solid.inside(hull)
+    if inside.volume >= (1 - LOST) * part.volume and not screen.excludes(inside.volume, hull.volume):
+        yield inside  # otherwise the clipping failed
 
 
 def fit_primitives(hull: Hull, kinds: Collection[PrimitiveKind] = PRIMITIVE_KINDS) -> list[Primitive]:

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rlacd import _native
 from rlacd._native import Stopped
 from rlacd.clock import Clock
 from rlacd.criteria import Criterion
@@ -134,12 +133,8 @@ class Lift:
 
     def _clipped(self, hull: Hull) -> Part:
         """What the solid fills of a hull; the hull itself if that is nothing."""
-        vertices, faces = self.solid.clipped(hull)
-        if not len(faces):
-            return Part(hull.vertices, hull.faces, hull.volume, hull)
-        part = Part(vertices, faces, max(0.0, _native.mesh_volume(vertices, faces)), hull)
-        part.tree = _native.TreeCache()
-        return part
+        part = self.solid.inside(hull)
+        return part if part.size else Part(hull.vertices, hull.faces, hull.volume, hull)
 
     def _failing(self, lifted: dict[int, Part], origins: Sequence[Part | None]) -> list[int]:
         """Indices of the parts that fail on the solid, but for those that were cut there before."""

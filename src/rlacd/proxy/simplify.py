@@ -77,9 +77,7 @@ def simplify(solid: Component, threshold: float, threads: int = 1) -> Proxy | No
     return None
 
 
-def _smallest(
-    solid: Component, looked_at: FloatArray, threshold: float, largest: float, threads: int
-) -> Proxy | None:
+def _smallest(solid: Component, looked_at: FloatArray, threshold: float, largest: float, threads: int) -> Proxy | None:
     """The smallest proxy that is near enough, if one with at most `largest` triangles is."""
     mesh = solid.vertices, solid.faces
     best: Proxy | None = None

@@ -201,9 +201,9 @@ class ClippedPart(Part):
     """
 
     def __init__(self, solid: Component, first: Part, second: Part, hull: Hull) -> None:
-        vertices, faces = solid.clipped(hull)
-        volume = _native.mesh_volume(vertices, faces) if len(faces) else 0.0
-        super().__init__(vertices, faces, volume, hull, first.piece_hulls + second.piece_hulls)
+        inside = solid.inside(hull)
+        super().__init__(inside.vertices, inside.faces, inside.volume, hull, first.piece_hulls + second.piece_hulls)
+        self.tree = inside.tree
         self.solid = solid
         self._members = (*first.members, *second.members)
 
@@ -271,16 +271,24 @@ class Component(Part):
         (below, _), (above, _) = (capped(*side) for side in sides)
         return _component(below, self, least), _component(above, self, least)
 
-    def clipped(self, hull: Hull) -> Surface:
-        """Return the surface of the solid inside a hull, closed by caps on the hull's facets; empty if none is."""
+    def inside(self, hull: Hull) -> Part:
+        """Return all that the solid fills of a hull, closed by caps on the hull's facets; without faces if nothing."""
+        (vertices, faces), tree = self._clipped(hull)
+        volume = max(0.0, _native.mesh_volume(vertices, faces)) if len(faces) else 0.0
+        part = Part(vertices, faces, volume, hull)
+        part.tree = tree
+        return part
+
+    def _clipped(self, hull: Hull) -> tuple[Surface, _native.TreeCache]:
         found = self.filling.clipped(hull.vertices, hull.faces)
         if found is not None:
-            vertices, faces, sections = found
+            vertices, faces, sections, tree = found
             caps, folded = section_caps(sections)
             if folded <= FOLDED:
-                return vertices, np.ascontiguousarray(np.concatenate([faces, caps]), dtype=np.int32)
+                return (vertices, np.ascontiguousarray(np.concatenate([faces, caps]), dtype=np.int32)), tree
         require_time_for(len(self.faces))
-        return surface_of(self.around(hull.box) ^ Manifold(Mesh64(hull.vertices, hull.faces.astype(np.uint64))))
+        clipped = self.around(hull.box) ^ Manifold(Mesh64(hull.vertices, hull.faces.astype(np.uint64)))
+        return surface_of(clipped), _native.TreeCache()
 
     def around(self, box: FloatArray) -> Manifold:
         """Return the solid cropped to a box [2, 3] and a margin around it, for booleans with what lies in the box.
