@@ -38,19 +38,6 @@ struct Body {
     for (const Vec3 p : hull.vertices) box.extend(p);
   }
 
-  // How far the planes would have to move out to take in a point; at most 0 inside.
-  double beyond(Vec3 p) const { return -planes.nearest(p).depth; }
-  double beyond(const Corners& corner) const {
-    return std::max({beyond(corner[0]), beyond(corner[1]), beyond(corner[2])});
-  }
-  bool holds(const Box& other) const {
-    const Vec3 middle = 0.5 * (other.lower + other.upper), half = 0.5 * (other.upper - other.lower);
-    for (std::size_t i = 0; i < planes.size(); ++i) {
-      const auto plane = static_cast<std::int32_t>(i);
-      if (planes.depth(plane, middle) < reach_along(planes.normal(plane), half)) return false;
-    }
-    return true;
-  }
   bool is_near(const Box& other, double reach) const {
     return box.lower.x - reach <= other.upper.x && other.lower.x <= box.upper.x + reach &&
            box.lower.y - reach <= other.upper.y && other.lower.y <= box.upper.y + reach &&
@@ -61,67 +48,106 @@ struct Body {
   Box box;
 };
 
-using Group = std::vector<std::int32_t>;
-
 constexpr int kLevels = 5;
 
-// One child of a node of the tree, and the bodies that may be near it.
+// One child of a node of the tree.
 struct Branch {
   std::int32_t node;
   int side;
-  Group near;
 };
 
 class Cover {
  public:
-  Cover(const Mesh& solid, const Bvh& bvh, const std::vector<Body>& bodies, const Group& all, double reach,
-        double grain)
-      : solid_(solid), bvh_(bvh), bodies_(bodies), all_(all), reach_(reach), grain_(grain), taken_(bodies.size()) {}
-
-  // Goes through one child of a node and everything below it.
-  void visit(const Branch& branch) {
-    poll_stop();
-    const Bvh::Node& node = bvh_.nodes()[branch.node];
-    const Box& box = node.box[branch.side];
-    if (box.is_empty()) return;
-    Group near;
-    for (const std::int32_t i : branch.near) {
-      if (!bodies_[i].is_near(box, reach_)) continue;
-      if (bodies_[i].holds(box)) return;
-      near.push_back(i);
-    }
-    if (near.empty()) near = all_;
-    const std::int32_t child = node.child[branch.side];
-    if (child >= 0) {
-      for (int side = 0; side < 2; ++side) visit({child, side, near});
-      return;
-    }
-    for (std::int32_t k = 0; k < node.leaf_size[branch.side]; ++k) {
-      const Triangle& face = solid_.faces[bvh_.face(~child + k)];
-      take({solid_.vertices[face[0]], solid_.vertices[face[1]], solid_.vertices[face[2]]}, near);
+  Cover(const Mesh& solid, const Bvh& bvh, const std::vector<Body>& bodies, double reach, double grain)
+      : solid_(solid), bvh_(bvh), bodies_(bodies), reach_(reach), grain_(grain), taken_(bodies.size()) {
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      const std::size_t first = planes_.size();
+      for (std::size_t k = 0; k < bodies[i].planes.size(); ++k) planes_.push_back(static_cast<std::int32_t>(k));
+      near_.push_back({static_cast<std::int32_t>(i), first, planes_.size()});
     }
   }
+
+  // Goes through one child of a node and everything below it.
+  void visit(const Branch& branch) { visit(branch, {0, near_.size()}); }
 
   const std::vector<std::vector<Vec3>>& taken() const { return taken_; }
 
  private:
-  void take(const Corners& corner, const Group& candidates) {
-    std::int32_t best = -1;
+  // A body, and those of its planes that what is looked at may reach beyond: planes_[first, last).
+  struct Near {
+    std::int32_t body;
+    std::size_t first, last;
+  };
+  struct Range {
+    std::size_t first, last;  // of near_
+  };
+
+  void visit(const Branch& branch, Range above) {
+    poll_stop();
+    const Bvh::Node& node = bvh_.nodes()[branch.node];
+    const Box& box = node.box[branch.side];
+    if (box.is_empty()) return;
+    const std::size_t planes_before = planes_.size(), first = near_.size();
+    if (!is_held(box, above)) {
+      // Where none is near, all are looked at.
+      const Range near = near_.size() > first ? Range{first, near_.size()} : Range{0, bodies_.size()};
+      const std::int32_t child = node.child[branch.side];
+      if (child >= 0) {
+        for (int side = 0; side < 2; ++side) visit({child, side}, near);
+      } else {
+        for (std::int32_t k = 0; k < node.leaf_size[branch.side]; ++k) {
+          const Triangle& face = solid_.faces[bvh_.face(~child + k)];
+          take({solid_.vertices[face[0]], solid_.vertices[face[1]], solid_.vertices[face[2]]}, near);
+        }
+      }
+    }
+    near_.resize(first);
+    planes_.resize(planes_before);
+  }
+
+  // Appends the bodies near a box, each with the planes that the box reaches beyond; true if a body holds it.
+  bool is_held(const Box& box, Range above) {
+    const Vec3 middle = 0.5 * (box.lower + box.upper), half = 0.5 * (box.upper - box.lower);
+    for (std::size_t i = above.first; i < above.last; ++i) {
+      const Near candidate = near_[i];
+      const Body& body = bodies_[candidate.body];
+      if (!body.is_near(box, reach_)) continue;
+      const std::size_t first = planes_.size();
+      for (std::size_t k = candidate.first; k < candidate.last; ++k) {
+        const std::int32_t plane = planes_[k];
+        if (body.planes.depth(plane, middle) < reach_along(body.planes.normal(plane), half)) planes_.push_back(plane);
+      }
+      if (planes_.size() == first) return true;
+      near_.push_back({candidate.body, first, planes_.size()});
+    }
+    return false;
+  }
+
+  // How far a body's planes would have to move out to take in a point; 0 inside.
+  double beyond(const Near& near, Vec3 p) const {
+    const ConvexPlanes& planes = bodies_[near.body].planes;
+    double most = 0;
+    for (std::size_t k = near.first; k < near.last; ++k) most = std::max(most, -planes.depth(planes_[k], p));
+    return most;
+  }
+
+  void take(const Corners& corner, Range candidates) {
+    const Near* best = nullptr;
     double least = std::numeric_limits<double>::infinity();  // growth of the hull that takes the whole triangle
     Vec3 needed = {least, least, least};                     // growth for each corner, by whichever hull
-    for (const std::int32_t i : candidates) {
+    for (std::size_t i = candidates.first; i < candidates.last; ++i) {
       double most = 0;
       for (int k = 0; k < 3; ++k) {
-        const double beyond = bodies_[i].beyond(corner[k]);
-        needed[k] = std::min(needed[k], beyond);
-        most = std::max(most, beyond);
+        const double growth = beyond(near_[i], corner[k]);
+        needed[k] = std::min(needed[k], growth);
+        most = std::max(most, growth);
       }
-      if (most < least) least = most, best = i;
+      if (most < least) least = most, best = &near_[i];
       if (least <= kRounding) return;
     }
-    if (least <= std::max({needed.x, needed.y, needed.z, 0.0}) + grain_) {
+    if (least <= std::max({needed.x, needed.y, needed.z}) + grain_) {
       for (const Vec3 p : corner)
-        if (bodies_[best].beyond(p) > 0) taken_[best].push_back(p);
+        if (beyond(*best, p) > 0) taken_[best->body].push_back(p);
       return;
     }
     poll_stop();
@@ -131,14 +157,16 @@ class Cover {
   const Mesh& solid_;
   const Bvh& bvh_;
   const std::vector<Body>& bodies_;
-  const Group& all_;
   const double reach_, grain_;
+  // First all bodies with all their planes, then those near each node on the way to the one that is looked at.
+  std::vector<Near> near_;
+  std::vector<std::int32_t> planes_;
   std::vector<std::vector<Vec3>> taken_;
 };
 
 // The branches of the tree at a fixed depth: the same work for any number of threads.
-std::vector<Branch> branches(const Bvh& bvh, const Group& all) {
-  std::vector<Branch> found = {{0, 0, all}, {0, 1, all}};
+std::vector<Branch> branches(const Bvh& bvh) {
+  std::vector<Branch> found = {{0, 0}, {0, 1}};
   for (int level = 0; level < kLevels; ++level) {
     std::vector<Branch> below;
     for (const Branch& branch : found) {
@@ -147,7 +175,7 @@ std::vector<Branch> branches(const Bvh& bvh, const Group& all) {
         below.push_back(branch);
         continue;
       }
-      for (int side = 0; side < 2; ++side) below.push_back({child, side, all});
+      for (int side = 0; side < 2; ++side) below.push_back({child, side});
     }
     found = std::move(below);
   }
@@ -159,15 +187,11 @@ std::vector<Branch> branches(const Bvh& bvh, const Group& all) {
 std::vector<std::vector<Vec3>> uncovered(const Mesh& mesh, const Bvh& bvh, const std::vector<Mesh>& hulls, double reach,
                                          double grain, int threads) {
   std::vector<Body> bodies;
-  Group all;
-  for (const Mesh& hull : hulls) {
-    all.push_back(static_cast<std::int32_t>(bodies.size()));
-    bodies.emplace_back(hull);
-  }
-  const std::vector<Branch> work = branches(bvh, all);
+  for (const Mesh& hull : hulls) bodies.emplace_back(hull);
+  const std::vector<Branch> work = branches(bvh);
   std::vector<std::vector<std::vector<Vec3>>> taken(work.size());
   parallel_for(work.size(), threads, [&](std::size_t i) {
-    Cover cover(mesh, bvh, bodies, all, reach, grain);
+    Cover cover(mesh, bvh, bodies, reach, grain);
     cover.visit(work[i]);
     taken[i] = cover.taken();
   });
