@@ -3,7 +3,6 @@
 
 #include "base/arrays.hpp"
 #include "base/parallel.hpp"
-#include "cut/plane_cut.hpp"
 #include "distance/concavity.hpp"
 #include "distance/filling.hpp"
 
@@ -121,28 +120,21 @@ void bind_concavity(nb::module_& m) {
               clip = self.clipped(hull);
             }
             if (!clip) return nb::none();
-            nb::list sections;
-            for (ConvexClip::Section& section : clip->sections) {
-              nb::list rims, outlines;
-              for (std::vector<std::int32_t>& rim : section.rims) {
-                std::vector<Vec3> points;
-                for (const std::int32_t i : rim) points.push_back(clip->mesh.vertices[i]);
-                outlines.append(to_array<double>(on_plane(points, section.normal)));
-                rims.append(to_array<std::int32_t>(std::move(rim)));
-              }
-              sections.append(nb::make_tuple(rims, outlines));
-            }
+            SectionPlan plan = side_by_side(*clip);
             return nb::make_tuple(to_array<double>(std::move(clip->mesh.vertices)),
-                                  to_array<std::int32_t>(std::move(clip->mesh.faces)), sections,
+                                  to_array<std::int32_t>(std::move(clip->mesh.faces)),
+                                  nb::make_tuple(to_array<std::int32_t>(std::move(plan.corners)),
+                                                 to_array<double>(std::move(plan.outline)),
+                                                 to_array<std::int32_t>(std::move(plan.rim_ends)),
+                                                 to_array<std::int32_t>(std::move(plan.section_ends))),
                                   new TreeCache(std::move(clip->shape)));
           },
           nb::arg("hull_vertices"), nb::arg("hull_faces"),
-          "The solid clipped to a convex hull, without the caps on the hull's facets: vertices [V, 3], faces [F, 3],\n"
-          "for each facet that cuts the solid the rims as loops of vertices, a list of [R], and as points [R, 2] of "
-          "the\n"
-          "plane, counter-clockwise from outside; and what makes the tree of the surface with the caps added to its "
-          "faces.\n"
-          "None where rounding makes the result uncertain.")
+          "The solid clipped to a convex hull, without the caps on the hull's facets: vertices [V, 3], faces [F, 3];\n"
+          "for the sections by the facets, side by side in one plane and counter-clockwise from outside, the vertices\n"
+          "of all rims [R], the same as points [R, 2], where each rim ends there, and at which rim each section ends;\n"
+          "and what makes the tree of the surface with caps added to its faces. None where rounding makes the result\n"
+          "uncertain.")
       .def(
           "uncovered",
           [](const Filling& self, const std::vector<PointsIn>& vertices, const std::vector<FacesIn>& faces,

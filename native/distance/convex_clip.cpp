@@ -6,6 +6,7 @@
 #include <unordered_map>
 
 #include "base/stop.hpp"
+#include "cut/plane_cut.hpp"
 #include "hull/convex_planes.hpp"
 #include "hull/hull.hpp"
 
@@ -438,6 +439,31 @@ class Clip {
 };
 
 }  // namespace
+
+SectionPlan side_by_side(const ConvexClip& clip) {
+  constexpr double kApart = 1.1;  // of a section's width, from its left end to the next one's
+  SectionPlan plan;
+  double x = 0;
+  for (const ConvexClip::Section& section : clip.sections) {
+    const std::size_t first = plan.outline.size();
+    for (const std::vector<std::int32_t>& rim : section.rims) {
+      std::vector<Vec3> points;
+      points.reserve(rim.size());
+      for (const std::int32_t i : rim) points.push_back(clip.mesh.vertices[i]);
+      const std::vector<std::array<double, 2>> outline = on_plane(points, section.normal);
+      plan.corners.insert(plan.corners.end(), rim.begin(), rim.end());
+      plan.outline.insert(plan.outline.end(), outline.begin(), outline.end());
+      plan.rim_ends.push_back(static_cast<std::int32_t>(plan.corners.size()));
+    }
+    plan.section_ends.push_back(static_cast<std::int32_t>(plan.rim_ends.size()));
+    double left = std::numeric_limits<double>::infinity(), right = -left;
+    for (std::size_t i = first; i < plan.outline.size(); ++i)
+      left = std::min(left, plan.outline[i][0]), right = std::max(right, plan.outline[i][0]);
+    for (std::size_t i = first; i < plan.outline.size(); ++i) plan.outline[i][0] += x - left;
+    x += kApart * (right - left);
+  }
+  return plan;
+}
 
 std::optional<ConvexClip> clip_to_convex(const Mesh& solid, const Surface& surface, const Mesh& hull) {
   for (const double larger : kLarger) {

@@ -64,28 +64,42 @@ def capped(
     return (vertices, np.ascontiguousarray(np.concatenate([faces, *caps]), dtype=np.int32)), folded
 
 
-def section_caps(sections: list[tuple[list[IntArray], list[FloatArray]]]) -> tuple[IntArray, float]:
-    """Triangles [T, 3] that close sections in several planes, and the share of their area that is upside down.
+def section_caps(
+    corners: IntArray, outline: FloatArray, rim_ends: IntArray, section_ends: IntArray
+) -> tuple[IntArray, float]:
+    """Close sections in several planes by triangles.
 
-    Each section consists of rims and their outlines [R, 2]. Side by side in one plane they are triangulated together,
-    which is quicker. Rims that cross stay as they are, since sections share edges.
+    They are triangulated together, which is quicker. Rims that cross stay as they are, since sections share edges.
+
+    Parameters
+    ----------
+    corners : int32 [R]
+        Vertices of all rims, one rim after the other.
+    outline : float64 [R, 2]
+        The same as points, the sections side by side in one plane.
+    rim_ends : int32 [L]
+        Where each rim ends in `corners`.
+    section_ends : int32 [S]
+        The number of rims up to the end of each section.
+
+    Returns
+    -------
+    caps : int32 [T, 3]
+    folded : float
+        Share of the caps' area that is upside down because rims cross.
     """
-    rims = [rim for own, _ in sections for rim in own]
-    if not rims:
+    if not len(corners):
         return np.empty((0, 3), np.int32), 0.0
-    x, beside = 0.0, []
-    for _, outlines in sections:
-        left, right = min(o[:, 0].min() for o in outlines), max(o[:, 0].max() for o in outlines)
-        beside += [outline + np.array([x - left, 0.0]) for outline in outlines]
-        x += 1.1 * (right - left)
-    points, triangles = np.concatenate(beside), triangulate(beside)
-    folded = _share_upside_down(points, triangles)
+    outlines = np.split(outline, rim_ends[:-1])
+    triangles = triangulate(outlines)
+    folded = _share_upside_down(outline, triangles)
     if folded > NEGLIGIBLE_FOLD:
-        each = [_least_folded(outlines)[0] for _, outlines in sections]
-        sizes = [sum(map(len, own)) for own, _ in sections]
-        triangles = np.concatenate([own + first for own, first in zip(each, np.cumsum([0, *sizes[:-1]]), strict=True)])
-        folded = _share_upside_down(points, triangles)
-    return np.concatenate(rims)[triangles], folded
+        begins = np.concatenate([[0], section_ends[:-1]])
+        first = np.concatenate([[0], rim_ends])[begins]
+        each = [_least_folded(outlines[begin:end])[0] for begin, end in zip(begins, section_ends, strict=True)]
+        triangles = np.concatenate([own + at for own, at in zip(each, first, strict=True)])
+        folded = _share_upside_down(outline, triangles)
+    return corners[triangles], folded
 
 
 def _least_folded(outlines: list[FloatArray]) -> tuple[IntArray, float]:

@@ -283,7 +283,7 @@ class Component(Part):
         found = self.filling.clipped(hull.vertices, hull.faces)
         if found is not None:
             vertices, faces, sections, tree = found
-            caps, folded = section_caps(sections)
+            caps, folded = section_caps(*sections)
             if folded <= FOLDED:
                 return (vertices, np.ascontiguousarray(np.concatenate([faces, caps]), dtype=np.int32)), tree
         require_time_for(len(self.faces))
