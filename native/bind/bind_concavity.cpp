@@ -5,6 +5,7 @@
 #include "base/parallel.hpp"
 #include "distance/concavity.hpp"
 #include "distance/filling.hpp"
+#include "distance/section_plan.hpp"
 
 namespace rlacd {
 

@@ -1,14 +1,11 @@
 #include "distance/convex_clip.hpp"
 
 #include <algorithm>
-#include <map>
 #include <tuple>
 #include <unordered_map>
 
 #include "base/stop.hpp"
-#include "cut/plane_cut.hpp"
-#include "hull/convex_planes.hpp"
-#include "hull/hull.hpp"
+#include "hull/polytope.hpp"
 
 namespace rlacd {
 namespace {
@@ -18,67 +15,6 @@ namespace {
 constexpr double kNudge = 1e-8;
 constexpr double kLarger[] = {1, 3.3, 11};
 constexpr double kInside = 0.5, kAccuracy = 4;
-
-struct HalfSpace {
-  Vec3 normal;
-  double offset;
-  double depth(Vec3 p) const { return offset - dot(normal, p); }
-};
-
-// A polytope in general position: three facets meet in every corner.
-struct Polytope {
-  struct Edge {
-    std::int32_t left, right;  // facets, left < right
-    std::int32_t from, to;     // corners, counter-clockwise around the left facet
-  };
-  std::vector<HalfSpace> facets;
-  std::vector<Vec3> corners;
-  std::vector<Edge> edges;
-  std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> edge_between;
-};
-
-// The corners of the polytope are the facets of the hull of its planes' dual points.
-std::optional<Polytope> nudged(const Mesh& hull, double nudge) {
-  const ConvexPlanes planes(hull);
-  Vec3 middle{0, 0, 0};
-  for (const Vec3 p : hull.vertices) middle = middle + (1.0 / static_cast<double>(hull.vertices.size())) * p;
-  std::vector<HalfSpace> all;
-  std::vector<Vec3> duals;
-  for (std::size_t i = 0; i < planes.size(); ++i) {
-    const auto plane = static_cast<std::int32_t>(i);
-    const double golden = 0.6180339887498949 * static_cast<double>(i + 1);
-    all.push_back({planes.normal(plane), planes.offset(plane) + nudge * (1 + golden - std::floor(golden))});
-    const double height = all.back().depth(middle);
-    if (!(height > 0)) return std::nullopt;
-    duals.push_back((1 / height) * all.back().normal);
-  }
-  const Hull dual = convex_hull(duals);
-  if (dual.rank < 3) return std::nullopt;
-
-  Polytope result;
-  for (const std::int32_t i : dual.indices) result.facets.push_back(all[i]);
-  std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> corner_left_of;
-  for (std::size_t t = 0; t < dual.faces.size(); ++t) {
-    const Triangle& face = dual.faces[t];
-    const Vec3 a = duals[dual.indices[face[0]]], b = duals[dual.indices[face[1]]], c = duals[dual.indices[face[2]]];
-    const Vec3 normal = cross(b - a, c - a);
-    const double height = dot(normal, a);
-    if (!(height > 0)) return std::nullopt;
-    result.corners.push_back(middle + (1 / height) * normal);
-    for (int k = 0; k < 3; ++k) corner_left_of[{face[k], face[(k + 1) % 3]}] = static_cast<std::int32_t>(t);
-  }
-  // Around facet i (seen from outside) the corners follow each other as the dual's faces do around point i: the corner
-  // left of the dual edge i -> j comes after the one right of it.
-  for (const auto& [pair, left] : corner_left_of) {
-    const auto [i, j] = pair;
-    if (i > j) continue;
-    const auto right = corner_left_of.find({j, i});
-    if (right == corner_left_of.end()) return std::nullopt;
-    result.edge_between[pair] = static_cast<std::int32_t>(result.edges.size());
-    result.edges.push_back({i, j, right->second, left});
-  }
-  return result;
-}
 
 // What made a corner: a vertex of the solid (v, -1, -1), an edge of it and a facet (v, w, facet) with v < w, a face of
 // it and two facets (~face, facet, facet), or a corner of the polytope (kOwn, corner, 0).
@@ -440,34 +376,9 @@ class Clip {
 
 }  // namespace
 
-SectionPlan side_by_side(const ConvexClip& clip) {
-  constexpr double kApart = 1.1;  // of a section's width, from its left end to the next one's
-  SectionPlan plan;
-  double x = 0;
-  for (const ConvexClip::Section& section : clip.sections) {
-    const std::size_t first = plan.outline.size();
-    for (const std::vector<std::int32_t>& rim : section.rims) {
-      std::vector<Vec3> points;
-      points.reserve(rim.size());
-      for (const std::int32_t i : rim) points.push_back(clip.mesh.vertices[i]);
-      const std::vector<std::array<double, 2>> outline = on_plane(points, section.normal);
-      plan.corners.insert(plan.corners.end(), rim.begin(), rim.end());
-      plan.outline.insert(plan.outline.end(), outline.begin(), outline.end());
-      plan.rim_ends.push_back(static_cast<std::int32_t>(plan.corners.size()));
-    }
-    plan.section_ends.push_back(static_cast<std::int32_t>(plan.rim_ends.size()));
-    double left = std::numeric_limits<double>::infinity(), right = -left;
-    for (std::size_t i = first; i < plan.outline.size(); ++i)
-      left = std::min(left, plan.outline[i][0]), right = std::max(right, plan.outline[i][0]);
-    for (std::size_t i = first; i < plan.outline.size(); ++i) plan.outline[i][0] += x - left;
-    x += kApart * (right - left);
-  }
-  return plan;
-}
-
 std::optional<ConvexClip> clip_to_convex(const Mesh& solid, const Surface& surface, const Mesh& hull) {
   for (const double larger : kLarger) {
-    std::optional<Polytope> polytope = nudged(hull, larger * kNudge);
+    std::optional<Polytope> polytope = in_general_position(hull, larger * kNudge);
     if (!polytope) continue;
     if (std::optional<ConvexClip> clip = Clip(solid, surface, std::move(*polytope)).run()) return clip;
   }

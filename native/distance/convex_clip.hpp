@@ -12,7 +12,6 @@
 //      Where rounding makes crossings contradict each other there is no result: callers use a boolean then.
 #pragma once
 
-#include <array>
 #include <optional>
 #include <vector>
 
@@ -29,15 +28,6 @@ struct ConvexClip {
   TreeShape shape;  // of a tree over its faces, the same as the solid's
   std::vector<Section> sections;
 };
-
-// The sections, each in its own plane, moved side by side into one plane: they can be triangulated together.
-struct SectionPlan {
-  std::vector<std::int32_t> corners;           // vertices of all rims, one rim after the other
-  std::vector<std::array<double, 2>> outline;  // the same as points of the plane
-  std::vector<std::int32_t> rim_ends;          // places in `corners` at which the rims end
-  std::vector<std::int32_t> section_ends;      // numbers of rims at which the sections end
-};
-SectionPlan side_by_side(const ConvexClip& clip);
 
 std::optional<ConvexClip> clip_to_convex(const Mesh& solid, const Surface& surface, const Mesh& hull);
 
