@@ -150,14 +150,18 @@ def test_simplifying_stops_where_the_topology_would_change() -> None:
     assert 7 <= len(simple.vertices) < 40  # no triangulation of a torus has fewer than seven vertices
 
 
-def test_simplifying_gives_the_same_bytes_every_time() -> None:
-    mesh = ring()
+def test_simplifying_gives_the_same_bytes_every_time_and_for_any_number_of_threads() -> None:
+    mesh = noisy(trimesh.creation.torus(1.0, 0.3, 200, 100))  # large enough for sweeps, and for several threads
     found = []
-    for _ in range(2):
+    for threads in (1, 1, 3):
         simplifier = _native.Simplifier(np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int32))
-        simplifier.reduce(500)
-        found.append(simplifier.mesh()[0].tobytes())
-    assert found[0] == found[1]
+        simplifier.reduce(500, threads)
+        found.append(simplifier.mesh())
+    assert len({vertices.tobytes() for vertices, _ in found}) == 1
+    simple = trimesh.Trimesh(*found[0], process=False)
+    assert len(simple.faces) <= 500
+    assert simple.is_watertight
+    assert simple.euler_number == 0
 
 
 def test_simple_hulls_hold_the_full_ones_and_have_fewer_corners() -> None:

@@ -12,7 +12,7 @@ namespace {
 // More faces than this are reduced in sweeps. One collapses only the cheapest edges, one in this many of all, so that
 // flat regions are swept again before features are touched.
 constexpr std::size_t kLarge = 12'000, kOneIn = 3;
-// Sweeps that remove less than one face in this many have run out of edges.
+// Sweeps that remove no more than one face in this many have run out of edges.
 constexpr std::size_t kHardlyAny = 50;
 constexpr std::size_t kChunk = 4096;  // faces whose edges one thread prices at a time
 // Edges drawn for each collapse: few while there are many faces, and more as each collapse matters more.
@@ -107,10 +107,11 @@ Simplifier::Simplifier(const Mesh& mesh)
 }
 
 void Simplifier::reduce(std::size_t count, int threads) {
-  for (std::size_t before = 0; size() > std::max(count, kLarge) && size() != before;) {
-    before = size();
-    sweep(std::max(count, kLarge), threads);
-    if (before - size() < before / kHardlyAny) break;
+  const std::size_t few = std::max(count, kLarge);
+  while (size() > few) {
+    const std::size_t before = size();
+    sweep(few, threads);
+    if (before - size() <= before / kHardlyAny) break;
   }
   collapse_drawn(count);
 }

@@ -5,10 +5,10 @@
 //      out.
 // How: Edges are collapsed to the point of least squared distance to the planes of all faces they replace (Garland and
 //      Heckbert, "Surface Simplification Using Quadric Error Metrics", 1997). While there are many faces, sweeps price
-//      every edge once and collapse the cheap ones, cheapest first, each vertex at most once. Then, of a few edges
-//      drawn at random, the cheapest is collapsed: nearly as good as the cheapest of all, without keeping them sorted
-//      (Wu and Kobbelt, "Fast Mesh Decimation by Multiple-Choice Techniques", 2002). The numbers drawn are the same
-//      every time. A collapse must not change the topology or turn a face over.
+//      every edge once and collapse the cheap ones, each vertex at most once. Then, of a few edges drawn at random, the
+//      cheapest is collapsed: nearly as good as the cheapest of all, without keeping them sorted (Wu and Kobbelt, "Fast
+//      Mesh Decimation by Multiple-Choice Techniques", 2002). The numbers drawn are the same every time.
+//      A collapse must not change the topology or turn a face over.
 #pragma once
 
 #include <array>
