@@ -103,10 +103,10 @@ def union_queries(hulls: list[Hull], mesh: Soup, surface: _native.Surface, rando
     expected = distance_to_union(points, solids)
     distance = same(lambda threads: union.distance(points, threads))
     assert np.abs(distance - expected).max() <= ROUNDING, f"the union is off by {np.abs(distance - expected).max()}"
-    lower, upper = same(lambda threads: union.under(*mesh, TOLERANCE, threads))
+    lower, upper, _ = same(lambda threads: union.under(*mesh, TOLERANCE, threads))
     assert expected[20:].max() <= upper + ROUNDING, f"under: {expected[20:].max()} > {upper}"
     assert lower <= upper, f"under: {lower}, {upper}"
-    lower, upper = same(lambda threads: union.over(surface, TOLERANCE, 1e-6, threads))
+    lower, upper, _ = same(lambda threads: union.over(surface, TOLERANCE, 1e-6, threads))
     for own in solids:
         on = sampled(own.vertices, own.faces, 20, random)
         for others in solids:

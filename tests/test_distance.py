@@ -281,7 +281,7 @@ def test_nothing_beyond_the_rim_of_a_flat_hull_or_the_tip_of_a_needle_is_inside(
         np.testing.assert_allclose(hull_union([hull]).distance(points), expected, atol=2e-5)
         corners = np.ascontiguousarray(points[:120])
         faces = np.arange(120, dtype=np.int32).reshape(-1, 3)
-        lower, upper = hull_union([hull]).under(corners, faces, 1e-4)
+        lower, upper, _ = hull_union([hull]).under(corners, faces, 1e-4)
         assert lower - 2e-5 <= expected[:120].max() <= upper + 2e-5
 
 

@@ -51,29 +51,29 @@ void bind_union(nb::module_& m) {
           "over",
           [=](const HullUnion& self, const Surface& surface, double tolerance, double gap, int threads) {
             require_positive(tolerance, gap);
-            Interval found;
+            Greatest found;
             {
               nb::gil_scoped_release release;
               found = self.over(surface.bvh(), tolerance, gap, threads);
             }
-            return nb::make_tuple(found.lower, found.upper);
+            return nb::make_tuple(found.lower, found.upper, nb::make_tuple(found.at.x, found.at.y, found.at.z));
           },
           nb::arg("surface"), nb::arg("tolerance"), nb::arg("gap") = 1e-6, nb::arg("threads") = 0,
-          "(lower, upper) around the greatest distance from the union's surface to the given surface.")
+          "(lower, upper, place) of the greatest distance from the union's surface to the given surface.")
       .def(
           "under",
           [=](const HullUnion& self, const PointsIn& vertices, const FacesIn& faces, double tolerance, int threads) {
             require_positive(tolerance, 1);
             const Mesh mesh = to_finite_mesh(vertices, faces);
-            Interval found;
+            Greatest found;
             {
               nb::gil_scoped_release release;
               found = self.under(mesh, tolerance, threads);
             }
-            return nb::make_tuple(found.lower, found.upper);
+            return nb::make_tuple(found.lower, found.upper, nb::make_tuple(found.at.x, found.at.y, found.at.z));
           },
           nb::arg("vertices"), nb::arg("faces"), nb::arg("tolerance"), nb::arg("threads") = 0,
-          "(lower, upper) around the greatest distance from the mesh's faces to the union as a solid, 0 inside.")
+          "(lower, upper, place) of the greatest distance from the mesh's faces to the union as a solid, 0 inside.")
       .def(
           "distance",
           [](const HullUnion& self, const PointsIn& array, int threads) {

@@ -6,7 +6,7 @@
 //        double from(int32 witness, Vec3 p)            f_w(p)
 //        double quick_upper(corners)                   a cheap upper bound over a triangle, or infinity
 //        void settled(corners, witness)                is called with the single witness that closed a triangle
-// Out: an interval that holds the maximum, narrow enough for the goal.
+// Out: an interval that holds the maximum, narrow enough for the goal; in waves, also where it is reached.
 // How: branch and bound over the triangles, halved at their longest edge.
 //      Lower bound: f at the corners.
 //      Upper bound over a triangle: for weights l_w >= 0 that add up to 1, f <= sum l_w f_w, which is convex, so its
@@ -196,10 +196,15 @@ Interval maximize(Field& field, const Mesh& mesh, const Goal& goal) {
   return found;
 }
 
+// An interval around the greatest value, and where its lower end is reached; undefined where no value is above 0.
+struct Greatest : Interval {
+  Vec3 at{};
+};
+
 // Multi-threaded: all open cells are halved at once, wave after wave. A wave depends only on the waves before it, so
-// the interval does not depend on the number of threads.
+// the interval does not depend on the number of threads, nor does the place.
 template <class Field>
-Interval maximize_in_waves(const Field& field, const Mesh& mesh, double tolerance, int threads) {
+Greatest maximize_in_waves(const Field& field, const Mesh& mesh, double tolerance, int threads) {
   constexpr std::size_t kChunk = 128;
   const auto for_each = [&](std::size_t count, const auto& task) {
     const std::size_t chunks = (count + kChunk - 1) / kChunk;
@@ -208,7 +213,10 @@ Interval maximize_in_waves(const Field& field, const Mesh& mesh, double toleranc
     });
   };
 
-  Interval found;
+  Greatest found;
+  const auto learn = [&](const Sample& sample, Vec3 at, double exact_above) {
+    if (sample.value > exact_above && sample.value > found.lower) found.lower = sample.value, found.at = at;
+  };
   double dropped = 0;
   std::vector<Sample> at_vertex(mesh.vertices.size());
   std::vector<char> is_corner(mesh.vertices.size(), 0);
@@ -220,8 +228,7 @@ Interval maximize_in_waves(const Field& field, const Mesh& mesh, double toleranc
     for_each((at_vertex.size() + stride - 1) / stride, [&](std::size_t i) {
       if (is_corner[i * stride]) at_vertex[i * stride] = field.at(mesh.vertices[i * stride], -1, exact_above);
     });
-    for (const Sample& sample : at_vertex)
-      if (sample.value > exact_above) found.lower = std::max(found.lower, sample.value);
+    for (std::size_t i = 0; i < at_vertex.size(); ++i) learn(at_vertex[i], mesh.vertices[i], exact_above);
   }
 
   std::vector<Cell> cells(mesh.faces.size()), halves;
@@ -248,8 +255,7 @@ Interval maximize_in_waves(const Field& field, const Mesh& mesh, double toleranc
       halves[2 * c] = pair[0];
       halves[2 * c + 1] = pair[1];
     });
-    for (std::size_t c = 0; c < halves.size(); c += 2)
-      if (halves[c].sample[0].value > exact_above) found.lower = std::max(found.lower, halves[c].sample[0].value);
+    for (std::size_t c = 0; c < halves.size(); c += 2) learn(halves[c].sample[0], halves[c].corner[0], exact_above);
     cells.swap(halves);
     drop(cells);
   }

@@ -191,12 +191,12 @@ HullUnion::Exposed HullUnion::exposed(double gap, int threads) const {
   return {resolved.take(), unresolved.take()};
 }
 
-Interval HullUnion::over(const Bvh& surface, double tolerance, double gap, int threads) const {
+Greatest HullUnion::over(const Bvh& surface, double tolerance, double gap, int threads) const {
   const Exposed found = exposed(gap, threads);
-  Interval over = maximize_in_waves(SurfaceField(surface), found.exposed, tolerance, threads);
+  Greatest over = maximize_in_waves(SurfaceField(surface), found.exposed, tolerance, threads);
   if (!found.unresolved.faces.empty()) {
-    const Interval most = maximize_in_waves(SurfaceField(surface), found.unresolved, tolerance, threads);
-    over.upper = std::max(over.upper, most.upper);
+    const Greatest most = maximize_in_waves(SurfaceField(surface), found.unresolved, tolerance, threads);
+    if (most.upper > over.upper) over.upper = most.upper, over.at = most.at;
   }
   return over;
 }
@@ -231,8 +231,8 @@ std::vector<char> HullUnion::held_faces(const Mesh& surface, int threads) const 
   return is_held;
 }
 
-Interval HullUnion::under(const Mesh& surface, double tolerance, int threads) const {
-  if (members_.empty()) return {kInfinity, kInfinity};
+Greatest HullUnion::under(const Mesh& surface, double tolerance, int threads) const {
+  if (members_.empty()) return {{kInfinity, kInfinity}, {}};
   std::vector<HalfSpaces> grown;
   for (const auto& member : members_) {
     for (double& offset : grown.emplace_back(member->planes).offset) offset += kInsideSlack;

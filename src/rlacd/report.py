@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import accumulate
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import trimesh
 
+from rlacd import _native
 from rlacd._version import __version__
 from rlacd.clock import Clock
 from rlacd.criteria import Criterion
@@ -19,7 +20,7 @@ from rlacd.options import Options
 from rlacd.presets import Preset, find_preset
 from rlacd.primitive_kinds import PRIMITIVE_KINDS
 from rlacd.solid.component import Component, Part, concatenated
-from rlacd.solid.distance import hull_distances, hull_union
+from rlacd.solid.distance import Place, hull_distances
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.mass import Mass, joint_mass, mass_of
@@ -30,8 +31,14 @@ HONEST_WITHIN = 5e-3
 """How far the union of the hulls may reach beyond the threshold before the report warns: slack for repair and
 measurement."""
 
-PLACES = 100_000
-"""Points of the input among which the one farthest from the hulls is looked for."""
+
+class _Distances(NamedTuple):
+    """How far the hulls reach out and fall short, and where they do so most: a place of the input, and its body."""
+
+    over: float
+    under: float
+    over_at: str
+    under_at: str
 
 
 def make_report(
@@ -52,12 +59,10 @@ def make_report(
     is_cover = len(solid.faces) == 0  # hulls of an input that was not repaired: the parts in them are unknown
     errors = None if is_cover else clock.if_in_time(lambda: workers.map(criterion.error, parts), lambda: None)
     summary = criterion.summary(errors)
-    over = under = place = None
     has_surface = len(solid.surface[1]) > 0  # a cloud of points has none
+    apart: _Distances | None = None
     if has_surface:
-        over, under, place = clock.if_in_time(
-            lambda: _distances(solid, parts, workers, root), lambda: (None, None, None)
-        )
+        apart = clock.if_in_time(lambda: _distances(solid, parts, workers, root), lambda: None)
     with clock.shielded():  # nothing below takes long
         stands_for_mass = [(part.hull.vertices, part.hull.faces) for part in parts] if is_cover else [solid.mesh]
         mass = mass_of(*concatenated(stands_for_mass), solid.frame)
@@ -72,7 +77,7 @@ def make_report(
             **({"primitives": _primitives(parts)} if options.primitives else {}),
             **({"overlap": _seams(seams, solid.frame)} if options.overlap > 0 else {}),
             **summary.entries,
-            "hausdorff": {"over": over, "under": under},
+            "hausdorff": {"over": apart and apart.over, "under": apart and apart.under},
             "scale": solid.frame.scale,
             "mass": _mass(mass),
             "repair": [{**vars(body)} for body in solid.bodies],
@@ -81,14 +86,12 @@ def make_report(
                 *_coarse(solid),
                 *_early_end(clock),
                 *_cut_short(clock),
-                *(_unmeasured(solid) if has_surface and over is None else []),
+                *(_unmeasured(solid) if has_surface and apart is None else []),
                 *(_shallow(seams, options.overlap / solid.frame.scale) if options.overlap > 0 else []),
                 *summary.warnings,
                 *_shortcomings(
                     [part.hull for part in parts],
-                    over,
-                    under,
-                    place,
+                    apart,
                     options,
                     criterion.overhang if not summary.warnings else math.inf,
                 ),
@@ -220,21 +223,18 @@ def _mass(mass: Mass) -> dict[str, Any]:
     return now | {"volume_m": volume, "centre_m": centre, "inertia_m": inertia}
 
 
-def _distances(
-    solid: Solid, parts: Sequence[Part], workers: Workers, root: Component | None
-) -> tuple[float, float, str | None]:
-    """How far the hulls reach out and fall short, and where they fall short most if that is worth a warning."""
-    hulls = [part.hull for part in parts]
-    known = root.filling.surface if root is not None and solid.is_as_given else None
-    distances = hull_distances(hulls, *solid.surface, threads=workers.threads, surface=known)
-    over, under = distances.over[1], distances.under[1]
-    if under <= HONEST_WITHIN:
-        return over, under, None
-    vertices, faces = solid.surface
-    points = np.concatenate([vertices, vertices[faces].mean(axis=1)])
-    points = np.ascontiguousarray(points[:: 1 + len(points) // PLACES])
-    away = hull_union(hulls, workers.threads).distance(points)
-    return over, under, solid.frame.place(points[away.argmax()])
+def _distances(solid: Solid, parts: Sequence[Part], workers: Workers, root: Component | None) -> _Distances:
+    known = root is not None and solid.is_as_given
+    surface = root.filling.surface if root is not None and known else _native.Surface(*solid.surface)
+    found = hull_distances([part.hull for part in parts], *solid.surface, threads=workers.threads, surface=surface)
+
+    def place(point: Place) -> str:
+        if solid.body_of is None or len(solid.bodies) == 1:
+            return solid.frame.place(point)
+        _, (face,) = surface.closest(np.array([point]))
+        return solid.frame.place(point, int(solid.body_of[face]))
+
+    return _Distances(found.over[1], found.under[1], place(found.over_at), place(found.under_at))
 
 
 def _unmeasured(solid: Solid) -> list[str]:
@@ -285,21 +285,19 @@ def _cut_short(clock: Clock) -> list[str]:
     return [sentence for stage, sentence in said.items() if stage in clock.cut_short]
 
 
-def _shortcomings(
-    hulls: Sequence[Hull], over: float | None, under: float | None, place: str | None, options: Options, overhang: float
-) -> list[str]:
+def _shortcomings(hulls: Sequence[Hull], apart: _Distances | None, options: Options, overhang: float) -> list[str]:
     sentences = [] if options.preset is None else engine_shortcomings(find_preset(options.preset), hulls)
     if options.max_hulls is not None and len(hulls) > options.max_hulls:
         sentences.append(f"{len(hulls)} hulls are left, more than the {options.max_hulls} asked for.")
-    if under is not None and under > HONEST_WITHIN:
+    if apart is not None and apart.under > HONEST_WITHIN:
         sentences.append(
-            f"Some of the input's surface lies {under:.4g} from the hulls, most near {place}: the repair gave up what "
-            "could not be made solid (see `deviation` in `repair`)."
+            f"Some of the input's surface lies {apart.under:.4g} from the hulls, most near {apart.under_at}: the "
+            "repair gave up what could not be made solid (see `deviation` in `repair`)."
         )
-    if over is not None and over > overhang + HONEST_WITHIN:
+    if apart is not None and apart.over > overhang + HONEST_WITHIN:
         sentences.append(
-            f"The hulls reach up to {over:.4g} beyond the input's surface, more than the threshold: "
-            "the repair closed what may be open in the input (see `repair`)."
+            f"The hulls reach up to {apart.over:.4g} beyond the input's surface, more than the threshold, most near "
+            f"{apart.over_at}: the repair closed what may be open in the input (see `repair`)."
         )
     return sentences
 

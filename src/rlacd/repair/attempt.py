@@ -51,6 +51,8 @@ class Attempt:
         What was done to each body.
     lost : float
         How far what a capped body lost lies from the solid, or a wrapped one beyond what wraps may lose.
+    lost_at : str
+        Where.
     warnings : list of str
     """
 
@@ -71,7 +73,7 @@ class Attempt:
         self._gap = gap
         self._keep_cavities = keep_cavities
         self._open_bodies = open_bodies
-        self._mouths: dict[int, FloatArray] = {}  # of hollow bodies, the centre of their widest opening
+        self._mouths: dict[int, tuple[float, FloatArray]] = {}  # of hollow bodies, their widest opening: area, centre
         self._bend = bend
         self.warnings: list[str] = []
 
@@ -94,7 +96,8 @@ class Attempt:
             self.record.step[:] = STEPS.index("hull")
             self.solid = hull_of_points(surface.vertices)
         self._warn_of_shells()
-        self.lost = measure(self.record, surface, self.solid)
+        self.lost, place, loser = measure(self.record, surface, self.solid)
+        self.lost_at = self._place(place, loser)
 
     def doubted(self) -> IntArray:
         """Bodies whose skin was chosen among crossing faces and leads away from them."""
@@ -194,13 +197,15 @@ class Attempt:
         )
         if closed is None:
             return soup
-        self._mouths = dict(zip(closed.hollow.tolist(), closed.mouths, strict=True))
+        openings = zip(closed.widths.tolist(), closed.mouths, strict=True)
+        self._mouths = dict(zip(closed.hollow.tolist(), openings, strict=True))
         self.record.note(closed.bodies, "capped")
         self._by_room |= closed.by_room
         self._hidden = np.concatenate([self._hidden, closed.hidden])
         self._across = np.concatenate([self._across, closed.across])
         if len(closed.far):
-            place = self._frame.place(closed.where[closed.far.argmax()])
+            widest = closed.far.argmax()
+            place = self._place(closed.where[widest], int(closed.whose[widest]))
             self.warnings.append(
                 f"Holes were closed although the caps lead up to {closed.far.max():.3f} (longest side = 2) away from "
                 f"the surface: the widest is at {place}."
@@ -216,9 +221,11 @@ class Attempt:
         shells = [body for body in self._mouths if is_slab[body]]
         if not shells:
             return
-        place = self._frame.place(self._mouths[shells[0]])
-        if len(shells) == 1:
-            sentence = f"1 open body became a thin shell; --open solid fills it (its widest opening is at {place})."
-        else:
-            sentence = f"{len(shells)} open bodies became thin shells; --open solid fills them (one opens at {place})."
-        self.warnings.append(sentence)
+        body = max(shells, key=lambda one: self._mouths[one][0])
+        became = "1 open body became a thin shell; --open solid fills it"
+        if len(shells) > 1:
+            became = f"{len(shells)} open bodies became thin shells; --open solid fills them"
+        self.warnings.append(f"{became} (the widest opening is at {self._place(self._mouths[body][1], body)}).")
+
+    def _place(self, point: FloatArray, body: int) -> str:
+        return self._frame.place(point, body if self.record.bodies > 1 else None)

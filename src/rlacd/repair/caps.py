@@ -77,10 +77,14 @@ class Closed:
         Distances of caps from the surface, for each body with a cap that something can reach.
     where
         The positions of `far`, ``[N, 3]``.
+    whose
+        The bodies of `far`, ``[N]``.
     hollow
         Bodies that stay open although caps would give them an inside.
     mouths
         The centre of the widest opening of each of them, ``[N, 3]``.
+    widths
+        The area of the caps of these openings, ``[N]``.
     """
 
     soup: Soup
@@ -90,8 +94,10 @@ class Closed:
     across: FloatArray
     far: FloatArray
     where: FloatArray
+    whose: IntArray
     hollow: IntArray
     mouths: FloatArray
+    widths: FloatArray
 
 
 def close_holes(
@@ -220,8 +226,10 @@ def close_holes(
         across,
         distance[wide],
         points[wide],
+        loop_body[place[wide]],
         hollow,
         mouths,
+        np.asarray(by_loop[widest], dtype=np.float64),
     )
 
 

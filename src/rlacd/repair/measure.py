@@ -14,13 +14,14 @@ from rlacd.solid.thickness import HALF_THICKNESS
 from rlacd.solid.topology import BoolArray
 
 
-def measure(record: Record, surface: SurfaceQuery, shape: Shape) -> float:
+def measure(record: Record, surface: SurfaceQuery, shape: Shape) -> tuple[float, FloatArray, int]:
     """Record, for the changed bodies, how far the solid and the input deviate from each other.
 
-    Returns how far what a capped body lost lies from the solid, or a wrapped one if that is more than two balls' radii.
+    Returns how far what a capped body lost lies from the solid, or a wrapped one if that is more than two balls' radii;
+    the place, and the body.
     """
     if record.step.max() < STEPS.index("outer skin"):
-        return 0.0
+        return 0.0, np.zeros(3), 0
     solid = SurfaceQuery(*to_arrays(shape), surface.threads)
     kept, taken_over = shared_faces(solid.vertices, solid.faces, surface.vertices, surface.faces)
     poll_stop()
@@ -36,7 +37,11 @@ def measure(record: Record, surface: SurfaceQuery, shape: Shape) -> float:
     body = record.body_of_input[changed[on[lost]]]
     np.maximum.at(record.deviation, body, distance[lost])
     is_capped, is_wrapped = (record.step[body] == STEPS.index(step) for step in ("capped", "wrapped"))
-    return float(distance[lost].max(initial=0.0, where=is_capped | (is_wrapped & (distance[lost] > 2 * GAP))))
+    counts = np.flatnonzero(is_capped | (is_wrapped & (distance[lost] > 2 * GAP)))
+    if len(counts) == 0:
+        return 0.0, np.zeros(3), 0
+    worst = counts[distance[lost[counts]].argmax()]
+    return float(distance[lost[worst]]), points[lost[worst]], int(body[worst])
 
 
 def inside_by_balls(solid: SurfaceQuery, points: FloatArray, distance: FloatArray) -> BoolArray:

@@ -158,8 +158,8 @@ def _attempted(attempt: Callable[..., Attempt], open_bodies: str, tangled: IntAr
         other = attempt(**how | {"open_bodies": "thin"})
         if other.lost < work.lost and volume_of(other.solid) > _FILLED * volume_of(work.solid):
             other.warnings.append(
-                f"Some of the surface lay up to {work.lost:.4g} from the solid once holes were closed, so open bodies "
-                "became thin shells; --open solid fills them."
+                f"Some of the surface lay up to {work.lost:.4g} from the solid once holes were closed, most near "
+                f"{work.lost_at}, so open bodies became thin shells; --open solid fills them."
             )
             work, how = other, how | {"open_bodies": "thin"}
     doubted = work.doubted()

@@ -20,6 +20,8 @@ from rlacd.solid.hull import Hull
 Interval = tuple[float, float]
 """A certified lower and upper bound."""
 
+Place = tuple[float, float, float]
+
 TOLERANCE = 2e-3
 """Default width of the intervals: 0.1 % of the input's longest side in the normalised frame."""
 
@@ -69,10 +71,14 @@ class HullDistances:
     under
         Greatest distance from the input surface to the union as a solid: what the hulls miss. Points inside a hull
         are at distance 0.
+    over_at, under_at
+        Places where the lower ends of these are reached; without meaning where they are 0.
     """
 
     over: Interval
     under: Interval
+    over_at: Place = (0.0, 0.0, 0.0)
+    under_at: Place = (0.0, 0.0, 0.0)
 
 
 def hull_distances(
@@ -113,9 +119,9 @@ def hull_distances(
     _require_positive(tolerance)
     union = hull_union(hulls, threads)
     surface = surface or _native.Surface(vertices, faces)
-    return HullDistances(
-        union.over(surface, tolerance, GAP, threads or 0), union.under(vertices, faces, tolerance, threads or 0)
-    )
+    least_over, over, over_at = union.over(surface, tolerance, GAP, threads or 0)
+    least_under, under, under_at = union.under(vertices, faces, tolerance, threads or 0)
+    return HullDistances((least_over, over), (least_under, under), over_at, under_at)
 
 
 def hull_union(hulls: Sequence[Hull], threads: int | None = None) -> _native.HullUnion:

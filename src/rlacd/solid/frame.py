@@ -58,6 +58,7 @@ class Frame:
         """Map points ``[N, 3]`` from the frame back to the input's unit."""
         return np.ascontiguousarray(np.asarray(points, dtype=np.float64) / self.scale + self.center)
 
-    def place(self, point: FloatArray) -> str:
-        """A point ``[3]`` of the frame as text, in the input's unit."""
-        return "(" + ", ".join(f"{x:.4g}" for x in self.to_input(point)) + ")"
+    def place(self, point: ArrayLike, body: int | None = None) -> str:
+        """A point ``[3]`` of the frame as text, in the input's unit, and the body there if there are several."""
+        where = "(" + ", ".join(f"{x:.4g}" for x in self.to_input(point)) + ")"
+        return where if body is None else f"{where}, body {body}"
