@@ -5,8 +5,8 @@
 
 Runs every family of `fuzz.flaws` at every share of damaged faces, with quality="fast" and one thread. `under` is the
 largest distance of the undamaged surface from the hulls; `over` is the largest distance of the hulls' surface from the
-damaged or undamaged input, whichever is nearer: a fin is part of the input. Lengths are in the frame of the undamaged
-mesh.
+damaged or undamaged input, whichever is nearer: a fin is part of the input. A place is named where a warning says one,
+and what is missed most lies at a hole that the report lists. Lengths are in the frame of the undamaged mesh.
 """
 
 from __future__ import annotations
@@ -54,7 +54,11 @@ def measure(vertices: Any, faces: Any, family: str, share: float) -> dict[str, A
                 nearest = np.minimum(nearest, distance)
         return nearest
 
-    under = apart(spread_points(*solid.surface, SPACING)[0]).max()
+    points, _ = spread_points(*solid.surface, SPACING)
+    missed = apart(points)
+    under, lost = missed.max(), frame.to_input(points[missed.argmax()])
+    holes = result.report["holes"]
+    is_hole = any(np.linalg.norm(lost - hole["at_abs"]) <= hole["width_abs"] for hole in holes)
     inputs = [SurfaceQuery(*solid.surface), SurfaceQuery(frame.to_frame(damaged[0]), damaged[1])]
     over = 0.0
     for i, hull in enumerate(hulls):
@@ -68,7 +72,8 @@ def measure(vertices: Any, faces: Any, family: str, share: float) -> dict[str, A
         "hulls": len(hulls),
         "under": float(under),
         "over": over,
-        "located": any(re.search(r" (at|near) \(", warning) for warning in result.report["warnings"]),
+        "located": (is_hole or under <= UNDER)
+        and any(re.search(r" (at|near) \(", warning) for warning in result.report["warnings"]),
         "seconds": seconds,
     }
 

@@ -285,6 +285,26 @@ def test_nothing_beyond_the_rim_of_a_flat_hull_or_the_tip_of_a_needle_is_inside(
         assert lower - 2e-5 <= expected[:120].max() <= upper + 2e-5
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_places_of_the_greatest_distances(seed: int) -> None:
+    """Measured there by point-to-triangle distances alone, it is as far as the lower bound says."""
+    rng = np.random.default_rng(seed)
+    surface = from_manifold(box(*BRICK))
+    hulls = [Hull.of(rng.normal(size=(12, 3)) * 0.4 + at) for at in rng.normal(size=(5, 3))]
+    found = hull_distances([hull for hull in hulls if hull], surface.vertices, surface.faces, threads=1)
+    out, missed = np.array([found.over_at]), np.array([found.under_at])
+    assert point_to_triangles(out, surface.vertices, surface.faces) == pytest.approx(found.over[0], abs=1e-9)
+    each = [point_to_triangles(missed, hull.vertices, hull.faces)[0] for hull in hulls if hull]
+    assert min(each) == pytest.approx(found.under[0], abs=1e-9)
+    for hull in hulls:
+        assert hull is not None
+        depth = depth_in(Closed(hull.vertices, hull.faces), np.concatenate([out, missed]))
+        assert (depth < 1e-6).all(), "a place inside a hull"
+    assert point_to_triangles(missed, surface.vertices, surface.faces) == pytest.approx(0, abs=1e-9)
+    threaded = hull_distances([hull for hull in hulls if hull], surface.vertices, surface.faces, threads=4)
+    assert threaded == found
+
+
 def test_hausdorff_of_a_shifted_box() -> None:
     brick, shifted = from_manifold(box(*BRICK)), from_manifold(box(*BRICK).translate((0.3, 0, 0)))
     lower, upper = directed_hausdorff(

@@ -1,5 +1,7 @@
 """Holes, cavities and damage: what is closed, what is filled, and what stays open."""
 
+import re
+
 import numpy as np
 import pytest
 import trimesh
@@ -14,6 +16,8 @@ from rlacd.repair.repair import _attempted as attempted
 from rlacd.repair.repair import repair
 from rlacd.repair.union import to_arrays
 from rlacd.repair.voxels import GAP
+from rlacd.solid.distance import hull_union
+from rlacd.solid.hull import Hull
 from rlacd.solid.thickness import HALF_THICKNESS
 from tests.repaired import BOX, join, moved, solid_of, steps, volume, with_hole, without
 
@@ -352,6 +356,45 @@ def test_a_damaged_solid_stays_the_solid_it_was(name, family, share):
     assert kept or (family in ("missing patches", "mixture") and " at (" in " ".join(solid.warnings))
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("family", ["moth holes", "missing patches"])
+def test_a_warning_names_the_bodies_and_places_where_a_damaged_scan_may_have_lost_something(family):
+    """Of four bodies the first two are damaged. What is lost is no farther from the middle of a hole than that is wide.
+
+    Places in the warnings are those of the report, in the input's unit, and lie on damaged bodies.
+    """
+    places = np.array([(0, 0, 0), (30, 0, 0), (0, 30, 0), (30, 30, 0)])
+    whole = trimesh.creation.capsule(height=14, radius=4, count=(8, 12))
+    damaged = [FAMILIES[family](np.array(whole.vertices), whole.faces, 0.2, np.random.default_rng(i)) for i in (0, 1)]
+    damaged += [(whole.vertices, whole.faces)] * 2
+    scan = trimesh.util.concatenate(
+        [trimesh.Trimesh(v + place, f, process=False) for (v, f), place in zip(damaged, places, strict=True)]
+    )
+    result = rlacd.decompose(scan, quality="fast", threads=1)
+    holes = result.report["holes"]
+    assert {tuple(places[np.linalg.norm(places - hole["at_abs"], axis=1).argmin()]) for hole in holes} == {
+        (0, 0, 0),
+        (30, 0, 0),
+    }
+    points = np.concatenate([whole.vertices + place for place in places])
+    missed = hull_union([hull for part in result if (hull := Hull.of(part.vertices))], 1).distance(
+        np.ascontiguousarray(points)
+    )
+    lost = points[missed > 0.005 * np.ptp(points, axis=0).max() / 2]
+    assert (len(lost) > 0) == (family == "missing patches")
+    for point in lost:
+        assert any(np.linalg.norm(point - hole["at_abs"]) <= hole["width_abs"] for hole in holes)
+    (said,) = [line for line in result.report["warnings"] if "holes" in line.lower() or "open at" in line]
+    named = re.findall(r"\(([^()]*, [^()]*, [^()]*)\), body (\d+)", said)
+    assert len(named) == 5
+    for place, body in named:
+        hole = min(
+            holes, key=lambda one: np.linalg.norm(np.array(one["at_abs"]) - [float(x) for x in place.split(",")])
+        )
+        assert np.allclose(hole["at_abs"], [float(x) for x in place.split(",")], rtol=1e-3, atol=1e-6)
+        assert int(body) == hole["body"]
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_faces_missing_from_flat_sides_come_back_exactly(seed):
     """A cap bends as little as it can, so what is missing of a box is a box again."""
@@ -427,7 +470,7 @@ def test_what_closing_would_lose_stays_open(corpus, name):
 def test_nothing_is_left_open_that_would_be_emptied(left, taken):
     class Fake:
         def __init__(self, open_bodies, tangled, bend=1.0):
-            self.open_bodies, self.warnings = open_bodies, []
+            self.open_bodies, self.warnings, self.holes = open_bodies, [], []
             self.lost, self.lost_at = (0.0 if open_bodies == "thin" else 0.1), "(0, 0, 0)"
             self.solid = Manifold.cube((1, 1, left if open_bodies == "thin" else 1.0))
 

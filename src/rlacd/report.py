@@ -31,6 +31,9 @@ HONEST_WITHIN = 5e-3
 """How far the union of the hulls may reach beyond the threshold before the report warns: slack for repair and
 measurement."""
 
+MOST_HOLES = 1000
+"""Holes that a report lists."""
+
 
 class _Distances(NamedTuple):
     """How far the hulls reach out and fall short, and where they do so most: a place of the input, and its body."""
@@ -81,6 +84,7 @@ def make_report(
             "scale": solid.frame.scale,
             "mass": _mass(mass),
             "repair": [{**vars(body)} for body in solid.bodies],
+            "holes": _holes(solid),
             "warnings": [
                 *solid.warnings,
                 *_coarse(solid),
@@ -102,6 +106,18 @@ def make_report(
                 ),
             ],
         }
+
+
+def _holes(solid: Solid) -> list[dict[str, Any]]:
+    return [
+        {
+            "body": hole.body,
+            "at_abs": solid.frame.to_input(hole.at).tolist(),
+            "width_abs": hole.width / solid.frame.scale,
+            "closed": hole.is_closed,
+        }
+        for hole in solid.holes[:MOST_HOLES]
+    ]
 
 
 def _primitives(parts: Sequence[Part]) -> dict[str, int]:
@@ -159,6 +175,7 @@ def joint_report(reports: Sequence[tuple[str, dict[str, Any]]], scale: float) ->
     sides = ("over", "under")
     far = {side: [_times(report["hausdorff"][side], factor) for _, report, factor in each] for side in sides}
     repairs = [(name, body, factor) for name, report, factor in each for body in report["repair"]]
+    firsts = accumulate((len(report["repair"]) for _, report, _ in each), initial=0)
     stopped = next((report for _, report, _ in each if not report["complete"]), first)
     return {
         "version": first["version"],
@@ -175,6 +192,11 @@ def joint_report(reports: Sequence[tuple[str, dict[str, Any]]], scale: float) ->
         "repair": [
             {**body, "body": index, "deviation": body["deviation"] * factor, "node": name}
             for index, (name, body, factor) in enumerate(repairs)
+        ],
+        "holes": [
+            {**hole, "body": first + hole["body"], "node": name}
+            for (name, report, _), first in zip(each, firsts, strict=False)
+            for hole in report["holes"]
         ],
         "nodes": nodes,
         "search": None,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from manifold3d import Manifold
+from numpy.typing import ArrayLike
 
 from rlacd._native import poll_stop
 from rlacd.repair.caps import FLAPS, close_holes
@@ -18,10 +19,14 @@ from rlacd.repair.voxels import GAP
 from rlacd.repair.wraps import Wraps
 from rlacd.solid.frame import FloatArray, Frame
 from rlacd.solid.manifold import to_manifold
+from rlacd.solid.solid import Hole
 from rlacd.solid.thickness import HALF_THICKNESS
 from rlacd.solid.topology import BoolArray, Edges, IntArray, bodies_of, is_balanced, signed_tetrahedra
 
 _WELDS = (2e-5, 5e-4)
+
+# A warning names this many holes.
+_NAMED = 5
 
 
 class Attempt:
@@ -54,6 +59,8 @@ class Attempt:
     lost_at : str
         Where.
     warnings : list of str
+    holes : list of Hole
+        The most doubtful first.
     """
 
     def __init__(
@@ -73,9 +80,9 @@ class Attempt:
         self._gap = gap
         self._keep_cavities = keep_cavities
         self._open_bodies = open_bodies
-        self._mouths: dict[int, tuple[float, FloatArray]] = {}  # of hollow bodies, their widest opening: area, centre
         self._bend = bend
         self.warnings: list[str] = []
+        self.holes: list[Hole] = []
 
         faces, origin = close_cracks(surface.vertices, surface.faces, _WELDS)
         count, body = bodies_of(faces, Edges.of(faces, len(surface.vertices)))
@@ -95,7 +102,7 @@ class Attempt:
             self.warnings.append("the surface could not be closed: the hull of its points stands in for the solid")
             self.record.step[:] = STEPS.index("hull")
             self.solid = hull_of_points(surface.vertices)
-        self._warn_of_shells()
+        self._warn_of_holes()
         self.lost, place, loser = measure(self.record, surface, self.solid)
         self.lost_at = self._place(place, loser)
 
@@ -186,46 +193,52 @@ class Attempt:
         free = int((soup.edges.valence == 1).sum())
         if free == 0 or free > MOST_FREE_EDGES or self._open_bodies == "thin":
             return soup
-        soup = self._close(soup)
-        # What hangs on a rim is rather a side than a fin, unless its body would be hollow.
-        return self._close(soup, fins=True) if self._mouths else soup
+        soup, holes = self._close(soup)
+        if not all(hole.is_closed for hole in holes):
+            # What hangs on a rim is rather a side than a fin, unless its body would be hollow.
+            soup, others = self._close(soup, fins=True)
+            holes = [hole for hole in holes if hole.is_closed] + others if others else holes
+        self.holes += holes
+        return soup
 
-    def _close(self, soup: Soup, fins: bool = False) -> Soup:
+    def _close(self, soup: Soup, fins: bool = False) -> tuple[Soup, list[Hole]]:
         fill = self._open_bodies == "solid"
         closed = close_holes(
             soup, self.record.bodies, self._input, self._covers, self._gap, HALF_THICKNESS / 2, fill, self._bend, fins
         )
         if closed is None:
-            return soup
-        openings = zip(closed.widths.tolist(), closed.mouths, strict=True)
-        self._mouths = dict(zip(closed.hollow.tolist(), openings, strict=True))
+            return soup, []
         self.record.note(closed.bodies, "capped")
         self._by_room |= closed.by_room
         self._hidden = np.concatenate([self._hidden, closed.hidden])
         self._across = np.concatenate([self._across, closed.across])
-        if len(closed.far):
-            widest = closed.far.argmax()
-            place = self._place(closed.where[widest], int(closed.whose[widest]))
-            self.warnings.append(
-                f"Holes were closed although the caps lead up to {closed.far.max():.3f} (longest side = 2) away from "
-                f"the surface: the widest is at {place}."
-            )
-        return closed.soup
+        return closed.soup, closed.holes
 
     def _covers(self, points: FloatArray) -> BoolArray:
         """Whether a ball can reach points; if cavities are kept, everything connected to them is open."""
         return np.ones(len(points), dtype=bool) if self._keep_cavities else self._wraps.reach.covers(points)
 
-    def _warn_of_shells(self) -> None:
+    def _warn_of_holes(self) -> None:
+        self.holes.sort(key=lambda hole: hole.doubt, reverse=True)
+        if any(hole.depth for hole in self.holes):
+            depth = max(hole.depth for hole in self.holes)
+            self.warnings.append(
+                f"Holes were closed although the caps lead up to {depth:.3f} (longest side = 2) away from the surface,"
+                f" at {self._places([hole for hole in self.holes if hole.is_closed])}."
+            )
         is_slab = self.record.has("slab")
-        shells = [body for body in self._mouths if is_slab[body]]
-        if not shells:
-            return
-        body = max(shells, key=lambda one: self._mouths[one][0])
-        became = "1 open body became a thin shell; --open solid fills it"
-        if len(shells) > 1:
-            became = f"{len(shells)} open bodies became thin shells; --open solid fills them"
-        self.warnings.append(f"{became} (the widest opening is at {self._place(self._mouths[body][1], body)}).")
+        openings = [hole for hole in self.holes if not hole.is_closed and is_slab[hole.body]]
+        shells = len({hole.body for hole in openings})
+        if shells:
+            became = "1 open body became a thin shell; --open solid fills it"
+            if shells > 1:
+                became = f"{shells} open bodies became thin shells; --open solid fills them"
+            self.warnings.append(f"{became} (open at {self._places(openings)}).")
 
-    def _place(self, point: FloatArray, body: int) -> str:
+    def _places(self, holes: list[Hole]) -> str:
+        """Where holes are, the most doubtful first."""
+        named = "; ".join(self._place(hole.at, hole.body) for hole in holes[:_NAMED])
+        return named + (f"; and {len(holes) - _NAMED} more, see `holes`" if len(holes) > _NAMED else "")
+
+    def _place(self, point: ArrayLike, body: int) -> str:
         return self._frame.place(point, body if self.record.bodies > 1 else None)

@@ -23,6 +23,7 @@ from rlacd.repair.rims import Rims, rims_of
 from rlacd.repair.soup import Soup, crossed_share, face_normals
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.products import dots
+from rlacd.solid.solid import Hole
 from rlacd.solid.topology import (
     BoolArray,
     IntArray,
@@ -73,18 +74,8 @@ class Closed:
         Points ``[N, 3]`` of such caps, away from the surface.
     across
         The unit normals of the caps there, ``[N, 3]``.
-    far
-        Distances of caps from the surface, for each body with a cap that something can reach.
-    where
-        The positions of `far`, ``[N, 3]``.
-    whose
-        The bodies of `far`, ``[N]``.
-    hollow
-        Bodies that stay open although caps would give them an inside.
-    mouths
-        The centre of the widest opening of each of them, ``[N, 3]``.
-    widths
-        The area of the caps of these openings, ``[N]``.
+    holes
+        The holes that were closed, and those of bodies that stay open although caps would give them an inside.
     """
 
     soup: Soup
@@ -92,12 +83,7 @@ class Closed:
     by_room: BoolArray
     hidden: FloatArray
     across: FloatArray
-    far: FloatArray
-    where: FloatArray
-    whose: IntArray
-    hollow: IntArray
-    mouths: FloatArray
-    widths: FloatArray
+    holes: list[Hole]
 
 
 def close_holes(
@@ -209,10 +195,10 @@ def close_holes(
     refused = np.setdiff1d(loop_body, np.flatnonzero(chosen))
     by_room = np.zeros(bodies, dtype=bool)
     by_room[loop_body[place[unreachable & ~excused]]] = True
-    wide = far & chosen[loop_body[place]]
     hollow = refused[np.abs(enclosed[refused]) > _ROOMY * body_area[refused]]
-    widest = [np.flatnonzero(loop_body == one)[by_loop[loop_body == one].argmax()] for one in hollow.tolist()]
-    mouths = np.array([soup.vertices[rims.loops[loop]].mean(axis=0) for loop in widest]).reshape(-1, 3)
+    reached = np.zeros(len(rims.loops))
+    np.maximum.at(reached, place[far], distance[far])
+    holes = _holes(soup, rims, loop_body, chosen[loop_body], smooth, reached)
     result = capped()[0] if chosen.any() else soup
     hidden = np.flatnonzero(unreachable & ~excused & chosen[loop_body[place]])
     # Slender faces have many points; one of each cell is enough.
@@ -224,13 +210,22 @@ def close_holes(
         by_room & chosen,
         points[hidden],
         across,
-        distance[wide],
-        points[wide],
-        loop_body[place[wide]],
-        hollow,
-        mouths,
-        np.asarray(by_loop[widest], dtype=np.float64),
+        [hole for hole in holes if hole.is_closed or hole.body in hollow],
     )
+
+
+def _holes(
+    soup: Soup, rims: Rims, body: IntArray, closed: BoolArray, smooth: BoolArray, depth: FloatArray
+) -> list[Hole]:
+    """Describe the loops, given the body of each, whether it was closed, and how far its cap leads away."""
+    lengths = np.array([len(loop) for loop in rims.loops])
+    loop = np.repeat(np.arange(len(lengths)), lengths)
+    corners = soup.vertices[np.concatenate(rims.loops)]
+    centre = np.stack([np.bincount(loop, corners[:, axis]) for axis in range(3)], axis=1) / lengths[:, None]
+    width = np.zeros(len(lengths))
+    np.maximum.at(width, loop, 2 * np.linalg.norm(corners - centre[loop], axis=1))
+    columns = (body.tolist(), map(tuple, centre.tolist()), width.tolist(), closed.tolist(), smooth.tolist())
+    return [Hole(*row) for row in zip(*columns, np.where(closed, depth, 0.0).tolist(), strict=True)]
 
 
 def _caps(soup: Soup, rims: Rims, bend: float) -> tuple[IntArray, IntArray]:

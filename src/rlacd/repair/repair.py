@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -137,6 +138,7 @@ def repair(
         frame,
         work.record.rows(),
         tuple(warnings + work.warnings),
+        holes=tuple(work.holes),
         body_of=work.record.body_of_input,
     )
 
@@ -161,6 +163,7 @@ def _attempted(attempt: Callable[..., Attempt], open_bodies: str, tangled: IntAr
                 f"Some of the surface lay up to {work.lost:.4g} from the solid once holes were closed, most near "
                 f"{work.lost_at}, so open bodies became thin shells; --open solid fills them."
             )
+            other.holes = [replace(hole, is_closed=False) for hole in work.holes]
             work, how = other, how | {"open_bodies": "thin"}
     doubted = work.doubted()
     if len(doubted):

@@ -37,6 +37,40 @@ class BodyRepair:
 
 
 @dataclass(frozen=True)
+class Hole:
+    """A hole of a body that has an inside: what was there is a guess.
+
+    Attributes
+    ----------
+    body
+        Number of the body, as in `BodyRepair`.
+    at
+        The mean of the corners of its rim, in the frame.
+    width
+        Twice the distance from there to the farthest corner.
+    is_closed
+        Whether it was closed. The body became a thin shell otherwise.
+    is_smooth
+        Whether the cap continues the faces around it.
+    depth
+        How far the cap leads away from the surface where something can reach it, if that is more than caps may without
+        a word; else 0.
+    """
+
+    body: int
+    at: tuple[float, float, float]
+    width: float
+    is_closed: bool
+    is_smooth: bool
+    depth: float
+
+    @property
+    def doubt(self) -> tuple[float, float]:
+        """Greater where more of the body may be missing: a smooth cap is likely right."""
+        return (0.0 if self.is_smooth else self.width, self.width)
+
+
+@dataclass(frozen=True)
 class Solid:
     """A closed, oriented solid in the normalised frame.
 
@@ -53,6 +87,8 @@ class Solid:
         What was done to each body.
     warnings
         One sentence for each thing the user should know.
+    holes
+        The holes of bodies that have an inside, the most doubtful first.
     body_of
         ``[F]``, the body of each face of the surface; None if there is only one.
     is_as_given
@@ -64,6 +100,7 @@ class Solid:
     frame: Frame
     bodies: tuple[BodyRepair, ...]
     warnings: tuple[str, ...]
+    holes: tuple[Hole, ...] = ()
     body_of: NDArray[np.int64] | None = None
     is_as_given: bool = False
 
