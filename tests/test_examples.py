@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import importlib.util
 import inspect
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
 
@@ -20,8 +22,9 @@ from tests.option_table import PAGE, options_table
 ROOT = Path(__file__).resolve().parent.parent
 
 
-def sample_script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("sample", ROOT / "examples" / "sample.py")
+def script(name: str) -> ModuleType:
+    """A script of examples/ as a module."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / "examples" / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -30,7 +33,7 @@ def sample_script() -> ModuleType:
 
 
 def test_the_sample_is_two_closed_bodies_of_a_few_thousand_triangles() -> None:
-    scene = sample_script().sample()
+    scene = script("sample").sample()
     assert set(scene.geometry) == {"chair", "jug"}
     assert all(mesh.is_watertight and mesh.body_count == 1 for mesh in scene.geometry.values())
     assert scene.geometry["chair"].euler_number == 2 - 2 * 7, "a chair with seven windows to see through"
@@ -41,8 +44,50 @@ def test_the_sample_is_two_closed_bodies_of_a_few_thousand_triangles() -> None:
 
 
 def test_the_sample_is_the_same_every_time() -> None:
-    script = sample_script()
-    assert script.sample().export(file_type="glb") == script.sample().export(file_type="glb")
+    sample = script("sample").sample
+    assert sample().export(file_type="glb") == sample().export(file_type="glb")
+
+
+@functools.cache
+def gallery() -> dict[str, list[str]]:
+    """The rows of the gallery's table, by the name of the object."""
+    text = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines() if line.startswith("| ")]
+    return {row[0]: row[1:] for row in rows[1:]}
+
+
+def holds(corpus: Path, names: Iterable[str]) -> None:
+    pytest.importorskip("PIL", reason="the extra view is not installed")
+    for name in names:
+        result = rlacd.decompose(corpus / "test" / name)
+        cells = [f"{len(result.source.faces):,}", str(len(result)), f"{result.report['faces']:,}"]
+        stem = Path(name).stem.partition("-")[0].lower()
+        assert gallery()[stem] == [*cells, f"{result.report['hausdorff']['over']:.3f}"], stem
+        assert (ROOT / "docs" / "gallery_objects" / f"{stem}.webp").is_file()
+
+
+@pytest.mark.slow
+def test_some_rows_of_the_gallery_are_what_the_objects_give(corpus: Path) -> None:
+    holds(corpus, ["vhacd/lamp.ply", "vhacd/horse_walk.ply", "vhacd/teddy.ply"])
+
+
+@pytest.mark.nightly
+def test_all_rows_of_the_gallery_are_what_the_objects_give(corpus: Path) -> None:
+    objects = script("gallery").OBJECTS
+    assert len(gallery()) == len(objects) == 12
+    holds(corpus, objects)
+
+
+@pytest.mark.slow
+def test_the_furnished_room_stays_open_for_a_small_ball_only() -> None:
+    """Under the bed and in the shelf, where only the small one goes, and in the middle of the room, where both go."""
+    places = [(3.5, 1.5, 0.2), (1.1, 2.7, 0.25), (1.0, 1.5, 1.3)]
+    inside = []
+    for radius in (0.02, 0.10):
+        space = rlacd.NavigableSpace(radius, tolerance=0.01)
+        hulls = rlacd.decompose(script("furnished_room").room(), criterion=space, policy="navacd", quality="fast")
+        inside.append([any(hull.contains([point])[0] for hull in hulls) for point in places])
+    assert inside == [[False, False, False], [True, True, False]]
 
 
 def test_the_documentation_holds_the_table_of_options() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -14,10 +15,12 @@ from typing import Any
 
 import pytest
 import trimesh
+import typer
 
 import rlacd
 from fuzz.faults import Fault, command, tree
 from rlacd.cli.exit_codes import ExitCode
+from rlacd.cli.main import app
 
 ROOT = Path(__file__).resolve().parent.parent
 TEST = re.compile(r"`(tests/\w+\.py)::(\w+)`")
@@ -149,6 +152,55 @@ def test_extras_are_those_that_the_project_has() -> None:
     assert named == extras
     sources = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "src").rglob("*.py"))
     assert set(re.findall(r"rlacd\[(\w+)\]", sources)) <= extras
+
+
+def section(page: str, title: str) -> str:
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    return text.split(f"\n## {title}\n")[1].split("\n## ")[0]
+
+
+def test_presets_are_those_of_the_table() -> None:
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in section("formats.md", "Presets").splitlines()]
+    table = {cells[0].strip("`"): cells[1:4] for cells in rows if cells and cells[0].startswith("`")}
+    assert list(table) == list(rlacd.PRESETS)
+    for name, (vertices, faces, file) in table.items():
+        preset = rlacd.PRESETS[name]
+        assert [vertices, faces] == [str(limit or "–") for limit in (preset.max_vertices, preset.max_faces)], name
+        assert re.findall(r"`(\.\w+)`", file) == [preset.ending], name
+        looks = {"unreal": "`UCX_`", "godot": "`-convcolonly`"}
+        assert preset.file_format is None or looks[preset.file_format] in file, name
+
+
+def test_the_readme_has_the_numbers_of_the_benchmarks() -> None:
+    readme, page = ((ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/benchmarks.md"))
+    table = [line for line in readme.splitlines() if line.startswith("|")]
+    assert len(table) == 9
+    assert "\n".join(table) in page
+
+
+BENCHMARKS = re.split(r"^## ", (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
+
+
+@pytest.mark.parametrize("text", BENCHMARKS, ids=[text.splitlines()[0] for text in BENCHMARKS])
+def test_a_benchmark_names_its_command_date_and_commit(text: str) -> None:
+    """The commands are there and have the options that the page gives them."""
+    commands = [shlex.split(words) for words in re.findall(r"`((?:rlacd|python|du) [^`]+)`", text)]
+    assert commands
+    assert re.search(r"\d November 2026", text)
+    assert re.search(r"\b[0-9a-f]{7}\b", text)
+    for program, *words in commands:
+        script = next((word for word in words if re.match(r"[\w/.]*(benchmarks|fuzz)[/.]\w+", word)), None)
+        if program == "python":
+            assert script is not None
+            path = ROOT / (script if script.endswith(".py") else script.replace(".", "/") + ".py")
+            known = path.read_text(encoding="utf-8")
+            assert [word for word in words if word.startswith("--") and f'"{word}"' not in known] == []
+        elif program == "rlacd" and len(words) > 1:
+            at: Any = typer.main.get_command(app)
+            while isinstance(at, typer.core.TyperGroup):
+                _, at, words = at.resolve_command(typer.Context(at), words)
+            options = {option for parameter in at.params for option in parameter.opts}
+            assert {word for word in words if word.startswith("--")} <= options
 
 
 @pytest.mark.parametrize(
