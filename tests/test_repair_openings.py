@@ -338,6 +338,21 @@ def test_the_side_of_a_plate_that_lost_its_other_sides_is_no_fin():
     assert volume(solid) == pytest.approx(plate.volume, rel=1e-3)
 
 
+@pytest.mark.parametrize("apart", [0.1, 0.3])
+def test_what_caps_leave_of_a_room_that_nothing_can_enter_is_filled(apart):
+    """A deep chest and its flat lid, open towards each other, and a belt around the slit that touches neither."""
+    belt = Manifold.cube((2.12, 2.12, apart + 0.2), True) - Manifold.cube((2.02, 2.02, apart + 0.3), True)
+    chest = trimesh.creation.box((2, 2, 2)).apply_translation((0, 0, -1 - apart / 2))
+    lid = trimesh.creation.box((2, 2, 0.6)).apply_translation((0, 0, 0.3 + apart / 2))
+    chest = without(chest, *np.flatnonzero(chest.face_normals[:, 2] > 0.9))
+    lid = without(lid, *np.flatnonzero(lid.face_normals[:, 2] < -0.9))
+    around = trimesh.Trimesh(*to_arrays(belt), process=False)
+    solid = solid_of(join(chest, lid, around))
+    assert volume(solid) == pytest.approx(4 * (2.6 + apart) + belt.volume(), rel=0.01)
+    ajar = solid_of(join(chest, lid, around.copy().apply_scale((1.2, 1.2, 1))))
+    assert volume(ajar) < 4, "where something gets in, they are shells"
+
+
 @pytest.mark.parametrize("share", [0.05, 0.1, 0.2])
 @pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize("name", ["ball", "torus"])

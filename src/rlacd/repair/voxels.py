@@ -100,6 +100,17 @@ class Reach:
         """Return ``[X, Y, Z]`` the unreachable cells of some rooms and of their walls."""
         return _grown(np.isin(self.room, rooms), self.radius / self.pitch + 2) & ~self.reached
 
+    def around_rest(self, points: FloatArray, solid: SurfaceQuery) -> BoolArray:
+        """Return ``[X, Y, Z]`` the unreachable cells of what a solid leaves empty of the rooms that hold some points."""
+        labels = self.room[tuple(np.rint((points - self.origin) / self.pitch).astype(np.int64).T)]
+        if not labels.any():
+            return np.zeros(self.room.shape, dtype=bool)
+        rest = np.flatnonzero(np.isin(self.room, labels[labels > 0]))
+        centers = self.origin + np.stack(np.unravel_index(rest, self.room.shape), axis=1) * self.pitch
+        mark = np.zeros(self.room.shape, dtype=bool)
+        mark.ravel()[rest[~solid.inside(centers)]] = True
+        return _grown(mark, self.radius / self.pitch + 2) & ~self.reached
+
     def around_points(self, points: FloatArray) -> BoolArray:
         """Return ``[X, Y, Z]`` the unreachable cells at and between some points."""
         mark = np.zeros(self.reached.shape, dtype=bool)

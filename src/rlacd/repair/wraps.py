@@ -155,9 +155,10 @@ class Wraps:
         return united
 
     def with_slits(self, solid: Shape, hidden: FloatArray, across: FloatArray, by_room: BoolArray) -> Shape:
-        """Fill the slits between the caps of bodies that close each other, such as a pot and its lid.
+        """Fill what is left between the caps of bodies that close each other, such as a pot and its lid.
 
-        Nothing can reach such caps; where they should coincide, noise leaves slits that would have to be cut around.
+        Nothing can reach such caps, so nothing can reach what they leave of a room; and where they should coincide,
+        noise leaves slits that would have to be cut around.
 
         Parameters
         ----------
@@ -173,10 +174,13 @@ class Wraps:
         query = SurfaceQuery(*to_arrays(solid), self._input.threads)
         bare = query.distance(hidden) < _ON_SURFACE
         points, step = hidden[bare], _SLIT * self._gap * across[bare]
-        points = points[query.inside(points + step) & query.inside(points - step)]
-        if len(points) == 0:
+        beside = np.stack([points + step, points - step])
+        inside = query.inside(beside.reshape(-1, 3)).reshape(beside.shape[:2])
+        cells = self.reach.around_points(points[inside.all(axis=0)])
+        cells |= self.reach.around_rest(beside[~inside], query)
+        if not cells.any():
             return solid
-        wrap = self._wrap(self.reach.around_points(points), _WRAP_ERROR)
+        wrap = self._wrap(cells, _WRAP_ERROR)
         united = unite([as_manifold(solid), wrap])
         if volume_of(united) <= volume_of(solid):
             return solid
