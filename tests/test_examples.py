@@ -13,6 +13,7 @@ from types import ModuleType
 
 import pytest
 import typer
+from typer.testing import CliRunner
 
 import rlacd
 from rlacd.cli.main import app
@@ -92,6 +93,17 @@ def test_the_furnished_room_stays_open_for_a_small_ball_only() -> None:
 
 def test_the_documentation_holds_the_table_of_options() -> None:
     assert options_table() in PAGE.read_text(encoding="utf-8"), "run  python -m tests.option_table"
+
+
+@pytest.mark.slow
+def test_five_minutes_shows_what_the_command_prints_for_the_sample(tmp_path: Path) -> None:
+    script("sample").sample().export(tmp_path / "chair.glb")
+    shown = (ROOT / "docs" / "start.md").read_text(encoding="utf-8").split("```text\n")[1].split("```")[0]
+    run = CliRunner().invoke(app, ["decompose", str(tmp_path / "chair.glb")])
+    assert run.exit_code == 0
+    said = re.sub(r"[\d.]+ s$", "…", run.stderr.replace(f"{tmp_path}/", ""), flags=re.MULTILINE)
+    assert said == shown
+    assert (tmp_path / "chair_hulls.glb").is_file()
 
 
 def test_the_readme_works_outside_the_repository() -> None:

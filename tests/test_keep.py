@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -240,6 +241,28 @@ def test_hulls_of_a_scene_in_memory_and_of_other_files_give_way(tmp_path: Path) 
         read = trimesh.load_scene(result.save(tmp_path / "out.glb", file_format="unreal"), process=False)
         assert read.extents.max() == pytest.approx(3.0)
         assert len(read.graph.nodes_geometry) == 2
+
+
+def test_hulls_in_an_obj_file_count_as_shapes(tmp_path: Path) -> None:
+    scene = trimesh.Scene({"post": trimesh.creation.box((1, 1, 3)), "UCX_post_00": trimesh.creation.box((5, 5, 5))})
+    (tmp_path / "post.obj").write_text(scene.export(file_type="obj"))
+    result = rlacd.decompose(tmp_path / "post.obj", threads=1, quality="fast")
+    assert max(hull.extents.max() for hull in result) == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize("how", [{"unit": "cm"}, {"scale": 0.01}])
+def test_a_gltf_file_stays_in_its_own_unit(tmp_path: Path, cart: Path, how: dict[str, Any]) -> None:
+    """Hulls alone are converted; in the input's scene they are as large as what they lie around."""
+    result = rlacd.decompose(cart, per_node=True, threads=1, **how)
+    before = trimesh.load_scene(cart, process=False)
+    assert np.allclose(result.source.extents, before.extents / 100, rtol=1e-5)
+    read = trimesh.load_scene(result.save(tmp_path / "out.glb", file_format="unreal"), process=False)
+    assert np.allclose(read.bounds, before.bounds, atol=0.02)
+    for hull in result:
+        transform, mesh = read.graph[f"UCX_{hull.metadata['node']}_00"]
+        assert np.allclose(read.geometry[mesh].copy().apply_transform(transform).bounds, 100 * hull.bounds, atol=1e-5)
+    alone = trimesh.load_scene(result.save(tmp_path / "hulls.glb"), process=False)
+    assert np.allclose(alone.extents, before.extents / 100, rtol=0.02)
 
 
 def test_a_file_of_hulls_alone_is_decomposed() -> None:

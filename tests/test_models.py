@@ -279,6 +279,44 @@ def test_a_flat_mesh_to_look_at_is_no_obstacle(tmp_path: Path) -> None:
     assert loaded_in_bullet(result.save(tmp_path / "square.urdf"), 0.0).hulls == len(result)
 
 
+def test_the_input_is_seen_and_hulls_collide(tmp_path: Path, wooden: Decomposition) -> None:
+    """In MuJoCo by groups, which its viewer switches; in URDF and SDF by elements."""
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    model = mujoco.MjModel.from_xml_path(str(wooden.save(tmp_path / "table.xml")))
+    for group, count, collides in ((2, 1, False), (3, len(wooden), True)):
+        members = np.flatnonzero(model.geom_group == group)
+        assert len(members) == count
+        assert (model.geom_contype[members].astype(bool) == collides).all()
+        assert (model.geom_conaffinity[members].astype(bool) == collides).all()
+    for ending in ("urdf", "sdf"):
+        root = etree.parse(str(wooden.save(tmp_path / f"table.{ending}"))).getroot()
+        assert len(root.findall(".//visual")) == 1
+        assert len(root.findall(".//collision")) == len(wooden)
+    assert len(root.findall(".//collision//{http://drake.mit.edu}declare_convex")) == len(wooden)
+
+
+def test_far_from_the_origin_a_model_keeps_the_shape_and_the_place(tmp_path: Path) -> None:
+    """At 500 km single precision resolves 3 cm; the box is 10 cm wide."""
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    far = trimesh.creation.box((0.1, 0.1, 0.1), transform=trimesh.transformations.translation_matrix([5e5, 0.03, 9]))
+    result = rlacd.decompose(far, threads=1)
+    model = mujoco.MjModel.from_xml_path(str(result.save(tmp_path / "far.xml")))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    for geom in range(model.ngeom):
+        mesh = model.geom_dataid[geom]
+        first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+        points = model.mesh_vert[first : first + count] @ data.geom_xmat[geom].reshape(3, 3).T
+        assert np.ptp(points, axis=0) == pytest.approx([0.1, 0.1, 0.1], abs=1e-6)
+        assert points.mean(axis=0) + data.geom_xpos[geom] == pytest.approx([5e5, 0.03, 9], abs=1e-6)
+    for ending in ("urdf", "sdf"):
+        path = result.save(tmp_path / f"far.{ending}")
+        for file in (tmp_path / f"far_{ending}").glob("*.obj"):
+            read = trimesh.load_mesh(file, process=False)
+            assert np.abs(read.vertices).max() < 0.06, "relative to its centre"
+        assert "500000" in path.read_text().replace(",", "")
+
+
 @pytest.mark.parametrize("ending", ["xml", "urdf", "sdf", "usda"])
 def test_same_decomposition_same_bytes(tmp_path: Path, wooden: Decomposition, ending: str) -> None:
     if ending == "usda":

@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 import rlacd
 from rlacd.cli.main import app
 from rlacd.errors import MeshFileError, OptionError, OutputError
+from rlacd.io.robots import rewrite
 from tests.models import table
 
 EAR = """<?xml version="1.0"?>
@@ -190,6 +191,32 @@ def test_lengths_are_in_the_robots_unit(tmp_path: Path) -> None:
     assert done.meshes[0].result.report["options"]["threshold"] == pytest.approx(0.004 * 2 / 0.4)
     (hulls,) = [trimesh.util.concatenate(collisions(done.path))]
     assert hulls.bounds == pytest.approx(table().bounds, abs=1e-6)
+
+
+def test_a_mesh_smaller_than_the_threshold_becomes_one_hull(tmp_path: Path) -> None:
+    apart = trimesh.util.concatenate([table(), table().apply_translation((1, 0, 0))])
+    for name, mesh in (("one", table()), ("two", apart)):
+        mesh.export(tmp_path / f"{name}.stl")
+    collision = "<collision><geometry><mesh filename='{}.stl'/></geometry></collision>"
+    both = collision.format("one") + collision.format("two")
+    (tmp_path / "r.urdf").write_text(f"<robot name='r'><link name='l'>{both}</link></robot>")
+    done = rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "out.urdf", threshold_abs=0.9, threads=1)
+    assert [len(mesh.files) for mesh in done.meshes] == [1, 1]
+    fine = rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "fine.urdf", threshold_abs=0.01, threads=1)
+    assert [len(mesh.files) for mesh in fine.meshes] == [5, 10]
+
+
+def test_a_timeout_counts_for_each_mesh(ear: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    given = []
+    whole = rewrite.decompose
+
+    def watched(*words: object, **options: object) -> object:
+        given.append(options["timeout"])
+        return whole(*words, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(rewrite, "decompose", watched)
+    rlacd.rewrite_robot(ear, ear.with_name("out.urdf"), timeout=50.0, threads=1)
+    assert given == [50.0, 50.0]
 
 
 def test_the_unit_of_collada_files_is_applied_as_ros_does(tmp_path: Path) -> None:
