@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import inspect
 import json
 import math
 import signal
@@ -123,6 +124,27 @@ class TestMethods:
         assert np.allclose(points.min(axis=0), (-1, -1, -0.2), atol=0.06)
         assert np.allclose(points.max(axis=0), (1, 1, 0.2), atol=0.06)
         assert all(f.shape[1] == 3 and f.max() < len(v) for v, f in hulls)
+
+
+def test_other_tools_run_at_their_own_defaults(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is passed but the setting compared, at the default it has there, and the input."""
+    coacd = pytest.importorskip("coacd", reason="the extra bench is not installed")
+    vhacdx = pytest.importorskip("vhacdx", reason="the extra bench is not installed")
+    threshold = inspect.signature(coacd.run_coacd).parameters["threshold"].default
+    hulls = int(vhacdx.compute_vhacd.__doc__.split("maxConvexHulls")[1].split(" = ")[1].split(",")[0])
+    passed: list[dict[str, Any]] = []
+    hull = trimesh.creation.box()
+
+    def seen(*_: Any, **options: Any) -> list[Any]:
+        passed.append(options)
+        return [(hull.vertices, hull.faces)]
+
+    monkeypatch.setattr(coacd, "run_coacd", seen)
+    monkeypatch.setattr(vhacdx, "compute_vhacd", seen)
+    for name in ("coacd", "vhacdx:hulls"):
+        method = make_method(name)
+        method.run(np.array(hull.vertices), np.array(hull.faces, dtype=np.int32), method.default, 1)
+    assert passed == [{"threshold": threshold}, {"maxConvexHulls": hulls, "asyncACD": False}]
 
 
 @pytest.mark.nightly

@@ -373,7 +373,7 @@ def test_a_damaged_solid_stays_the_solid_it_was(name, family, share):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("family", ["moth holes", "missing patches"])
-def test_a_warning_names_the_bodies_and_places_where_a_damaged_scan_may_have_lost_something(family):
+def test_warnings_and_report_name_where_a_damaged_scan_may_have_lost_something(family):
     """Of four bodies the first two are damaged. What is lost is no farther from the middle of a hole than that is wide.
 
     Places in the warnings are those of the report, in the input's unit, and lie on damaged bodies.
