@@ -48,6 +48,8 @@ class Attempt:
         Bodies all of whose faces become slabs.
     bend : float
         How much caps may bend; see `rlacd.repair.caps.close_holes`.
+    by_faces : bool
+        Unite slabs that cross themselves from their faces.
 
     Attributes
     ----------
@@ -74,6 +76,7 @@ class Attempt:
         tangled: IntArray,
         as_sheets: IntArray | None = None,
         bend: float = 1.0,
+        by_faces: bool = False,
     ) -> None:
         self._input = surface
         self._frame = frame
@@ -94,7 +97,7 @@ class Attempt:
         self._hidden, self._across = np.empty((2, 0, 3))  # points of such caps, and the normals there
         sheets = np.empty(0, dtype=np.int64) if as_sheets is None else as_sheets
         self._tangled = tangled
-        self._wraps = Wraps(surface, self.record, gap, resolution, sheets, tangled)
+        self._wraps = Wraps(surface, self.record, gap, resolution, sheets, tangled, by_faces)
 
         poll_stop()
         self.solid = self._solid(Soup(surface.vertices, faces, body))
@@ -109,6 +112,11 @@ class Attempt:
     def doubted(self) -> IntArray:
         """Bodies whose skin was chosen among crossing faces and leads away from them."""
         return np.flatnonzero(self.record.has("outer skin") & (self.record.deviation > GAP))
+
+    @property
+    def torn(self) -> float:
+        """How far slabs lead away from the input: beyond their thickness if booleans of them went wrong."""
+        return float(self.record.deviation.max(initial=0.0, where=self.record.has("slab")))
 
     def _solid(self, soup: Soup) -> Shape:
         if len(self._tangled) == 0 and self._is_oriented(soup):

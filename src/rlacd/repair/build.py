@@ -10,12 +10,15 @@ from rlacd.repair.distance import SurfaceQuery, probes
 from rlacd.repair.record import Record
 from rlacd.repair.skin import skin
 from rlacd.repair.slabs import slab_of_faces
-from rlacd.repair.soup import FLAT, Soup, on_repeated_edge
-from rlacd.repair.union import split_labels
+from rlacd.repair.soup import FLAT, Soup, crossed_share, on_repeated_edge
+from rlacd.repair.union import split_labels, to_arrays
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.thickness import HALF_THICKNESS
 from rlacd.solid.topology import BoolArray, IntArray
+
+# Slabs of more triangles are not united from their faces: that would take seconds.
+_MOST_OF_A_SLAB = 1000
 
 
 def walls_and_sheets(soup: Soup, record: Record, as_sheets: IntArray) -> tuple[Soup, Soup]:
@@ -43,8 +46,12 @@ def walls_and_sheets(soup: Soup, record: Record, as_sheets: IntArray) -> tuple[S
     return soup.only(~sheet & (wall | ~mixed[soup.body])), soup.only(sheet)
 
 
-def skins(soup: Soup, record: Record) -> list[tuple[Manifold, int]]:
-    """Build the outer side components of a soup; sheets and flat bodies get thickness."""
+def skins(soup: Soup, record: Record, by_faces: bool = False) -> list[tuple[Manifold, int]]:
+    """Build the outer side components of a soup; sheets and flat bodies get thickness.
+
+    If it says so, slabs that cross themselves, as where sheets lie closer than they become thick, are united from
+    slabs of their faces; the soup has nothing but sheets then.
+    """
     if len(soup.faces) == 0:
         return []
     sides = soup.sides
@@ -75,7 +82,7 @@ def skins(soup: Soup, record: Record) -> list[tuple[Manifold, int]]:
     # Sheets narrower than their intended thickness can cross themselves, and come out inside out.
     for i in np.flatnonzero(has_sheet[built] | flat[built]):
         poll_stop()
-        if solids[i].volume() <= 0:
+        if solids[i].volume() <= 0 or (by_faces and _crosses_itself(solids[i])):
             some = (sides.label.reshape(-1, 2) == built[i]).any(axis=1)
             solids[i] = slab_of_faces(soup.vertices, soup.faces[some])
             count[i] = solids[i].num_tri()
@@ -88,6 +95,10 @@ def _skin(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, Int
     front = soup.sides.label[0::2]
     thin = keep[front] & (soup.sides.sheet | flat[front])
     return skin(soup.vertices, soup.faces, soup.sides, keep, thin, HALF_THICKNESS)
+
+
+def _crosses_itself(slab: Manifold) -> bool:
+    return slab.num_tri() <= _MOST_OF_A_SLAB and crossed_share(*to_arrays(slab)) > 0
 
 
 def _poking_out(soup: Soup, wall: BoolArray, inner: BoolArray) -> BoolArray:

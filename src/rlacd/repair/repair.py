@@ -46,6 +46,8 @@ CELLS_ACROSS = 1.5
 
 # What a capped body may lose before its caps are made another way, or none.
 _LOST = 5e-3
+# How far slabs may lead away from the input before those that cross themselves are made another way.
+_TORN = 1e-2
 # Share of the volume that is left where no hole is closed, below which bodies were emptied.
 _FILLED = 0.4
 # manifold3d collapses edges shorter than 1e-12, and swaps those of faces that are no higher, or folded back onto a
@@ -165,6 +167,11 @@ def _attempted(attempt: Callable[..., Attempt], open_bodies: str, tangled: IntAr
             )
             other.holes = [replace(hole, is_closed=False) for hole in work.holes]
             work, how = other, how | {"open_bodies": "thin"}
+    if work.torn > _TORN:
+        # Slabs that cross themselves and each other can leave wedges that none of them has.
+        other = attempt(**how, by_faces=True)
+        if other.torn < work.torn:
+            work, how = other, how | {"by_faces": True}
     doubted = work.doubted()
     if len(doubted):
         # If faces of one body cross each other, they may be joined into a wrong skin: try them as sheets.

@@ -101,7 +101,7 @@ class Reach:
         return _grown(np.isin(self.room, rooms), self.radius / self.pitch + 2) & ~self.reached
 
     def around_rest(self, points: FloatArray, solid: SurfaceQuery) -> BoolArray:
-        """Return ``[X, Y, Z]`` the unreachable cells of what a solid leaves empty of the rooms that hold some points."""
+        """Return ``[X, Y, Z]`` the unreachable cells of what a solid leaves of the rooms that hold some points."""
         labels = self.room[tuple(np.rint((points - self.origin) / self.pitch).astype(np.int64).T)]
         if not labels.any():
             return np.zeros(self.room.shape, dtype=bool)

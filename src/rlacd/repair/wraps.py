@@ -46,16 +46,26 @@ class Wraps:
         Bodies all of whose faces become slabs.
     tangled : int64 [N]
         Bodies that `untangled` builds.
+    by_faces : bool
+        Unite slabs that cross themselves from their faces.
     """
 
     def __init__(
-        self, surface: SurfaceQuery, record: Record, gap: float, resolution: int, as_sheets: IntArray, tangled: IntArray
+        self,
+        surface: SurfaceQuery,
+        record: Record,
+        gap: float,
+        resolution: int,
+        as_sheets: IntArray,
+        tangled: IntArray,
+        by_faces: bool,
     ) -> None:
         self._input = surface
         self._record = record
         self._gap = gap
         self._resolution = resolution
         self._as_sheets = as_sheets
+        self._by_faces = by_faces
         self._is_tangled = np.zeros(record.bodies, dtype=bool)
         self._is_tangled[tangled] = True
 
@@ -73,7 +83,7 @@ class Wraps:
         if crowded:  # slabs of single faces are most of the work, and not needed
             parts = skins(walls.only(~is_slab[walls.body]), record)
         else:
-            parts = skins(walls, record) + skins(sheets.in_patches(), record)
+            parts = skins(walls, record) + skins(sheets.in_patches(), record, self._by_faces)
             boxes = np.array([part.bounding_box() for part, body in parts if is_slab[body]]).reshape(-1, 2, 3)
             if _crossings(boxes) <= _CROSSINGS:
                 return parts
@@ -142,7 +152,7 @@ class Wraps:
             record.faces_out[is_slab] = 0
             others = [part for part, body in parts if not is_slab[body]]
             rest = walls_and_sheets(slabs.only(~wall), record, self._as_sheets)
-            rebuilt = skins(rest[0], record) + skins(rest[1].in_patches(), record)
+            rebuilt = skins(rest[0], record) + skins(rest[1].in_patches(), record, self._by_faces)
             united = unite([*others, *(part for part, _ in rebuilt), wrap])
         else:
             united = unite([as_manifold(solid), wrap])
