@@ -230,7 +230,7 @@ def test_the_command_writes_the_balls(mesh: Path, tmp_path: Path) -> None:
     assert len(rows) == json.loads(report.read_text(encoding="utf-8"))["navigable"]["balls"] > 0
     places = np.array([[float(row[name]) for name in "xyz"] for row in rows])
     hulls = trimesh.load_scene(tmp_path / "out.glb").to_mesh().split()
-    reach = np.min([np.abs(trimesh.proximity.closest_point(hull, places)[1]) for hull in hulls], axis=0)
+    reach = np.min([point_to_triangles(places, hull.vertices, hull.faces) for hull in hulls], axis=0)
     assert (reach >= np.array([float(row["radius"]) for row in rows]) - 1e-4).all(), "a hull reaches into a ball"
 
 

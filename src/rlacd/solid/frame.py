@@ -15,6 +15,9 @@ SMALLEST = 1e-300
 NOTHING = 2.0**-280
 """Frame coordinates below this become 0: products of three, which exact predicates rely on, would underflow."""
 
+# Coordinates below this, in the frame, are written as 0: what is left of a difference means nothing.
+_NAUGHT = 1e-4
+
 
 @dataclass(frozen=True)
 class Frame:
@@ -60,5 +63,7 @@ class Frame:
 
     def place(self, point: ArrayLike, body: int | None = None) -> str:
         """A point ``[3]`` of the frame as text, in the input's unit, and the body there if there are several."""
-        where = "(" + ", ".join(f"{x:.4g}" for x in self.to_input(point)) + ")"
+        place = self.to_input(point)
+        place[np.abs(place) < _NAUGHT / self.scale] = 0.0
+        where = "(" + ", ".join(f"{x:.4g}" for x in place) + ")"
         return where if body is None else f"{where}, body {body}"
