@@ -8,15 +8,20 @@ from typing import Any
 import manifold3d
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rlacd
+from rlacd import report
 from rlacd.bench import Metrics, measure
 from rlacd.bench.metrics import COVERED, SAMPLES, TOLERANCE, is_valid
 from rlacd.errors import OptionError
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
+from rlacd.solid.distance import hull_distances
+from rlacd.solid.frame import Frame
+from rlacd.solid.hull import Hull
 from tests.shapes import Closed, box, dense, from_manifold, point_to_triangles, to_manifold
 
 # The input of most tests: its longest side is 2 and it is centred, so that lengths are the frame's.
@@ -184,3 +189,21 @@ def test_the_union_is_the_solid_where_the_parts_are_exact() -> None:
     assert found.volume == pytest.approx((2 * 2 * 0.4 * 0.4) / cross.volume())
     closed: Closed = from_manifold(cross)
     assert to_manifold(closed.vertices, closed.faces).volume() == pytest.approx(cross.volume())
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_no_warning_is_due_to_how_coarsely_a_report_measures(side: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Near the limit of a warning, distances are measured more finely than the usual interval is wide."""
+    ring = trimesh.creation.torus(1, 0.4, major_sections=48, minor_sections=24)
+    result = rlacd.decompose(ring, threshold=1.0, quality="fast", threads=1)
+    frame = Frame.of(ring.vertices)
+    hulls = [hull for part in result if (hull := Hull.of(frame.to_frame(part.vertices)))]
+    surface = frame.to_frame(ring.vertices), np.array(ring.faces, dtype=np.int32)
+    lower, upper = hull_distances(hulls, *surface, threads=1).over
+    least, most = hull_distances(hulls, *surface, 1e-6, threads=1).over
+    assert upper - most > 2e-4, "the usual interval is not wide enough for this test"
+    limit = most + 1.5e-4 if side > 0 else least - 1.5e-4
+    monkeypatch.setattr(report, "HONEST_WITHIN", limit - 1.0)
+    again = rlacd.decompose(ring, threshold=1.0, quality="fast", threads=1).report
+    assert any("beyond the input's surface" in line for line in again["warnings"]) == (side < 0)
+    assert lower <= again["hausdorff"]["over"] <= most + (1e-4 if side > 0 else 2e-3)

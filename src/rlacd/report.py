@@ -20,7 +20,7 @@ from rlacd.options import Options
 from rlacd.presets import Preset, find_preset
 from rlacd.primitive_kinds import PRIMITIVE_KINDS
 from rlacd.solid.component import Component, Part, concatenated
-from rlacd.solid.distance import Place, hull_distances
+from rlacd.solid.distance import Interval, Place, hull_distances
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.mass import Mass, joint_mass, mass_of
@@ -30,6 +30,9 @@ from rlacd.workers import Workers
 HONEST_WITHIN = 5e-3
 """How far the union of the hulls may reach beyond the threshold before the report warns: slack for repair and
 measurement."""
+
+FINE = 1e-4
+"""Width of the intervals where the usual one would decide a warning."""
 
 MOST_HOLES = 1000
 """Holes that a report lists."""
@@ -65,7 +68,7 @@ def make_report(
     has_surface = len(solid.surface[1]) > 0  # a cloud of points has none
     apart: _Distances | None = None
     if has_surface:
-        apart = clock.if_in_time(lambda: _distances(solid, parts, workers, root), lambda: None)
+        apart = clock.if_in_time(lambda: _distances(solid, parts, workers, root, criterion.overhang), lambda: None)
     with clock.shielded():  # nothing below takes long
         stands_for_mass = [(part.hull.vertices, part.hull.faces) for part in parts] if is_cover else [solid.mesh]
         mass = mass_of(*concatenated(stands_for_mass), solid.frame)
@@ -245,10 +248,15 @@ def _mass(mass: Mass) -> dict[str, Any]:
     return now | {"volume_m": volume, "centre_m": centre, "inertia_m": inertia}
 
 
-def _distances(solid: Solid, parts: Sequence[Part], workers: Workers, root: Component | None) -> _Distances:
+def _distances(
+    solid: Solid, parts: Sequence[Part], workers: Workers, root: Component | None, overhang: float
+) -> _Distances:
     known = root is not None and solid.is_as_given
     surface = root.filling.surface if root is not None and known else _native.Surface(*solid.surface)
-    found = hull_distances([part.hull for part in parts], *solid.surface, threads=workers.threads, surface=surface)
+    hulls = [part.hull for part in parts]
+    found = hull_distances(hulls, *solid.surface, threads=workers.threads, surface=surface)
+    if _is_undecided(found.over, overhang + HONEST_WITHIN) or _is_undecided(found.under, HONEST_WITHIN):
+        found = hull_distances(hulls, *solid.surface, FINE, threads=workers.threads, surface=surface)
 
     def place(point: Place) -> str:
         if solid.body_of is None or len(solid.bodies) == 1:
@@ -257,6 +265,11 @@ def _distances(solid: Solid, parts: Sequence[Part], workers: Workers, root: Comp
         return solid.frame.place(point, int(solid.body_of[face]))
 
     return _Distances(found.over[1], found.under[1], place(found.over_at), place(found.under_at))
+
+
+def _is_undecided(interval: Interval, limit: float) -> bool:
+    """Whether a warning would be due only to how wide the interval is."""
+    return interval[0] <= limit < interval[1]
 
 
 def _unmeasured(solid: Solid) -> list[str]:
