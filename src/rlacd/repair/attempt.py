@@ -118,6 +118,10 @@ class Attempt:
         """How far slabs lead away from the input: beyond their thickness if booleans of them went wrong."""
         return float(self.record.deviation.max(initial=0.0, where=self.record.has("slab")))
 
+    def has_crossing_slabs(self) -> bool:
+        """Whether a slab crosses itself, so that booleans of it may go wrong."""
+        return self._wraps.has_crossing_slabs()
+
     def _solid(self, soup: Soup) -> Shape:
         if len(self._tangled) == 0 and self._is_oriented(soup):
             parts = self._as_they_are(soup)

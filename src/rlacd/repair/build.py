@@ -82,7 +82,7 @@ def skins(soup: Soup, record: Record, by_faces: bool = False) -> list[tuple[Mani
     # Sheets narrower than their intended thickness can cross themselves, and come out inside out.
     for i in np.flatnonzero(has_sheet[built] | flat[built]):
         poll_stop()
-        if solids[i].volume() <= 0 or (by_faces and _crosses_itself(solids[i])):
+        if solids[i].volume() <= 0 or (by_faces and crosses_itself(solids[i])):
             some = (sides.label.reshape(-1, 2) == built[i]).any(axis=1)
             solids[i] = slab_of_faces(soup.vertices, soup.faces[some])
             count[i] = solids[i].num_tri()
@@ -97,7 +97,8 @@ def _skin(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, Int
     return skin(soup.vertices, soup.faces, soup.sides, keep, thin, HALF_THICKNESS)
 
 
-def _crosses_itself(slab: Manifold) -> bool:
+def crosses_itself(slab: Manifold) -> bool:
+    """Whether faces of a slab cross that do not meet; False if it has too many to be built in another way."""
     return slab.num_tri() <= _MOST_OF_A_SLAB and crossed_share(*to_arrays(slab)) > 0
 
 

@@ -167,7 +167,7 @@ def _attempted(attempt: Callable[..., Attempt], open_bodies: str, tangled: IntAr
             )
             other.holes = [replace(hole, is_closed=False) for hole in work.holes]
             work, how = other, how | {"open_bodies": "thin"}
-    if work.torn > _TORN:
+    if work.torn > _TORN and work.has_crossing_slabs():
         # Slabs that cross themselves and each other can leave wedges that none of them has.
         other = attempt(**how, by_faces=True)
         if other.torn < work.torn:

@@ -8,7 +8,7 @@ import numpy as np
 from manifold3d import Manifold
 
 from rlacd._native import poll_stop
-from rlacd.repair.build import skins, walls_and_sheets
+from rlacd.repair.build import crosses_itself, skins, walls_and_sheets
 from rlacd.repair.distance import SurfaceQuery, points_covering, spread_points
 from rlacd.repair.record import Record
 from rlacd.repair.slabs import slab_of_faces
@@ -66,6 +66,7 @@ class Wraps:
         self._resolution = resolution
         self._as_sheets = as_sheets
         self._by_faces = by_faces
+        self._slabs: list[tuple[Manifold, int]] = []
         self._is_tangled = np.zeros(record.bodies, dtype=bool)
         self._is_tangled[tangled] = True
 
@@ -83,7 +84,8 @@ class Wraps:
         if crowded:  # slabs of single faces are most of the work, and not needed
             parts = skins(walls.only(~is_slab[walls.body]), record)
         else:
-            parts = skins(walls, record) + skins(sheets.in_patches(), record, self._by_faces)
+            self._slabs = skins(sheets.in_patches(), record, self._by_faces)
+            parts = skins(walls, record) + self._slabs
             boxes = np.array([part.bounding_box() for part, body in parts if is_slab[body]]).reshape(-1, 2, 3)
             if _crossings(boxes) <= _CROSSINGS:
                 return parts
@@ -98,6 +100,10 @@ class Wraps:
         record.faces_out[is_slab] = 0
         record.faces_out[first] = wrap.num_tri()
         return [*((part, body) for part, body in parts if not is_slab[body]), (wrap, first)]
+
+    def has_crossing_slabs(self) -> bool:
+        """Whether a slab that was built crosses itself."""
+        return any(crosses_itself(slab) for slab, _ in self._slabs)
 
     def untangled(self, soup: Soup) -> list[tuple[Manifold, int]]:
         """Build bodies that cross themselves from the place of their faces alone; returns solids and their bodies.
