@@ -84,8 +84,9 @@ class Wraps:
         if crowded:  # slabs of single faces are most of the work, and not needed
             parts = skins(walls.only(~is_slab[walls.body]), record)
         else:
+            parts = skins(walls, record)
             self._slabs = skins(sheets.in_patches(), record, self._by_faces)
-            parts = skins(walls, record) + self._slabs
+            parts += self._slabs
             boxes = np.array([part.bounding_box() for part, body in parts if is_slab[body]]).reshape(-1, 2, 3)
             if _crossings(boxes) <= _CROSSINGS:
                 return parts
