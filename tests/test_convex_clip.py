@@ -8,7 +8,7 @@ import trimesh
 from manifold3d import Manifold, Mesh64
 
 from rlacd.criteria import Concavity
-from rlacd.solid.component import Component, Part
+from rlacd.solid.component import Component, Part, Plane
 from rlacd.solid.distance import hull_union
 from rlacd.solid.hull import Hull
 
@@ -78,6 +78,25 @@ def test_clipping_agrees_with_a_boolean(name: str) -> None:
             heights = np.einsum("vfk,fk->vf", vertices[:, None] - planes[None, large, 0], normals)
             assert heights[np.unique(faces)].max() < 1e-6
     assert undecided <= 2  # a boolean decides
+
+
+def test_a_surface_folded_by_noise_is_clipped_and_its_halves_add_up() -> None:
+    """Some hulls have corners where the folded surface holds them twice, or turns inside out."""
+    crumpled = trimesh.creation.icosphere(subdivisions=4)
+    crumpled.vertices += np.random.default_rng(0).uniform(-0.1, 0.1, crumpled.vertices.shape)
+    solid = component(crumpled)
+    rng = np.random.default_rng(2)
+    for _ in range(60):
+        hull = Hull.of(crumpled.vertices[rng.integers(len(crumpled.vertices), size=12)] * 0.985)
+        assert hull is not None
+        below, above = Component((hull.vertices, hull.faces)).cut(Plane((0.0, 0.6, 0.8), 0.1))
+        assert below is not None
+        assert above is not None
+        hulls = (hull, below.hull, above.hull)
+        assert all(solid.filling.clipped(one.vertices, one.faces) is not None for one in hulls)
+        whole, *halves = (solid.inside(one) for one in hulls)
+        assert all(is_closed(part.faces) for part in (whole, *halves))
+        assert whole.volume == pytest.approx(sum(half.volume for half in halves), rel=1e-3)
 
 
 def test_the_result_does_not_depend_on_threads_or_on_earlier_calls() -> None:

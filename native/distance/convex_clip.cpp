@@ -15,6 +15,9 @@ namespace {
 constexpr double kNudge = 1e-8;
 constexpr double kLarger[] = {1, 3.3, 11};
 constexpr double kInside = 0.5, kAccuracy = 4;
+// Corners are in the solid once or not at all; in spots where noise makes it overlap itself they may be in it twice, or
+// less than not at all.
+constexpr std::int32_t kLeastState = -1, kMostState = 2;
 
 // What made a corner: a vertex of the solid (v, -1, -1), an edge of it and a facet (v, w, facet) with v < w, a face of
 // it and two facets (~face, facet, facet), or a corner of the polytope (kOwn, corner, 0).
@@ -222,7 +225,7 @@ class Clip {
     return at->second;
   }
 
-  // Decides which corners of the polytope are inside the solid: along an edge, every entry and exit changes sides.
+  // Decides how often the solid holds each corner of the polytope: along an edge, every entry and exit changes it by 1.
   bool find_states() {
     const std::size_t count = polytope_.corners.size();
     std::vector<std::vector<std::pair<std::int32_t, std::int32_t>>> around(count);  // (other corner, change)
@@ -250,10 +253,26 @@ class Clip {
       }
     }
     const auto [least, most] = std::minmax_element(states_.begin(), states_.end());
-    if (*most == kUnknown || *most - *least > 1) return false;
-    const std::int32_t first = *most > *least ? -*least : (first_is_inside() ? 1 : 0) - *least;
+    if (*most == kUnknown) return false;
+    const std::int32_t first = *most - *least > 1  ? winding_of_first()
+                               : *most > *least    ? -*least
+                               : first_is_inside() ? 1 - *least
+                                                   : -*least;
     for (std::int32_t& state : states_) state += first;
-    return true;
+    return std::all_of(states_.begin(), states_.end(),
+                       [](std::int32_t state) { return kLeastState <= state && state <= kMostState; });
+  }
+
+  // The winding number of the first corner, from that of the corner farthest from the surface.
+  std::int32_t winding_of_first() const {
+    std::size_t best = 0;
+    double farthest = -1;
+    for (std::size_t c = 0; c < polytope_.corners.size(); ++c) {
+      const double distance = surface_.bvh().closest(polytope_.corners[c]).distance2;
+      if (distance > farthest) farthest = distance, best = c;
+    }
+    const double winding = surface_.winding().at(polytope_.corners[best], kAccuracy);
+    return static_cast<std::int32_t>(std::lround(winding)) - states_[best];
   }
 
   // Whether the polytope's corners are inside, if all are on the same side.
@@ -288,8 +307,11 @@ class Clip {
       Crossings& own = crossings_[e];
       const auto corner = [&](std::int32_t c) { return number_of({kOwn, c, 0}, polytope_.corners[c]); };
       constexpr double kFar = std::numeric_limits<double>::infinity();
-      if (states_[edge.from] == 1) own.entries.push_back({-kFar, corner(edge.from)});
-      if (states_[edge.to] == 1) own.exits.push_back({kFar, corner(edge.to)});
+      for (const auto& [c, at] : {std::pair(edge.from, -kFar), std::pair(edge.to, kFar)}) {
+        const std::int32_t state = states_[c];
+        for (std::int32_t k = 0; k < std::abs(state); ++k)
+          ((c == edge.from) == (state > 0) ? own.entries : own.exits).push_back({at, corner(c)});
+      }
       if (own.entries.size() != own.exits.size()) return false;
       const auto before = [](const Crossing& a, const Crossing& b) {
         return std::tie(a.at, a.vertex) < std::tie(b.at, b.vertex);
@@ -363,7 +385,7 @@ class Clip {
   const Polytope polytope_;
   std::vector<Crossings> crossings_;                                       // of the polytope's edges
   std::vector<std::vector<std::pair<std::int32_t, std::int32_t>>> paths_;  // on its facets
-  std::vector<std::int32_t> states_;                                       // 1 for its corners inside the solid
+  std::vector<std::int32_t> states_;                                       // how often the solid holds its corners
   bool is_contradictory_ = false;
   Group crossing_;  // the facets that cross the nodes on the way from the root, one group after the other
   std::vector<Corner> polygon_, kept_;
