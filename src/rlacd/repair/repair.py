@@ -48,6 +48,8 @@ CELLS_ACROSS = 1.5
 _LOST = 5e-3
 # How far slabs may lead away from the input before those that cross themselves are made another way.
 _TORN = 1e-2
+# Of that, what may be left if making them another way is worth its many small faces.
+_MENDED = 0.5
 # Share of the volume that is left where no hole is closed, below which bodies were emptied.
 _FILLED = 0.4
 # manifold3d collapses edges shorter than 1e-12, and swaps those of faces that are no higher, or folded back onto a
@@ -170,7 +172,7 @@ def _attempted(attempt: Callable[..., Attempt], open_bodies: str, tangled: IntAr
     if work.torn > _TORN and work.has_crossing_slabs():
         # Slabs that cross themselves and each other can leave wedges that none of them has.
         other = attempt(**how, by_faces=True)
-        if other.torn < work.torn:
+        if other.torn < _MENDED * work.torn:
             work, how = other, how | {"by_faces": True}
     doubted = work.doubted()
     if len(doubted):
