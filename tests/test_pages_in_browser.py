@@ -277,6 +277,41 @@ def test_an_open_sheet_is_explained_in_the_header(browser: Any, tmp_path: Path) 
 
 
 @pytest.mark.nightly
+def test_an_open_box_is_filled_at_a_click(browser: Any, tmp_path: Path) -> None:
+    tray = trimesh.creation.box()
+    tray.update_faces(tray.face_normals[:, 2] < 0.5)
+    tray.export(tmp_path / "tray.ply")
+    with open_viewer(tmp_path / "tray.ply", {"quality": "fast"}, port=0) as viewer, open_page(browser) as watched:
+        page = watched.page
+        page.goto(viewer.address)
+        wait_for_run(page, 1)
+        assert rows(page) >= 5
+        page.check("#openings input[value=solid]")
+        wait_for_run(page, 2)
+        assert rows(page) == 1
+        assert page.locator("#notes").is_hidden()
+
+
+@pytest.mark.nightly
+def test_nothing_is_asked_about_openings_of_a_closed_mesh(seen: Watched) -> None:
+    assert seen.page.locator("#openings").is_hidden()
+
+
+@pytest.mark.nightly
+def test_volume_is_a_criterion(seen: Watched, viewer: Viewer) -> None:
+    page = seen.page
+    assert page.locator("#volume_tolerance").is_hidden()
+    page.check("#criterion input[value=volume]")
+    wait_for_run(page, 2)
+    assert page.locator("#threshold").is_hidden()
+    assert "of volume added" in page.locator("#summary").inner_text()
+    page.fill("#volume_tolerance-number", "5")
+    page.locator("#volume_tolerance-number").press("Enter")
+    wait_for_run(page, 3)
+    assert rows(page) < 5
+
+
+@pytest.mark.nightly
 def test_rows_and_hulls_point_at_each_other(seen: Watched) -> None:
     page = seen.page
     plain = pixels(page)

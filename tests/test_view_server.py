@@ -327,6 +327,8 @@ def test_files_come_from_the_own_page_only(viewer: Viewer) -> None:
         ({"criterion": "navigable", "radius": 0.07}, ["--criterion navigable", "--radius 0.07"]),
         ({"primitives": True, "overlap": 0.02}, ["--primitives all", "--overlap 0.02"]),
         ({"primitives": ["box", "sphere"], "overlap": 0.0}, ["--primitives box,sphere"]),
+        ({"criterion": "volume", "volume_tolerance": 0.02}, ["--criterion volume", "--tolerance 0.02"]),
+        ({"open": "solid"}, ["--open solid"]),
     ],
 )
 def test_the_options_are_a_command(viewer: Viewer, mesh: Path, wanted: dict[str, Any], says: list[str]) -> None:
@@ -372,6 +374,24 @@ def test_parts_are_primitives_and_overlap_when_asked_for(viewer: Viewer) -> None
         answer = ask(viewer, "POST", "/decompose", wrong)
         assert answer.status == 400
         assert says in answer.json["error"]
+
+
+def test_an_open_box_is_filled_when_asked_for(tmp_path: Path) -> None:
+    box = trimesh.creation.box()
+    box.update_faces(box.face_normals[:, 2] < 0.5)
+    box.export(tmp_path / "tray.ply")
+    with open_viewer(tmp_path / "tray.ply", {"quality": "fast"}, port=0) as viewer:
+        settled(viewer, run=1)
+        assert len(ask(viewer, "GET", "/scene").json["parts"]) >= 5
+        events_of_a_run(viewer, {"quality": "fast", "open": "solid"})
+        assert len(ask(viewer, "GET", "/scene").json["parts"]) == 1
+
+
+def test_volume_decides_when_asked_for(viewer: Viewer) -> None:
+    settled(viewer, run=1)
+    events_of_a_run(viewer, {"quality": "fast", "criterion": "volume", "volume_tolerance": 5.0})
+    assert ask(viewer, "GET", "/scene").json["report"]["volume"]["tolerance"] == 5.0
+    assert len(ask(viewer, "GET", "/scene").json["parts"]) == 1
 
 
 def test_what_is_not_there_is_reported(viewer: Viewer, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -493,6 +513,7 @@ def test_mistakes_are_found_before_anything_is_served(mesh: Path, tmp_path: Path
         (["{mesh}", "--up", "w"], "x, y or z"),
         (["{mesh}", "--threshold", "-1"], "threshold is -1"),
         (["{mesh}", "--criterion", "beauty"], "concavity, volume or navigable"),
+        (["{mesh}", "--open", "wide"], "auto, solid, thin"),
     ],
 )
 def test_the_command_says_what_is_wrong_in_one_sentence(mesh: Path, words: list[str], says: str) -> None:
@@ -526,7 +547,7 @@ def test_the_command_tells_its_address_and_ends_with_ctrl_c(mesh: Path) -> None:
 
 def test_the_controls_hold_the_defaults_of_the_command_line() -> None:
     controls, usual, space = ViewerControls(), Options(), NavigableSpace()
-    for name in ("criterion", "threshold", "quality", "max_hulls", "max_vertices", "overlap"):
+    for name in ("criterion", "threshold", "quality", "max_hulls", "max_vertices", "overlap", "open"):
         assert getattr(controls, name) == getattr(usual, name)
     assert bool(controls.primitives) == bool(usual.primitives)
     assert (controls.radius, controls.tolerance) == (space.radius, space.tolerance)

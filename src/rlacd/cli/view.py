@@ -26,6 +26,9 @@ def view(
         str | None, typer.Option(help="fast, balanced or best, as for decompose; the page changes it.")
     ] = None,
     max_hulls: Annotated[int | None, typer.Option(help="As for decompose; the page changes it.")] = None,
+    open_bodies: Annotated[
+        str | None, typer.Option("--open", help="auto, solid or thin, as for decompose; the page changes it.")
+    ] = None,
     up: Annotated[
         str | None,
         typer.Option(
@@ -59,7 +62,13 @@ def view(
             raise OptionError(f"{mesh} is a robot; view shows one mesh: give one of those that it names.")
         from rlacd.viewer.viewer import open_viewer
 
-        chosen = {"threshold": threshold, "criterion": criterion, "quality": quality, "max_hulls": max_hulls}
+        chosen = {
+            "threshold": threshold,
+            "criterion": criterion,
+            "quality": quality,
+            "max_hulls": max_hulls,
+            "open": open_bodies,
+        }
         given = {name: value for name, value in chosen.items() if value is not None}
         viewer = open_viewer(mesh, given, up=up, port=port, threads=threads)
         with viewer as server, contextlib.suppress(KeyboardInterrupt):  # which may come before the wait begins

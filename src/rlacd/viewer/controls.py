@@ -30,6 +30,7 @@ class ViewerControls:
     quality: str = _DEFAULTS.quality or QUALITIES[0]
     primitives: bool | Sequence[PrimitiveKind] = False
     overlap: float = _DEFAULTS.overlap
+    open: str = _DEFAULTS.open
     max_hulls: int | None = None
     max_vertices: int | None = None
     preset: str | None = None
@@ -54,6 +55,7 @@ class ViewerControls:
             "quality": self.quality,
             "primitives": self.primitives,
             "overlap": self.overlap,
+            "open": self.open,
             "max_hulls": self.max_hulls,
             "max_vertices": self.max_vertices,
             "preset": self.preset,

@@ -1,4 +1,5 @@
 // The controls that decompose anew: what they hold is what `rlacd.decompose` is asked for.
+import { hasOpenBodies } from "page/facts";
 import { choice, make, measure } from "page/widgets";
 
 /** Lengths are shares of the longest side or of the frame; the slider moves by equal ratios. */
@@ -141,6 +142,21 @@ export class Controls {
       this.changed,
       { orNone: true },
     );
+    this.open = choice(
+      "Open bodies",
+      "openings",
+      [
+        ["auto", "Auto", "Fill bodies that nothing can get into, or that have lost some faces; the others become thin shells."],
+        ["solid", "Solid", "Fill every body that encloses a space once its openings are closed."],
+        ["thin", "Thin", "Fill none: every open body becomes a thin shell."],
+      ],
+      given.open,
+      (value) => {
+        this.options.open = value;
+        this.changed();
+      },
+      "What becomes of bodies with openings.",
+    );
     this.hulls = this.#limit("max_hulls", "Hulls, at most", "No more hulls than this. The threshold may then be exceeded.");
     this.corners = this.#limit("max_vertices", "Vertices each", "Corners that each hull may have. Engines have limits, and every corner costs time in a contact.");
     this.element = make(
@@ -154,6 +170,7 @@ export class Controls {
       this.quality,
       this.shapes,
       this.overlap.element,
+      this.open,
       make("div", { class: "limits" }, this.hulls.element, this.corners.element),
     );
     this.#arrange();
@@ -168,7 +185,7 @@ export class Controls {
         ? { volume_tolerance: this.volume.value }
         : { threshold: this.threshold.value };
     const limits = { max_hulls: this.hulls.value(), max_vertices: this.corners.value(), preset: this.options.preset ?? null };
-    return { ...size, criterion, quality, primitives: this.options.primitives, overlap: this.overlap.value, ...limits };
+    return { ...size, criterion, quality, primitives: this.options.primitives, overlap: this.overlap.value, open: this.options.open, ...limits };
   }
 
   /** Take another engine's limits. */
@@ -184,12 +201,13 @@ export class Controls {
     length.box.dispatchEvent(new Event("change"));
   }
 
-  /** Lengths are also told in the unit of what is shown. */
-  setScale(scene) {
+  /** Lengths are also told in the unit of what is shown; a mesh without open bodies offers no choice about them. */
+  setScene(scene) {
     this.threshold.tell(scene, 1);
     this.radius.tell(scene, 2);
     this.tolerance.tell(scene, 2);
     this.overlap.tell(scene, 1);
+    this.open.hidden = this.options.open === "auto" && !hasOpenBodies(scene);
   }
 
   #arrange() {

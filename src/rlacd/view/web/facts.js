@@ -41,8 +41,8 @@ export const HINTS = {
   draft: "The first hulls found, in one quick pass. A search for fewer hulls follows.",
   early: "The work was stopped. The hulls cover the input, but may be coarser or more than with more time.",
   shell:
-    "An open surface has no inside, so it was given a small thickness. Its hulls follow that thin wall, which takes many of them; close the surface in your modeller to have a solid instead.",
-  wrapped: "The surface was too damaged to close face by face, so a tight skin was wrapped around it.",
+    "An open surface has no inside, so it was given a small thickness. Its hulls follow that thin wall, which takes many of them. If it encloses a space, --open solid fills it; in the viewer, “Solid” under “Open bodies”.",
+  wrapped: "The surface could not be closed face by face, so a tight skin was wrapped around it.",
 };
 
 /** One line: hulls, triangles, how tight, how long; each with its explanation. */
@@ -64,10 +64,14 @@ export function summary(scene, { draft = false } = {}) {
   return words.flatMap((word, i) => (i ? [" · ", word] : [word]));
 }
 
+const repaired = (report, ...steps) => (report?.repair ?? []).filter(({ step }) => steps.includes(step)).length;
+
+/** Whether repair had to decide what is inside. */
+export const hasOpenBodies = ({ report }) => repaired(report, "slab", "wrapped", "capped") > 0;
+
 /** What repair made of open bodies, in a sentence, with its explanation. */
 export function notes({ report }) {
-  const count = (...steps) => (report?.repair ?? []).filter(({ step }) => steps.includes(step)).length;
-  const [shells, wrapped] = [count("slab"), count("wrapped")];
+  const [shells, wrapped] = [repaired(report, "slab"), repaired(report, "wrapped")];
   const bodies = (n) => (n === 1 ? "1 open body" : `${n.toLocaleString("en")} open bodies`);
   return [
     shells && term(`${bodies(shells)} became ${shells === 1 ? "a thin shell" : "thin shells"}`, HINTS.shell),

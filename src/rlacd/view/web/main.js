@@ -66,7 +66,7 @@ function show(scene, { draft = false } = {}) {
   at("notes").replaceChildren(...notes(scene));
   at("notes").hidden = at("notes").childNodes.length === 0;
   document.title = scene.report ? `${scene.name}: ${plural(scene.parts.length, "hull")}` : scene.name;
-  controls?.setScale(scene);
+  controls?.setScene(scene);
   at("parts-count").textContent = scene.report ? scene.parts.length : "";
   document.body.classList.toggle("bare", !scene.report);
   if (scene.report) tell(scene);
