@@ -80,7 +80,7 @@ def judge(case: Case, samples: int = SAMPLES) -> list[str]:
     faces = finite_faces(case.shape)
     if (
         found
-        or "tell nothing apart" in case.warned
+        or "cannot resolve lengths" in case.warned
         or len(np.unique(case.shape.vertices[np.unique(faces)], axis=0)) < 2
     ):
         return found
@@ -123,7 +123,9 @@ def coverage(
     found = []
     if reported is not None and missed.distance > reported + ROUNDING:
         found.append(f"the input leads {missed.distance:.6g} out of the hulls, the report says {reported:.6g}")
-    if missed.distance > HONEST_WITHIN + ROUNDING and "from the hulls" not in case.warned:
+    if missed.distance > HONEST_WITHIN + ROUNDING and not any(
+        word in case.warned for word in ("outside the hulls", "from the hulls")
+    ):
         found.append(f"the input leads {missed.distance:.6g} out of the hulls, and no word of it")
     return found
 
@@ -243,7 +245,10 @@ def free_space(case: Case, solid: manifold3d.Manifold, hulls: list[Polytope], ra
     space = case.options.get("criterion")
     if not isinstance(space, NavigableSpace) or space.closed_planes or not case.report["complete"]:
         return []
-    if any(word in case.warned for word in ("gave way", "reach into", "is small", "asked for", "larger than")):
+    if any(
+        word in case.warned
+        for word in ("could keep the hulls off", "reach into", "is small", "asked for", "no tighter", "larger than")
+    ):
         return []
     assert space.radius is not None
     assert space.tolerance is not None

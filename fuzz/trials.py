@@ -214,7 +214,7 @@ class Laboratory:
             found = faults.complaints(fault, first)
             found += faults.left_behind(fault, first.code, main, old, after, whole)
             if first.code == 4 and main.endswith((".obj", ".ply")):
-                report = {**said["report"], "complete": False, "warnings": ["Incomplete exceed from the hulls"]}
+                report = {**said["report"], "complete": False, "warnings": ["Incomplete exceed outside the hulls"]}
                 hulls = read_hulls(after[main], main[-3:])
                 report |= {"parts": len(hulls), "hausdorff": {"under": None, "over": None}, "concavity": None}
                 found += judge(Case(shape, {**options, "max_hulls": None}, hulls, report))

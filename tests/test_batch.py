@@ -145,7 +145,7 @@ def test_large_meshes_are_named_before_anything_is_done(
 @pytest.mark.parametrize(
     ("words", "code", "says"),
     [
-        (["{in}/no", "-o", "{in}/out"], 2, "no folder"),
+        (["{in}/no", "-o", "{in}/out"], 2, "not a folder"),
         (["{in}/empty", "-o", "{in}/out"], 2, "no mesh in"),
         (["{in}", "-o", "{in}/out", "--glob", "*.fbx"], 2, "'*.fbx'"),
         (["{in}", "-o", "{in}"], 2, "among the meshes"),

@@ -173,14 +173,14 @@ class TestCommands:
     @pytest.mark.parametrize(
         ("words", "says"),
         [
-            (["compare", "nowhere", "-o", "run"], "is no folder"),
+            (["compare", "nowhere", "-o", "run"], "is not a folder"),
             (["compare", ".", "-o", "run", "--list", "nowhere.txt"], "does not exist"),
             (["compare", ".", "-o", "run"], "there are no meshes"),
             (["paper-table-3", "meshes", "-o", "run", "--planes", "a,b"], "whole numbers"),
             (["compare", "meshes", "-o", "run", "--methods", "gredy"], "there is no method"),
             (["compare", "meshes", "-o", "run", "--methods", ","], "name at least one"),
             (["paper-rewards", "meshes", "-o", "run", "--preset", "x"], "preset"),
-            (["paper-discounts", "nowhere", "-o", "run"], "is no folder"),
+            (["paper-discounts", "nowhere", "-o", "run"], "is not a folder"),
         ],
     )
     def test_wrong_options_are_one_sentence(

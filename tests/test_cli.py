@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -134,6 +135,17 @@ def test_what_else_is_written_is_named(mesh: Path, stand_in: StandIn) -> None:
     assert rlacd(*words, "-q").stderr == ""
 
 
+def test_the_summary_says_how_far_hulls_and_input_are_apart(tmp_path: Path) -> None:
+    trimesh.creation.icosphere(2).export(tmp_path / "ball.stl")
+    run = CliRunner().invoke(
+        app, ["decompose", str(tmp_path / "ball.stl"), "-o", str(tmp_path / "b.glb"), "-t", "2.5%"]
+    )
+    reach = re.search(r"extend up to (0\.0\d+) beyond the input and cover it \(longest side = 2\)", run.stderr)
+    assert reach is not None, run.stderr
+    assert float(reach[1]) <= 0.05
+    assert "(threshold 0.05)" in run.stderr
+
+
 def test_the_summary_counts_primitives_by_kind() -> None:
     boxes = [trimesh.creation.box((1, 2, 3)), trimesh.creation.box((1, 1, 1))]
     boxes[1].apply_translation((5, 0, 0))
@@ -250,7 +262,7 @@ def test_folders_that_are_missing_are_made(mesh: Path, stand_in: StandIn) -> Non
 def test_viewing_a_robot_is_refused_for_what_it_is() -> None:
     run = rlacd("view", "robot.urdf")
     assert run.exit_code == 2
-    assert "is a robot; view shows one mesh" in run.stderr
+    assert "is a robot; view shows a single mesh" in run.stderr
 
 
 def test_debugging_lets_the_traceback_through(mesh: Path, stand_in: StandIn, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -409,8 +421,8 @@ def test_density_and_up_reach_the_model(mesh: Path, stand_in: StandIn) -> None:
         (["--preset", "havok"], 2, "one of mujoco, physx"),
         (["--density", "-1", "-o", "{dir}/out.xml"], 2, "density is -1.0"),
         (["--format", "urdf", "-o", "{dir}/out.glb"], 2, "ends in .urdf"),
-        (["--one-mesh", "-o", "{dir}/out.xml"], 2, "is for .urdf"),
-        (["--package-dir", "a=b"], 2, "belongs to robots"),
+        (["--one-mesh", "-o", "{dir}/out.xml"], 2, "for .urdf files only"),
+        (["--package-dir", "a=b"], 2, "is for robots"),
         (["-o", "{dir}/out.xml", "--up", "w"], 2, "x, y or z"),
     ],
 )

@@ -14,6 +14,7 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
+import rlacd
 from rlacd import NavigableSpace
 from rlacd.batch import JobSpec, find_assets
 from rlacd.batch.assets import _places, content_hash
@@ -49,6 +50,17 @@ def test_hulls_that_decompose_wrote_among_the_meshes_are_passed_over(tmp_path: P
     touch(tmp_path, "b/hulls/mesh_001.stl")
     names = [asset.name for asset in find_assets(tmp_path)]
     assert names == ["a.stl", "b/a_hulls.obj", "b/c.obj", "b/hulls/mesh_001.stl", "own_hulls.glb"]
+
+
+def test_hulls_are_passed_over_under_any_name(tmp_path: Path) -> None:
+    box = trimesh.creation.box()
+    box.export(tmp_path / "box.glb")
+    box.export(tmp_path / "box.obj")
+    for ending in ("glb", "obj", "ply"):
+        save_hulls([box], tmp_path / f"result.{ending}")
+    rlacd.decompose(box, quality="fast").save(tmp_path / "model.xml")
+    names = [asset.name for asset in find_assets(tmp_path)]
+    assert names == ["box.glb", "box.obj"]
 
 
 @pytest.mark.parametrize(
@@ -91,7 +103,7 @@ def test_links_to_files_count_and_links_to_folders_do_not(tmp_path: Path) -> Non
 
 
 def test_a_missing_folder_is_reported(tmp_path: Path) -> None:
-    with pytest.raises(MeshFileError, match="no folder"):
+    with pytest.raises(MeshFileError, match="not a folder"):
         find_assets(tmp_path / "nothing")
 
 

@@ -271,7 +271,7 @@ def test_files_cut_short_are_one_error_that_names_the_first_parameter(
 def test_files_of_something_else_are_reported(tmp_path: Path, content: bytes, ending: str) -> None:
     path = tmp_path / f"weights{ending}"
     path.write_bytes(content)
-    with pytest.raises(WeightsError, match="no file of weights"):
+    with pytest.raises(WeightsError, match="not a file of weights"):
         I2PMAEEncoder.from_checkpoint(path)
     with pytest.raises(WeightsError, match="there is no file"):
         I2PMAEEncoder.from_checkpoint(tmp_path / "nowhere.pth")
@@ -298,7 +298,7 @@ def test_nothing_in_a_checkpoint_is_run(tmp_path: Path) -> None:
     torch.save(
         {"base_model": dict(tiny_encoder().state_dict()), "extra": Harmful(tmp_path / "ran")}, tmp_path / "w.pth"
     )
-    with pytest.raises(WeightsError, match="no file of weights"):
+    with pytest.raises(WeightsError, match="not a file of weights"):
         I2PMAEEncoder.from_checkpoint(tmp_path / "w.pth")
     assert not (tmp_path / "ran").exists()
 

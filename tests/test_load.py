@@ -136,7 +136,7 @@ def test_counts_of_every_variant_of_off_are_held_against_the_file(box, tmp_path,
     whole = off(box, letters).split("\n")
     for lines in (whole[:-1], whole[:5], [whole[0], "8 1000000000000 0", *whole[2:]]):
         path.write_text("\n".join(lines))
-        with pytest.raises(MeshFileError, match="cut off: its header promises 8 vertices and 1"):
+        with pytest.raises(MeshFileError, match="cut off: its header declares 8 vertices and 1"):
             load_mesh(path)
     for counts in ("8", "-8 12 0", "many few", "9" * 40 + " 1"):
         path.write_text("\n".join([whole[0], counts, *whole[2:]]))
@@ -152,9 +152,9 @@ def test_off_that_is_not_read_is_refused_for_what_it_is(box, tmp_path):
         (b"nOFF\n5\n1 0 0\n1 2 3 4 5\n", "5 dimensions"),
         (b"4nOFF 3\n1 0 0\n1 2 3 4\n", "homogeneous"),
         (b"4OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "four numbers"),
-        (b"OFF\n", "how much it holds"),
-        (b"NOFF", "how much it holds"),
-        (b"# OFF", "how much it holds"),
+        (b"OFF\n", "lacks the counts"),
+        (b"NOFF", "lacks the counts"),
+        (b"# OFF", "lacks the counts"),
     ):
         path.write_bytes(content)
         with pytest.raises(MeshFileError, match=says):

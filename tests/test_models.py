@@ -351,7 +351,7 @@ def test_usd_without_its_extra_is_one_sentence_before_any_work(
         ("table.xml", {"density": 0.0}, OptionError, "density is 0.0"),
         ("table.xml", {"density": float("nan")}, OptionError, "density"),
         ("table.xml", {"up": "w"}, OptionError, "x, y or z"),
-        ("table.xml", {"one_mesh": True}, OptionError, r"one mesh for all hulls is for \.urdf"),
+        ("table.xml", {"one_mesh": True}, OptionError, r"one_mesh .* works for \.urdf files only"),
         ("table.blend", {}, OptionError, r"\.xml, \.urdf, \.sdf, \.usd"),
     ],
 )

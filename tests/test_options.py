@@ -243,7 +243,7 @@ def test_former_names_are_taken_with_a_warning() -> None:
 def test_former_names_on_the_command_line(tmp_path: Path) -> None:
     said: list[str] = []
     assert decompose_options({"threshold_m": 0.4}, warn=said.append) == {"threshold_abs": 0.4}
-    assert said == ["--threshold-m is now called --threshold-abs; the old name will go."]
+    assert said == ["--threshold-m is now called --threshold-abs; the old name will be removed."]
     mesh = tmp_path / "box.stl"
     creation.box().export(mesh)
     run = CliRunner().invoke(app, ["decompose", str(mesh), "--threshold-m", "0.1", "--quality", "fast"])

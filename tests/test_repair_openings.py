@@ -212,6 +212,53 @@ def test_a_box_whose_lid_misses_by_a_hair_is_solid():
     assert volume(solid) == pytest.approx(8, rel=0.01)
 
 
+@pytest.mark.parametrize(("slit", "filled"), [(0.02, True), (0.2, False)])
+def test_a_cupboard_is_solid_if_nothing_gets_past_its_door(slit, filled):
+    """Its boxes share edges, so it is one body without free edges: an outer skin with a room."""
+    walls = [
+        ((-1, -1, -1), (1, 1, -0.9)),
+        ((-1, -1, 0.9), (1, 1, 1)),
+        ((-1, -1, -0.9), (-0.9, 1, 0.9)),
+        ((0.9, -1, -0.9), (1, 1, 0.9)),
+        ((-0.9, 0.9, -0.9), (0.9, 1, 0.9)),
+    ]
+    door = ((-0.9, -1, -0.9), (0.9 - slit, -0.9, 0.9))
+    cupboard = join(*(trimesh.creation.box(bounds=bounds) for bounds in [*walls, door]))
+    solid = solid_of(cupboard)
+    assert steps(solid) == ["outer skin"]
+    assert volume(solid) == pytest.approx(8 if filled else 2.16, rel=0.02)
+    assert volume(solid_of(cupboard, open_bodies="thin")) == pytest.approx(2.16, rel=0.02)
+    hulls = rlacd.decompose(cupboard, quality="fast")
+    assert len(hulls) <= 2 if filled else len(hulls) >= 6
+
+
+@pytest.mark.parametrize(("width", "filled"), [(0.001, True), (0.04, False)])
+def test_a_deep_hair_thin_slit_in_a_body_is_filled(width, filled):
+    blocks = [
+        ((-1, -1, -1), (1, 1, -0.5)),
+        ((-1, -1, -0.5), (-width / 2, 1, 1)),
+        ((width / 2, -1, -0.5), (1, 1, 1)),
+    ]
+    split = join(*(trimesh.creation.box(bounds=bounds) for bounds in blocks))
+    assert steps(solid_of(split)) == ["outer skin"]
+    assert volume(solid_of(split, open_bodies="thin")) == pytest.approx(8 - 3 * width, rel=1e-6)
+    # What is nearer to the outside than two radii of the ball may stay open: it is too shallow to need a cut.
+    empty = 8 - volume(solid_of(split))
+    assert 0 <= empty < 0.5 * width if filled else empty == pytest.approx(3 * width, rel=0.05)
+    assert (len(rlacd.decompose(split, quality="fast")) == 1) == filled
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name", ["kitchenCabinetDrawer-1", "kitchenCabinetUpperLow", "kitchenFridge", "kitchenFridgeBuiltIn"]
+)
+def test_closed_furniture_is_a_few_hulls(name, corpus):
+    result = rlacd.decompose(corpus / "train" / "kenney_cc0" / f"furniture_pack__{name}.ply", quality="fast")
+    assert len(result) <= 6
+    assert result.report["hausdorff"]["over"] < 0.05
+    assert result.report["hausdorff"]["under"] == 0
+
+
 @pytest.mark.parametrize("missing", [1, 5, 10])
 def test_a_knob_with_doubled_faces_a_few_missing_and_a_fin_is_a_ball(missing):
     ball = trimesh.creation.icosphere(subdivisions=2)
@@ -470,7 +517,7 @@ def test_a_person_with_fins_loses_nothing(corpus, share, seed):
     beyond = [line for line in report["warnings"] if "beyond the input's surface" in line]
     assert len(beyond) == (over > 0.055)
     for line in beyond:  # where it says, the surface is that far away
-        place = [float(x) for x in re.search(r"most near \(([^)]*)\)", line)[1].split(",")]
+        place = [float(x) for x in re.search(r"farthest near \(([^)]*)\)", line)[1].split(",")]
         frame = Frame.of(damaged[0])
         query = SurfaceQuery(frame.to_frame(damaged[0]), damaged[1])
         assert query.distance(frame.to_frame([place]))[0] == pytest.approx(over, abs=2e-3)

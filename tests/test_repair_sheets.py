@@ -147,7 +147,7 @@ def test_a_klein_bottle_is_a_result():
 def test_what_has_no_area_gets_the_hull_of_its_points(points, faces):
     solid = solid_of((points, np.array(faces, dtype=int).reshape(-1, 3)))
     assert steps(solid) == ["hull"]
-    assert "hull of the points" in solid.warnings[-1]
+    assert "convex hull of all points" in solid.warnings[-1]
     vertices, _ = to_arrays(solid.manifold)
     inside = solid.frame.to_frame(points)
     assert (inside.min(axis=0) >= vertices.min(axis=0) - 1e-9).all()

@@ -265,7 +265,7 @@ def test_a_robot_is_rewritten_on_the_command_line(ear: Path) -> None:
     for words, says in (
         (["-o", str(ear)], "overwrite the input"),
         (["-o", str(ear.with_name("x.glb"))], "only be rewritten as another .urdf"),
-        (["--picture", "p.png"], "--picture belongs to a single mesh"),
+        (["--picture", "p.png"], "--picture is for a single mesh"),
         (["--package-dir", "no/such"], "does not exist"),
     ):
         run = CliRunner().invoke(app, ["decompose", str(ear), *words])
@@ -406,7 +406,7 @@ STEAL = """<?xml version="1.0"?><!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/pass
         ("<a>" * 2000 + "</a>" * 2000, "more than 500 deep"),
         ('<robot xmlns:xacro="x"><xacro:macro name="m"/></robot>', "xacro"),
         ("<robot name='r'><link name='l'/></robot>", "no collision mesh"),
-        ("<sdf/>", "is no URDF: it starts with <sdf>"),
+        ("<sdf/>", "is not URDF: it starts with <sdf>"),
         ('<?xml version="1.0" encoding="klingon"?><robot/>', "klingon|encoding"),
         ("<robot><link name='l'><collision><geometry><mesh/></geometry></collision></link></robot>", "no filename"),
     ],
@@ -468,7 +468,7 @@ def test_places_are_checked_before_the_work(ear: Path, tmp_path: Path) -> None:
     (tmp_path / "out_urdf").write_text("mine")
     with pytest.raises(OutputError, match="it is a file"):
         rlacd.rewrite_robot(ear, tmp_path / "out.urdf")
-    with pytest.raises(MeshFileError, match="is no robot"):
+    with pytest.raises(MeshFileError, match="is not a robot"):
         rlacd.rewrite_robot(ear.parent / "meshes" / "table.stl", tmp_path / "out.stl")
     with pytest.raises(OptionError, match="threshold"):
         rlacd.rewrite_robot(ear, tmp_path / "out2.urdf", threshold=-1.0)

@@ -125,6 +125,14 @@ def test_a_doubt_suggests_what_would_help(tmp_path: Path, factor: float, says: s
     assert f"in metres: {says}" in str(doubts[0].message)
 
 
+def test_a_doubtful_mass_of_a_body_of_plausible_size_is_no_matter_of_units(tmp_path: Path) -> None:
+    result = rlacd.decompose(table(), threads=1, quality="fast")
+    with pytest.warns(rlacd.ImplausibleBodyWarning) as doubts:
+        result.save(tmp_path / "table.xml", density=1e9)
+    assert "--density or --mass" in str(doubts[0].message)
+    assert "--unit" not in str(doubts[0].message)
+
+
 def test_a_hollow_shell_is_doubted_unless_its_mass_is_given(tmp_path: Path) -> None:
     """A box of faces without its lid: repair makes its walls a thousandth of its longest side thick."""
     walls = trimesh.creation.box((0.2, 0.2, 0.2))

@@ -220,9 +220,9 @@ def test_everything_offered_can_be_downloaded_and_read(viewer: Viewer) -> None:
         ({"criterion": "navigable", "radius": 0}, "radius"),
         ({"quality": "perfect"}, "quality"),
         ({"max_hulls": 1.5}, "max_hulls"),
-        ({"mesh": "/etc/passwd"}, "'mesh' is no option of the viewer"),
-        ([], "no JSON object"),
-        (b"{", "no JSON object"),
+        ({"mesh": "/etc/passwd"}, "'mesh' is not an option of the viewer"),
+        ([], "not a JSON object"),
+        (b"{", "not a JSON object"),
     ],
 )
 def test_bad_options_are_answered_in_a_sentence_and_change_nothing(viewer: Viewer, options: Any, says: str) -> None:
@@ -482,7 +482,7 @@ def test_a_port_in_use_is_one_sentence(viewer: Viewer, mesh: Path) -> None:
         open_viewer(mesh, port=port),
     ):
         pass
-    with pytest.raises(OptionError, match="99999 is no port"), open_viewer(mesh, port=99_999):
+    with pytest.raises(OptionError, match="99999 is not a port"), open_viewer(mesh, port=99_999):
         pass
 
 
@@ -509,7 +509,7 @@ def test_mistakes_are_found_before_anything_is_served(mesh: Path, tmp_path: Path
     [
         (["{dir}/nothing.glb"], "does not exist"),
         (["{dir}"], "is a folder"),
-        (["{mesh}", "--port", "99999"], "no port"),
+        (["{mesh}", "--port", "99999"], "not a port"),
         (["{mesh}", "--up", "w"], "x, y or z"),
         (["{mesh}", "--threshold", "-1"], "threshold is -1"),
         (["{mesh}", "--criterion", "beauty"], "concavity, volume or navigable"),

@@ -197,7 +197,7 @@ class Options:
     )
     policy: str | Policy = option(
         "greedy",
-        "What chooses the next cut: navacd is the quickest, FILE.onnx is a network of yours (extra rlacd[learned]).",
+        "What chooses the next cut: navacd is the quickest, FILE.onnx is your own network (extra rlacd[learned]).",
         custom(
             f"one of {', '.join(POLICIES)}, an .onnx file, or (in Python) an object with a method `choose`",
             read_policy,
@@ -208,21 +208,21 @@ class Options:
     )
     resolution: int = option(
         DEFAULT_RESOLUTION,
-        "Grid cells along the longest side when bodies that are not closed are repaired.",
+        "Grid cells along the longest side, used to repair bodies that are not closed.",
         integer(*RESOLUTIONS),
         panel=METHOD,
     )
     open: OpenName = option(
         "auto",
-        "Bodies with openings: auto fills those that nothing can get into, or that have lost some faces; solid fills "
-        "all that are hollow, thin none.",
+        "Bodies with openings: auto fills those that nothing can get into, or that have lost some faces, and makes the "
+        "others thin shells; solid fills all that enclose a space; thin fills none.",
         one_of(OPEN),
         panel=METHOD,
         metavar="|".join(OPEN),
     )
     gap: float = option(
         0.03,
-        "Radius of a ball: what it cannot get into through the openings counts as closed (the longest side is 2).",
+        "Openings that a ball of this radius cannot pass count as closed (the longest side of the mesh is 2).",
         number(*GAPS),
         panel=METHOD,
     )
@@ -243,8 +243,8 @@ class Options:
     )
     quality: QualityName | None = option(
         None,
-        "How long to search for fewer hulls: fast not at all, balanced about three times as long as fast takes, best "
-        "until --budget ends.",
+        "How long to search for fewer hulls: fast does not search, balanced takes about three times as long as fast, "
+        "best searches until --budget ends.",
         one_of(QUALITIES),
         panel=METHOD,
         usual="balanced; fast with --no-merge",
@@ -311,21 +311,24 @@ class Options:
                     object.__setattr__(self, name, getattr(engine, name))
         if self.criterion == VOLUME:
             unused = self.threshold_abs is not None or self.threshold != DEFAULT_THRESHOLD
-            rule = "left out: the criterion volume has a volume_tolerance"
+            rule = "left out: with the criterion volume, volume_tolerance takes its place"
             _require(not unused, "threshold", self.threshold_abs or self.threshold, rule)
         if isinstance(self.criterion, SpaceOptions):
             unused = self.threshold_abs is not None or self.threshold != DEFAULT_THRESHOLD
             _require(
-                not unused, "threshold", self.threshold_abs or self.threshold, "left out: a NavigableSpace has none"
+                not unused,
+                "threshold",
+                self.threshold_abs or self.threshold,
+                "left out: navigable space has a radius and a tolerance instead",
             )
-            _require(not self.per_node, "per_node", True, "left out: the space around a scene is that of all its nodes")
+            _require(not self.per_node, "per_node", True, "left out: navigable space is that of the whole scene")
         if self.quality is None:  # searching means merging
             object.__setattr__(self, "quality", "balanced" if self.merge else "fast")
         for name in ("budget", "search_steps"):
             unused = getattr(self, name) is not None and self.quality == "fast"
             _require(not unused, name, getattr(self, name), "left out with quality='fast', which does not search")
         if not self.merge:
-            rule = "'fast', or left out, without merge: searching means merging"
+            rule = "'fast', or left out, without merge: searching includes merging"
             _require(self.quality == "fast", "quality", self.quality, rule)
 
     def as_plain(self) -> dict[str, Any]:

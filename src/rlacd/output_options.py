@@ -34,8 +34,8 @@ class OutputOptions:
     output: str | None = option(
         None,
         "Where the hulls go: .glb, .obj, .ply or .stl for one file with a node, group or solid per hull; .xml (MJCF), "
-        ".urdf, .sdf, .usd, .usda or .usdc for a body with mass, looks and hulls; an existing folder, or a name ending "
-        "in /, for one file per hull. An older file is replaced.",
+        ".urdf, .sdf, .usd, .usda or .usdc for a body with mass, visual mesh and hulls; an existing folder, or a name "
+        "ending in /, for one file per hull. An existing file is replaced.",
         text(accepts=lambda given: True),
         panel=OUTPUT,
         flags=("--output", "-o"),

@@ -31,7 +31,9 @@ def with_former(options: Any, given: Mapping[str, Any], former: Mapping[str, Any
             continue
         if taken.get(new) is not None:
             raise OptionError(f"{old} is the former name of {new}; give one of the two.")
-        warnings.warn(f"{old} is now called {new}; the old name will go.", DeprecationWarning, stacklevel=level + 1)
+        warnings.warn(
+            f"{old} is now called {new}; the old name will be removed.", DeprecationWarning, stacklevel=level + 1
+        )
         taken[new] = value
     return taken
 

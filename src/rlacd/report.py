@@ -99,6 +99,7 @@ def make_report(
                 *_shortcomings(
                     [part.hull for part in parts],
                     apart,
+                    solid,
                     options,
                     criterion.overhang if not summary.warnings else math.inf,
                 ),
@@ -284,8 +285,8 @@ def _coarse(solid: Solid) -> list[str]:
     if solid.frame.resolution <= HONEST_WITHIN / 2:
         return []
     return [
-        f"So far from the origin coordinates tell nothing apart that is closer than {solid.frame.resolution:.2g} (the "
-        "longest side is 2), and hulls thinner than that are made thicker: move the mesh to the origin."
+        f"So far from the origin, coordinates cannot resolve lengths below {solid.frame.resolution:.2g} (the longest "
+        "side is 2), so hulls thinner than that are made thicker: move the mesh to the origin."
     ]
 
 
@@ -296,8 +297,8 @@ def _out_of_the_box(hulls: Sequence[Hull], solid: Solid) -> list[str]:
     if beyond <= HONEST_WITHIN:
         return []
     return [
-        f"The hulls reach up to {beyond:.4g} out of the solid's bounding box, where a ball may go: the limits on "
-        "corners or faces that were asked for leave no better ones."
+        f"The hulls extend up to {beyond:.4g} outside the solid's bounding box, where a ball may go: the limits on "
+        "vertices or faces allow no tighter ones."
     ]
 
 
@@ -315,26 +316,36 @@ def _cut_short(clock: Clock) -> list[str]:
         "cut": "There were so many components that cutting stopped at its bound of work: the hulls cover the solid "
         "but are coarser than asked for.",
         "merge": "There were so many parts that merging stopped at its bound of work: all hulls are valid, but fewer "
-        "may do. A larger threshold leaves less to merge.",
+        "may suffice. A larger threshold leaves less to merge.",
     }
     return [sentence for stage, sentence in said.items() if stage in clock.cut_short]
 
 
-def _shortcomings(hulls: Sequence[Hull], apart: _Distances | None, options: Options, overhang: float) -> list[str]:
+def _shortcomings(
+    hulls: Sequence[Hull], apart: _Distances | None, solid: Solid, options: Options, overhang: float
+) -> list[str]:
     sentences = [] if options.preset is None else engine_shortcomings(find_preset(options.preset), hulls)
     if options.max_hulls is not None and len(hulls) > options.max_hulls:
         sentences.append(f"{len(hulls)} hulls are left, more than the {options.max_hulls} asked for.")
     if apart is not None and apart.under > HONEST_WITHIN:
         sentences.append(
-            f"Some of the input's surface lies {apart.under:.4g} from the hulls, most near {apart.under_at}: the "
-            "repair gave up what could not be made solid (see `deviation` in `repair`)."
+            f"Some of the input's surface lies up to {apart.under:.4g} outside the hulls, farthest near "
+            f"{apart.under_at}: repair dropped what it could not make solid (see `deviation` in `repair`)."
         )
     if apart is not None and apart.over > overhang + HONEST_WITHIN:
         sentences.append(
-            f"The hulls reach up to {apart.over:.4g} beyond the input's surface, more than the threshold, most near "
-            f"{apart.over_at}: the repair closed what may be open in the input (see `repair`)."
+            f"The hulls extend up to {apart.over:.4g} beyond the input's surface, more than the threshold, farthest "
+            f"near {apart.over_at}: {_why_beyond(solid, options)}."
         )
     return sentences
+
+
+def _why_beyond(solid: Solid, options: Options) -> str:
+    """What repair did that moves hulls away from the surface, and what leaves it undone."""
+    filled = any(body.step in ("capped", "wrapped") for body in solid.bodies)
+    if filled and options.open != "thin":
+        return "repair closed openings (see `repair`), which --open thin leaves open"
+    return "repair moved the surface there (see `repair`)"
 
 
 def engine_shortcomings(engine: Preset, hulls: Sequence[Hull]) -> list[str]:

@@ -88,8 +88,8 @@ class SpaceOptions:
     )
     tolerance: float | None = option(
         0.05,
-        "Space nearer to the surface than this may be filled; the same share. With --criterion volume: the share of "
-        "volume that a hull may add, such as 1%.",
+        "Space nearer to the surface than this may be filled; also a share of the longest side. With --criterion "
+        "volume: the share of volume that a hull may add, such as 1%.",
         number(*LENGTHS, rule=_SHARE, typed=str),
         panel=PANEL,
         metavar="NUMBER",
@@ -106,7 +106,7 @@ class SpaceOptions:
     )
     seeds: tuple[Point, ...] | None = option(
         None,
-        "A place that balls come from instead of outside, in the mesh's own unit; may be repeated.",
+        "A point from which balls start, instead of from outside, in the mesh's own unit; may be repeated.",
         custom("a list of at least one finite point [x, y, z]", _seeds),
         keyword=True,
         panel=PANEL,
@@ -118,8 +118,8 @@ class SpaceOptions:
     )
     closed_planes: tuple[tuple[Point, float], ...] = option(
         (),
-        "A plane that balls do not cross, such as the ground 0,0,1,0: they stay where the normal X,Y,Z points, D its "
-        "distance from the origin; may be repeated.",
+        "A plane that balls do not cross, such as the ground 0,0,1,0: they stay on the side to which the normal X,Y,Z "
+        "points; D is the plane's distance from the origin; may be repeated.",
         custom("a list of (normal, offset) pairs, every normal a finite vector [x, y, z] that is not zero", _planes),
         keyword=True,
         panel=PANEL,

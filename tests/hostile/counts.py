@@ -28,7 +28,7 @@ def _() -> bytes:
     return ply(f"element vertex 3\n{XYZ}element face 1\n{lists}", bytes(40_000))
 
 
-@refused("a trillion vertices in text.ply", "promises")
+@refused("a trillion vertices in text.ply", "declares")
 def _() -> bytes:
     return ply(f"element vertex {10**12}\n{XYZ}", b"0 0 0\n1 0 0\n0 1 0\n", "ascii")
 
@@ -39,18 +39,18 @@ def _() -> bytes:
     return ply(elements.replace("property float b\n", "property int b\n"))
 
 
-@refused("a face of two billion corners.ply", "again|promises")
+@refused("a face of two billion corners.ply", "again|declares")
 def _() -> bytes:
     body = np.zeros(9, "<f4").tobytes() + struct.pack("<i", 2 * 10**9) + b"\0" * 100
     return ply(f"element vertex 3\n{XYZ}element face 1\n{LIST.format(count='int')}", body)
 
 
-@refused("faces without corners, a billion of them.ply", "promises|again")
+@refused("faces without corners, a billion of them.ply", "declares|again")
 def _() -> bytes:
     return ply(f"element vertex 3\n{XYZ}element face {10**9}\n{LIST.format(count='uchar')}", b"\0" * 5000)
 
 
-@refused("a billion things of no size.ply", "promises|again")
+@refused("a billion things of no size.ply", "declares|again")
 def _() -> bytes:
     return ply(f"element vertex 3\n{XYZ}element nothing {10**9}\n", b"\0" * 36)
 
@@ -65,12 +65,12 @@ def _() -> bytes:
     return ply(f"element vertex {10**7}\n{XYZ}", b"\n" * 10**7, "ascii")
 
 
-@refused("four billion triangles.stl", "promises 4294967295 triangles")
+@refused("four billion triangles.stl", "declares 4294967295 triangles")
 def _() -> bytes:
     return b"\0" * 80 + b"\xff" * 4 + b"\0" * 500
 
 
-@refused("a trillion vertices.off", "promises")
+@refused("a trillion vertices.off", "declares")
 def _() -> bytes:
     return f"OFF\n{10**12} {10**12} 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".encode()
 
@@ -85,7 +85,7 @@ def _() -> bytes:
     return b"OFF\n" + b"9" * 10**6 + b" 1 0\n0 0 0\n"
 
 
-@refused("a trillion vertices with normals, colours and texture coordinates.off", "promises")
+@refused("a trillion vertices with normals, colours and texture coordinates.off", "declares")
 def _() -> bytes:
     return f"STCNOFF {10**12} 0 0\n0 0 0 0 0 1 1 1 1 1 0 0\n".encode()
 
@@ -100,7 +100,7 @@ def _() -> bytes:
     return b"OFF BINARY\n" + b"\xff" * 4000
 
 
-@refused("a comment of ten million characters, and nothing else.off", "holds|empty")
+@refused("a comment of ten million characters, and nothing else.off", "counts|empty")
 def _() -> bytes:
     return b"#" * 10**7
 

@@ -116,12 +116,12 @@ def _() -> bytes:
     return collada(scene='<node id="n">' + '<instance_geometry url="#g"/>' * 300_000 + "</node>")
 
 
-@refused("a polygon of two billion corners.dae", "promises")
+@refused("a polygon of two billion corners.dae", "declares")
 def _() -> bytes:
     return collada(faces=f'<polylist count="1">{INPUT}<vcount>2000000000</vcount><p>{INDICES}</p></polylist>')
 
 
-@refused("an offset of two billion.dae", "again|promises|no points")
+@refused("an offset of two billion.dae", "again|declares|no points")
 def _() -> bytes:
     far = INPUT.replace('offset="0"', 'offset="2000000000"')
     return collada(faces=f'<triangles count="12">{far}<p>{INDICES}</p></triangles>')

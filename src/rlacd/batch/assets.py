@@ -13,6 +13,7 @@ from pathlib import Path, PurePosixPath
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.companions import mesh_files
+from rlacd.io.write.encode import GENERATOR
 from rlacd.io.write.folder import listed_hulls
 
 ENDINGS = (".obj", ".stl", ".ply", ".off", ".glb", ".gltf", ".vrm", ".dae", ".3mf", ".usd", ".usda", ".usdc", ".usdz")
@@ -22,6 +23,14 @@ EVERYTHING = "**"
 
 HULLS = "_hulls"
 """What `rlacd decompose` appends to a mesh's name to name its hulls."""
+
+# How files written by rlacd begin, within the first bytes.
+_MARKS = {
+    ".glb": f'"generator":"{GENERATOR}"'.encode(),
+    ".obj": f"# {GENERATOR}".encode(),
+    ".ply": f"comment {GENERATOR}".encode(),
+}
+_HEAD = 128
 
 
 @dataclass(frozen=True)
@@ -69,8 +78,8 @@ def find_assets(folder: Path, glob: str = EVERYTHING, leave_out: Path | None = N
     Parameters
     ----------
     folder : Path
-        Folder to search. Hidden files and folders, links to folders, and hulls written by `rlacd decompose` are
-        skipped; links to files are followed.
+        Folder to search. Hidden files and folders, links to folders, and files written by rlacd are skipped; links to
+        files are followed.
     glob : str
         Pattern to select meshes: matched against the name if it holds a slash, else against its last part. ``*``
         matches slashes too.
@@ -83,7 +92,7 @@ def find_assets(folder: Path, glob: str = EVERYTHING, leave_out: Path | None = N
         `folder` does not exist or is not a folder, or a folder in it cannot be read.
     """
     if not folder.is_dir():
-        raise MeshFileError(f"{folder} is no folder; give the folder that holds the meshes.")
+        raise MeshFileError(f"{folder} is not a folder; give the folder that holds the meshes.")
     # Names of results depend on all meshes of the folder, not only on the selected ones, so that a mesh's result has
     # the same name in every run.
     names = sorted(_names(folder, None if leave_out is None else leave_out.resolve()))
@@ -97,7 +106,9 @@ def _names(folder: Path, leave_out: Path | None) -> Iterator[str]:
         folders[:] = [f for f in folders if not f.startswith(".") and (here / f).resolve() != leave_out]
         hulls = _written_hulls(here, files)
         for file in files:
-            if not file.startswith(".") and PurePosixPath(file).suffix.lower() in ENDINGS and file not in hulls:
+            if file.startswith(".") or PurePosixPath(file).suffix.lower() not in ENDINGS or file in hulls:
+                continue
+            if not _is_written(here / file):
                 yield (here / file).relative_to(folder).as_posix()
 
 
@@ -111,8 +122,20 @@ def _written_hulls(folder: Path, files: Sequence[str]) -> set[str]:
     return beside.union(*(listed_hulls(folder / name, name.removesuffix(f"{HULLS}.json")) for name in listings))
 
 
+def _is_written(path: Path) -> bool:
+    """Whether a file says that rlacd wrote it: hulls, balls, and meshes of models, under any name."""
+    mark = _MARKS.get(path.suffix.lower())
+    if mark is None or not path.is_file():
+        return False
+    try:
+        with path.open("rb") as file:
+            return mark in file.read(_HEAD)
+    except OSError:  # reported when the mesh is read
+        return False
+
+
 def _refuse(error: OSError) -> None:
-    raise MeshFileError(f"{error.filename} cannot be looked into ({error.strerror}); check its permissions.") from error
+    raise MeshFileError(f"{error.filename} cannot be read ({error.strerror}); check its permissions.") from error
 
 
 def _matches(name: str, glob: str) -> bool:

@@ -96,7 +96,9 @@ class JobSpec:
         """
         checked = Options(**{"threads": 1, **options})
         if not isinstance(checked.policy, str):
-            raise OptionError("policy has to be a name or a file in a batch: its processes are given plain values.")
+            raise OptionError(
+                "in a batch, policy has to be a name or a file: an object cannot be sent to other processes."
+            )
         make_policy(checked.policy)
         ending, wanted = _file_kind(file_format, folders, checked.preset)
         check_model_options(DENSITY if density is None else density, up)
@@ -104,7 +106,7 @@ class JobSpec:
         with TemporaryDirectory() as folder:
             hull_target(f"{folder}/mesh{ending or '/'}", wanted, keep_input=keep_input)
         if one_mesh and ending != ".urdf":
-            raise OptionError("one mesh for all hulls is for .urdf files; leave it out.")
+            raise OptionError("one_mesh (--one-mesh) works for .urdf files only: leave it out.")
         plain = {"threads": 1, **options}
         if isinstance(checked.criterion, NavigableSpace):
             plain["criterion"] = asdict(checked.criterion)
@@ -166,7 +168,7 @@ def _file_kind(file_format: str | None, folders: bool, preset: str | None) -> tu
         raise OptionError(f"unknown format {file_format!r}; use one of {', '.join((*FORMATS, *MODELS))}.")
     if folders:
         if wanted not in (None, *FORMATS):
-            raise OptionError(f"{file_format} is no format for a folder a mesh; use one of {', '.join(FORMATS)}.")
+            raise OptionError(f"{file_format} cannot be written as a folder per mesh; use one of {', '.join(FORMATS)}.")
         return "", wanted or FOLDER_FORMAT
     if wanted is None and preset is not None:
         engine = find_preset(preset)

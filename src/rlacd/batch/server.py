@@ -24,7 +24,7 @@ from rlacd.pool.process import peak_memory
 
 SERVER = "rlacd.batch.server:MeshServer"
 
-STAND_IN = "The convex hull of the whole mesh stands in for its decomposition."
+STAND_IN = "The mesh was given its convex hull instead of a decomposition."
 
 
 def make(

@@ -225,7 +225,7 @@ class AddressStore:
         except ImportError as error:
             raise MissingExtraError(f"{address} needs another package: {str(error).splitlines()[0]}") from error
         except ValueError as error:
-            raise OptionError(f"{address} is no address that fsspec knows: {error}.") from error
+            raise OptionError(f"{address} is not an address that fsspec knows: {error}.") from error
         self.shared = not address.startswith("memory://")
 
     def write(self, name: str, data: bytes) -> None:

@@ -87,7 +87,7 @@ _OWN: Parameters = {
         600.0, float, metavar="SECONDS", min=0.1, help="Time limit per mesh; after it the mesh's process is killed."
     ),
     "memory": _option(4.0, float, metavar="GB", min=0.0, help="Memory limit per mesh; 0 means no limit."),
-    "fallback": _option(True, bool, "--fallback/--no-fallback", help="Give meshes that fail their convex hull."),
+    "fallback": _option(True, bool, "--fallback/--no-fallback", help="Write the convex hull of a mesh that fails."),
     "folders": _option(False, bool, "--folders", help="Write a folder per mesh with one file per hull."),
     "redo": _option(
         "none", str, metavar="WHICH", help="Which meshes to do again: none, those that failed (failed), or all."
@@ -97,7 +97,7 @@ _OWN: Parameters = {
         str | None,
         "--format",
         metavar="EXT",
-        help="Of each result: glb, obj, ply, stl, mjcf, urdf, sdf, usd, unreal or godot. "
+        help="The format of each result: glb, obj, ply, stl, mjcf, urdf, sdf, usd, unreal or godot. "
         "[dim]\\[default: what --preset says, or glb][/dim]",
         show_default=False,
     ),

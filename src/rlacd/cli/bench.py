@@ -296,7 +296,7 @@ def _open(
 
 def _need_folder(meshes: Path) -> None:
     if not meshes.is_dir():
-        raise MeshFileError(f"{meshes} is no folder; give the folder that holds the meshes.")
+        raise MeshFileError(f"{meshes} is not a folder; give the folder that holds the meshes.")
 
 
 def _make_folder(folder: Path) -> None:

@@ -160,7 +160,7 @@ def _check_mesh(wanted: OutputOptions) -> None:
     flags = {"one_mesh": bool(wanted.one_mesh), "keep_input": bool(wanted.keep_input), "scene": bool(wanted.scene)}
     hull_target(str(wanted.output), wanted.file_format, **flags)
     if wanted.package_dirs:
-        raise OptionError("--package-dir belongs to robots: a .urdf or .xml file as input.")
+        raise OptionError("--package-dir is for robots, a .urdf or .xml file as input.")
     if wanted.report not in (None, STDOUT):
         check_file(Path(wanted.report))
     if wanted.picture is not None:
@@ -175,11 +175,11 @@ def _check_robot(asked: OutputOptions, wanted: OutputOptions) -> None:
     from rlacd.view import is_html
 
     if wanted.report is not None and is_html(wanted.report):
-        raise OptionError("--report as a page belongs to a single mesh; for a robot give a .json file.")
+        raise OptionError("--report as a page is for a single mesh; for a robot give a .json file.")
     for name in ("picture", "balls", "file_format", "density", "mass", "one_mesh", "keep_input", "scene"):
         if getattr(asked, name) is not None:
             spelled = "format" if name == "file_format" else name.replace("_", "-")
-            raise OptionError(f"--{spelled} belongs to a single mesh; leave it out for a robot.")
+            raise OptionError(f"--{spelled} is for a single mesh; leave it out for a robot.")
     if wanted.report not in (None, STDOUT):
         check_file(Path(wanted.report))
 

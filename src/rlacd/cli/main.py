@@ -33,7 +33,7 @@ class Commands(TyperGroup):
         if self.get_command(ctx, word) is None and (Path(word).suffix or os.path.exists(word)):
             verb = "batch" if os.path.isdir(word) else "decompose"
             typed = shlex.join(["rlacd", verb, *args])
-            typer.echo(f"rlacd: {printable(word)} is no command; did you mean  {printable(typed)}", err=True)
+            typer.echo(f"rlacd: {printable(word)} is not a command; did you mean  {printable(typed)}", err=True)
             raise typer.Exit(ExitCode.BAD_INPUT)
         return super().resolve_command(ctx, args)
 

@@ -95,7 +95,7 @@ def _renamed(given: dict[str, Any], warn: Callable[[str], None]) -> dict[str, An
         typed_old, typed_new = (f"--{name.replace('_', '-')}" for name in (old, new))
         if new in given:
             raise OptionError(f"{typed_old} is the former name of {typed_new}; give one of the two.")
-        warn(f"{typed_old} is now called {typed_new}; the old name will go.")
+        warn(f"{typed_old} is now called {typed_new}; the old name will be removed.")
         given[new] = given.pop(old)
     return given
 
@@ -140,7 +140,7 @@ def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
     found = tuple(value for value in values if value is not None)
     if len(found) != count or len(values) != count:
         raise OptionError(
-            f"{option} is {text!r}; it takes {count} numbers with commas between, such as {'0,0,1,0'[: 2 * count - 1]}."
+            f"{option} is {text!r}; it takes {count} numbers separated by commas, such as {'0,0,1,0'[: 2 * count - 1]}."
         )
     return found
 

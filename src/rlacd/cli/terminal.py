@@ -140,7 +140,7 @@ def _fit(report: dict[str, Any]) -> str:
     worst = report.get("concavity", {}).get("max")
     if worst is not None:
         threshold = report.get("options", {}).get("threshold")
-        verdict = "" if threshold is None else f" (threshold {threshold:g}{', exceeded' * (worst > threshold)})"
+        verdict = "" if threshold is None else f" (threshold {threshold:.4g}{', exceeded' * (worst > threshold)})"
         words.append(f"max concavity {worst:.4f}{verdict}")
     added = report.get("volume")
     if added is not None and added["max"] is not None:
@@ -157,7 +157,7 @@ def _fit(report: dict[str, Any]) -> str:
         )
     reach = report.get("hausdorff", {})
     if reach.get("over") is not None:
-        words.append(f"hulls reach {reach['over']:.4f} from the input")
-    if reach.get("under") is not None:
-        words.append(f"input lies {reach['under']:.4f} from the hulls")
-    return "; ".join(words)
+        missed = f"{reach['under']:.4f}"
+        covered = "and cover it" if missed == "0.0000" else f"and miss it by up to {missed}"
+        words.append(f"hulls extend up to {reach['over']:.4f} beyond the input {covered}")
+    return "; ".join(words) + (" (longest side = 2)" if words else "")

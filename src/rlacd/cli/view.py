@@ -59,7 +59,7 @@ def view(
     """
     with exit_codes():
         if mesh.suffix.lower() in ROBOTS:
-            raise OptionError(f"{mesh} is a robot; view shows one mesh: give one of those that it names.")
+            raise OptionError(f"{mesh} is a robot; view shows a single mesh: give one of the meshes that it refers to.")
         from rlacd.viewer.viewer import open_viewer
 
         chosen = {

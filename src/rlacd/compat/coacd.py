@@ -19,13 +19,13 @@ from rlacd.options import DEFAULT_THRESHOLD, MAX_OVERLAP, MIN_THRESHOLD
 __all__ = ["Mesh", "run_coacd", "set_log_level"]
 
 _UNUSED = {
-    "preprocess_mode": "what is not closed is repaired, and nothing else is touched",
-    "preprocess_resolution": "repair does not sample the mesh",
-    "resolution": "distances are bounded, not sampled",
-    "mcts_nodes": "there is no tree search; rlacd.decompose(quality='best') searches",
-    "mcts_iterations": "there is no tree search; rlacd.decompose(quality='best') searches",
-    "mcts_max_depth": "there is no tree search; rlacd.decompose(quality='best') searches",
-    "pca": "planes along the principal axes are among the candidates anyway",
+    "preprocess_mode": "it repairs bodies that are not closed, and no others",
+    "preprocess_resolution": "it does not remesh the input",
+    "resolution": "it bounds distances instead of sampling them",
+    "mcts_nodes": "it has no tree search; rlacd.decompose(quality='best') searches in another way",
+    "mcts_iterations": "it has no tree search; rlacd.decompose(quality='best') searches in another way",
+    "mcts_max_depth": "it has no tree search; rlacd.decompose(quality='best') searches in another way",
+    "pca": "it tries planes along the principal axes anyway",
 }
 
 

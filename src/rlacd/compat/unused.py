@@ -20,7 +20,7 @@ def warn_unused(
     for name, reason in reasons.items():
         if not _same(given[name], defaults[name]) and (function, name) not in _WARNED:
             _WARNED.add((function, name))
-            warnings.warn(f"{function}: {name} does nothing in rlacd: {reason}.", UnusedOptionWarning, stacklevel=3)
+            warnings.warn(f"{function}: rlacd ignores {name}: {reason}.", UnusedOptionWarning, stacklevel=3)
 
 
 def _same(given: Any, default: Any) -> bool:

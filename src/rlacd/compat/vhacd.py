@@ -19,12 +19,12 @@ from rlacd.fields import flag, integer, number, read
 __all__ = ["compute_vhacd"]
 
 _UNUSED = {
-    "resolution": "nothing is turned into voxels",
-    "maxRecursionDepth": "parts are cut until they are tight",
-    "shrinkWrap": "hulls lie on the mesh's own vertices",
-    "fillMode": "what is not closed is repaired",
-    "minEdgeLength": "nothing is turned into voxels",
-    "findBestPlane": "the best plane is always looked for",
+    "resolution": "it uses no voxels",
+    "maxRecursionDepth": "it cuts until every part is tight",
+    "shrinkWrap": "its hulls lie on the mesh anyway",
+    "fillMode": "it repairs meshes that are not closed",
+    "minEdgeLength": "it uses no voxels",
+    "findBestPlane": "it always searches for the best plane",
 }
 
 

@@ -116,13 +116,13 @@ class NavigableSpace(SpaceOptions):
         hull = Hull.of(vertices)
         balls = Balls(np.empty((0, 3)), np.empty(0))
         if radius >= 2:
-            warnings.append("the radius is larger than the object, so that no ball comes in: one hull is enough")
+            warnings.append("the radius is larger than the object, so no ball can get in: one hull is enough")
         elif hull is not None:
             pitch = max(radius / 2, (2 + 2 * radius) / MOST_CELLS)
             if pitch > radius / 2:
                 warnings.append(
-                    f"the radius, {50 * radius:.3g} % of the longest side, is small: the balls stand "
-                    f"{pitch / radius:.2g} radii apart and what lies between them may be missed"
+                    f"the radius, {50 * radius:.3g} % of the longest side, is small: balls are placed "
+                    f"{pitch / radius:.2g} radii apart, and free space between them may be missed"
                 )
             balls = Balls(
                 *_native.navigable_balls(
@@ -149,7 +149,7 @@ class NavigableSpace(SpaceOptions):
             Frame units per unit of the input.
         """
         radius, tolerance = self.in_frame(scale)
-        warning = "There was no time to find the navigable space: nothing is known of it, and there are no balls."
+        warning = "There was no time to find the navigable space, so there are no balls."
         return Navigable(self, radius, tolerance, Balls(np.empty((0, 3)), np.empty(0)), (warning,))
 
     @property
@@ -248,8 +248,8 @@ class Navigable:
         given_way = self.conflicts.shrunk + self.conflicts.dropped
         if given_way:
             sentences.append(
-                f"{given_way} balls gave way to parts that no cut could keep off them: {self.conflicts.shrunk} shrank, "
-                f"{self.conflicts.dropped} were dropped; the largest loss of radius is {self.conflicts.most:.4g}."
+                f"No cut could keep the hulls off {given_way} balls, so {self.conflicts.shrunk} balls were shrunk and "
+                f"{self.conflicts.dropped} dropped; the largest loss of radius is {self.conflicts.most:.4g}."
             )
         if errors is not None and exceeding:
             sentences.append(

@@ -62,10 +62,10 @@ class OnnxQ:
         except OSError as error:
             raise WeightsError(f"The policy {path} cannot be read ({error}); give another path.") from error
         except Exception as error:  # onnxruntime's own exceptions have no public base
-            raise WeightsError(f"{path} is damaged or no ONNX file; export the policy again.") from error
+            raise WeightsError(f"{path} is damaged or not an ONNX file; export the policy again.") from error
         about = _about(self._session)
         if about.get("kind") != KIND or signature != [INPUTS, OUTPUTS]:
-            raise WeightsError(f"{path} is no Q network of rlacd; export the policy again.")
+            raise WeightsError(f"{path} is not a Q network of rlacd; export the policy again.")
         try:
             self.points, self.threshold = int(about["points"]), float(about["threshold"])
             if not 1 <= self.points <= MOST_POINTS or not 0 < self.threshold < math.inf:

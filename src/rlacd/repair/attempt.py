@@ -102,7 +102,7 @@ class Attempt:
         poll_stop()
         self.solid = self._solid(Soup(surface.vertices, faces, body))
         if volume_of(self.solid) == 0:
-            self.warnings.append("the surface could not be closed: the hull of its points stands in for the solid")
+            self.warnings.append("The surface could not be closed, so the convex hull of its points is used instead.")
             self.record.step[:] = STEPS.index("hull")
             self.solid = hull_of_points(surface.vertices)
         self._warn_of_holes()
@@ -138,6 +138,7 @@ class Attempt:
         if self._open_bodies == "thin":
             return solid
         solid = self._wraps.with_rooms(solid, soup, parts, self._by_room)
+        solid = self._wraps.with_deep_slits(solid, soup)
         return self._wraps.with_slits(solid, self._hidden, self._across, self._by_room)
 
     def _is_oriented(self, soup: Soup) -> bool:

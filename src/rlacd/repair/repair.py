@@ -123,7 +123,7 @@ def repair(
     surface = (vertices, faces.astype(np.int32))
 
     if len(faces) == 0 or face_areas(vertices, faces).max() < NO_AREA:
-        warnings.append("no face has an area: the hull of the points stands in for the solid")
+        warnings.append("No face has an area, so the convex hull of all points is used instead.")
         solid = hull_of_points(points)
         body = BodyRepair(0, "hull", len(mesh.faces), solid.num_tri(), 0.0)
         return Solid(solid, surface, frame, (body,), tuple(warnings))
@@ -133,7 +133,7 @@ def repair(
     if tangled is not None:
         bodies = "1 body crosses" if len(tangled) == 1 else f"{len(tangled)} bodies cross"
         warnings.append(
-            f"{bodies} too much of the own surface to be cut: what the faces enclose was taken to be solid."
+            f"{bodies} too much of their own surface to be cut, so whatever the faces enclose is taken to be solid."
         )
     work = _attempted(partial(Attempt, query, frame, cells, gap, keep_cavities), open_bodies, tangled)
     return Solid(
@@ -164,7 +164,7 @@ def _attempted(attempt: Callable[..., Attempt], open_bodies: str, tangled: IntAr
         other = attempt(**how | {"open_bodies": "thin"})
         if other.lost < work.lost and volume_of(other.solid) > _FILLED * volume_of(work.solid):
             other.warnings.append(
-                f"Some of the surface lay up to {work.lost:.4g} from the solid once holes were closed, most near "
+                f"Some of the surface lay up to {work.lost:.4g} from the solid once holes were closed, farthest near "
                 f"{work.lost_at}, so open bodies became thin shells; --open solid fills them."
             )
             other.holes = [replace(hole, is_closed=False) for hole in work.holes]

@@ -91,6 +91,16 @@ class Reach:
         centers = self.origin + deepest * self.pitch
         return labels[~solid.inside(centers)]
 
+    def volumes(self, rooms: IntArray) -> FloatArray:
+        """Return the volume of the cells of each of some rooms: where the ball's centre may be."""
+        return np.asarray(np.bincount(self.room.ravel())[rooms] * self.pitch**3)
+
+    def is_deep(self, points: FloatArray, depth: float) -> BoolArray:
+        """Return ``[N]`` whether points lie at least `depth` from the cells that the ball can reach."""
+        cell = np.clip(np.rint((points - self.origin) / self.pitch).astype(np.int64), 0, np.array(self.room.shape) - 1)
+        reached = self.reached.astype(self.room.dtype)
+        return np.asarray(nearest_labels(reached, cell, depth / self.pitch + _ROUNDING) == 0)
+
     def rooms_near(self, points: FloatArray) -> IntArray:
         """Return ``[N]`` the label of a room whose walls may contain each point, 0 for none."""
         cell = np.clip(np.rint((points - self.origin) / self.pitch).astype(np.int64), 0, np.array(self.room.shape) - 1)
@@ -117,21 +127,26 @@ class Reach:
         mark[tuple(np.rint((points - self.origin) / self.pitch).astype(np.int64).T)] = True
         return _grown(mark, self.radius / self.pitch) & ~self.reached
 
-    def wrap(self, cells: BoolArray, surface: SurfaceQuery, thickness: float) -> tuple[FloatArray, IntArray]:
+    def wrap(
+        self, cells: BoolArray, surface: SurfaceQuery, thickness: float, solid: SurfaceQuery | None = None
+    ) -> tuple[FloatArray, IntArray]:
         """Return the closed surface of a set of cells, projected onto a surface where it is near.
 
         Corners of cells move to `thickness` in front of the closest point of the surface as seen from their place,
         so a wrap of a single sheet keeps two sides. Corners farther than two cells away span a gap and are smoothed.
+        Corners inside `solid`, with which the wrap will be united, stay: projected, they would leave a slit.
         """
         corners, quads = _boundary_squares(cells)
         points = self.origin + (corners - 0.5) * self.pitch
         closest, _ = surface.closest(points)
         away = points - closest
         distance = np.linalg.norm(away, axis=1)
+        is_free = np.ones(len(points), dtype=bool) if solid is None else ~solid.inside(points)
         attached = distance <= 2 * self.pitch
         step = thickness / np.maximum(distance, np.finfo(float).tiny)
-        points[attached] = (closest + np.minimum(step, 1)[:, None] * away)[attached]
-        _smooth(points, quads, ~attached)
+        moved = attached & is_free
+        points[moved] = (closest + np.minimum(step, 1)[:, None] * away)[moved]
+        _smooth(points, quads, ~attached & is_free)
         return points, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 

@@ -24,6 +24,12 @@ _WRAP_ERROR = 4e-3
 # Widest slit between caps that is filled, as a share of the gap, and the distance up to which a cap is part of the
 # solid's surface.
 _SLIT, _ON_SURFACE = 1 / 4, 1e-6
+# A room of an outer skin is filled from this share of the solid's volume on: rooms in furniture have 0.04 and more,
+# crevices at most 0.0023.
+_ROOM = 0.01
+# A slit in an outer skin is filled from this depth on, up to this width (multiples of the gap), if all of them hold no
+# more than this share of the volume: what is shallower needs no cut, and what is wider leaves steps of the grid.
+_DEEP, _HAIR, _LITTLE = 2.0, 1 / 16, 1e-3
 # More sheets than this are not united one by one: that would take seconds, and cutting the result even longer. Neither
 # are fewer sheets that all cross each other: 40 have 780 crossings (a second or two), 80 have 3,160 (ten seconds).
 _CROWD, _CROSSINGS = 300, 1000
@@ -125,7 +131,7 @@ class Wraps:
         return parts
 
     def with_rooms(self, solid: Shape, soup: Soup, parts: list[tuple[Manifold, int]], by_room: BoolArray) -> Shape:
-        """Close rooms that sheets enclose except for gaps too narrow for the ball.
+        """Fill rooms with openings too narrow for the ball: all rooms that sheets enclose, large ones in outer skins.
 
         Parameters
         ----------
@@ -140,17 +146,19 @@ class Wraps:
         """
         record = self._record
         is_slab = record.has("slab") & ~self._is_tangled
+        is_skin = record.has("outer skin") & ~self._is_tangled
         slabs = soup.only(is_slab[soup.body])
-        around = soup.only((is_slab | by_room)[soup.body])
-        if around.area.sum() < 4 * np.pi * self._gap**2 or volume_of(solid) == 0:
+        sheets = soup.only((is_slab | by_room)[soup.body])
+        shells = soup.only(is_skin[soup.body])
+        if volume_of(solid) == 0 or not (self._is_large(sheets) or self._is_large(shells)):
             return solid
-        rooms = self.reach.rooms_outside(SurfaceQuery(*to_arrays(solid)))
+        query = SurfaceQuery(*to_arrays(solid), self._input.threads)
+        rooms = self.reach.rooms_outside(query)
+        in_shells = self._rooms_in(shells, rooms[self.reach.volumes(rooms) >= _ROOM * volume_of(solid)])
+        rooms = np.union1d(self._rooms_in(sheets, rooms), in_shells)
         if len(rooms) == 0:
             return solid
-        rooms = np.intersect1d(rooms, self.reach.rooms_near(spread_points(around.vertices, around.faces, GAP)[0]))
-        if len(rooms) == 0:
-            return solid
-        wrap = self._wrap(self.reach.around_rooms(rooms), _WRAP_ERROR)
+        wrap = self._wrap(self.reach.around_rooms(rooms), _WRAP_ERROR, query if len(in_shells) else None)
         # The wrap replaces the sheets that are only walls of the rooms; the others stay slabs.
         points, on = spread_points(slabs.vertices, slabs.faces, GAP)
         wall = np.bincount(on, ~np.isin(self.reach.rooms_near(points), rooms), len(slabs.faces)) == 0
@@ -168,8 +176,50 @@ class Wraps:
             return solid
         wrapped = np.concatenate([slabs.body[wall], np.flatnonzero(by_room)])
         record.note(wrapped, "wrapped")
-        record.faces_out[wrapped.min(initial=record.bodies - 1)] += wrap.num_tri()
+        skins_too = np.flatnonzero(is_skin) if len(in_shells) else wrapped[:0]
+        record.faces_out[np.concatenate([wrapped, skins_too]).min(initial=record.bodies - 1)] += wrap.num_tri()
         return united
+
+    def _is_large(self, walls: Soup) -> bool:
+        """Whether faces could enclose a ball."""
+        return bool(walls.area.sum() >= 4 * np.pi * self._gap**2)
+
+    def _rooms_in(self, walls: Soup, rooms: IntArray) -> IntArray:
+        """Those of some rooms that faces may be walls of."""
+        if len(rooms) == 0 or not self._is_large(walls):
+            return rooms[:0]
+        return np.intersect1d(rooms, self.reach.rooms_near(spread_points(walls.vertices, walls.faces, GAP)[0]))
+
+    def with_deep_slits(self, solid: Shape, soup: Soup) -> Shape:
+        """Fill slits in outer skins that nothing can reach, such as around a door: cuts would have to follow them.
+
+        Parameters
+        ----------
+        solid
+            The solid so far.
+        soup
+            The faces that it was built from.
+        """
+        is_skin = self._record.has("outer skin") & ~self._is_tangled
+        if not self._is_large(soup.only(is_skin[soup.body])) or volume_of(solid) == 0:
+            return solid
+        vertices, faces = to_arrays(solid)
+        points, on = spread_points(vertices, faces, GAP)
+        deep = self.reach.is_deep(points, _DEEP * self._gap)
+        if not deep.any():
+            return solid
+        corners = vertices[faces[on[deep]]]
+        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
+        query = SurfaceQuery(vertices, faces, self._input.threads)
+        points, step = points[deep], _HAIR * self._gap * across
+        points = points[query.inside(points + step) & query.inside(points - step)]  # both sides of a slit
+        if len(points) == 0:
+            return solid
+        wrap = self._wrap(self.reach.around_points(points), _WRAP_ERROR, query)
+        united = unite([as_manifold(solid), wrap])
+        volume = volume_of(solid)
+        return united if volume < volume_of(united) < (1 + _LITTLE) * volume else solid
 
     def with_slits(self, solid: Shape, hidden: FloatArray, across: FloatArray, by_room: BoolArray) -> Shape:
         """Fill what is left between the caps of bodies that close each other, such as a pot and its lid.
@@ -211,9 +261,9 @@ class Wraps:
         faces = SurfaceQuery(soup.vertices, soup.faces, self._input.threads)
         return to_manifold(*reach.wrap(~reach.reached, faces, HALF_THICKNESS)).simplify(HALF_THICKNESS / 2)
 
-    def _wrap(self, cells: BoolArray, error: float) -> Manifold:
-        """Return a solid of grid cells, projected onto the input and simplified."""
-        return to_manifold(*self.reach.wrap(cells, self._input, HALF_THICKNESS)).simplify(error)
+    def _wrap(self, cells: BoolArray, error: float, solid: SurfaceQuery | None = None) -> Manifold:
+        """Return a solid of grid cells, projected onto the input where it does not overlap `solid`, and simplified."""
+        return to_manifold(*self.reach.wrap(cells, self._input, HALF_THICKNESS, solid)).simplify(error)
 
 
 def _crossings(boxes: FloatArray) -> int:

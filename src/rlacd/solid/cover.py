@@ -65,8 +65,8 @@ def cover(mesh: InputMesh, clock: Clock) -> tuple[Solid, list[Part]]:
     hulls = [_hull(points, clock) for points in bodies]
     clock.stop.trip()
     warning = (
-        f"Repair had no time: {len(hulls)} hulls around the bodies as they are in the input stand in for everything; "
-        "mass is that of the hulls."
+        f"There was no time to repair the mesh: the result is the convex hulls of its bodies as they are in the file "
+        f"({len(hulls)}), and the mass is that of these hulls."
     )
     solid = Solid(Manifold(), (vertices, faces), frame, (), (*mesh.warnings, warning))
     return solid, [Part(hull.vertices, hull.faces, hull.volume, hull) for hull in hulls]

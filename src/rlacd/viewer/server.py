@@ -193,7 +193,7 @@ class ViewServer(BoundedServer):
         try:
             super().__init__((ADDRESS, USUAL_PORT if port is None else port), _Handler)
         except OverflowError:
-            raise OptionError(f"{port} is no port; choose one from 1024 to 65535.") from None
+            raise OptionError(f"{port} is not a port; choose one from 1024 to 65535.") from None
         except OSError as error:
             if port is None:
                 super().__init__((ADDRESS, 0), _Handler)
@@ -254,7 +254,7 @@ class _Handler(BoundedHandler):
 
     def _open(self, query: dict[str, list[str]]) -> None:
         if self.headers.get_content_type() != "application/octet-stream":
-            raise _Refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "a mesh is sent as application/octet-stream.")
+            raise _Refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "send the mesh as application/octet-stream.")
         controls = self.server.accept(_object(query.get("options", ["{}"])[0]))
         controls.options()
         with self.server.heavy:
@@ -378,7 +378,7 @@ def _object(text: str | bytes) -> dict[str, Any]:
     except (ValueError, RecursionError):
         given = None
     if not isinstance(given, dict):
-        raise OptionError("the request is no JSON object; send {} at least.")
+        raise OptionError("the request is not a JSON object; send {} at least.")
     return given
 
 

@@ -153,5 +153,5 @@ def read_controls(given: dict[str, Any]) -> ViewerControls:
     known = {field.name for field in dataclasses.fields(ViewerControls)}
     for name in given:
         if name not in known:
-            raise OptionError(f"{name!r} is no option of the viewer; choose from {', '.join(sorted(known))}.")
+            raise OptionError(f"{name!r} is not an option of the viewer; choose from {', '.join(sorted(known))}.")
     return ViewerControls(**given)

@@ -26,7 +26,7 @@ def open_archive(path: Path, content: bytes) -> zipfile.ZipFile:
         archive = zipfile.ZipFile(io.BytesIO(content))
     except (zipfile.BadZipFile, ValueError, OverflowError, NotImplementedError) as error:
         raise MeshFileError(
-            f"{path} is no whole archive ({error}): it is damaged or cut off; export it again"
+            f"{path} is not a complete archive ({error}): it is damaged or cut off; export it again"
         ) from error
     members = archive.infolist()
     if len(members) > MOST_MEMBERS:

@@ -108,14 +108,14 @@ def split(path: Path, content: bytes) -> tuple[Json, bytes | None]:
             raise MeshFileError(f"{path} {UNREADABLE}; export it again")
         length, chunk = struct.unpack_from("<II", content, 8)
         if max(length, 20 + chunk) > len(content):
-            raise MeshFileError(f"{path} is cut off: its header promises {length} bytes; export it again")
+            raise MeshFileError(f"{path} is cut off: its header declares {length} bytes; export it again")
         if content[4:8] != b"\2\0\0\0":
             raise MeshFileError(f"{path} is of another version than glTF 2: convert it to glb, obj, stl or ply")
         text, rest = content[20 : 20 + chunk], content[20 + chunk :]
     try:
         header = json.loads(text.decode())
     except RecursionError as error:
-        raise MeshFileError(f"{path} nests its JSON too deep: no exporter writes such files") from error
+        raise MeshFileError(f"{path} nests its JSON too deeply: no exporter writes such files") from error
     except ValueError as error:
         raise MeshFileError(f"{path} {UNREADABLE} ({error}); export it again") from error
     if not isinstance(header, dict):
@@ -161,7 +161,9 @@ def _bytes_given(path: Path, header: Json, own: int, beside: Callable[[str], byt
     """Count the bytes of the file and of the files its buffers name."""
     buffers = header.get("buffers", [])
     if len(buffers) > MOST_PLACES:
-        raise MeshFileError(f"{path} has {len(buffers)} buffers, more than {MOST_PLACES}: export it again, with one")
+        raise MeshFileError(
+            f"{path} has {len(buffers)} buffers, more than {MOST_PLACES}: export it again with a single buffer"
+        )
     named = {buffer["uri"] for buffer in buffers if "base64," not in buffer.get("uri", "base64,")}
     return own + sum(len(beside(name)) for name in sorted(named))
 
@@ -202,7 +204,7 @@ class _Accessor:
         stride = _natural(path, view.get("byteStride", row), "byteStride")
         length = start + (count - 1) * stride + row if count else 0
         if stride < row or length > view["byteLength"]:
-            raise MeshFileError(f"{path} promises {count} rows where there is no room for them; export it again")
+            raise MeshFileError(f"{path} declares {count} rows but has no room for them; export it again")
 
 
 def _used(primitive: Json) -> Iterator[int]:
@@ -215,6 +217,6 @@ def _used(primitive: Json) -> Iterator[int]:
 def _natural(path: Path, number: Any, what: str) -> int:
     if not isinstance(number, int) or number < 0:
         raise MeshFileError(
-            f"{path} has {number!r:.40} as a {what}, which cannot be negative or broken; export it again"
+            f"{path} has {number!r:.40} as a {what}, which cannot be negative or fractional; export it again"
         )
     return number

@@ -47,7 +47,7 @@ def decoded_gltf(path: Path, content: bytes, beside: Callable[[str], bytes]) -> 
     MeshFileError
         It is damaged, or would need more memory than is reasonable.
     MissingExtraError
-        It is compressed by Draco, and the extra ``draco`` is not installed.
+        It is compressed with Draco, and the extra ``draco`` is not installed.
     """
     if DRACO.encode() not in content and b'"normalized"' not in content:
         return content
@@ -86,7 +86,7 @@ class DracoDecoder:
                     "export it again"
                 ) from error
             if points.ndim != 2 or points.shape[1] != 3 or (len(corners) and corners.max() >= len(points)):
-                raise MeshFileError(f"{values['path']} holds triangles without their points: export it again")
+                raise MeshFileError(f"{values['path']} holds triangles without points: export it again")
             if len(corners) > MOST_TRIANGLES:
                 raise MeshFileError(f"{values['path']} holds more than {MOST_TRIANGLES} triangles: simplify it first")
             arrays[f"{name}.points"] = _as_floats(points, values["normalized"][name]).tobytes()
@@ -132,7 +132,7 @@ class _File:
             return False
         if find_spec("DracoPy") is None:
             raise MissingExtraError(
-                f"{self._path} is compressed by Draco: run  pip install 'rlacd[draco]'  and try again."
+                f"{self._path} is compressed with Draco: run  pip install 'rlacd[draco]'  and try again."
             )
         self._need(sum(map(len, streams.values())))
         values = {"path": str(self._path), "attributes": attributes, "normalized": normalized}

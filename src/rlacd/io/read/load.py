@@ -144,7 +144,7 @@ def _read(path: Path) -> tuple[bytes, str, trimesh.Scene]:
     if extension not in FORMATS:
         renamed = f"rename it to .{holds}, which it seems to hold" if holds else None
         hint = CONVERTERS.get(extension) or renamed or "convert it to glb, obj, stl or ply"
-        raise MeshFileError(f"{path} is in no format that is read here: {hint}")
+        raise MeshFileError(f"{path} is in a format that rlacd does not read: {hint}")
     extension = "glb" if extension == "vrm" else extension  # a VRM file is a GLB file
     if (declared := declared_triangles(content, extension)) is not None:
         require_memory(declared, BYTES_READ, path.name)
@@ -301,7 +301,7 @@ def _placed(graph: Any, node: Any, placed: dict[Any, FloatArray], name: str) -> 
             return _placed_otherwise(graph, node, name)
         chain.append((parent, at))
         if len(chain) > len(graph.transforms.parents):
-            raise MeshDataError(f"the node {node!r:.80} of {name} is placed in itself: export the scene again")
+            raise MeshDataError(f"the node {node!r:.80} of {name} is placed inside itself: export the scene again")
         at = parent
     for parent, child in reversed(chain):
         edge = graph.transforms.edge_data[parent, child]
@@ -314,7 +314,9 @@ def _placed_otherwise(graph: Any, node: Any, name: str) -> FloatArray:
     try:
         return np.asarray(graph[node][0], dtype=np.float64)
     except ValueError as error:
-        raise MeshDataError(f"the node {node!r:.80} of {name} is placed nowhere: export the scene again") from error
+        raise MeshDataError(
+            f"the node {node!r:.80} of {name} has no place in its scene: export the scene again"
+        ) from error
 
 
 def _arrays(vertices: Any, faces: Any) -> tuple[FloatArray, IntArray]:

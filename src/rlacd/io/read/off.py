@@ -42,7 +42,9 @@ def plain_off(path: Path, content: bytes) -> bytes:
     content = content.removeprefix(b"\xef\xbb\xbf")
     keyword = KEYWORD.match(content)
     if keyword is not None and BINARY.match(content, keyword.end()):
-        raise MeshFileError(f"{path} is a binary OFF file, which is not read here: save it as text, or as ply or obj")
+        raise MeshFileError(
+            f"{path} is a binary OFF file, which rlacd does not read: save it as text, or as ply or obj"
+        )
     check_text(path, content)
     lines = [line for line in (raw.split(b"#", 1)[0].strip() for raw in content.splitlines()) if line]
     letters = _take_keyword(lines)
@@ -50,12 +52,12 @@ def plain_off(path: Path, content: bytes) -> bytes:
         _check_dimension(path, letters, lines)
     header = lines[0].split() if lines else []
     if len(header) < 2:
-        raise MeshFileError(f"{path} cannot be read as off: it does not say how much it holds; export it again")
+        raise MeshFileError(f"{path} cannot be read as off: its header lacks the counts; export it again")
     vertices, faces = (count_in(path, word) for word in header[:2])
     body = lines[1:]
     if len(body) < vertices + faces:
         raise MeshFileError(
-            f"{path} is cut off: its header promises {vertices} vertices and {faces} faces; export it again"
+            f"{path} is cut off: its header declares {vertices} vertices and {faces} faces; export it again"
         )
     if b"4" in letters:
         body[:vertices] = _divided(path, body[:vertices])
@@ -105,7 +107,7 @@ def _triangles(path: Path, vertices: list[bytes], faces: list[bytes]) -> list[by
     except (ValueError, OverflowError) as error:
         raise MeshFileError(f"{path} cannot be read as off: it is damaged ({error}); export it again") from error
     if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
-        raise MeshFileError(f"{path} has faces with points that are not there: export it again")
+        raise MeshFileError(f"{path} has faces that refer to missing points: export it again")
     counts = np.array([len(ring) for ring in rings], dtype=np.int64)
     return [b"3 %d %d %d" % (a, b, c) for a, b, c in triangles_of(points, counts, corners).tolist()]
 

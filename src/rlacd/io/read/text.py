@@ -43,7 +43,7 @@ BODY_END = re.compile(rb"endsolid", re.IGNORECASE)
 def check_text(path: Path, content: bytes) -> None:
     """Refuse text in UTF-16, and text of more lines than any mesh has."""
     if b"\0" in content.rstrip(b"\0"):
-        raise MeshFileError(f"{path} is no plain text: save it as UTF-8, or export it again if it is damaged")
+        raise MeshFileError(f"{path} is not plain text: save it as UTF-8, or export it again if it is damaged")
     lines = content.count(b"\n")
     if lines > MOST_TRIANGLES:
         raise MeshFileError(f"{path} has {lines} lines, more than {MOST_TRIANGLES}: simplify it first")
@@ -89,7 +89,7 @@ def plain_stl(path: Path, content: bytes) -> bytes:
     if b"\0" in content[:512]:
         count = int.from_bytes(content[80:84], "little")
         if len(content) < 84 + 50 * count:
-            raise MeshFileError(f"{path} is cut off: its header promises {count} triangles; export it again")
+            raise MeshFileError(f"{path} is cut off: its header declares {count} triangles; export it again")
         return content
     if len(content) == 84 + 50 * int.from_bytes(content[80:84], "little"):
         return content
@@ -120,7 +120,7 @@ def plain_ply(path: Path, content: bytes) -> bytes:
         return plain
     body = EMPTY_LINES.sub(b"\n", content[end.end() :].strip())
     if body.count(b"\n") + bool(body) < sum(counts):
-        raise MeshFileError(f"{path} is cut off: its header promises {sum(counts)} lines; export it again")
+        raise MeshFileError(f"{path} is cut off: its header declares {sum(counts)} lines; export it again")
     return header + body + b"\n"
 
 

@@ -68,7 +68,9 @@ def _stage(path: Path) -> tuple[Values, dict[str, bytes]]:
         if len(nodes) > MOST_PLACES:
             raise MeshFileError(f"{path} places more than {MOST_PLACES} meshes: join them first")
         if prim.IsA(UsdGeom.PointInstancer):
-            raise MeshFileError(f"{path} has a point instancer, which is not read: make its instances real first")
+            raise MeshFileError(
+                f"{path} has a point instancer, which rlacd does not read: convert its instances to meshes first"
+            )
         if not _is_rendered(prim):
             continue
         primitive = _primitive(prim)
@@ -131,7 +133,7 @@ def _check_files(path: Path) -> None:
             known.add(found)
             file = Path(found.split("[", 1)[0])
             if not file.resolve().is_relative_to(folder):
-                raise MeshFileError(f"{path} refers to {named!r:.200}, outside its folder, which is not read")
+                raise MeshFileError(f"{path} refers to {named!r:.200}, outside its folder, which is not allowed")
             try:
                 read_file(file)
             except (OSError, ValueError) as error:
@@ -162,9 +164,9 @@ def _mesh(path: Path, prim: Any) -> tuple[FloatArray, np.ndarray[Any, Any]]:
         )
     )
     if (counts < 0).any() or counts.sum() != len(corners):
-        raise MeshFileError(f"{path} has faces at {prim.GetPath()} that do not add up: export it again")
+        raise MeshFileError(f"{path} has faces at {prim.GetPath()} that are inconsistent: export it again")
     if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
-        raise MeshFileError(f"{path} has faces at {prim.GetPath()} with points that are not there: export it again")
+        raise MeshFileError(f"{path} has faces at {prim.GetPath()} that refer to missing points: export it again")
     positions = np.asarray(points.reshape(-1, 3), dtype=np.float64)
     faces = triangles_of(positions, np.asarray(counts, dtype=np.int64), np.asarray(corners, dtype=np.int64))
     if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:

@@ -56,7 +56,9 @@ def check_prologue(path: Path, data: bytes) -> None:
     parser = expat.ParserCreate()
 
     def refuse(*_: object) -> None:
-        raise MeshFileError(f"{path} has a document type (<!DOCTYPE>), which may hide anything: remove it")
+        raise MeshFileError(
+            f"{path} has a document type (<!DOCTYPE>), which is not allowed, as it can refer to anything: remove it"
+        )
 
     def reached(*_: object) -> None:
         raise _RootReached
@@ -72,9 +74,7 @@ def check_prologue(path: Path, data: bytes) -> None:
     except (expat.ExpatError, LookupError, ValueError) as error:
         if isinstance(error, MeshFileError):
             raise
-        raise MeshFileError(
-            f"{path} is no XML that can be read ({error}): it is damaged or cut off; export it again"
-        ) from error
+        raise MeshFileError(f"{path} is not valid XML ({error}): it is damaged or cut off; export it again") from error
 
 
 def check_3mf(path: Path, content: bytes) -> None:
@@ -88,7 +88,7 @@ def check_3mf(path: Path, content: bytes) -> None:
     archive = open_archive(path, content)
     models = [name for name in archive.namelist() if "3d/3dmodel.model" in name.lower()]
     if not models:
-        raise MeshFileError(f"{path} holds no model: it is damaged or no 3MF file; export it again")
+        raise MeshFileError(f"{path} holds no model: it is damaged or not a 3MF file; export it again")
     parts: dict[str, XmlPart] = {}
     reads = _Reads(path, archive)
     for element in reads.elements(models[0]):
@@ -159,7 +159,7 @@ def collada_of(path: Path, content: bytes, extension: str) -> bytes:
             raise MeshFileError(f"{path} holds no .dae file: export it again")
         content = unpack(path, archive, names[0])
     if is_zipfile(io.BytesIO(content)):
-        raise MeshFileError(f"{path} has an archive in the place of its XML: rename it to .zae, or export it again")
+        raise MeshFileError(f"{path} is an archive, not XML: rename it to .zae, or export it again")
     root = checked_collada(path, content)
     return etree.tostring(root, xml_declaration=True, encoding="utf-8") if collada_without_folds(root) else content
 
@@ -205,7 +205,7 @@ def _corners(path: Path, primitive: Any) -> int:
     if counts is not None and counts.text:
         promised = _sum(counts.text)
         if promised > corners:
-            raise MeshFileError(f"{path} promises polygons with {promised:.0f} corners; export it again")
+            raise MeshFileError(f"{path} declares polygons with {promised:.0f} corners; export it again")
     return corners
 
 
@@ -225,7 +225,7 @@ def _placed(element: Any) -> list[str]:
 def _check_names(path: Path, element: Any, attributes: tuple[str, ...]) -> None:
     longest = max(len(element.get(attribute, "")) for attribute in attributes)
     if longest > LONGEST_NAME:
-        raise MeshFileError(f"{path} has a name of {longest} letters, more than {LONGEST_NAME}: export it again")
+        raise MeshFileError(f"{path} has a name of {longest} characters, more than {LONGEST_NAME}: export it again")
 
 
 def _is(element: Any, name: str) -> bool:
@@ -248,7 +248,7 @@ def check_instances(path: Path, parts: dict[str, XmlPart], most_places: int = MO
         if name in done:
             return done[name]
         if name in open_parts:
-            raise MeshFileError(f"{path} places the part {name!r:.80} in itself: export it again")
+            raise MeshFileError(f"{path} places the part {name!r:.80} inside itself: export it again")
         if depth > DEEPEST:
             raise MeshFileError(f"{path} places parts inside parts more than {DEEPEST} deep: export it again")
         part = parts.get(name, XmlPart())

@@ -19,6 +19,7 @@ def collada_unit(path: Path) -> tuple[float, list[str]]:
     warnings = []
     if up != "z":
         warnings.append(
-            f"{path.name} says {up.upper()}_UP, which some readers obey by turning it; its hulls lie as its numbers do."
+            f"{path.name} declares {up.upper()}_UP, and some programs rotate such a file when they read it; its hulls "
+            "keep its coordinates."
         )
     return metres or 1.0, warnings

@@ -78,7 +78,7 @@ def plan_mjcf(document: Document, references: References, named: Callable[[str, 
     folder = mesh_folder(document)
     assets = {_mesh_name(mesh, defaults): mesh for mesh in _assets(root)}
     warnings = [
-        f"What <{kind}> brings in is left as it is: rewrite that file too."
+        f"What <{kind}> brings in is left unchanged: rewrite that file too."
         for kind in ("include", "model", "attach")
         if any(element.tag == kind for element in root.walk())
     ]
@@ -135,7 +135,7 @@ def mesh_folder(document: Document) -> Path:
         settings.update(compiler.attributes)
     if settings.get("strippath") == "true":
         raise MeshFileError(
-            f'{document.path} has strippath="true", under which meshes cannot lie in a folder of their own: '
+            f'{document.path} has strippath="true", with which meshes cannot be in a folder of their own: '
             "remove it, and write the paths out."
         )
     named = settings.get("meshdir", settings.get("assetdir", ""))
@@ -166,7 +166,7 @@ def _mass(attributes: Mapping[str, str]) -> float:
         return float(attributes.get("mass", "0"))
     except ValueError as error:
         name, mass = attributes.get("name", "without a name"), attributes["mass"]
-        raise MeshFileError(f"the geom {name} has {mass!r} as its mass, which is no number: mend it.") from error
+        raise MeshFileError(f"the mass of the geom {name} is {mass!r}, which is not a number: correct it.") from error
 
 
 def _colliding(body: Element, defaults: Defaults) -> Iterator[_Geom]:
@@ -198,7 +198,7 @@ def _is_file(assets: Mapping[str, Element], geom: _Geom, defaults: Defaults, war
     if asset is not None and "file" in defaults.full(asset):
         return True
     why = "is not in this file" if asset is None else "has no file of its own"
-    sentence = f"The mesh {geom.mesh} is left as it is: it {why}."
+    sentence = f"The mesh {geom.mesh} is left unchanged: it {why}."
     if sentence not in warnings:
         warnings.append(sentence)
     return False

@@ -67,19 +67,19 @@ class References:
         elif parts is not None and parts.scheme == "file":
             base, rest = folder, unquote(parts.netloc + parts.path)
         elif parts is not None:
-            raise MeshFileError(f"{self._robot} names {reference}, which is not on this disk: fetch it first.")
+            raise MeshFileError(f"{self._robot} refers to {reference}, which is not on this disk: download it first.")
         else:
             base, rest = folder, reference.replace("\\", "/")
         if "\0" in rest:
-            raise MeshFileError(f"{self._robot} names {reference!r}, which is no file name.")
+            raise MeshFileError(f"{self._robot} refers to {reference!r}, which is not a file name.")
         place = Path(os.path.abspath(base / rest))
         if not any(place.is_relative_to(allowed) for allowed in ([package] if package else self._allowed)):
             raise MeshFileError(
-                f"{self._robot} names {reference}, outside of {package or self.root}: "
+                f"{self._robot} refers to {reference}, outside of {package or self.root}: "
                 "give --package-dir with a folder that holds it if you trust the file."
             )
         if not place.is_file():
-            raise MeshFileError(f"{self._robot} names {reference}, but {place} does not exist.")
+            raise MeshFileError(f"{self._robot} refers to {reference}, but {place} does not exist.")
         return place
 
     def package_of(self, reference: str) -> Path | None:
@@ -100,7 +100,7 @@ class References:
                 if folder.is_dir():
                     return folder
         raise MeshFileError(
-            f"{self._robot} names the package {name}, which is not found: give --package-dir {name}=FOLDER."
+            f"{self._robot} refers to the package {name}, which was not found: give --package-dir {name}=FOLDER."
         )
 
     def _candidates(self, name: str) -> Iterator[Path]:

@@ -118,13 +118,11 @@ def rewrite_robot(
     document = parse(source, _read(source))
     if document.root.tag != ROOTS[kind]:
         raise MeshFileError(
-            f"{source} is no {kind.upper()}: it starts with <{document.root.tag}>, not <{ROOTS[kind]}>."
+            f"{source} is not {kind.upper()}: it starts with <{document.root.tag}>, not <{ROOTS[kind]}>."
         )
     for name in ("unit", "scale", "per_node"):
         if options.get(name):
-            raise OptionError(
-                f"{name} belongs to a single mesh; the description of a robot says it for each of its own."
-            )
+            raise OptionError(f"{name} is for a single mesh; a robot file states it for each of its meshes.")
     references = References(source, packages)
     folder = place.with_name(f"{place.stem}_{kind}")
     plan, warnings = _plan(document, kind, references, place, folder)
@@ -157,7 +155,7 @@ def rewrite_robot(
 def check_rewrite(source: Path, place: Path) -> None:
     """Check, before any work, that `source` can be rewritten as `place`; raises as `rewrite_robot`."""
     if not is_robot(source):
-        raise MeshFileError(f"{source} is no robot: its name has to end in {' or '.join(ENDINGS)}.")
+        raise MeshFileError(f"{source} is not a robot file: its name has to end in {' or '.join(ENDINGS)}.")
     if place.suffix.lower() != source.suffix.lower():
         raise OptionError(f"{source} can only be rewritten as another {source.suffix}, not as {shown(str(place))}.")
     if os.path.realpath(source) == os.path.realpath(place):
@@ -180,8 +178,9 @@ def _plan(document: Document, kind: str, references: References, place: Path, fo
     warnings = list(plan.warnings)
     if plan.relative and os.path.realpath(place.absolute().parent) != os.path.realpath(document.path.absolute().parent):
         warnings.append(
-            f"{len(plan.relative)} other files, such as {plan.relative[0]}, are named relative to "
-            f"{document.path.absolute().parent}: they are not found from {place.absolute().parent}."
+            f"{len(plan.relative)} other files, such as {plan.relative[0]}, are referred to relative to "
+            f"{document.path.absolute().parent} and will not be found from {place.absolute().parent}: write the result "
+            "beside the input, or copy them too."
         )
     return plan, warnings
 
@@ -213,8 +212,8 @@ def _fewer(meshes: Mapping[MeshUse, RewrittenMesh], options: Mapping[str, Any]) 
         )
         if fewer <= FEWER * hulls:
             return [
-                f"{len(meshes)} meshes became {hulls} hulls, as the threshold is relative to each; --threshold-abs "
-                f"{length:g} gives {fewer} or fewer."
+                f"{len(meshes)} meshes became {hulls} hulls, because the threshold is relative to each; "
+                f"--threshold-abs {length:g} gives {fewer} or fewer."
             ]
     return []
 
@@ -256,7 +255,7 @@ def _unscaled(hull: trimesh.Trimesh, use: MeshUse) -> trimesh.Trimesh:
     with np.errstate(over="ignore"):
         points = np.ascontiguousarray(hull.vertices / use.scale)
     if not np.isfinite(points).all():
-        raise MeshFileError(f"{use.path} has the scale {use.scale}, which cannot be divided out again: mend the scale.")
+        raise MeshFileError(f"{use.path} has the scale {use.scale}, which cannot be inverted: correct the scale.")
     exact = Hull.of(points)
     if exact is not None:
         return trimesh.Trimesh(exact.vertices, exact.faces, process=False)

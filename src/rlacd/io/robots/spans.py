@@ -105,7 +105,9 @@ def parse(path: Path, data: bytes) -> Document:
     encodings, count = ["utf-8"], [0]
 
     def refuse(*_: object) -> None:
-        raise MeshFileError(f"{path} has a document type (<!DOCTYPE>), which may hide anything: remove it.")
+        raise MeshFileError(
+            f"{path} has a document type (<!DOCTYPE>), which is not allowed, as it can refer to anything: remove it."
+        )
 
     def declared(version: str, encoding: str | None, standalone: int) -> None:
         encodings[0] = encoding or "utf-8"
@@ -113,10 +115,10 @@ def parse(path: Path, data: bytes) -> Document:
     def start(tag: str, attributes: dict[str, str]) -> None:
         at = parser.CurrentByteIndex
         if len(open_elements) >= DEEPEST:
-            raise MeshFileError(f"{path} nests elements more than {DEEPEST} deep: that is no robot.")
+            raise MeshFileError(f"{path} nests elements more than {DEEPEST} deep, too deep for a robot file.")
         count[0] += 1
         if count[0] > MOST_ELEMENTS:
-            raise MeshFileError(f"{path} has more than {MOST_ELEMENTS} elements: that is no robot.")
+            raise MeshFileError(f"{path} has more than {MOST_ELEMENTS} elements, too many for a robot file.")
         element = Element(tag, attributes, open_elements[-1] if open_elements else None, at, _tag_end(data, at))
         (open_elements[-1].children if open_elements else top).append(element)
         open_elements.append(element)
@@ -136,9 +138,9 @@ def parse(path: Path, data: bytes) -> Document:
     try:
         parser.Parse(data, True)
     except expat.ExpatError as error:
-        raise MeshFileError(f"{path} is not well-formed XML ({error}): mend it first.") from error
+        raise MeshFileError(f"{path} is not well-formed XML ({error}): correct it first.") from error
     except (LookupError, ValueError) as error:
-        raise MeshFileError(f"{path} is in an encoding that is not known here ({error}): save it as UTF-8.") from error
+        raise MeshFileError(f"{path} is in an unknown encoding ({error}): save it as UTF-8.") from error
     return Document(path, data, top[0], encodings[0])
 
 

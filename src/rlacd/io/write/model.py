@@ -122,11 +122,16 @@ def implausible(model: Model) -> str | None:
     mass = model.mass.volume_abs
     if LENGTHS[0] <= size <= LENGTHS[1] and MASSES[0] <= mass <= MASSES[1]:
         return None
+    if PREFERRED[0] <= size <= PREFERRED[1]:
+        return (
+            f"the body of {model.name} is {size:.3g} m long and weighs {mass:.3g} kg: --density or --mass sets its "
+            "mass (density=, mass= in Python)."
+        )
     units = [f"--unit {unit}" for unit in ("mm", "cm") if PREFERRED[0] <= size * UNITS[unit] <= PREFERRED[1]]
     way = f"{' or '.join(units)} converts" if units and size > LENGTHS[0] else "--scale multiplies"
     return (
-        f"the body of {model.name} is {size:.3g} m long and weighs {mass:.3g} kg, as simulators take lengths to be in "
-        f"metres: {way} them, --mass sets its mass (unit=, scale=, mass= in Python)."
+        f"the body of {model.name} is {size:.3g} m long and weighs {mass:.3g} kg, since simulators take lengths to be "
+        f"in metres: {way} them, --mass sets its mass (unit=, scale=, mass= in Python)."
     )
 
 

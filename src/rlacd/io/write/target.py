@@ -93,11 +93,14 @@ def hull_target(
     one_mesh = read(flag(), "one_mesh", one_mesh)
     target = _target(read(path_like(), "path", path), file_format)
     if one_mesh and target.file_format != "urdf":
-        raise OptionError(f"one mesh for all hulls is for .urdf files, not for {target.path}: leave it out.")
+        raise OptionError(f"one_mesh (--one-mesh) works for .urdf files only, not for {target.path}: leave it out.")
     if read(flag(), "scene", scene) and target.file_format != "mjcf":
-        raise OptionError(f"a scene with a floor is for .xml files (MJCF), not for {target.path}: leave it out.")
+        raise OptionError(f"scene (--scene) works for .xml files (MJCF) only, not for {target.path}: leave it out.")
     if read(flag(), "keep_input", keep_input) and (target.is_folder or target.path.suffix.lower() != ".glb"):
-        raise OptionError(f"the input is kept in .glb files, not in {target.path}: leave it out, or write a .glb.")
+        raise OptionError(
+            f"keep_input (--keep-input) works for .glb files only, not for {target.path}: leave it out, or write "
+            "a .glb."
+        )
     return target
 
 
@@ -124,7 +127,9 @@ def _target(text: str, file_format: str | None) -> Target:
 
     if ending not in FORMATS:
         known = ", ".join(f".{name}" for name in (*FORMATS, *_MODEL_OF))
-        said = f"the ending .{ending} of {shown(str(place))}" if ending else f"{shown(str(place))} without an ending"
+        said = (
+            f"{shown(str(place))}, whose ending is .{ending}" if ending else f"{shown(str(place))}, which has no ending"
+        )
         raise OptionError(f"cannot write {said}; use one of {known}, or end the name with / for a folder.")
     if wanted not in (None, ending):
         raise OptionError(
@@ -145,7 +150,9 @@ def mesh_folder(path: Path, file_format: str) -> Path:
 def check_name(path: Path) -> None:
     """Raise OptionError if a file's name cannot be written in XML, since its mesh folder is named after it."""
     if _UNWRITABLE.search(path.name):
-        raise OptionError(f"cannot write {str(path)!r}: XML cannot hold some marks of its name; choose another name.")
+        raise OptionError(
+            f"cannot write {str(path)!r}: XML cannot hold some characters of its name; choose another name."
+        )
 
 
 def _model_target(text: str, file_format: str) -> Target:

@@ -210,7 +210,7 @@ class I2PMAEEncoder(nn.Module):
         try:
             sizes = Sizes.from_plain(weights.sizes)
         except ValueError as error:
-            raise WeightsError(f"{path} is no file of weights: {error}; make it again.") from error
+            raise WeightsError(f"{path} is not a file of weights: {error}; make it again.") from error
         encoder = cls(sizes)
         encoder.load_state_dict(weights.fitted(encoder.state_dict()))
         return encoder

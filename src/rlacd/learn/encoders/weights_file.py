@@ -57,11 +57,11 @@ class Weights:
             found = self.state.get(name)
             if found is None:
                 raise WeightsError(
-                    f"{self.path} is no I2P-MAE checkpoint: {name} is missing; give the published pre-trained file."
+                    f"{self.path} is not an I2P-MAE checkpoint: {name} is missing; give the published pre-trained file."
                 )
             if found.shape != wanted.shape:
                 raise WeightsError(
-                    f"{self.path} is no I2P-MAE checkpoint of this size: {name} has shape {list(found.shape)}, "
+                    f"{self.path} is not an I2P-MAE checkpoint of this size: {name} has shape {list(found.shape)}, "
                     f"not {list(wanted.shape)}."
                 )
             if not torch.isfinite(found).all():
@@ -78,14 +78,14 @@ def load_weights(path: Path) -> Weights:
         The file is missing, damaged, or holds anything but named tensors.
     """
     if not path.is_file():
-        raise WeightsError(f"there is no file {path}; give the weights that --encoder-weights shall read.")
+        raise WeightsError(f"there is no file {path}; give the file of weights as --encoder-weights.")
     try:
         state, sizes = _read_safetensors(path) if path.suffix == ".safetensors" else (_read_torch(path), {})
     except (SafetensorError, pickle.UnpicklingError, RuntimeError, ValueError, EOFError, KeyError, OSError) as error:
         reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:160].rstrip(".")
         raise WeightsError(
-            f"{path} is damaged, cut short or no file of weights ({reason}): {FIRST} and all that should follow it are "
-            "missing; fetch or make it again."
+            f"{path} is damaged, cut off or not a file of weights ({reason}): {FIRST} and all that should follow it "
+            "are missing; fetch or make it again."
         ) from error
     return Weights(path, {name.removeprefix("module."): value for name, value in state.items()}, sizes)
 
