@@ -9,8 +9,8 @@ namespace {
 
 constexpr int kLeafSize = 4;
 constexpr int kBins = 8;
-// Deeper nodes are halved by count, so no tree is deeper than this plus log2 of the number of triangles: with the rest
-// of the 31 bits, every traversal fits in a stack of fixed size.
+// Deeper nodes are halved by count, so no tree is deeper than this plus log2 of the number of triangles, and one made
+// by the shape of another than one more: with the rest of the 31 bits, every traversal fits in a stack of fixed size.
 constexpr int kDeepestHeuristicSplit = 48;
 constexpr int kStack = 96;
 constexpr std::size_t kBetweenPolls = 1024;
