@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import heapq
 from typing import TypeAlias
 
 import numpy as np
@@ -152,16 +153,21 @@ def _of_faces(vertices: FloatArray, faces: Indices) -> tuple[FloatArray, Indices
 
 
 def _united(solids: list[Manifold]) -> Manifold:
-    """Unite solids pairwise, neighbours in the list first, then the results."""
-    while len(solids) > 1:
-        united, group, triangles = [], [solids[0]], solids[0].num_tri()
-        for solid in solids[1:]:
-            if len(group) > 1 and triangles + solid.num_tri() > _AT_ONCE:
-                united.append(_united_at_once(group, triangles))
-                group, triangles = [], 0
-            group.append(solid)
-            triangles += solid.num_tri()
-        solids = [*united, _united_at_once(group, triangles)]
+    """Unite solids, always those with the fewest triangles first: what is large takes part in few booleans."""
+    waiting = [(solid.num_tri(), i) for i, solid in enumerate(solids)]
+    heapq.heapify(waiting)
+    some = dict(enumerate(solids))
+    for newest in range(len(solids), 2 * len(solids) - 1):
+        group, triangles = [], 0
+        while waiting and (len(group) < 2 or triangles + waiting[0][0] <= _AT_ONCE):
+            more, i = heapq.heappop(waiting)
+            group.append(some.pop(i))
+            triangles += more
+        union = _united_at_once(group, triangles)
+        if not waiting:
+            return union
+        some[newest] = union
+        heapq.heappush(waiting, (union.num_tri(), newest))
     return solids[0]
 
 
