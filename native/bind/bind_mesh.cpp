@@ -77,6 +77,33 @@ void bind_mesh(nb::module_& m) {
       "like\n"
       "most of them stays; it is a film if as many are wound in either way.");
   m.def(
+      "first_in_place",
+      [](const PointsIn& array) {
+        const std::vector<Vec3> points = to_points(array);
+        std::vector<std::int64_t> first;
+        {
+          nb::gil_scoped_release release;
+          const std::vector<std::int32_t> found = first_in_place(points);
+          first.assign(found.begin(), found.end());
+        }
+        return to_array<std::int64_t>(std::move(first));
+      },
+      nb::arg("points"),
+      "The first of the points [N, 3] at the same place as each [N]; zeros of either sign are equal.");
+  m.def(
+      "first_of_doubled",
+      [](const WideFacesIn& array, std::int64_t vertices) {
+        const std::vector<Triangle> faces = to_faces(array, vertices);
+        std::vector<char> is_first;
+        {
+          nb::gil_scoped_release release;
+          is_first = first_of_doubled(faces, static_cast<std::size_t>(vertices));
+        }
+        return to_array<bool>(std::move(is_first));
+      },
+      nb::arg("faces"), nb::arg("count"),
+      "Whether each of the faces [F, 3] over `count` vertices is the first with its three corners, in any order [F].");
+  m.def(
       "edges",
       [](const WideFacesIn& array, std::int64_t vertices) {
         const std::vector<Triangle> faces = to_faces(array, vertices);

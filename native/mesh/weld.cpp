@@ -29,47 +29,64 @@ enum Worth : char { kDropped, kFace, kFilm };
 // Whether a face with these corners is an even permutation of them in ascending order.
 bool is_even(const Triangle& f) { return (f[0] < f[1]) + (f[1] < f[2]) + (f[2] < f[0]) == 2; }
 
-// Of the faces with the same three different corners, the first that is wound like most of them; it is a film if as
-// many are wound in either way.
-std::vector<char> worth_keeping(const std::vector<Triangle>& faces, std::size_t vertices) {
-  struct Rest {
-    std::int32_t middle, high, face;
-    bool operator<(const Rest& o) const {
-      return middle != o.middle ? middle < o.middle : high != o.high ? high < o.high : face < o.face;
-    }
-  };
-  std::vector<char> keep(faces.size(), kDropped);
-  std::vector<Triangle> sorted(faces);
+// The corners of a face in ascending order.
+Triangle sorted(Triangle f) {
+  if (f[0] > f[1]) std::swap(f[0], f[1]);
+  if (f[1] > f[2]) std::swap(f[1], f[2]);
+  if (f[0] > f[1]) std::swap(f[0], f[1]);
+  return f;
+}
+
+// What distinguishes faces with the same lowest corner.
+struct Rest {
+  std::int32_t middle, high, face;
+  bool has_same_corners(const Rest& o) const { return middle == o.middle && high == o.high; }
+  bool operator<(const Rest& o) const {
+    return middle != o.middle ? middle < o.middle : high != o.high ? high < o.high : face < o.face;
+  }
+};
+
+// Calls visit(begin, end) with the Rest of all faces that have the same three corners, if they are several, in
+// ascending order of the faces. Only faces of which is_counted(sorted corners) are looked at.
+template <class IsCounted, class Visit>
+void for_each_doubled(const std::vector<Triangle>& faces, std::size_t vertices, const IsCounted& is_counted,
+                      const Visit& visit) {
+  Buckets<Rest> by_low(vertices);
   for (std::size_t f = 0; f < faces.size(); ++f) {
     if (f % kBetweenPolls == 0) poll_stop();
-    Triangle& s = sorted[f];
-    if (s[0] > s[1]) std::swap(s[0], s[1]);
-    if (s[1] > s[2]) std::swap(s[1], s[2]);
-    if (s[0] > s[1]) std::swap(s[0], s[1]);
-    keep[f] = s[0] != s[1] && s[1] != s[2] ? kFace : kDropped;
+    if (const Triangle s = sorted(faces[f]); is_counted(s)) by_low.count(s[0]);
   }
-  Buckets<Rest> by_low(vertices);
-  for (std::size_t f = 0; f < faces.size(); ++f)
-    if (keep[f]) by_low.count(sorted[f][0]);
   by_low.allocate();
   for (std::size_t f = 0; f < faces.size(); ++f)
-    if (keep[f]) by_low.add(sorted[f][0], {sorted[f][1], sorted[f][2], static_cast<std::int32_t>(f)});
+    if (const Triangle s = sorted(faces[f]); is_counted(s))
+      by_low.add(s[0], {s[1], s[2], static_cast<std::int32_t>(f)});
   for (std::size_t v = 0; v < vertices; ++v) {
     if (v % kBetweenPolls == 0) poll_stop();
     const auto [begin, end] = by_low.range(v);
     if (end - begin < 2) continue;
     std::sort(begin, end);
     for (Rest *same = begin, *next; same < end; same = next) {
-      int net = 0;
-      for (next = same; next < end && next->middle == same->middle && next->high == same->high; ++next)
-        net += is_even(faces[next->face]) ? 1 : -1;
-      if (next - same < 2) continue;
-      const Rest* kept = same;
-      while (net != 0 && is_even(faces[kept->face]) != (net > 0)) ++kept;
-      for (const Rest* r = same; r < next; ++r) keep[r->face] = kDropped;
-      keep[kept->face] = net == 0 ? kFilm : kFace;
+      for (next = same + 1; next < end && next->has_same_corners(*same);) ++next;
+      if (next - same > 1) visit(same, next);
     }
   }
+}
+
+// Of the faces with the same three different corners, the first that is wound like most of them; it is a film if as
+// many are wound in either way.
+std::vector<char> worth_keeping(const std::vector<Triangle>& faces, std::size_t vertices) {
+  const auto has_three = [](const Triangle& s) { return s[0] != s[1] && s[1] != s[2]; };
+  std::vector<char> keep(faces.size(), kDropped);
+  for (std::size_t f = 0; f < faces.size(); ++f)
+    if (has_three(sorted(faces[f]))) keep[f] = kFace;
+  for_each_doubled(faces, vertices, has_three, [&](const Rest* begin, const Rest* end) {
+    int net = 0;
+    for (const Rest* r = begin; r < end; ++r) net += is_even(faces[r->face]) ? 1 : -1;
+    const Rest* kept = begin;
+    while (net != 0 && is_even(faces[kept->face]) != (net > 0)) ++kept;
+    for (const Rest* r = begin; r < end; ++r) keep[r->face] = kDropped;
+    keep[kept->face] = net == 0 ? kFilm : kFace;
+  });
   return keep;
 }
 
@@ -116,6 +133,16 @@ Welded weld(const Mesh& mesh) {
       result.is_film.push_back(keep[f] == kFilm);
     }
   return result;
+}
+
+std::vector<char> first_of_doubled(const std::vector<Triangle>& faces, std::size_t vertices) {
+  std::vector<char> is_first(faces.size(), 1);
+  for_each_doubled(
+      faces, vertices, [](const Triangle&) { return true; },
+      [&](const Rest* begin, const Rest* end) {
+        for (const Rest* r = begin + 1; r < end; ++r) is_first[r->face] = 0;
+      });
+  return is_first;
 }
 
 }  // namespace rlacd

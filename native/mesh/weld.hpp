@@ -20,4 +20,7 @@ struct Welded {
 };
 Welded weld(const Mesh& mesh);
 
+// Whether each face is the first with its three corners, in any order. Linear time.
+std::vector<char> first_of_doubled(const std::vector<Triangle>& faces, std::size_t vertices);
+
 }  // namespace rlacd

@@ -88,7 +88,8 @@ class Attempt:
         self.holes: list[Hole] = []
 
         faces, origin = close_cracks(surface.vertices, surface.faces, _WELDS)
-        count, body = bodies_of(faces, Edges.of(faces, len(surface.vertices)))
+        edges = Edges.of(faces, len(surface.vertices))
+        count, body = bodies_of(faces, edges)
         body_of_input = np.zeros(len(surface.faces), dtype=np.int64)
         body_of_input[origin] = body
         self.record = Record(count, body_of_input)
@@ -100,7 +101,7 @@ class Attempt:
         self._wraps = Wraps(surface, self.record, gap, resolution, sheets, tangled, by_faces)
 
         poll_stop()
-        self.solid = self._solid(Soup(surface.vertices, faces, body))
+        self.solid = self._solid(Soup(surface.vertices, faces, body, known_edges=edges))
         if volume_of(self.solid) == 0:
             self.warnings.append("The surface could not be closed, so the convex hull of its points is used instead.")
             self.record.step[:] = STEPS.index("hull")

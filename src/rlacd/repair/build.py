@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from manifold3d import Manifold
+from numpy.typing import NDArray
 
 from rlacd._native import poll_stop
 from rlacd.repair.distance import SurfaceQuery, probes
@@ -11,7 +11,7 @@ from rlacd.repair.record import Record
 from rlacd.repair.skin import skin
 from rlacd.repair.slabs import slab_of_faces
 from rlacd.repair.soup import FLAT, Soup, crossed_share, on_repeated_edge
-from rlacd.repair.union import split_labels, to_arrays
+from rlacd.repair.union import Shape, one_body, split_labels, to_arrays, volume_of
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.thickness import HALF_THICKNESS
@@ -29,7 +29,7 @@ def walls_and_sheets(soup: Soup, record: Record, as_sheets: IntArray) -> tuple[S
     sheet_area = np.bincount(front, soup.area * sides.sheet, len(none))
     # A component that is mostly sheet yet has negative volume joins the inside with the outside: its body is
     # nowhere solid, so all of it becomes slabs (whose cavities are filled later).
-    leaky = soup.body_of_side()[(sides.volume < -none) & (4 * sheet_area > sides.area)]
+    leaky = soup.body_of_side[(sides.volume < -none) & (4 * sheet_area > sides.area)]
     solid = sides.volume > none
     flat = np.abs(sides.volume) <= none
     leaky = np.union1d(leaky, as_sheets)
@@ -46,7 +46,7 @@ def walls_and_sheets(soup: Soup, record: Record, as_sheets: IntArray) -> tuple[S
     return soup.only(~sheet & (wall | ~mixed[soup.body])), soup.only(sheet)
 
 
-def skins(soup: Soup, record: Record, by_faces: bool = False) -> list[tuple[Manifold, int]]:
+def skins(soup: Soup, record: Record, by_faces: bool = False) -> list[tuple[Shape, int]]:
     """Build the outer side components of a soup; sheets and flat bodies get thickness.
 
     If it says so, slabs that cross themselves, as where sheets lie closer than they become thick, are united from
@@ -63,29 +63,36 @@ def skins(soup: Soup, record: Record, by_faces: bool = False) -> list[tuple[Mani
     # The two side components of a flat closed body mirror each other: build the fronts.
     flat = (np.abs(sides.volume) <= none) & ~has_sheet & is_front
     keep = (sides.volume > none) | (has_sheet & (sides.volume >= -none)) | flat
+    if sides.volume[keep].shape == (1,) and not has_sheet.any() and (soup.edges.valence == 2).all():
+        simple = _wound_like(soup, keep)
+        taken = one_body(*simple)
+        if taken is not None and not taken[1]:
+            record.faces_out[soup.body[0]] += len(simple[1])
+            return [(taken[0], int(soup.body[0]))]
     vertices, faces, label = _skin(soup, keep, flat)
     # Where parts touch along an edge, their common outer skin passes the edge twice. Their insides are simple:
     # build those, turned inside out, and let the union join them.
     pinched = np.zeros(record.bodies, dtype=bool)
-    pinched[soup.body_of_side()[label[on_repeated_edge(faces, len(vertices))]]] = True
+    if (soup.edges.valence > 2).any():
+        pinched[soup.body_of_side[label[on_repeated_edge(faces, len(vertices))]]] = True
     # Only if the skin is one piece: volumes of crossing pieces do not add up to those of the insides.
-    pinched &= np.bincount(soup.body_of_side(), sides.volume > 0, record.bodies) == 1
+    pinched &= np.bincount(soup.body_of_side, sides.volume > 0, record.bodies) == 1
     pinched[soup.body[sides.sheet]] = False
-    pinched = pinched[soup.body_of_side()]
+    pinched = pinched[soup.body_of_side]
     if pinched.any():
         rooms = pinched & (sides.volume < -none)
         vertices, faces, label = _skin(soup, (keep & ~pinched) | rooms, flat)
         faces[rooms[label]] = faces[rooms[label]][:, ::-1]
     built, count = np.unique(label, return_counts=True)
-    body = soup.body_of_side()[built]
-    solids = [to_manifold(v, f) for v, f in split_labels(vertices, faces, label)]
+    body = soup.body_of_side[built]
+    solids: list[Shape] = [to_manifold(v, f) for v, f in split_labels(vertices, faces, label)]
     # Sheets narrower than their intended thickness can cross themselves, and come out inside out.
     for i in np.flatnonzero(has_sheet[built] | flat[built]):
         poll_stop()
-        if solids[i].volume() <= 0 or (by_faces and crosses_itself(solids[i])):
+        if volume_of(solids[i]) <= 0 or (by_faces and crosses_itself(solids[i])):
             some = (sides.label.reshape(-1, 2) == built[i]).any(axis=1)
-            solids[i] = slab_of_faces(soup.vertices, soup.faces[some])
-            count[i] = solids[i].num_tri()
+            slab = slab_of_faces(soup.vertices, soup.faces[some])
+            solids[i], count[i] = slab, slab.num_tri()
     np.add.at(record.faces_out, body, count)
     return list(zip(solids, body.tolist(), strict=True))
 
@@ -97,9 +104,24 @@ def _skin(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, Int
     return skin(soup.vertices, soup.faces, soup.sides, keep, thin, HALF_THICKNESS)
 
 
-def crosses_itself(slab: Manifold) -> bool:
+def _wound_like(soup: Soup, keep: BoolArray) -> tuple[FloatArray, NDArray[np.int32]]:
+    """The faces of a closed soup, each showing the side that is kept; vertices in the order in which faces use them."""
+    corners = soup.faces.ravel()
+    first = np.full(len(soup.vertices), len(corners))
+    first[corners[::-1]] = np.arange(len(corners) - 1, -1, -1)
+    used = np.argsort(first, kind="stable")[: int((first < len(corners)).sum())]
+    number = np.empty(len(soup.vertices), dtype=np.int32)
+    number[used] = np.arange(len(used))
+    faces = number[soup.faces]
+    back = keep[soup.sides.label[1::2]]
+    faces[back] = faces[back, ::-1]
+    return soup.vertices[used], faces
+
+
+def crosses_itself(slab: Shape) -> bool:
     """Whether faces of a slab cross that do not meet; False if it has too many to be built in another way."""
-    return slab.num_tri() <= _MOST_OF_A_SLAB and crossed_share(*to_arrays(slab)) > 0
+    vertices, faces = to_arrays(slab)
+    return len(faces) <= _MOST_OF_A_SLAB and crossed_share(vertices, faces) > 0
 
 
 def _poking_out(soup: Soup, wall: BoolArray, inner: BoolArray) -> BoolArray:

@@ -185,7 +185,8 @@ def close_holes(
 
     # A cap is useful only if it gives the body an inside: a strip whose cap lies on itself stays a sheet.
     trial, flap = capped()
-    volume = np.bincount(trial.body_of_side(), np.maximum(trial.sides.volume, 0), bodies)
+    tried = chosen.copy()
+    volume = np.bincount(trial.body_of_side, np.maximum(trial.sides.volume, 0), bodies)
     chosen &= volume > thickness * np.bincount(trial.body, trial.area, bodies)
     chosen &= trial.sheet_share(bodies, flap) <= FLAPS
     # Nor where caps of large wounds cross the body: what is inside out there would be cut into ever more pieces.
@@ -199,7 +200,7 @@ def close_holes(
     reached = np.zeros(len(rims.loops))
     np.maximum.at(reached, place[far], distance[far])
     holes = _holes(soup, rims, loop_body, chosen[loop_body], smooth, reached)
-    result = capped()[0] if chosen.any() else soup
+    result = (trial if (chosen == tried).all() else capped()[0]) if chosen.any() else soup
     hidden = np.flatnonzero(unreachable & ~excused & chosen[loop_body[place]])
     # Slender faces have many points; one of each cell is enough.
     hidden = hidden[np.unique(np.floor(points[hidden] * (2 / gap)), axis=0, return_index=True)[1]]

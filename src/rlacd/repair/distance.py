@@ -12,9 +12,6 @@ from rlacd.solid.frame import FloatArray
 from rlacd.solid.products import dots
 from rlacd.solid.topology import BoolArray, IntArray, first_of_doubled
 
-# An odd number that spreads the bits of a factor over the upper half of the product.
-_MIX = np.uint64(0x9E3779B97F4A7C15)
-_HALF = np.uint64(32)
 # Points of a triangle at which it is looked whether it lies inside a body: near its corners, its edges, its middle.
 _PROBES = np.array([(18, 1, 1), (1, 18, 1), (1, 1, 18), (9, 9, 2), (9, 2, 9), (2, 9, 9), (7, 7, 6)]) / 20
 
@@ -38,15 +35,21 @@ class SurfaceQuery:
 
     def distance(self, points: FloatArray) -> FloatArray:
         """Return the distance ``[N]`` of each point to the faces."""
+        if len(points) == 0:
+            return np.empty(0)
         return np.asarray(self._surface.distance(np.ascontiguousarray(points), threads=self.threads or 0))
 
     def closest(self, points: FloatArray) -> tuple[FloatArray, IntArray]:
         """Return the closest point ``[N, 3]`` of the faces and the face ``[N]`` it lies on."""
+        if len(points) == 0:
+            return np.empty((0, 3)), np.empty(0, dtype=np.int64)
         found, face = self._surface.closest(np.ascontiguousarray(points), threads=self.threads or 0)
         return np.asarray(found), np.asarray(face, dtype=np.int64)
 
     def winding(self, points: FloatArray) -> FloatArray:
         """Return ``[N]`` how many times the faces wind around each point."""
+        if len(points) == 0:
+            return np.empty(0)
         return np.asarray(self._surface.winding(np.ascontiguousarray(points), threads=self.threads or 0))
 
     def inside(self, points: FloatArray) -> BoolArray:
@@ -91,18 +94,8 @@ def shared_faces(
     vertices: FloatArray, faces: IntArray, other_vertices: FloatArray, other_faces: IntArray
 ) -> tuple[BoolArray, BoolArray]:
     """Return which faces ``[F]`` and ``[G]`` of two meshes have their corners in the same places, however wound."""
-    places = np.concatenate([vertices, other_vertices]) + 0.0  # no -0.0
-    key = np.zeros(len(places), dtype=np.uint64)
-    for bits in places.view(np.uint64).T:
-        key = (key ^ bits) * _MIX
-        key ^= key >> _HALF
-    order = np.argsort(key, kind="stable")
-    poll_stop()
-    # Places between which another one with the same key lies get several numbers: faces with them count as different.
-    new = (places[order[1:]] != places[order[:-1]]).any(axis=1)
-    number = np.zeros(len(places), dtype=np.int64)
-    number[order[1:]] = np.cumsum(new)
-    poll_stop()
+    places = np.concatenate([vertices, other_vertices])
+    number = _native.first_in_place(places)
     mine, others = number[faces], number[len(vertices) + other_faces]
     is_other = ~first_of_doubled(np.concatenate([others, mine]), len(places))[len(others) :]
     is_mine = ~first_of_doubled(np.concatenate([mine, others]), len(places))[len(mine) :]

@@ -31,32 +31,51 @@ MOST_FREE_EDGES = 500_000
 def close_cracks(vertices: FloatArray, faces: IntArray, tolerances: Sequence[float]) -> tuple[IntArray, IntArray]:
     """Merge free edges that nearly coincide, with increasing tolerances.
 
-    An attempt that closes nothing, or leaves no face, is undone.
+    An attempt that closes nothing, or leaves no face, is undone. No two of the faces have the same three corners.
 
     Returns the faces ``[G, 3]`` and ``[G]`` the given face each comes from.
     """
     origin = np.arange(len(faces))
-    free = len(free_edges(faces, len(vertices)))
+    free = free_edges(faces, len(vertices))
     for tolerance in tolerances:
         poll_stop()
-        if free == 0 or free > MOST_FREE_EDGES:
+        if not 0 < len(free) <= MOST_FREE_EDGES:
             break
-        split, parent = split_at_free_vertices(vertices, weld_free_vertices(vertices, faces, tolerance), tolerance)
+        # Only faces with free vertices change. All faces at their corners are needed, for the valence of their edges.
+        changing = _marked(free, len(vertices))[faces].any(axis=1)
+        inner = _marked(faces[changing], len(vertices))
+        near = inner[faces].any(axis=1)
+        welded = weld_free_vertices(vertices, faces[near], free, tolerance)
+        split, parent, is_piece = split_at_free_vertices(vertices, welded, inner, tolerance)
         poll_stop()
         keep = nondegenerate(split)
         keep[keep] = first_of_doubled(split[keep], len(vertices))
-        left = len(free_edges(split[keep], len(vertices)))
-        if left < free and keep.any():
-            faces, origin, free = split[keep], origin[parent[keep]], left
+        left = free_edges(split[keep], len(vertices), inner)
+        if len(left) < len(free) and (keep.any() or not near.all()):
+            whole = keep & ~is_piece
+            changed, at = faces.copy(), np.flatnonzero(near)
+            kept = np.logical_not(near)
+            changed[at[parent[whole]]] = split[whole]
+            kept[at[parent[whole]]] = True
+            pieces = keep & is_piece
+            faces = np.concatenate([changed[kept], split[pieces]])
+            origin = np.concatenate([origin[kept], origin[at[parent[pieces]]]])
+            free = left
     return faces, origin
 
 
-def weld_free_vertices(vertices: FloatArray, faces: IntArray, tolerance: float) -> IntArray:
-    """Merge vertices of free edges that lie within `tolerance` of each other; returns faces of the same number.
+def _marked(vertices: IntArray, count: int) -> BoolArray:
+    marked = np.zeros(count, dtype=bool)
+    marked[vertices] = True
+    return marked
 
-    A face may come out degenerate. Vertices keep their places: each group is represented by its first vertex.
+
+def weld_free_vertices(vertices: FloatArray, faces: IntArray, free: IntArray, tolerance: float) -> IntArray:
+    """Merge vertices of free edges ``[B, 2]`` that lie within `tolerance` of each other.
+
+    Returns faces of the same number, of which some may be degenerate. Vertices keep their places: each group is
+    represented by its first vertex.
     """
-    free = free_edges(faces, len(vertices))
     ends = np.unique(free)
     counts, near = PointTree(vertices[ends]).within(vertices[ends], np.full(len(ends), tolerance))
     if len(near) == len(ends):  # each is near itself only
@@ -68,19 +87,23 @@ def weld_free_vertices(vertices: FloatArray, faces: IntArray, tolerance: float) 
     return target[faces]
 
 
-def split_at_free_vertices(vertices: FloatArray, faces: IntArray, tolerance: float) -> tuple[IntArray, IntArray]:
+def split_at_free_vertices(
+    vertices: FloatArray, faces: IntArray, inner: BoolArray, tolerance: float
+) -> tuple[IntArray, IntArray, BoolArray]:
     """Insert free vertices into the free edges they lie on (T-junctions).
 
-    Returns the faces ``[G, 3]``, split ones replaced by several, and ``[G]`` the old face each comes from.
+    Returns the faces ``[G, 3]``, split ones replaced by several; ``[G]`` the old face each comes from; and ``[G]``
+    whether it is a piece of it. Edges without an end among the `inner` vertices ``[V]`` are not looked at.
     """
     edges = Edges.of(faces, len(vertices))
-    halfedge = np.flatnonzero(edges.valence[edges.of_halfedge] == 1)
+    is_free = (edges.valence == 1) & inner[edges.vertices].any(axis=1)
+    halfedge = np.flatnonzero(is_free[edges.of_halfedge])
     # One edge per face and round, so that the pieces of a face do not depend on each other.
     _, first = np.unique(halfedge // 3, return_index=True)
     halfedge = halfedge[first]
     poll_stop()
-    free = np.unique(edges.vertices[edges.valence == 1])
-    none = faces, np.arange(len(faces))
+    free = np.unique(edges.vertices[is_free])
+    none = faces, np.arange(len(faces)), np.zeros(len(faces), dtype=bool)
     if len(halfedge) == 0:
         return none
     face, corner = halfedge // 3, halfedge % 3
@@ -118,14 +141,21 @@ def split_at_free_vertices(vertices: FloatArray, faces: IntArray, tolerance: flo
     whole[face[split]] = False
     new = np.concatenate([faces[whole], pieces])
     origin = np.concatenate([np.flatnonzero(whole), face[chain_edge[pair]]])
+    is_piece = np.repeat([False, True], [len(new) - len(pieces), len(pieces)])
     good = nondegenerate(new)
-    return new[good], origin[good]
+    return new[good], origin[good], is_piece[good]
 
 
-def free_edges(faces: IntArray, count: int) -> IntArray:
-    """Return the directed edges ``[B, 2]`` that only one face uses, as that face runs along them."""
+def free_edges(faces: IntArray, count: int, inner: BoolArray | None = None) -> IntArray:
+    """Return the directed edges ``[B, 2]`` that only one face uses, as that face runs along them.
+
+    If `inner` vertices ``[V]`` are given, only edges with an end among them.
+    """
     edges = Edges.of(faces, count)
-    halfedge = np.flatnonzero(edges.valence[edges.of_halfedge] == 1)
+    is_free = edges.valence == 1
+    if inner is not None:
+        is_free &= inner[edges.vertices].any(axis=1)
+    halfedge = np.flatnonzero(is_free[edges.of_halfedge])
     face, corner = halfedge // 3, halfedge % 3
     return np.stack([faces[face, corner], faces[face, (corner + 1) % 3]], axis=1)
 

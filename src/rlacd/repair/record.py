@@ -39,8 +39,9 @@ class Record:
 
     def note(self, bodies: IntArray, step: str) -> None:
         """Record a step; a body keeps the one that changes it most."""
-        bodies = np.unique(bodies)
-        self.step[bodies] = np.maximum(self.step[bodies], STEPS.index(step))
+        noted = np.zeros(self.bodies, dtype=bool)
+        noted[bodies] = True
+        self.step[noted] = np.maximum(self.step[noted], STEPS.index(step))
 
     def has(self, step: str) -> BoolArray:
         """Return ``[bodies]`` whether this is the step of a body."""

@@ -32,10 +32,9 @@ from rlacd.memory import BYTES_REPAIRED, require_memory
 from rlacd.repair.attempt import Attempt
 from rlacd.repair.distance import SurfaceQuery, probes
 from rlacd.repair.slabs import hull_of_points
-from rlacd.repair.soup import FLAT, NO_AREA
-from rlacd.repair.union import volume_of
+from rlacd.repair.soup import NO_AREA
+from rlacd.repair.union import one_body, volume_of
 from rlacd.repair.voxels import GAP
-from rlacd.solid.arrays import IntArray as Indices
 from rlacd.solid.frame import FloatArray, Frame
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import BodyRepair, Solid
@@ -52,9 +51,6 @@ _TORN = 1e-2
 _MENDED = 0.5
 # Share of the volume that is left where no hole is closed, below which bodies were emptied.
 _FILLED = 0.4
-# manifold3d collapses edges shorter than 1e-12, and swaps those of faces that are no higher, or folded back onto a
-# neighbour in a plane within 1e-12.
-_THIN = 1e-11
 
 
 def repair(
@@ -113,9 +109,11 @@ def repair(
     points = frame.to_frame(points)
     poll_stop()
     welded_vertices, welded_faces, is_film = _native.weld(points, corners)
-    taken = _taken_as_it_is(welded_vertices, welded_faces) if tangled is None else None
+    taken = one_body(welded_vertices, welded_faces) if tangled is None else None
     if taken is not None:
-        return Solid(taken[0], (welded_vertices, welded_faces), frame, (taken[1],), tuple(warnings), is_as_given=True)
+        shape, was_inward = taken
+        row = BodyRepair(0, "reoriented" if was_inward else "closed", len(welded_faces), len(welded_faces), 0.0)
+        return Solid(shape, (welded_vertices, welded_faces), frame, (row,), tuple(warnings), is_as_given=True)
     require_memory(len(welded_faces), BYTES_REPAIRED, mesh.name)
     vertices, faces = detach_films(welded_vertices, welded_faces.astype(np.int64), is_film)
     detached = np.asarray(faces[:, 0] >= len(welded_vertices))
@@ -190,24 +188,6 @@ def _used(mesh: InputMesh) -> tuple[FloatArray, IntArray]:
     if used.all() or len(mesh.faces) == 0:
         return mesh.vertices, mesh.faces
     return mesh.vertices[used], (np.cumsum(used) - 1)[mesh.faces]
-
-
-def _taken_as_it_is(vertices: FloatArray, faces: Indices) -> tuple[tuple[FloatArray, Indices], BodyRepair] | None:
-    """One closed and oriented body, as it is; None for anything else.
-
-    The vertices and faces are those that manifold3d would make of it, in its order, as long as it would leave all edges
-    alone; it takes twenty times as long.
-    """
-    found = _native.closed_bodies(vertices, faces)
-    if found is None or len(found[1]) > 1:
-        return None
-    _, (volume,), (area,), _, has_no_pinch, least_height, least_fold = found
-    if abs(volume) <= 2 * FLAT * area or least_height * min(least_fold, 1.0) <= _THIN:
-        return None
-    outward = faces if volume > 0 else np.ascontiguousarray(faces[:, ::-1])
-    separate = (vertices, outward) if has_no_pinch else _native.separate_fans(vertices, outward)
-    step = "closed" if volume > 0 else "reoriented"
-    return _native.along_a_curve(*separate), BodyRepair(0, step, len(faces), len(faces), 0.0)
 
 
 def _is_inside(vertices: FloatArray, faces: IntArray, film: BoolArray, threads: int | None) -> BoolArray:

@@ -87,7 +87,9 @@ def rims_of(soup: Soup, fins: bool = False) -> Rims:
         label = _sides(soup, mate)
     poll_stop()
     low = np.minimum(label[0::2], label[1::2])
-    _, patch = np.unique(low, return_inverse=True)
+    is_low = np.zeros(len(label), dtype=bool)
+    is_low[low] = True
+    patch = (np.cumsum(is_low) - 1)[low]
     flap = _flaps(soup, patch) | fin
     inverted = label[0::2] > low
     poll_stop()
@@ -97,13 +99,20 @@ def rims_of(soup: Soup, fins: bool = False) -> Rims:
     weighted[inverted] *= -1
     inverted ^= _against_main(soup, patch, flap, weighted)
     weighted[flap] = 0
-    normal_of_vertex: FloatArray = np.stack(
-        [np.bincount(soup.faces.ravel(), np.repeat(weighted[:, k], 3), len(soup.vertices)) for k in range(3)], axis=1
-    )
     rim = np.flatnonzero((mate < 0) & np.repeat(~flap, 3))
-    tail, head = soup.faces.ravel()[rim], soup.faces[:, _NEXT].ravel()[rim]
+    tail, head = soup.faces.ravel()[rim], soup.faces[rim // 3, _NEXT[rim % 3]]
+    on_rim = np.zeros(len(soup.vertices), dtype=bool)
+    on_rim[tail] = on_rim[head] = True
+    beside_rim = np.flatnonzero(on_rim[soup.faces].any(axis=1))  # only these faces count at vertices of the rim
+    normal_of_vertex: FloatArray = np.stack(
+        [
+            np.bincount(soup.faces[beside_rim].ravel(), np.repeat(weighted[beside_rim, k], 3), len(soup.vertices))
+            for k in range(3)
+        ],
+        axis=1,
+    )
     swap = inverted[rim // 3]
-    fan = _fans(soup.faces, mate)
+    fan = _fans(soup.faces, mate, beside_rim)
     tail_fan, head_fan = fan[rim], fan[rim - rim % 3 + _NEXT[rim % 3]]
     tail, head = np.where(swap, head, tail), np.where(swap, tail, head)
     tail_fan, head_fan = np.where(swap, head_fan, tail_fan), np.where(swap, tail_fan, head_fan)
@@ -125,15 +134,19 @@ def _sides(soup: Soup, mate: IntArray) -> IntArray:
     forward = (soup.faces < soup.faces[:, _NEXT]).ravel()
     # Mates wound alike run along their edge in opposite directions; then fronts continue fronts.
     turned = forward[mated] == forward[mate[mated]]
+    if not turned.any():  # fronts join fronts, and backs backs
+        _, patch = components(len(soup.faces), mated // 3, mate[mated] // 3)
+        return (2 * patch[:, None] + np.arange(2)).ravel()
     front, other = 2 * (mated // 3), 2 * (mate[mated] // 3)
     return components(
         2 * len(soup.faces), np.concatenate([front, front + 1]), np.concatenate([other + turned, other + 1 - turned])
     )[1]
 
 
-def _fans(faces: IntArray, mate: IntArray) -> IntArray:
-    """Return ``[3F]`` the fan of each corner: the corners around a vertex that mates connect."""
-    here = np.flatnonzero(mate >= 0)
+def _fans(faces: IntArray, mate: IntArray, some: IntArray) -> IntArray:
+    """Return ``[3F]`` the fan of each corner of some faces: the corners around a vertex that mates connect."""
+    here = (3 * some[:, None] + np.arange(3)).ravel()
+    here = here[mate[here] >= 0]
     there = mate[here]
     here_next, there_next = (h - h % 3 + _NEXT[h % 3] for h in (here, there))
     flat = faces.ravel()
@@ -145,13 +158,20 @@ def _fans(faces: IntArray, mate: IntArray) -> IntArray:
 def _mates(soup: Soup) -> IntArray:
     """Return ``[3F]`` the halfedge that continues each across its edge, -1 for none."""
     edge = soup.edges
-    mate = np.full(3 * len(soup.faces), -1, dtype=np.int64)
-    order = np.argsort(edge.of_halfedge, kind="stable")
-    valence = edge.valence[edge.of_halfedge[order]]
-    two = order[valence == 2].reshape(-1, 2)
-    mate[two[:, 0]], mate[two[:, 1]] = two[:, 1], two[:, 0]
+    halfedges = np.arange(3 * len(soup.faces))
+    mate = np.full(len(halfedges), -1, dtype=np.int64)
+    first, last = np.empty((2, len(edge.valence)), dtype=np.int64)
+    first[edge.of_halfedge[::-1]], last[edge.of_halfedge] = halfedges[::-1], halfedges
+    two = edge.valence == 2
+    mate[first[two]], mate[last[two]] = last[two], first[two]
+    valence = edge.valence[edge.of_halfedge]
+    if (valence <= 2).all():
+        return mate
+    order = np.flatnonzero(valence > 2)
+    order = order[np.argsort(edge.of_halfedge[order], kind="stable")]
+    valence = valence[order]
     free = soup.at_valence(edge.valence == 1)
-    for number in np.unique(valence[valence > 2]).tolist():
+    for number in np.unique(valence).tolist():
         around = order[valence == number].reshape(-1, number)
         away = across(soup.vertices, soup.faces, around.ravel()).reshape(-1, number, 3)
         folded = dots(away[:, :, None], away[:, None])

@@ -82,7 +82,8 @@ def skin(
     base[fan] = corner_vertex
     positions = vertices[base].copy()
     poll_stop()
-    positions += half_thickness * _fan_offsets(vertices, faces[face_of_side], back, thin[face_of_side], fan, number)
+    if thin.any():
+        positions += half_thickness * _fan_offsets(vertices, faces[face_of_side], back, thin[face_of_side], fan, number)
 
     poll_stop()
     triangles = fan.reshape(-1, 3).copy()

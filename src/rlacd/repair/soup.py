@@ -40,18 +40,20 @@ _BESIDE = 2e-4
 class Soup:
     """Faces during the repair steps; `body` numbers the body of each, from the input to the end.
 
-    The windings of `trusted` faces have been checked and corrected.
+    The windings of `trusted` faces have been checked and corrected. `known_edges` are those of the faces, if they have
+    been collected already.
     """
 
     vertices: FloatArray
     faces: IntArray
     body: IntArray
     trusted: BoolArray | None = None
+    known_edges: Edges | None = None
 
     @cached_property
     def edges(self) -> Edges:
         """Which faces meet at which edge."""
-        return Edges.of(self.faces, len(self.vertices))
+        return self.known_edges or Edges.of(self.faces, len(self.vertices))
 
     @cached_property
     def sides(self) -> Sides:
@@ -67,6 +69,7 @@ class Soup:
         """Return ``[F]`` whether a face has an edge of marked valence, given ``[E]`` marks."""
         return np.asarray(marked[self.edges.of_halfedge].reshape(-1, 3).any(axis=1))
 
+    @cached_property
     def body_of_side(self) -> IntArray:
         """Return ``[C]`` the body of each side component."""
         result = np.zeros(len(self.sides.volume), dtype=np.int64)
@@ -105,7 +108,9 @@ class Soup:
         return Soup(self.vertices[distinct // max(count, 1)], corner.reshape(-1, 3), self.body)
 
     def only(self, keep: BoolArray) -> Soup:
-        """The marked faces."""
+        """The marked faces; the same soup if these are all."""
+        if keep.all():
+            return self
         trusted = None if self.trusted is None else self.trusted[keep]
         return Soup(self.vertices, self.faces[keep], self.body[keep], trusted)
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import heapq
-from typing import TypeAlias
+from collections.abc import Sequence
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 from manifold3d import Manifold, OpType
+from numpy.typing import NDArray
 
 from rlacd import _native
 from rlacd._native import poll_stop
+from rlacd.repair.soup import FLAT
 from rlacd.solid.arrays import IntArray as Indices
 from rlacd.solid.boolean_time import require_time_for
 from rlacd.solid.frame import FloatArray
@@ -17,8 +20,14 @@ from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import surface_of
 from rlacd.solid.topology import IntArray
 
+Index = TypeVar("Index", bound=np.signedinteger)
+
 Shape: TypeAlias = Manifold | tuple[FloatArray, Indices]
 """A closed solid: a manifold, or vertices float64 [V, 3] and faces int32 [F, 3]."""
+
+# manifold3d collapses edges shorter than 1e-12, and swaps those of faces that are no higher, or folded back onto a
+# neighbour in a plane within 1e-12.
+_THIN = 1e-11
 
 # Uniting takes time per mesh even without overlaps; above this number, disjoint meshes are composed instead.
 MOST_UNITED = 4000
@@ -33,6 +42,23 @@ def to_arrays(solid: Shape) -> tuple[FloatArray, IntArray]:
     return vertices, faces.astype(np.int64)
 
 
+def one_body(vertices: FloatArray, faces: Indices) -> tuple[tuple[FloatArray, Indices], bool] | None:
+    """One closed and oriented body as it is, and whether it was wound inside out; None for anything else.
+
+    The vertices and faces are those that manifold3d would make of it, in its order, as long as it would leave all edges
+    alone; it takes twenty times as long.
+    """
+    found = _native.closed_bodies(vertices, faces)
+    if found is None or len(found[1]) > 1:
+        return None
+    _, (volume,), (area,), _, has_no_pinch, least_height, least_fold = found
+    if abs(volume) <= 2 * FLAT * area or least_height * min(least_fold, 1.0) <= _THIN:
+        return None
+    outward = faces if volume > 0 else np.ascontiguousarray(faces[:, ::-1])
+    separate = (vertices, outward) if has_no_pinch else _native.separate_fans(vertices, outward)
+    return _native.along_a_curve(*separate), volume < 0
+
+
 def as_manifold(solid: Shape) -> Manifold:
     """Return a solid in the form that booleans take."""
     return solid if isinstance(solid, Manifold) else to_manifold(*solid)
@@ -45,6 +71,8 @@ def volume_of(solid: Shape) -> float:
 
 def split_labels(vertices: FloatArray, faces: IntArray, label: IntArray) -> list[tuple[FloatArray, IntArray]]:
     """Split a mesh into the faces of each label, in ascending order of the labels."""
+    if len(label) and (label == label[0]).all():
+        return [_of_faces(vertices, faces)]
     order = np.argsort(label, kind="stable")
     cuts = np.flatnonzero(np.diff(label[order])) + 1
     parts = []
@@ -55,8 +83,14 @@ def split_labels(vertices: FloatArray, faces: IntArray, label: IntArray) -> list
     return parts
 
 
-def unite(solids: list[Manifold], *, keep_cavities: bool = False) -> Shape:
-    """Unite solids and fill the cavities nothing can reach."""
+def unite(solids: Sequence[Shape], *, keep_cavities: bool = False) -> Shape:
+    """Unite solids and fill the cavities nothing can reach; one that is no manifold has none (`one_body`)."""
+    if len(solids) == 1 and not isinstance(solids[0], Manifold):
+        return solids[0]
+    return _united_and_filled([as_manifold(solid) for solid in solids], keep_cavities)
+
+
+def _united_and_filled(solids: list[Manifold], keep_cavities: bool) -> Shape:
     solids = [s for s in solids if not s.is_empty()]
     if not solids:
         return Manifold()
@@ -67,17 +101,18 @@ def unite(solids: list[Manifold], *, keep_cavities: bool = False) -> Shape:
     return united if keep_cavities and united.volume() > 0 else _without_cavities(united)
 
 
-def unite_around_cavities(solids: list[Manifold], inward: list[bool]) -> Shape:
+def unite_around_cavities(shapes: Sequence[Shape], inward: list[bool]) -> Shape:
     """Unite solids except for the cavities that some of them bound, and keep what stands in a cavity.
 
     Parameters
     ----------
-    solids : list of Manifold
+    shapes : sequence of Manifold or (vertices, faces)
         Each with positive volume.
     inward : list of bool
         Which of them the input winds inside out. A solid is a cavity if it is wound opposite to the outermost solid
         around it.
     """
+    solids = [as_manifold(shape) for shape in shapes]
     kept = [i for i, solid in enumerate(solids) if not solid.is_empty()]
     if len({inward[i] for i in kept}) < 2:
         return unite(solids, keep_cavities=True)
@@ -145,11 +180,13 @@ def _outer_united(solid: Manifold) -> Manifold:
     return _united(outer)
 
 
-def _of_faces(vertices: FloatArray, faces: Indices) -> tuple[FloatArray, Indices]:
+def _of_faces(vertices: FloatArray, faces: NDArray[Index]) -> tuple[FloatArray, NDArray[Index]]:
     """Some faces and the vertices that they use, in the same order."""
     used = np.zeros(len(vertices), dtype=bool)
     used[faces] = True
-    return vertices[used], (np.cumsum(used, dtype=np.int32) - np.int32(1))[faces]
+    if used.all():
+        return vertices, faces
+    return vertices[used], (np.cumsum(used, dtype=faces.dtype) - 1).astype(faces.dtype)[faces]
 
 
 def _united(solids: list[Manifold]) -> Manifold:
@@ -158,7 +195,8 @@ def _united(solids: list[Manifold]) -> Manifold:
     heapq.heapify(waiting)
     some = dict(enumerate(solids))
     for newest in range(len(solids), 2 * len(solids) - 1):
-        group, triangles = [], 0
+        group: list[Manifold] = []
+        triangles = 0
         while waiting and (len(group) < 2 or triangles + waiting[0][0] <= _AT_ONCE):
             more, i = heapq.heappop(waiting)
             group.append(some.pop(i))

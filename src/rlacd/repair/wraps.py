@@ -72,7 +72,7 @@ class Wraps:
         self._resolution = resolution
         self._as_sheets = as_sheets
         self._by_faces = by_faces
-        self._slabs: list[tuple[Manifold, int]] = []
+        self._slabs: list[tuple[Shape, int]] = []
         self._is_tangled = np.zeros(record.bodies, dtype=bool)
         self._is_tangled[tangled] = True
 
@@ -81,7 +81,7 @@ class Wraps:
         """Where the ball can go."""
         return Reach.of(self._input.vertices, self._input.faces, radius=self._gap, resolution=self._resolution)
 
-    def build_or_wrap(self, soup: Soup) -> list[tuple[Manifold, int]]:
+    def build_or_wrap(self, soup: Soup) -> list[tuple[Shape, int]]:
         """Build every body, but wrap crowds of sheets (leaves, feathers) as one; returns solids and their bodies."""
         record = self._record
         walls, sheets = walls_and_sheets(soup, record, self._as_sheets)
@@ -93,8 +93,8 @@ class Wraps:
             parts = skins(walls, record)
             self._slabs = skins(sheets.in_patches(), record, self._by_faces)
             parts += self._slabs
-            boxes = np.array([part.bounding_box() for part, body in parts if is_slab[body]]).reshape(-1, 2, 3)
-            if _crossings(boxes) <= _CROSSINGS:
+            boxes = [as_manifold(part).bounding_box() for part, body in parts if is_slab[body]]
+            if _crossings(np.reshape(boxes, (-1, 2, 3))) <= _CROSSINGS:
                 return parts
         slabs = soup.only(is_slab[soup.body])
         points, _ = points_covering(slabs.vertices, slabs.faces, self.reach.pitch / 2)
@@ -112,7 +112,7 @@ class Wraps:
         """Whether a slab that was built crosses itself."""
         return any(crosses_itself(slab) for slab, _ in self._slabs)
 
-    def untangled(self, soup: Soup) -> list[tuple[Manifold, int]]:
+    def untangled(self, soup: Soup) -> list[tuple[Shape, int]]:
         """Build bodies that cross themselves from the place of their faces alone; returns solids and their bodies.
 
         A few faces become a slab each. Where they are many, what the ball cannot reach from outside the body is solid.
@@ -130,7 +130,7 @@ class Wraps:
             parts.append((solid, body))
         return parts
 
-    def with_rooms(self, solid: Shape, soup: Soup, parts: list[tuple[Manifold, int]], by_room: BoolArray) -> Shape:
+    def with_rooms(self, solid: Shape, soup: Soup, parts: list[tuple[Shape, int]], by_room: BoolArray) -> Shape:
         """Fill rooms with openings too narrow for the ball: all rooms that sheets enclose, large ones in outer skins.
 
         Parameters

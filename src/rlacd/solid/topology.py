@@ -37,19 +37,7 @@ def nondegenerate(faces: IntArray) -> BoolArray:
 
 def first_of_doubled(faces: IntArray, count: int) -> BoolArray:
     """Return ``[F]`` whether a face is the first with its three corners, in any order; ``count`` vertices exist."""
-    ordered = np.sort(faces, axis=1).astype(np.uint64)
-    if count < 2**21:
-        key = (ordered[:, 0] << np.uint64(42)) | (ordered[:, 1] << np.uint64(21)) | ordered[:, 2]
-        _, first = np.unique(key, return_index=True)
-    else:
-        order = np.lexsort(ordered.T[::-1])
-        rows = ordered[order]
-        new = np.ones(len(rows), dtype=bool)
-        new[1:] = (rows[1:] != rows[:-1]).any(axis=1)
-        first = order[new]  # lexsort is stable: the first of a run is the first in the file
-    keep = np.zeros(len(faces), dtype=bool)
-    keep[first] = True
-    return keep
+    return _native.first_of_doubled(np.ascontiguousarray(faces), count)
 
 
 def components(count: int, a: IntArray, b: IntArray) -> tuple[int, IntArray]:
