@@ -107,7 +107,7 @@ class Attempt:
             self.record.step[:] = STEPS.index("hull")
             self.solid = hull_of_points(surface.vertices)
         self._warn_of_holes()
-        self.lost, place, loser = measure(self.record, surface, self.solid)
+        self.lost, place, loser = measure(self.record, surface, self._wraps.query(self.solid))
         self.lost_at = self._place(place, loser)
 
     def doubted(self) -> IntArray:

@@ -33,6 +33,11 @@ class SurfaceQuery:
             np.ascontiguousarray(self.vertices, dtype=np.float64), np.ascontiguousarray(self.faces, dtype=np.int32)
         )
 
+    @property
+    def index(self) -> Surface | None:
+        """What the queries so far were answered by."""
+        return self.__dict__.get("_surface")
+
     def distance(self, points: FloatArray) -> FloatArray:
         """Return the distance ``[N]`` of each point to the faces."""
         if len(points) == 0:

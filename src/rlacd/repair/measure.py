@@ -7,14 +7,13 @@ import numpy as np
 from rlacd._native import PointTree, poll_stop
 from rlacd.repair.distance import SurfaceQuery, points_covering, shared_faces
 from rlacd.repair.record import STEPS, Record
-from rlacd.repair.union import Shape, to_arrays
 from rlacd.repair.voxels import GAP
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.thickness import HALF_THICKNESS
 from rlacd.solid.topology import BoolArray
 
 
-def measure(record: Record, surface: SurfaceQuery, shape: Shape) -> tuple[float, FloatArray, int]:
+def measure(record: Record, surface: SurfaceQuery, solid: SurfaceQuery) -> tuple[float, FloatArray, int]:
     """Record, for the changed bodies, how far the solid and the input deviate from each other.
 
     Returns how far what a capped body lost lies from the solid, or a wrapped one if that is more than two balls' radii;
@@ -22,7 +21,6 @@ def measure(record: Record, surface: SurfaceQuery, shape: Shape) -> tuple[float,
     """
     if record.step.max() < STEPS.index("outer skin"):
         return 0.0, np.zeros(3), 0
-    solid = SurfaceQuery(*to_arrays(shape), surface.threads)
     kept, taken_over = shared_faces(solid.vertices, solid.faces, surface.vertices, surface.faces)
     poll_stop()
     points, _ = points_covering(solid.vertices, solid.faces[~kept], GAP)

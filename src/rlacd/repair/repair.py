@@ -142,6 +142,7 @@ def repair(
         tuple(warnings + work.warnings),
         holes=tuple(work.holes),
         body_of=work.record.body_of_input,
+        index=query.index,
     )
 
 

@@ -113,7 +113,8 @@ def rims_of(soup: Soup, fins: bool = False) -> Rims:
     )
     swap = inverted[rim // 3]
     fan = _fans(soup.faces, mate, beside_rim)
-    tail_fan, head_fan = fan[rim], fan[rim - rim % 3 + _NEXT[rim % 3]]
+    place = np.searchsorted(beside_rim, rim // 3)
+    tail_fan, head_fan = fan[place, rim % 3], fan[place, _NEXT[rim % 3]]
     tail, head = np.where(swap, head, tail), np.where(swap, tail, head)
     tail_fan, head_fan = np.where(swap, head_fan, tail_fan), np.where(swap, tail_fan, head_fan)
     follower = _followers(soup.vertices, normal_of_vertex, tail, head, tail_fan, head_fan)
@@ -144,15 +145,22 @@ def _sides(soup: Soup, mate: IntArray) -> IntArray:
 
 
 def _fans(faces: IntArray, mate: IntArray, some: IntArray) -> IntArray:
-    """Return ``[3F]`` the fan of each corner of some faces: the corners around a vertex that mates connect."""
+    """Return ``[S, 3]`` the fan of each corner of some faces: the corners around a vertex that their mates connect.
+
+    The faces ``[S]`` ascend.
+    """
+    slot = np.full(len(faces), -1, dtype=np.int64)
+    slot[some] = 3 * np.arange(len(some))
     here = (3 * some[:, None] + np.arange(3)).ravel()
-    here = here[mate[here] >= 0]
+    here = here[(mate[here] >= 0) & (slot[mate[here] // 3] >= 0)]
     there = mate[here]
     here_next, there_next = (h - h % 3 + _NEXT[h % 3] for h in (here, there))
     flat = faces.ravel()
     same = flat[here] == flat[there]  # mates wound differently begin at the same vertex
     begins, ends = np.where(same, there, there_next), np.where(same, there_next, there)
-    return components(3 * len(faces), np.concatenate([here, here_next]), np.concatenate([begins, ends]))[1]
+    here, here_next, begins, ends = (slot[h // 3] + h % 3 for h in (here, here_next, begins, ends))
+    links = np.concatenate([here, here_next]), np.concatenate([begins, ends])
+    return components(3 * len(some), *links)[1].reshape(-1, 3)
 
 
 def _mates(soup: Soup) -> IntArray:
@@ -285,6 +293,8 @@ def _against_main(soup: Soup, patch: IntArray, left_out: BoolArray, weighted: Fl
     """
     turned = np.zeros(len(soup.faces), dtype=bool)
     count = int(patch.max(initial=-1)) + 1
+    if count == 1:
+        return turned
     corner = np.repeat(np.arange(len(soup.faces)), 3)
     _, cluster = components(len(soup.faces) + len(soup.vertices), corner, len(soup.faces) + soup.faces.ravel())
     area = np.bincount(patch, np.where(left_out, 0, soup.area), count)

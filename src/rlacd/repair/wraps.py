@@ -75,6 +75,13 @@ class Wraps:
         self._slabs: list[tuple[Shape, int]] = []
         self._is_tangled = np.zeros(record.bodies, dtype=bool)
         self._is_tangled[tangled] = True
+        self._asked: tuple[Shape, SurfaceQuery] | None = None
+
+    def query(self, solid: Shape) -> SurfaceQuery:
+        """Queries of a solid; those of the last one asked for are kept."""
+        if self._asked is None or self._asked[0] is not solid:
+            self._asked = solid, SurfaceQuery(*to_arrays(solid), self._input.threads)
+        return self._asked[1]
 
     @cached_property
     def reach(self) -> Reach:
@@ -152,7 +159,7 @@ class Wraps:
         shells = soup.only(is_skin[soup.body])
         if volume_of(solid) == 0 or not (self._is_large(sheets) or self._is_large(shells)):
             return solid
-        query = SurfaceQuery(*to_arrays(solid), self._input.threads)
+        query = self.query(solid)
         rooms = self.reach.rooms_outside(query)
         in_shells = self._rooms_in(shells, rooms[self.reach.volumes(rooms) >= _ROOM * volume_of(solid)])
         rooms = np.union1d(self._rooms_in(sheets, rooms), in_shells)
@@ -203,7 +210,8 @@ class Wraps:
         is_skin = self._record.has("outer skin") & ~self._is_tangled
         if not self._is_large(soup.only(is_skin[soup.body])) or volume_of(solid) == 0:
             return solid
-        vertices, faces = to_arrays(solid)
+        query = self.query(solid)
+        vertices, faces = query.vertices, query.faces
         points, on = spread_points(vertices, faces, GAP)
         deep = self.reach.is_deep(points, _DEEP * self._gap)
         if not deep.any():
@@ -211,7 +219,6 @@ class Wraps:
         corners = vertices[faces[on[deep]]]
         across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
-        query = SurfaceQuery(vertices, faces, self._input.threads)
         points, step = points[deep], _HAIR * self._gap * across
         points = points[query.inside(points + step) & query.inside(points - step)]  # both sides of a slit
         if len(points) == 0:
@@ -238,7 +245,7 @@ class Wraps:
         """
         if len(hidden) == 0 or volume_of(solid) == 0:
             return solid
-        query = SurfaceQuery(*to_arrays(solid), self._input.threads)
+        query = self.query(solid)
         bare = query.distance(hidden) < _ON_SURFACE
         points, step = hidden[bare], _SLIT * self._gap * across[bare]
         beside = np.stack([points + step, points - step])

@@ -9,6 +9,7 @@ import numpy as np
 from manifold3d import Manifold, Mesh64
 from numpy.typing import NDArray
 
+from rlacd._native import Surface
 from rlacd.solid.frame import FloatArray, Frame
 
 
@@ -93,6 +94,8 @@ class Solid:
         ``[F]``, the body of each face of the surface; None if there is only one.
     is_as_given
         Whether the shape is the surface, in another order.
+    index
+        The surface, ready for queries, if repair made any.
     """
 
     shape: Manifold | tuple[FloatArray, NDArray[np.int32]]
@@ -103,6 +106,7 @@ class Solid:
     holes: tuple[Hole, ...] = ()
     body_of: NDArray[np.int64] | None = None
     is_as_given: bool = False
+    index: Surface | None = None
 
     @property
     def vertices(self) -> FloatArray:
