@@ -87,8 +87,10 @@ class Attempt:
         self.warnings: list[str] = []
         self.holes: list[Hole] = []
 
-        faces, origin = close_cracks(surface.vertices, surface.faces, _WELDS)
-        edges = Edges.of(faces, len(surface.vertices))
+        edges = Edges.of(surface.faces, len(surface.vertices))
+        faces, origin = close_cracks(surface.vertices, surface.faces, edges, _WELDS)
+        if faces is not surface.faces:
+            edges = Edges.of(faces, len(surface.vertices))
         count, body = bodies_of(faces, edges)
         body_of_input = np.zeros(len(surface.faces), dtype=np.int64)
         body_of_input[origin] = body

@@ -28,15 +28,17 @@ MOST_NEAR = 50_000_000
 MOST_FREE_EDGES = 500_000
 
 
-def close_cracks(vertices: FloatArray, faces: IntArray, tolerances: Sequence[float]) -> tuple[IntArray, IntArray]:
+def close_cracks(
+    vertices: FloatArray, faces: IntArray, edges: Edges, tolerances: Sequence[float]
+) -> tuple[IntArray, IntArray]:
     """Merge free edges that nearly coincide, with increasing tolerances.
 
     An attempt that closes nothing, or leaves no face, is undone. No two of the faces have the same three corners.
 
-    Returns the faces ``[G, 3]`` and ``[G]`` the given face each comes from.
+    Returns the faces ``[G, 3]``, the given ones if nothing changed, and ``[G]`` the given face each comes from.
     """
     origin = np.arange(len(faces))
-    free = free_edges(faces, len(vertices))
+    free = free_edges(faces, edges)
     for tolerance in tolerances:
         poll_stop()
         if not 0 < len(free) <= MOST_FREE_EDGES:
@@ -50,7 +52,7 @@ def close_cracks(vertices: FloatArray, faces: IntArray, tolerances: Sequence[flo
         poll_stop()
         keep = nondegenerate(split)
         keep[keep] = first_of_doubled(split[keep], len(vertices))
-        left = free_edges(split[keep], len(vertices), inner)
+        left = free_edges(split[keep], Edges.of(split[keep], len(vertices)), inner)
         if len(left) < len(free) and (keep.any() or not near.all()):
             whole = keep & ~is_piece
             changed, at = faces.copy(), np.flatnonzero(near)
@@ -146,12 +148,11 @@ def split_at_free_vertices(
     return new[good], origin[good], is_piece[good]
 
 
-def free_edges(faces: IntArray, count: int, inner: BoolArray | None = None) -> IntArray:
+def free_edges(faces: IntArray, edges: Edges, inner: BoolArray | None = None) -> IntArray:
     """Return the directed edges ``[B, 2]`` that only one face uses, as that face runs along them.
 
     If `inner` vertices ``[V]`` are given, only edges with an end among them.
     """
-    edges = Edges.of(faces, count)
     is_free = edges.valence == 1
     if inner is not None:
         is_free &= inner[edges.vertices].any(axis=1)

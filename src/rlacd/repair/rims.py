@@ -166,12 +166,9 @@ def _fans(faces: IntArray, mate: IntArray, some: IntArray) -> IntArray:
 def _mates(soup: Soup) -> IntArray:
     """Return ``[3F]`` the halfedge that continues each across its edge, -1 for none."""
     edge = soup.edges
-    halfedges = np.arange(3 * len(soup.faces))
-    mate = np.full(len(halfedges), -1, dtype=np.int64)
-    first, last = np.empty((2, len(edge.valence)), dtype=np.int64)
-    first[edge.of_halfedge[::-1]], last[edge.of_halfedge] = halfedges[::-1], halfedges
-    two = edge.valence == 2
-    mate[first[two]], mate[last[two]] = last[two], first[two]
+    mate = np.full(3 * len(soup.faces), -1, dtype=np.int64)
+    first, last = edge.halfedges[:, edge.valence == 2]
+    mate[first], mate[last] = last, first
     valence = edge.valence[edge.of_halfedge]
     if (valence <= 2).all():
         return mate

@@ -13,7 +13,9 @@ volume, those of enclosed rooms negative; a face with both sides in one componen
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +72,14 @@ class Edges:
     def of(cls, faces: IntArray, count: int) -> Edges:
         """Collect the edges of faces ``[F, 3]`` over ``count`` vertices."""
         return cls(*_native.edges(faces, count))
+
+    @property
+    def halfedges(self) -> IntArray:
+        """The first and the last halfedge of each edge, ``[2, E]``."""
+        number = np.arange(len(self.of_halfedge))
+        first, last = ends = np.empty((2, len(self.valence)), dtype=np.int64)
+        first[self.of_halfedge[::-1]], last[self.of_halfedge] = number[::-1], number
+        return ends
 
 
 def bodies_of(faces: IntArray, edges: Edges) -> tuple[int, IntArray]:
@@ -137,12 +147,8 @@ class Sides:
 
     Attributes
     ----------
-    wedges
-        ``[W, 2]`` pairs of halfedges ``(h, g)``: going around their edge from its smaller to its larger vertex by the
-        right-hand rule, g follows h with nothing in between. A boundary edge gives ``h == g``. Faces at equal angles,
-        to the precision of float32 files, and all around edges of trusted faces alternate as their windings require.
-    facing
-        ``[W, 2]``, the sides that bound each wedge, on its first and on its second halfedge.
+    find_wedges
+        Returns what `wedges` and `facing` are: many inputs need neither.
     label
         ``[2F]``, the component of every side.
     volume
@@ -153,12 +159,30 @@ class Sides:
         ``[F]``, whether both sides of the face lie in one component.
     """
 
-    wedges: IntArray
-    facing: IntArray
+    find_wedges: Callable[[], tuple[IntArray, IntArray]]
     label: IntArray
     volume: FloatArray
     area: FloatArray
     sheet: BoolArray
+
+    @cached_property
+    def _wedges(self) -> tuple[IntArray, IntArray]:
+        return self.find_wedges()
+
+    @property
+    def wedges(self) -> IntArray:
+        """Pairs of halfedges ``(h, g)``, ``[W, 2]``.
+
+        Going around their edge from its smaller to its larger vertex by the right-hand rule, g follows h with nothing
+        in between. A boundary edge gives ``h == g``. Faces at equal angles, to the precision of float32 files, and all
+        around edges of trusted faces alternate as their windings require.
+        """
+        return self._wedges[0]
+
+    @property
+    def facing(self) -> IntArray:
+        """The sides that bound each wedge ``[W, 2]``, on its first and on its second halfedge."""
+        return self._wedges[1]
 
 
 def signed_tetrahedra(vertices: FloatArray, faces: IntArray) -> FloatArray:
@@ -177,15 +201,22 @@ def _sums(group: IntArray, values: FloatArray, number: int) -> FloatArray:
 
 def sides_of(vertices: FloatArray, faces: IntArray, edges: Edges, trusted: BoolArray | None = None) -> Sides:
     """Join the sides of all faces across their wedges, except where ``trusted`` ``[F]`` faces meet by their angles."""
-    wedges, facing = _native.wedges(vertices, faces, edges.of_halfedge, len(edges.valence), trusted)
-    number, label = components(2 * len(faces), *np.ascontiguousarray(facing.T))
+
+    @cache
+    def wedges() -> tuple[IntArray, IntArray]:
+        return _native.wedges(vertices, faces, edges.of_halfedge, len(edges.valence), trusted)
+
+    if (edges.valence == 2).all() and is_balanced(faces, edges).all():
+        number, patch = components(len(faces), *(edges.halfedges // 3))
+        number, label = 2 * number, (2 * patch[:, None] + np.arange(2)).ravel()  # fronts join fronts, and backs backs
+    else:
+        number, label = components(2 * len(faces), *np.ascontiguousarray(wedges()[1].T))
     poll_stop()
     tetrahedra = signed_tetrahedra(vertices, faces)
     area = face_areas(vertices, faces)
     front, back = label[0::2], label[1::2]
     return Sides(
-        wedges=wedges,
-        facing=facing,
+        find_wedges=wedges,
         label=label,
         volume=_sums(front, tetrahedra, number) - _sums(back, tetrahedra, number),
         area=_sums(front, area, number) + _sums(back, area, number),
