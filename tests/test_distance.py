@@ -325,6 +325,27 @@ def test_hausdorff_is_found_between_the_corners() -> None:
     assert upper == pytest.approx(1, abs=1e-6)
 
 
+def test_trees_made_by_several_threads_are_the_same() -> None:
+    ball = trimesh.creation.icosphere(6)
+    ball.vertices *= 1 + 0.01 * np.random.default_rng(0).normal(size=(len(ball.vertices), 1))
+    points = np.random.default_rng(1).uniform(-1.5, 1.5, (2000, 3))
+    vertices, faces = np.array(ball.vertices), np.array(ball.faces, dtype=np.int32)
+    assert len(faces) > 80_000  # or one thread makes it
+    answers = []
+    for threads in (1, 2, 7):
+        surface = _native.Surface(vertices, faces, threads)
+        answers.append((*surface.closest(points), surface.distance(points), surface.winding(points)))
+    for other in answers[1:]:
+        assert all(np.array_equal(a, b) for a, b in zip(answers[0], other, strict=True))
+    corners = vertices[faces]
+    away = np.linalg.norm(points[:50, None] - vertices, axis=2).min(axis=1)
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max()
+    assert (answers[0][2][:50] <= away).all()
+    assert (answers[0][2][:50] >= away - longest).all()
+    inside = np.linalg.norm(points, axis=1) < 0.95
+    assert (answers[0][3][inside] > 0.9).all()
+
+
 def test_results_do_not_depend_on_threads() -> None:
     rng = np.random.default_rng(1)
     hulls = [h for c in rng.uniform(-0.6, 0.6, (15, 3)) if (h := Hull.of(c + rng.normal(scale=0.2, size=(30, 3))))]

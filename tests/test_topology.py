@@ -19,7 +19,18 @@ from rlacd.repair.repair import repair
 from rlacd.repair.union import to_arrays, unite, volume_of
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.manifold import to_manifold
-from rlacd.solid.topology import Edges, bodies_of, components, detach_films, face_areas, signed_tetrahedra
+from rlacd.solid.topology import (
+    Edges,
+    bodies_of,
+    components,
+    detach_films,
+    face_areas,
+    first_of_doubled,
+    has_marked,
+    long_normals,
+    sides_of,
+    signed_tetrahedra,
+)
 
 
 def soup(seed: int, count: int, faces: int) -> tuple[np.ndarray, np.ndarray]:
@@ -74,6 +85,22 @@ def test_edges_are_the_distinct_pairs_in_ascending_order(seed: int, count: int, 
 
 @settings(max_examples=200, deadline=None)
 @soups
+def test_doubled_faces_and_equal_places_are_found(seed: int, count: int, faces: int) -> None:
+    vertices, triangles = soup(seed, count, faces)
+    seen: set[tuple[int, ...]] = set()
+    expected = []
+    for corners in map(tuple, np.sort(triangles, axis=1).tolist()):
+        expected.append(corners not in seen)
+        seen.add(corners)
+    assert first_of_doubled(triangles, count).tolist() == expected
+    _, first, inverse = np.unique(vertices + 0.0, axis=0, return_index=True, return_inverse=True)
+    assert np.array_equal(_native.first_in_place(vertices), first[inverse.reshape(-1)])
+    marked = np.random.default_rng(seed).random(count) < 0.2
+    assert np.array_equal(has_marked(marked, triangles), marked[triangles].any(axis=1))
+
+
+@settings(max_examples=200, deadline=None)
+@soups
 def test_components_are_numbered_by_their_first_nodes(seed: int, count: int, faces: int) -> None:
     a, b, _ = soup(seed, count, faces)[1].T
     number, label = components(count, a, b)
@@ -98,6 +125,25 @@ def test_bodies_areas_and_volumes_of_soups(seed: int, count: int, faces: int) ->
     corners = vertices[triangles]
     np.testing.assert_allclose(face_areas(vertices, triangles), trimesh.triangles.area(corners), atol=1e-14)
     np.testing.assert_allclose(signed_tetrahedra(vertices, triangles), np.linalg.det(corners) / 6, atol=1e-14)
+    along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    assert np.array_equal(long_normals(vertices, triangles), np.cross(along, across))
+
+
+@pytest.mark.parametrize("inward", [False, True])
+def test_sides_of_closed_surfaces_join_as_their_wedges_say(inward: bool) -> None:
+    balls = [trimesh.creation.icosphere(2, radius) for radius in (1.0, 0.5, 0.2)]
+    mesh = trimesh.util.concatenate([*balls, trimesh.creation.torus(3.0, 0.2)])
+    faces = np.random.default_rng(0).permutation(np.asarray(mesh.faces, dtype=np.int64))
+    faces = np.ascontiguousarray(faces[:, ::-1]) if inward else faces
+    edges = Edges.of(faces, len(mesh.vertices))
+    sides = sides_of(mesh.vertices, faces, edges)
+    number, label = components(2 * len(faces), *np.ascontiguousarray(sides.facing.T))
+    assert number == len(sides.volume) == 8
+    assert np.array_equal(sides.label, label)
+    assert not sides.sheet.any()
+    assert sorted(np.abs(sides.volume[::2]).round(6)) == sorted(np.abs([b.volume for b in mesh.split()]).round(6))
+    assert np.array_equal(sides.volume[::2], -sides.volume[1::2])
+    assert np.array_equal(sides.area[::2], sides.area[1::2])
 
 
 def test_indices_out_of_range_are_refused() -> None:
@@ -275,3 +321,29 @@ def test_windings_decide_where_rounding_folds_a_closed_surface() -> None:
     rounded = np.asarray(body.vert_properties[:, :3], dtype=np.float32).astype(float)
     exact, solid = Manifold(body).volume(), repair(load_mesh((rounded, body.tri_verts)))
     assert solid.manifold.volume() / solid.frame.scale**3 == pytest.approx(exact, rel=2e-3)
+
+
+def test_a_scan_with_holes_closed_is_taken_as_manifold3d_would_take_it() -> None:
+    ball = trimesh.creation.icosphere(4)
+    bumpy = ball.vertices * (1 + 0.01 * np.random.default_rng(0).normal(size=(len(ball.vertices), 1)))
+    kept = np.ones(len(ball.faces), dtype=bool)
+    kept[[3, 700, 701]] = False
+    solid = repair(InputMesh(bumpy, ball.faces[kept][:, ::-1].astype(np.int64), "ball", ()), threads=1)
+    assert [body.step for body in solid.bodies] == ["capped"]
+    assert not isinstance(solid.shape, Manifold)
+    assert len(solid.faces) == len(ball.faces)
+    expected = to_arrays(to_manifold(solid.vertices, solid.faces))
+    assert np.array_equal(solid.vertices, expected[0])
+    assert np.array_equal(solid.faces, expected[1])
+    assert solid.manifold.volume() > 0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_union_does_not_depend_on_the_order_of_solids(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    solids = [
+        Manifold.sphere(0.3 + rng.random(), 8 + 40 * int(rng.integers(8))).translate(rng.random(3)) for _ in range(12)
+    ]
+    volume = volume_of(unite(solids, keep_cavities=True))
+    assert volume == pytest.approx(Manifold.batch_boolean(solids, OpType.Add).volume(), rel=1e-9)
+    assert volume_of(unite(solids[::-1], keep_cavities=True)) == pytest.approx(volume, rel=1e-9)

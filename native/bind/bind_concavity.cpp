@@ -53,13 +53,13 @@ void bind_concavity(nb::module_& m) {
   nb::class_<Filling>(m, "Filling", "A closed solid that hulls of its parts are held against.")
       .def(
           "__init__",
-          [](Filling* self, const PointsIn& vertices, const FacesIn& faces) {
+          [](Filling* self, const PointsIn& vertices, const FacesIn& faces, int threads) {
             const Mesh solid = to_finite_mesh(vertices, faces);
             if (solid.faces.empty()) throw std::invalid_argument("the solid has no faces");
             nb::gil_scoped_release release;
-            new (self) Filling(solid);
+            new (self) Filling(solid, threads);
           },
-          nb::arg("vertices"), nb::arg("faces"))
+          nb::arg("vertices"), nb::arg("faces"), nb::arg("threads") = 1)
       .def_prop_ro("surface", &Filling::surface, nb::rv_policy::reference_internal, "The solid's surface.")
       .def(
           "feasibility",

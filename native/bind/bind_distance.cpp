@@ -51,13 +51,13 @@ void bind_distance(nb::module_& m) {
                       "A triangle surface and a tree of boxes over it. Any quality: open, self-intersecting, slivers.")
       .def(
           "__init__",
-          [](Surface* self, const PointsIn& vertices, const FacesIn& faces) {
+          [](Surface* self, const PointsIn& vertices, const FacesIn& faces, int threads) {
             const Mesh mesh = to_finite_mesh(vertices, faces);
             if (mesh.faces.empty()) throw std::invalid_argument("the surface has no faces");
             nb::gil_scoped_release release;
-            new (self) Surface(mesh);
+            new (self) Surface(mesh, threads);
           },
-          nb::arg("vertices"), nb::arg("faces"))
+          nb::arg("vertices"), nb::arg("faces"), nb::arg("threads") = 1)
       .def(
           "distance",
           [](const Surface& self, const PointsIn& array, int threads) {

@@ -207,6 +207,22 @@ void bind_mesh(nb::module_& m) {
       },
       nb::arg("vertices"), nb::arg("faces"), "The area [F] of each face.");
   m.def(
+      "long_normals",
+      [](const PointsIn& vertices, const WideFacesIn& faces) {
+        const Mesh mesh = to_wide_mesh(vertices, faces);
+        std::vector<Vec3> normals(mesh.faces.size());
+        {
+          nb::gil_scoped_release release;
+          for (std::size_t f = 0; f < normals.size(); ++f) {
+            if (f % kBetweenPolls == 0) poll_stop();
+            const auto [a, b, c] = mesh.faces[f];
+            normals[f] = cross(mesh.vertices[b] - mesh.vertices[a], mesh.vertices[c] - mesh.vertices[a]);
+          }
+        }
+        return to_array<double>(std::move(normals));
+      },
+      nb::arg("vertices"), nb::arg("faces"), "The normal [F, 3] of each face, twice as long as its area.");
+  m.def(
       "signed_tetrahedra",
       [](const PointsIn& vertices, const WideFacesIn& faces) {
         const Mesh mesh = to_wide_mesh(vertices, faces);

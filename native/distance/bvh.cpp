@@ -1,7 +1,8 @@
 #include "distance/bvh.hpp"
 
-#include <numeric>
+#include <utility>
 
+#include "base/parallel.hpp"
 #include "base/stop.hpp"
 
 namespace rlacd {
@@ -14,6 +15,7 @@ constexpr int kBins = 8;
 constexpr int kDeepestHeuristicSplit = 48;
 constexpr int kStack = 96;
 constexpr std::size_t kBetweenPolls = 1024;
+constexpr std::ptrdiff_t kAlone = 20'000;  // trees over no more triangles are made in one thread
 
 double distance2_to_box(const Box& box, Vec3 p) {
   const double x = std::max(std::max(box.lower.x - p.x, p.x - box.upper.x), 0.0);
@@ -136,40 +138,97 @@ std::vector<Item> items_of(const Mesh& mesh, std::size_t first) {
   return items;
 }
 
-// Appends the nodes of a tree over some items, which are sorted into the order of its leaves; the first item gets the
-// slot `first_slot`.
-void grow(std::vector<Bvh::Node>& nodes, std::vector<Item>& items, std::int32_t first_slot) {
-  struct Range {
-    Items first, last;
-    std::int32_t node;
-    int depth;
-    Ends centres;
-  };
-  nodes.reserve(nodes.size() + items.size() / 2 + 1);
-  std::vector<Range> open = {{items.begin(), items.end(), static_cast<std::int32_t>(nodes.size()), 0,
-                              bounds(items.begin(), items.end()).centres}};
-  nodes.emplace_back();
+// Items that a node is yet to be made over.
+struct Range {
+  Items first, last;
+  std::int32_t node;
+  int depth;
+  Ends centres;
+};
+
+// Sets the boxes and leaves of a node; calls open_child(side, range) for each child that is no leaf, before which
+// range.node is unknown. Leaves have slots from `first_slot` on, that of the item at `begin`.
+template <class OpenChild>
+void fill(Bvh::Node& node, const Range& range, Items begin, std::int32_t first_slot, const OpenChild& open_child) {
+  // A mesh of one triangle cannot be halved: its second child stays an empty leaf.
+  const Halves halves = range.last - range.first > 1 ? split(range.first, range.last, range.centres, range.depth)
+                                                     : Halves{range.last, {bounds(range.first, range.last), {}}};
+  const Items ends[3] = {range.first, halves.middle, range.last};
+  for (int side = 0; side < 2; ++side) {
+    const auto count = static_cast<std::int32_t>(ends[side + 1] - ends[side]);
+    node.box[side] = halves.bounds[side].box.box();
+    if (count <= kLeafSize) {
+      node.child[side] = ~(first_slot + static_cast<std::int32_t>(ends[side] - begin));
+      node.leaf_size[side] = count;
+    } else {
+      open_child(side, Range{ends[side], ends[side + 1], -1, range.depth + 1, halves.bounds[side].centres});
+    }
+  }
+}
+
+// The nodes over some items, the first of them the root, which are sorted into the order of its leaves.
+std::vector<Bvh::Node> nodes_over(Range root, Items begin, std::int32_t first_slot) {
+  std::vector<Bvh::Node> nodes(1);
+  nodes.reserve(static_cast<std::size_t>(root.last - root.first) / 2 + 1);
+  root.node = 0;
+  std::vector<Range> open = {root};
   while (!open.empty()) {
     poll_stop();
     const Range range = open.back();
     open.pop_back();
-    // A mesh of one triangle cannot be halved: its second child stays an empty leaf.
-    const Halves halves = range.last - range.first > 1 ? split(range.first, range.last, range.centres, range.depth)
-                                                       : Halves{range.last, {bounds(range.first, range.last), {}}};
-    const Items ends[3] = {range.first, halves.middle, range.last};
-    for (int side = 0; side < 2; ++side) {
-      const auto count = static_cast<std::int32_t>(ends[side + 1] - ends[side]);
-      Bvh::Node& node = nodes[range.node];
-      node.box[side] = halves.bounds[side].box.box();
-      if (count <= kLeafSize) {
-        node.child[side] = ~(first_slot + static_cast<std::int32_t>(ends[side] - items.begin()));
-        node.leaf_size[side] = count;
-      } else {
-        node.child[side] = static_cast<std::int32_t>(nodes.size());
-        open.push_back({ends[side], ends[side + 1], node.child[side], range.depth + 1, halves.bounds[side].centres});
+    Bvh::Node node;
+    fill(node, range, begin, first_slot, [&](int side, Range child) {
+      child.node = node.child[side] = static_cast<std::int32_t>(nodes.size());
+      nodes.emplace_back();
+      open.push_back(child);
+    });
+    nodes[range.node] = node;
+  }
+  return nodes;
+}
+
+// Appends the nodes of a tree over some items, which are sorted into the order of its leaves; the first item gets the
+// slot `first_slot`. The topmost nodes are made level by level, the trees below them side by side.
+void grow(std::vector<Bvh::Node>& nodes, std::vector<Item>& items, std::int32_t first_slot, int threads) {
+  const auto root = static_cast<std::int32_t>(nodes.size());
+  nodes.emplace_back();
+  std::vector<Range> level = {{items.begin(), items.end(), root, 0, bounds(items.begin(), items.end()).centres}}, small;
+  struct Made {
+    Bvh::Node node;
+    std::vector<std::pair<int, Range>> children;
+  };
+  while (!level.empty()) {
+    std::vector<Range> large;
+    for (const Range& range : level) (range.last - range.first > kAlone ? large : small).push_back(range);
+    std::vector<Made> made(large.size());
+    parallel_for(large.size(), threads, [&](std::size_t i) {
+      fill(made[i].node, large[i], items.begin(), first_slot,
+           [&](int side, const Range& child) { made[i].children.emplace_back(side, child); });
+    });
+    level.clear();
+    for (std::size_t i = 0; i < large.size(); ++i) {
+      for (auto& [side, child] : made[i].children) {
+        child.node = made[i].node.child[side] = static_cast<std::int32_t>(nodes.size());
         nodes.emplace_back();
+        level.push_back(child);
       }
+      nodes[large[i].node] = made[i].node;
     }
+  }
+  std::vector<std::vector<Bvh::Node>> trees(small.size());
+  parallel_for(small.size(), threads,
+               [&](std::size_t i) { trees[i] = nodes_over(small[i], items.begin(), first_slot); });
+  std::size_t count = nodes.size();
+  for (const std::vector<Bvh::Node>& tree : trees) count += tree.size() - 1;
+  nodes.reserve(count);
+  for (std::size_t i = 0; i < small.size(); ++i) {
+    // The root of each has a place among the topmost nodes; the others follow.
+    const auto shift = static_cast<std::int32_t>(nodes.size()) - 1;
+    for (Bvh::Node& node : trees[i])
+      for (std::int32_t& child : node.child)
+        if (child >= 0) child += shift;
+    nodes[small[i].node] = trees[i][0];
+    nodes.insert(nodes.end(), trees[i].begin() + 1, trees[i].end());
   }
 }
 
@@ -181,9 +240,9 @@ Box box_around(const Bvh::Node& node) {
 
 }  // namespace
 
-Bvh::Bvh(const Mesh& mesh) {
+Bvh::Bvh(const Mesh& mesh, int threads) {
   std::vector<Item> items = items_of(mesh, 0);
-  grow(nodes_, items, 0);
+  grow(nodes_, items, 0, threads);
   triangles_.reserve(items.size());
   faces_.reserve(items.size());
   for (const Item& item : items) hold(mesh, item.face);
@@ -217,7 +276,7 @@ Bvh::Bvh(const Mesh& mesh, const TreeShape& shape) {
   }
   for (std::size_t f = 0; f < shape.faces; ++f) hold(mesh, static_cast<std::int32_t>(f));
   if (others.empty()) return;
-  grow(nodes_, others, static_cast<std::int32_t>(shape.faces));
+  grow(nodes_, others, static_cast<std::int32_t>(shape.faces), 1);
   for (const Item& item : others) hold(mesh, item.face);
   for (int side = 0; side < 2; ++side) nodes_[0].box[side] = box_around(nodes_[nodes_[0].child[side]]);
 }

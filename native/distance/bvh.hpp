@@ -29,7 +29,7 @@ struct TreeShape {
 
 class Bvh {
  public:
-  explicit Bvh(const Mesh& mesh);
+  explicit Bvh(const Mesh& mesh, int threads = 1);  // which do not change the tree
   // The faces beyond those of the shape get a tree of their own beside it.
   Bvh(const Mesh& mesh, const TreeShape& shape);
 

@@ -32,7 +32,7 @@ struct HullCorners {
 
 class Filling {
  public:
-  explicit Filling(const Mesh& solid) : solid_(solid), surface_(solid) {}
+  explicit Filling(const Mesh& solid, int threads = 1) : solid_(solid), surface_(solid, threads) {}
 
   const Surface& surface() const { return surface_; }
   Feasibility feasibility(const Mesh& hull, double threshold) const;

@@ -12,7 +12,7 @@ namespace rlacd {
 
 class Surface {
  public:
-  explicit Surface(const Mesh& mesh) : bvh_(mesh) {}
+  explicit Surface(const Mesh& mesh, int threads = 1) : bvh_(mesh, threads) {}
   Surface(const Surface&) = delete;  // winding_ refers to bvh_
   Surface& operator=(const Surface&) = delete;
 

@@ -89,6 +89,7 @@ def spread_points(
     vertices: FloatArray, faces: NDArray[np.int64], spacing: float
 ) -> tuple[FloatArray, IntArray]: ...  # [N, 3], [N]
 def components(count: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> tuple[int, NDArray[np.int64]]: ...
+def long_normals(vertices: FloatArray, faces: NDArray[np.int64]) -> FloatArray: ...  # [F, 3]
 def face_areas(vertices: FloatArray, faces: NDArray[np.int64]) -> FloatArray: ...  # [F]
 def signed_tetrahedra(vertices: FloatArray, faces: NDArray[np.int64]) -> FloatArray: ...  # [F]
 def closed_bodies(
@@ -116,7 +117,7 @@ _OpenSide = tuple[FloatArray, IntArray, list[IntArray], list[FloatArray]]
 """Vertices [V, 3], faces [F, 3]; rims of the cap as loops of vertices, [R] each, and as points of the plane, [R, 2]."""
 
 class Surface:
-    def __init__(self, vertices: FloatArray, faces: IntArray) -> None: ...
+    def __init__(self, vertices: FloatArray, faces: IntArray, threads: int = 1) -> None: ...
     def distance(self, points: FloatArray, threads: int = 0) -> FloatArray: ...  # [N]
     def closest(self, points: FloatArray, threads: int = 0) -> tuple[FloatArray, IntArray]: ...  # [N, 3], [N]
     def winding(self, points: FloatArray, accuracy: float = 2.0, threads: int = 0) -> FloatArray: ...  # [N]
@@ -127,7 +128,7 @@ def directed_hausdorff(
 ) -> Interval: ...
 
 class Filling:
-    def __init__(self, vertices: FloatArray, faces: IntArray) -> None: ...
+    def __init__(self, vertices: FloatArray, faces: IntArray, threads: int = 1) -> None: ...
     @property
     def surface(self) -> Surface: ...
     def feasibility(self, hull_vertices: FloatArray, hull_faces: IntArray, threshold: float) -> int: ...  # 0, 1 or 2

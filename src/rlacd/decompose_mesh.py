@@ -419,7 +419,7 @@ def _repaired_and_cut(
             )
         options = options.at_scale(solid.frame.scale)
         goal = _prepared(options, solid, workers, clock)
-        root = Component(solid.shape)
+        root = Component(solid.shape, workers.threads)
     except Stopped:
         clock.note_stop()
         solid, parts = cover(source, clock)

@@ -29,9 +29,8 @@ class SurfaceQuery:
 
     @cached_property
     def _surface(self) -> Surface:
-        return Surface(
-            np.ascontiguousarray(self.vertices, dtype=np.float64), np.ascontiguousarray(self.faces, dtype=np.int32)
-        )
+        vertices = np.ascontiguousarray(self.vertices, dtype=np.float64)
+        return Surface(vertices, np.ascontiguousarray(self.faces, dtype=np.int32), self.threads or 0)
 
     @property
     def index(self) -> Surface | None:
@@ -73,9 +72,10 @@ def points_covering(vertices: FloatArray, faces: IntArray, spacing: float) -> tu
 
     Returns the points ``[N, 3]`` and a face ``[N]`` each lies on. Faces no larger than `spacing` share their corners.
     """
-    corners = vertices[faces]
-    edges = np.roll(corners, -1, axis=1) - corners
-    small = (dots(edges, edges) <= spacing**2).all(axis=1)
+    a, b, c = (vertices[corner] for corner in faces.T)
+    small: BoolArray = np.ones(len(faces), dtype=bool)
+    for edge in (b - a, c - b, a - c):
+        small &= dots(edge, edge) <= spacing**2
     first = np.full(len(vertices), -1, dtype=np.int64)
     numbers = np.flatnonzero(small)
     poll_stop()

@@ -22,7 +22,7 @@ from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.soup import Soup, across
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.products import dots
-from rlacd.solid.topology import BoolArray, IntArray, components
+from rlacd.solid.topology import BoolArray, IntArray, components, has_marked, long_normals
 
 # A flap has at most this share of its body's area.
 _FLAP = 0.05
@@ -93,9 +93,7 @@ def rims_of(soup: Soup, fins: bool = False) -> Rims:
     flap = _flaps(soup, patch) | fin
     inverted = label[0::2] > low
     poll_stop()
-    a, b, c = (soup.vertices[soup.faces[:, i]] for i in range(3))
-    weighted = np.cross(b - a, c - a)
-    poll_stop()
+    weighted = long_normals(soup.vertices, soup.faces)
     weighted[inverted] *= -1
     inverted ^= _against_main(soup, patch, flap, weighted)
     weighted[flap] = 0
@@ -103,7 +101,7 @@ def rims_of(soup: Soup, fins: bool = False) -> Rims:
     tail, head = soup.faces.ravel()[rim], soup.faces[rim // 3, _NEXT[rim % 3]]
     on_rim = np.zeros(len(soup.vertices), dtype=bool)
     on_rim[tail] = on_rim[head] = True
-    beside_rim = np.flatnonzero(on_rim[soup.faces].any(axis=1))  # only these faces count at vertices of the rim
+    beside_rim = np.flatnonzero(has_marked(on_rim, soup.faces))  # only these faces count at vertices of the rim
     normal_of_vertex: FloatArray = np.stack(
         [
             np.bincount(soup.faces[beside_rim].ravel(), np.repeat(weighted[beside_rim, k], 3), len(soup.vertices))
@@ -308,8 +306,7 @@ def _against_main(soup: Soup, patch: IntArray, left_out: BoolArray, weighted: Fl
     island = island[np.lexsort((-soup.area[island], patch[island]))]
     island = island[np.unique(patch[island], return_index=True)[1]]
     corners = soup.faces[there].copy()
-    a, b, c = (soup.vertices[corners[:, i]] for i in range(3))
-    flipped = dots(np.cross(b - a, c - a), weighted[there]) < 0
+    flipped = dots(long_normals(soup.vertices, corners), weighted[there]) < 0
     corners[flipped] = corners[flipped, ::-1]
     query = SurfaceQuery(soup.vertices, corners)
     middle = soup.vertices[soup.faces[island]].mean(axis=1)

@@ -18,6 +18,8 @@ from rlacd.solid.topology import (
     Sides,
     components,
     face_areas,
+    has_marked,
+    long_normals,
     sides_of,
     signed_tetrahedra,
 )
@@ -67,7 +69,7 @@ class Soup:
 
     def at_valence(self, marked: BoolArray) -> BoolArray:
         """Return ``[F]`` whether a face has an edge of marked valence, given ``[E]`` marks."""
-        return np.asarray(marked[self.edges.of_halfedge].reshape(-1, 3).any(axis=1))
+        return has_marked(marked, self.edges.of_halfedge.reshape(-1, 3))
 
     @cached_property
     def body_of_side(self) -> IntArray:
@@ -127,8 +129,7 @@ def across(vertices: FloatArray, faces: IntArray, halfedges: IntArray) -> FloatA
 
 def face_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return ``[F, 3]`` the unit normals of faces; zero for those without an area."""
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    normal = np.cross(b - a, c - a)
+    normal = long_normals(vertices, faces)
     return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny))
 
 

@@ -225,6 +225,8 @@ class Component(Part):
     ----------
     solid : manifold3d.Manifold or (vertices, faces)
         The solid, in the normalised frame; not flat. A surface [V, 3], [F, 3] has to be closed and oriented.
+    threads : int
+        Number of threads that may prepare the tests of how well hulls are filled.
 
     Raises
     ------
@@ -232,12 +234,13 @@ class Component(Part):
         The solid is flat.
     """
 
-    def __init__(self, solid: Manifold | tuple[FloatArray, IntArray]) -> None:
+    def __init__(self, solid: Manifold | tuple[FloatArray, IntArray], threads: int = 1) -> None:
         vertices, faces = solid if isinstance(solid, tuple) else surface_of(solid)
         hull = Hull.of(vertices)
         if hull is None:
             raise ValueError("a component has to have a volume")
         super().__init__(vertices, faces, _native.mesh_volume(vertices, faces), hull)
+        self._threads = threads
         if isinstance(solid, Manifold):
             self.manifold = solid
 
@@ -254,7 +257,7 @@ class Component(Part):
     @cached_property
     def filling(self) -> _native.Filling:
         """Tests how well the hulls of the solid's parts are filled."""
-        return _native.Filling(self.vertices, self.faces)
+        return _native.Filling(self.vertices, self.faces, self._threads)
 
     @cached_property
     def principal_axes(self) -> FloatArray:

@@ -37,6 +37,13 @@ def nondegenerate(faces: IntArray) -> BoolArray:
     return result
 
 
+def has_marked(marked: BoolArray, corners: IntArray) -> BoolArray:
+    """Return ``[N]`` whether any of three corners (edges, ...) ``[N, 3]`` is marked."""
+    a, b, c = corners.T
+    result: BoolArray = marked[a] | marked[b] | marked[c]
+    return result
+
+
 def first_of_doubled(faces: IntArray, count: int) -> BoolArray:
     """Return ``[F]`` whether a face is the first with its three corners, in any order; ``count`` vertices exist."""
     return _native.first_of_doubled(np.ascontiguousarray(faces), count)
@@ -188,6 +195,11 @@ class Sides:
 def signed_tetrahedra(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return ``[F]`` the signed volume between the origin and each face."""
     return _native.signed_tetrahedra(vertices, faces)
+
+
+def long_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return ``[F, 3]`` the normal of each face, twice as long as its area."""
+    return _native.long_normals(vertices, faces)
 
 
 def face_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
