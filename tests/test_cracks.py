@@ -69,6 +69,22 @@ def test_only_faces_beside_free_edges_matter(seed: int, cut: float, missing: flo
     assert np.array_equal(origin, expected_origin)
 
 
+def test_an_edge_that_a_weld_leaves_free_counts() -> None:
+    """Two faces become one when a and b are welded: their other edge, from p to q, is free from then on."""
+    a, b, p, q, c, d, e, f = range(8)
+    pocket = [(0, 0, 0), (0, 0, 1e-6), (1, 0, 0), (1, 3e-4, 0), (0.5, -1, 0), (0.5, -1, 1), (0.5, 1, 0), (0.5, 1, 1)]
+    around_p, around_q = [(p, q, a), (p, a, c), (p, c, d), (p, d, b), (p, b, q)], [(q, b, e), (q, e, f), (q, f, a)]
+    crack = [(5, 0, 0), (5, 1, 0), (6, 0, 0), (5, 0, 1e-6), (5, 1, 1e-6), (4, 0, 0)]  # closes at the same time
+    vertices = np.array(pocket + crack, dtype=float)
+    faces = np.array([*around_p, *around_q, (8, 9, 10), (12, 11, 13)])
+    found, origin = close_cracks(vertices, faces, Edges.of(faces, len(vertices)), TOLERANCES)
+    assert p in found
+    assert q not in found
+    expected = closed_globally(vertices, faces)
+    assert np.array_equal(found, expected[0])
+    assert np.array_equal(origin, expected[1])
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_cracks_are_closed(seed: int) -> None:
     ball = trimesh.creation.icosphere(3)
