@@ -253,7 +253,8 @@ def _distances(
     solid: Solid, parts: Sequence[Part], workers: Workers, root: Component | None, overhang: float
 ) -> _Distances:
     known = root is not None and solid.is_as_given
-    surface = root.filling.surface if root is not None and known else solid.index or _native.Surface(*solid.surface)
+    surface = root.filling.surface if root is not None and known else solid.index
+    surface = surface or _native.Surface(*solid.surface, workers.threads)
     hulls = [part.hull for part in parts]
     found = hull_distances(hulls, *solid.surface, threads=workers.threads, surface=surface)
     if _is_undecided(found.over, overhang + HONEST_WITHIN) or _is_undecided(found.under, HONEST_WITHIN):
