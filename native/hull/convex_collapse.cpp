@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
 #include <map>
 #include <utility>
 
@@ -17,13 +19,19 @@ constexpr double kFlat = 1e-9;
 // A collapse whose point is farther away than this (the hull is about 2 wide) adds too much volume to be useful.
 constexpr double kReach = 50;
 
+// A facet with less area than this share of a square on its longest side has no usable normal.
+constexpr double kSliver = 1e-6;
+
+// Safety factor on the tolerance, since normals and depths are rounded.
+constexpr double kSafely = 1.1;
+
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
 }  // namespace
 
-ConvexCollapse::ConvexCollapse(const Mesh& hull, const std::function<bool(std::int32_t, std::int32_t)>& may_collapse)
-    : points_(hull.vertices),
-      facet_of_(hull.vertices.size(), -1),
-      version_(hull.vertices.size(), 0),
-      horizon_at_(hull.vertices.size(), -1) {
+ConvexCollapse::ConvexCollapse(const Mesh& hull, std::function<Vec3(Vec3)> placed, double tolerance)
+    : placed_(std::move(placed)), tolerance_(tolerance) {
+  for (const Vec3 point : hull.vertices) add_corner(point);
   std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> sides;
   for (const Triangle& face : hull.faces) {
     const std::int32_t f = add_facet(face[0], face[1], face[2]);
@@ -33,8 +41,7 @@ ConvexCollapse::ConvexCollapse(const Mesh& hull, const std::function<bool(std::i
     for (int i = 0; i < 3; ++i) facet.neighbour[i] = sides.at({facet.corner[(i + 1) % 3], facet.corner[i]});
   for (const std::int32_t f : facet_of_) alive_ += f >= 0;
   for (const auto& side : sides)
-    if (side.first.first < side.first.second && may_collapse(side.first.first, side.first.second))
-      schedule(side.first.first, side.first.second);
+    if (side.first.first < side.first.second) schedule(side.first.first, side.first.second);
 }
 
 std::vector<Vec3> ConvexCollapse::corners() const {
@@ -67,6 +74,57 @@ std::int32_t ConvexCollapse::add_facet(std::int32_t a, std::int32_t b, std::int3
   }
   facet_of_[a] = facet_of_[b] = facet_of_[c] = f;
   return f;
+}
+
+std::int32_t ConvexCollapse::add_corner(Vec3 point) {
+  points_.push_back(point);
+  if (placed_) places_.push_back(placed_(point));
+  reach_.push_back(kUnknown);
+  facet_of_.push_back(-1);
+  version_.push_back(0);
+  horizon_at_.push_back(-1);
+  return static_cast<std::int32_t>(points_.size()) - 1;
+}
+
+// Whether the new corner of an edge may be within the tolerance of the hull. It lies above all facets around both ends.
+// So a point of the hull within the tolerance of it is no deeper than that under these facets, and both ends are near
+// that point.
+bool ConvexCollapse::is_near(std::int32_t from, std::int32_t to) {
+  return !placed_ || norm(places_[to] - places_[from]) <= kSafely * tolerance_ * (reach(from) + reach(to));
+}
+
+// The greatest distance from a corner to a point of the hull at most t deep under every facet around the corner, in
+// multiples of t; infinity if no bound is known.
+//
+// The cone of the edges a -> v from a corner a contains the hull: x - a = sum c_v (v - a) with c_v >= 0. With N the
+// mean of the normals of the facets around a, the mean depth of x is N . (a - x) = sum c_v N . (a - v) <= t, so that |x
+// - a| <= sum c_v |v - a| is at most t times the greatest |v - a| / N . (a - v).
+double ConvexCollapse::reach(std::int32_t corner) {
+  double& reach = reach_[corner];
+  if (!std::isnan(reach)) return reach;
+  constexpr double kEverywhere = std::numeric_limits<double>::infinity();
+  const Vec3 a = places_[corner];
+  Vec3 normals;
+  double facets = 0;
+  reach = 0;
+  edges_.clear();
+  std::int32_t f = facet_of_[corner];
+  do {
+    const Facet& facet = facets_[f];
+    const int i = facet.corner[0] == corner ? 0 : facet.corner[1] == corner ? 1 : 2;
+    const Vec3 b = places_[facet.corner[(i + 1) % 3]] - a, c = places_[facet.corner[(i + 2) % 3]] - a;
+    const Vec3 product = cross(b, c);
+    if (norm(product) <= kSliver * std::max({norm2(b), norm2(c), norm2(c - b)})) return reach = kEverywhere;
+    normals = normals + normalized(product);
+    ++facets;
+    edges_.push_back(b);
+    f = facet.neighbour[(i + 2) % 3];
+  } while (f != facet_of_[corner]);
+  for (const Vec3 edge : edges_) {
+    const double depth = -dot(normals, edge) / facets;
+    reach = std::max(reach, depth > 0 ? norm(edge) / depth : kEverywhere);
+  }
+  return reach;
 }
 
 // The facets around two corners into region_; false when no edge joins the corners.
@@ -148,6 +206,7 @@ std::optional<ConvexCollapse::Collapse> ConvexCollapse::plan(std::int32_t from, 
 
 void ConvexCollapse::schedule(std::int32_t from, std::int32_t to) {
   poll_stop();
+  if (!is_near(from, to)) return;
   if (const std::optional<Collapse> collapse = plan(from, to)) {
     heap_.push_back(*collapse);
     std::push_heap(heap_.begin(), heap_.end());
@@ -168,12 +227,7 @@ void ConvexCollapse::apply(const Collapse& collapse) {
     facets_[f].alive = false;
     free_.push_back(f);
   }
-  const auto apex = static_cast<std::int32_t>(points_.size());
-  points_.push_back(collapse.point);
-  facet_of_.push_back(-1);
-  version_.push_back(0);
-  horizon_at_.push_back(-1);
-
+  const std::int32_t apex = add_corner(collapse.point);
   std::vector<std::int32_t> fan;
   for (const HorizonEdge& edge : ring) fan.push_back(add_facet(edge.from, edge.to, apex));
   for (std::size_t i = 0; i < ring.size(); ++i) {
@@ -188,7 +242,10 @@ void ConvexCollapse::apply(const Collapse& collapse) {
   // Corners of the region that remain are those on the ring: the fan has given them a facet again.
   ++alive_;
   for (const std::int32_t corner : touched) alive_ -= facet_of_[corner] < 0;
-  for (const HorizonEdge& edge : ring) ++version_[edge.from];
+  for (const HorizonEdge& edge : ring) {
+    ++version_[edge.from];
+    reach_[edge.from] = kUnknown;
+  }
   for (const HorizonEdge& edge : ring) schedule(edge.from, apex);
 }
 

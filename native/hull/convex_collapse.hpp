@@ -18,10 +18,10 @@ namespace rlacd {
 
 class ConvexCollapse {
  public:
-  // may_collapse(from, to) excludes edges of the hull that need not be tried.
-  explicit ConvexCollapse(
-      const Mesh& hull, const std::function<bool(std::int32_t, std::int32_t)>& may_collapse =
-                            [](std::int32_t, std::int32_t) { return true; });
+  explicit ConvexCollapse(const Mesh& hull) : ConvexCollapse(hull, {}, 0) {}
+  // The same if no corner is acceptable that is farther than the tolerance from the hull, measured where `placed` puts
+  // corners: most edges are too long then, which is seen before their new corner is known.
+  ConvexCollapse(const Mesh& hull, std::function<Vec3(Vec3)> placed, double tolerance);
 
   // Collapses edges while there are more than `most` corners, and beyond that while the new corner is acceptable. False
   // if no edge can be collapsed although there are still too many corners.
@@ -53,6 +53,9 @@ class ConvexCollapse {
   };
 
   std::int32_t add_facet(std::int32_t a, std::int32_t b, std::int32_t c);
+  std::int32_t add_corner(Vec3 point);
+  bool is_near(std::int32_t from, std::int32_t to);
+  double reach(std::int32_t corner);
   bool gather(std::int32_t from, std::int32_t to);
   bool extend(Vec3 point);
   bool trace_horizon();
@@ -60,7 +63,10 @@ class ConvexCollapse {
   void schedule(std::int32_t from, std::int32_t to);
   void apply(const Collapse& collapse);
 
-  std::vector<Vec3> points_;
+  const std::function<Vec3(Vec3)> placed_;
+  const double tolerance_;
+  std::vector<Vec3> points_, places_;
+  std::vector<double> reach_;  // of a corner; not a number where it is not known
   std::vector<Facet> facets_;
   std::vector<std::int32_t> facet_of_;  // one living facet of each living corner, -1 for the dead
   std::vector<std::uint32_t> version_;  // of a corner: changes with its facets
@@ -74,6 +80,7 @@ class ConvexCollapse {
   std::vector<HorizonEdge> horizon_;
   std::vector<std::int32_t> horizon_at_;  // of a corner: the horizon edge that starts there
   std::vector<Above> above_;
+  std::vector<Vec3> edges_;
 };
 
 template <class Acceptable>

@@ -25,14 +25,6 @@ constexpr int kSweepsOnTheWay = 3, kSweepsAtTheEnd = 30;
 // and where two facets meet at the tip of a needle that much of its length would be left outside.
 constexpr double kThinnest = 1e-9;
 
-// A facet with less area than this share of a square on its longest side has no usable normal.
-constexpr double kSliver = 1e-6;
-
-// Safety factor on the tolerance, since normals and depths are rounded.
-constexpr double kSafely = 4;
-
-constexpr double kUnknown = std::numeric_limits<double>::infinity();
-
 // The affine map to a frame where the hull is about 2 wide in three perpendicular directions and around the origin. The
 // directions come from extreme points (the longest line, the point farthest from it), not from second moments, whose
 // cancellation would lose a plate's thickness below 1e-8 of its width.
@@ -185,35 +177,6 @@ std::vector<std::size_t> stages(std::size_t corners, std::size_t most) {
   return sizes;
 }
 
-// For every corner of a convex hull, the greatest distance to a point of the hull at most t deep under every facet
-// around the corner, in multiples of t; infinity if no bound is known.
-//
-// The cone of the edges a -> v from a corner a contains the hull: x - a = sum c_v (v - a) with c_v >= 0. With N the
-// mean of the normals of the facets around a, the mean depth of x is N . (a - x) = sum c_v N . (a - v) <= t, so that |x
-// - a| <= sum c_v |v - a| is at most t times the greatest |v - a| / N . (a - v).
-std::vector<double> reach_of_corners(const Mesh& hull) {
-  std::vector<Vec3> normal(hull.vertices.size());
-  std::vector<double> facets(hull.vertices.size(), 0), reach(hull.vertices.size(), 0);
-  for (const Triangle& f : hull.faces) {
-    const Vec3 a = hull.vertices[f[0]];
-    const Vec3 b = hull.vertices[f[1]] - a, c = hull.vertices[f[2]] - a, product = cross(b, c);
-    const bool is_sliver = norm(product) <= kSliver * std::max({norm2(b), norm2(c), norm2(c - b)});
-    for (const std::int32_t corner : f) {
-      if (is_sliver) reach[corner] = kUnknown;
-      normal[corner] = normal[corner] + normalized(product);
-      ++facets[corner];
-    }
-  }
-  for (const Triangle& f : hull.faces)
-    for (int e = 0; e < 3; ++e) {  // every edge from both ends: the mesh is closed
-      const std::int32_t a = f[e];
-      const Vec3 edge = hull.vertices[f[(e + 1) % 3]] - hull.vertices[a];
-      const double depth = -dot(normal[a], edge) / facets[a];
-      reach[a] = std::max(reach[a], depth > 0 ? norm(edge) / depth : kUnknown);
-    }
-  return reach;
-}
-
 }  // namespace
 
 Mesh simplify_hull(const Mesh& hull, std::size_t max_vertices, std::size_t max_faces, double tolerance) {
@@ -235,15 +198,7 @@ Mesh simplify_hull(const Mesh& hull, std::size_t max_vertices, std::size_t max_f
     return planes.nearest(p).depth >= -tolerance && surface.closest(p).distance2 <= tolerance * tolerance;
   };
   if (inner.vertices.size() <= most) {
-    // The new corner of a collapse lies above all facets around both ends of its edge. If it is redundant, it is within
-    // the tolerance of a point of the hull that is no deeper than that under them: the ends are near it, and each
-    // other.
-    Mesh corners = inner;
-    for (Vec3& p : corners.vertices) p = whitening.from(p);
-    const std::vector<double> reach = reach_of_corners(corners);
-    ConvexCollapse collapse(inner, [&](std::int32_t a, std::int32_t b) {
-      return norm(corners.vertices[b] - corners.vertices[a]) <= kSafely * tolerance * (reach[a] + reach[b]);
-    });
+    ConvexCollapse collapse(inner, [&](Vec3 p) { return whitening.from(p); }, tolerance);
     collapse.reduce(most, redundant);
     const std::vector<Vec3> left = collapse.corners();
     return left.size() == hull.vertices.size() ? hull : brought_back(hull_mesh(left), inner, whitening);
