@@ -127,6 +127,8 @@ def test_bodies_areas_and_volumes_of_soups(seed: int, count: int, faces: int) ->
     np.testing.assert_allclose(signed_tetrahedra(vertices, triangles), np.linalg.det(corners) / 6, atol=1e-14)
     along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     assert np.array_equal(long_normals(vertices, triangles), np.cross(along, across))
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0)
+    np.testing.assert_allclose(_native.longest_edges(vertices, triangles), edges, rtol=1e-14)
 
 
 @pytest.mark.parametrize("inward", [False, True])

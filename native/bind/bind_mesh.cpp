@@ -223,6 +223,23 @@ void bind_mesh(nb::module_& m) {
       },
       nb::arg("vertices"), nb::arg("faces"), "The normal [F, 3] of each face, twice as long as its area.");
   m.def(
+      "longest_edges",
+      [](const PointsIn& vertices, const WideFacesIn& faces) {
+        const Mesh mesh = to_wide_mesh(vertices, faces);
+        std::vector<double> longest(mesh.faces.size());
+        {
+          nb::gil_scoped_release release;
+          for (std::size_t f = 0; f < longest.size(); ++f) {
+            if (f % kBetweenPolls == 0) poll_stop();
+            const auto [i, j, k] = mesh.faces[f];
+            const Vec3 a = mesh.vertices[i], b = mesh.vertices[j], c = mesh.vertices[k];
+            longest[f] = std::sqrt(std::max({norm2(b - a), norm2(c - b), norm2(a - c)}));
+          }
+        }
+        return to_array<double>(std::move(longest));
+      },
+      nb::arg("vertices"), nb::arg("faces"), "The length [F] of the longest edge of each face.");
+  m.def(
       "signed_tetrahedra",
       [](const PointsIn& vertices, const WideFacesIn& faces) {
         const Mesh mesh = to_wide_mesh(vertices, faces);

@@ -90,6 +90,7 @@ def spread_points(
 ) -> tuple[FloatArray, IntArray]: ...  # [N, 3], [N]
 def components(count: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> tuple[int, NDArray[np.int64]]: ...
 def long_normals(vertices: FloatArray, faces: NDArray[np.int64]) -> FloatArray: ...  # [F, 3]
+def longest_edges(vertices: FloatArray, faces: NDArray[np.int64]) -> FloatArray: ...  # [F]
 def face_areas(vertices: FloatArray, faces: NDArray[np.int64]) -> FloatArray: ...  # [F]
 def signed_tetrahedra(vertices: FloatArray, faces: NDArray[np.int64]) -> FloatArray: ...  # [F]
 def closed_bodies(

@@ -9,7 +9,6 @@ import numpy as np
 from rlacd import _native
 from rlacd._native import Surface, poll_stop
 from rlacd.solid.frame import FloatArray
-from rlacd.solid.products import dots
 from rlacd.solid.topology import BoolArray, IntArray, first_of_doubled
 
 # Points of a triangle at which it is looked whether it lies inside a body: near its corners, its edges, its middle.
@@ -72,10 +71,7 @@ def points_covering(vertices: FloatArray, faces: IntArray, spacing: float) -> tu
 
     Returns the points ``[N, 3]`` and a face ``[N]`` each lies on. Faces no larger than `spacing` share their corners.
     """
-    a, b, c = (vertices[corner] for corner in faces.T)
-    small: BoolArray = np.ones(len(faces), dtype=bool)
-    for edge in (b - a, c - b, a - c):
-        small &= dots(edge, edge) <= spacing**2
+    small = _native.longest_edges(vertices, faces) <= spacing
     first = np.full(len(vertices), -1, dtype=np.int64)
     numbers = np.flatnonzero(small)
     poll_stop()
