@@ -528,7 +528,10 @@ def test_the_command_says_what_is_wrong_in_one_sentence(mesh: Path, words: list[
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for one process")
 def test_the_command_tells_its_address_and_ends_with_ctrl_c(mesh: Path) -> None:
-    command = [sys.executable, "-c", "from rlacd.cli.main import main; main()", "view", str(mesh), "--no-browser"]
+    # Background jobs of a shell ignore Ctrl-C, and so would this one.
+    heed = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+    start = f"{heed}; from rlacd.cli.main import main; main()"
+    command = [sys.executable, "-c", start, "view", str(mesh), "--no-browser"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         try:
             assert process.stderr is not None
