@@ -55,6 +55,27 @@ nb::tuple as_tuple(Mesh&& mesh) {
   return nb::make_tuple(to_array<double>(std::move(mesh.vertices)), to_array<std::int32_t>(std::move(mesh.faces)));
 }
 
+// Binds what is measured on every face of a mesh, given its corners.
+template <class Value, class Measure>
+void def_on_faces(nb::module_& m, const char* name, const char* text, const Measure& measure) {
+  m.def(
+      name,
+      [measure](const PointsIn& vertices, const WideFacesIn& faces) {
+        const Mesh mesh = to_wide_mesh(vertices, faces);
+        std::vector<Value> values(mesh.faces.size());
+        {
+          nb::gil_scoped_release release;
+          for (std::size_t f = 0; f < values.size(); ++f) {
+            if (f % kBetweenPolls == 0) poll_stop();
+            const auto [a, b, c] = mesh.faces[f];
+            values[f] = measure(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]);
+          }
+        }
+        return to_array<double>(std::move(values));
+      },
+      nb::arg("vertices"), nb::arg("faces"), text);
+}
+
 }  // namespace
 
 void bind_mesh(nb::module_& m) {
@@ -190,71 +211,15 @@ void bind_mesh(nb::module_& m) {
       nb::arg("count"), nb::arg("a"), nb::arg("b"),
       "Connected components under links a[i] - b[i]: their number, and the label [count] of each node, by first "
       "nodes.");
-  m.def(
-      "face_areas",
-      [](const PointsIn& vertices, const WideFacesIn& faces) {
-        const Mesh mesh = to_wide_mesh(vertices, faces);
-        std::vector<double> area(mesh.faces.size());
-        {
-          nb::gil_scoped_release release;
-          for (std::size_t f = 0; f < area.size(); ++f) {
-            if (f % kBetweenPolls == 0) poll_stop();
-            const auto [a, b, c] = mesh.faces[f];
-            area[f] = norm(cross(mesh.vertices[b] - mesh.vertices[a], mesh.vertices[c] - mesh.vertices[a])) / 2;
-          }
-        }
-        return to_array<double>(std::move(area));
-      },
-      nb::arg("vertices"), nb::arg("faces"), "The area [F] of each face.");
-  m.def(
-      "long_normals",
-      [](const PointsIn& vertices, const WideFacesIn& faces) {
-        const Mesh mesh = to_wide_mesh(vertices, faces);
-        std::vector<Vec3> normals(mesh.faces.size());
-        {
-          nb::gil_scoped_release release;
-          for (std::size_t f = 0; f < normals.size(); ++f) {
-            if (f % kBetweenPolls == 0) poll_stop();
-            const auto [a, b, c] = mesh.faces[f];
-            normals[f] = cross(mesh.vertices[b] - mesh.vertices[a], mesh.vertices[c] - mesh.vertices[a]);
-          }
-        }
-        return to_array<double>(std::move(normals));
-      },
-      nb::arg("vertices"), nb::arg("faces"), "The normal [F, 3] of each face, twice as long as its area.");
-  m.def(
-      "longest_edges",
-      [](const PointsIn& vertices, const WideFacesIn& faces) {
-        const Mesh mesh = to_wide_mesh(vertices, faces);
-        std::vector<double> longest(mesh.faces.size());
-        {
-          nb::gil_scoped_release release;
-          for (std::size_t f = 0; f < longest.size(); ++f) {
-            if (f % kBetweenPolls == 0) poll_stop();
-            const auto [i, j, k] = mesh.faces[f];
-            const Vec3 a = mesh.vertices[i], b = mesh.vertices[j], c = mesh.vertices[k];
-            longest[f] = std::sqrt(std::max({norm2(b - a), norm2(c - b), norm2(a - c)}));
-          }
-        }
-        return to_array<double>(std::move(longest));
-      },
-      nb::arg("vertices"), nb::arg("faces"), "The length [F] of the longest edge of each face.");
-  m.def(
-      "signed_tetrahedra",
-      [](const PointsIn& vertices, const WideFacesIn& faces) {
-        const Mesh mesh = to_wide_mesh(vertices, faces);
-        std::vector<double> volume(mesh.faces.size());
-        {
-          nb::gil_scoped_release release;
-          for (std::size_t f = 0; f < volume.size(); ++f) {
-            if (f % kBetweenPolls == 0) poll_stop();
-            const auto [a, b, c] = mesh.faces[f];
-            volume[f] = dot(mesh.vertices[a], cross(mesh.vertices[b], mesh.vertices[c])) / 6;
-          }
-        }
-        return to_array<double>(std::move(volume));
-      },
-      nb::arg("vertices"), nb::arg("faces"), "The signed volume [F] between the origin and each face.");
+  def_on_faces<double>(m, "face_areas", "The area [F] of each face.",
+                       [](Vec3 a, Vec3 b, Vec3 c) { return norm(cross(b - a, c - a)) / 2; });
+  def_on_faces<Vec3>(m, "long_normals", "The normal [F, 3] of each face, twice as long as its area.",
+                     [](Vec3 a, Vec3 b, Vec3 c) { return cross(b - a, c - a); });
+  def_on_faces<double>(
+      m, "longest_edges", "The length [F] of the longest edge of each face.",
+      [](Vec3 a, Vec3 b, Vec3 c) { return std::sqrt(std::max({norm2(b - a), norm2(c - b), norm2(a - c)})); });
+  def_on_faces<double>(m, "signed_tetrahedra", "The signed volume [F] between the origin and each face.",
+                       [](Vec3 a, Vec3 b, Vec3 c) { return dot(a, cross(b, c)) / 6; });
   m.def(
       "spread_points",
       [](const PointsIn& vertices, const WideFacesIn& faces, double spacing) {

@@ -63,7 +63,7 @@ def skins(soup: Soup, record: Record, by_faces: bool = False) -> list[tuple[Shap
     # The two side components of a flat closed body mirror each other: build the fronts.
     flat = (np.abs(sides.volume) <= none) & ~has_sheet & is_front
     keep = (sides.volume > none) | (has_sheet & (sides.volume >= -none)) | flat
-    if sides.volume[keep].shape == (1,) and not has_sheet.any() and (soup.edges.valence == 2).all():
+    if keep.sum() == 1 and not has_sheet.any() and (soup.edges.valence == 2).all():
         simple = _wound_like(soup, keep)
         taken = one_body(*simple)
         if taken is not None and not taken[1]:

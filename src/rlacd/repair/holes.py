@@ -14,7 +14,16 @@ import numpy as np
 from rlacd._native import PointTree, least_bent, poll_stop
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.products import dots
-from rlacd.solid.topology import BoolArray, Edges, IntArray, components, first_of_doubled, has_marked, nondegenerate
+from rlacd.solid.topology import (
+    BoolArray,
+    Edges,
+    IntArray,
+    components,
+    first_of_doubled,
+    has_marked,
+    marked,
+    nondegenerate,
+)
 
 # Optimal triangulation considers all triples of corners; longer loops are cut by ears, or up to a length if that fails.
 _EXACT_LOOP = 60
@@ -44,8 +53,8 @@ def close_cracks(
         if not 0 < len(free) <= MOST_FREE_EDGES:
             break
         # Only faces with free vertices change. All faces at their corners are needed, for the valence of their edges.
-        changing = has_marked(_marked(free, len(vertices)), faces)
-        inner = _marked(faces[changing], len(vertices))
+        changing = has_marked(marked(free, len(vertices)), faces)
+        inner = marked(faces[changing], len(vertices))
         near = has_marked(inner, faces)
         welded = weld_free_vertices(vertices, faces[near], free, tolerance)
         split, parent, is_piece = split_at_free_vertices(vertices, welded, inner, tolerance)
@@ -64,12 +73,6 @@ def close_cracks(
             origin = np.concatenate([origin[kept], origin[at[parent[pieces]]]])
             free = left
     return faces, origin
-
-
-def _marked(vertices: IntArray, count: int) -> BoolArray:
-    marked = np.zeros(count, dtype=bool)
-    marked[vertices] = True
-    return marked
 
 
 def weld_free_vertices(vertices: FloatArray, faces: IntArray, free: IntArray, tolerance: float) -> IntArray:

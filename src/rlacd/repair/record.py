@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rlacd.solid.solid import BodyRepair
-from rlacd.solid.topology import BoolArray, IntArray
+from rlacd.solid.topology import BoolArray, IntArray, marked
 
 STEPS = ("closed", "reoriented", "outer skin", "welded", "capped", "slab", "wrapped", "hull")
 """The possible steps for a body, from the least change to the most."""
@@ -39,8 +39,7 @@ class Record:
 
     def note(self, bodies: IntArray, step: str) -> None:
         """Record a step; a body keeps the one that changes it most."""
-        noted = np.zeros(self.bodies, dtype=bool)
-        noted[bodies] = True
+        noted = marked(bodies, self.bodies)
         self.step[noted] = np.maximum(self.step[noted], STEPS.index(step))
 
     def has(self, step: str) -> BoolArray:

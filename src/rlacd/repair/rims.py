@@ -22,7 +22,7 @@ from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.soup import Soup, across
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.products import dots
-from rlacd.solid.topology import BoolArray, IntArray, components, has_marked, long_normals
+from rlacd.solid.topology import BoolArray, IntArray, both_sides, components, has_marked, long_normals, marked
 
 # A flap has at most this share of its body's area.
 _FLAP = 0.05
@@ -87,9 +87,7 @@ def rims_of(soup: Soup, fins: bool = False) -> Rims:
         label = _sides(soup, mate)
     poll_stop()
     low = np.minimum(label[0::2], label[1::2])
-    is_low = np.zeros(len(label), dtype=bool)
-    is_low[low] = True
-    patch = (np.cumsum(is_low) - 1)[low]
+    patch = (np.cumsum(marked(low, len(label))) - 1)[low]
     flap = _flaps(soup, patch) | fin
     inverted = label[0::2] > low
     poll_stop()
@@ -99,8 +97,7 @@ def rims_of(soup: Soup, fins: bool = False) -> Rims:
     weighted[flap] = 0
     rim = np.flatnonzero((mate < 0) & np.repeat(~flap, 3))
     tail, head = soup.faces.ravel()[rim], soup.faces[rim // 3, _NEXT[rim % 3]]
-    on_rim = np.zeros(len(soup.vertices), dtype=bool)
-    on_rim[tail] = on_rim[head] = True
+    on_rim = marked(np.concatenate([tail, head]), len(soup.vertices))
     beside_rim = np.flatnonzero(has_marked(on_rim, soup.faces))  # only these faces count at vertices of the rim
     normal_of_vertex: FloatArray = np.stack(
         [
@@ -135,7 +132,7 @@ def _sides(soup: Soup, mate: IntArray) -> IntArray:
     turned = forward[mated] == forward[mate[mated]]
     if not turned.any():  # fronts join fronts, and backs backs
         _, patch = components(len(soup.faces), mated // 3, mate[mated] // 3)
-        return (2 * patch[:, None] + np.arange(2)).ravel()
+        return both_sides(patch)
     front, other = 2 * (mated // 3), 2 * (mate[mated] // 3)
     return components(
         2 * len(soup.faces), np.concatenate([front, front + 1]), np.concatenate([other + turned, other + 1 - turned])

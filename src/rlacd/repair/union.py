@@ -87,16 +87,12 @@ def unite(solids: Sequence[Shape], *, keep_cavities: bool = False) -> Shape:
     """Unite solids and fill the cavities nothing can reach; one that is no manifold has none (`one_body`)."""
     if len(solids) == 1 and not isinstance(solids[0], Manifold):
         return solids[0]
-    return _united_and_filled([as_manifold(solid) for solid in solids], keep_cavities)
-
-
-def _united_and_filled(solids: list[Manifold], keep_cavities: bool) -> Shape:
-    solids = [s for s in solids if not s.is_empty()]
-    if not solids:
+    manifolds = [manifold for solid in solids if not (manifold := as_manifold(solid)).is_empty()]
+    if not manifolds:
         return Manifold()
-    if len(solids) > MOST_UNITED:
-        return Manifold.compose(solids)
-    united = _united(solids)
+    if len(manifolds) > MOST_UNITED:
+        return Manifold.compose(manifolds)
+    united = _united(manifolds)
     # More cavity than solid means shells that came out inside out, not cavities.
     return united if keep_cavities and united.volume() > 0 else _without_cavities(united)
 
@@ -191,22 +187,20 @@ def _of_faces(vertices: FloatArray, faces: NDArray[Index]) -> tuple[FloatArray, 
 
 def _united(solids: list[Manifold]) -> Manifold:
     """Unite solids, always those with the fewest triangles first: what is large takes part in few booleans."""
-    waiting = [(solid.num_tri(), i) for i, solid in enumerate(solids)]
+    waiting = [(solid.num_tri(), i, solid) for i, solid in enumerate(solids)]
     heapq.heapify(waiting)
-    some = dict(enumerate(solids))
-    for newest in range(len(solids), 2 * len(solids) - 1):
+    newest = len(solids)
+    while len(waiting) > 1:
         group: list[Manifold] = []
         triangles = 0
         while waiting and (len(group) < 2 or triangles + waiting[0][0] <= _AT_ONCE):
-            more, i = heapq.heappop(waiting)
-            group.append(some.pop(i))
+            more, _, solid = heapq.heappop(waiting)
+            group.append(solid)
             triangles += more
         union = _united_at_once(group, triangles)
-        if not waiting:
-            return union
-        some[newest] = union
-        heapq.heappush(waiting, (union.num_tri(), newest))
-    return solids[0]
+        heapq.heappush(waiting, (union.num_tri(), newest, union))
+        newest += 1
+    return waiting[0][2]
 
 
 def _united_at_once(solids: list[Manifold], triangles: int) -> Manifold:

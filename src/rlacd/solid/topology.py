@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,10 +37,17 @@ def nondegenerate(faces: IntArray) -> BoolArray:
     return result
 
 
-def has_marked(marked: BoolArray, corners: IntArray) -> BoolArray:
+def marked(items: IntArray, count: int) -> BoolArray:
+    """Return ``[count]`` which numbers are among the items."""
+    found = np.zeros(count, dtype=bool)
+    found[items] = True
+    return found
+
+
+def has_marked(mark: BoolArray, corners: IntArray) -> BoolArray:
     """Return ``[N]`` whether any of three corners (edges, ...) ``[N, 3]`` is marked."""
     a, b, c = corners.T
-    result: BoolArray = marked[a] | marked[b] | marked[c]
+    result: BoolArray = mark[a] | mark[b] | mark[c]
     return result
 
 
@@ -172,10 +179,6 @@ class Sides:
     area: FloatArray
     sheet: BoolArray
 
-    @cached_property
-    def _wedges(self) -> tuple[IntArray, IntArray]:
-        return self.find_wedges()
-
     @property
     def wedges(self) -> IntArray:
         """Pairs of halfedges ``(h, g)``, ``[W, 2]``.
@@ -184,12 +187,12 @@ class Sides:
         in between. A boundary edge gives ``h == g``. Faces at equal angles, to the precision of float32 files, and all
         around edges of trusted faces alternate as their windings require.
         """
-        return self._wedges[0]
+        return self.find_wedges()[0]
 
     @property
     def facing(self) -> IntArray:
         """The sides that bound each wedge ``[W, 2]``, on its first and on its second halfedge."""
-        return self._wedges[1]
+        return self.find_wedges()[1]
 
 
 def signed_tetrahedra(vertices: FloatArray, faces: IntArray) -> FloatArray:
@@ -211,6 +214,11 @@ def _sums(group: IntArray, values: FloatArray, number: int) -> FloatArray:
     return np.bincount(group, values, number).astype(np.float64)
 
 
+def both_sides(patch: IntArray) -> IntArray:
+    """Return ``[2F]`` the component of every side if fronts join only fronts, given the patch ``[F]`` of each face."""
+    return (2 * patch[:, None] + np.arange(2)).ravel()
+
+
 def sides_of(vertices: FloatArray, faces: IntArray, edges: Edges, trusted: BoolArray | None = None) -> Sides:
     """Join the sides of all faces across their wedges, except where ``trusted`` ``[F]`` faces meet by their angles."""
 
@@ -220,7 +228,7 @@ def sides_of(vertices: FloatArray, faces: IntArray, edges: Edges, trusted: BoolA
 
     if (edges.valence == 2).all() and is_balanced(faces, edges).all():
         number, patch = components(len(faces), *(edges.halfedges // 3))
-        number, label = 2 * number, (2 * patch[:, None] + np.arange(2)).ravel()  # fronts join fronts, and backs backs
+        number, label = 2 * number, both_sides(patch)
     else:
         number, label = components(2 * len(faces), *np.ascontiguousarray(wedges()[1].T))
     poll_stop()
