@@ -25,6 +25,7 @@ import rlacd
 from rlacd import work
 from rlacd.criteria.concavity import Concavity, ConcavityScreen
 from rlacd.merge import merge
+from rlacd.policies import Greedy
 from rlacd.search import recut
 from rlacd.search.neighbourhood import Neighbourhood
 from rlacd.search.operators import OperatorSampler, Trial
@@ -34,10 +35,20 @@ from rlacd.solid.hull import Hull
 Sizes = tuple[int, ...]
 
 KERNELS: dict[str, tuple[Any, str, Callable[..., Sizes], Callable[..., float]]] = {
+    "choosing": (Greedy, "choose", lambda policy, component, threads: (len(component.faces),), work.choosing),
     "cutting": (Component, "cut", lambda part, plane: (part.size,), work.cutting),
     "judging": (Concavity, "is_met", lambda goal, part: (len(part.faces), len(part.hull.faces)), work.judging),
-    "joining": (Hull, "around", lambda a, b: (len(a.vertices) + len(b.vertices),), work.joining),
+    "joining": (Hull, "around", lambda *hulls: (sum(len(hull.vertices) for hull in hulls),), work.joining),
     "testing": (ConcavityScreen, "feasibility", lambda screen, solid, hull: (len(hull.vertices),), work.testing),
+    "screening": (
+        ConcavityScreen,
+        "feasibilities",
+        lambda screen, solid, hulls, pairs, threads: (
+            len(pairs),
+            sum(len(hulls[i].vertices) for i in pairs.ravel().tolist()),
+        ),
+        lambda pairs, vertices: pairs * work.screening(0) + work.screening(vertices) - work.screening(0),
+    ),
     "probing": (ConcavityScreen, "forbids", lambda screen, solid, hull: (len(hull.vertices),), work.probing),
     "gluing": (Part, "glued", lambda a, b, hull=None: (a.size + b.size,), work.gluing),
     "filling": (

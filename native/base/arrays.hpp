@@ -28,17 +28,21 @@ inline std::vector<Vec3> to_points(const PointsIn& array) {
   return points;
 }
 
-// Copies a mesh in and checks its indices, so that no kernel can read out of bounds.
+// Copies faces in and checks their indices, so that no kernel can read out of bounds.
+inline std::vector<Triangle> to_faces(const FacesIn& array, std::size_t vertices) {
+  std::vector<Triangle> faces(array.shape(0));
+  if (!faces.empty()) std::memcpy(static_cast<void*>(faces.data()), array.data(), faces.size() * sizeof(Triangle));
+  const auto count = static_cast<std::int64_t>(vertices);
+  for (const Triangle& face : faces)
+    for (const std::int32_t corner : face)
+      if (corner < 0 || corner >= count) throw std::invalid_argument("face index out of range");
+  return faces;
+}
+
 inline Mesh to_mesh(const PointsIn& vertices, const FacesIn& faces) {
   Mesh mesh;
   mesh.vertices = to_points(vertices);
-  mesh.faces.resize(faces.shape(0));
-  if (!mesh.faces.empty())
-    std::memcpy(static_cast<void*>(mesh.faces.data()), faces.data(), mesh.faces.size() * sizeof(Triangle));
-  const auto count = static_cast<std::int64_t>(mesh.vertices.size());
-  for (const Triangle& face : mesh.faces)
-    for (const std::int32_t corner : face)
-      if (corner < 0 || corner >= count) throw std::invalid_argument("face index out of range");
+  mesh.faces = to_faces(faces, mesh.vertices.size());
   return mesh;
 }
 

@@ -34,6 +34,8 @@ inline double max_abs(Vec3 a) { return std::max(std::max(std::fabs(a.x), std::fa
 
 using Triangle = std::array<std::int32_t, 3>;  // indices of the corners, counter-clockwise seen from outside
 
+using PlanePoint = std::array<double, 2>;
+
 struct Mesh {
   std::vector<Vec3> vertices;
   std::vector<Triangle> faces;

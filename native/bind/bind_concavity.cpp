@@ -50,6 +50,15 @@ void bind_concavity(nb::module_& m) {
       "one-sided distance may be wider below the value, where the others decide it. Values up to `floor` need not be "
       "told\n"
       "apart: the interval may then be as wide as (0, floor), which is much faster for nearly convex parts.");
+  nb::class_<HullCorners>(m, "HullCorners", "The corners of a convex hull, prepared for `joint_feasibilities`.")
+      .def(
+          "__init__",
+          [](HullCorners* self, const PointsIn& corners) {
+            std::vector<Vec3> points = to_points(corners);
+            require_finite(points);
+            new (self) HullCorners(std::move(points));
+          },
+          nb::arg("corners"));
   nb::class_<Filling>(m, "Filling", "A closed solid that hulls of its parts are held against.")
       .def(
           "__init__",
@@ -73,14 +82,12 @@ void bind_concavity(nb::module_& m) {
           "0: they may; 1: they are not; 2: nor are those of any hull that holds this one.")
       .def(
           "joint_feasibilities",
-          [](const Filling& self, const std::vector<PointsIn>& groups,
+          [](const Filling& self, const std::vector<const HullCorners*>& hulls,
              const nb::ndarray<const std::int32_t, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>& pairs,
              double threshold, int threads) {
-            std::vector<HullCorners> corners;
-            for (const PointsIn& group : groups) corners.emplace_back(to_points(group));
             const std::vector<std::int32_t> pair(pairs.data(), pairs.data() + pairs.size());
             for (const std::int32_t g : pair)
-              if (g < 0 || g >= static_cast<std::int64_t>(groups.size()))
+              if (g < 0 || g >= static_cast<std::int64_t>(hulls.size()) || hulls[g] == nullptr)
                 throw std::invalid_argument("pair out of range");
             std::vector<double> volumes(pairs.shape(0));
             std::vector<std::int32_t> verdicts(pairs.shape(0));
@@ -88,20 +95,18 @@ void bind_concavity(nb::module_& m) {
               nb::gil_scoped_release release;
               parallel_for(volumes.size(), resolve_threads(threads), [&](std::size_t i) {
                 const Filling::Joint joint =
-                    self.joint_feasibility(corners[pair[2 * i]], corners[pair[2 * i + 1]], threshold);
+                    self.joint_feasibility(*hulls[pair[2 * i]], *hulls[pair[2 * i + 1]], threshold);
                 volumes[i] = joint.volume;
                 verdicts[i] = static_cast<std::int32_t>(joint.feasibility);
               });
             }
             return nb::make_tuple(to_array<double>(std::move(volumes)), to_array<std::int32_t>(std::move(verdicts)));
           },
-          nb::arg("groups"), nb::arg("pairs"), nb::arg("threshold"), nb::arg("threads") = 0,
-          "Volumes [P] of the joint hulls of pairs [P, 2] of hulls, given by their corners, a list of arrays [N, 3], "
-          "and\n"
-          "the `feasibility` [P] of each, where the hulls themselves are close enough to their shares of the solid. "
-          "There "
-          "is no\n"
-          "volume (0) where it is 2.")
+          nb::arg("hulls"), nb::arg("pairs"), nb::arg("threshold"), nb::arg("threads") = 0,
+          "Volumes [P] of the joint hulls of pairs [P, 2] of hulls, and the `feasibility` [P] of each, decided less\n"
+          "thoroughly than for a single hull, where the hulls themselves are close enough to their shares of the "
+          "solid.\n"
+          "There is no volume (0) where it is 2.")
       .def(
           "comes_deeper",
           [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces, double threshold) {

@@ -53,7 +53,7 @@ void bind_hull(nb::module_& m) {
   m.def(
       "outline",
       [](const PlanePointsIn& array) {
-        std::vector<std::array<double, 2>> points(array.shape(0));
+        std::vector<PlanePoint> points(array.shape(0));
         for (std::size_t i = 0; i < points.size(); ++i) {
           points[i] = {array(i, 0), array(i, 1)};
           if (!std::isfinite(points[i][0]) || !std::isfinite(points[i][1]))

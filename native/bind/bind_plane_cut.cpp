@@ -2,6 +2,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "base/arrays.hpp"
+#include "base/mesh_measures.hpp"
 #include "cut/bodies.hpp"
 #include "cut/plane_cut.hpp"
 #include "cut/uncross.hpp"
@@ -27,7 +28,8 @@ nb::tuple as_tuple(OpenSide&& side, Vec3 outward) {
 }
 
 using RimsIn = std::vector<nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>>;
-using OutlinesIn = std::vector<nb::ndarray<const double, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>>;
+using OutlineIn = nb::ndarray<const double, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
+using OutlinesIn = std::vector<OutlineIn>;
 
 std::vector<std::vector<std::int32_t>> to_rims(const RimsIn& arrays, std::size_t vertices) {
   std::vector<std::vector<std::int32_t>> rims;
@@ -39,13 +41,16 @@ std::vector<std::vector<std::int32_t>> to_rims(const RimsIn& arrays, std::size_t
   return rims;
 }
 
+std::vector<PlanePoint> to_plane_points(const OutlineIn& array) {
+  std::vector<PlanePoint> points(array.shape(0));
+  for (std::size_t i = 0; i < points.size(); ++i) points[i] = {array(i, 0), array(i, 1)};
+  return points;
+}
+
 std::vector<std::vector<PlanePoint>> to_outlines(const OutlinesIn& arrays,
                                                  const std::vector<std::vector<std::int32_t>>& rims) {
   std::vector<std::vector<PlanePoint>> outlines;
-  for (const auto& array : arrays) {
-    outlines.emplace_back(array.shape(0));
-    for (std::size_t i = 0; i < array.shape(0); ++i) outlines.back()[i] = {array(i, 0), array(i, 1)};
-  }
+  for (const auto& array : arrays) outlines.push_back(to_plane_points(array));
   if (outlines.size() != rims.size()) throw std::invalid_argument("as many outlines as rims are needed");
   for (std::size_t r = 0; r < rims.size(); ++r)
     if (outlines[r].size() != rims[r].size()) throw std::invalid_argument("an outline has as many points as its rim");
@@ -84,6 +89,14 @@ void bind_plane_cut(nb::module_& m) {
       "3],\n"
       "faces [F, 3], the cap's rims as loops of vertices, a list of [R], and as points [R, 2] of the plane, counter-\n"
       "clockwise from outside.");
+  m.def(
+      "upside_down_share",
+      [](const OutlineIn& outline, const FacesIn& triangles) {
+        const std::vector<PlanePoint> points = to_plane_points(outline);
+        return upside_down_share(points, to_faces(triangles, points.size()));
+      },
+      nb::arg("points"), nb::arg("triangles"),
+      "Share of the area of triangles [T, 3] of points [N, 2] in the plane that is upside down.");
   m.def(
       "uncross",
       [](const PointsIn& vertices, const FacesIn& faces, const RimsIn& rims, const OutlinesIn& outlines) {

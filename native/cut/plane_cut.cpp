@@ -274,11 +274,11 @@ class Cutter {
 
 }  // namespace
 
-std::vector<std::array<double, 2>> on_plane(const std::vector<Vec3>& points, Vec3 normal) {
+std::vector<PlanePoint> on_plane(const std::vector<Vec3>& points, Vec3 normal) {
   const int axis = dominant_axis(normal);
   int u = (axis + 1) % 3, v = (axis + 2) % 3;
   if (normal[axis] < 0) std::swap(u, v);
-  std::vector<std::array<double, 2>> flat;
+  std::vector<PlanePoint> flat;
   flat.reserve(points.size());
   for (const Vec3 p : points) flat.push_back({p[u], p[v]});
   return flat;

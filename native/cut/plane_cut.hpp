@@ -23,7 +23,7 @@ struct OpenSide {
 };
 
 // Coordinates of points on a plane that preserve orientation as seen against the normal.
-std::vector<std::array<double, 2>> on_plane(const std::vector<Vec3>& points, Vec3 normal);
+std::vector<PlanePoint> on_plane(const std::vector<Vec3>& points, Vec3 normal);
 
 // The sides below and above.
 std::array<OpenSide, 2> cut_by_plane(const Mesh& mesh, Vec3 normal, double offset);

@@ -22,8 +22,6 @@
 
 namespace rlacd {
 
-using PlanePoint = std::array<double, 2>;
-
 struct RimRegion {
   int winding;                                    // never 0
   std::vector<std::vector<std::int32_t>> rims;    // loops of vertices

@@ -13,10 +13,18 @@ namespace {
 constexpr std::size_t kMaybe = 40;  // corners; with more than this it pays to test some of them first
 
 constexpr double kInside = 0.5, kAccuracy = 2;
+constexpr double kBeyond = 1 + 1e-9;
 
-// Limits on the cells examined: this many besides the facets, down to this share of the threshold.
-constexpr int kMostCells = 400;
+// Limits on the cells examined: this many besides the facets, down to this share of the threshold. Most pairs of hulls
+// are never united, so less is spent on each.
+constexpr int kMostCells = 400, kMostCellsOfPair = 64;
 constexpr double kSmall = 0.2;
+
+// Points of a cell may be farther out than its middle by its radius, but hardly ever are by more than this share of it.
+constexpr double kFarther = 0.25;
+
+// A distance below this share of the threshold need not be known more exactly.
+constexpr double kNear = 0.5;
 
 bool meet(const Box& a, const Box& b) {
   return a.lower.x <= b.upper.x && b.lower.x <= a.upper.x && a.lower.y <= b.upper.y && b.lower.y <= a.upper.y &&
@@ -105,8 +113,7 @@ struct Cell {
   Vec3 middle;
   double radius;
   std::int32_t hint;                                      // the slot of a nearby face of the solid
-  double most = std::numeric_limits<double>::infinity();  // upper bound on the distance from a point of the cell
-                                                          // outside the solid to it
+  double most = std::numeric_limits<double>::infinity();  // how far a point of the cell outside the solid may well be
 
   Cell(Vec3 a, Vec3 b, Vec3 c, std::int32_t near) : corner{a, b, c}, middle((1.0 / 3) * (a + b + c)), hint(near) {
     radius = std::sqrt(std::max({norm2(a - middle), norm2(b - middle), norm2(c - middle)}));
@@ -161,7 +168,7 @@ Filling::Joint Filling::joint_feasibility(const HullCorners& first, const HullCo
   const double volume = mesh_volume(hull.vertices, hull.faces);
   if (!are_all && is_missed(hull, facets, threshold, 0)) return {volume, Feasibility::kNo};
   if (!are_all && comes_deeper(hull, threshold)) return {volume, Feasibility::kNever};
-  return {volume, is_missed(hull, facets, threshold, kMostCells) ? Feasibility::kNo : Feasibility::kMaybe};
+  return {volume, is_missed(hull, facets, threshold, kMostCellsOfPair) ? Feasibility::kNo : Feasibility::kMaybe};
 }
 
 bool Filling::comes_deeper(const Mesh& hull, double threshold) const {
@@ -197,17 +204,17 @@ bool Filling::comes_deeper(const Mesh& hull, double threshold) const {
 
 bool Filling::is_missed(const Mesh& hull, const std::vector<Triangle>& facets, double threshold, int most) const {
   std::priority_queue<Cell> open;
-  // Whether the middle of a cell is missed; the cell stays open if another point of it may be.
+  // Whether the middle of a cell is missed; the cell stays open if another point of it may well be.
   const auto look_at = [&](Cell cell) {
     poll_stop();
     if (cell.radius < kSmall * threshold) return false;
-    const double enough = std::max(0.0, threshold - cell.radius), within = threshold + cell.radius;
+    const double enough = std::max(kNear * threshold, threshold - cell.radius), within = kBeyond * threshold;
     const Bvh::Hit hit = surface_.bvh().closest(cell.middle, cell.hint, enough, within);
     const double distance = std::sqrt(hit.distance2);  // `within` if nothing is nearer
     const bool is_far = distance > threshold;
     if (is_far && surface_.winding().at(cell.middle, kAccuracy) < kInside) return true;
     // On the way from a middle inside the solid to a point outside, the surface comes no sooner than its distance.
-    cell.most = is_far ? cell.radius - distance : cell.radius + distance;
+    cell.most = kFarther * cell.radius + (is_far ? -distance : distance);
     cell.hint = hit.slot;
     if (cell.most > threshold) open.push(cell);
     return false;

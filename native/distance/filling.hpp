@@ -5,9 +5,9 @@
 //      if the solid's surface comes deeper than t inside the hull, as it then does in every larger hull; and if a point
 //      of the hull's surface lies outside the solid and farther than t from it.
 // How: faces of the solid are clipped to the points deeper than t. Facets of the hull are subdivided, those with the
-//      largest possible miss first, until each is decided by the distance at its middle and its radius, is small, or
-//      the limit on cells is reached. For the joint hull of two hulls, a few corners mostly suffice to see that the
-//      solid comes too deep, and facets it shares with one of them need not be examined.
+//      largest probable miss first, until each is decided by the distance at its middle and a share of its radius, is
+//      small, or the limit on cells is reached. For the joint hull of two hulls, a few corners mostly suffice to see
+//      that the solid comes too deep, and facets it shares with one of them need not be examined.
 #pragma once
 
 #include "distance/convex_clip.hpp"

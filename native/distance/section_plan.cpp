@@ -17,7 +17,7 @@ SectionPlan side_by_side(const ConvexClip& clip) {
       std::vector<Vec3> points;
       points.reserve(rim.size());
       for (const std::int32_t i : rim) points.push_back(clip.mesh.vertices[i]);
-      const std::vector<std::array<double, 2>> outline = on_plane(points, section.normal);
+      const std::vector<PlanePoint> outline = on_plane(points, section.normal);
       plan.corners.insert(plan.corners.end(), rim.begin(), rim.end());
       plan.outline.insert(plan.outline.end(), outline.begin(), outline.end());
       plan.rim_ends.push_back(static_cast<std::int32_t>(plan.corners.size()));

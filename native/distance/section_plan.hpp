@@ -11,10 +11,10 @@ namespace rlacd {
 
 // The sections, each in its own plane, moved side by side into one plane: they can be triangulated together.
 struct SectionPlan {
-  std::vector<std::int32_t> corners;           // vertices of all rims, one rim after the other
-  std::vector<std::array<double, 2>> outline;  // the same as points of the plane
-  std::vector<std::int32_t> rim_ends;          // places in `corners` at which the rims end
-  std::vector<std::int32_t> section_ends;      // numbers of rims at which the sections end
+  std::vector<std::int32_t> corners;       // vertices of all rims, one rim after the other
+  std::vector<PlanePoint> outline;         // the same as points of the plane
+  std::vector<std::int32_t> rim_ends;      // places in `corners` at which the rims end
+  std::vector<std::int32_t> section_ends;  // numbers of rims at which the sections end
 };
 SectionPlan side_by_side(const ConvexClip& clip);
 

@@ -7,7 +7,7 @@
 namespace rlacd {
 
 // A. M. Andrew, "Another efficient algorithm for convex hulls in two dimensions" (1979).
-std::vector<std::int32_t> outline(const std::vector<std::array<double, 2>>& points) {
+std::vector<std::int32_t> outline(const std::vector<PlanePoint>& points) {
   std::vector<std::int32_t> order(points.size());
   std::iota(order.begin(), order.end(), 0);
   std::sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) { return points[a] < points[b]; });

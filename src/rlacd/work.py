@@ -55,49 +55,49 @@ class Work:
 
 def choosing(faces: int) -> float:
     """Choose a plane for a component."""
-    return 1000 + 5.0 * faces
+    return 1100 + 4.3 * faces
 
 
 def judging(faces: int, hull_faces: int) -> float:
     """Decide whether a part meets the criterion."""
-    return 30 + 0.7 * (faces + hull_faces)
+    return 32 + 0.64 * faces + 1.5 * hull_faces
 
 
 def cutting(faces: int) -> float:
     """Cut a component by a plane and compute the hulls of its sides."""
-    return 200 + 0.95 * faces
+    return 145 + 0.73 * faces
 
 
 def joining(vertices: int) -> float:
     """Compute the joint hull of parts whose hulls have `vertices` vertices in total."""
-    return 25 + 0.6 * vertices
+    return 18 + 0.8 * vertices
 
 
 def screening(vertices: int) -> float:
     """Test the joint hull of two parts against the solid; most are rejected at once."""
-    return 80 + 0.3 * vertices
+    return 45 + 1.3 * vertices
 
 
 def testing(vertices: int) -> float:
     """Test a hull against the solid."""
-    return 160 + 0.5 * vertices
+    return 160 + 7 * vertices
 
 
 def probing(vertices: int) -> float:
     """Test only whether the solid comes too deep inside a hull."""
-    return 5 + 0.85 * vertices
+    return 5 + 0.9 * vertices
 
 
 def gluing(faces: int) -> float:
     """Glue two parts that have `faces` faces in total."""
-    return 20 + 0.12 * faces
+    return 16 + 0.2 * faces
 
 
 def filling(faces: int, hull_faces: int) -> float:
     """Clip a solid to a hull around parts that have `faces` faces in total."""
-    return 370 + 0.95 * faces + 6.3 * hull_faces
+    return 170 + 1.05 * faces + 4.1 * hull_faces
 
 
 def reuniting(faces: int, count: int) -> float:
     """Reunite `count` components that have `faces` faces in total into one solid."""
-    return 2.7 * faces + 730 * count
+    return 9.6 * faces + 320 * count

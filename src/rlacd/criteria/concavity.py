@@ -61,6 +61,11 @@ class ConcavityScreen(Screen):
 
     threshold: float
 
+    @property
+    def looks_inside(self) -> bool:
+        """Yes."""
+        return True
+
     def filled(self, part: Part) -> float:
         """The part's volume: the rest of the hull is the volume in ``R_v``."""
         return part.volume
@@ -81,7 +86,7 @@ class ConcavityScreen(Screen):
         self, filling: _native.Filling, hulls: Sequence[Hull], pairs: IntArray, threads: int
     ) -> tuple[FloatArray, IntArray]:
         """Test the solid's corners and points of the joint hulls."""
-        return filling.joint_feasibilities([hull.vertices for hull in hulls], pairs, self.threshold, threads)
+        return filling.joint_feasibilities([hull.corners for hull in hulls], pairs, self.threshold, threads)
 
     def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
         """Whether the solid's surface reaches deeper into the hull than the threshold."""

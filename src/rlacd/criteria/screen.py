@@ -73,6 +73,11 @@ class Screen:
 
     reach: float
 
+    @property
+    def looks_inside(self) -> bool:
+        """Whether the criterion judges what fills a hull, not the hull alone."""
+        return False
+
     def filled(self, part: Part) -> float:
         """Volume that a joint hull may fill for free on account of this part; the cheapest pairs are merged first."""
         return part.piece_hulls
@@ -93,7 +98,7 @@ class Screen:
         self, filling: _native.Filling, hulls: Sequence[Hull], pairs: IntArray, threads: int
     ) -> tuple[FloatArray, IntArray]:
         """Volumes [P] of the joint hulls of pairs [P, 2] of hulls (undefined for `NEVER`), and the `feasibility` [P] of
-        each."""
+        each, decided less thoroughly."""
         return np.zeros(len(pairs)), np.full(len(pairs), int(Feasibility.NEVER), dtype=np.int32)
 
     def forbids(self, filling: _native.Filling, hull: Hull) -> bool:

@@ -110,6 +110,24 @@ def merge_lifted(
     )
 
 
+class _Verdict(NamedTuple):
+    """On a pair of parts.
+
+    Attributes
+    ----------
+    union : Part or None
+        None if it does not meet the criterion.
+    price : float
+        The work of finding out.
+    for_good : bool
+        No larger union can meet the criterion either.
+    """
+
+    union: Part | None
+    price: float
+    for_good: bool = False
+
+
 class _Pairing(Protocol):
     """A way to find pairs of parts that may be united, and to unite them."""
 
@@ -121,11 +139,8 @@ class _Pairing(Protocol):
         Incomplete if the clock's work runs out.
         """
 
-    def price(self, first: Part, second: Part) -> float:
-        """The work of uniting two parts."""
-
-    def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
-        """The union if it meets the criterion; otherwise None, and whether no larger union can meet it either."""
+    def unite(self, first: Part, second: Part) -> _Verdict:
+        """Unite two parts if that meets the criterion."""
 
 
 def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, workers: Workers, clock: Clock) -> list[Part]:
@@ -144,7 +159,7 @@ def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, workers: Wo
         heapq.heapify(queue)
         for first, second in never:
             refuse(first, second)
-        verdicts: dict[_Pair, tuple[Part | None, bool]] = {}  # for pairs put back into the queue
+        verdicts: dict[_Pair, _Verdict] = {}  # for pairs put back into the queue
         count = newest = len(alive)
         while queue and clock.step(count - len(alive), None, len(alive)):
             batch = _cheapest(queue, alive, 2 * workers.threads)
@@ -153,9 +168,9 @@ def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, workers: Wo
                 zip(fresh, workers.map(lambda p: pairing.unite(alive[p.first], alive[p.second]), fresh), strict=True)
             )
             for taken, pair in enumerate(batch, start=1):
-                union, for_good = verdicts.pop(pair)
+                union, price, for_good = verdicts.pop(pair)
                 # Pay in the order of the pairs: the batch size, which depends on the threads, must not matter.
-                if not clock.work.pay(pairing.price(alive[pair.first], alive[pair.second])):
+                if not clock.work.pay(price):
                     break
                 if union is None:
                     if for_good:
@@ -213,14 +228,12 @@ class _Adjoining:
         ]
         return found, []
 
-    def price(self, first: Part, second: Part) -> float:
-        """The work of gluing and judging."""
-        return price_of_gluing(first, second)
-
-    def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
+    def unite(self, first: Part, second: Part) -> _Verdict:
         """Glue the two parts."""
-        union = Part.glued(first, second)
-        return (union, False) if self.criterion.is_met(union) else (None, self.criterion.is_hereditary)
+        union, price = Part.glued(first, second), price_of_gluing(first, second)
+        if self.criterion.is_met(union):
+            return _Verdict(union, price)
+        return _Verdict(None, price, self.criterion.is_hereditary)
 
 
 @dataclass(frozen=True)
@@ -258,13 +271,16 @@ class _Bridged:
                     never.append((first, second))
         return found, never
 
-    def price(self, first: Part, second: Part) -> float:
-        """The work of clipping the solid and judging."""
-        return price_of_clipping(first, second)
+    def unite(self, first: Part, second: Part) -> _Verdict:
+        """Test the joint hull more thoroughly, and clip the solid to it."""
+        hull = Hull.around(first.hull, second.hull)
+        price = work.testing(len(hull.vertices))
+        if self.criterion.screen.feasibility(self.solid.filling, hull) is not Feasibility.MAYBE:
+            return _Verdict(None, price)
+        return _Verdict(self._united(first, second, hull), price + price_of_clipping(first, second))
 
-    def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
-        """Clip the solid to the joint hull."""
-        return _clipped(first, second, Hull.around(first.hull, second.hull), self.criterion, self.solid), False
+    def _united(self, first: Part, second: Part, hull: Hull) -> Part | None:
+        return _clipped(first, second, hull, self.criterion, self.solid)
 
 
 @dataclass(frozen=True)
@@ -273,11 +289,9 @@ class _Lifted(_Bridged):
 
     confirmed: Callable[[Hull], Part | None] = lambda hull: None
 
-    def unite(self, first: Part, second: Part) -> tuple[Part | None, bool]:
-        """Clip the proxy to the joint hull, then the solid."""
-        hull = Hull.around(first.hull, second.hull)
-        rehearsed = _clipped(first, second, hull, self.criterion, self.solid)
-        return (None if rehearsed is None else self.confirmed(hull)), False
+    def _united(self, first: Part, second: Part, hull: Hull) -> Part | None:
+        rehearsed = super()._united(first, second, hull)
+        return None if rehearsed is None else self.confirmed(hull)
 
 
 @dataclass(frozen=True)
@@ -298,22 +312,46 @@ class Uniter:
     solid: Component
     account: Work
 
-    def unite(self, first: Part, second: Part, hull: Hull | None = None) -> Part | None:
-        """Unite two parts; None if no union meets the criterion. `hull` is their joint hull, if already known."""
-        hull = hull or Hull.around(first.hull, second.hull)
+    def unite(self, first: Part, second: Part) -> Part | None:
+        """Unite two parts; None if no union meets the criterion."""
+        hull = Hull.around(first.hull, second.hull)
         if not self.account.pay(work.testing(len(hull.vertices))):
             return None
         screen = self.criterion.screen
-        feasibility = screen.feasibility(self.solid.filling, hull)
-        if feasibility is Feasibility.NO:
+        if screen.looks_inside and screen.feasibility(self.solid.filling, hull) is not Feasibility.MAYBE:
             return None
+        return self.unite_feasible(first, second, hull)
+
+    def feasible(self, part: Part, others: Sequence[Part]) -> list[tuple[int, float]]:
+        """Find which of other parts may be united with a part, and the volumes of the joint hulls.
+
+        Returns
+        -------
+        list of (int, float)
+            Index and volume. Empty if too little work is left.
+        """
+        hulls = [part.hull, *(other.hull for other in others)]
+        pairs = np.array([(0, i) for i in range(1, len(hulls))], dtype=np.int32).reshape(-1, 2)
+        corners = [len(hull.vertices) for hull in hulls]
+        if not self.account.pay(sum(work.screening(corners[0] + corner) for corner in corners[1:])):
+            return []
+        screen = self.criterion.screen
+        if not screen.looks_inside:
+            return list(enumerate(_native.joint_hull_volumes([hull.vertices for hull in hulls], pairs, 1).tolist()))
+        volumes, verdicts = screen.feasibilities(self.solid.filling, hulls, pairs, 1)
+        return [(i, float(volumes[i])) for i in np.flatnonzero(verdicts == Feasibility.MAYBE).tolist()]
+
+    def unite_feasible(self, first: Part, second: Part, hull: Hull | None = None) -> Part | None:
+        """Unite two parts that may be united; None if no union meets the criterion after all."""
+        hull = hull or Hull.around(first.hull, second.hull)
+        screen = self.criterion.screen
         if is_alone(first) and is_alone(second):  # otherwise they may overlap
             if not self.account.pay(price_of_gluing(first, second)):
                 return None
             union = Part.glued(first, second, hull)
             if not screen.excludes(union.volume, hull.volume) and self.criterion.is_met(union):
                 return union
-        if feasibility is not Feasibility.MAYBE or not self.account.pay(price_of_clipping(first, second)):
+        if not screen.looks_inside or not self.account.pay(price_of_clipping(first, second)):
             return None
         return _clipped(first, second, hull, self.criterion, self.solid)
 

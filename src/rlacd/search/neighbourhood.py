@@ -203,7 +203,8 @@ class Neighbourhood:
             self._operators.count(trial, gain, clock.work.done)
             self._accepted += taken
             self._without_gain = 0 if gain > 0 else self._without_gain + 1
-            self._best = min(self._best, self.parts, key=cost)
+            if taken:
+                self._best = min(self._best, self.parts, key=cost)
         budget.parts = min(budget.parts, len(self._graph.parts))
         budget.work.pay(self._graph.collect())
         if all(clock.work.is_spent for clock in clocks) or budget.work.left < TOO_LITTLE * budget.work.most < math.inf:

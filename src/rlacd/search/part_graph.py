@@ -52,6 +52,12 @@ class PartGraph:
             del self.parts[i]
             for j in self._gaps.pop(i):
                 del self._gaps[j][i]
+        self._add(new)
+        self._ids = np.array(list(self.parts), dtype=np.int64)
+        self._boxes = np.array([part.box for part in self.parts.values()]).reshape(-1, 2, 3)
+        self._by_size = sorted(self.parts, key=lambda i: (self.parts[i].hull.volume, i))
+
+    def _add(self, new: Sequence[Part]) -> None:
         if not new:
             return
         ids = list(range(self._next, self._next + len(new)))
@@ -89,19 +95,14 @@ class PartGraph:
 
     def near(self, which: int, reach: float) -> Cluster:
         """Get the parts whose boxes are within reach of a part's box along every axis, in ascending order."""
-        ids = [i for i in self.parts if i != which]
-        if not ids:
-            return ()
-        boxes = np.array([self.parts[i].box for i in ids])
         box = self.parts[which].box
-        gaps = np.maximum(box[0] - boxes[:, 1], boxes[:, 0] - box[1]).max(axis=1)
-        return tuple(i for i, gap in zip(ids, gaps.tolist(), strict=True) if gap <= reach)
+        gaps = np.maximum(box[0] - self._boxes[:, 1], self._boxes[:, 0] - box[1]).max(axis=1)
+        return tuple(self._ids[(gaps <= reach) & (self._ids != which)].tolist())
 
     def draw_small(self, random: np.random.Generator) -> int:
         """Draw a part, favouring small hulls: the weights by rank are 1/2, 1/3, 1/4, ..."""
-        by_size = sorted(self.parts, key=lambda i: (self.parts[i].hull.volume, i))
-        weights = 1 / np.arange(2, len(by_size) + 2)
-        return by_size[int(random.choice(len(by_size), p=weights / weights.sum()))]
+        weights = 1 / np.arange(2, len(self._by_size) + 2)
+        return self._by_size[int(random.choice(len(self._by_size), p=weights / weights.sum()))]
 
     def draw(self, size: int, random: np.random.Generator) -> Cluster | None:
         """Draw a connected cluster: a pair with a small gap, extended by the neighbours with the smallest gaps.

@@ -8,6 +8,7 @@ offered again.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,9 +20,7 @@ from rlacd.search.recut import Exchange
 from rlacd.search.transfer import exchange_of
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part, Plane
-from rlacd.solid.hull import Hull
-from rlacd.solid.products import heights, length
-from rlacd.work import Work
+from rlacd.solid.products import dots, heights
 
 TAKERS = 6
 """Number of parts a piece is offered to, starting with those whose hulls would grow the least."""
@@ -64,63 +63,59 @@ def redistribute(
     """
     clock = clock or Clock()
     uniter = Uniter(criterion, solid, clock.work)
-    if not _may_be_taken(part, around, uniter):
-        return None
     now = list(around)
 
-    def take(piece: Component, halvings: int) -> bool:
-        for i, hull in _by_growth(now, piece, criterion.screen.reach, clock.work):
-            union = uniter.unite(now[i], piece, hull)
+    def halves(piece: _Piece) -> list[_Piece]:
+        if piece.halves is None:
+            may_cut = clock.step(0, None, len(now)) and clock.work.pay(work.cutting(piece.component.size))
+            piece.halves = [_Piece(half) for half in _halved(piece.component, random)] if may_cut else []
+        return piece.halves
+
+    def may_go(piece: _Piece, halvings: int) -> bool:
+        """Whether each of its smallest pieces may be taken: if one may not, hardly anything larger can go either."""
+        smaller = halves(piece) if halvings > 0 else []
+        if smaller:
+            return all(may_go(half, halvings - 1) for half in smaller)
+        return bool(uniter.feasible(piece.component, now))  # those out of its reach may take it with what lies between
+
+    def take(piece: _Piece, halvings: int) -> bool:
+        for i in _takers(now, piece.component, uniter):
+            union = uniter.unite_feasible(now[i], piece.component)
             if union is not None:
                 now[i] = union
                 return True
-        if halvings == 0 or not clock.step(0, None, len(now)) or not clock.work.pay(work.cutting(piece.size)):
-            return False
-        halves = _halves(piece, random)
-        return bool(halves) and all(take(half, halvings - 1) for half in halves)
+        return halvings > 0 and bool(halves(piece)) and all(take(half, halvings - 1) for half in halves(piece))
 
-    if not all(take(member, HALVINGS) for member in sorted(part.members, key=lambda member: -member.volume)):
+    pieces = [_Piece(member) for member in sorted(part.members, key=lambda member: -member.volume)]
+    if not all(may_go(piece, HALVINGS) for piece in pieces) or not all(take(piece, HALVINGS) for piece in pieces):
         return None
     return exchange_of(part, around, now, criterion)
 
 
-def _may_be_taken(part: Part, around: Sequence[Part], uniter: Uniter) -> bool:
-    """Whether some other part could take each of the part's extreme vertices by itself: a quick necessary test."""
-    corners = part.hull.vertices
-    directions = np.concatenate([np.eye(3), -np.eye(3)])
-    outermost = sorted(set(np.argmax(heights(corners, directions), axis=0).tolist()))
-    return all(
-        any(
-            uniter.account.pay(work.joining(len(around[i].hull.vertices)) + work.probing(len(around[i].hull.vertices)))
-            and not uniter.forbids(_with_point(around[i].hull, corners[k]))
-            for i in np.argsort([_gap(other.box, corners[k]) for other in around], kind="stable").tolist()
-        )
-        for k in outermost
-    )
+@dataclass
+class _Piece:
+    """A piece of the part, and its halves once it has been cut."""
+
+    component: Component
+    halves: list[_Piece] | None = None
 
 
-def _with_point(hull: Hull, point: FloatArray) -> Hull:
-    return Hull.of(np.vstack([hull.vertices, point])) or hull
+def _takers(parts: Sequence[Part], piece: Part, uniter: Uniter) -> list[int]:
+    """The parts that may take a piece, those first whose hulls would grow the least."""
+    boxes = np.array([part.box for part in parts]).reshape(-1, 2, 3)
+    near = np.flatnonzero(_gaps(boxes, piece.box) <= uniter.criterion.screen.reach).tolist()
+    feasible = uniter.feasible(piece, [parts[i] for i in near])
+    by_growth = sorted(feasible, key=lambda found: found[1] - parts[near[found[0]]].hull.volume)
+    return [near[k] for k, _ in by_growth[:TAKERS]]
 
 
-def _by_growth(parts: Sequence[Part], piece: Part, reach: float, account: Work) -> list[tuple[int, Hull]]:
-    """The parts within reach whose hulls would grow the least, with their joint hulls."""
-    near = [i for i, part in enumerate(parts) if _gap(part.box, piece.box) <= reach]
-    corners = len(piece.hull.vertices)
-    if not account.pay(sum(work.joining(len(parts[i].hull.vertices) + corners) for i in near)):
-        return []
-    joint = [Hull.around(parts[i].hull, piece.hull) for i in near]
-    growth = [hull.volume - parts[i].hull.volume for i, hull in zip(near, joint, strict=True)]
-    return [(near[k], joint[k]) for k in np.argsort(growth, kind="stable")[:TAKERS]]
+def _gaps(boxes: FloatArray, box: FloatArray) -> FloatArray:
+    """Distances of boxes [N, 2, 3] from another [2, 3]."""
+    apart = np.maximum(np.maximum(box[0] - boxes[:, 1], boxes[:, 0] - box[1]), 0.0)
+    return np.sqrt(dots(apart, apart))
 
 
-def _gap(box: FloatArray, other: FloatArray) -> float:
-    """Distance of a box [2, 3] from another, or from a point [3]."""
-    low, high = (other[0], other[1]) if other.ndim == 2 else (other, other)
-    return length(np.maximum(np.maximum(low - box[1], box[0] - high), 0.0))
-
-
-def _halves(piece: Component, random: np.random.Generator) -> list[Component]:
+def _halved(piece: Component, random: np.random.Generator) -> list[Component]:
     """Cut across the longest coordinate axis or principal axis, chosen at random; the smaller half first."""
     axes = np.eye(3) if random.random() < 0.5 else piece.principal_axes
     along = heights(piece.hull.vertices, axes)

@@ -168,13 +168,9 @@ def _whole(pieces: Sequence[Component], uniter: Uniter) -> Part | None:
 
 def _take_whole(rest: Part, takers: list[Part], uniter: Uniter) -> bool:
     """Give all of the rest to one of the takers; False if none can have it."""
-    corners = len(rest.hull.vertices)
-    if not uniter.account.pay(sum(work.joining(len(taker.hull.vertices) + corners) for taker in takers)):
-        return False
-    joint = [Hull.around(taker.hull, rest.hull) for taker in takers]
-    added = [hull.volume - taker.hull.volume for hull, taker in zip(joint, takers, strict=True)]
-    for i in np.argsort(added, kind="stable")[:WHOLE].tolist():
-        union = uniter.unite(takers[i], rest, joint[i])
+    feasible = sorted(uniter.feasible(rest, takers), key=lambda found: found[1] - takers[found[0]].hull.volume)
+    for i, _ in feasible[:WHOLE]:
+        union = uniter.unite_feasible(takers[i], rest)
         if union is not None:
             takers[i] = union
             return True

@@ -93,13 +93,13 @@ def section_caps(
     ends = rim_ends.tolist()  # `np.split` takes ten times as long for many short rims
     outlines = [outline[begin:end] for begin, end in zip([0, *ends], ends, strict=False)]
     triangles = triangulate(outlines)
-    folded = _share_upside_down(outline, triangles)
+    folded = _native.upside_down_share(outline, triangles)
     if folded > NEGLIGIBLE_FOLD:
         begins = np.concatenate([[0], section_ends[:-1]])
         first = np.concatenate([[0], rim_ends])[begins]
         each = [_least_folded(outlines[begin:end])[0] for begin, end in zip(begins, section_ends, strict=True)]
         triangles = np.concatenate([own + at for own, at in zip(each, first, strict=True)])
-        folded = _share_upside_down(outline, triangles)
+        folded = _native.upside_down_share(outline, triangles)
     return corners[triangles], folded
 
 
@@ -110,19 +110,12 @@ def _least_folded(outlines: list[FloatArray]) -> tuple[IntArray, float]:
     """
     points = np.concatenate(outlines)
     triangles = triangulate(outlines)
-    folded = _share_upside_down(points, triangles)
+    folded = _native.upside_down_share(points, triangles)
     if folded > NEGLIGIBLE_FOLD:
         mirrored = triangulate([outline[::-1, ::-1] for outline in outlines])
         ends = np.cumsum([len(outline) for outline in outlines])
         back = np.concatenate([np.arange(end - 1, end - 1 - len(o), -1) for end, o in zip(ends, outlines, strict=True)])
         other = back[mirrored][:, ::-1]
-        if (share := _share_upside_down(points, other)) < folded:
+        if (share := _native.upside_down_share(points, other)) < folded:
             return other, share
     return triangles, folded
-
-
-def _share_upside_down(points: FloatArray, triangles: IntArray) -> float:
-    a, b, c = (points[corner] for corner in triangles.T)
-    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    total = np.abs(area).sum()
-    return float(-area[area < 0].sum() / total) if total > 0 else 0.0

@@ -38,6 +38,11 @@ class Hull:
         """Lower and upper corner of the bounding box [2, 3]."""
         return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
+    @cached_property
+    def corners(self) -> _native.HullCorners:
+        """The vertices, prepared for tests of joint hulls."""
+        return _native.HullCorners(self.vertices)
+
     @classmethod
     def of(cls, points: FloatArray) -> Hull | None:
         """Return the hull of points [N, 3]; None when they all lie in one plane."""

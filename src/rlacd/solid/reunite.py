@@ -12,7 +12,7 @@ import numpy as np
 from manifold3d import Manifold, Mesh64, OpType
 
 from rlacd import _native
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import BoolArray, FloatArray
 from rlacd.solid.boolean_time import require_time_for
 from rlacd.solid.component import LOST, ClippedPart, Component, Part
 
@@ -48,7 +48,7 @@ def reunite(components: Sequence[Component]) -> Component | None:
     if len(components) == 1:
         return components[0]
     require_time_for(sum(len(component.faces) for component in components))
-    united = Manifold.batch_boolean([_overlapping(i, components) for i in range(len(components))], OpType.Add)
+    united = Manifold.batch_boolean(_overlapping(components), OpType.Add)
     volume = sum(component.volume for component in components)
     area = sum(_native.mesh_area(component.vertices, component.faces) for component in components)
     if united.is_empty() or abs(united.volume() - volume) > FOLDED * volume:
@@ -105,19 +105,23 @@ def _holds(whole: Component, components: Sequence[Component]) -> bool:
     return bool((surface.winding(off, 2.0, 1) > 0.5).all()) if len(off) else True
 
 
-def _overlapping(which: int, components: Sequence[Component]) -> Manifold:
-    """Move one component's faces out by `OVERLAP` where they touch any other's."""
-    component = components[which]
-    outward = np.zeros_like(component.vertices)
-    for other in (*components[:which], *components[which + 1 :]):
-        if _boxes_meet(component, other):
-            outward += _outward(component, other)
-    if not outward.any():
-        return component.manifold
+def _overlapping(components: Sequence[Component]) -> list[Manifold]:
+    """Move the components' faces out by `OVERLAP` where they touch each other's."""
+    boxes = np.array([component.box for component in components])
     # Stay within the common box: parts that are reunited repeatedly would creep out of the input.
-    boxes = np.array([other.box for other in components])
-    moved = np.clip(component.vertices + OVERLAP * outward, boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0))
-    return Manifold(Mesh64(moved, component.faces.astype(np.uint64)))
+    lower, upper = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+    overlapping = []
+    for which, component in enumerate(components):
+        outward = np.zeros_like(component.vertices)
+        for other in np.flatnonzero(_meet(boxes, boxes[which])).tolist():
+            if other != which:
+                outward += _outward(component, components[other])
+        if outward.any():
+            moved = np.clip(component.vertices + OVERLAP * outward, lower, upper)
+            overlapping.append(Manifold(Mesh64(moved, component.faces.astype(np.uint64))))
+        else:
+            overlapping.append(component.manifold)
+    return overlapping
 
 
 def _outward(part: Part, other: Part) -> FloatArray:
@@ -125,4 +129,11 @@ def _outward(part: Part, other: Part) -> FloatArray:
 
 
 def _boxes_meet(a: Part, b: Part) -> bool:
-    return bool((np.maximum(a.box[0], b.box[0]) <= np.minimum(a.box[1], b.box[1]) + TOUCHING).all())
+    return bool(_meet(a.box, b.box))
+
+
+def _meet(boxes: FloatArray, box: FloatArray) -> BoolArray:
+    """Whether each of the boxes [..., 2, 3] meets one [2, 3]."""
+    low, high = boxes[..., 0, :], boxes[..., 1, :]
+    meet: BoolArray = (np.maximum(low, box[0]) <= np.minimum(high, box[1]) + TOUCHING).all(axis=-1)
+    return meet
