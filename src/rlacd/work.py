@@ -1,6 +1,7 @@
 """Work, counted rather than timed, so that it is the same on every machine and for every number of threads.
 
-A unit takes about a microsecond on one core; the weights below were fitted to measured CPU times (docs/search.md).
+A unit takes about a microsecond on one core; the weights below were fitted to measured CPU times
+(`benchmarks/search_costs.py`).
 A limit on work does not depend on the clock, so results under such a limit depend only on the input.
 """
 
@@ -74,12 +75,12 @@ def joining(vertices: int) -> float:
 
 
 def screening(vertices: int) -> float:
-    """Test the joint hull of two parts against the solid; most are rejected at once."""
+    """Test the joint hull of two parts against the solid, quickly; most are rejected at once."""
     return 45 + 1.3 * vertices
 
 
 def testing(vertices: int) -> float:
-    """Test a hull against the solid."""
+    """Test a hull against the solid, thoroughly."""
     return 160 + 7 * vertices
 
 

@@ -25,7 +25,7 @@ SHARE = 2 / 5
 HOPELESS = 5
 """A pass is abandoned when its pieces outnumber the parts by this factor: merging will not make up for that."""
 
-TIMES_FIRST_PASS = 4
+TIMES_FIRST_PASS = 3.5
 """Limit on the work of a search, as a multiple of the work of the first pass."""
 
 LEAST_WORK, MOST_WORK = 0.15e6, 6e6

@@ -72,11 +72,11 @@ def redistribute(
         return piece.halves
 
     def may_go(piece: _Piece, halvings: int) -> bool:
-        """Whether each of its smallest pieces may be taken: if one may not, hardly anything larger can go either."""
+        """Whether each of its smallest pieces may be taken: if one may not, hardly anything larger may."""
         smaller = halves(piece) if halvings > 0 else []
         if smaller:
             return all(may_go(half, halvings - 1) for half in smaller)
-        return bool(uniter.feasible(piece.component, now))  # those out of its reach may take it with what lies between
+        return bool(_takers(now, piece.component, uniter))
 
     def take(piece: _Piece, halvings: int) -> bool:
         for i in _takers(now, piece.component, uniter):
@@ -87,7 +87,9 @@ def redistribute(
         return halvings > 0 and bool(halves(piece)) and all(take(half, halvings - 1) for half in halves(piece))
 
     pieces = [_Piece(member) for member in sorted(part.members, key=lambda member: -member.volume)]
-    if not all(may_go(piece, HALVINGS) for piece in pieces) or not all(take(piece, HALVINGS) for piece in pieces):
+    if not all(_takers(now, piece.component, uniter) or may_go(piece, HALVINGS) for piece in pieces):
+        return None  # quick, and what most end with
+    if not all(take(piece, HALVINGS) for piece in pieces):
         return None
     return exchange_of(part, around, now, criterion)
 
