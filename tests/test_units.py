@@ -79,8 +79,8 @@ def test_units_that_files_state(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("unit", "metres"), [("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("in", 0.0254)])
 def test_a_unit_and_a_factor_convert_everything(unit: str, metres: float) -> None:
-    plain = rlacd.decompose(table(), threads=1)
-    result = rlacd.decompose(table(), unit=unit, scale=2.0, threads=1)  # type: ignore[arg-type]
+    plain = rlacd.decompose(table(), quality="fast", threads=1)
+    result = rlacd.decompose(table(), quality="fast", unit=unit, scale=2.0, threads=1)  # type: ignore[arg-type]
     factor = 2 * metres
     assert len(result) == len(plain)
     assert result.report["mass"]["volume_abs"] == pytest.approx(TABLE_VOLUME * factor**3, rel=1e-6)
