@@ -90,7 +90,7 @@ def test_work_ends_the_cutting(units: float) -> None:
 def test_limits_on_parts_see_the_same_tree(monkeypatch: pytest.MonkeyPatch) -> None:
     """The default policy, made to fail, is replaced in `decompose` too; a chosen one is not."""
     monkeypatch.setattr(cut, "MANY", 12)
-    monkeypatch.setattr("rlacd.decompose_mesh.make_policy", lambda *_: Slices())
+    monkeypatch.setattr("rlacd.find_parts.make_policy", lambda *_: Slices())
     solid = from_manifold(box((-1, -0.1, -0.1), (1, 0.1, 0.1)) + box((-0.1, -1, -0.1), (0.1, 1, 0.1)))
     options = {"quality": "fast", "merge": False, "threshold": 0.02, "threads": 1}
     mesh = solid.vertices, solid.faces

@@ -179,7 +179,7 @@ def test_it_is_asked_after_much_work_and_again_after_more(monkeypatch: pytest.Mo
         asked.append(failing)
         refuse_tangles(solid, threads, failing)
 
-    monkeypatch.setattr("rlacd.decompose_mesh.refuse_tangles", ask)
+    monkeypatch.setattr("rlacd.find_parts.refuse_tangles", ask)
     torus = trimesh.creation.torus(1, 0.4, major_sections=16, minor_sections=8)
     first = rlacd.decompose(torus, quality="fast", threads=1)
     assert asked == [False, True]

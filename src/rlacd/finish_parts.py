@@ -1,0 +1,95 @@
+"""From parts to hulls in the input's unit: clean the parts, carry them over, measure them."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, cast
+
+import trimesh
+
+from rlacd import _native
+from rlacd.clock import Clock
+from rlacd.find_parts import Reached
+from rlacd.merge import (
+    as_carried,
+    drop_slivers,
+    in_input,
+    limit_part,
+    limit_roughly,
+    overlap_parts,
+    primitive_part,
+    simple_part,
+)
+from rlacd.merge.overlap import Seams
+from rlacd.merge.primitives import SLACK
+from rlacd.options import SIMPLE
+from rlacd.primitive_kinds import PrimitiveKind
+from rlacd.report import make_report
+from rlacd.solid.balls import Balls
+from rlacd.solid.component import Part
+from rlacd.solid.provenance import owners
+from rlacd.solid.solid import Solid
+from rlacd.workers import Workers
+
+
+class Finished(NamedTuple):
+    """Hulls in the input's unit, with what was measured."""
+
+    hulls: list[trimesh.Trimesh]
+    report: dict[str, Any]
+    balls: Balls | None = None
+
+
+def finish_parts(reached: Reached, workers: Workers, clock: Clock) -> Finished:
+    """Clean the parts, carry them to the input's unit, and measure them."""
+    solid, goal = reached.solid, reached.goal
+    with clock.stage("finish"):
+        limits = reached.options.max_vertices, reached.options.max_faces
+        parts, seams = clock.if_in_time(
+            lambda: _cleaned(reached, *limits, workers),
+            lambda: ([limit_roughly(part, *limits) for part in reached.parts], None),
+        )
+        with clock.shielded():
+            hulls = workers.map(lambda part: in_input(part.hull, solid.frame, *limits), parts)
+            parts = [as_carried(part, hull, solid.frame) for part, hull in zip(parts, hulls, strict=True)]
+    with clock.stage("measure"):
+        report = make_report(solid, parts, hulls, reached.options, goal, seams, workers, clock, reached.root)
+        unknown: list[int] | list[None] = [None] * len(hulls)
+        bodies = clock.if_in_time(lambda: _bodies(solid, hulls), lambda: unknown)
+    for hull, body in zip(hulls, bodies, strict=True):
+        hull.metadata["body"] = body
+    report["search"] = None if reached.found is None else reached.found.as_plain()
+    balls = goal.obstacles.in_input(solid.frame) if goal.obstacles is not None else None
+    return Finished(hulls, report, balls)
+
+
+def _cleaned(
+    reached: Reached, max_vertices: int | None, max_faces: int | None, workers: Workers
+) -> tuple[list[Part], Seams | None]:
+    """The parts without slivers, overlapping if asked for, as primitives or with simple hulls inside the limits."""
+    kinds, goal = cast("tuple[PrimitiveKind, ...]", reached.options.primitives), reached.goal
+    slack = SLACK + 8 * reached.solid.frame.resolution
+
+    def cleaned(part: Part) -> Part:
+        part.tree = part.tree or _native.TreeCache()
+        if kinds:
+            shaped = primitive_part(part, goal, kinds, max_vertices, max_faces, slack, reached.root)
+            if shaped is not part:
+                return shaped
+        if reached.options.detail == SIMPLE:
+            part = simple_part(part, goal, max_vertices, max_faces)
+        return limit_part(part, max_vertices, max_faces, goal)
+
+    parts, seams = drop_slivers(reached.parts, workers), None
+    if reached.options.overlap > 0 and reached.root is not None:
+        parts, seams = overlap_parts(parts, reached.root, goal, reached.options.overlap)
+    return workers.map(cleaned, parts), seams
+
+
+def _bodies(solid: Solid, hulls: list[trimesh.Trimesh]) -> list[int] | list[None]:
+    """The body of each hull, by its number in the report; None if the input was not repaired, or there is no time."""
+    if len(solid.bodies) == 0:
+        return [None] * len(hulls)
+    if solid.body_of is None:
+        return [0] * len(hulls)
+    vertices, faces = solid.surface
+    return owners(hulls, solid.frame.to_input(vertices), faces, solid.body_of)
