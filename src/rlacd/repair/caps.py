@@ -140,7 +140,10 @@ def close_holes(
     cap_area = face_areas(soup.vertices, caps)
     body_area = np.bincount(body, soup.area, bodies)
     points, on = spread_points(soup.vertices, caps, gap / 2)
-    distance = surface.distance(points)
+    # Corners lie on the surface, and how far points are matters only beyond a certain distance.
+    beyond = (np.linalg.norm(points[:, None] - soup.vertices[caps[on]], axis=2) > min(gap, HOLE)).all(axis=1)
+    distance = np.zeros(len(points))
+    distance[beyond] = surface.distance(points[beyond])
     far = distance > gap
     unreachable = far.copy()
     if far.any() and not fill:
@@ -245,9 +248,11 @@ def _caps(soup: Soup, rims: Rims, bend: float) -> tuple[IntArray, IntArray]:
             low, high = np.minimum(loop[:, None], loop), np.maximum(loop[:, None], loop)
             at = np.minimum(np.searchsorted(edges, low * count + high), len(edges) - 1)
             taken = (edges[at] == low * count + high) | (low == high)
+            places: dict[int, list[int]] = {}
             for i, vertex in enumerate(loop.tolist()):
-                if vertex in across:
-                    taken[i] |= np.isin(loop, across[vertex])
+                places.setdefault(vertex, []).append(i)
+            for i, vertex in enumerate(loop.tolist()):
+                taken[i, [place for other in across.get(vertex, ()) for place in places.get(other, ())]] = True
         caps.append(loop[cap(soup.vertices[loop], rims.normals[beside], taken, bend)])
         if len(loop) > 3:
             for a, b, c in caps[-1].tolist():

@@ -144,10 +144,15 @@ def on_repeated_edge(faces: IntArray, count: int) -> BoolArray:
 
 def hidden_faces(vertices: FloatArray, faces: IntArray) -> BoolArray:
     """Return ``[F]`` which faces of one body it winds around on both sides."""
-    beside = winding_beside(vertices, faces)
+    front, back = _beside(vertices, faces)
+    query = SurfaceQuery(vertices, faces)
+    sign = -1 if signed_tetrahedra(vertices, faces).sum() < 0 else 1
     # On a skin the sides have 0 and 1; a wall inside has 0.5 and 1.5. A skin that lies double has 0 and 2.
-    result: BoolArray = (beside.mean(axis=0) > 0.75) & (beside.min(axis=0) > 0.25)
-    return result
+    before = sign * query.winding(front)
+    hidden: BoolArray = before > 0.25
+    behind = sign * query.winding(back[hidden])
+    hidden[hidden] = (behind > 0.25) & ((before[hidden] + behind) / 2 > 0.75)
+    return hidden
 
 
 def crossed_share(vertices: FloatArray, faces: IntArray) -> float:
@@ -160,9 +165,13 @@ def crossed_share(vertices: FloatArray, faces: IntArray) -> float:
 
 def winding_beside(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return ``[2, F]`` how often faces wind around a point before each face and one behind; positive inside."""
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    normal = face_normals(vertices, faces)
-    middle = (a + b + c) / 3
     query = SurfaceQuery(vertices, faces)
-    beside = np.stack([query.winding(middle + _BESIDE * normal), query.winding(middle - _BESIDE * normal)])
+    beside = np.stack([query.winding(points) for points in _beside(vertices, faces)])
     return -beside[::-1] if signed_tetrahedra(vertices, faces).sum() < 0 else beside
+
+
+def _beside(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Return a point ``[F, 3]`` in front of each face and one behind it."""
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    middle, step = (a + b + c) / 3, _BESIDE * face_normals(vertices, faces)
+    return middle + step, middle - step
