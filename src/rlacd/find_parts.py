@@ -32,7 +32,7 @@ from rlacd.solid.component import Component, Part
 from rlacd.solid.cover import cover
 from rlacd.solid.distance import hull_union
 from rlacd.solid.input_mesh import InputMesh
-from rlacd.solid.solid import Solid
+from rlacd.solid.solid import Shape, Solid
 from rlacd.solid.topology import IntArray
 from rlacd.workers import Workers
 
@@ -118,7 +118,8 @@ def _repaired_and_cut(
     if options.max_hulls is None:  # otherwise the threshold may be exceeded anyway
         goal = with_limits(goal, options.max_vertices, options.max_faces)
     doubt = None if tangled is not None else partial(refuse_tangles, solid, workers.threads)
-    proxy = _proxy(root, goal, options, workers, clock)
+    proxy = _proxy(root, solid.pieces, goal, options, workers, clock)
+    solid.pieces.clear()
     if proxy is not None:
         return _through_proxy(solid, root, proxy, goal, options, workers, clock, doubt)
     parts, goal, found = _cut_and_searched(root, goal, options, workers, clock, doubt)
@@ -139,13 +140,15 @@ def _lost_in_cuts(solid: Solid, parts: Sequence[Part], workers: Workers, clock: 
         return bool(away.max() > HONEST_WITHIN)
 
 
-def _proxy(root: Component, goal: Criterion, options: Options, workers: Workers, clock: Clock) -> Proxy | None:
+def _proxy(
+    root: Component, pieces: Sequence[Shape], goal: Criterion, options: Options, workers: Workers, clock: Clock
+) -> Proxy | None:
     """A simpler solid to decompose in place of a dense one."""
     if not math.isfinite(goal.overhang) or len(root.faces) < FEW:
         return None
     try:
         with clock.stage("simplify"):
-            return simplify(root, options.threshold, workers.threads)
+            return simplify(root, options.threshold, workers.threads, pieces)
     except Stopped:
         clock.note_stop()
         return None

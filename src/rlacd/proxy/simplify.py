@@ -4,18 +4,25 @@ What a decomposition costs grows with the triangles, what it needs only with the
 proxy averages it: its faces lie in the middle of those they replace (M. Garland and P. Heckbert, "Surface
 Simplification Using Quadric Error Metrics", SIGGRAPH 1997). Nothing is promised about a proxy: `rlacd.proxy.lift` makes
 and checks every hull on the solid itself.
+
+Where noisy walls of two bodies touch, their union is riddled with tunnels, sometimes thousands, which no simplification
+removes. So the pieces that repair united are simplified one by one, and united again.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from rlacd import _native
+from rlacd.repair.union import to_arrays, unite
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component
+from rlacd.solid.solid import Shape
 
 FEW = 10_000
 """Solids with fewer triangles are decomposed as they are: little time is to be gained, and a few parts to be lost."""
@@ -33,11 +40,12 @@ STEP = 0.7
 """Ratio of the numbers of triangles of one proxy and the next. Planes are fitted to each anew: those of the original
 are noisy, and tell nothing about points far from them."""
 
-COARSEST = 100
-"""No proxy has fewer triangles."""
+COARSEST, COARSEST_PIECE = 100, 12
+"""No proxy has fewer triangles, nor a piece of one if it had more before."""
 
-LOST = 0.02
-"""A proxy's volume may differ from the solid's by this share: thin walls would fold up sooner than they deviate."""
+LOST, LOST_OF_PIECES = 0.02, 0.05
+"""A proxy's volume may differ from the solid's by this share: thin walls would fold up sooner than they deviate. Noise
+alone is more than the first of some thin pieces."""
 
 WORTHWHILE = 0.5
 """A proxy has at most this share of the solid's triangles."""
@@ -48,8 +56,13 @@ LARGE_STEP = 0.5
 TYPICAL = 8
 """Proxies with more than one triangle in this many are only looked at where smaller ones are not near enough."""
 
-SAMPLES = 2000
-"""Number of the solid's vertices whose distances are measured, besides one of each body."""
+SAMPLES, LEAST_SAMPLES = 2000, 50
+"""Number of the solid's vertices whose distances are measured, besides one of each body; and of each of its pieces, at
+least."""
+
+
+Mesh: TypeAlias = tuple[FloatArray, IntArray]
+"""Vertices float64 ``[V, 3]`` and faces int32 ``[F, 3]``, closed."""
 
 
 @dataclass(frozen=True)
@@ -67,57 +80,111 @@ class Proxy:
     deviation: float
 
 
-def simplify(solid: Component, threshold: float, threads: int = 1) -> Proxy | None:
-    """Make the smallest proxy that is near enough for a threshold; None if none is worthwhile."""
-    looked_at = solid.vertices[_samples(solid)]
-    for largest in (max(FEW, len(solid.faces) // TYPICAL), WORTHWHILE * len(solid.faces)):
-        proxy = _smallest(solid, looked_at, threshold, largest, threads)
-        if proxy is not None:
-            return proxy
+class _Copy(NamedTuple):
+    """A simpler copy of a mesh, and the distances of some of the mesh's vertices from it."""
+
+    mesh: Mesh
+    distances: FloatArray
+
+
+def simplify(solid: Component, threshold: float, threads: int = 1, pieces: Sequence[Shape] = ()) -> Proxy | None:
+    """Make the smallest proxy that is near enough for a threshold; None if none is worthwhile.
+
+    Parameters
+    ----------
+    solid : Component
+    threshold : float
+        Largest concavity of a part.
+    threads : int
+    pieces : sequence of Manifold or (vertices, faces)
+        Closed solids whose union, without its cavities, the solid is; not needed if it is only one.
+    """
+    for copy in _copies(solid, threshold, threads, pieces):
+        if copy is not None:
+            try:
+                return Proxy(Component(copy.mesh), float(np.quantile(copy.distances, OFTEN)))
+            except ValueError:  # flat
+                return None
     return None
 
 
-def _smallest(solid: Component, looked_at: FloatArray, threshold: float, largest: float, threads: int) -> Proxy | None:
-    """The smallest proxy that is near enough, if one with at most `largest` triangles is."""
-    mesh = solid.vertices, solid.faces
-    best: Proxy | None = None
-    while (count := math.floor((STEP if len(mesh[1]) <= largest else LARGE_STEP) * len(mesh[1]))) >= COARSEST:
-        mesh = _reduced(mesh, count, threads)
-        if len(mesh[1]) <= largest:
-            near = _as_proxy(mesh, solid, looked_at, threshold)
-            if near is None:
+def _copies(solid: Component, threshold: float, threads: int, pieces: Sequence[Shape]) -> Iterator[_Copy | None]:
+    """Copies of a solid made in several ways, the best first; None for each way in which none is near enough."""
+    mesh, size = (solid.vertices, solid.faces), len(solid.faces)
+    if pieces:
+        yield _smallest(mesh, threshold, threads, FEW)
+        yield _of_pieces(pieces, solid, threshold, threads)
+    yield _smallest(mesh, threshold, threads, max(FEW, size // TYPICAL))
+    yield _smallest(mesh, threshold, threads)
+
+
+def _of_pieces(pieces: Sequence[Shape], solid: Component, threshold: float, threads: int) -> _Copy | None:
+    """The union of the smallest copies of a solid's pieces that are near enough."""
+    meshes = [(vertices, faces.astype(np.int32)) for vertices, faces in map(to_arrays, pieces)]
+    size = sum(len(faces) for _, faces in meshes)
+    copies = []
+    for mesh in meshes:
+        samples = max(LEAST_SAMPLES, SAMPLES * len(mesh[1]) // size)
+        copy = _smallest(mesh, threshold, threads, FEW, samples, COARSEST_PIECE, LOST_OF_PIECES)
+        copies.append(copy or _Copy(mesh, np.zeros(1)))
+    if sum(len(copy.mesh[1]) for copy in copies) > WORTHWHILE * size:
+        return None
+    vertices, faces = to_arrays(unite([copy.mesh for copy in copies]))
+    union = vertices, faces.astype(np.int32)
+    if len(faces) > WORTHWHILE * len(solid.faces) or not _is_alike(union, solid.volume, LOST_OF_PIECES):
+        return None
+    return _Copy(union, np.concatenate([copy.distances for copy in copies]))
+
+
+def _smallest(
+    mesh: Mesh,
+    threshold: float,
+    threads: int,
+    largest: float = math.inf,
+    samples: int = SAMPLES,
+    coarsest: int = COARSEST,
+    lost: float = LOST,
+) -> _Copy | None:
+    """The smallest copy that is near enough; None if none with at most `largest` triangles is, or so many are needed
+    that it is not worthwhile."""
+    largest = min(largest, WORTHWHILE * len(mesh[1]))
+    if largest < coarsest:
+        return None
+    volume = _native.mesh_volume(*mesh)
+    looked_at = mesh[0][_samples(mesh, samples)]
+    best: _Copy | None = None
+    copy = mesh
+    while (count := math.floor((STEP if len(copy[1]) <= largest else LARGE_STEP) * len(copy[1]))) >= coarsest:
+        copy = _reduced(copy, count, threads)
+        if len(copy[1]) <= largest:
+            if not _is_alike(copy, volume, lost):
                 break
-            best = near
-        if len(mesh[1]) > count:  # hardly any edge can be collapsed any more
+            distances = _native.Surface(*copy).distance(looked_at, 1)
+            if not _is_near(distances, threshold):
+                break
+            best = _Copy(copy, distances)
+        if len(copy[1]) > count:  # hardly any edge can be collapsed any more
             break
     return best
 
 
-def _samples(solid: Component) -> IntArray:
-    """Indices of one vertex of each body and of `SAMPLES` others, the same ones every time."""
-    _, firsts = np.unique(_native.point_bodies(solid.vertices, solid.faces), return_index=True)
-    count = len(solid.vertices)
-    others = np.random.default_rng(0).choice(count, min(SAMPLES, count), replace=False)
+def _samples(mesh: Mesh, samples: int) -> IntArray:
+    """Indices of one vertex of each body and of some others, the same ones every time."""
+    _, firsts = np.unique(_native.point_bodies(*mesh), return_index=True)
+    count = len(mesh[0])
+    others = np.random.default_rng(0).choice(count, min(samples, count), replace=False)
     return np.concatenate([firsts, others]).astype(np.int32)
 
 
-def _reduced(mesh: tuple[FloatArray, IntArray], count: int, threads: int) -> tuple[FloatArray, IntArray]:
+def _reduced(mesh: Mesh, count: int, threads: int) -> Mesh:
     simplifier = _native.Simplifier(*mesh)
     simplifier.reduce(count, threads)
     return simplifier.mesh()
 
 
-def _as_proxy(
-    mesh: tuple[FloatArray, IntArray], solid: Component, looked_at: FloatArray, threshold: float
-) -> Proxy | None:
-    """The mesh as a proxy of a solid, if it is near enough."""
-    if abs(_native.mesh_volume(*mesh) - solid.volume) > LOST * solid.volume:
-        return None
-    distances = _native.Surface(*mesh).distance(looked_at, 1)
-    deviation = float(np.quantile(distances, OFTEN))
-    if deviation > NEAR * threshold or distances.max() > ANYWHERE * threshold:
-        return None
-    try:
-        return Proxy(Component(mesh), deviation)
-    except ValueError:  # flat
-        return None
+def _is_alike(copy: Mesh, volume: float, lost: float) -> bool:
+    return bool(abs(_native.mesh_volume(*copy) - volume) <= lost * volume)
+
+
+def _is_near(distances: FloatArray, threshold: float) -> bool:
+    return bool(np.quantile(distances, OFTEN) <= NEAR * threshold and distances.max() <= ANYWHERE * threshold)

@@ -14,9 +14,9 @@ from rlacd.repair.measure import measure
 from rlacd.repair.record import STEPS, Record
 from rlacd.repair.slabs import hull_of_points
 from rlacd.repair.soup import FLAT, Soup, hidden_faces
-from rlacd.repair.union import Shape, split_labels, unite, unite_around_cavities, volume_of
+from rlacd.repair.union import split_labels, unite, unite_around_cavities, volume_of
 from rlacd.repair.voxels import GAP
-from rlacd.repair.wraps import Wraps
+from rlacd.repair.wraps import Built, Wraps
 from rlacd.solid.frame import FloatArray, Frame
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import Hole
@@ -54,6 +54,8 @@ class Attempt:
     Attributes
     ----------
     solid : Manifold or (vertices, faces)
+    pieces : list of Manifold or (vertices, faces)
+        Closed solids whose union the solid is, but for cavities; none if that is not known.
     record : Record
         What was done to each body.
     lost : float
@@ -103,11 +105,11 @@ class Attempt:
         self._wraps = Wraps(surface, self.record, gap, resolution, sheets, tangled, by_faces)
 
         poll_stop()
-        self.solid = self._solid(Soup(surface.vertices, faces, body, known_edges=edges))
+        self.solid, self.pieces = self._built(Soup(surface.vertices, faces, body, known_edges=edges))
         if volume_of(self.solid) == 0:
             self.warnings.append("The surface could not be closed, so the convex hull of its points is used instead.")
             self.record.step[:] = STEPS.index("hull")
-            self.solid = hull_of_points(surface.vertices)
+            self.solid, self.pieces = hull_of_points(surface.vertices), []
         self._warn_of_holes()
         self.lost, place, loser = measure(self.record, surface, self._wraps.query(self.solid))
         self.lost_at = self._place(place, loser)
@@ -125,7 +127,7 @@ class Attempt:
         """Whether a slab crosses itself, so that booleans of it may go wrong."""
         return self._wraps.has_crossing_slabs()
 
-    def _solid(self, soup: Soup) -> Shape:
+    def _built(self, soup: Soup) -> Built:
         if len(self._tangled) == 0 and self._is_oriented(soup):
             parts = self._as_they_are(soup)
         else:
@@ -134,15 +136,16 @@ class Attempt:
             soup = self._cap(self._drop_hidden(self._trust_windings(soup.only(~is_tangled))))
             parts = self._wraps.build_or_wrap(soup) if len(soup.faces) else []
             parts += self._wraps.untangled(tangles)
+        pieces = [part for part, _ in parts]
         if self._keep_cavities:
             inward = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces), self.record.bodies) < 0
-            return unite_around_cavities([part for part, _ in parts], [bool(inward[body]) for _, body in parts])
-        solid = unite([part for part, _ in parts])
+            return Built(unite_around_cavities(pieces, [bool(inward[body]) for _, body in parts]), [])
+        built = Built(unite(pieces), pieces)
         if self._open_bodies == "thin":
-            return solid
-        solid = self._wraps.with_rooms(solid, soup, parts, self._by_room)
-        solid = self._wraps.with_deep_slits(solid, soup)
-        return self._wraps.with_slits(solid, self._hidden, self._across, self._by_room)
+            return built
+        built = self._wraps.with_rooms(built, soup, parts, self._by_room)
+        built = self._wraps.with_deep_slits(built, soup)
+        return self._wraps.with_slits(built, self._hidden, self._across, self._by_room)
 
     def _is_oriented(self, soup: Soup) -> bool:
         """Whether every edge joins two faces that run along it in opposite directions, and no body is flat."""

@@ -11,9 +11,10 @@ from rlacd.repair.record import Record
 from rlacd.repair.skin import skin
 from rlacd.repair.slabs import slab_of_faces
 from rlacd.repair.soup import FLAT, Soup, crossed_share, on_repeated_edge
-from rlacd.repair.union import Shape, one_body, split_labels, to_arrays, volume_of
+from rlacd.repair.union import one_body, split_labels, to_arrays, volume_of
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.manifold import to_manifold
+from rlacd.solid.solid import Shape
 from rlacd.solid.thickness import HALF_THICKNESS
 from rlacd.solid.topology import BoolArray, IntArray
 

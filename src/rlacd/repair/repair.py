@@ -143,6 +143,7 @@ def repair(
         holes=tuple(work.holes),
         body_of=work.record.body_of_input,
         index=query.index,
+        pieces=work.pieces if len(work.pieces) > 1 else [],
     )
 
 

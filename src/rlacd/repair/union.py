@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Sequence
-from typing import TypeAlias, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from manifold3d import Manifold, OpType
@@ -17,13 +17,10 @@ from rlacd.solid.arrays import IntArray as Indices
 from rlacd.solid.boolean_time import require_time_for
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.manifold import to_manifold
-from rlacd.solid.solid import surface_of
+from rlacd.solid.solid import Shape, surface_of
 from rlacd.solid.topology import IntArray
 
 Index = TypeVar("Index", bound=np.signedinteger)
-
-Shape: TypeAlias = Manifold | tuple[FloatArray, Indices]
-"""A closed solid: a manifold, or vertices float64 [V, 3] and faces int32 [F, 3]."""
 
 # manifold3d collapses edges shorter than 1e-12, and swaps those of faces that are no higher, or folded back onto a
 # neighbour in a plane within 1e-12.
@@ -67,6 +64,11 @@ def as_manifold(solid: Shape) -> Manifold:
 def volume_of(solid: Shape) -> float:
     """Return the volume of a solid."""
     return solid.volume() if isinstance(solid, Manifold) else _native.mesh_volume(*solid)
+
+
+def size_of(solid: Shape) -> int:
+    """Return the number of triangles of a solid."""
+    return solid.num_tri() if isinstance(solid, Manifold) else len(solid[1])
 
 
 def split_labels(vertices: FloatArray, faces: IntArray, label: IntArray) -> list[tuple[FloatArray, IntArray]]:

@@ -101,6 +101,12 @@ class Reach:
         reached = self.reached.astype(self.room.dtype)
         return np.asarray(nearest_labels(reached, cell, depth / self.pitch + _ROUNDING) == 0)
 
+    def first_in_place(self, points: FloatArray) -> IntArray:
+        """Return the indices of the first point in each place the size of a quarter of a cell."""
+        place = np.floor((points - self.origin) * (4 / self.pitch)).astype(np.int64)
+        shape = 4 * (np.array(self.room.shape, dtype=np.int64) + 2)
+        return np.unique(np.ravel_multi_index(tuple((place + 4).T), tuple(shape)), return_index=True)[1]
+
     def rooms_near(self, points: FloatArray) -> IntArray:
         """Return ``[N]`` the label of a room whose walls may contain each point, 0 for none."""
         cell = np.clip(np.rint((points - self.origin) / self.pitch).astype(np.int64), 0, np.array(self.room.shape) - 1)

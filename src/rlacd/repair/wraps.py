@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from manifold3d import Manifold
@@ -12,11 +13,12 @@ from rlacd.repair.build import crosses_itself, skins, walls_and_sheets
 from rlacd.repair.distance import SurfaceQuery, points_covering, spread_points
 from rlacd.repair.record import Record
 from rlacd.repair.slabs import slab_of_faces
-from rlacd.repair.soup import Soup
-from rlacd.repair.union import MOST_UNITED, Shape, as_manifold, to_arrays, unite, volume_of
+from rlacd.repair.soup import Soup, face_normals
+from rlacd.repair.union import MOST_UNITED, as_manifold, size_of, to_arrays, unite, volume_of
 from rlacd.repair.voxels import GAP, Reach
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.manifold import to_manifold
+from rlacd.solid.solid import Shape
 from rlacd.solid.thickness import HALF_THICKNESS
 from rlacd.solid.topology import BoolArray, IntArray
 
@@ -30,9 +32,30 @@ _ROOM = 0.01
 # A slit in an outer skin is filled from this depth on, up to this width (multiples of the gap), if all of them hold no
 # more than this share of the volume: what is shallower needs no cut, and what is wider leaves steps of the grid.
 _DEEP, _HAIR, _LITTLE = 2.0, 1 / 16, 1e-3
+# From so many triangles on, the surface is noisy enough for walls of bodies that touch to leave such slits too; that is
+# where the time to look for them is short beside the rest.
+_DENSE = 10_000
 # More sheets than this are not united one by one: that would take seconds, and cutting the result even longer. Neither
 # are fewer sheets that all cross each other: 40 have 780 crossings (a second or two), 80 have 3,160 (ten seconds).
 _CROWD, _CROSSINGS = 300, 1000
+
+
+class Built(NamedTuple):
+    """What was built of an input.
+
+    Attributes
+    ----------
+    solid : Manifold or (vertices, faces)
+    pieces : list of Manifold or (vertices, faces)
+        Closed solids whose union it is, but for cavities; none if that is not known.
+    """
+
+    solid: Shape
+    pieces: list[Shape]
+
+    def filled(self, solid: Shape, wrap: Manifold) -> Built:
+        """Get the same with the union of the solid and a wrap in place of the solid."""
+        return Built(solid, [*self.pieces, wrap])
 
 
 class Wraps:
@@ -137,12 +160,12 @@ class Wraps:
             parts.append((solid, body))
         return parts
 
-    def with_rooms(self, solid: Shape, soup: Soup, parts: list[tuple[Shape, int]], by_room: BoolArray) -> Shape:
+    def with_rooms(self, built: Built, soup: Soup, parts: list[tuple[Shape, int]], by_room: BoolArray) -> Built:
         """Fill rooms with openings too narrow for the ball: all rooms that sheets enclose, large ones in outer skins.
 
         Parameters
         ----------
-        solid
+        built
             The union of the parts.
         soup
             The faces that the parts were built from.
@@ -151,20 +174,20 @@ class Wraps:
         by_room : bool [bodies]
             Bodies that were capped only because nothing can reach the caps.
         """
-        record = self._record
+        solid, record = built.solid, self._record
         is_slab = record.has("slab") & ~self._is_tangled
         is_skin = record.has("outer skin") & ~self._is_tangled
         slabs = soup.only(is_slab[soup.body])
         sheets = soup.only((is_slab | by_room)[soup.body])
         shells = soup.only(is_skin[soup.body])
         if volume_of(solid) == 0 or not (self._is_large(sheets) or self._is_large(shells)):
-            return solid
+            return built
         query = self.query(solid)
         rooms = self.reach.rooms_outside(query)
         in_shells = self._rooms_in(shells, rooms[self.reach.volumes(rooms) >= _ROOM * volume_of(solid)])
         rooms = np.union1d(self._rooms_in(sheets, rooms), in_shells)
         if len(rooms) == 0:
-            return solid
+            return built
         wrap = self._wrap(self.reach.around_rooms(rooms), _WRAP_ERROR, query if len(in_shells) else None)
         # The wrap replaces the sheets that are only walls of the rooms; the others stay slabs.
         points, on = spread_points(slabs.vertices, slabs.faces, GAP)
@@ -175,17 +198,18 @@ class Wraps:
             others = [part for part, body in parts if not is_slab[body]]
             rest = walls_and_sheets(slabs.only(~wall), record, self._as_sheets)
             rebuilt = skins(rest[0], record) + skins(rest[1].in_patches(), record, self._by_faces)
-            united = unite([*others, *(part for part, _ in rebuilt), wrap])
+            pieces = [*others, *(part for part, _ in rebuilt), wrap]
+            filled = Built(unite(pieces), pieces)
         else:
-            united = unite([as_manifold(solid), wrap])
-        if volume_of(united) <= volume_of(solid):
+            filled = built.filled(unite([as_manifold(solid), wrap]), wrap)
+        if volume_of(filled.solid) <= volume_of(solid):
             record.faces_out = before
-            return solid
+            return built
         wrapped = np.concatenate([slabs.body[wall], np.flatnonzero(by_room)])
         record.note(wrapped, "wrapped")
         skins_too = np.flatnonzero(is_skin) if len(in_shells) else wrapped[:0]
         record.faces_out[np.concatenate([wrapped, skins_too]).min(initial=record.bodies - 1)] += wrap.num_tri()
-        return united
+        return filled
 
     def _is_large(self, walls: Soup) -> bool:
         """Whether faces could enclose a ball."""
@@ -197,38 +221,44 @@ class Wraps:
             return rooms[:0]
         return np.intersect1d(rooms, self.reach.rooms_near(spread_points(walls.vertices, walls.faces, GAP)[0]))
 
-    def with_deep_slits(self, solid: Shape, soup: Soup) -> Shape:
-        """Fill slits in outer skins that nothing can reach, such as around a door: cuts would have to follow them.
+    def with_deep_slits(self, built: Built, soup: Soup) -> Built:
+        """Fill slits that nothing can reach, since cuts would have to follow them.
+
+        They are looked for in outer skins, such as around a door, and where several dense bodies were united: noisy
+        walls that touch leave slits riddled with bridges.
 
         Parameters
         ----------
-        solid
+        built
             The solid so far.
         soup
             The faces that it was built from.
         """
+        solid = built.solid
         is_skin = self._record.has("outer skin") & ~self._is_tangled
-        if not self._is_large(soup.only(is_skin[soup.body])) or volume_of(solid) == 0:
-            return solid
+        is_dense = len(built.pieces) > 1 and size_of(solid) >= _DENSE
+        if not (is_dense or self._is_large(soup.only(is_skin[soup.body]))) or volume_of(solid) == 0:
+            return built
         query = self.query(solid)
         vertices, faces = query.vertices, query.faces
         points, on = spread_points(vertices, faces, GAP)
-        deep = self.reach.is_deep(points, _DEEP * self._gap)
-        if not deep.any():
-            return solid
-        corners = vertices[faces[on[deep]]]
-        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
-        points, step = points[deep], _HAIR * self._gap * across
-        points = points[query.inside(points + step) & query.inside(points - step)]  # both sides of a slit
+        deep = np.flatnonzero(self.reach.is_deep(points, _DEEP * self._gap))
+        if is_dense:
+            deep = deep[self.reach.first_in_place(points[deep])]
+        if len(deep) == 0:
+            return built
+        points, step = points[deep], _HAIR * self._gap * face_normals(vertices, faces[on[deep]])
+        before = query.inside(points + step)
+        points, step = points[before], step[before]
+        points = points[query.inside(points - step)]  # both sides of a slit
         if len(points) == 0:
-            return solid
+            return built
         wrap = self._wrap(self.reach.around_points(points), _WRAP_ERROR, query)
         united = unite([as_manifold(solid), wrap])
         volume = volume_of(solid)
-        return united if volume < volume_of(united) < (1 + _LITTLE) * volume else solid
+        return built.filled(united, wrap) if volume < volume_of(united) < (1 + _LITTLE) * volume else built
 
-    def with_slits(self, solid: Shape, hidden: FloatArray, across: FloatArray, by_room: BoolArray) -> Shape:
+    def with_slits(self, built: Built, hidden: FloatArray, across: FloatArray, by_room: BoolArray) -> Built:
         """Fill what is left between the caps of bodies that close each other, such as a pot and its lid.
 
         Nothing can reach such caps, so nothing can reach what they leave of a room; and where they should coincide,
@@ -236,15 +266,16 @@ class Wraps:
 
         Parameters
         ----------
-        solid
+        built
             The solid so far.
         hidden, across : float64 [N, 3]
             Points of such caps, and the normals there.
         by_room : bool [bodies]
             Their bodies.
         """
+        solid = built.solid
         if len(hidden) == 0 or volume_of(solid) == 0:
-            return solid
+            return built
         query = self.query(solid)
         bare = query.distance(hidden) < _ON_SURFACE
         points, step = hidden[bare], _SLIT * self._gap * across[bare]
@@ -253,14 +284,14 @@ class Wraps:
         cells = self.reach.around_points(points[inside.all(axis=0)])
         cells |= self.reach.around_rest(beside[~inside], query)
         if not cells.any():
-            return solid
+            return built
         wrap = self._wrap(cells, _WRAP_ERROR)
         united = unite([as_manifold(solid), wrap])
         if volume_of(united) <= volume_of(solid):
-            return solid
+            return built
         self._record.note(np.flatnonzero(by_room), "wrapped")
         self._record.faces_out[by_room.argmax()] += wrap.num_tri()
-        return united
+        return built.filled(united, wrap)
 
     def _wrapped(self, soup: Soup) -> Manifold:
         """What the ball cannot reach from outside some faces."""

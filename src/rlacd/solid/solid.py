@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 from manifold3d import Manifold, Mesh64
@@ -11,6 +12,9 @@ from numpy.typing import NDArray
 
 from rlacd._native import Surface
 from rlacd.solid.frame import FloatArray, Frame
+
+Shape: TypeAlias = Manifold | tuple[FloatArray, NDArray[np.int32]]
+"""A closed solid: a manifold, or vertices float64 ``[V, 3]`` and faces int32 ``[F, 3]``."""
 
 
 @dataclass(frozen=True)
@@ -96,9 +100,12 @@ class Solid:
         Whether the shape is the surface, in another order.
     index
         The surface, ready for queries, if repair made any.
+    pieces
+        Closed solids whose union, without its cavities, the shape is; none if that is not known, or there is only one.
+        They may be removed when they are no longer needed: they take as much memory as the shape.
     """
 
-    shape: Manifold | tuple[FloatArray, NDArray[np.int32]]
+    shape: Shape
     surface: tuple[FloatArray, NDArray[np.int32]]
     frame: Frame
     bodies: tuple[BodyRepair, ...]
@@ -107,6 +114,7 @@ class Solid:
     body_of: NDArray[np.int64] | None = None
     is_as_given: bool = False
     index: Surface | None = None
+    pieces: list[Shape] = field(default_factory=list)
 
     @property
     def vertices(self) -> FloatArray:
