@@ -11,9 +11,12 @@ import rlacd
 from rlacd import _native
 from rlacd.criteria import Concavity
 from rlacd.proxy import simplify
+from rlacd.repair.union import unite
 from rlacd.solid.component import Component, Part
 from rlacd.solid.distance import hull_union
 from rlacd.solid.hull import Hull
+from rlacd.solid.manifold import to_manifold
+from rlacd.solid.solid import Shape
 
 
 def noisy(mesh: trimesh.Trimesh, noise: float = 0.001) -> trimesh.Trimesh:
@@ -32,6 +35,18 @@ def cross() -> trimesh.Trimesh:
     bars = [trimesh.creation.box(extents) for extents in ((2, 0.3, 0.3), (0.3, 2, 0.3))]
     united = trimesh.boolean.union(bars, engine="manifold")
     return noisy(trimesh.Trimesh(*trimesh.remesh.subdivide_to_size(united.vertices, united.faces, 0.04)))
+
+
+def bricks(count: int, edge: float) -> trimesh.Trimesh:
+    """A bar of bricks with their own noise: slits full of bridges between walls that would coincide without it."""
+    row = []
+    for number in range(count):
+        brick = trimesh.creation.box((2 / count, 0.4, 0.4))
+        brick.apply_translation((2 * number / count, 0, 0))
+        dense = trimesh.Trimesh(*trimesh.remesh.subdivide_to_size(brick.vertices, brick.faces, edge))
+        shift = np.random.default_rng(number).normal(0, 0.001, (len(dense.vertices), 1))
+        row.append(trimesh.Trimesh(dense.vertices + shift * dense.vertex_normals, dense.faces, process=False))
+    return trimesh.util.concatenate(row)
 
 
 SHAPES = {"ring": ring, "cross": cross}
@@ -87,6 +102,34 @@ def test_noise_and_density_cost_hardly_any_parts(shape: str) -> None:
             [trimesh.creation.box(extents) for extents in ((2, 0.3, 0.3), (0.3, 2, 0.3))], engine="manifold"
         )
     assert len(rlacd.decompose(dense, quality="fast")) <= len(rlacd.decompose(plain, quality="fast")) + 1
+
+
+def test_noisy_walls_of_bodies_that_touch_need_no_cuts() -> None:
+    mesh = bricks(4, 0.03)
+    result = rlacd.decompose(mesh, quality="fast")
+    assert len(result) == 1
+    assert not result.report["warnings"]
+    assert result.report["hausdorff"]["over"] <= 0.012  # a bar that is noisy in one piece: 0.010
+
+
+def test_pieces_make_a_proxy_of_a_union_full_of_tunnels() -> None:
+    """As if repair had not filled the slits between the bricks."""
+    mesh = bricks(4, 0.03)
+    pieces: list[Shape] = [
+        to_manifold(np.array(brick.vertices), np.array(brick.faces)) for brick in mesh.split(only_watertight=False)
+    ]
+    solid = Component(unite(pieces))
+    tunnels = 1 - (len(solid.vertices) - len(solid.faces) // 2) // 2
+    assert tunnels > 20
+    without, proxy = simplify(solid, 0.05), simplify(solid, 0.05, pieces=pieces)
+    assert proxy is not None
+    assert len(proxy.component.faces) < 500
+    assert without is None or len(without.component.faces) > 10 * len(proxy.component.faces)
+    simple = trimesh.Trimesh(proxy.component.vertices, proxy.component.faces, process=False)
+    assert simple.is_watertight
+    assert simple.volume == pytest.approx(solid.volume, rel=0.01)
+    surface, corners = _native.Surface(solid.vertices, solid.faces), proxy.component.vertices
+    assert surface.distance(corners[surface.winding(corners) < 0.5], 1).max() <= 0.005
 
 
 @pytest.mark.slow

@@ -71,6 +71,12 @@ def size_of(solid: Shape) -> int:
     return solid.num_tri() if isinstance(solid, Manifold) else len(solid[1])
 
 
+def tunnels_in(solid: Shape) -> int:
+    """Return the number of tunnels through a solid, less one for each of its surfaces but the first."""
+    vertices = solid.num_vert() if isinstance(solid, Manifold) else len(solid[0])
+    return 1 - (vertices - size_of(solid) // 2) // 2
+
+
 def split_labels(vertices: FloatArray, faces: IntArray, label: IntArray) -> list[tuple[FloatArray, IntArray]]:
     """Split a mesh into the faces of each label, in ascending order of the labels."""
     if len(label) and (label == label[0]).all():

@@ -69,6 +69,11 @@ class Reach:
         room = np.where(outside, 0, label)
         return cls(origin, pitch, radius, reached, occupied, room)
 
+    @property
+    def place(self) -> float:
+        """A quarter of a cell."""
+        return self.pitch / 4
+
     def covers(self, points: FloatArray) -> BoolArray:
         """Return ``[N]`` whether the ball can reach each point; it can reach all points off the grid."""
         cell = np.rint((points - self.origin) / self.pitch).astype(np.int64)
@@ -102,10 +107,16 @@ class Reach:
         return np.asarray(nearest_labels(reached, cell, depth / self.pitch + _ROUNDING) == 0)
 
     def first_in_place(self, points: FloatArray) -> IntArray:
-        """Return the indices of the first point in each place the size of a quarter of a cell."""
-        place = np.floor((points - self.origin) * (4 / self.pitch)).astype(np.int64)
+        """Return the indices of the first point in each place, of size `place`."""
+        place = np.floor((points - self.origin) / self.place).astype(np.int64)
         shape = 4 * (np.array(self.room.shape, dtype=np.int64) + 2)
         return np.unique(np.ravel_multi_index(tuple((place + 4).T), tuple(shape)), return_index=True)[1]
+
+    def points_in(self, cells: BoolArray, count: int) -> FloatArray:
+        """Return `count` random points or a few more ``[N, 3]``, as many in each cell, the same ones every time."""
+        inside = np.argwhere(cells)
+        inside = np.repeat(inside, -(-count // len(inside)), axis=0)
+        return self.origin + (inside + np.random.default_rng(0).uniform(-0.5, 0.5, inside.shape)) * self.pitch
 
     def rooms_near(self, points: FloatArray) -> IntArray:
         """Return ``[N]`` the label of a room whose walls may contain each point, 0 for none."""

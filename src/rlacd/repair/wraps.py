@@ -8,13 +8,14 @@ from typing import NamedTuple
 import numpy as np
 from manifold3d import Manifold
 
+from rlacd import _native
 from rlacd._native import poll_stop
 from rlacd.repair.build import crosses_itself, skins, walls_and_sheets
 from rlacd.repair.distance import SurfaceQuery, points_covering, spread_points
 from rlacd.repair.record import Record
 from rlacd.repair.slabs import slab_of_faces
 from rlacd.repair.soup import Soup, face_normals
-from rlacd.repair.union import MOST_UNITED, as_manifold, size_of, to_arrays, unite, volume_of
+from rlacd.repair.union import MOST_UNITED, as_manifold, size_of, to_arrays, tunnels_in, unite, volume_of
 from rlacd.repair.voxels import GAP, Reach
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.manifold import to_manifold
@@ -32,9 +33,13 @@ _ROOM = 0.01
 # A slit in an outer skin is filled from this depth on, up to this width (multiples of the gap), if all of them hold no
 # more than this share of the volume: what is shallower needs no cut, and what is wider leaves steps of the grid.
 _DEEP, _HAIR, _LITTLE = 2.0, 1 / 16, 1e-3
-# From so many triangles on, the surface is noisy enough for walls of bodies that touch to leave such slits too; that is
-# where the time to look for them is short beside the rest.
-_DENSE = 10_000
+# Noise leaves slits between walls of dense bodies that touch, full of bridges: a union of so many triangles, with so
+# many tunnels, is looked at, and its slits are filled if they make up this share of its surface. They are filled nearer
+# to their mouths than others, since they are no doors.
+_DENSE, _TUNNELS, _SLITTED = 10_000, 25, 0.01
+_DENSE_DEEP, _DENSE_LITTLE = 1.25, 3e-3
+# How many points tell how much a wrap would add, which is sooner than uniting it.
+_TRIED = 20_000
 # More sheets than this are not united one by one: that would take seconds, and cutting the result even longer. Neither
 # are fewer sheets that all cross each other: 40 have 780 crossings (a second or two), 80 have 3,160 (ten seconds).
 _CROWD, _CROSSINGS = 300, 1000
@@ -236,27 +241,39 @@ class Wraps:
         """
         solid = built.solid
         is_skin = self._record.has("outer skin") & ~self._is_tangled
-        is_dense = len(built.pieces) > 1 and size_of(solid) >= _DENSE
+        is_dense = len(built.pieces) > 1 and size_of(solid) >= _DENSE and tunnels_in(solid) >= _TUNNELS
         if not (is_dense or self._is_large(soup.only(is_skin[soup.body]))) or volume_of(solid) == 0:
             return built
         query = self.query(solid)
         vertices, faces = query.vertices, query.faces
         points, on = spread_points(vertices, faces, GAP)
-        deep = np.flatnonzero(self.reach.is_deep(points, _DEEP * self._gap))
+        depth, little = (_DENSE_DEEP, _DENSE_LITTLE) if is_dense else (_DEEP, _LITTLE)
+        deep = np.flatnonzero(self.reach.is_deep(points, depth * self._gap))
+        least = 1.0
         if is_dense:
             deep = deep[self.reach.first_in_place(points[deep])]
-        if len(deep) == 0:
+            least = _SLITTED * _native.mesh_area(vertices, faces.astype(np.int32)) / self.reach.place**2
+        if len(deep) < least:
             return built
         points, step = points[deep], _HAIR * self._gap * face_normals(vertices, faces[on[deep]])
         before = query.inside(points + step)
         points, step = points[before], step[before]
         points = points[query.inside(points - step)]  # both sides of a slit
-        if len(points) == 0:
+        if len(points) < least:
             return built
-        wrap = self._wrap(self.reach.around_points(points), _WRAP_ERROR, query)
+        cells, volume = self.reach.around_points(points), volume_of(solid)
+        wrap = self._wrap(cells, _WRAP_ERROR, query)
+        if is_dense and self._volume_beyond(query, wrap, cells) > little * volume:
+            return built
         united = unite([as_manifold(solid), wrap])
-        volume = volume_of(solid)
-        return built.filled(united, wrap) if volume < volume_of(united) < (1 + _LITTLE) * volume else built
+        return built.filled(united, wrap) if volume < volume_of(united) < (1 + little) * volume else built
+
+    def _volume_beyond(self, solid: SurfaceQuery, wrap: Manifold, cells: BoolArray) -> float:
+        """Estimate how much of a wrap of cells lies outside a solid."""
+        points = self.reach.points_in(cells, _TRIED)
+        wrapped = points[SurfaceQuery(*to_arrays(wrap), self._input.threads).inside(points)]
+        share = np.count_nonzero(~solid.inside(wrapped)) / len(points)
+        return float(share * np.count_nonzero(cells) * self.reach.pitch**3)
 
     def with_slits(self, built: Built, hidden: FloatArray, across: FloatArray, by_room: BoolArray) -> Built:
         """Fill what is left between the caps of bodies that close each other, such as a pot and its lid.
