@@ -229,8 +229,8 @@ class Wraps:
     def with_deep_slits(self, built: Built, soup: Soup) -> Built:
         """Fill slits that nothing can reach, since cuts would have to follow them.
 
-        They are looked for in outer skins, such as around a door, and where several dense bodies were united: noisy
-        walls that touch leave slits riddled with bridges.
+        They are looked for in outer skins, such as around a door, and otherwise where several dense bodies were united:
+        noisy walls that touch leave slits riddled with bridges.
 
         Parameters
         ----------
@@ -241,8 +241,9 @@ class Wraps:
         """
         solid = built.solid
         is_skin = self._record.has("outer skin") & ~self._is_tangled
-        is_dense = len(built.pieces) > 1 and size_of(solid) >= _DENSE and tunnels_in(solid) >= _TUNNELS
-        if not (is_dense or self._is_large(soup.only(is_skin[soup.body]))) or volume_of(solid) == 0:
+        has_skin = self._is_large(soup.only(is_skin[soup.body]))
+        is_dense = len(built.pieces) > 1 and size_of(solid) >= _DENSE and tunnels_in(solid) >= _TUNNELS and not has_skin
+        if not (has_skin or is_dense) or volume_of(solid) == 0:
             return built
         query = self.query(solid)
         vertices, faces = query.vertices, query.faces
