@@ -145,7 +145,8 @@ class Attempt:
             return built
         built = self._wraps.with_rooms(built, soup, parts, self._by_room)
         built = self._wraps.with_deep_slits(built, soup)
-        return self._wraps.with_slits(built, self._hidden, self._across, self._by_room)
+        built = self._wraps.with_slits(built, self._hidden, self._across, self._by_room)
+        return self._wraps.with_noisy_slits(built)
 
     def _is_oriented(self, soup: Soup) -> bool:
         """Whether every edge joins two faces that run along it in opposite directions, and no body is flat."""

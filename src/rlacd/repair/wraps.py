@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from manifold3d import Manifold
 
-from rlacd import _native
 from rlacd._native import poll_stop
 from rlacd.repair.build import crosses_itself, skins, walls_and_sheets
 from rlacd.repair.distance import SurfaceQuery, points_covering, spread_points
@@ -21,7 +20,7 @@ from rlacd.solid.frame import FloatArray
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import Shape
 from rlacd.solid.thickness import HALF_THICKNESS
-from rlacd.solid.topology import BoolArray, IntArray
+from rlacd.solid.topology import BoolArray, IntArray, face_areas
 
 _WRAP_ERROR = 4e-3
 # Widest slit between caps that is filled, as a share of the gap, and the distance up to which a cap is part of the
@@ -34,10 +33,10 @@ _ROOM = 0.01
 # more than this share of the volume: what is shallower needs no cut, and what is wider leaves steps of the grid.
 _DEEP, _HAIR, _LITTLE = 2.0, 1 / 16, 1e-3
 # Noise leaves slits between walls of dense bodies that touch, full of bridges: a union of so many triangles, with so
-# many tunnels, is looked at, and its slits are filled if they make up this share of its surface. They are filled nearer
-# to their mouths than others, since they are no doors.
+# many tunnels, is looked at, and its slits are filled if they make up this share of its surface, nearer to their mouths
+# than others, since they are no doors.
 _DENSE, _TUNNELS, _SLITTED = 10_000, 25, 0.01
-_DENSE_DEEP, _DENSE_LITTLE = 1.25, 3e-3
+_DEEP_IN_NOISE, _LITTLE_NOISE = 1.25, 3e-3
 # How many points tell how much a wrap would add, which is sooner than uniting it.
 _TRIED = 20_000
 # More sheets than this are not united one by one: that would take seconds, and cutting the result even longer. Neither
@@ -227,10 +226,7 @@ class Wraps:
         return np.intersect1d(rooms, self.reach.rooms_near(spread_points(walls.vertices, walls.faces, GAP)[0]))
 
     def with_deep_slits(self, built: Built, soup: Soup) -> Built:
-        """Fill slits that nothing can reach, since cuts would have to follow them.
-
-        They are looked for in outer skins, such as around a door, and otherwise where several dense bodies were united:
-        noisy walls that touch leave slits riddled with bridges.
+        """Fill slits in outer skins that nothing can reach, such as around a door: cuts would have to follow them.
 
         Parameters
         ----------
@@ -241,33 +237,48 @@ class Wraps:
         """
         solid = built.solid
         is_skin = self._record.has("outer skin") & ~self._is_tangled
-        has_skin = self._is_large(soup.only(is_skin[soup.body]))
-        is_dense = len(built.pieces) > 1 and size_of(solid) >= _DENSE and tunnels_in(solid) >= _TUNNELS and not has_skin
-        if not (has_skin or is_dense) or volume_of(solid) == 0:
+        if not self._is_large(soup.only(is_skin[soup.body])) or volume_of(solid) == 0:
             return built
         query = self.query(solid)
-        vertices, faces = query.vertices, query.faces
-        points, on = spread_points(vertices, faces, GAP)
-        depth, little = (_DENSE_DEEP, _DENSE_LITTLE) if is_dense else (_DEEP, _LITTLE)
-        deep = np.flatnonzero(self.reach.is_deep(points, depth * self._gap))
-        least = 1.0
-        if is_dense:
-            deep = deep[self.reach.first_in_place(points[deep])]
-            least = _SLITTED * _native.mesh_area(vertices, faces.astype(np.int32)) / self.reach.place**2
-        if len(deep) < least:
+        points = _in_slits(query, *self._deep(query, _DEEP), _HAIR * self._gap)
+        if len(points) == 0:
             return built
-        points, step = points[deep], _HAIR * self._gap * face_normals(vertices, faces[on[deep]])
-        before = query.inside(points + step)
-        points, step = points[before], step[before]
-        points = points[query.inside(points - step)]  # both sides of a slit
+        wrap = self._wrap(self.reach.around_points(points), _WRAP_ERROR, query)
+        united, volume = unite([as_manifold(solid), wrap]), volume_of(solid)
+        return built.filled(united, wrap) if volume < volume_of(united) < (1 + _LITTLE) * volume else built
+
+    def with_noisy_slits(self, built: Built) -> Built:
+        """Fill slits between the walls of dense bodies that touch: noise leaves slits there, full of bridges.
+
+        Parameters
+        ----------
+        built
+            The solid so far.
+        """
+        solid, volume = built.solid, volume_of(built.solid)
+        if len(built.pieces) < 2 or size_of(solid) < _DENSE or tunnels_in(solid) < _TUNNELS or volume <= 0:
+            return built
+        query = self.query(solid)
+        points, on = self._deep(query, _DEEP_IN_NOISE)
+        first = self.reach.first_in_place(points)
+        least = _SLITTED * face_areas(query.vertices, query.faces).sum() / self.reach.place**2
+        if len(first) < least:
+            return built
+        points = _in_slits(query, points[first], on[first], _HAIR * self._gap)
         if len(points) < least:
             return built
-        cells, volume = self.reach.around_points(points), volume_of(solid)
+        cells = self.reach.around_points(points)
         wrap = self._wrap(cells, _WRAP_ERROR, query)
-        if is_dense and self._volume_beyond(query, wrap, cells) > little * volume:
+        if self._volume_beyond(query, wrap, cells) > _LITTLE_NOISE * volume:
             return built
         united = unite([as_manifold(solid), wrap])
-        return built.filled(united, wrap) if volume < volume_of(united) < (1 + little) * volume else built
+        return built.filled(united, wrap) if volume < volume_of(united) < (1 + _LITTLE_NOISE) * volume else built
+
+    def _deep(self, solid: SurfaceQuery, depth: float) -> tuple[FloatArray, IntArray]:
+        """Points ``[N, 3]`` of a solid at least so many radii from where the ball can reach, and the face of each."""
+        points, on = spread_points(solid.vertices, solid.faces, GAP)
+        deep = self.reach.is_deep(points, depth * self._gap)
+        return points[deep], on[deep]
 
     def _volume_beyond(self, solid: SurfaceQuery, wrap: Manifold, cells: BoolArray) -> float:
         """Estimate how much of a wrap of cells lies outside a solid."""
@@ -320,6 +331,14 @@ class Wraps:
     def _wrap(self, cells: BoolArray, error: float, solid: SurfaceQuery | None = None) -> Manifold:
         """Return a solid of grid cells, projected onto the input where it does not overlap `solid`, and simplified."""
         return to_manifold(*self.reach.wrap(cells, self._input, HALF_THICKNESS, solid)).simplify(error)
+
+
+def _in_slits(solid: SurfaceQuery, points: FloatArray, on: IntArray, width: float) -> FloatArray:
+    """Those of some points on faces of a solid that have it on both sides, so far away."""
+    step = width * face_normals(solid.vertices, solid.faces[on])
+    before = solid.inside(points + step)
+    points, step = points[before], step[before]
+    return points[solid.inside(points - step)]
 
 
 def _crossings(boxes: FloatArray) -> int:
