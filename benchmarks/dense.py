@@ -43,7 +43,7 @@ def tools(path: str) -> dict[str, Callable[[], list[int]]]:
 def main(paths: list[str]) -> None:
     """Print a row for each mesh, then the median ratios."""
     coacd.set_log_level("error")
-    rlacd.decompose(trimesh.creation.box(), threads=1)  # loads the libraries, with as many threads of manifold3d
+    rlacd.decompose(trimesh.creation.box(), threads=1)  # loads the libraries; manifold3d too gets one thread
     columns = " | ".join(f"{tool}: s, hulls, tri/hull" for tool in TOOLS)
     print(f"| mesh | {columns} |\n|---|{'---|' * len(TOOLS)}", flush=True)
     seconds: dict[str, list[float]] = {tool: [] for tool in TOOLS}

@@ -19,10 +19,10 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from rlacd import _native
-from rlacd.repair.union import to_arrays, unite
+from rlacd.repair.union import unite
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component
-from rlacd.solid.solid import Shape
+from rlacd.solid.solid import Shape, mesh_of
 
 FEW = 10_000
 """Solids with fewer triangles are decomposed as they are: little time is to be gained, and a few parts to be lost."""
@@ -120,7 +120,7 @@ def _copies(solid: Component, threshold: float, threads: int, pieces: Sequence[S
 
 def _of_pieces(pieces: Sequence[Shape], solid: Component, threshold: float, threads: int) -> _Copy | None:
     """The union of the smallest copies of a solid's pieces that are near enough."""
-    meshes = [(vertices, faces.astype(np.int32)) for vertices, faces in map(to_arrays, pieces)]
+    meshes = [mesh_of(piece) for piece in pieces]
     size = sum(len(faces) for _, faces in meshes)
     copies = []
     for mesh in meshes:
@@ -129,9 +129,8 @@ def _of_pieces(pieces: Sequence[Shape], solid: Component, threshold: float, thre
         copies.append(copy or _Copy(mesh, np.zeros(1)))
     if sum(len(copy.mesh[1]) for copy in copies) > WORTHWHILE * size:
         return None
-    vertices, faces = to_arrays(unite([copy.mesh for copy in copies]))
-    union = vertices, faces.astype(np.int32)
-    if len(faces) > WORTHWHILE * len(solid.faces) or not _is_alike(union, solid.volume, LOST_OF_PIECES):
+    union = mesh_of(unite([copy.mesh for copy in copies]))
+    if len(union[1]) > WORTHWHILE * len(solid.faces) or not _is_alike(union, solid.volume, LOST_OF_PIECES):
         return None
     return _Copy(union, np.concatenate([copy.distances for copy in copies]))
 

@@ -17,7 +17,7 @@ from rlacd.solid.arrays import IntArray as Indices
 from rlacd.solid.boolean_time import require_time_for
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.manifold import to_manifold
-from rlacd.solid.solid import Shape, surface_of
+from rlacd.solid.solid import Shape, mesh_of, surface_of
 from rlacd.solid.topology import IntArray
 
 Index = TypeVar("Index", bound=np.signedinteger)
@@ -35,7 +35,7 @@ _AT_ONCE = 20_000
 
 def to_arrays(solid: Shape) -> tuple[FloatArray, IntArray]:
     """Return vertices float64 ``[V, 3]`` and faces int64 ``[F, 3]`` of a solid."""
-    vertices, faces = surface_of(solid) if isinstance(solid, Manifold) else solid
+    vertices, faces = mesh_of(solid)
     return vertices, faces.astype(np.int64)
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rlacd import _native
 from rlacd._native import label_cells, nearest_labels, poll_stop
 from rlacd.repair.distance import SurfaceQuery, points_covering
 from rlacd.solid.frame import FloatArray
@@ -106,11 +107,10 @@ class Reach:
         reached = self.reached.astype(self.room.dtype)
         return np.asarray(nearest_labels(reached, cell, depth / self.pitch + _ROUNDING) == 0)
 
-    def first_in_place(self, points: FloatArray) -> IntArray:
-        """Return the indices of the first point in each place, of size `place`."""
-        place = np.floor((points - self.origin) / self.place).astype(np.int64)
-        shape = 4 * (np.array(self.room.shape, dtype=np.int64) + 2)
-        return np.unique(np.ravel_multi_index(tuple((place + 4).T), tuple(shape)), return_index=True)[1]
+    def one_in_each_place(self, points: FloatArray) -> IntArray:
+        """Return the indices of the first point in each cube of size `place`."""
+        first = _native.first_in_place(np.floor((points - self.origin) / self.place))
+        return np.flatnonzero(first == np.arange(len(points)))
 
     def points_in(self, cells: BoolArray, count: int) -> FloatArray:
         """Return `count` random points or a few more ``[N, 3]``, as many in each cell, the same ones every time."""

@@ -57,9 +57,14 @@ class Built(NamedTuple):
     solid: Shape
     pieces: list[Shape]
 
-    def filled(self, solid: Shape, wrap: Manifold) -> Built:
-        """Get the same with the union of the solid and a wrap in place of the solid."""
-        return Built(solid, [*self.pieces, wrap])
+    @property
+    def volume(self) -> float:
+        """Volume of the solid."""
+        return volume_of(self.solid)
+
+    def filled(self, wrap: Manifold) -> Built:
+        """Unite the solid with a wrap."""
+        return Built(unite([as_manifold(self.solid), wrap]), [*self.pieces, wrap])
 
 
 class Wraps:
@@ -178,17 +183,17 @@ class Wraps:
         by_room : bool [bodies]
             Bodies that were capped only because nothing can reach the caps.
         """
-        solid, record = built.solid, self._record
+        record = self._record
         is_slab = record.has("slab") & ~self._is_tangled
         is_skin = record.has("outer skin") & ~self._is_tangled
         slabs = soup.only(is_slab[soup.body])
         sheets = soup.only((is_slab | by_room)[soup.body])
         shells = soup.only(is_skin[soup.body])
-        if volume_of(solid) == 0 or not (self._is_large(sheets) or self._is_large(shells)):
+        if built.volume == 0 or not (self._is_large(sheets) or self._is_large(shells)):
             return built
-        query = self.query(solid)
+        query = self.query(built.solid)
         rooms = self.reach.rooms_outside(query)
-        in_shells = self._rooms_in(shells, rooms[self.reach.volumes(rooms) >= _ROOM * volume_of(solid)])
+        in_shells = self._rooms_in(shells, rooms[self.reach.volumes(rooms) >= _ROOM * built.volume])
         rooms = np.union1d(self._rooms_in(sheets, rooms), in_shells)
         if len(rooms) == 0:
             return built
@@ -205,8 +210,8 @@ class Wraps:
             pieces = [*others, *(part for part, _ in rebuilt), wrap]
             filled = Built(unite(pieces), pieces)
         else:
-            filled = built.filled(unite([as_manifold(solid), wrap]), wrap)
-        if volume_of(filled.solid) <= volume_of(solid):
+            filled = built.filled(wrap)
+        if filled.volume <= built.volume:
             record.faces_out = before
             return built
         wrapped = np.concatenate([slabs.body[wall], np.flatnonzero(by_room)])
@@ -235,17 +240,16 @@ class Wraps:
         soup
             The faces that it was built from.
         """
-        solid = built.solid
         is_skin = self._record.has("outer skin") & ~self._is_tangled
-        if not self._is_large(soup.only(is_skin[soup.body])) or volume_of(solid) == 0:
+        if not self._is_large(soup.only(is_skin[soup.body])) or built.volume == 0:
             return built
-        query = self.query(solid)
+        query = self.query(built.solid)
         points = _in_slits(query, *self._deep(query, _DEEP), _HAIR * self._gap)
         if len(points) == 0:
             return built
         wrap = self._wrap(self.reach.around_points(points), _WRAP_ERROR, query)
-        united, volume = unite([as_manifold(solid), wrap]), volume_of(solid)
-        return built.filled(united, wrap) if volume < volume_of(united) < (1 + _LITTLE) * volume else built
+        filled = built.filled(wrap)
+        return filled if built.volume < filled.volume < (1 + _LITTLE) * built.volume else built
 
     def with_noisy_slits(self, built: Built) -> Built:
         """Fill slits between the walls of dense bodies that touch: noise leaves slits there, full of bridges.
@@ -255,12 +259,12 @@ class Wraps:
         built
             The solid so far.
         """
-        solid, volume = built.solid, volume_of(built.solid)
+        solid, volume = built.solid, built.volume
         if len(built.pieces) < 2 or size_of(solid) < _DENSE or tunnels_in(solid) < _TUNNELS or volume <= 0:
             return built
         query = self.query(solid)
         points, on = self._deep(query, _DEEP_IN_NOISE)
-        first = self.reach.first_in_place(points)
+        first = self.reach.one_in_each_place(points)
         least = _SLITTED * face_areas(query.vertices, query.faces).sum() / self.reach.place**2
         if len(first) < least:
             return built
@@ -271,8 +275,8 @@ class Wraps:
         wrap = self._wrap(cells, _WRAP_ERROR, query)
         if self._volume_beyond(query, wrap, cells) > _LITTLE_NOISE * volume:
             return built
-        united = unite([as_manifold(solid), wrap])
-        return built.filled(united, wrap) if volume < volume_of(united) < (1 + _LITTLE_NOISE) * volume else built
+        filled = built.filled(wrap)
+        return filled if volume < filled.volume < (1 + _LITTLE_NOISE) * volume else built
 
     def _deep(self, solid: SurfaceQuery, depth: float) -> tuple[FloatArray, IntArray]:
         """Points ``[N, 3]`` of a solid at least so many radii from where the ball can reach, and the face of each."""
@@ -302,10 +306,9 @@ class Wraps:
         by_room : bool [bodies]
             Their bodies.
         """
-        solid = built.solid
-        if len(hidden) == 0 or volume_of(solid) == 0:
+        if len(hidden) == 0 or built.volume == 0:
             return built
-        query = self.query(solid)
+        query = self.query(built.solid)
         bare = query.distance(hidden) < _ON_SURFACE
         points, step = hidden[bare], _SLIT * self._gap * across[bare]
         beside = np.stack([points + step, points - step])
@@ -315,12 +318,12 @@ class Wraps:
         if not cells.any():
             return built
         wrap = self._wrap(cells, _WRAP_ERROR)
-        united = unite([as_manifold(solid), wrap])
-        if volume_of(united) <= volume_of(solid):
+        filled = built.filled(wrap)
+        if filled.volume <= built.volume:
             return built
         self._record.note(np.flatnonzero(by_room), "wrapped")
         self._record.faces_out[by_room.argmax()] += wrap.num_tri()
-        return built.filled(united, wrap)
+        return filled
 
     def _wrapped(self, soup: Soup) -> Manifold:
         """What the ball cannot reach from outside some faces."""

@@ -18,7 +18,7 @@ from rlacd.solid.boolean_time import require_time_for
 from rlacd.solid.caps import FOLDED, NEGLIGIBLE_FOLD, Surface, capped, section_caps
 from rlacd.solid.hull import Hull
 from rlacd.solid.manifold import to_manifold
-from rlacd.solid.solid import surface_of
+from rlacd.solid.solid import mesh_of, surface_of
 
 NEGLIGIBLE_VOLUME = 1e-12
 """Solids below this volume (the frame's box has 8) are rounding left over by a cut."""
@@ -235,7 +235,7 @@ class Component(Part):
     """
 
     def __init__(self, solid: Manifold | tuple[FloatArray, IntArray], threads: int = 1) -> None:
-        vertices, faces = solid if isinstance(solid, tuple) else surface_of(solid)
+        vertices, faces = mesh_of(solid)
         hull = Hull.of(vertices)
         if hull is None:
             raise ValueError("a component has to have a volume")

@@ -138,7 +138,12 @@ class Solid:
     @cached_property
     def mesh(self) -> tuple[FloatArray, NDArray[np.int32]]:
         """Vertices and faces of the shape."""
-        return surface_of(self.shape) if isinstance(self.shape, Manifold) else self.shape
+        return mesh_of(self.shape)
+
+
+def mesh_of(shape: Shape) -> tuple[FloatArray, NDArray[np.int32]]:
+    """Return the vertices ``[V, 3]`` and faces ``[F, 3]`` of a shape."""
+    return surface_of(shape) if isinstance(shape, Manifold) else shape
 
 
 def surface_of(manifold: Manifold) -> tuple[FloatArray, NDArray[np.int32]]:
