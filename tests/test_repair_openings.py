@@ -524,12 +524,18 @@ def test_a_person_with_fins_loses_nothing(corpus, share, seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", ["test/gazebo_models/speed_limit_sign__speed_limit_sign", "train/kenney_cc0/space_kit__spaceCraft1"]
-)
-def test_what_closing_would_lose_stays_open(corpus, name):
-    """A body that caps turn inside out in places, and one of films that a wrap cuts off."""
-    path = corpus / f"{name}.ply"
+def test_films_around_a_room_stay_when_it_is_filled(corpus):
+    """The filling took the place of films that it did not cover, 0.12 of them; then all became a thin shell."""
+    result = rlacd.decompose(corpus / "train/kenney_cc0/space_kit__spaceCraft1.ply", quality="fast")
+    assert result.report["hausdorff"]["under"] < 1e-3
+    assert [body["step"] for body in result.report["repair"]] == ["wrapped"]
+    assert not result.report["warnings"]
+
+
+@pytest.mark.slow
+def test_what_closing_would_lose_stays_open(corpus):
+    """A body that caps turn inside out in places."""
+    path = corpus / "test/gazebo_models/speed_limit_sign__speed_limit_sign.ply"
     result = rlacd.decompose(path, quality="fast")
     assert result.report["hausdorff"]["under"] < 1e-3
     assert "became thin shells" in result.report["warnings"][0]

@@ -7,13 +7,13 @@ from manifold3d import Manifold
 from numpy.typing import ArrayLike
 
 from rlacd._native import poll_stop
-from rlacd.repair.caps import FLAPS, close_holes
+from rlacd.repair.caps import close_holes
 from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.holes import MOST_FREE_EDGES, close_cracks
 from rlacd.repair.measure import measure
 from rlacd.repair.record import STEPS, Record
 from rlacd.repair.slabs import hull_of_points
-from rlacd.repair.soup import FLAT, Soup, hidden_faces
+from rlacd.repair.soup import FLAPS, FLAT, Soup, hidden_faces, trust_windings
 from rlacd.repair.union import split_labels, unite, unite_around_cavities, volume_of
 from rlacd.repair.voxels import GAP
 from rlacd.repair.wraps import Built, Wraps
@@ -21,7 +21,7 @@ from rlacd.solid.frame import FloatArray, Frame
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import Hole
 from rlacd.solid.thickness import HALF_THICKNESS
-from rlacd.solid.topology import BoolArray, Edges, IntArray, bodies_of, is_balanced, signed_tetrahedra
+from rlacd.solid.topology import BoolArray, Edges, IntArray, bodies_of, signed_tetrahedra
 
 _WELDS = (2e-5, 5e-4)
 
@@ -133,7 +133,7 @@ class Attempt:
         else:
             is_tangled = np.isin(soup.body, self._tangled)
             tangles = self._cap(soup.only(is_tangled))
-            soup = self._cap(self._drop_hidden(self._trust_windings(soup.only(~is_tangled))))
+            soup = self._cap(self._drop_hidden(trust_windings(soup.only(~is_tangled), self.record.bodies)))
             parts = self._wraps.build_or_wrap(soup) if len(soup.faces) else []
             parts += self._wraps.untangled(tangles)
         pieces = [part for part, _ in parts]
@@ -167,24 +167,6 @@ class Attempt:
         self.record.faces_out = np.bincount(soup.body)
         solids = [to_manifold(v, f) for v, f in split_labels(soup.vertices, faces, soup.body)]
         return list(zip(solids, range(self.record.bodies), strict=True))
-
-    def _trust_windings(self, soup: Soup) -> Soup:
-        """Trust the windings of closed bodies if the angles between their faces join the inside with the outside.
-
-        Where corners were rounded, slivers fold over and angles around an edge with four faces are wrong.
-        """
-        uneven, crowded = np.zeros((2, self.record.bodies), dtype=bool)
-        uneven[soup.body[soup.at_valence(~is_balanced(soup.faces, soup.edges))]] = True
-        crowded[soup.body[soup.at_valence(soup.edges.valence > 2)]] = True
-        if not (crowded & ~uneven).any():
-            return soup
-        share = soup.sheet_share(self.record.bodies)
-        doubted = crowded & ~uneven & (share > FLAPS)
-        if not doubted.any():
-            return soup
-        trusting = Soup(soup.vertices, soup.faces, soup.body, doubted[soup.body])
-        better = doubted & (trusting.sheet_share(self.record.bodies) < share / 2)
-        return Soup(soup.vertices, soup.faces, soup.body, better[soup.body]) if better.any() else soup
 
     def _drop_hidden(self, soup: Soup) -> Soup:
         """Drop faces that lie inside their own body, if they are what keeps the body from having an inside.

@@ -20,7 +20,7 @@ from rlacd._native import poll_stop
 from rlacd.repair.distance import SurfaceQuery, spread_points
 from rlacd.repair.holes import LONGEST_EXACT_LOOP, cap
 from rlacd.repair.rims import Rims, rims_of
-from rlacd.repair.soup import Soup, crossed_share, face_normals
+from rlacd.repair.soup import FLAPS, Soup, crossed_parts, face_normals, trust_windings
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.products import dots
 from rlacd.solid.solid import Hole
@@ -54,8 +54,6 @@ _WOUNDS = 0.7
 _ROOMY = 0.02
 # A body closed over large wounds may cross itself in this share of its area.
 _CROSSED = 0.08
-# A solid may have a few faces sticking out of it, up to this share of its area, beside flaps.
-FLAPS = 0.05
 
 
 @dataclass(frozen=True)
@@ -184,7 +182,8 @@ def close_holes(
         sure = whole & ~rims.flap & ~soup.at_valence(soup.edges.valence > 2)
         before = ~whole & (False if soup.trusted is None else soup.trusted)
         trusted = np.concatenate([sure | before, ~no_cap])
-        return Soup(soup.vertices, faces, owners, trusted).only(kept), np.concatenate([rims.flap, no_cap])[kept]
+        flap = np.concatenate([rims.flap, no_cap])[kept]
+        return trust_windings(Soup(soup.vertices, faces, owners, trusted).only(kept), bodies, flap, _CROSSED), flap
 
     # A cap is useful only if it gives the body an inside: a strip whose cap lies on itself stays a sheet.
     trial, flap = capped()
@@ -195,7 +194,7 @@ def close_holes(
     # Nor where caps of large wounds cross the body: what is inside out there would be cut into ever more pieces.
     for one in np.unique(loop_body[place[far & wound[place]]]).tolist():
         some = (trial.body == one) & ~flap
-        chosen[one] &= not chosen[one] or crossed_share(trial.vertices, trial.faces[some]) <= _CROSSED
+        chosen[one] &= not chosen[one] or crossed_parts(trial.only(some)) <= _CROSSED
     refused = np.setdiff1d(loop_body, np.flatnonzero(chosen))
     by_room = np.zeros(bodies, dtype=bool)
     by_room[loop_body[place[unreachable & ~excused]]] = True

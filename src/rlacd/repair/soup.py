@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +19,7 @@ from rlacd.solid.topology import (
     components,
     face_areas,
     has_marked,
+    is_balanced,
     long_normals,
     sides_of,
     signed_tetrahedra,
@@ -30,8 +31,14 @@ NO_AREA = 1e-14
 FLAT = 1e-6
 """A closed body with less volume per area is flat: there is nothing to cut."""
 
-# Sheets of a body are separated before thickening if there are at most this many, with at most this many faces in all.
-_MOST_PATCHES, _MOST_PATCHED = 100, 4000
+FLAPS = 0.05
+"""A solid may have a few faces sticking out of it, up to this share of its area, beside flaps."""
+
+# Sheets of a body are separated before thickening if there are at most so many. If they have more faces than this,
+# there may be more of them, unless they are layers: a face lies in the boxes of more than so many, on average.
+_MOST_PATCHES, _MOST_PATCHED, _MOST_DENSE, _LAYERS = 100, 4000, 300, 1.5
+# How many faces tell.
+_ASKED = 10_000
 # Cosine of the angle between two faces below which a sheet is folded onto itself (20 degrees).
 _FOLD = 0.94
 # Distance from a face at which the winding number is evaluated.
@@ -99,9 +106,11 @@ class Soup:
         # Layers of thousands of stacked faces take minutes to unite: there, thin spots are the lesser evil.
         poll_stop()
         patches = np.unique(self.body * count + patch) // max(count, 1)
-        tangled = (np.bincount(patches)[self.body] > _MOST_PATCHES) | (
-            np.bincount(self.body)[self.body] > _MOST_PATCHED
-        )
+        is_tangled = np.bincount(patches) > _MOST_PATCHES
+        for one in np.flatnonzero(np.bincount(self.body) > _MOST_PATCHED):
+            own = self.body == one
+            is_tangled[one] = _are_layers(self.vertices[self.faces[own]], patch[own])
+        tangled = is_tangled[self.body]
         patch = np.where(tangled, count + self.body, patch)
         count += int(self.body.max(initial=0)) + 1
         key = self.faces * count + patch[:, None]
@@ -115,6 +124,58 @@ class Soup:
             return self
         trusted = None if self.trusted is None else self.trusted[keep]
         return Soup(self.vertices, self.faces[keep], self.body[keep], trusted)
+
+
+def _are_layers(corners: FloatArray, patch: IntArray) -> bool:
+    """Whether patches of faces lie on each other, given the corners ``[F, 3, 3]`` and the patch ``[F]`` of each."""
+    order = np.argsort(patch, kind="stable")
+    first = np.flatnonzero(np.diff(patch[order], prepend=-1))
+    if len(first) > _MOST_DENSE:
+        return True
+    lower = np.minimum.reduceat(corners.min(axis=1)[order], first)
+    upper = np.maximum.reduceat(corners.max(axis=1)[order], first)
+    middle = corners[:: -(-len(corners) // _ASKED)].mean(axis=1)
+    inside = [((middle >= low) & (middle <= high)).all(axis=1).mean() for low, high in zip(lower, upper, strict=True)]
+    return bool(sum(inside) > _LAYERS)
+
+
+def trust_windings(soup: Soup, bodies: int, flap: BoolArray | bool = False, most_crossed: float = 1.0) -> Soup:
+    """Trust the windings of closed bodies if the angles between their faces join the inside with the outside.
+
+    Where corners were rounded, slivers fold over, and noise turns faces that nearly lie in one plane: then angles
+    around an edge with four faces are wrong.
+
+    Parameters
+    ----------
+    soup
+    bodies
+        Number of bodies.
+    flap
+        Faces ``[F]`` that need no inside.
+    most_crossed
+        Share of a body's area that may cross it if its windings are trusted.
+    """
+    uneven, crowded = np.zeros((2, bodies), dtype=bool)
+    uneven[soup.body[soup.at_valence(~is_balanced(soup.faces, soup.edges))]] = True
+    crowded[soup.body[soup.at_valence(soup.edges.valence > 2)]] = True
+    if not (crowded & ~uneven).any():
+        return soup
+    share = soup.sheet_share(bodies, flap)
+    doubted = crowded & ~uneven & (share > FLAPS)
+    if not doubted.any():
+        return soup
+    before = False if soup.trusted is None else soup.trusted
+    trusting = replace(soup, known_edges=soup.edges, trusted=before | doubted[soup.body])
+    better = doubted & (trusting.sheet_share(bodies, flap) < share / 2)
+    for one in np.flatnonzero(better) if most_crossed < 1 else ():
+        own = (soup.body == one) & ~np.asarray(flap)
+        better[one] = crossed_parts(trusting.only(own)) <= most_crossed
+    return replace(soup, known_edges=soup.edges, trusted=before | better[soup.body]) if better.any() else soup
+
+
+def no_faces(vertices: FloatArray) -> Soup:
+    """No faces."""
+    return Soup(vertices, np.empty((0, 3), dtype=np.int64), np.empty(0, dtype=np.int64))
 
 
 def across(vertices: FloatArray, faces: IntArray, halfedges: IntArray) -> FloatArray:
@@ -161,6 +222,17 @@ def crossed_share(vertices: FloatArray, faces: IntArray) -> float:
     area = face_areas(vertices, faces)
     wrong = (np.abs(front) > 0.25) | (np.abs(back - 1) > 0.25)
     return float(area[wrong].sum() / max(area.sum(), NO_AREA))
+
+
+def crossed_parts(soup: Soup) -> float:
+    """Return the share of the area of a soup in which what its sides enclose crosses itself; it may cross others."""
+    front, back = soup.sides.label[0::2], soup.sides.label[1::2]
+    inside = soup.sides.volume > 0
+    part = np.where(inside[front], front, back)
+    crossed = [
+        crossed_share(soup.vertices, soup.faces[part == one]) * soup.area[part == one].sum() for one in np.unique(part)
+    ]
+    return float(sum(crossed) / max(soup.area.sum(), NO_AREA))
 
 
 def winding_beside(vertices: FloatArray, faces: IntArray) -> FloatArray:

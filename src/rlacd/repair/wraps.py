@@ -13,7 +13,7 @@ from rlacd.repair.build import crosses_itself, skins, walls_and_sheets
 from rlacd.repair.distance import SurfaceQuery, points_covering, spread_points
 from rlacd.repair.record import Record
 from rlacd.repair.slabs import slab_of_faces
-from rlacd.repair.soup import Soup, face_normals
+from rlacd.repair.soup import Soup, face_normals, no_faces
 from rlacd.repair.union import MOST_UNITED, as_manifold, size_of, to_arrays, tunnels_in, unite, volume_of
 from rlacd.repair.voxels import GAP, Reach
 from rlacd.solid.frame import FloatArray
@@ -104,6 +104,7 @@ class Wraps:
         self._resolution = resolution
         self._as_sheets = as_sheets
         self._by_faces = by_faces
+        self._sheets = no_faces(surface.vertices)  # what the slabs were built from
         self._slabs: list[tuple[Shape, int]] = []
         self._is_tangled = np.zeros(record.bodies, dtype=bool)
         self._is_tangled[tangled] = True
@@ -130,8 +131,7 @@ class Wraps:
             parts = skins(walls.only(~is_slab[walls.body]), record)
         else:
             parts = skins(walls, record)
-            self._slabs = skins(sheets.in_patches(), record, self._by_faces)
-            parts += self._slabs
+            parts += self._built_slabs(sheets)
             boxes = [as_manifold(part).bounding_box() for part, body in parts if is_slab[body]]
             if _crossings(np.reshape(boxes, (-1, 2, 3))) <= _CROSSINGS:
                 return parts
@@ -139,13 +139,19 @@ class Wraps:
         points, _ = points_covering(slabs.vertices, slabs.faces, self.reach.pitch / 2)
         wrap = self._wrap(self.reach.around_points(points), HALF_THICKNESS / 2)
         if wrap.volume() <= 0:
-            slabs_too = (walls.only(is_slab[walls.body]), sheets.in_patches()) if crowded else ()
-            return parts + [part for some in slabs_too for part in skins(some, record)]
+            if crowded:
+                parts += skins(walls.only(is_slab[walls.body]), record) + self._built_slabs(sheets)
+            return parts
+        self._sheets, self._slabs = no_faces(soup.vertices), []
         first = int(slabs.body.min())
         record.note(slabs.body, "wrapped")
         record.faces_out[is_slab] = 0
         record.faces_out[first] = wrap.num_tri()
         return [*((part, body) for part, body in parts if not is_slab[body]), (wrap, first)]
+
+    def _built_slabs(self, sheets: Soup) -> list[tuple[Shape, int]]:
+        self._sheets, self._slabs = sheets, skins(sheets.in_patches(), self._record, self._by_faces)
+        return self._slabs
 
     def has_crossing_slabs(self) -> bool:
         """Whether a slab that was built crosses itself."""
@@ -186,7 +192,6 @@ class Wraps:
         record = self._record
         is_slab = record.has("slab") & ~self._is_tangled
         is_skin = record.has("outer skin") & ~self._is_tangled
-        slabs = soup.only(is_slab[soup.body])
         sheets = soup.only((is_slab | by_room)[soup.body])
         shells = soup.only(is_skin[soup.body])
         if built.volume == 0 or not (self._is_large(sheets) or self._is_large(shells)):
@@ -198,27 +203,43 @@ class Wraps:
         if len(rooms) == 0:
             return built
         wrap = self._wrap(self.reach.around_rooms(rooms), _WRAP_ERROR, query if len(in_shells) else None)
-        # The wrap replaces the sheets that are only walls of the rooms; the others stay slabs.
-        points, on = spread_points(slabs.vertices, slabs.faces, GAP)
-        wall = np.bincount(on, ~np.isin(self.reach.rooms_near(points), rooms), len(slabs.faces)) == 0
+        if wrap.is_empty():
+            return built
         before = record.faces_out.copy()
-        if wall.any() or len(parts) > MOST_UNITED:  # that many overlap in what was made of them
-            record.faces_out[is_slab] = 0
-            others = [part for part, body in parts if not is_slab[body]]
-            rest = walls_and_sheets(slabs.only(~wall), record, self._as_sheets)
-            rebuilt = skins(rest[0], record) + skins(rest[1].in_patches(), record, self._by_faces)
-            pieces = [*others, *(part for part, _ in rebuilt), wrap]
+        left, walled = self._sheets_but_walls(rooms, wrap)
+        # More parts than can be united overlap in what was made of them.
+        if len(left.faces) < len(self._sheets.faces) or len(parts) > MOST_UNITED:
+            slabs = {id(slab) for slab, _ in self._slabs}
+            np.subtract.at(record.faces_out, [b for _, b in self._slabs], [size_of(slab) for slab, _ in self._slabs])
+            pieces = [part for part, _ in parts if id(part) not in slabs]
+            pieces += [*(slab for slab, _ in skins(left.in_patches(), record, self._by_faces)), wrap]
             filled = Built(unite(pieces), pieces)
         else:
             filled = built.filled(wrap)
         if filled.volume <= built.volume:
             record.faces_out = before
             return built
-        wrapped = np.concatenate([slabs.body[wall], np.flatnonzero(by_room)])
+        wrapped = np.concatenate([walled, np.flatnonzero(by_room)])
         record.note(wrapped, "wrapped")
         skins_too = np.flatnonzero(is_skin) if len(in_shells) else wrapped[:0]
         record.faces_out[np.concatenate([wrapped, skins_too]).min(initial=record.bodies - 1)] += wrap.num_tri()
         return filled
+
+    def _sheets_but_walls(self, rooms: IntArray, wrap: Manifold) -> tuple[Soup, IntArray]:
+        """The sheets that the wrap of some rooms does not replace, and the bodies with walls of the rooms.
+
+        It replaces those that are only walls, unless it leaves some of their body's outside, as noise does.
+        """
+        sheets = self._sheets
+        points, on = spread_points(sheets.vertices, sheets.faces, GAP)
+        is_wall = np.bincount(on, ~np.isin(self.reach.rooms_near(points), rooms), len(sheets.faces)) == 0
+        bodies = np.unique(sheets.body[is_wall])
+        points, on = points[is_wall[on]], on[is_wall[on]]
+        wrapped = SurfaceQuery(*to_arrays(wrap), self._input.threads)
+        away = wrapped.distance(points) > HALF_THICKNESS
+        left_out = on[away][~wrapped.inside(points[away])]
+        is_wall &= ~np.isin(sheets.body, sheets.body[left_out])
+        return sheets.only(~is_wall), bodies
 
     def _is_large(self, walls: Soup) -> bool:
         """Whether faces could enclose a ball."""
