@@ -7,14 +7,15 @@ from manifold3d import Manifold
 from numpy.typing import ArrayLike
 
 from rlacd._native import poll_stop
+from rlacd.repair.build import skins
 from rlacd.repair.caps import close_holes
 from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.holes import MOST_FREE_EDGES, close_cracks
-from rlacd.repair.measure import measure
+from rlacd.repair.measure import faces_outside, measure
 from rlacd.repair.record import STEPS, Record
 from rlacd.repair.slabs import hull_of_points
 from rlacd.repair.soup import FLAPS, FLAT, Soup, hidden_faces, trust_windings
-from rlacd.repair.union import split_labels, unite, unite_around_cavities, volume_of
+from rlacd.repair.union import as_manifold, split_labels, unite, unite_around_cavities, volume_of
 from rlacd.repair.voxels import GAP
 from rlacd.repair.wraps import Built, Wraps
 from rlacd.solid.frame import FloatArray, Frame
@@ -24,6 +25,9 @@ from rlacd.solid.thickness import HALF_THICKNESS
 from rlacd.solid.topology import BoolArray, Edges, IntArray, bodies_of, signed_tetrahedra
 
 _WELDS = (2e-5, 5e-4)
+
+# Where more pieces than this are lost, as of a plant's leaves, they stay lost: cuts would take too long.
+_MOST_KEPT = 100
 
 # A warning names this many holes.
 _NAMED = 5
@@ -111,8 +115,21 @@ class Attempt:
             self.record.step[:] = STEPS.index("hull")
             self.solid, self.pieces = hull_of_points(surface.vertices), []
         self._warn_of_holes()
-        self.lost, place, loser = measure(self.record, surface, self._wraps.query(self.solid))
-        self.lost_at = self._place(place, loser)
+        self._measured = measure(self.record, surface, self._wraps.query(self.solid))
+        self.lost = self._measured.depth
+        self.lost_at = self._place(self._measured.at, self._measured.body)
+
+    def keep_lost(self) -> None:
+        """Add slabs of the faces that the solid leaves outside: a skin that crosses itself, or a wrap, loses some."""
+        faces = faces_outside(self._measured, self._input, self._wraps.query(self.solid))
+        body = self.record.body_of_input[faces]
+        soup = Soup(self._input.vertices, self._input.faces[faces], body).in_patches()
+        if not 0 < bodies_of(soup.faces, soup.edges)[0] <= _MOST_KEPT:
+            return
+        slabs = [slab for slab, _ in skins(soup, self.record)]
+        self.solid = unite([as_manifold(self.solid), *slabs], keep_cavities=self._keep_cavities)
+        self.pieces = [*self.pieces, *slabs] if self.pieces else []
+        self.record.lost[body] = HALF_THICKNESS
 
     def doubted(self) -> IntArray:
         """Bodies whose skin was chosen among crossing faces and leads away from them."""

@@ -2,44 +2,97 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from rlacd import _native
 from rlacd._native import PointTree, poll_stop
-from rlacd.repair.distance import SurfaceQuery, points_covering, shared_faces
+from rlacd.repair.distance import SurfaceQuery, points_covering, shared_faces, spread_points
 from rlacd.repair.record import STEPS, Record
 from rlacd.repair.voxels import GAP
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.thickness import HALF_THICKNESS
-from rlacd.solid.topology import BoolArray
+from rlacd.solid.topology import BoolArray, IntArray, marked
+
+# How far outside a solid what is lost lies; more where there are slabs, whose faces lie inside them that far.
+_OFF, _OFF_SLAB = HALF_THICKNESS, 2 * HALF_THICKNESS
+# Between corners this many times nearer than the gap, nothing is looked for.
+_BETWEEN = 3
 
 
-def measure(record: Record, surface: SurfaceQuery, solid: SurfaceQuery) -> tuple[float, FloatArray, int]:
-    """Record, for the changed bodies, how far the solid and the input deviate from each other.
+class Measured(NamedTuple):
+    """How well a solid stands for its input.
 
-    Returns how far what a capped body lost lies from the solid, or a wrapped one if that is more than two balls' radii;
-    the place, and the body.
+    Attributes
+    ----------
+    depth : float
+        How far what a capped body lost lies from the solid, or a wrapped one if that is more than two balls' radii.
+    at : float64 [3]
+        Where.
+    body : int
+        Of which body.
+    outside : int64 [N]
+        Faces of the input that lead out of the solid.
+    doubted : int64 [N]
+        Those that may do so although their corners do not.
     """
+
+    depth: float
+    at: FloatArray
+    body: int
+    outside: IntArray
+    doubted: IntArray
+
+
+def measure(record: Record, surface: SurfaceQuery, solid: SurfaceQuery) -> Measured:
+    """Record, for the changed bodies, how far the solid and the input deviate from each other."""
+    found = Measured(0.0, np.zeros(3), 0, *np.empty((2, 0), dtype=np.int64))
     if record.step.max() < STEPS.index("outer skin"):
-        return 0.0, np.zeros(3), 0
+        return found
     kept, taken_over = shared_faces(solid.vertices, solid.faces, surface.vertices, surface.faces)
     poll_stop()
     points, _ = points_covering(solid.vertices, solid.faces[~kept], GAP)
     closest, face = surface.closest(points)
-    np.maximum.at(record.deviation, record.body_of_input[face], np.linalg.norm(points - closest, axis=1))
+    np.maximum.at(record.beyond, record.body_of_input[face], np.linalg.norm(points - closest, axis=1))
 
-    changed = np.flatnonzero((record.step[record.body_of_input] >= STEPS.index("outer skin")) & ~taken_over)
-    points, on = points_covering(surface.vertices, surface.faces[changed], GAP)
+    replaced = np.flatnonzero((record.step[record.body_of_input] >= STEPS.index("outer skin")) & ~taken_over)
+    faces = surface.faces[replaced]
+    points, on = points_covering(surface.vertices, faces, GAP)
     distance = solid.distance(points)
-    lost = np.flatnonzero(distance > 2 * HALF_THICKNESS)
-    lost = lost[~inside_by_balls(solid, points[lost], distance[lost])]
-    body = record.body_of_input[changed[on[lost]]]
-    np.maximum.at(record.deviation, body, distance[lost])
+    off = np.where(record.has("slab")[record.body_of_input[replaced]], _OFF_SLAB, _OFF)
+    outside = _outside(solid, points, distance, off[on])
+    longest = _native.longest_edges(surface.vertices, faces)
+    corners = np.unique(faces[longest <= GAP])  # the first of the points
+    is_out = marked(corners[outside[outside < len(corners)]], len(surface.vertices))
+    leads_out = np.asarray(is_out[faces].any(axis=1))
+    leads_out[on[outside]] = True
+    doubted = ~leads_out & (longest > GAP / _BETWEEN) & (longest <= GAP)
+    found = found._replace(outside=replaced[leads_out], doubted=replaced[doubted])
+
+    lost = outside[distance[outside] > _OFF_SLAB]
+    body = record.body_of_input[replaced[on[lost]]]
+    np.maximum.at(record.lost, body, distance[lost])
     is_capped, is_wrapped = (record.step[body] == STEPS.index(step) for step in ("capped", "wrapped"))
     counts = np.flatnonzero(is_capped | (is_wrapped & (distance[lost] > 2 * GAP)))
     if len(counts) == 0:
-        return 0.0, np.zeros(3), 0
+        return found
     worst = counts[distance[lost[counts]].argmax()]
-    return float(distance[lost[worst]]), points[lost[worst]], int(body[worst])
+    return found._replace(depth=float(distance[lost[worst]]), at=points[lost[worst]], body=int(body[worst]))
+
+
+def faces_outside(measured: Measured, surface: SurfaceQuery, solid: SurfaceQuery) -> IntArray:
+    """Return the faces of the input that lead out of the solid."""
+    doubted = measured.doubted
+    points, on = spread_points(surface.vertices, surface.faces[doubted], GAP / _BETWEEN)
+    outside = _outside(solid, points, solid.distance(points), np.full(len(points), _OFF_SLAB))
+    return np.concatenate([measured.outside, doubted[np.unique(on[outside])]])
+
+
+def _outside(solid: SurfaceQuery, points: FloatArray, distance: FloatArray, off: FloatArray) -> IntArray:
+    """Return which of some points lie outside a solid and farther away than given."""
+    away = np.flatnonzero(distance > off)
+    return away[~inside_by_balls(solid, points[away], distance[away])]
 
 
 def inside_by_balls(solid: SurfaceQuery, points: FloatArray, distance: FloatArray) -> BoolArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rlacd.solid.frame import FloatArray
 from rlacd.solid.solid import BodyRepair
 from rlacd.solid.topology import BoolArray, IntArray, marked
 
@@ -24,8 +25,8 @@ class Record:
     ----------
     step : int64 [bodies]
         The step that changed a body most, an index of `STEPS`.
-    deviation : float64 [bodies]
-        Greatest distance between the repaired surface and the input's.
+    beyond, lost : float64 [bodies]
+        Greatest distance of the repaired surface from the input's, and of the input's outside the solid from it.
     faces_out : int64 [bodies]
         Triangles after the repair.
     """
@@ -34,8 +35,13 @@ class Record:
         self.bodies = bodies
         self.body_of_input = body_of_input
         self.step = np.zeros(bodies, dtype=np.int64)
-        self.deviation = np.zeros(bodies)
+        self.beyond, self.lost = np.zeros((2, bodies))
         self.faces_out = np.zeros(bodies, dtype=np.int64)
+
+    @property
+    def deviation(self) -> FloatArray:
+        """Greatest distance between the repaired surface and the input's: float64 ``[bodies]``."""
+        return np.maximum(self.beyond, self.lost)
 
     def note(self, bodies: IntArray, step: str) -> None:
         """Record a step; a body keeps the one that changes it most."""

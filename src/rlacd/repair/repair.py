@@ -9,7 +9,8 @@ Input: an `InputMesh`. Output: a `Solid`, with the step that every body needed. 
 4. holes are capped if every point of the cap stays near the input's surface, or if nothing can reach it;
 5. whatever is still open consists of sheets: each is thickened into a slab, face by face, without remeshing;
 6. all solids are united and their cavities filled;
-7. any remaining room that no ball can enter is closed by a voxel wrap projected onto the surface.
+7. any remaining room that no ball can enter is closed by a voxel wrap projected onto the surface;
+8. faces that still lie outside, such as those of a skin that crosses itself, become slabs too.
 
 The watertight-manifold algorithm of Huang et al. (2018) could replace step 5, but it grows every sheet by a voxel and
 turns a dozen exact faces into tens of thousands of approximate ones; steps 3 to 5 keep the faces of the input.
@@ -134,6 +135,7 @@ def repair(
             f"{bodies} too much of their own surface to be cut, so whatever the faces enclose is taken to be solid."
         )
     work = _attempted(partial(Attempt, query, frame, cells, gap, keep_cavities), open_bodies, tangled)
+    work.keep_lost()
     return Solid(
         work.solid,
         surface,
