@@ -15,8 +15,8 @@ from rlacd.solid.frame import FloatArray
 from rlacd.solid.thickness import HALF_THICKNESS
 from rlacd.solid.topology import BoolArray, IntArray, marked
 
-# How far outside a solid what is lost lies; more where there are slabs, whose faces lie inside them that far.
-_OFF, _OFF_SLAB = HALF_THICKNESS, 2 * HALF_THICKNESS
+# Farther away from a solid, what is outside is lost: the middle of a slab is half as far from its surface.
+_OFF = 2 * HALF_THICKNESS
 # Between corners this many times nearer than the gap, nothing is looked for.
 _BETWEEN = 3
 
@@ -60,17 +60,15 @@ def measure(record: Record, surface: SurfaceQuery, solid: SurfaceQuery) -> Measu
     faces = surface.faces[replaced]
     points, on = points_covering(surface.vertices, faces, GAP)
     distance = solid.distance(points)
-    off = np.where(record.has("slab")[record.body_of_input[replaced]], _OFF_SLAB, _OFF)
-    outside = _outside(solid, points, distance, off[on])
+    lost = _outside(solid, points, distance)
     longest = _native.longest_edges(surface.vertices, faces)
     corners = np.unique(faces[longest <= GAP])  # the first of the points
-    is_out = marked(corners[outside[outside < len(corners)]], len(surface.vertices))
+    is_out = marked(corners[lost[lost < len(corners)]], len(surface.vertices))
     leads_out = np.asarray(is_out[faces].any(axis=1))
-    leads_out[on[outside]] = True
+    leads_out[on[lost]] = True
     doubted = ~leads_out & (longest > GAP / _BETWEEN) & (longest <= GAP)
     found = found._replace(outside=replaced[leads_out], doubted=replaced[doubted])
 
-    lost = outside[distance[outside] > _OFF_SLAB]
     body = record.body_of_input[replaced[on[lost]]]
     np.maximum.at(record.lost, body, distance[lost])
     is_capped, is_wrapped = (record.step[body] == STEPS.index(step) for step in ("capped", "wrapped"))
@@ -85,13 +83,13 @@ def faces_outside(measured: Measured, surface: SurfaceQuery, solid: SurfaceQuery
     """Return the faces of the input that lead out of the solid."""
     doubted = measured.doubted
     points, on = spread_points(surface.vertices, surface.faces[doubted], GAP / _BETWEEN)
-    outside = _outside(solid, points, solid.distance(points), np.full(len(points), _OFF_SLAB))
+    outside = _outside(solid, points, solid.distance(points))
     return np.concatenate([measured.outside, doubted[np.unique(on[outside])]])
 
 
-def _outside(solid: SurfaceQuery, points: FloatArray, distance: FloatArray, off: FloatArray) -> IntArray:
-    """Return which of some points lie outside a solid and farther away than given."""
-    away = np.flatnonzero(distance > off)
+def _outside(solid: SurfaceQuery, points: FloatArray, distance: FloatArray) -> IntArray:
+    """Return which of some points are lost, given their distances from the solid."""
+    away = np.flatnonzero(distance > _OFF)
     return away[~inside_by_balls(solid, points[away], distance[away])]
 
 
