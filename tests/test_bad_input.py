@@ -18,6 +18,7 @@ from typer.testing import CliRunner, Result
 import rlacd
 from rlacd.cli.main import app
 from rlacd.errors import EmptyMeshError, MeshDataError, OptionError, OutputError, RlacdError
+from rlacd.repair import attempt
 from tests.hulls import assert_convex_hull
 from tests.shapes_bad import arrays, ell, folded_sphere, klein_bottle, moebius_strip
 
@@ -142,9 +143,17 @@ def test_vertices_that_are_not_numbers_are_left_out_and_said() -> None:
     assert any("NaN or infinite" in sentence for sentence in result.report["warnings"])
 
 
-def test_a_triangle_that_is_given_up_is_reported() -> None:
-    vertices = np.vstack([ELL, [[1e6, 0, 0]]])
-    result = check((vertices, np.vstack([FACES, [[0, 1, len(ELL)]]])))
+FAR = (np.vstack([ELL, [[1e6, 0, 0]]]), np.vstack([FACES, [[0, 1, len(ELL)]]]))
+"""With a triangle that ends far away."""
+
+
+def test_a_triangle_that_ends_far_away_is_kept() -> None:
+    assert check(FAR).report["hausdorff"]["under"] < 1e-3
+
+
+def test_a_triangle_that_is_given_up_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(attempt, "_MOST_KEPT", 0)
+    result = check(FAR)
     missed = result.report["hausdorff"]["under"]
     assert missed > 1
     assert any("outside the hulls, farthest near (1e+06, 0, 0)" in sentence for sentence in result.report["warnings"])
