@@ -176,7 +176,7 @@ def test_hundreds_of_leaves_are_one_crowd():
 
 @pytest.mark.slow
 def test_a_crowd_leaves_no_leaf_outside():
-    """A wrap on a grid cut tips of leaves off, 0.003 of them."""
+    """The wrap cut up to 0.003 off the tips of leaves."""
     vertices, faces = with_leaves(310)
     solid = solid_of((vertices, faces))
     assert set(steps(solid)) == {"wrapped"}

@@ -21,6 +21,7 @@ from rlacd.solid.topology import (
     has_marked,
     is_balanced,
     long_normals,
+    marked,
     sides_of,
     signed_tetrahedra,
 )
@@ -155,9 +156,11 @@ def trust_windings(soup: Soup, bodies: int, flap: BoolArray | bool = False, most
     most_crossed
         Share of a body's area that may cross it if its windings are trusted.
     """
-    uneven, crowded = np.zeros((2, bodies), dtype=bool)
-    uneven[soup.body[soup.at_valence(~is_balanced(soup.faces, soup.edges))]] = True
-    crowded[soup.body[soup.at_valence(soup.edges.valence > 2)]] = True
+    is_crowded = soup.edges.valence > 2
+    if not is_crowded.any():
+        return soup
+    crowded = marked(soup.body[soup.at_valence(is_crowded)], bodies)
+    uneven = marked(soup.body[soup.at_valence(~is_balanced(soup.faces, soup.edges))], bodies)
     if not (crowded & ~uneven).any():
         return soup
     share = soup.sheet_share(bodies, flap)
@@ -229,10 +232,11 @@ def crossed_parts(soup: Soup) -> float:
     front, back = soup.sides.label[0::2], soup.sides.label[1::2]
     inside = soup.sides.volume > 0
     part = np.where(inside[front], front, back)
-    crossed = [
-        crossed_share(soup.vertices, soup.faces[part == one]) * soup.area[part == one].sum() for one in np.unique(part)
-    ]
-    return float(sum(crossed) / max(soup.area.sum(), NO_AREA))
+    crossed = 0.0
+    for one in np.unique(part):
+        own = part == one
+        crossed += crossed_share(soup.vertices, soup.faces[own]) * soup.area[own].sum()
+    return float(crossed / max(soup.area.sum(), NO_AREA))
 
 
 def winding_beside(vertices: FloatArray, faces: IntArray) -> FloatArray:
