@@ -1,7 +1,5 @@
 """Repair does not depend on how finely a surface is divided, nor on a little noise."""
 
-import importlib.util
-
 import numpy as np
 import pytest
 import trimesh
@@ -11,6 +9,7 @@ from rlacd.io.read.load import load_mesh
 from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.repair import repair
 from rlacd.repair.union import to_arrays
+from tests.noisy import noisy_copy
 from tests.repaired import BOX, join, solid_of, volume, without
 
 AS_SOLID = [
@@ -73,15 +72,6 @@ def test_a_capped_body_whose_faces_cross_at_an_edge_is_solid(times):
     far = int(np.argmax(closed.triangles_center @ (1, 0, 0)))
     solid = solid_of(without(closed, far))
     assert volume(solid) == pytest.approx(np.sin(np.radians(30)), rel=0.02)
-
-
-def noisy_copy(corpus, name):
-    """The mesh and a copy with some 10,000 faces or more, displaced by 0.001 of half the longest side."""
-    spec = importlib.util.spec_from_file_location("dense", corpus / "dense.py")
-    maker = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(maker)
-    mesh = trimesh.load(corpus / name, force="mesh", process=False)
-    return mesh, maker.densify(mesh.copy(), 10_000, 0.001)
 
 
 def solid_as_read(mesh):

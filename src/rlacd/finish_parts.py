@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple, cast
 
+import numpy as np
 import trimesh
 
 from rlacd import _native
@@ -18,14 +20,16 @@ from rlacd.merge import (
     overlap_parts,
     primitive_part,
     simple_part,
+    take_in,
 )
 from rlacd.merge.overlap import Seams
 from rlacd.merge.primitives import SLACK
 from rlacd.options import SIMPLE
 from rlacd.primitive_kinds import PrimitiveKind
-from rlacd.report import make_report
+from rlacd.report import HONEST_WITHIN, NEARLY, make_report
 from rlacd.solid.balls import Balls
 from rlacd.solid.component import Part
+from rlacd.solid.distance import hull_union
 from rlacd.solid.provenance import owners
 from rlacd.solid.solid import Solid
 from rlacd.workers import Workers
@@ -39,8 +43,23 @@ class Finished(NamedTuple):
     balls: Balls | None = None
 
 
+GRAIN = 2e-4
+"""How much finer than needed the input is looked at where it lies outside the hulls."""
+
+
 def finish_parts(reached: Reached, workers: Workers, clock: Clock) -> Finished:
-    """Clean the parts, carry them to the input's unit, and measure them."""
+    """Clean the parts, carry them to the input's unit, and measure them; again if hulls have to grow to the input."""
+    done, parts = _finished(reached, workers, clock)
+    under = done.report["hausdorff"]["under"]
+    if under is None or not NEARLY < under <= HONEST_WITHIN or clock.stopped_by is not None:
+        return done
+    with clock.stage("finish"):
+        grown = clock.if_in_time(lambda: _taking_in(reached, parts, workers), lambda: None)
+    return done if grown is None else _finished(reached._replace(parts=grown), workers, clock)[0]
+
+
+def _finished(reached: Reached, workers: Workers, clock: Clock) -> tuple[Finished, list[Part]]:
+    """The result, and the cleaned parts."""
     solid, goal = reached.solid, reached.goal
     with clock.stage("finish"):
         limits = reached.options.max_vertices, reached.options.max_faces
@@ -59,7 +78,25 @@ def finish_parts(reached: Reached, workers: Workers, clock: Clock) -> Finished:
         hull.metadata["body"] = body
     report["search"] = None if reached.found is None else reached.found.as_plain()
     balls = goal.obstacles.in_input(solid.frame) if goal.obstacles is not None else None
-    return Finished(hulls, report, balls)
+    return Finished(hulls, report, balls), parts
+
+
+def _taking_in(reached: Reached, finished: Sequence[Part], workers: Workers) -> list[Part] | None:
+    """The parts, with hulls grown to what of the input lies outside the finished ones; None if none can grow."""
+    hulls = [part.hull for part in finished]
+    points = np.concatenate(
+        _native.Filling(*reached.solid.surface, workers.threads).uncovered(
+            [hull.vertices for hull in hulls],
+            [hull.faces for hull in hulls],
+            HONEST_WITHIN,
+            GRAIN,
+            workers.threads,
+        )
+    )
+    distance = hull_union(hulls, workers.threads).distance(points, workers.threads)
+    missed = points[(distance > NEARLY / 2) & (distance <= HONEST_WITHIN)]
+    grown = take_in(reached.parts, missed, reached.goal) if len(missed) else reached.parts
+    return None if all(new is old for new, old in zip(grown, reached.parts, strict=True)) else grown
 
 
 def _cleaned(

@@ -31,8 +31,11 @@ HONEST_WITHIN = 5e-3
 """How far the union of the hulls may reach beyond the threshold before the report warns: slack for repair and
 measurement."""
 
+NEARLY = 1e-3
+"""No point of the input should lie farther outside the hulls than this, which is half the thickness of a sheet."""
+
 FINE = 1e-4
-"""Width of the intervals where the usual one would decide a warning."""
+"""Width of the intervals where the usual one would decide a warning, or whether hulls have to grow to the input."""
 
 MOST_HOLES = 1000
 """Holes that a report lists."""
@@ -257,7 +260,8 @@ def _distances(
     surface = surface or _native.Surface(*solid.surface, workers.threads)
     hulls = [part.hull for part in parts]
     found = hull_distances(hulls, *solid.surface, threads=workers.threads, surface=surface)
-    if _is_undecided(found.over, overhang + HONEST_WITHIN) or _is_undecided(found.under, HONEST_WITHIN):
+    outside = any(_is_undecided(found.under, limit) for limit in (NEARLY, HONEST_WITHIN))
+    if outside or _is_undecided(found.over, overhang + HONEST_WITHIN):
         found = hull_distances(hulls, *solid.surface, FINE, threads=workers.threads, surface=surface)
 
     def place(point: Place) -> str:

@@ -7,6 +7,7 @@ from rlacd.merge.overlap import overlap_parts
 from rlacd.merge.primitives import primitive_part
 from rlacd.merge.simple import simple_part
 from rlacd.merge.slivers import drop_slivers
+from rlacd.merge.take_in import take_in
 
 __all__ = [
     "as_carried",
@@ -20,5 +21,6 @@ __all__ = [
     "overlap_parts",
     "primitive_part",
     "simple_part",
+    "take_in",
     "with_limits",
 ]

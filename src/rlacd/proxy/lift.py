@@ -17,7 +17,7 @@ from rlacd.clock import Clock
 from rlacd.criteria import Criterion
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
-from rlacd.merge.limits import limit_hull
+from rlacd.merge.limits import TOLERANCE, limit_hull
 from rlacd.policies import Policy
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part
@@ -39,6 +39,45 @@ TIGHTER = 0.8
 
 ROUNDS = 3
 """Number of times that parts are cut again on the proxy."""
+
+
+@dataclass
+class _Lifted:
+    """A part on its way to the solid.
+
+    Attributes
+    ----------
+    hull : Hull
+    on_proxy : Part or None
+        The part of the proxy it comes from; None if it was cut on the solid.
+    part : Part or None
+        Its part of the solid, if that is known for this hull.
+    is_met : bool
+        Whether that is known to meet the goal.
+    """
+
+    hull: Hull
+    on_proxy: Part | None
+    part: Part | None = None
+    is_met: bool = False
+
+    @property
+    def on_solid(self) -> Part:
+        """Its part of the solid, which is known."""
+        assert self.part is not None, "clipped first"
+        return self.part
+
+    def grow(self, points: FloatArray) -> None:
+        """Take in points.
+
+        A part that was cut on the solid stays what it is, without the slivers that were left out, and its hull is not
+        simplified: there may be no room for it below the threshold.
+        """
+        grown = Hull.of(np.concatenate([self.hull.vertices, points]))
+        assert grown is not None, "a hull stays solid when it grows"
+        self.hull = limit_hull(grown, tolerance=TOLERANCE if self.on_proxy is None else TRIM)
+        self.part = self.part.with_hull(self.hull) if self.on_proxy is None and self.part is not None else None
+        self.is_met = False
 
 
 @dataclass(frozen=True)
@@ -79,81 +118,84 @@ class Lift:
         mend : bool
             Cut parts again if they meet their criterion on the proxy only.
         """
-        origins: list[Part | None] = list(parts)  # None for a part that was cut on the solid
         with self.clock.shielded():
-            hulls = self._covering([limit_hull(part.hull, tolerance=SMOOTH) for part in parts])
+            lifted = [_Lifted(limit_hull(part.hull, tolerance=SMOOTH), part) for part in parts]
+            self._cover(lifted)
+            hulls = [each.hull for each in lifted]
         try:
-            return self._tested(hulls, origins) if mend else self.workers.map(self._clipped, hulls)
+            return self._tested(lifted) if mend else self.workers.map(self._clipped, hulls)
         except Stopped:
             self.clock.note_stop()
             return [part.with_hull(hull) for part, hull in zip(parts, hulls, strict=True)]
 
-    def _tested(self, hulls: list[Hull], origins: list[Part | None]) -> list[Part]:
+    def _tested(self, lifted: list[_Lifted]) -> list[Part]:
         """Clip the solid to the hulls and cut parts again until all meet the goal."""
-        known: dict[int, Part] = {}  # by their hulls
-        met: set[int] = set()
         criterion = self.on_proxy
-        for round_ in range(ROUNDS + 2):
-            fresh = [hull for hull in hulls if id(hull) not in known]
-            known |= {id(part.hull): part for part in self.workers.map(self._clipped, fresh)}
-            lifted = [known[id(hull)] for hull in hulls]
-            if round_ > ROUNDS:
-                break
-            failing = self._failing({i: part for i, part in enumerate(lifted) if id(part) not in met}, origins)
+        for left in range(ROUNDS, -1, -1):
+            self._clip(lifted)
+            failing = self._failing(lifted)
             if not failing:
                 break
-            met = {id(part) for part in lifted} - {id(lifted[i]) for i in failing}
-            known = {id(part.hull): part for part in lifted}  # and keeps the hulls, whose ids stay theirs
             criterion = criterion.scaled(TIGHTER)
             for i in reversed(failing):
-                origin = origins[i]
-                assert origin is not None
-                on_proxy = round_ < ROUNDS and self.on_proxy.is_met(origin)  # else the proxy could not be cut there
-                new = self._on_proxy(origin, criterion) if on_proxy else self._on_solid(lifted[i])
-                origins[i : i + 1] = new if on_proxy else [None] * len(new)
-                hulls[i : i + 1] = [limit_hull(part.hull, tolerance=SMOOTH) for part in new]
-            hulls = self._covering(hulls)
-        return lifted
+                lifted[i : i + 1] = self._cut_again(lifted[i], criterion, left)
+            self._cover(lifted)
+        self._clip(lifted)
+        return [each.on_solid for each in lifted]
+
+    def _cut_again(self, failing: _Lifted, criterion: Criterion, left: int) -> list[_Lifted]:
+        """Cut a part on the proxy, under a criterion that is tightened until that takes a cut; else on the solid."""
+        if failing.on_proxy is not None:
+            for _ in range(left):
+                new = self._on_proxy(failing.on_proxy, criterion)
+                if len(new) > 1:
+                    return [_Lifted(limit_hull(part.hull, tolerance=SMOOTH), part) for part in new]
+                criterion = criterion.scaled(TIGHTER)
+        part = failing.on_solid
+        new = self._cut(Component((part.vertices, part.faces)), self.goal) or [part]
+        return [_Lifted(part.hull, None, part) for part in new]
 
     def confirmed(self, hull: Hull) -> Part | None:
         """Get what the solid fills of a hull; None if it does not meet the goal."""
         part = self._clipped(hull)
         return part if self.goal.is_met(part) else None
 
-    def _covering(self, hulls: Sequence[Hull]) -> list[Hull]:
-        """The hulls, grown where necessary to cover the solid's surface; those that need not grow are the same."""
+    def _cover(self, lifted: Sequence[_Lifted]) -> None:
+        """Grow hulls where necessary to cover the solid's surface; those that need not grow stay the same."""
         points = self.solid.filling.uncovered(
-            [hull.vertices for hull in hulls],
-            [hull.faces for hull in hulls],
+            [each.hull.vertices for each in lifted],
+            [each.hull.faces for each in lifted],
             2 * self.deviation + SMOOTH,
             GRAIN,
             self.workers.threads,
         )
-        return [_grown(hull, own) if len(own) else hull for hull, own in zip(hulls, points, strict=True)]
+        for each, own in zip(lifted, points, strict=True):
+            if len(own):
+                each.grow(own)
+
+    def _clip(self, lifted: Sequence[_Lifted]) -> None:
+        """Get what the solid fills of hulls that have changed."""
+        changed = [each for each in lifted if each.part is None]
+        for each, part in zip(changed, self.workers.map(self._clipped, [each.hull for each in changed]), strict=True):
+            each.part = part
 
     def _clipped(self, hull: Hull) -> Part:
         """What the solid fills of a hull; the hull itself if that is nothing."""
         part = self.solid.inside(hull)
         return part if part.size else Part(hull.vertices, hull.faces, hull.volume, hull)
 
-    def _failing(self, lifted: dict[int, Part], origins: Sequence[Part | None]) -> list[int]:
+    def _failing(self, lifted: Sequence[_Lifted]) -> list[int]:
         """Indices of the parts that fail on the solid, but for those that were cut there before."""
-        verdicts = self.workers.map(self.goal.is_met, lifted.values())
-        return [i for i, met in zip(lifted, verdicts, strict=True) if not met and origins[i] is not None]
+        fresh = [i for i, each in enumerate(lifted) if each.on_proxy is not None and not each.is_met]
+        verdicts = self.workers.map(self.goal.is_met, [lifted[i].on_solid for i in fresh])
+        for i, is_met in zip(fresh, verdicts, strict=True):
+            lifted[i].is_met = is_met
+        return [i for i in fresh if not lifted[i].is_met]
 
     def _on_proxy(self, part: Part, criterion: Criterion) -> list[Part]:
         whole = reunite(part.members)
         roots = [whole] if whole is not None else list(part.members)
         return [new for root in roots for new in self._cut(root, criterion)] or [part]
 
-    def _on_solid(self, part: Part) -> list[Part]:
-        return self._cut(Component((part.vertices, part.faces)), self.goal) or [part]
-
     def _cut(self, root: Component, criterion: Criterion) -> list[Part]:
         return cut_and_merge(CutTree(root, self.policy, self.workers), criterion, self.workers, self.clock).parts
-
-
-def _grown(hull: Hull, points: FloatArray) -> Hull:
-    grown = Hull.of(np.concatenate([hull.vertices, points]))
-    assert grown is not None, "a hull stays solid when it grows"
-    return limit_hull(grown, tolerance=TRIM)
