@@ -83,6 +83,9 @@ def faces_outside(measured: Measured, surface: SurfaceQuery, solid: SurfaceQuery
     """Return the faces of the input that lead out of the solid."""
     doubted = measured.doubted
     points, on = spread_points(surface.vertices, surface.faces[doubted], GAP / _BETWEEN)
+    # Their corners were looked at.
+    is_corner = (points[:, None] == surface.vertices[surface.faces[doubted][on]]).all(axis=2).any(axis=1)
+    points, on = points[~is_corner], on[~is_corner]
     outside = _outside(solid, points, solid.distance(points))
     return np.concatenate([measured.outside, doubted[np.unique(on[outside])]])
 
