@@ -43,7 +43,7 @@ are noisy, and tell nothing about points far from them."""
 COARSEST, COARSEST_PIECE = 100, 12
 """No proxy has fewer triangles, nor a piece of one if it had more before."""
 
-LOST, LOST_OF_PIECES = 0.02, 0.05
+LOST, LOST_OF_PIECES = 0.02, 0.1
 """A proxy's volume may differ from the solid's by this share: thin walls would fold up sooner than they deviate. Noise
 alone is more than the first of some thin pieces."""
 

@@ -8,7 +8,13 @@ import numpy as np
 
 from rlacd import _native
 from rlacd._native import PointTree, poll_stop
-from rlacd.repair.distance import SurfaceQuery, points_covering, shared_faces, spread_points
+from rlacd.repair.distance import (
+    SurfaceQuery,
+    once_in_each_place,
+    points_covering,
+    shared_faces,
+    spread_points,
+)
 from rlacd.repair.record import STEPS, Record
 from rlacd.repair.voxels import GAP
 from rlacd.solid.frame import FloatArray
@@ -86,7 +92,11 @@ def faces_outside(measured: Measured, surface: SurfaceQuery, solid: SurfaceQuery
     # Their corners were looked at.
     is_corner = (points[:, None] == surface.vertices[surface.faces[doubted][on]]).all(axis=2).any(axis=1)
     points, on = points[~is_corner], on[~is_corner]
-    outside = _outside(solid, points, solid.distance(points))
+
+    def is_outside(points: FloatArray) -> BoolArray:
+        return marked(_outside(solid, points, solid.distance(points)), len(points))
+
+    outside = once_in_each_place(is_outside, points)
     return np.concatenate([measured.outside, doubted[np.unique(on[outside])]])
 
 

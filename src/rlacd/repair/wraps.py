@@ -10,7 +10,7 @@ from manifold3d import Manifold
 
 from rlacd._native import poll_stop
 from rlacd.repair.build import crosses_itself, skins, walls_and_sheets
-from rlacd.repair.distance import SurfaceQuery, points_covering, spread_points
+from rlacd.repair.distance import SurfaceQuery, once_in_each_place, points_covering, spread_points
 from rlacd.repair.record import Record
 from rlacd.repair.slabs import slab_of_faces
 from rlacd.repair.soup import Soup, face_normals, no_faces
@@ -232,12 +232,18 @@ class Wraps:
         """
         sheets = self._sheets
         points, on = spread_points(sheets.vertices, sheets.faces, GAP)
-        is_wall = np.bincount(on, ~np.isin(self.reach.rooms_near(points), rooms), len(sheets.faces)) == 0
+        is_elsewhere = once_in_each_place(lambda some: ~np.isin(self.reach.rooms_near(some), rooms), points)
+        is_wall = np.bincount(on, is_elsewhere, len(sheets.faces)) == 0
         bodies = np.unique(sheets.body[is_wall])
         points, on = points[is_wall[on]], on[is_wall[on]]
         wrapped = SurfaceQuery(*to_arrays(wrap), self._input.threads)
-        away = wrapped.distance(points) > HALF_THICKNESS
-        left_out = on[away][~wrapped.inside(points[away])]
+
+        def is_left_out(points: FloatArray) -> BoolArray:
+            away = wrapped.distance(points) > HALF_THICKNESS
+            away[away] = ~wrapped.inside(points[away])
+            return away
+
+        left_out = on[once_in_each_place(is_left_out, points)]
         is_wall &= ~np.isin(sheets.body, sheets.body[left_out])
         return sheets.only(~is_wall), bodies
 
@@ -249,7 +255,7 @@ class Wraps:
         """Those of some rooms that faces may be walls of."""
         if len(rooms) == 0 or not self._is_large(walls):
             return rooms[:0]
-        return np.intersect1d(rooms, self.reach.rooms_near(spread_points(walls.vertices, walls.faces, GAP)[0]))
+        return np.intersect1d(rooms, self.reach.rooms_near(points_covering(walls.vertices, walls.faces, GAP)[0]))
 
     def with_deep_slits(self, built: Built, soup: Soup) -> Built:
         """Fill slits in outer skins that nothing can reach, such as around a door: cuts would have to follow them.
