@@ -66,6 +66,11 @@ def volume_of(solid: Shape) -> float:
     return solid.volume() if isinstance(solid, Manifold) else _native.mesh_volume(*solid)
 
 
+def area_of(solid: Shape) -> float:
+    """Return the surface area of a solid."""
+    return solid.surface_area() if isinstance(solid, Manifold) else _native.mesh_area(*solid)
+
+
 def size_of(solid: Shape) -> int:
     """Return the number of triangles of a solid."""
     return solid.num_tri() if isinstance(solid, Manifold) else len(solid[1])

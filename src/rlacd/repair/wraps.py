@@ -14,7 +14,7 @@ from rlacd.repair.distance import SurfaceQuery, once_in_each_place, points_cover
 from rlacd.repair.record import Record
 from rlacd.repair.slabs import slab_of_faces
 from rlacd.repair.soup import Soup, face_normals, no_faces
-from rlacd.repair.union import MOST_UNITED, as_manifold, size_of, to_arrays, tunnels_in, unite, volume_of
+from rlacd.repair.union import MOST_UNITED, area_of, as_manifold, size_of, to_arrays, tunnels_in, unite, volume_of
 from rlacd.repair.voxels import GAP, Reach
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.manifold import to_manifold
@@ -29,9 +29,11 @@ _SLIT, _ON_SURFACE = 1 / 4, 1e-6
 # A room of an outer skin is filled from this share of the solid's volume on: rooms in furniture have 0.04 and more,
 # crevices at most 0.0023.
 _ROOM = 0.01
-# A slit in an outer skin is filled from this depth on, up to this width (multiples of the gap), if all of them hold no
+# A slit in an outer skin or a filling is filled from this depth on, up to this width (multiples of the gap), if all of them hold no
 # more than this share of the volume: what is shallower needs no cut, and what is wider leaves steps of the grid.
 _DEEP, _HAIR, _LITTLE = 2.0, 1 / 16, 1e-3
+# Such slits may be too thin to have a volume that is told from rounding: this share of the surface has to go with them.
+_ROUNDING, _BARED = 1e-5, 0.004
 # Noise leaves slits between walls of dense bodies that touch, full of bridges: a union of so many triangles, with so
 # many tunnels, is looked at, and its slits are filled if they make up this share of its surface, nearer to their mouths
 # than others, since they are no doors.
@@ -258,7 +260,7 @@ class Wraps:
         return np.intersect1d(rooms, self.reach.rooms_near(points_covering(walls.vertices, walls.faces, GAP)[0]))
 
     def with_deep_slits(self, built: Built, soup: Soup) -> Built:
-        """Fill slits in outer skins that nothing can reach, such as around a door: cuts would have to follow them.
+        """Fill slits in outer skins and around fillings that nothing can reach: cuts would have to follow them.
 
         Parameters
         ----------
@@ -267,8 +269,8 @@ class Wraps:
         soup
             The faces that it was built from.
         """
-        is_skin = self._record.has("outer skin") & ~self._is_tangled
-        if not self._is_large(soup.only(is_skin[soup.body])) or built.volume == 0:
+        may_have = (self._record.has("outer skin") | self._record.has("wrapped")) & ~self._is_tangled
+        if not self._is_large(soup.only(may_have[soup.body])) or built.volume == 0:
             return built
         query = self.query(built.solid)
         points = _in_slits(query, *self._deep(query, _DEEP), _HAIR * self._gap)
@@ -276,7 +278,9 @@ class Wraps:
             return built
         wrap = self._wrap(self.reach.around_points(points), _WRAP_ERROR, query)
         filled = built.filled(wrap)
-        return filled if built.volume < filled.volume < (1 + _LITTLE) * built.volume else built
+        adds = filled.volume / built.volume - 1
+        is_little = -_ROUNDING < adds < _LITTLE
+        return filled if is_little and area_of(filled.solid) < (1 - _BARED) * area_of(built.solid) else built
 
     def with_noisy_slits(self, built: Built) -> Built:
         """Fill slits between the walls of dense bodies that touch: noise leaves slits there, full of bridges.
