@@ -29,8 +29,9 @@ _SLIT, _ON_SURFACE = 1 / 4, 1e-6
 # A room of an outer skin is filled from this share of the solid's volume on: rooms in furniture have 0.04 and more,
 # crevices at most 0.0023.
 _ROOM = 0.01
-# A slit in an outer skin or a filling is filled from this depth on, up to this width (multiples of the gap), if all of them hold no
-# more than this share of the volume: what is shallower needs no cut, and what is wider leaves steps of the grid.
+# A slit in an outer skin or along a filling is filled from this depth on, up to this width (multiples of the gap), if
+# all of them hold no more than this share of the volume: what is shallower needs no cut, and what is wider leaves steps
+# of the grid.
 _DEEP, _HAIR, _LITTLE = 2.0, 1 / 16, 1e-3
 # Such slits may be too thin to have a volume that is told from rounding: this share of the surface has to go with them.
 _ROUNDING, _BARED = 1e-5, 0.004
