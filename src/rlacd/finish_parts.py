@@ -34,6 +34,9 @@ from rlacd.solid.provenance import owners
 from rlacd.solid.solid import Solid
 from rlacd.workers import Workers
 
+GRAIN = 2e-4
+"""Hulls may grow by this more than they must to take in the input."""
+
 
 class Finished(NamedTuple):
     """Hulls in the input's unit, with what was measured."""
@@ -41,10 +44,6 @@ class Finished(NamedTuple):
     hulls: list[trimesh.Trimesh]
     report: dict[str, Any]
     balls: Balls | None = None
-
-
-GRAIN = 2e-4
-"""How much finer than needed the input is looked at where it lies outside the hulls."""
 
 
 def finish_parts(reached: Reached, workers: Workers, clock: Clock) -> Finished:
@@ -55,7 +54,10 @@ def finish_parts(reached: Reached, workers: Workers, clock: Clock) -> Finished:
         return done
     with clock.stage("finish"):
         grown = clock.if_in_time(lambda: _taking_in(reached, parts, workers), lambda: None)
-    return done if grown is None else _finished(reached._replace(parts=grown), workers, clock)[0]
+    if grown is None:
+        return done
+    again, _ = _finished(reached._replace(parts=grown), workers, clock)
+    return again if clock.stopped_by is None else done
 
 
 def _finished(reached: Reached, workers: Workers, clock: Clock) -> tuple[Finished, list[Part]]:

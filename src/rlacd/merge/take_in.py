@@ -9,14 +9,15 @@ import numpy as np
 from rlacd.criteria import Criterion
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
+from rlacd.solid.distance import hull_union
 from rlacd.solid.hull import Hull
 
 MOST = 10_000
-"""Points looked at: the first ones."""
+"""Of more points than this, only every second, third, ... is looked at."""
 
 
 def take_in(parts: Sequence[Part], points: FloatArray, criterion: Criterion) -> list[Part]:
-    """Grow hulls to points, for each the hull that has to grow least, unless its part then breaks the criterion.
+    """Grow the hull nearest to each point to take it in, unless the hull's part then breaks the criterion.
 
     Parameters
     ----------
@@ -30,9 +31,9 @@ def take_in(parts: Sequence[Part], points: FloatArray, criterion: Criterion) -> 
     list of Part
         In the same order, some with larger hulls.
     """
-    points = points[:MOST]
-    growth = np.array([_beyond(part.hull, points) for part in parts])
-    taker = np.where(growth > 0, growth, np.inf).argmin(axis=0)
+    points = points[:: 1 + len(points) // MOST]
+    distance = np.array([hull_union([part.hull], 1).distance(points, 1) for part in parts])
+    taker = np.where(distance > 0, distance, np.inf).argmin(axis=0)
     grown = list(parts)
     for i in np.unique(taker):
         part = parts[i]
@@ -43,16 +44,3 @@ def take_in(parts: Sequence[Part], points: FloatArray, criterion: Criterion) -> 
         if criterion.is_met(larger) or not criterion.is_met(part):
             grown[i] = larger
     return grown
-
-
-def _beyond(hull: Hull, points: FloatArray) -> FloatArray:
-    """How far the planes of a hull have to move outwards to take in points ``[N]``; 0 for those inside."""
-    a, b, c = hull.vertices[hull.faces].transpose(1, 0, 2)
-    normals = np.cross(b - a, c - a)
-    lengths = np.linalg.norm(normals, axis=1)
-    is_flat = lengths == 0
-    normals, offsets = normals[~is_flat] / lengths[~is_flat, None], a[~is_flat]
-    # Sums written out: a library's matrix product may round otherwise on another machine.
-    beyond = sum(points[:, k, None] * normals[:, k] - offsets[:, k] * normals[:, k] for k in range(3))
-    least: FloatArray = np.maximum(np.max(beyond, axis=1), 0.0)
-    return least

@@ -145,14 +145,16 @@ class Lift:
 
     def _cut_again(self, failing: _Lifted, criterion: Criterion, left: int) -> list[_Lifted]:
         """Cut a part on the proxy, under a criterion that is tightened until that takes a cut; else on the solid."""
-        if failing.on_proxy is not None:
+        origin = failing.on_proxy
+        if origin is not None and left and self.on_proxy.is_met(origin):  # else the proxy could not be cut there
+            trees = self._trees(origin)
             for _ in range(left):
-                new = self._on_proxy(failing.on_proxy, criterion)
+                new = [part for tree in trees for part in self._cut(tree, criterion)]
                 if len(new) > 1:
                     return [_Lifted(limit_hull(part.hull, tolerance=SMOOTH), part) for part in new]
                 criterion = criterion.scaled(TIGHTER)
         part = failing.on_solid
-        new = self._cut(Component((part.vertices, part.faces)), self.goal) or [part]
+        new = self._cut(self._tree(Component((part.vertices, part.faces))), self.goal) or [part]
         return [_Lifted(part.hull, None, part) for part in new]
 
     def confirmed(self, hull: Hull) -> Part | None:
@@ -192,10 +194,13 @@ class Lift:
             lifted[i].is_met = is_met
         return [i for i in fresh if not lifted[i].is_met]
 
-    def _on_proxy(self, part: Part, criterion: Criterion) -> list[Part]:
+    def _trees(self, part: Part) -> list[CutTree]:
+        """The cuts of a part of the proxy, made once for all criteria; of its pieces if these do not become one."""
         whole = reunite(part.members)
-        roots = [whole] if whole is not None else list(part.members)
-        return [new for root in roots for new in self._cut(root, criterion)] or [part]
+        return [self._tree(root) for root in ([whole] if whole is not None else part.members)]
 
-    def _cut(self, root: Component, criterion: Criterion) -> list[Part]:
-        return cut_and_merge(CutTree(root, self.policy, self.workers), criterion, self.workers, self.clock).parts
+    def _tree(self, root: Component) -> CutTree:
+        return CutTree(root, self.policy, self.workers)
+
+    def _cut(self, tree: CutTree, criterion: Criterion) -> list[Part]:
+        return cut_and_merge(tree, criterion, self.workers, self.clock).parts

@@ -44,8 +44,8 @@ COARSEST, COARSEST_PIECE = 100, 12
 """No proxy has fewer triangles, nor a piece of one if it had more before."""
 
 LOST, LOST_OF_PIECES = 0.02, 0.1
-"""A proxy's volume may differ from the solid's by this share: thin walls would fold up sooner than they deviate. Noise
-alone is more than the first of some thin pieces."""
+"""A proxy's volume may differ from the solid's by this share: thin walls would fold up sooner than they deviate. Pieces
+may lose more: a sheet of even thickness has less volume once its noise, and so some of its area, is gone."""
 
 WORTHWHILE = 0.5
 """A proxy has at most this share of the solid's triangles."""

@@ -88,9 +88,9 @@ def measure(record: Record, surface: SurfaceQuery, solid: SurfaceQuery) -> Measu
 def faces_outside(measured: Measured, surface: SurfaceQuery, solid: SurfaceQuery) -> IntArray:
     """Return the faces of the input that lead out of the solid."""
     doubted = measured.doubted
-    points, on = spread_points(surface.vertices, surface.faces[doubted], GAP / _BETWEEN)
-    # Their corners were looked at.
-    is_corner = (points[:, None] == surface.vertices[surface.faces[doubted][on]]).all(axis=2).any(axis=1)
+    faces = surface.faces[doubted]
+    points, on = spread_points(surface.vertices, faces, GAP / _BETWEEN)
+    is_corner = (points[:, None] == surface.vertices[faces[on]]).all(axis=2).any(axis=1)  # which were looked at
     points, on = points[~is_corner], on[~is_corner]
 
     def is_outside(points: FloatArray) -> BoolArray:
