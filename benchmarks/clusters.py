@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rlacd.clock import Clock
+from rlacd.run import Clock
 from rlacd.criteria import Concavity
 from rlacd.criteria.screen import Feasibility
 from rlacd.cut import CutTree
@@ -28,7 +28,7 @@ from rlacd.primitive_kinds import PRIMITIVE_KINDS
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component, Part
 from rlacd.solid.hull import Hull
-from rlacd.workers import Workers
+from rlacd.run import Workers
 
 LARGEST = 4
 

@@ -27,7 +27,7 @@ import typer
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rlacd.clock import Clock
+from rlacd.run import Clock
 from rlacd.criteria import Concavity, Criterion, NavigableSpace
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
@@ -41,7 +41,7 @@ from rlacd.policies.shortlist import RandomShortlist
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component
 from rlacd.solid.solid import Solid
-from rlacd.workers import Workers
+from rlacd.run import Workers
 
 COUNTS = {"raw": "raw", "touching": "NavACD's merging", "merged": "merged"}
 

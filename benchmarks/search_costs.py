@@ -1,4 +1,4 @@
-"""What the search spends its time on: prices of `rlacd.work` against measured times, and what each operator gains.
+"""What the search spends its time on: prices of `rlacd.run.work` against measured times, and what each operator gains.
 
     python benchmarks/search_costs.py MESHES --count 14
 

@@ -12,16 +12,15 @@ from manifold3d import CrossSection, Manifold, Mesh64, OpType
 
 import rlacd
 from rlacd import _native
-from rlacd.clock import Clock
 from rlacd.criteria import Concavity
 from rlacd.criteria.navigable import Navigable, NavigableSpace
 from rlacd.criteria.screen import Feasibility
 from rlacd.merge import merge_parts, merge_to_count
+from rlacd.run import Run
 from rlacd.solid.balls import Balls
 from rlacd.solid.component import ClippedPart, Component, Part, Plane
 from rlacd.solid.hull import Hull
 from rlacd.solid.reunite import reunite
-from rlacd.workers import Workers
 from tests.shapes import strangers
 
 TIGHT = Concavity(0.02)
@@ -47,15 +46,15 @@ def arms_and_beam(solid: Manifold) -> tuple[Component, list[Part]]:
 
 
 @pytest.fixture
-def workers() -> Iterator[Workers]:
-    with Workers(2) as pool:
+def run() -> Iterator[Run]:
+    with Run(2) as pool:
         yield pool
 
 
-def test_a_beam_is_one_part_although_another_crosses_it(workers: Workers) -> None:
+def test_a_beam_is_one_part_although_another_crosses_it(run: Run) -> None:
     root, parts = arms_and_beam(CROSS)
-    assert len(merge_parts(parts, TIGHT, workers, Clock())) == 3
-    merged = merge_parts(parts, TIGHT, workers, Clock(), solid=root)
+    assert len(merge_parts(parts, TIGHT, run)) == 3
+    merged = merge_parts(parts, TIGHT, run, solid=root)
     assert sorted(part.hull.volume for part in merged) == pytest.approx([2 * 0.09, 2 * 0.09])
     assert all(part.volume == pytest.approx(2 * 0.09) for part in merged)  # the crossing belongs to both
     (beam,) = (part for part in merged if isinstance(part, ClippedPart))
@@ -72,9 +71,9 @@ def test_a_beam_is_one_part_although_another_crosses_it(workers: Workers) -> Non
         block(0.85, 0.3, 0.3, (-0.575, 0, 0)) + block(0.85, 0.3, 0.3, (0.575, 0, 0.25)) + block(0.3, 2, 1),  # beside
     ],
 )
-def test_arms_stay_apart_where_something_is_missing_between(workers: Workers, solid: Manifold) -> None:
+def test_arms_stay_apart_where_something_is_missing_between(run: Run, solid: Manifold) -> None:
     root, parts = arms_and_beam(solid)
-    merged = merge_parts(parts, TIGHT, workers, Clock(), solid=root)
+    merged = merge_parts(parts, TIGHT, run, solid=root)
     assert not any({parts[0], parts[2]} <= set(part.members) for part in merged)
 
 
@@ -94,18 +93,18 @@ def test_the_number_of_threads_does_not_matter() -> None:
     root, parts = arms_and_beam(CROSS + block(0.3, 0.3, 2))
     found = []
     for threads in (1, 4):
-        with Workers(threads) as pool:
-            found.append(merge_parts(parts, TIGHT, pool, Clock(), solid=root))
+        with Run(threads) as pool:
+            found.append(merge_parts(parts, TIGHT, pool, solid=root))
     for one, four in zip(*found, strict=True):
         assert one.vertices.tobytes() == four.vertices.tobytes()
         assert one.hull.vertices.tobytes() == four.hull.vertices.tobytes()
 
 
-def test_what_is_united_with_a_share_is_a_share(workers: Workers) -> None:
+def test_what_is_united_with_a_share_is_a_share(run: Run) -> None:
     """Gluing would count what two of them have in common twice."""
     root, parts = arms_and_beam(CROSS)
-    merged = merge_parts(parts, TIGHT, workers, Clock(), solid=root)
-    (whole,) = merge_to_count(merged, 1, TIGHT, workers, Clock()) or []
+    merged = merge_parts(parts, TIGHT, run, solid=root)
+    (whole,) = merge_to_count(merged, 1, TIGHT, run) or []
     assert isinstance(whole, ClippedPart)
     assert whole.volume == pytest.approx(CROSS.volume())
     united = reunite(strangers(whole.members))
@@ -174,7 +173,7 @@ def test_a_quick_no_about_a_pair_is_never_wrong(seed: int, threshold: float) -> 
         assert not (share_fits(solid, joint, threshold) and feasibility != Feasibility.MAYBE)
 
 
-def test_all_pairs_in_one_go_are_the_pairs_one_by_one(workers: Workers) -> None:
+def test_all_pairs_in_one_go_are_the_pairs_one_by_one(run: Run) -> None:
     root, parts = arms_and_beam(CROSS)
     hulls = [part.hull for part in parts]
     pairs = np.array([(i, j) for j in range(len(parts)) for i in range(j)], dtype=np.int32)
@@ -194,10 +193,10 @@ def test_all_pairs_in_one_go_are_the_pairs_one_by_one(workers: Workers) -> None:
         TIGHT.screen.feasibilities(root.filling, hulls, np.array([(0, len(hulls))], dtype=np.int32), 1)
 
 
-def test_time_may_run_out_before_pairs_are_looked_at(workers: Workers) -> None:
+def test_time_may_run_out_before_pairs_are_looked_at() -> None:
     root, parts = arms_and_beam(CROSS)
-    late = Clock(timeout=-1.0)
-    assert len(merge_parts(parts, TIGHT, workers, late, solid=root)) == len(parts)
+    late = Run(1, timeout=-1.0)
+    assert len(merge_parts(parts, TIGHT, late, solid=root)) == len(parts)
     assert late.stopped_by == "timeout"
 
 

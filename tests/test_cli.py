@@ -21,7 +21,7 @@ from rlacd.cli.terminal import summary
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError, OptionError, OutputError
-from rlacd.progress import Progress, ProgressCallback
+from rlacd.run import Progress, ProgressCallback
 from tests.hulls import hull_of
 
 ELL = [(2.0, 0.4, 0.4), (0.4, 0.4, 2.0)]

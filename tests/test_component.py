@@ -9,8 +9,8 @@ from manifold3d import Manifold
 from rlacd.merge.slivers import drop_slivers, is_film, is_sliver
 from rlacd.planes.candidates import OFFSETS_PER_AXIS, axis_and_principal
 from rlacd.policies import SCORES, Greedy
+from rlacd.run import Run
 from rlacd.solid.component import Component, Plane
-from rlacd.workers import Workers
 
 
 def box(x: float, y: float, z: float, at: tuple[float, float, float] = (0, 0, 0)) -> Component:
@@ -80,10 +80,10 @@ def test_slivers_are_distinguished_from_thin_but_sound_parts() -> None:
 
 def test_a_sliver_goes_only_where_others_stand_for_it() -> None:
     block, shaving, sheet = box(1, 1, 1), box(1, 1, 0.001, (0, 0, 1)), box(1, 1, 0.001, (0, 0, 3))
-    with Workers(1) as workers:
-        assert drop_slivers([block, shaving, sheet], workers) == [block, sheet]
-        assert drop_slivers([block, shaving], workers, suspects=[block]) == [block, shaving]
-        assert drop_slivers([sheet], workers) == [sheet]
+    with Run(1) as run:
+        assert drop_slivers([block, shaving, sheet], run) == [block, sheet]
+        assert drop_slivers([block, shaving], run, suspects=[block]) == [block, shaving]
+        assert drop_slivers([sheet], run) == [sheet]
 
 
 def test_many_slivers_are_compared_at_once(monkeypatch) -> None:
@@ -91,8 +91,8 @@ def test_many_slivers_are_compared_at_once(monkeypatch) -> None:
     shavings = [box(1, 1, 0.001, (0, 0, 3 * i)) for i in range(40)]
     looks = []
     monkeypatch.setattr(type(shavings[0]), "box", property(lambda part: looks.append(part) or part.hull.box))
-    with Workers(1) as workers:
-        assert drop_slivers(shavings, workers) == shavings
+    with Run(1) as run:
+        assert drop_slivers(shavings, run) == shavings
     assert len(looks) <= 2 * len(shavings)
 
 

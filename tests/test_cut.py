@@ -9,13 +9,12 @@ import pytest
 from manifold3d import CrossSection
 
 from rlacd import cut
-from rlacd.clock import Clock
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.decompose_mesh import decompose
 from rlacd.policies import Greedy
+from rlacd.run import Run
 from rlacd.solid.component import Component, Plane
-from rlacd.workers import Workers
 from tests.shapes import box, from_manifold
 
 CRITERION = Concavity(0.02)
@@ -40,7 +39,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def cut_by(tree: CutTree, criterion: Concavity = CRITERION) -> list[Component]:
-    done, left = tree.cut_until(criterion, Clock())
+    done, left = tree.cut_until(criterion)
     assert not left
     assert all(criterion.is_met(part) for part in done)
     return done
@@ -49,23 +48,23 @@ def cut_by(tree: CutTree, criterion: Concavity = CRITERION) -> list[Component]:
 @pytest.mark.usefixtures("few")
 def test_where_one_policy_fails_the_other_takes_over_for_good() -> None:
     solid = cross()
-    with Workers(1) as workers:
-        sliced = len(cut_by(CutTree(solid, Slices(), workers)))
-        alone = cut_by(CutTree(solid, Greedy(), workers))
-        tree = CutTree(solid, Slices(), workers, second=Greedy())
+    with Run(1) as run:
+        sliced = len(cut_by(CutTree(solid, Slices(), run)))
+        alone = cut_by(CutTree(solid, Greedy(), run))
+        tree = CutTree(solid, Slices(), run, second=Greedy())
         both = cut_by(tree)
         assert len(alone) < 12 < sliced
         assert [part.volume for part in both] == [part.volume for part in alone]
         coarser = Concavity(2 * CRITERION.threshold)
-        assert len(cut_by(tree, coarser)) == len(cut_by(CutTree(solid, Greedy(), workers), coarser))
+        assert len(cut_by(tree, coarser)) == len(cut_by(CutTree(solid, Greedy(), run), coarser))
 
 
 @pytest.mark.usefixtures("few")
 def test_a_second_policy_that_is_no_better_changes_nothing() -> None:
     solid = cross()
-    with Workers(1) as workers:
-        alone = cut_by(CutTree(solid, Slices(), workers))
-        both = cut_by(CutTree(solid, Slices(), workers, second=Slices()))
+    with Run(1) as run:
+        alone = cut_by(CutTree(solid, Slices(), run))
+        both = cut_by(CutTree(solid, Slices(), run, second=Slices()))
     assert [part.volume for part in both] == [part.volume for part in alone]
 
 
@@ -74,17 +73,16 @@ def test_below_the_limit_the_second_policy_is_not_asked() -> None:
         def choose(self, component: Component, threads: int = 1) -> Plane:
             raise AssertionError
 
-    with Workers(1) as workers:
-        cut_by(CutTree(cross(), Slices(), workers, second=Never()))
+    with Run(1) as run:
+        cut_by(CutTree(cross(), Slices(), run, second=Never()))
 
 
 @pytest.mark.parametrize("units", [0.0, 3e3])
 def test_work_ends_the_cutting(units: float) -> None:
-    with Workers(1) as workers:
-        clock = Clock()
-        _, left = CutTree(cross(), Slices(), workers).cut_until(CRITERION, clock, math.inf, units)
+    with Run(1) as run:
+        _, left = CutTree(cross(), Slices(), run).cut_until(CRITERION, math.inf, units)
     assert left
-    assert clock.work.done > units
+    assert run.work.done > units
 
 
 def test_limits_on_parts_see_the_same_tree(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -113,9 +111,9 @@ class Never:
 
 
 def test_a_film_that_no_plane_cuts_is_halved_until_it_is_done() -> None:
-    with Workers(1) as workers:
+    with Run(1) as run:
         film = gutter(1e-4)
-        parts = cut_by(CutTree(film, Never(), workers))
+        parts = cut_by(CutTree(film, Never(), run))
         assert 4 <= len(parts) <= 64
         assert sum(part.volume for part in parts) == pytest.approx(film.volume, rel=1e-6)
         corners = np.concatenate([part.vertices for part in parts])
@@ -123,11 +121,11 @@ def test_a_film_that_no_plane_cuts_is_halved_until_it_is_done() -> None:
 
 
 def test_a_film_inside_out_is_halved_and_a_body_is_left_as_it_is() -> None:
-    with Workers(1) as workers:
+    with Run(1) as run:
         film = gutter(1e-4)
         turned = Component((film.vertices, np.ascontiguousarray(film.faces[:, ::-1])))
         assert turned.volume < 0
         below, above = cut.halves(turned)
         assert below.volume + above.volume == pytest.approx(turned.volume, rel=1e-6)
         body = gutter(0.1)
-        assert CutTree(body, Never(), workers).cut_until(CRITERION, Clock()) == ([], [body])
+        assert CutTree(body, Never(), run).cut_until(CRITERION) == ([], [body])

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from manifold3d import Manifold
 
-from rlacd.clock import Clock
 from rlacd.criteria import Concavity
 from rlacd.criteria.navigable import Navigable, NavigableSpace
 from rlacd.merge import boxes, merge_parts, merge_to_count
 from rlacd.merge.boxes import Boxes
+from rlacd.run import Run
 from rlacd.solid.balls import Balls
 from rlacd.solid.component import Component, Part, Plane
-from rlacd.workers import Workers
 
 
 def pieces_of(solid: Manifold, *planes: Plane) -> list[Component]:
@@ -29,51 +28,51 @@ def along(normal: tuple[float, float, float], offset: float) -> Plane:
 
 
 @pytest.fixture
-def workers():
-    with Workers(2) as pool:
+def run():
+    with Run(2) as pool:
         yield pool
 
 
-def test_a_shattered_box_becomes_one_part(workers) -> None:
+def test_a_shattered_box_becomes_one_part(run) -> None:
     parts = pieces_of(Manifold.cube((2, 1, 1), True), along((1, 2, 3), 0.1), along((-1, 1, 0.3), 0.0))
     assert len(parts) == 4
-    (whole,) = merge_parts(parts, Concavity(0.01), workers, Clock())
+    (whole,) = merge_parts(parts, Concavity(0.01), run)
     assert whole.volume == pytest.approx(2)
     assert whole.hull.volume == pytest.approx(2)
 
 
-def test_parts_of_an_l_never_become_one(workers) -> None:
+def test_parts_of_an_l_never_become_one(run) -> None:
     shape = Manifold.cube((2, 1, 1)) + Manifold.cube((1, 2, 1))
     parts = pieces_of(shape, along((0, 1, 0), 1.0), along((1, 0, 0), 0.5), along((0, 0, 1), 0.3))
-    assert len(merge_parts(parts, Concavity(0.05), workers, Clock())) >= 2
+    assert len(merge_parts(parts, Concavity(0.05), run)) >= 2
 
 
-def test_the_inner_surface_of_a_tube_forbids_uniting_its_halves(workers) -> None:
+def test_the_inner_surface_of_a_tube_forbids_uniting_its_halves(run) -> None:
     """Joint R_v is small for a thin bore, but its wall lies deep inside the joint hull: both ways have to be tested."""
     tube = Manifold.cube((1, 1, 1), True) - Manifold.cylinder(2, 0.06, 0.06, 24, True)
     parts = pieces_of(tube, along((1, 0, 0), 0.0))
-    assert len(merge_parts(parts, Concavity(0.05), workers, Clock())) >= 2
+    assert len(merge_parts(parts, Concavity(0.05), run)) >= 2
 
 
-def test_parts_apart_unite_where_the_gap_is_no_deeper_than_the_threshold(workers) -> None:
+def test_parts_apart_unite_where_the_gap_is_no_deeper_than_the_threshold(run) -> None:
     def sheets(gap: float) -> list[Component]:
         return [Component(Manifold.cube((1, 1, 0.01)).translate((0, 0, i * (0.01 + gap)))) for i in range(2)]
 
-    assert len(merge_parts(sheets(0.015), Concavity(0.05), workers, Clock())) == 1
-    assert len(merge_parts(sheets(0.2), Concavity(0.05), workers, Clock())) == 2
+    assert len(merge_parts(sheets(0.015), Concavity(0.05), run)) == 1
+    assert len(merge_parts(sheets(0.2), Concavity(0.05), run)) == 2
 
 
-def test_a_deep_crack_keeps_parts_apart(workers) -> None:
+def test_a_deep_crack_keeps_parts_apart(run) -> None:
     """The walls of the crack are surface of the union, and lie half a unit inside its hull."""
     blocks = [Component(Manifold.cube((1, 1, 1)).translate((i * 1.001, 0, 0))) for i in range(2)]
-    assert len(merge_parts(blocks, Concavity(0.05), workers, Clock())) == 2
+    assert len(merge_parts(blocks, Concavity(0.05), run)) == 2
 
 
-def test_every_part_of_a_merge_meets_the_criterion(workers) -> None:
+def test_every_part_of_a_merge_meets_the_criterion(run) -> None:
     criterion = Concavity(0.05)
     ring = Manifold.cylinder(0.3, 1, 1, 40, True) - Manifold.cylinder(1, 0.8, 0.8, 40, True)
     parts = pieces_of(ring, *(along((np.cos(a), np.sin(a), 0), 0.0) for a in np.linspace(0, 3, 7)))
-    merged = merge_parts(parts, criterion, workers, Clock())
+    merged = merge_parts(parts, criterion, run)
     assert len(merged) < len(parts)
     assert all(criterion.is_met(part) for part in merged)
     assert sum(part.volume for part in merged) == pytest.approx(sum(part.volume for part in parts))
@@ -84,8 +83,8 @@ def test_same_result_for_any_number_of_workers() -> None:
     parts = pieces_of(ring, *(along((np.cos(a), np.sin(a), 0.1), 0.0) for a in np.linspace(0, 3, 6)))
     results = []
     for count in (1, 3):
-        with Workers(count) as pool:
-            results.append(merge_parts(parts, Concavity(0.05), pool, Clock()))
+        with Run(count) as pool:
+            results.append(merge_parts(parts, Concavity(0.05), pool))
     assert len(results[0]) == len(results[1])
     for a, b in zip(*results, strict=True):
         assert np.array_equal(a.hull.vertices, b.hull.vertices)
@@ -116,8 +115,8 @@ def test_what_a_ball_keeps_apart_is_not_asked_again() -> None:
         results = []
         for kind in asked:
             criterion = kind(NavigableSpace(), 0.02, 0.01, balls)
-            with Workers(1) as pool:
-                results.append(merge_parts(parts, criterion, pool, Clock()))
+            with Run(1) as pool:
+                results.append(merge_parts(parts, criterion, pool))
             asked[kind] += criterion.asked
         for a, b in zip(*results, strict=True):
             assert np.array_equal(a.hull.vertices, b.hull.vertices)
@@ -125,19 +124,19 @@ def test_what_a_ball_keeps_apart_is_not_asked_again() -> None:
 
 
 @pytest.mark.parametrize("count", [1, 2, 4])
-def test_merging_to_a_count(workers, count: int) -> None:
+def test_merging_to_a_count(run, count: int) -> None:
     boxes = [Component(Manifold.cube((1, 1, 1)).translate((3 * i, 0, 0))) for i in range(5)]
-    few = merge_to_count(boxes, count, Concavity(0.05), workers, Clock())
+    few = merge_to_count(boxes, count, Concavity(0.05), run)
     assert few is not None
     assert len(few) == count
     assert sum(part.volume for part in few) == pytest.approx(5)
 
 
-def test_merging_to_a_count_gives_up_when_it_gets_too_bad(workers) -> None:
+def test_merging_to_a_count_gives_up_when_it_gets_too_bad(run) -> None:
     boxes = [Component(Manifold.cube((1, 1, 1)).translate((3 * i, 0, 0))) for i in range(3)]
-    assert merge_to_count(boxes, 1, Concavity(0.05), workers, Clock(), worst=0.1) is None
+    assert merge_to_count(boxes, 1, Concavity(0.05), run, worst=0.1) is None
     with pytest.raises(ValueError, match="one part"):
-        merge_to_count(boxes, 0, Concavity(0.05), workers, Clock())
+        merge_to_count(boxes, 0, Concavity(0.05), run)
 
 
 @pytest.mark.parametrize("at_once", [1, 7, boxes.AT_ONCE])

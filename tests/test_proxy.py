@@ -11,18 +11,17 @@ from manifold3d import Manifold, Mesh64
 
 import rlacd
 from rlacd import _native
-from rlacd.clock import Clock
 from rlacd.criteria import Concavity
 from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import make_policy
 from rlacd.proxy import Lift, simplify
 from rlacd.repair.union import unite
+from rlacd.run import Run
 from rlacd.solid.component import Component, Part
 from rlacd.solid.distance import hull_union
 from rlacd.solid.hull import Hull
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import Shape
-from rlacd.workers import Workers
 from tests.noisy import noisy_copy
 
 
@@ -111,7 +110,7 @@ def test_a_part_without_room_below_the_threshold_keeps_its_own_hull() -> None:
         middle = (broken + met) / 2
         broken, met = (broken, middle) if Concavity(middle).is_met(solid) else (middle, met)
     goal, policy = Concavity(met), make_policy("greedy", SweepCache(), None)
-    lift = Lift(solid, proxy.deviation, goal, Concavity(0.2), policy, Workers(1), Clock())
+    lift = Lift(solid, proxy.deviation, goal, Concavity(0.2), policy, Run(1))
     (part,) = lift([proxy.component])
     assert goal.is_met(part)
     assert hull_union([part.hull], 1).distance(solid.vertices, 1).max() <= 1e-9

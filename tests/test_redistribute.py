@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rlacd import _native
-from rlacd.clock import Clock
 from rlacd.criteria import Concavity, NavigableSpace
 from rlacd.criteria.criterion import Criterion
 from rlacd.cut import CutTree
@@ -20,10 +19,10 @@ from rlacd.merge import merge_parts
 from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import make_policy
 from rlacd.repair.repair import repair
+from rlacd.run import Run
 from rlacd.search.recut import Exchange
 from rlacd.search.redistribute import redistribute
 from rlacd.solid.component import Component, Part
-from rlacd.workers import Workers
 from tests.shapes import bent_bar, box, own_volume, stacks, together
 
 CRITERION = Concavity(0.05)
@@ -82,7 +81,7 @@ def test_without_time_pieces_are_not_halved() -> None:
     left, middle, right = bent_bar()
     solid = together([left, middle, right])
     for seed in range(5):
-        assert redistribute(middle, [left, right], CRITERION, np.random.default_rng(seed), solid, Clock(-1.0)) is None
+        assert redistribute(middle, [left, right], CRITERION, np.random.default_rng(seed), solid, Run(1, -1.0)) is None
 
 
 @settings(max_examples=30, deadline=None)
@@ -104,10 +103,10 @@ def test_parts_of_a_real_shape(name: str, space: NavigableSpace | None, corpus: 
     solid = repair(load_mesh(corpus / name))
     root = Component(solid.manifold)
     goal: Criterion = CRITERION if space is None else space.prepare(solid, 1)
-    with Workers(1) as workers:
-        done, left = CutTree(root, make_policy("greedy", SweepCache(), None), workers).cut_until(goal, Clock())
+    with Run(1) as run:
+        done, left = CutTree(root, make_policy("greedy", SweepCache(), None), run).cut_until(goal)
         goal = goal.settled([*done, *left])
-        parts = merge_parts([*done, *left], goal, workers, Clock(), solid=root)
+        parts = merge_parts([*done, *left], goal, run, solid=root)
     gone = 0
     for part in sorted(parts, key=lambda part: part.hull.volume)[:20]:
         around = [other for other in parts if other is not part]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,6 @@ from typer.testing import CliRunner
 import rlacd
 from rlacd import _native
 from rlacd.cli.main import app
-from rlacd.clock import Clock
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.io.read.load import load_mesh
@@ -28,16 +26,14 @@ from rlacd.merge import merge_parts
 from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import make_policy
 from rlacd.repair.repair import repair
-from rlacd.search.budget import SearchBudget
+from rlacd.run import Run
 from rlacd.search.context import SearchContext, by_score
-from rlacd.search.levels import BOUNDED_PATIENCE, LEVELS, Level, cost, level, search
-from rlacd.search.neighbourhood import LEAST_TRIALS, Neighbourhood
-from rlacd.search.operators import BATCH
+from rlacd.search.neighbourhood import BATCH, LEAST_TRIALS, Neighbourhood, cost
 from rlacd.search.part_graph import PartGraph
 from rlacd.search.recut import Exchange, recut
+from rlacd.search.search import BOUNDED_PATIENCE, search
 from rlacd.solid.component import Component, Part, Plane
 from rlacd.solid.reunite import reunite, touch
-from rlacd.workers import Workers
 from tests.shapes import box, from_manifold, strangers
 
 SHAPES = ("test/coacd_examples/SnowFlake.ply", "test/vhacd/ob_chess_table.ply", "test/capod/class8__m85.ply")
@@ -53,10 +49,10 @@ def solid_of(mesh: Path) -> Component:
     return Component(repair(load_mesh(mesh), resolution=100, threads=1).manifold)
 
 
-def first_pass(root: Component, workers: Workers) -> list[Part]:
-    done, left = CutTree(root, make_policy("greedy"), workers).cut_until(CRITERION, Clock())
+def first_pass(root: Component, run: Run) -> list[Part]:
+    done, left = CutTree(root, make_policy("greedy"), run).cut_until(CRITERION)
     assert not left
-    return merge_parts(done, CRITERION, workers, Clock())
+    return merge_parts(done, CRITERION, run)
 
 
 @pytest.fixture(scope="module", params=SHAPES)
@@ -94,8 +90,8 @@ def test_what_slanted_planes_cut_is_reunited(cuts: list[tuple[tuple[float, float
 
 @pytest.mark.nightly
 def test_most_neighbours_can_be_reunited_without_a_wall_between_them(real: Component) -> None:
-    with Workers(1) as workers:
-        parts = first_pass(real, workers)
+    with Run(1) as run:
+        parts = first_pass(real, run)
     reunited = glued = 0.0
     tried = failed = 0
     for first, second in itertools.pairwise(parts):
@@ -114,9 +110,9 @@ def test_most_neighbours_can_be_reunited_without_a_wall_between_them(real: Compo
 
 @pytest.mark.nightly
 def test_a_search_only_improves_and_keeps_the_solid(real: Component) -> None:
-    with Workers(1) as workers:
-        parts = first_pass(real, workers)
-        found, account = search(SearchContext(real, CRITERION, workers), parts, Level("best", 40, None), Clock())
+    with Run(1) as run:
+        parts = first_pass(real, run)
+        found, account = search(SearchContext(real, CRITERION), parts, run, "best", steps=40)
     assert cost(found) <= cost(parts)
     assert account.parts == len(found) <= account.portfolio <= account.first_pass == len(parts)
     assert account.steps == 40 or account.exhausted
@@ -128,25 +124,24 @@ def test_a_search_only_improves_and_keeps_the_solid(real: Component) -> None:
 def test_a_search_is_never_worse_than_its_start(real: Component) -> None:
     """Whatever its steps. More of them may well end with more parts: what can be eliminated changes on the way."""
     costs = []
-    with Workers(1) as workers:
-        parts = first_pass(real, workers)
+    with Run(1) as run:
+        parts = first_pass(real, run)
         for steps in (0, 8, 24):
-            context = SearchContext(real, CRITERION, workers, seed=3)
-            found, _ = search(context, parts, Level("best", steps, None), Clock())
+            context = SearchContext(real, CRITERION, seed=3)
+            found, _ = search(context, parts, run, "best", steps=steps)
             costs.append(cost(found))
     assert costs[0] >= max(costs[1:])
 
 
 def test_the_state_of_a_search_is_always_feasible() -> None:
     root = Component(frame())
-    with Workers(1) as workers:
-        parts = first_pass(root, workers)
+    with Run(1) as run:
+        parts = first_pass(root, run)
         state = Neighbourhood(
-            SearchContext(root, CRITERION, workers, rankings=[by_score("hull-sum")], near_sweeps=SweepCache(12, 0)),
-            parts,
+            SearchContext(root, CRITERION, rankings=[by_score("hull-sum")], near_sweeps=SweepCache(12, 0)), parts, run
         )
-        for _ in range(4):
-            state.run(SearchBudget(Clock(), None, len(parts)), 3)
+        for steps in range(3, 15, 3):
+            state.improve(steps)
             assert all(CRITERION.is_met(part) for part in state.parts)
             assert sum(own.volume for part in state.parts for own in part.members) == pytest.approx(
                 root.volume, rel=1e-6
@@ -155,17 +150,19 @@ def test_the_state_of_a_search_is_always_feasible() -> None:
 
 def test_a_bounded_search_gives_up_after_a_few_trials_per_part(monkeypatch: pytest.MonkeyPatch) -> None:
     tried: list[Any] = []
-    monkeypatch.setattr(Neighbourhood, "_try", lambda state, trial, clock: tried.append(trial))
+    for operator in ("recut", "redistribute"):
+        monkeypatch.setattr(f"rlacd.search.neighbourhood.{operator}", lambda *given: tried.append(given))
     root = Component(frame())
-    with Workers(1) as workers:
-        parts = first_pass(root, workers)
-        found, account = search(SearchContext(root, CRITERION, workers), parts, LEVELS["balanced"], Clock())
+    with Run(1) as run:
+        parts = first_pass(root, run)
+        found, account = search(SearchContext(root, CRITERION), parts, run, "balanced")
         assert (account.exhausted, account.parts) == (True, len(found))
         patience = max(BOUNDED_PATIENCE * len(found), LEAST_TRIALS)
-        assert patience <= len(tried) < patience + BATCH
+        assert len(tried) < patience + BATCH
+        few = len(tried)
         tried.clear()
-        search(SearchContext(root, CRITERION, workers), parts, Level("balanced", 10_000, None), Clock())
-        assert len(tried) > 2 * patience
+        search(SearchContext(root, CRITERION), parts, run, "balanced", steps=10_000)
+        assert len(tried) > few
 
 
 def cubes(*places: tuple[float, float, float]) -> list[Part]:
@@ -174,8 +171,8 @@ def cubes(*places: tuple[float, float, float]) -> list[Part]:
 
 def test_neighbours_share_a_face() -> None:
     parts = cubes(*((float(x), float(y), 0.0) for x in range(3) for y in range(2)))
-    with Workers(1) as workers:
-        here = PartGraph(parts, CRITERION, workers)
+    with Run(1) as run:
+        here = PartGraph(parts, CRITERION, run)
         assert here.around((0,)) == (1, 2)  # not 3, which has an edge in common
         assert here.around((0, 1)) == (2, 3)
         for seed in range(20):
@@ -229,12 +226,12 @@ def test_a_cluster_that_was_cut_badly_becomes_fewer_parts() -> None:
     pieces: list[Component] = [bar]
     for offset in (-1.0, 0.2, 1.1):
         pieces = [side for piece in pieces for side in piece.cut(Plane((1, 0, 0), offset)) if side is not None]
-    exchange = recut(pieces, [], by_score("hull-sum")(SweepCache(12, 0)), CRITERION, Clock())
+    exchange = recut(pieces, [], by_score("hull-sum")(SweepCache(12, 0)), CRITERION, Run(1))
     assert exchange is not None
     assert exchange.gain == 3
     assert exchange.into[0].volume == pytest.approx(3)
     # With no time left, nothing is found.
-    assert recut(pieces, [], by_score("hull-sum")(SweepCache(12, 0)), CRITERION, Clock(-1.0)) is None
+    assert recut(pieces, [], by_score("hull-sum")(SweepCache(12, 0)), CRITERION, Run(1, -1.0)) is None
 
 
 @pytest.mark.nightly
@@ -339,7 +336,7 @@ def test_cancelling_a_search_keeps_what_it_has_reached(corpus: Path) -> None:
 
 @pytest.mark.nightly
 def test_time_does_not_make_the_best_level_worse_than_balanced(corpus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(LEVELS, "best", replace(LEVELS["best"], seconds=0.01))
+    monkeypatch.setattr("rlacd.search.search.BEST_SECONDS", 0.01)
     balanced, best = (rlacd.decompose(corpus / SHAPES[0], quality=quality) for quality in ("balanced", "best"))
     assert len(best) <= len(balanced)
     assert best.report["search"]["steps"] >= balanced.report["search"]["steps"]
@@ -357,13 +354,6 @@ def test_a_convex_solid_needs_no_search() -> None:
     result = rlacd.decompose(trimesh.creation.icosphere(), quality="best")
     assert len(result) == 1
     assert result.report["search"]["exhausted"]
-
-
-def test_bounds_of_levels() -> None:
-    assert level("balanced", None, None) == LEVELS["balanced"]
-    assert level("best", 2.0, None) == Level("best", None, 2.0)
-    assert level("best", None, 7) == Level("best", 7, None)
-    assert level("best", 2.0, 7) == Level("best", 7, 2.0)
 
 
 @pytest.mark.parametrize(

@@ -17,12 +17,11 @@ import trimesh
 
 import rlacd
 from rlacd import _native, decompose_mesh
-from rlacd.clock import Clock
 from rlacd.io.read.load import load_mesh
 from rlacd.merge.slivers import THIN
+from rlacd.run import Run
 from rlacd.solid.cover import MOST_HULLS, cover
 from rlacd.solid.distance import hull_distances
-from rlacd.workers import Workers
 from tests.hulls import assert_covers
 from tests.shapes_large import LARGE, Mesh, boxes, bristles, noisy_ball, screws, sheet, spiked_ball, sponge, terrain
 
@@ -46,25 +45,17 @@ PATIENCE = 30.0
 
 @pytest.fixture
 def polls(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Trips the clock of the next decomposition at the poll whose number is put in here: no time is needed for that."""
+    """Stops the next decomposition at the poll whose number is put in here: no time is needed for that."""
     wanted: list[int] = []
-    arm = Clock.running
+    enter = Run.__enter__
 
-    def running(self: Clock) -> object:
-        context = arm(self)
+    def counting(self: Run) -> Run:
+        enter(self)
+        if wanted:
+            self.stop.trip_after(wanted[0])
+        return self
 
-        class Counting:
-            def __enter__(self_) -> None:
-                context.__enter__()
-                if wanted:
-                    self.stop.trip_after(wanted[0])
-
-            def __exit__(self_, *error: object) -> None:
-                context.__exit__(*error)  # type: ignore[arg-type]
-
-        return Counting()
-
-    monkeypatch.setattr(Clock, "running", running)
+    monkeypatch.setattr(Run, "__enter__", counting)
     return wanted
 
 
@@ -95,13 +86,13 @@ def test_stopped_at_any_poll_the_hulls_cover_the_input(polls: list[int], name: s
 
 
 def test_what_an_engine_does_not_take_is_said_when_no_time_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    nothing_left_to_stop = Clock.nothing_left_to_stop
+    begin_finishing = Run.begin_finishing
 
-    def at_once(self: Clock) -> None:
-        nothing_left_to_stop(self)
+    def at_once(self: Run) -> None:
+        begin_finishing(self)
         self.stop.trip()
 
-    monkeypatch.setattr(Clock, "nothing_left_to_stop", at_once)
+    monkeypatch.setattr(Run, "begin_finishing", at_once)
     plate = trimesh.creation.box((1, 1, 1.2 * THIN))
     result = rlacd.decompose(plate, preset="physx-gpu", quality="fast", threads=1)
     assert result.report["hausdorff"] == {"over": None, "under": None}
@@ -185,8 +176,7 @@ def test_bodies_by_the_thousand_share_hulls_with_those_near_them() -> None:
     rng = np.random.default_rng(0)
     corners = rng.random((3 * MOST_HULLS, 1, 3)) + 1e-3 * rng.random((3 * MOST_HULLS, 3, 3))
     mesh = corners.reshape(-1, 3), np.arange(9 * MOST_HULLS, dtype=np.int32).reshape(-1, 3)
-    clock = Clock()
-    solid, parts = cover(load_mesh(mesh), clock)
+    solid, parts = cover(load_mesh(mesh), Run(1))
     assert len(parts) == MOST_HULLS
     under = hull_distances([part.hull for part in parts], *solid.surface).under[0]
     assert under < 1e-9
@@ -198,10 +188,9 @@ def test_a_body_whose_hull_takes_too_long_gets_a_wider_one(flat: bool) -> None:
     vertices, faces = noisy_ball(20_000, 0.0)
     vertices = vertices * [1, 1, 0 if flat else 1]
     mesh = load_mesh((vertices, faces))
-    clock = Clock()
-    with clock.running():
-        clock.stop.trip_after(1)
-        solid, parts = cover(mesh, clock)
+    with Run(1) as run:
+        run.stop.trip_after(1)
+        solid, parts = cover(mesh, run)
     (hull,) = (part.hull for part in parts)
     assert hull.volume > 0
     if not flat:
@@ -247,8 +236,7 @@ def test_a_long_kernel_calls_progress_in_the_thread_of_the_caller() -> None:
     assert threads == {threading.get_ident()}
 
 
-def test_workers_wait_for_each_other_when_one_fails() -> None:
-    clock = Clock()
+def test_threads_wait_for_each_other_when_one_fails() -> None:
     running = itertools.count()
     ended = []
 
@@ -263,15 +251,15 @@ def test_workers_wait_for_each_other_when_one_fails() -> None:
         finally:
             ended.append(item)
 
-    with clock.running(), Workers(4, clock.stop) as workers:
+    with Run(4) as run:
         with pytest.raises(ValueError, match="three"):
-            workers.map(work, range(40))
+            run.map(work, range(40))
         assert len(ended) == next(running)
-        clock.stop.trip()
+        run.stop.trip()
         with pytest.raises(_native.Stopped):
-            workers.map(work, range(40))
-        clock.stop.arm(float("inf"))
-        assert workers.map(lambda item: 2 * item, range(10)) == list(range(0, 20, 2))
+            run.map(work, range(40))
+        run.stop.arm(float("inf"))
+        assert run.map(lambda item: 2 * item, range(10)) == list(range(0, 20, 2))
 
 
 def test_an_error_of_progress_leaves_long_kernels_too() -> None:

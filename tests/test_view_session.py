@@ -11,7 +11,7 @@ import trimesh
 
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError
-from rlacd.progress import Progress, ProgressCallback
+from rlacd.run import Progress, ProgressCallback
 from rlacd.viewer.session import Session, SessionState
 from tests.hulls import hull_of
 

@@ -14,13 +14,10 @@ from manifold3d import Manifold, OpType
 
 import rlacd
 from rlacd import cut_and_merge
-from rlacd.clock import Clock
 from rlacd.criteria import Concavity
 from rlacd.merge import merge_parts
-from rlacd.search.budget import SearchBudget
+from rlacd.run import Run, Work
 from rlacd.solid.component import Component
-from rlacd.work import Work
-from rlacd.workers import Workers
 from tests.shapes import box
 
 PRICES = st.lists(st.floats(0, 50), max_size=40)
@@ -37,14 +34,15 @@ def test_no_more_is_spent_than_there_is(most: float, prices: list[float]) -> Non
 
 @given(st.floats(0, 200), st.floats(0, 200), PRICES)
 def test_an_allowance_is_part_of_the_account(most: float, units: float, prices: list[float]) -> None:
-    pace = SearchBudget(Clock(), None, 1, work=Work(most))
-    with pace.allowance(units):
+    run = Run(1).alone(most)
+    with run.limited(units, cuts="cut"):
         for price in prices:
-            pace.work.pay(price)
-        spent = pace.work.done
+            run.work.pay(price)
+        spent, used_up = run.work.done, run.work.is_spent
         assert spent <= units
-    assert pace.work.done == spent <= most
-    assert not pace.work.is_spent
+    assert run.work.done == spent <= most
+    assert not run.work.is_spent
+    assert run.cut_short == ({"cut"} if used_up else set())
 
 
 def grate() -> Manifold:
@@ -97,8 +95,8 @@ def test_merging_cut_short_is_the_same_for_any_number_of_threads(most: float) ->
     parts = [Component(Manifold.cube().translate((x, y, 0))) for x in range(4) for y in range(4)]
     counts = []
     for threads in (1, 3):
-        with Workers(threads) as workers:
-            merged = merge_parts(parts, Concavity(0.05), workers, Clock(work=Work(most)))
+        with Run(threads) as run, run.limited(most):
+            merged = merge_parts(parts, Concavity(0.05), run)
         assert sum(part.volume for part in merged) == pytest.approx(16)
         counts.append([part.volume for part in merged])
     assert counts[0] == counts[1]

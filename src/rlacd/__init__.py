@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rlacd.planes.sweep_cache import SweepCache
     from rlacd.policies import Policy
     from rlacd.presets import PRESETS, Preset
-    from rlacd.progress import Progress
+    from rlacd.run import Progress
     from rlacd.solid.component import Component, Plane
     from rlacd.solid.primitive import Primitive
 

@@ -7,13 +7,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from rlacd import _native, work
+from rlacd import _native
 from rlacd._native import Stopped
-from rlacd.clock import Clock
 from rlacd.criteria import Criterion
 from rlacd.policies import Policy
+from rlacd.run import Run, work
 from rlacd.solid.component import Component, Plane
-from rlacd.workers import Workers
 
 FILM = 2e-4
 """Mean thickness (twice the volume over the area) below which a piece may be a shaving; sheets are 10 times thicker."""
@@ -85,8 +84,7 @@ class CutTree:
         The solid.
     policy : Policy
         Chooses the planes.
-    workers : Workers
-        Runs the kernels.
+    run : Run
     cache : CutCache, optional
         Cuts shared with other trees.
     doubt : callable, optional
@@ -100,7 +98,7 @@ class CutTree:
         self,
         root: Component,
         policy: Policy,
-        workers: Workers,
+        run: Run,
         cache: CutCache | None = None,
         doubt: Callable[[bool], None] | None = None,
         second: Policy | None = None,
@@ -109,13 +107,13 @@ class CutTree:
         self._doubt = doubt
         self._doubtful = DOUBTFUL + DOUBTFUL_PER_FACE * root.size
         self._policy = policy
-        self._workers = workers
+        self._run = run
         self._cache = cache or CutCache()
         self._children: dict[Component, list[Component]] = {}
-        self._second = None if second is None else CutTree(root, second, workers, self._cache)
+        self._second = None if second is None else CutTree(root, second, run, self._cache)
 
     def cut_until(
-        self, criterion: Criterion, clock: Clock, most: float = math.inf, units: float = math.inf
+        self, criterion: Criterion, most: float = math.inf, units: float = math.inf
     ) -> tuple[list[Component], list[Component]]:
         """Cut the solid until each component meets the criterion.
 
@@ -124,43 +122,44 @@ class CutTree:
         most : float
             Stop as soon as it is clear that there will be more components than this.
         units : float
-            Stop after a round in which more units of work than this have been done (see `rlacd.work`).
+            Stop after a round in which more units of work than this have been done (see `rlacd.run.work`).
 
         Returns
         -------
         done : list of Component
             Components that meet the criterion.
         left : list of Component
-            Components that do not: no plane cuts them, the clock stopped, or there would be more than `most`.
+            Components that do not: no plane cuts them, the run ended, or there would be more than `most`.
         """
-        begin, many = clock.work.done, MANY
+        run, many = self._run, MANY
+        begin = run.work.done
         done: list[Component] = []
         left: list[Component] = []
         frontier = [self.root]
         while frontier:
-            if not clock.work.pay(sum(work.judging(c.size, len(c.hull.faces)) for c in frontier)):
+            if not run.work.pay(sum(work.judging(c.size, len(c.hull.faces)) for c in frontier)):
                 return done, left + frontier
             unmet = frontier
             try:
-                self._ask_after(clock.work.done - begin)
-                verdicts = self._workers.map(criterion.is_met, frontier)
+                self._ask_after(run.work.done - begin)
+                verdicts = self._run.map(criterion.is_met, frontier)
                 done += [c for c, met in zip(frontier, verdicts, strict=True) if met]
                 unmet = [c for c, met in zip(frontier, verdicts, strict=True) if not met]
-                if not clock.step(len(done), None, len(done) + len(left) + len(unmet)):
+                if not run.step(len(done), None, len(done) + len(left) + len(unmet)):
                     return done, left + unmet
-                count, spent = len(done) + len(left) + 2 * len(unmet), clock.work.done - begin  # each becomes two
+                count, spent = len(done) + len(left) + 2 * len(unmet), run.work.done - begin  # each becomes two
                 if count > most or spent > units:
                     return done, left + unmet
                 if unmet and count > many:
-                    if (parts := self._by_second(criterion, clock, FAR_FEWER * count, FAR_FEWER * spent)) is not None:
+                    if (parts := self._by_second(criterion, FAR_FEWER * count, FAR_FEWER * spent)) is not None:
                         return parts, []
                     many = AGAIN * count
                 new = [c for c in unmet if c not in self._children]
-                if not clock.work.pay(sum(work.choosing(c.size) + work.cutting(c.size) for c in new)):
+                if not run.work.pay(sum(work.choosing(c.size) + work.cutting(c.size) for c in new)):
                     return done, left + unmet
                 self._divide(new)
             except Stopped:
-                clock.note_stop()
+                run.note_stop()
                 return done, left + unmet
             frontier = []
             for component in unmet:
@@ -169,12 +168,12 @@ class CutTree:
                     left.append(component)
         return done, left
 
-    def _by_second(self, criterion: Criterion, clock: Clock, most: float, units: float) -> list[Component] | None:
+    def _by_second(self, criterion: Criterion, most: float, units: float) -> list[Component] | None:
         """Cut by the second policy, which takes over if it finishes within the limits; None if it does not."""
         second = self._second
         if second is None:
             return None
-        done, left = second.cut_until(criterion, clock, most, units)
+        done, left = second.cut_until(criterion, most, units)
         if left:
             return None
         self._policy, self._children, self._second = second._policy, second._children, None
@@ -194,8 +193,8 @@ class CutTree:
         """Split components into their connected pieces, and cut those that are connected."""
         pieces = [self._cache.pieces(component) or [component] for component in components]
         whole = [c for c, own in zip(components, pieces, strict=True) if own == [c]]
-        threads = self._workers.share(len(whole))
-        planes = self._workers.map(lambda c: self._policy.choose(c, threads), whole)
+        threads = self._run.share(len(whole))
+        planes = self._run.map(lambda c: self._policy.choose(c, threads), whole)
         self._children.update((c, own) for c, own in zip(components, pieces, strict=True) if own != [c])
         for component, plane in zip(whole, planes, strict=True):
             if plane is not None:

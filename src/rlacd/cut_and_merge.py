@@ -7,15 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rlacd._native import Stopped
-from rlacd.clock import Clock
 from rlacd.criteria import Criterion
 from rlacd.cut import CutTree
 from rlacd.merge import drop_slivers, merge_parts
+from rlacd.run import Run
 from rlacd.solid.component import Component, Part
-from rlacd.workers import Workers
 
 MOST_CUTTING, MOST_PER_FACE = 5e6, 300
-"""Units of work (see `rlacd.work`), and units per triangle of the solid, after which cutting stops: five seconds
+"""Units of work (see `rlacd.run.work`), and units per triangle of the solid, after which cutting stops: five seconds
 and more of one core. Of 181 real meshes none took more than a third of it."""
 
 MOST_MERGING = 14e6
@@ -47,8 +46,7 @@ class Pass:
 def cut_and_merge(
     tree: CutTree,
     criterion: Criterion,
-    workers: Workers,
-    clock: Clock,
+    run: Run,
     *,
     merge: bool = True,
     most: float = math.inf,
@@ -64,8 +62,7 @@ def cut_and_merge(
     tree : CutTree
         The cuts of the solid.
     criterion : Criterion
-    workers : Workers
-    clock : Clock
+    run : Run
         Times the stages ``cut`` and ``merge``. When it stops, the parts reached so far are returned.
     merge : bool
         Whether to merge, and to drop slivers afterwards.
@@ -74,37 +71,37 @@ def cut_and_merge(
     strict : bool
         Skip merging unless all pieces meet the criterion: the caller has no use for other passes.
     """
-    with clock.stage("cut"):
+    with run.stage("cut"):
         most_work = math.inf if strict else MOST_CUTTING + MOST_PER_FACE * tree.root.size
-        with clock.allowance(most_work):
-            done, left = tree.cut_until(criterion, clock, most)
+        with run.limited(most_work, cuts="cut"):
+            done, left = tree.cut_until(criterion, most)
         pieces: list[Part] = [*done, *left]
         if strict and len(pieces) > most:
             return Pass(pieces, [*left], pieces, criterion)
         try:
-            if clock.stopped_by is None:
-                pieces = drop_slivers(pieces, workers, suspects=left)
+            if run.stopped_by is None:
+                pieces = drop_slivers(pieces, run, suspects=left)
                 criterion = criterion.settled(pieces)
         except Stopped:
-            clock.note_stop()
-        if clock.stopped_by is not None and not strict:
-            left = _apart(left, clock)
+            run.note_stop()
+        if run.stopped_by is not None and not strict:
+            left = _apart(left, run)
             pieces = [*done, *left]
         kept = {id(part) for part in pieces}
         unmet: list[Part] = [part for part in left if id(part) in kept]
     if not merge or (strict and unmet):
         return Pass(pieces, unmet, pieces, criterion)
-    with clock.stage("merge"), clock.allowance(MOST_MERGING):
-        parts = merge_parts(pieces, criterion, workers, clock, solid=tree.root)
+    with run.stage("merge"), run.limited(MOST_MERGING, cuts=None if strict else "merge"):
+        parts = merge_parts(pieces, criterion, run, solid=tree.root)
         try:
-            if clock.stopped_by is None:
-                parts = drop_slivers(parts, workers)
+            if run.stopped_by is None:
+                parts = drop_slivers(parts, run)
         except Stopped:
-            clock.note_stop()
+            run.note_stop()
     return Pass(pieces, unmet, parts, criterion)
 
 
-def _apart(components: Sequence[Component], clock: Clock) -> list[Component]:
+def _apart(components: Sequence[Component], run: Run) -> list[Component]:
     """The connected pieces of components that there was no time to cut."""
-    with clock.shielded():
+    with run.shielded():
         return [piece for component in components for piece in component.pieces()]

@@ -12,7 +12,6 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
-from rlacd.clock import Clock
 from rlacd.criteria import NavigableSpace
 from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError
@@ -38,13 +37,12 @@ from rlacd.options import (
 from rlacd.policies import Policy, make_policy
 from rlacd.presets import PresetName
 from rlacd.primitive_kinds import PrimitiveKind
-from rlacd.progress import ProgressCallback
 from rlacd.renamed import with_former
 from rlacd.report import joint_report
+from rlacd.run import ProgressCallback, Run
 from rlacd.solid.frame import Frame
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.provenance import owners
-from rlacd.workers import Workers
 
 MeshLike: TypeAlias = "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]"
 
@@ -196,44 +194,43 @@ def decompose(
     options = Options(**chosen)
     check_callback("progress", progress, "a `rlacd.Progress`")
     make_policy(options.policy)  # reports a bad network before any work is done
-    clock = Clock(options.timeout, progress)
-    with clock.running(), Workers(options.threads, clock.stop) as workers:
-        with clock.stage("load"):
+    with Run(options.threads, options.timeout, progress, options.seed) as run:
+        with run.stage("load"):
             source = in_metres(load_mesh(mesh), options)
         apart = options.per_node and len(source.nodes) > 1
-        done = _each_node(source, options, workers, clock) if apart else _as_one(source, options, workers, clock)
+        done = _each_node(source, options, run) if apart else _as_one(source, options, run)
     report = {
         "name": Path(source.name).stem if isinstance(mesh, (str, os.PathLike)) else "mesh",
         **done.report,
         "provenance": [{"node": hull.metadata.get("node"), "body": hull.metadata.get("body")} for hull in done.hulls],
         "up": source.up,
         "metres": source.metres,
-        "seconds": {**clock.seconds, "total": clock.elapsed},
+        "seconds": {**run.seconds, "total": run.elapsed},
     }
     surface = trimesh.Trimesh(source.vertices, source.faces, process=False)
     return Decomposition(done.hulls, report, surface, done.balls, source)
 
 
-def _as_one(source: InputMesh, options: Options, workers: Workers, clock: Clock) -> Finished:
-    reached = find_parts(source, options, workers, clock)
-    clock.nothing_left_to_stop()
-    done = finish_parts(reached, workers, clock)
+def _as_one(source: InputMesh, options: Options, run: Run) -> Finished:
+    reached = find_parts(source, options, run)
+    run.begin_finishing()
+    done = finish_parts(reached, run)
     if (node_of := source.node_of) is not None:
-        places = clock.if_in_time(lambda: owners(done.hulls, source.vertices, source.faces, node_of), lambda: [])
+        places = run.if_in_time(lambda: owners(done.hulls, source.vertices, source.faces, node_of), lambda: [])
         for hull, place in zip(done.hulls, places, strict=False):
             hull.metadata |= {"node": source.nodes[place].name, "node_index": place}
     return done
 
 
-def _each_node(source: InputMesh, options: Options, workers: Workers, clock: Clock) -> Finished:
+def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
     """Decompose every node separately; lengths of the joint report are in the frame of the whole scene."""
     scale = Frame.of(source.vertices[np.unique(source.faces)]).scale
     assert source.node_of is not None
     used = np.unique(source.node_of).tolist()
     meshes = [source.of_node(index) for index in used]
-    reached = [find_parts(mesh, options.for_node(scale, _scale_of(mesh)), workers, clock) for mesh in meshes]
-    clock.nothing_left_to_stop()
-    done = [finish_parts(one, workers, clock) for one in reached]
+    reached = [find_parts(mesh, options.for_node(scale, _scale_of(mesh)), run) for mesh in meshes]
+    run.begin_finishing()
+    done = [finish_parts(one, run) for one in reached]
     bodies = 0
     for place, one in zip(used, done, strict=True):
         for hull in one.hulls:

@@ -9,7 +9,6 @@ import numpy as np
 import trimesh
 
 from rlacd import _native
-from rlacd.clock import Clock
 from rlacd.find_parts import Reached
 from rlacd.merge import (
     as_carried,
@@ -27,12 +26,12 @@ from rlacd.merge.primitives import SLACK
 from rlacd.options import SIMPLE
 from rlacd.primitive_kinds import PrimitiveKind
 from rlacd.report import HONEST_WITHIN, NEARLY, make_report
+from rlacd.run import Run
 from rlacd.solid.balls import Balls
 from rlacd.solid.component import Part
 from rlacd.solid.distance import hull_union
 from rlacd.solid.provenance import owners
 from rlacd.solid.solid import Solid
-from rlacd.workers import Workers
 
 GRAIN = 2e-4
 """Hulls may grow by this more than they must to take in the input."""
@@ -46,36 +45,36 @@ class Finished(NamedTuple):
     balls: Balls | None = None
 
 
-def finish_parts(reached: Reached, workers: Workers, clock: Clock) -> Finished:
+def finish_parts(reached: Reached, run: Run) -> Finished:
     """Clean the parts, carry them to the input's unit, and measure them; again if hulls have to grow to the input."""
-    done, parts = _finished(reached, workers, clock)
+    done, parts = _finished(reached, run)
     under = done.report["hausdorff"]["under"]
-    if under is None or not NEARLY < under <= HONEST_WITHIN or clock.stopped_by is not None:
+    if under is None or not NEARLY < under <= HONEST_WITHIN or run.stopped_by is not None:
         return done
-    with clock.stage("finish"):
-        grown = clock.if_in_time(lambda: _taking_in(reached, parts, workers), lambda: None)
+    with run.stage("finish"):
+        grown = run.if_in_time(lambda: _taking_in(reached, parts, run), lambda: None)
     if grown is None:
         return done
-    again, _ = _finished(reached._replace(parts=grown), workers, clock)
-    return again if clock.stopped_by is None else done
+    again, _ = _finished(reached._replace(parts=grown), run)
+    return again if run.stopped_by is None else done
 
 
-def _finished(reached: Reached, workers: Workers, clock: Clock) -> tuple[Finished, list[Part]]:
+def _finished(reached: Reached, run: Run) -> tuple[Finished, list[Part]]:
     """The result, and the cleaned parts."""
     solid, goal = reached.solid, reached.goal
-    with clock.stage("finish"):
+    with run.stage("finish"):
         limits = reached.options.max_vertices, reached.options.max_faces
-        parts, seams = clock.if_in_time(
-            lambda: _cleaned(reached, *limits, workers),
+        parts, seams = run.if_in_time(
+            lambda: _cleaned(reached, *limits, run),
             lambda: ([limit_roughly(part, *limits) for part in reached.parts], None),
         )
-        with clock.shielded():
-            hulls = workers.map(lambda part: in_input(part.hull, solid.frame, *limits), parts)
+        with run.shielded():
+            hulls = run.map(lambda part: in_input(part.hull, solid.frame, *limits), parts)
             parts = [as_carried(part, hull, solid.frame) for part, hull in zip(parts, hulls, strict=True)]
-    with clock.stage("measure"):
-        report = make_report(solid, parts, hulls, reached.options, goal, seams, workers, clock, reached.root)
+    with run.stage("measure"):
+        report = make_report(solid, parts, hulls, reached.options, goal, seams, run, reached.root)
         unknown: list[int] | list[None] = [None] * len(hulls)
-        bodies = clock.if_in_time(lambda: _bodies(solid, hulls), lambda: unknown)
+        bodies = run.if_in_time(lambda: _bodies(solid, hulls), lambda: unknown)
     for hull, body in zip(hulls, bodies, strict=True):
         hull.metadata["body"] = body
     report["search"] = None if reached.found is None else reached.found.as_plain()
@@ -83,26 +82,26 @@ def _finished(reached: Reached, workers: Workers, clock: Clock) -> tuple[Finishe
     return Finished(hulls, report, balls), parts
 
 
-def _taking_in(reached: Reached, finished: Sequence[Part], workers: Workers) -> list[Part] | None:
+def _taking_in(reached: Reached, finished: Sequence[Part], run: Run) -> list[Part] | None:
     """The parts, with hulls grown to what of the input lies outside the finished ones; None if none can grow."""
     hulls = [part.hull for part in finished]
     points = np.concatenate(
-        _native.Filling(*reached.solid.surface, workers.threads).uncovered(
+        _native.Filling(*reached.solid.surface, run.threads).uncovered(
             [hull.vertices for hull in hulls],
             [hull.faces for hull in hulls],
             HONEST_WITHIN,
             GRAIN,
-            workers.threads,
+            run.threads,
         )
     )
-    distance = hull_union(hulls, workers.threads).distance(points, workers.threads)
+    distance = hull_union(hulls, run.threads).distance(points, run.threads)
     missed = points[(distance > NEARLY / 2) & (distance <= HONEST_WITHIN)]
     grown = take_in(reached.parts, missed, reached.goal) if len(missed) else reached.parts
     return None if all(new is old for new, old in zip(grown, reached.parts, strict=True)) else grown
 
 
 def _cleaned(
-    reached: Reached, max_vertices: int | None, max_faces: int | None, workers: Workers
+    reached: Reached, max_vertices: int | None, max_faces: int | None, run: Run
 ) -> tuple[list[Part], Seams | None]:
     """The parts without slivers, overlapping if asked for, as primitives or with simple hulls inside the limits."""
     kinds, goal = cast("tuple[PrimitiveKind, ...]", reached.options.primitives), reached.goal
@@ -118,10 +117,10 @@ def _cleaned(
             part = simple_part(part, goal, max_vertices, max_faces)
         return limit_part(part, max_vertices, max_faces, goal)
 
-    parts, seams = drop_slivers(reached.parts, workers), None
+    parts, seams = drop_slivers(reached.parts, run), None
     if reached.options.overlap > 0 and reached.root is not None:
         parts, seams = overlap_parts(parts, reached.root, goal, reached.options.overlap)
-    return workers.map(cleaned, parts), seams
+    return run.map(cleaned, parts), seams
 
 
 def _bodies(solid: Solid, hulls: list[trimesh.Trimesh]) -> list[int] | list[None]:

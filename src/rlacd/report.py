@@ -12,20 +12,19 @@ import trimesh
 
 from rlacd import _native
 from rlacd._version import __version__
-from rlacd.clock import Clock
 from rlacd.criteria import Criterion
 from rlacd.merge.overlap import Seams
 from rlacd.merge.slivers import is_sliver
 from rlacd.options import Options
 from rlacd.presets import Preset, find_preset
 from rlacd.primitive_kinds import PRIMITIVE_KINDS
+from rlacd.run import Run
 from rlacd.solid.component import Component, Part, concatenated
 from rlacd.solid.distance import Interval, Place, hull_distances
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.mass import Mass, joint_mass, mass_of
 from rlacd.solid.solid import Solid
-from rlacd.workers import Workers
 
 HONEST_WITHIN = 5e-3
 """How far the union of the hulls may reach beyond the threshold before the report warns: slack for repair and
@@ -57,8 +56,7 @@ def make_report(
     options: Options,
     criterion: Criterion,
     seams: Seams | None,
-    workers: Workers,
-    clock: Clock,
+    run: Run,
     root: Component | None,
 ) -> dict[str, Any]:
     """Measure a finished decomposition; the keys are those of `rlacd.Decomposition` without name, search and seconds.
@@ -66,20 +64,20 @@ def make_report(
     Values that there was no time to measure are None. The component that was cut is None if there was no time for one.
     """
     is_cover = len(solid.faces) == 0  # hulls of an input that was not repaired: the parts in them are unknown
-    errors = None if is_cover else clock.if_in_time(lambda: workers.map(criterion.error, parts), lambda: None)
+    errors = None if is_cover else run.if_in_time(lambda: run.map(criterion.error, parts), lambda: None)
     summary = criterion.summary(errors)
     has_surface = len(solid.surface[1]) > 0  # a cloud of points has none
     apart: _Distances | None = None
     if has_surface:
-        apart = clock.if_in_time(lambda: _distances(solid, parts, workers, root, criterion.overhang), lambda: None)
-    with clock.shielded():  # nothing below takes long
+        apart = run.if_in_time(lambda: _distances(solid, parts, run, root, criterion.overhang), lambda: None)
+    with run.shielded():  # nothing below takes long
         stands_for_mass = [(part.hull.vertices, part.hull.faces) for part in parts] if is_cover else [solid.mesh]
         mass = mass_of(*concatenated(stands_for_mass), solid.frame)
         return {
             "version": __version__,
             "options": _options(options),
-            "complete": clock.stopped_by is None,
-            "stopped_by": clock.stopped_by,
+            "complete": run.stopped_by is None,
+            "stopped_by": run.stopped_by,
             "parts": len(hulls),
             "faces": sum(len(hull.faces) for hull in hulls),
             "vertices": sum(len(hull.vertices) for hull in hulls),
@@ -94,8 +92,8 @@ def make_report(
             "warnings": [
                 *solid.warnings,
                 *_coarse(solid),
-                *_early_end(clock),
-                *_cut_short(clock),
+                *_early_end(run),
+                *_cut_short(run),
                 *(_unmeasured(solid) if has_surface and apart is None else []),
                 *(_shallow(seams, options.overlap / solid.frame.scale) if options.overlap > 0 else []),
                 *summary.warnings,
@@ -252,17 +250,15 @@ def _mass(mass: Mass) -> dict[str, Any]:
     return now | {"volume_m": volume, "centre_m": centre, "inertia_m": inertia}
 
 
-def _distances(
-    solid: Solid, parts: Sequence[Part], workers: Workers, root: Component | None, overhang: float
-) -> _Distances:
+def _distances(solid: Solid, parts: Sequence[Part], run: Run, root: Component | None, overhang: float) -> _Distances:
     known = root is not None and solid.is_as_given
     surface = root.filling.surface if root is not None and known else solid.index
-    surface = surface or _native.Surface(*solid.surface, workers.threads)
+    surface = surface or _native.Surface(*solid.surface, run.threads)
     hulls = [part.hull for part in parts]
-    found = hull_distances(hulls, *solid.surface, threads=workers.threads, surface=surface)
+    found = hull_distances(hulls, *solid.surface, threads=run.threads, surface=surface)
     outside = any(_is_undecided(found.under, limit) for limit in (NEARLY, HONEST_WITHIN))
     if outside or _is_undecided(found.over, overhang + HONEST_WITHIN):
-        found = hull_distances(hulls, *solid.surface, FINE, threads=workers.threads, surface=surface)
+        found = hull_distances(hulls, *solid.surface, FINE, threads=run.threads, surface=surface)
 
     def place(point: Place) -> str:
         if solid.body_of is None or len(solid.bodies) == 1:
@@ -307,23 +303,23 @@ def _out_of_the_box(hulls: Sequence[Hull], solid: Solid) -> list[str]:
     ]
 
 
-def _early_end(clock: Clock) -> list[str]:
-    if clock.stopped_by is None:
+def _early_end(run: Run) -> list[str]:
+    if run.stopped_by is None:
         return []
-    reason = {"timeout": "the timeout ended", "cancel": "the caller ended"}[clock.stopped_by]
-    if clock.stopped_in == "search":
+    reason = {"timeout": "the timeout ended", "cancel": "the caller ended"}[run.stopped_by]
+    if run.stopped_in == "search":
         return [f"{reason.capitalize()} the search for fewer hulls early; those found so far are valid."]
     return [f"Incomplete: {reason} the work early; the hulls cover the solid but are coarser than asked for."]
 
 
-def _cut_short(clock: Clock) -> list[str]:
+def _cut_short(run: Run) -> list[str]:
     said = {
         "cut": "There were so many components that cutting stopped at its bound of work: the hulls cover the solid "
         "but are coarser than asked for.",
         "merge": "There were so many parts that merging stopped at its bound of work: all hulls are valid, but fewer "
         "may suffice. A larger threshold leaves less to merge.",
     }
-    return [sentence for stage, sentence in said.items() if stage in clock.cut_short]
+    return [sentence for stage, sentence in said.items() if stage in run.cut_short]
 
 
 def _shortcomings(

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rlacd.clock import Clock
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
@@ -25,10 +24,10 @@ from rlacd.policies.observe import observe
 from rlacd.policies.shortlist import generator_of, least_hulls
 from rlacd.policy_names import WEIGHTS_ENDING
 from rlacd.repair.repair import repair
+from rlacd.run import Clock, Workers
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Plane
 from rlacd.solid.hull import Hull
-from rlacd.workers import Workers
 
 RANKINGS = ("excess", "random")
 

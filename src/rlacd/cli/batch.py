@@ -17,7 +17,7 @@ from rlacd.cli.options import decompose_options, how_parameters
 from rlacd.cli.parameters import REQUIRED, Parameters, command, option_parameters
 from rlacd.errors import OptionError
 from rlacd.output_options import OutputOptions
-from rlacd.workers import available_cpus
+from rlacd.run import available_cpus
 
 if TYPE_CHECKING:
     from rlacd.batch import Batch

@@ -16,7 +16,7 @@ from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bars
 
 from rlacd.decomposition import Decomposition
-from rlacd.progress import Progress
+from rlacd.run import Progress
 
 if TYPE_CHECKING:
     from rlacd.io.robots import Rewritten

@@ -6,13 +6,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rlacd.clock import Clock
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.policies import Policy
+from rlacd.run import Run
 from rlacd.solid.component import Component
-from rlacd.workers import Workers
 
 
 @dataclass(frozen=True)
@@ -45,9 +44,9 @@ def count_parts(policy: Policy, solids: Sequence[Component], criterion: Concavit
         too large.
     """
     raw, merged = [], []
-    with Workers(1) as workers:
+    with Run(1) as run:
         for solid in solids:
-            done = cut_and_merge(CutTree(solid, policy, workers), criterion, workers, Clock(), most=most)
+            done = cut_and_merge(CutTree(solid, policy, run), criterion, run, most=most)
             raw.append(len(done.pieces))
             merged.append(len(done.parts))
     return Score(raw, merged)

@@ -9,17 +9,15 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from rlacd import _native, work
+from rlacd import _native
 from rlacd._native import Stopped
-from rlacd.clock import Clock
 from rlacd.criteria.criterion import Criterion
 from rlacd.criteria.screen import Feasibility
 from rlacd.merge.boxes import Boxes
+from rlacd.run import Run, Work, work
 from rlacd.solid.arrays import IntArray
 from rlacd.solid.component import LOST, ClippedPart, Component, Part
 from rlacd.solid.hull import Hull
-from rlacd.work import Work
-from rlacd.workers import Workers
 
 FEW = 100
 """Up to this many parts, any pair may be united across other parts; with more, only pairs near each other or near a
@@ -29,7 +27,7 @@ MEASURING = 5e6
 """Work spent on measuring pairs where parts are united down to a number."""
 
 AT_ONCE = 512
-"""Number of pairs tested against the solid between two checks of the clock."""
+"""Number of pairs tested against the solid between two checks of the run."""
 
 
 class _Pair(NamedTuple):
@@ -41,8 +39,7 @@ class _Pair(NamedTuple):
 def merge_parts(
     parts: Sequence[Part],
     criterion: Criterion,
-    workers: Workers,
-    clock: Clock,
+    run: Run,
     beside: Sequence[Part] = (),
     solid: Component | None = None,
 ) -> list[Part]:
@@ -51,7 +48,7 @@ def merge_parts(
     First the criterion judges the glued union of each pair. When no more pairs can be united this way and `solid` is
     given, parts are united across what lies between them: there it judges the solid clipped to the joint hull
     (`ClippedPart`). Pairs are tested in batches on all workers and united in order of their cost, whatever the number
-    of workers.
+    of threads.
 
     Parameters
     ----------
@@ -59,8 +56,7 @@ def merge_parts(
         Parts with disjoint interiors.
     criterion : Criterion
         Every union meets it.
-    workers : Workers
-    clock : Clock
+    run : Run
         When it stops, the parts reached so far are returned.
     beside : sequence of Part
         More parts. No two of them are united with each other: that has been tried before.
@@ -72,14 +68,14 @@ def merge_parts(
     list of Part
         Parts that could not be united further, in the order of their first piece, those from `beside` last.
     """
-    pairs = _Adjoining(criterion, workers, clock)
-    alive = _unite_pairs([*parts, *beside], len(parts), pairs, workers, clock)
+    pairs = _Adjoining(criterion, run)
+    alive = _unite_pairs([*parts, *beside], len(parts), pairs, run)
     if solid is None:
         return alive
     waiting = {id(part) for part in beside}
     new = [part for part in alive if id(part) not in waiting]
     old = [part for part in alive if id(part) in waiting]
-    return _unite_pairs([*new, *old], len(new), _Bridged(criterion, workers, clock, solid), workers, clock)
+    return _unite_pairs([*new, *old], len(new), _Bridged(criterion, run, solid), run)
 
 
 def merge_lifted(
@@ -87,8 +83,7 @@ def merge_lifted(
     proxy: Component,
     rehearsal: Criterion,
     confirmed: Callable[[Hull], Part | None],
-    workers: Workers,
-    clock: Clock,
+    run: Run,
 ) -> list[Part]:
     """Unite pairs of parts that were carried from a proxy to a solid, if their joint hull is tight on both.
 
@@ -102,12 +97,9 @@ def merge_lifted(
         What the proxy clipped to a joint hull has to meet.
     confirmed : callable
         Returns the solid clipped to a hull, or None if it does not meet the criterion.
-    workers : Workers
-    clock : Clock
+    run : Run
     """
-    return _unite_pairs(
-        parts, len(parts), _Lifted(rehearsal, workers, clock, proxy, few=0, confirmed=confirmed), workers, clock
-    )
+    return _unite_pairs(parts, len(parts), _Lifted(rehearsal, run, proxy, few=0, confirmed=confirmed), run)
 
 
 class _Verdict(NamedTuple):
@@ -136,14 +128,14 @@ class _Pairing(Protocol):
     ) -> tuple[list[_Pair], list[tuple[int, int]]]:
         """Pairs of a new part and another in the boxes that may be united, with costs; and pairs that never can be.
 
-        Incomplete if the clock's work runs out.
+        Incomplete if the run's work runs out.
         """
 
     def unite(self, first: Part, second: Part) -> _Verdict:
         """Unite two parts if that meets the criterion."""
 
 
-def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, workers: Workers, clock: Clock) -> list[Part]:
+def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, run: Run) -> list[Part]:
     """Unite pairs of which at least one is among the first `new` parts or made from them."""
     alive: dict[int, Part] = dict(enumerate(parts))
     origin = {i: i for i in alive}
@@ -161,16 +153,16 @@ def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, workers: Wo
             refuse(first, second)
         verdicts: dict[_Pair, _Verdict] = {}  # for pairs put back into the queue
         count = newest = len(alive)
-        while queue and clock.step(count - len(alive), None, len(alive)):
-            batch = _cheapest(queue, alive, 2 * workers.threads)
+        while queue and run.step(count - len(alive), None, len(alive)):
+            batch = _cheapest(queue, alive, 2 * run.threads)
             fresh = [pair for pair in batch if pair not in verdicts]
             verdicts.update(
-                zip(fresh, workers.map(lambda p: pairing.unite(alive[p.first], alive[p.second]), fresh), strict=True)
+                zip(fresh, run.map(lambda p: pairing.unite(alive[p.first], alive[p.second]), fresh), strict=True)
             )
             for taken, pair in enumerate(batch, start=1):
                 union, price, for_good = verdicts.pop(pair)
                 # Pay in the order of the pairs: the batch size, which depends on the threads, must not matter.
-                if not clock.work.pay(price):
+                if not run.work.pay(price):
                     break
                 if union is None:
                     if for_good:
@@ -191,7 +183,7 @@ def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, workers: Wo
                 newest += 1
                 break
     except Stopped:  # raised between two unions
-        clock.note_stop()
+        run.note_stop()
     return [alive[i] for i in sorted(alive, key=origin.__getitem__)]
 
 
@@ -210,8 +202,7 @@ class _Adjoining:
     """Pairs within the criterion's reach, judged by their glued union."""
 
     criterion: Criterion
-    workers: Workers
-    clock: Clock
+    run: Run
 
     def pairs(
         self, alive: Mapping[int, Part], boxes: Boxes, new: Sequence[int]
@@ -219,11 +210,11 @@ class _Adjoining:
         """Pairs that the volume bound allows."""
         screen = self.criterion.screen
         pairs = boxes.pairs(new, screen.reach)
-        if not self.clock.work.pay(_sum_over(alive, pairs, work.joining)):
+        if not self.run.work.pay(_sum_over(alive, pairs, work.joining)):
             return [], []
         found = [
             _Pair(hull_volume - (screen.filled(alive[first]) + screen.filled(alive[second])), first, second)
-            for first, second, volume, hull_volume in joint_volumes(alive, pairs, self.workers)
+            for first, second, volume, hull_volume in joint_volumes(alive, pairs, self.run)
             if not screen.excludes(volume, hull_volume)
         ]
         return found, []
@@ -241,8 +232,7 @@ class _Bridged:
     """All pairs (see `FEW`), judged by the solid clipped to their joint hull."""
 
     criterion: Criterion
-    workers: Workers
-    clock: Clock
+    run: Run
     solid: Component
     few: int = FEW
 
@@ -256,11 +246,11 @@ class _Bridged:
         found: list[_Pair] = []
         never: list[tuple[int, int]] = []
         for some in np.split(pairs, range(AT_ONCE, len(pairs), AT_ONCE)):
-            if not self.clock.may_continue() or not self.clock.work.pay(_sum_over(alive, some, work.screening)):
+            if not self.run.may_continue() or not self.run.work.pay(_sum_over(alive, some, work.screening)):
                 break
             used, places = _places(some)
             hulls = [alive[i].hull for i in used]
-            volumes, feasibilities = screen.feasibilities(self.solid.filling, hulls, places, self.workers.threads)
+            volumes, feasibilities = screen.feasibilities(self.solid.filling, hulls, places, self.run.threads)
             for (first, second), volume, feasibility in zip(
                 some.tolist(), volumes.tolist(), feasibilities.tolist(), strict=True
             ):
@@ -387,17 +377,17 @@ def _clipped(first: Part, second: Part, hull: Hull, criterion: Criterion, solid:
 
 
 def neighbours(
-    alive: Mapping[int, Part], new: Sequence[int], reach: float, workers: Workers
+    alive: Mapping[int, Part], new: Sequence[int], reach: float, run: Run
 ) -> list[tuple[int, int, float, float]]:
     """Pairs of a new part and any other with boxes within reach: (first, second, volume, joint hull's volume)."""
-    return joint_volumes(alive, Boxes(alive).pairs(new, reach), workers)
+    return joint_volumes(alive, Boxes(alive).pairs(new, reach), run)
 
 
-def joint_volumes(alive: Mapping[int, Part], pairs: IntArray, workers: Workers) -> list[tuple[int, int, float, float]]:
+def joint_volumes(alive: Mapping[int, Part], pairs: IntArray, run: Run) -> list[tuple[int, int, float, float]]:
     """Volumes of pairs of parts [P, 2]: (first, second, volume of both, joint hull's volume)."""
     used, places = _places(pairs)
     corners = [alive[i].hull.vertices for i in used]
-    hulls = _native.joint_hull_volumes(corners, places, workers.threads)
+    hulls = _native.joint_hull_volumes(corners, places, run.threads)
     return [
         (i, j, alive[i].volume + alive[j].volume, hull)
         for (i, j), hull in zip(pairs.tolist(), hulls.tolist(), strict=True)
@@ -420,8 +410,7 @@ def merge_to_count(
     parts: Sequence[Part],
     count: int,
     criterion: Criterion,
-    workers: Workers,
-    clock: Clock,
+    run: Run,
     worst: float = np.inf,
 ) -> list[Part] | None:
     """Unite parts, always the pair whose union has the least error, until at most `count` are left.
@@ -436,8 +425,7 @@ def merge_to_count(
         At least 1.
     criterion : Criterion
         Measures the errors; unions need not meet it.
-    workers : Workers
-    clock : Clock
+    run : Run
         When it stops, the parts reached so far are returned, which may be more than `count`.
     worst : float
         Give up and return None as soon as a union would have an error of at least this.
@@ -455,14 +443,14 @@ def merge_to_count(
     reach = criterion.screen.reach
     account = Work(MEASURING)
     try:
-        queue = _bounded_pairs(alive, list(alive), reach, criterion, workers)
-        while len(alive) > count and clock.step(len(parts) - len(alive), len(parts) - count, len(alive)):
+        queue = _bounded_pairs(alive, list(alive), reach, criterion, run)
+        while len(alive) > count and run.step(len(parts) - len(alive), len(parts) - count, len(alive)):
             pair = _pop_least(queue, alive, criterion, account)
             if pair is None:
                 if reach == np.inf:
                     break
                 reach = np.inf
-                queue = _bounded_pairs(alive, list(alive), reach, criterion, workers)
+                queue = _bounded_pairs(alive, list(alive), reach, criterion, run)
                 continue
             if pair.error >= worst:
                 return None
@@ -470,11 +458,11 @@ def merge_to_count(
             del alive[pair.first], alive[pair.second]
             origin[newest] = min(origin[pair.first], origin[pair.second])
             alive[newest] = union
-            for bounded in _bounded_pairs(alive, [newest], reach, criterion, workers):
+            for bounded in _bounded_pairs(alive, [newest], reach, criterion, run):
                 heapq.heappush(queue, bounded)
             newest += 1
     except Stopped:  # between two unions
-        clock.note_stop()
+        run.note_stop()
     return [alive[i] for i in sorted(alive, key=origin.__getitem__)]
 
 
@@ -486,12 +474,12 @@ class _BoundedPair(NamedTuple):
 
 
 def _bounded_pairs(
-    alive: dict[int, Part], new: Sequence[int], reach: float, criterion: Criterion, workers: Workers
+    alive: dict[int, Part], new: Sequence[int], reach: float, criterion: Criterion, run: Run
 ) -> list[_BoundedPair]:
     screen = criterion.screen
     queue = [
         _BoundedPair(screen.least_error(volume, hull_volume), first, second, False)
-        for first, second, volume, hull_volume in neighbours(alive, new, reach, workers)
+        for first, second, volume, hull_volume in neighbours(alive, new, reach, run)
     ]
     heapq.heapify(queue)
     return queue

@@ -8,12 +8,12 @@ from itertools import compress
 import numpy as np
 
 from rlacd import _native
+from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
 from rlacd.solid.distance import hull_union
 from rlacd.solid.hull import Hull
 from rlacd.solid.topology import BoolArray
-from rlacd.workers import Workers
 
 THIN = 0.01
 """A hull is a sliver if the radius of its inscribed ball is below this share of its largest extent."""
@@ -25,7 +25,7 @@ MISSED = 2e-3
 """A sliver is dropped if none of its points is farther than this from the other hulls (0.1 % of the longest side)."""
 
 
-def drop_slivers(parts: Sequence[Part], workers: Workers, suspects: Sequence[Part] | None = None) -> list[Part]:
+def drop_slivers(parts: Sequence[Part], run: Run, suspects: Sequence[Part] | None = None) -> list[Part]:
     """Drop slivers and films that the other hulls stand in for; all others stay, such as those of thin solids.
 
     Parameters
@@ -42,20 +42,20 @@ def drop_slivers(parts: Sequence[Part], workers: Workers, suspects: Sequence[Par
     """
     parts = list(parts)
     suspects = parts if suspects is None else suspects
-    thin = workers.map(lambda part: is_film(part) or is_sliver(part.hull), suspects)
+    thin = run.map(lambda part: is_film(part) or is_sliver(part.hull), suspects)
     place = {id(part): i for i, part in enumerate(parts)}
     slivers = [place[id(part)] for part, is_thin in zip(suspects, thin, strict=True) if is_thin]
     boxes = np.array([part.box for part in parts]).reshape(-1, 2, 3)
     concerned = np.zeros(len(parts), dtype=bool)
     for own in slivers:
         concerned |= _near(boxes, boxes[own])
-    union = hull_union([part.hull for part in compress(parts, concerned)], workers.threads)
+    union = hull_union([part.hull for part in compress(parts, concerned)], run.threads)
     number = np.cumsum(concerned, dtype=np.int32) - 1
     kept = np.ones(len(parts), dtype=bool)
     for own in sorted(slivers, key=lambda i: parts[i].hull.volume):
         kept[own] = False
         others = np.flatnonzero(kept & _near(boxes, boxes[own]))
-        kept[own] = len(others) == 0 or _misses(union.only(number[others]), parts[own], workers.threads)
+        kept[own] = len(others) == 0 or _misses(union.only(number[others]), parts[own], run.threads)
     return [parts[i] for i in np.flatnonzero(kept)]
 
 

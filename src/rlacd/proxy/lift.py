@@ -13,17 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from rlacd._native import Stopped
-from rlacd.clock import Clock
 from rlacd.criteria import Criterion
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.merge.limits import TOLERANCE, limit_hull
 from rlacd.policies import Policy
+from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part
 from rlacd.solid.hull import Hull
 from rlacd.solid.reunite import reunite
-from rlacd.workers import Workers
 
 GRAIN = 5e-4
 """Hulls may grow by this more than they must to cover the solid (the longest side is 2)."""
@@ -95,8 +94,7 @@ class Lift:
         The criterion for parts on the proxy.
     policy : Policy
         Chooses the planes where parts are cut again.
-    workers : Workers
-    clock : Clock
+    run : Run
         When it stops, the parts stay those of the proxy, with hulls that cover the solid.
     """
 
@@ -105,8 +103,7 @@ class Lift:
     goal: Criterion
     on_proxy: Criterion
     policy: Policy
-    workers: Workers
-    clock: Clock
+    run: Run
 
     def __call__(self, parts: Sequence[Part], mend: bool = True) -> list[Part]:
         """Get the parts of the solid; together they cover it.
@@ -118,14 +115,14 @@ class Lift:
         mend : bool
             Cut parts again if they meet their criterion on the proxy only.
         """
-        with self.clock.shielded():
+        with self.run.shielded():
             lifted = [_Lifted(limit_hull(part.hull, tolerance=SMOOTH), part) for part in parts]
             self._cover(lifted)
             hulls = [each.hull for each in lifted]
         try:
-            return self._tested(lifted) if mend else self.workers.map(self._clipped, hulls)
+            return self._tested(lifted) if mend else self.run.map(self._clipped, hulls)
         except Stopped:
-            self.clock.note_stop()
+            self.run.note_stop()
             return [part.with_hull(hull) for part, hull in zip(parts, hulls, strict=True)]
 
     def _tested(self, lifted: list[_Lifted]) -> list[Part]:
@@ -169,7 +166,7 @@ class Lift:
             [each.hull.faces for each in lifted],
             2 * self.deviation + SMOOTH,
             GRAIN,
-            self.workers.threads,
+            self.run.threads,
         )
         for each, own in zip(lifted, points, strict=True):
             if len(own):
@@ -178,7 +175,7 @@ class Lift:
     def _clip(self, lifted: Sequence[_Lifted]) -> None:
         """Get what the solid fills of hulls that have changed."""
         changed = [each for each in lifted if each.part is None]
-        for each, part in zip(changed, self.workers.map(self._clipped, [each.hull for each in changed]), strict=True):
+        for each, part in zip(changed, self.run.map(self._clipped, [each.hull for each in changed]), strict=True):
             each.part = part
 
     def _clipped(self, hull: Hull) -> Part:
@@ -189,7 +186,7 @@ class Lift:
     def _failing(self, lifted: Sequence[_Lifted]) -> list[int]:
         """Indices of the parts that fail on the solid, but for those that were cut there before."""
         fresh = [i for i, each in enumerate(lifted) if each.on_proxy is not None and not each.is_met]
-        verdicts = self.workers.map(self.goal.is_met, [lifted[i].on_solid for i in fresh])
+        verdicts = self.run.map(self.goal.is_met, [lifted[i].on_solid for i in fresh])
         for i, is_met in zip(fresh, verdicts, strict=True):
             lifted[i].is_met = is_met
         return [i for i in fresh if not lifted[i].is_met]
@@ -200,7 +197,7 @@ class Lift:
         return [self._tree(root) for root in ([whole] if whole is not None else part.members)]
 
     def _tree(self, root: Component) -> CutTree:
-        return CutTree(root, self.policy, self.workers)
+        return CutTree(root, self.policy, self.run)
 
     def _cut(self, tree: CutTree, criterion: Criterion) -> list[Part]:
-        return cut_and_merge(tree, criterion, self.workers, self.clock).parts
+        return cut_and_merge(tree, criterion, self.run).parts

@@ -1,6 +1,6 @@
 """Search for fewer parts than one pass of cuts finds."""
 
 from rlacd.search.context import SearchContext
-from rlacd.search.levels import LEVELS, eliminate_parts, level, search
+from rlacd.search.search import SearchSummary, eliminate_parts, search
 
-__all__ = ["LEVELS", "SearchContext", "eliminate_parts", "level", "search"]
+__all__ = ["SearchContext", "SearchSummary", "eliminate_parts", "search"]

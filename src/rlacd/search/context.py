@@ -10,7 +10,6 @@ from rlacd.criteria.criterion import Criterion
 from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import Greedy, Policy
 from rlacd.solid.component import Component
-from rlacd.workers import Workers
 
 Ranking: TypeAlias = Callable[[SweepCache], Policy]
 """Makes a policy that takes the best-ranked plane of a component's sweep."""
@@ -41,7 +40,6 @@ class SearchContext:
         The solid.
     criterion : Criterion
         Every new part meets it.
-    workers : Workers
     seed : int
     sweeps : SweepCache
         Sweeps of the solid's components, including those of the first pass.
@@ -54,7 +52,6 @@ class SearchContext:
 
     root: Component
     criterion: Criterion
-    workers: Workers
     seed: int = 0
     sweeps: SweepCache = field(default_factory=SweepCache)
     rankings: Sequence[Ranking] = PORTFOLIO

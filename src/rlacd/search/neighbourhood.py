@@ -1,65 +1,57 @@
-"""Adaptive large-neighbourhood search over the parts of a decomposition.
+"""Large-neighbourhood search over the parts of a decomposition.
 
-A state is a set of parts, all of which meet the criterion. Three operators change it:
+A state is a set of parts, all of which meet the criterion. Two operators change it, in turn:
 
-- recut: a cluster of neighbours, two of which have a joint hull that almost fits, is reunited into one solid and cut
-  again; the pieces are merged with each other and with the parts around. Accepted if it leaves fewer parts, or equally
-  many with a smaller total hull volume.
-- transfer: a part gives pieces to the parts around it. Accepted even if it saves no part yet.
-- redistribute: a part is divided among the parts around it and disappears.
+- redistribute: a part is divided among the parts around it and disappears. Every part is tried, the smallest first.
+- recut: a cluster of neighbours is reunited into one solid and cut again; the pieces are merged with each other and
+  with the parts around. Accepted if it leaves fewer parts, or equally many with a smaller total hull volume.
 
-Small clusters are quick to try; large ones allow very different cuts. Which operator, cluster size and ranking of
-planes pays off depends on the shape, so the search adapts their weights to the gains so far.
-
-Sources: P. Shaw, "Using Constraint Programming and Local Search Methods to Solve Vehicle Routing Problems", CP 1998;
-S. Ropke and D. Pisinger, "An Adaptive Large Neighborhood Search Heuristic for the Pickup and Delivery Problem with Time
-Windows", 2006.
+Source: P. Shaw, "Using Constraint Programming and Local Search Methods to Solve Vehicle Routing Problems", CP 1998.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from rlacd._native import Stopped
-from rlacd.clock import Clock
-from rlacd.search.budget import SearchBudget
+from rlacd.run import Run
 from rlacd.search.context import SearchContext
-from rlacd.search.operators import BATCH, Operator, OperatorSampler, Trial, giving_away
-from rlacd.search.part_graph import PartGraph
+from rlacd.search.part_graph import Cluster, PartGraph
 from rlacd.search.recut import Exchange, recut
 from rlacd.search.redistribute import redistribute
-from rlacd.search.transfer import transfer
 from rlacd.solid.component import Part
 
-DRY = 4
-"""The search ends after this many batches in a row with nothing new to try."""
+BATCH = 8
+"""Trials made from the same state. It does not depend on the number of threads, so neither does the result."""
+
+CLUSTER = 3
+"""Parts that are recut together: two rarely become one, and of more, hardly any trial saves a part
+(docs/search.md)."""
+
+DRAWS = 10
+"""Draws of a cluster before a trial is skipped for lack of a new one."""
+
+REPEATS = 4
+"""How often a part may be offered to the same parts, each time divided in other places."""
 
 OPENING = 16
-"""Steps before the first attempt to eliminate all parts: later recuts undo some of what elimination gains."""
+"""Recuts before the first attempt to redistribute all parts: later recuts undo some of what that gains."""
 
 SMALL = 0.5
-"""Share of the parts, the smallest, that the search tries to eliminate first: nothing saves more parts per unit of
-work."""
+"""Share of the parts, the smallest, that are redistributed first: nothing saves more parts per unit of work."""
 
-OPENING_SHARE = 4
-"""The steps of the opening take at most one part in this many of the time left."""
-
-TOO_LITTLE = 0.02
-"""The search ends when less than this share of the allowed work is left."""
-
-STEPS_PER_PART = 2
-"""Steps per part between two attempts to eliminate all parts."""
+RECUTS_PER_PART = 2
+"""Recuts per part between two attempts to redistribute all parts."""
 
 PATIENCE = 24
-"""By default, the search also ends after this many trials per part without a gain: transfer always finds something new
-to try."""
+"""By default the search is exhausted after this many trials per part without a gain, ..."""
 
 LEAST_TRIALS = 32
-"""But not before this many trials without a gain: where parts are few, trials cost little."""
+"""... but not before this many: where parts are few, trials cost little."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +63,7 @@ class SearchOutcome:
     parts : list of Part
         The best parts found.
     steps : int
-        Trials made.
+        Recuts tried.
     accepted : int
         Trials accepted.
     exhausted : bool
@@ -89,6 +81,9 @@ class SearchOutcome:
         return SearchOutcome(best, self.steps + other.steps, self.accepted + other.accepted, other.exhausted)
 
 
+_Trial = Callable[[Run], Exchange | None]
+
+
 class Neighbourhood:
     """A decomposition that is being improved.
 
@@ -97,129 +92,124 @@ class Neighbourhood:
     context : SearchContext
     parts : sequence of Part
         Made of components with disjoint interiors.
+    run : Run
     patience : int
         The search is exhausted after this many trials per part without a gain.
     """
 
-    def __init__(self, context: SearchContext, parts: Sequence[Part], patience: int = PATIENCE) -> None:
+    def __init__(self, context: SearchContext, parts: Sequence[Part], run: Run, patience: int = PATIENCE) -> None:
         self._context = context
+        self._run = run
         self._patience = patience
         self._policies = [ranking(context.near_sweeps) for ranking in context.rankings]
         self._random = np.random.default_rng(context.seed)
-        self._graph = PartGraph(parts, context.criterion, context.workers)
-        self._operators = OperatorSampler(len(context.rankings))
+        self._graph = PartGraph(parts, context.criterion, run)
         self._best = list(parts)
-        self._steps = self._accepted = self._dry = self._without_gain = 0
+        self._steps = self._accepted = self._without_gain = 0
+        self._recut: set[tuple[Cluster, int]] = set()
+        self._offered: dict[tuple[int, Cluster], int] = {}
+        self._price = {"recut": 0.0, "redistribute": 0.0}  # units, of the last batch
         self._near = min(context.criterion.screen.reach, 2 * context.criterion.overhang)
 
-    @property
-    def parts(self) -> list[Part]:
-        """The parts so far."""
-        return list(self._graph.parts.values())
-
-    def run(self, budget: SearchBudget, most: float = math.inf, enough: int = 1) -> SearchOutcome:
-        """Search until nothing is left to try, the budget is used up, `most` steps are made or `enough` parts are left.
-
-        It opens with a few steps followed by an attempt to eliminate every part. Eliminations do not count as steps.
-        """
+    def improve(self, most: float = math.inf, enough: int = 1) -> SearchOutcome:
+        """Search until nothing is left to try, the run is over, `most` recuts are made or `enough` parts are left."""
         exhausted = len(self._graph.parts) == 1
         try:
             if most > 0:
-                self.redistribute_all(budget, enough, SMALL)
-                with budget.share(OPENING_SHARE):
-                    self._walk(budget, min(most, OPENING), enough)
-                self.redistribute_all(budget, enough)
+                self.redistribute_all(enough, SMALL)
+                self._recut_some(min(most, OPENING), enough)
+                self.redistribute_all(enough)
             exhausted = len(self._graph.parts) == 1
-            while not exhausted and self._steps < most and len(self._graph.parts) > enough and not budget.is_over:
-                exhausted = self._walk(budget, min(most, self._steps + STEPS_PER_PART * len(self._graph.parts)), enough)
-                self.redistribute_all(budget, enough)
+            while not exhausted and self._steps < most and len(self._graph.parts) > enough and not self._run.is_over:
+                target = self._steps + RECUTS_PER_PART * len(self._graph.parts)
+                exhausted = self._recut_some(min(most, target), enough) or self._gave_up
+                self.redistribute_all(enough)
         except Stopped:  # raised between two exchanges: the best state so far is kept
-            budget.note_stop()
+            self._run.note_stop()
         return SearchOutcome(self._best, self._steps, self._accepted, exhausted)
 
-    def _walk(self, budget: SearchBudget, most: float, enough: int) -> bool:
-        """Make random trials until `most` steps are made in total; whether the search is exhausted."""
+    def redistribute_all(self, enough: int = 1, share: float = 1.0) -> None:
+        """Offer each part, or the smallest share of them, to those around, until `enough` parts are left."""
         graph = self._graph
-        while self._dry < DRY and not self._gave_up and len(graph.parts) > 1:
-            if (
-                not budget.step(self._steps, None, len(graph.parts))
-                or self._steps >= most
-                or len(graph.parts) <= enough
-            ):
-                return False
-            batch = self._affordable(list(self._operators.draw(graph, self._random, self._near)), budget)
-            self._dry = 0 if batch else self._dry + 1
-            # The batch is drawn in full and then shortened, so a search with more steps starts with the same trials.
-            batch = batch[: int(min(BATCH, most - self._steps))]
-            self._make(batch, budget)
-            self._steps += len(batch)
-            budget.steps += len(batch)
-        return True
+        waiting = sorted(graph.parts, key=lambda i: (graph.parts[i].hull.volume, i))
+        waiting = waiting[: math.ceil(share * len(waiting))]
+        while waiting and len(graph.parts) > enough and not self._gave_up and self._may_continue():
+            batch, waiting = waiting[:BATCH], waiting[BATCH:]
+            self._make("redistribute", [trial for i in batch if (trial := self._redistributing(i)) is not None])
+
+    def _recut_some(self, most: float, enough: int) -> bool:
+        """Recut clusters until `most` steps are made in total; whether nothing new was left to recut."""
+        graph = self._graph
+        while self._steps < most and len(graph.parts) > enough and not self._gave_up and self._may_continue():
+            taken: set[int] = set()
+            trials = [trial for _ in range(BATCH) if (trial := self._recutting(taken)) is not None]
+            if not trials:
+                return True
+            # Drawn in full and then shortened, so a search with more steps starts with the same trials.
+            trials = trials[: int(min(BATCH, most - self._steps))]
+            self._steps += self._make("recut", trials)
+        return len(graph.parts) == 1
 
     @property
     def _gave_up(self) -> bool:
         return self._without_gain >= max(self._patience * len(self._graph.parts), LEAST_TRIALS)
 
-    def redistribute_all(self, budget: SearchBudget, enough: int = 1, share: float = 1.0) -> None:
-        """Try to eliminate each part, or the smallest share of them, smallest first, until `enough` parts are left."""
-        graph = self._graph
-        waiting = sorted(graph.parts, key=lambda i: (graph.parts[i].hull.volume, i))
-        waiting = waiting[: math.ceil(share * len(waiting))]
-        while (
-            waiting
-            and not self._gave_up
-            and len(graph.parts) > enough
-            and budget.step(self._steps, None, len(graph.parts))
-        ):
-            batch, waiting = waiting[:BATCH], waiting[BATCH:]
-            trials = [
-                giving_away(Operator.REDISTRIBUTE, graph, i, self._random, self._near)
-                for i in batch
-                if i in graph.parts
-            ]
-            self._make(self._affordable([trial for trial in trials if self._operators.is_new(trial)], budget), budget)
+    def _may_continue(self) -> bool:
+        return self._run.step(self._steps, None, len(self._best))
 
-    def _affordable(self, trials: list[Trial], budget: SearchBudget) -> list[Trial]:
-        """The first trials, as many as the work left pays for, estimated from earlier trials of their kind."""
-        if math.isinf(budget.work.left):
-            return trials
-        dearest = 0.0
-        for count, trial in enumerate(trials, start=1):
-            dearest = max(dearest, self._operators.price(trial))
-            if count > 1 and count * dearest > budget.work.left:  # each trial gets an equal share
-                return trials[: count - 1]
-        return trials
+    def _recutting(self, taken: set[int]) -> _Trial | None:
+        """Draw a cluster disjoint from those taken that has not been recut by the drawn policy."""
+        for _ in range(DRAWS):
+            cluster = self._graph.draw(CLUSTER, self._random)
+            if cluster is None:
+                return None
+            policy = int(self._random.integers(len(self._policies)))
+            if taken.isdisjoint(cluster) and (cluster, policy) not in self._recut:
+                taken.update(cluster)
+                self._recut.add((cluster, policy))
+                parts, around = self._graph.of(cluster), self._graph.of(self._graph.around(cluster))
+                context, chosen = self._context, self._policies[policy]
+                return lambda run: recut(parts, around, chosen, context.criterion, run, context.root)
+        return None
 
-    def _make(self, trials: Sequence[Trial], budget: SearchBudget) -> None:
-        """Make trials of the same state in parallel, then apply the exchanges they found in order."""
+    def _redistributing(self, which: int) -> _Trial | None:
+        if which not in self._graph.parts:
+            return None
+        around = self._graph.near(which, self._near)
+        key, seed = (which, around), int(self._random.integers(2**32))
+        self._offered[key] = self._offered.get(key, 0) + 1
+        if self._offered[key] > REPEATS:
+            return None
+        part, takers, context = self._graph.parts[which], self._graph.of(around), self._context
+        return lambda run: redistribute(part, takers, context.criterion, np.random.default_rng(seed), context.root, run)
+
+    def _make(self, kind: str, trials: list[_Trial]) -> int:
+        """Make trials of the same state at a time, as many as the work left pays for; apply what they find in order."""
+        run, account = self._run, self._run.work
         if not trials:
-            return
-        clocks = [budget.trial(budget.work.share(len(trials))) for _ in trials]
-        found = self._context.workers.map(lambda pair: self._try(*pair), zip(trials, clocks, strict=True))
-        for trial, clock, exchange in zip(trials, clocks, found, strict=True):
-            budget.work.pay(clock.work.done)
+            return 0
+        if self._price[kind] > 0 and math.isfinite(account.left):
+            trials = trials[: max(1, int(account.left / self._price[kind]))]
+        alone = [run.alone(account.share(len(trials))) for _ in trials]
+        found = run.map(lambda pair: pair[0](pair[1]), zip(trials, alone, strict=True))
+        for exchange, trial in zip(found, alone, strict=True):
+            account.pay(trial.work.done)
             taken = exchange is not None and self._graph.apply(exchange)
             gain = exchange.gain if exchange is not None and taken else 0
-            self._operators.count(trial, gain, clock.work.done)
             self._accepted += taken
             self._without_gain = 0 if gain > 0 else self._without_gain + 1
             if taken:
                 self._best = min(self._best, self.parts, key=cost)
-        budget.parts = min(budget.parts, len(self._graph.parts))
-        budget.work.pay(self._graph.collect())
-        if all(clock.work.is_spent for clock in clocks) or budget.work.left < TOO_LITTLE * budget.work.most < math.inf:
-            budget.work.close()
+        self._price[kind] = max(trial.work.done for trial in alone)
+        account.pay(self._graph.collect())
+        if all(trial.work.is_spent for trial in alone):
+            account.close()
+        return len(trials)
 
-    def _try(self, trial: Trial, clock: Clock) -> Exchange | None:
-        criterion, root = self._context.criterion, self._context.root
-        parts = self._graph.parts
-        cluster = [parts[i] for i in trial.cluster]
-        if trial.policy is not None:
-            around = [parts[i] for i in self._graph.around(trial.cluster)]
-            return recut(cluster, around, self._policies[trial.policy], criterion, clock, root)
-        give = redistribute if trial.move is Operator.REDISTRIBUTE else transfer
-        around = [parts[i] for i in trial.around]
-        return give(cluster[0], around, criterion, np.random.default_rng(trial.seed), root, clock)
+    @property
+    def parts(self) -> list[Part]:
+        """The parts so far."""
+        return list(self._graph.parts.values())
 
 
 def cost(parts: Sequence[Part]) -> tuple[int, float]:

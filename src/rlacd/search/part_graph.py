@@ -6,13 +6,12 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from rlacd import work
 from rlacd.criteria.criterion import Criterion
 from rlacd.merge.merge import neighbours
+from rlacd.run import Run, work
 from rlacd.search.recut import Exchange
 from rlacd.solid.component import Part
 from rlacd.solid.reunite import TOUCHING, touch
-from rlacd.workers import Workers
 
 Cluster = tuple[int, ...]
 """Ids of parts, ascending."""
@@ -33,14 +32,14 @@ class PartGraph:
         They get the ids 0, 1, ...
     criterion : Criterion
         Decides what may be filled for free.
-    workers : Workers
+    run : Run
         Tests pairs in parallel.
     """
 
-    def __init__(self, parts: Sequence[Part], criterion: Criterion, workers: Workers) -> None:
+    def __init__(self, parts: Sequence[Part], criterion: Criterion, run: Run) -> None:
         self.parts: dict[int, Part] = {}
         self._screen = criterion.screen
-        self._workers = workers
+        self._run = run
         self._gaps: dict[int, dict[int, float]] = {}
         self._next = 0
         self._work = 0.0
@@ -55,7 +54,6 @@ class PartGraph:
         self._add(new)
         self._ids = np.array(list(self.parts), dtype=np.int64)
         self._boxes = np.array([part.box for part in self.parts.values()]).reshape(-1, 2, 3)
-        self._by_size = sorted(self.parts, key=lambda i: (self.parts[i].hull.volume, i))
 
     def _add(self, new: Sequence[Part]) -> None:
         if not new:
@@ -65,13 +63,13 @@ class PartGraph:
         self.parts.update(zip(ids, new, strict=True))
         self._gaps.update((i, {}) for i in ids)
         filled = {i: self._screen.filled(part) for i, part in self.parts.items()}
-        near = neighbours(self.parts, ids, TOUCHING, self._workers)
+        near = neighbours(self.parts, ids, TOUCHING, self._run)
         self._work += sum(
             work.joining(len(self.parts[i].hull.vertices) + len(self.parts[j].hull.vertices))
             + work.gluing(self.parts[i].size + self.parts[j].size)
             for i, j, _, _ in near
         )
-        touching = self._workers.map(lambda pair: touch(self.parts[pair[0]], self.parts[pair[1]]), near)
+        touching = self._run.map(lambda pair: touch(self.parts[pair[0]], self.parts[pair[1]]), near)
         for (i, j, _, hull_volume), does in zip(near, touching, strict=True):
             if does:
                 self._gaps[i][j] = self._gaps[j][i] = max(hull_volume - filled[i] - filled[j], 0.0) ** (1 / 3)
@@ -89,6 +87,10 @@ class PartGraph:
         self.replace([ids[id(part)] for part in exchange.out], exchange.into)
         return True
 
+    def of(self, ids: Iterable[int]) -> list[Part]:
+        """Get the parts of some ids."""
+        return [self.parts[i] for i in ids]
+
     def around(self, cluster: Cluster) -> Cluster:
         """Get the parts that touch a cluster, in ascending order."""
         return tuple(sorted({j for i in cluster for j in self._gaps[i]} - set(cluster)))
@@ -98,11 +100,6 @@ class PartGraph:
         box = self.parts[which].box
         gaps = np.maximum(box[0] - self._boxes[:, 1], self._boxes[:, 0] - box[1]).max(axis=1)
         return tuple(self._ids[(gaps <= reach) & (self._ids != which)].tolist())
-
-    def draw_small(self, random: np.random.Generator) -> int:
-        """Draw a part, favouring small hulls: the weights by rank are 1/2, 1/3, 1/4, ..."""
-        weights = 1 / np.arange(2, len(self._by_size) + 2)
-        return self._by_size[int(random.choice(len(self._by_size), p=weights / weights.sum()))]
 
     def draw(self, size: int, random: np.random.Generator) -> Cluster | None:
         """Draw a connected cluster: a pair with a small gap, extended by the neighbours with the smallest gaps.

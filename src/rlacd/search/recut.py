@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rlacd import work
-from rlacd.clock import Clock
 from rlacd.criteria.criterion import Criterion
 from rlacd.cut import CutTree
 from rlacd.merge.merge import merge_parts
 from rlacd.policies import Policy
+from rlacd.run import Run, work
 from rlacd.solid.component import LOST, Component, Part
 from rlacd.solid.reunite import reunite
-from rlacd.workers import Workers
 
 SLACK = 5
 """Pieces allowed beyond the number of parts: merging rarely makes up for more."""
@@ -49,7 +47,7 @@ def recut(
     around: Sequence[Part],
     policy: Policy,
     criterion: Criterion,
-    clock: Clock,
+    run: Run,
     whole: Component | None = None,
 ) -> Exchange | None:
     """Reunite some parts, cut them again, and merge the pieces with each other and with the parts around.
@@ -64,8 +62,8 @@ def recut(
         Chooses the planes.
     criterion : Criterion
         Every new part meets it.
-    clock : Clock
-        Give up when its time or its work is used up.
+    run : Run
+        Give up when it is over.
     whole : Component, optional
         The solid; if given, pieces may be merged across other parts between them.
 
@@ -74,20 +72,19 @@ def recut(
     Exchange or None
         None if the result has neither fewer parts nor equally many with smaller hulls.
     """
-    alone = Workers(1)
     members = [member for part in parts for member in part.members]
-    if not clock.work.pay(work.reuniting(sum(member.size for member in members), len(members))):
+    if not run.work.pay(work.reuniting(sum(member.size for member in members), len(members))):
         return None
     solid = reunite(members)
     if solid is None:
         return None
-    pieces, left = CutTree(solid, policy, alone).cut_until(criterion, clock, len(parts) + SLACK)
+    pieces, left = CutTree(solid, policy, run).cut_until(criterion, len(parts) + SLACK)
     if left or sum(piece.volume for piece in pieces) < (1 - LOST) * solid.volume:
         return None
     if _volumes(pieces) == _volumes(parts):  # cut as before: merging these has already been tried
         return None
-    merged = merge_parts(pieces, criterion, alone, clock, beside=around, solid=whole)
-    if clock.stopped_by is not None or clock.work.is_spent:
+    merged = merge_parts(pieces, criterion, run, beside=around, solid=whole)
+    if run.is_over:
         return None
     exchange = Exchange.between([*parts, *around], merged)
     tighter = hull_volume(exchange.into) < (1 - TIGHTER) * hull_volume(exchange.out)

@@ -12,21 +12,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rlacd import work
-from rlacd.clock import Clock
 from rlacd.criteria.criterion import Criterion
 from rlacd.merge.merge import Uniter
+from rlacd.run import Run, work
 from rlacd.search.recut import Exchange
-from rlacd.search.transfer import exchange_of
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part, Plane
 from rlacd.solid.products import dots, heights
+from rlacd.solid.reunite import reunite
 
 TAKERS = 6
 """Number of parts a piece is offered to, starting with those whose hulls would grow the least."""
 
 HALVINGS = 3
 """Maximum depth of halving for a piece that no part can take."""
+
+PATCHES = 4
+"""Parts of more components than this are reunited into one if that meets the criterion."""
 
 MIDDLE = 0.1
 """A piece is halved within this share of its length from the middle, at random, so each trial divides differently."""
@@ -38,7 +40,7 @@ def redistribute(
     criterion: Criterion,
     random: np.random.Generator,
     solid: Component,
-    clock: Clock | None = None,
+    run: Run | None = None,
 ) -> Exchange | None:
     """Divide a part among the parts around it.
 
@@ -53,21 +55,21 @@ def redistribute(
         Draws where pieces are halved.
     solid : Component
         The solid that was decomposed.
-    clock : Clock, optional
-        Give up when its time or its work is used up.
+    run : Run, optional
+        Give up when it is over.
 
     Returns
     -------
     Exchange or None
         An exchange that saves one part; None if some piece cannot be taken.
     """
-    clock = clock or Clock()
-    uniter = Uniter(criterion, solid, clock.work)
+    run = run or Run(1)
+    uniter = Uniter(criterion, solid, run.work)
     now = list(around)
 
     def halves(piece: _Piece) -> list[_Piece]:
         if piece.halves is None:
-            may_cut = clock.step(0, None, len(now)) and clock.work.pay(work.cutting(piece.component.size))
+            may_cut = run.step(0, None, len(now)) and run.work.pay(work.cutting(piece.component.size))
             piece.halves = [_Piece(half) for half in _halved(piece.component, random)] if may_cut else []
         return piece.halves
 
@@ -92,6 +94,20 @@ def redistribute(
     if not all(take(piece, HALVINGS) for piece in pieces):
         return None
     return exchange_of(part, around, now, criterion)
+
+
+def exchange_of(part: Part, around: Sequence[Part], after: Sequence[Part], criterion: Criterion) -> Exchange:
+    """The exchange of parts before and after giving; changed parts of many components are reunited."""
+    known = {id(other) for other in around}
+    return Exchange.between([part, *around], [p if id(p) in known else _mended(p, criterion) for p in after])
+
+
+def _mended(part: Part, criterion: Criterion) -> Part:
+    """Get a part of many components as a single component, if that meets the criterion."""
+    if len(part.members) <= PATCHES:
+        return part
+    whole = reunite(part.members)
+    return whole if whole is not None and criterion.is_met(whole) else part
 
 
 @dataclass

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rlacd import _native
 from rlacd._native import Stopped
-from rlacd.clock import Clock
+from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Part
 from rlacd.solid.frame import Frame
@@ -35,7 +35,7 @@ _DIRECTIONS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3)
 _AT_ONCE = 100_000
 
 
-def cover(mesh: InputMesh, clock: Clock) -> tuple[Solid, list[Part]]:
+def cover(mesh: InputMesh, run: Run) -> tuple[Solid, list[Part]]:
     """Return the hull of every body of an input, without repairing anything.
 
     Faces that share a corner, or have corners at the same place, form one body. The hull of a body holds all of its
@@ -43,9 +43,9 @@ def cover(mesh: InputMesh, clock: Clock) -> tuple[Solid, list[Part]]:
 
     Parameters
     ----------
-    Has at least one point.
-        With a point at least.
-    clock : Clock
+    mesh : InputMesh
+        Has at least one point.
+    run : Run
         Has stopped; it does not interrupt this.
 
     Returns
@@ -55,15 +55,14 @@ def cover(mesh: InputMesh, clock: Clock) -> tuple[Solid, list[Part]]:
     parts : list of Part
         Each is its own hull.
     """
-    with clock.shielded():
+    with run.shielded():
         used = mesh.vertices if len(mesh.faces) == 0 else mesh.vertices[_used(mesh)]
         frame = Frame.of(used)
         vertices = frame.to_frame(mesh.vertices)
         faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
         bodies = _bodies(vertices, faces) if len(faces) else [frame.to_frame(used)]
-    clock.stop.arm(SECONDS)
-    hulls = [_hull(points, clock) for points in bodies]
-    clock.stop.trip()
+    with run.hurried(SECONDS):
+        hulls = [_hull(points, run) for points in bodies]
     warning = (
         f"There was no time to repair the mesh: the result is the convex hulls of its bodies as they are in the file "
         f"({len(hulls)}), and the mass is that of these hulls."
@@ -104,15 +103,15 @@ def _along_a_curve(points: FloatArray) -> NDArray[np.int64]:
     return place
 
 
-def _hull(points: FloatArray, clock: Clock) -> Hull:
+def _hull(points: FloatArray, run: Run) -> Hull:
     try:
         exact = Hull.of(points)
         if exact is not None:
             return exact
     except Stopped:
-        with clock.shielded():
+        with run.shielded():
             return _touching(points) if len(points) > FEW else _box(points)
-    with clock.shielded():
+    with run.shielded():
         return Hull.of(thickened(points)) or _box(points)
 
 

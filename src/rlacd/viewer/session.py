@@ -16,7 +16,7 @@ from typing import Any
 
 from rlacd.decomposition import Decomposition
 from rlacd.errors import RlacdError
-from rlacd.progress import Progress
+from rlacd.run import Progress
 
 Run = Callable[..., Decomposition]
 """Takes ``progress`` and the options, returns a decomposition: `rlacd.decompose` with the mesh bound."""
@@ -36,7 +36,7 @@ class SessionState:
     draft : bool
         Whether the current hulls come from a quick first pass and may still be replaced.
     stage, done, total, parts, seconds
-        Progress of the current work; see `rlacd.progress.Progress`.
+        Progress of the current work; see `rlacd.run.Progress`.
     error : str or None
         Why the last requested work failed.
     """

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from rlacd.workers import Workers, available_cpus
+from rlacd.run import Run, available_cpus
 
 ON_LINUX = sys.platform.startswith("linux")
 
@@ -41,12 +41,12 @@ def test_one_thread_is_one_thread_for_booleans_too() -> None:
 @pytest.mark.skipif(not ON_LINUX, reason="processors are given to processes on Linux")
 def test_as_many_workers_as_the_process_may_use() -> None:
     assert available_cpus() == len(os.sched_getaffinity(0))
-    with Workers() as workers:
-        assert workers.threads == available_cpus()
+    with Run() as run:
+        assert run.threads == available_cpus()
 
 
 def test_results_come_in_the_order_of_the_items() -> None:
-    with Workers(3) as workers:
-        assert workers.map(lambda x: x * x, range(100)) == [x * x for x in range(100)]
-        assert workers.share(2) == 1
-        assert workers.share(1) == 3
+    with Run(3) as run:
+        assert run.map(lambda x: x * x, range(100)) == [x * x for x in range(100)]
+        assert run.share(2) == 1
+        assert run.share(1) == 3

@@ -1,0 +1,325 @@
+"""One decomposition under way: its threads, its time, its work, and when it has to stop."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import time
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager
+from functools import cache
+from typing import Literal, TypeVar
+
+from manifold3d import Manifold
+
+from rlacd._native import Stop, Stopped, poll_stop, use_stop
+from rlacd.run.progress import Progress, ProgressCallback
+from rlacd.run.work import Work
+
+StoppedBy = Literal["timeout", "cancel"]
+
+GRACE, GRACE_SHARE, LEAST_GRACE = 0.4, 0.04, 0.1
+"""After a stop, finishing may take `GRACE` seconds plus `GRACE_SHARE` of the timeout, and always at least `LEAST_GRACE`
+seconds; then optional work is skipped. After a cancellation it may take half as long: the command line then still has
+to write files. The promise is 1 s and 10 %: the rest is for what cannot be skipped."""
+
+BETWEEN_POLLS = 0.05
+"""Seconds between two looks, while other threads work, at whether they have to stop."""
+
+BLOCKS = 16
+"""Blocks per thread in which many items are handed over."""
+
+_T = TypeVar("_T")
+_R = TypeVar("_R")
+
+
+class Run:
+    """Threads, seed, time and work of one decomposition; a context that has to be entered before it is used.
+
+    Work stops in two ways: between steps, `step` returns False; within a step, kernels and all other code that calls
+    `rlacd._native.poll_stop` raise `Stopped`. Code that can continue with the result of earlier steps catches it and
+    calls `note_stop`.
+
+    Parameters
+    ----------
+    threads : int, optional
+        All processors by default. No result depends on it.
+    timeout : float, optional
+        Seconds after which `stopped_by` becomes "timeout".
+    progress : callable, optional
+        Called at every step, and several times a second during long ones; when it returns anything false but None,
+        `stopped_by` becomes "cancel".
+    seed : int
+        Of all random choices.
+
+    Attributes
+    ----------
+    work : Work
+        The account that pays for what is being done.
+    seconds : dict of str to float
+        Wall time of each stage so far.
+    stopped_by : "timeout", "cancel" or None
+        Why the run was stopped.
+    stopped_in : str or None
+        The stage in which that happened.
+    cut_short : set of str
+        Stages that ended because their work was used up.
+    """
+
+    def __init__(
+        self,
+        threads: int | None = None,
+        timeout: float | None = None,
+        progress: ProgressCallback | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.threads = threads or available_cpus()
+        self.seed = seed
+        self.work = Work()
+        self.seconds: dict[str, float] = {}
+        self.stopped_by: StoppedBy | None = None
+        self.stopped_in: str | None = None
+        self.cut_short: set[str] = set()
+        self.stop = Stop()
+        self._timeout = math.inf if timeout is None else timeout
+        self._progress = progress
+        self._start = time.perf_counter()
+        self._end = math.inf  # of the innermost time limit
+        self._stage = ""
+        self._done = self._parts = 0
+        self._total: int | None = None
+        self._is_quiet = self._is_finishing = False
+        self._stopped_at = self._finish_by = math.inf
+        self._outer: Run | None = None
+        self._pool: ThreadPoolExecutor | None = None
+
+    def __enter__(self) -> Run:
+        _start_booleans(self.threads)
+        self._pool = ThreadPoolExecutor(self.threads, initializer=use_stop, initargs=(self.stop,))
+        self._before = use_stop(self.stop)
+        self.stop.begin(self._look)
+        self.stop.arm(self._timeout - self.elapsed)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop.end()
+        use_stop(self._before)
+        assert self._pool is not None
+        self._pool.shutdown()
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Count the time inside towards stage `name`."""
+        self._stage = name
+        start = time.perf_counter()
+        self.step(0, None, self._parts)
+        try:
+            yield
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+
+    @property
+    def elapsed(self) -> float:
+        """Seconds since the start."""
+        return time.perf_counter() - self._start
+
+    @property
+    def seconds_left(self) -> float:
+        """Seconds left of the innermost time limit; infinite if there is none."""
+        return self._end - time.perf_counter()
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the work has to end: the run was stopped, or the time or the work allowed for it is used up."""
+        stopped = self.stopped_by if self._outer is None else self._outer.stopped_by
+        return stopped is not None or self.work.is_spent or self.seconds_left <= 0
+
+    @contextmanager
+    def limited(self, units: float = math.inf, seconds: float = math.inf, cuts: str | None = None) -> Iterator[None]:
+        """Limit the work and the seconds inside; using them up does not end the work outside.
+
+        Parameters
+        ----------
+        units : float
+            Of work (see `rlacd.run.work`).
+        seconds : float
+        cuts : str, optional
+            A stage to add to `cut_short` if the work is used up.
+        """
+        account, end = self.work, self._end
+        self.work, self._end = Work(min(units, account.left)), min(end, time.perf_counter() + seconds)
+        try:
+            yield
+        finally:
+            if self.work.is_spent and cuts is not None:
+                self.cut_short.add(cuts)
+            account.pay(self.work.done)
+            self.work, self._end = account, end
+
+    @contextmanager
+    def quietly(self) -> Iterator[None]:
+        """Report the last step again in place of the steps inside."""
+        before, self._is_quiet = self._is_quiet, True
+        try:
+            yield
+        finally:
+            self._is_quiet = before
+
+    def alone(self, units: float = math.inf) -> Run:
+        """Get a run of a single thread with its own account of `units`, for one of several trials made at a time."""
+        trial = Run(1, seed=self.seed)
+        trial.work, trial._end, trial._outer = Work(units), self._end, self
+        return trial
+
+    def step(self, done: int, total: int | None, parts: int) -> bool:
+        """Report a step of the current stage; True if the work may continue."""
+        if self._outer is not None:
+            return not self.is_over
+        if not self._is_quiet:
+            self._done, self._total, self._parts = done, total, parts
+        self._ask_caller()
+        return self._is_finishing or not self.is_over
+
+    def may_continue(self) -> bool:
+        """Report the last step again; True if the work may continue."""
+        return self.step(self._done, self._total, self._parts)
+
+    def note_stop(self) -> None:
+        """Record that a step was interrupted."""
+        if self.stopped_by is None:
+            self._stop_by("timeout")
+
+    @contextmanager
+    def shielded(self) -> Iterator[None]:
+        """Run work that must be completed even after a stop: nothing raises `Stopped` inside."""
+        self.stop.shield(True)
+        try:
+            yield
+        finally:
+            self.stop.shield(False)
+
+    @contextmanager
+    def hurried(self, seconds: float) -> Iterator[None]:
+        """After a stop, give what is inside some seconds before it is interrupted again."""
+        self.stop.arm(seconds)
+        try:
+            yield
+        finally:
+            self.stop.trip()
+
+    def begin_finishing(self) -> None:
+        """Declare the parts found: from here on a stop cannot make the result incomplete.
+
+        Finishing has some extra time after a stop or the timeout (see `GRACE`); then `if_in_time` takes its fallback.
+        """
+        self._is_finishing = True
+        self._finish_by = self._timeout * (1 + GRACE_SHARE) + GRACE
+        if self.stopped_by == "cancel":
+            self._finish_by = min(self._finish_by, self._stopped_at + GRACE / 2)
+        self.stop.arm(max(self._finish_by - self.elapsed, LEAST_GRACE))
+
+    def if_in_time(self, work: Callable[[], _T], otherwise: Callable[[], _T]) -> _T:
+        """Do some work; if there is no time left for it, do something quick instead, without interruption."""
+        try:
+            return work()
+        except Stopped:
+            with self.shielded():
+                return otherwise()
+
+    def map(self, function: Callable[[_T], _R], items: Iterable[_T]) -> list[_R]:
+        """Apply `function` to every item; results come in the order of the items, whatever the number of threads.
+
+        When an exception leaves this, no thread works on any of them any more.
+        """
+        items = list(items)
+        if self._pool is None or self.threads == 1 or len(items) < 2:
+            return self._each(function, items)
+        size = max(1, len(items) // (BLOCKS * self.threads))
+        futures = [self._pool.submit(self._each, function, items[i : i + size]) for i in range(0, len(items), size)]
+        try:
+            self._watch(futures)
+            return [result for future in futures for result in future.result()]
+        except BaseException as error:
+            for future in futures:
+                future.cancel()
+            if not isinstance(error, (Exception, Stopped)):  # Ctrl-C does not wait
+                self.stop.trip()
+            wait(futures)
+            raise
+
+    def share(self, count: int) -> int:
+        """Threads for each of `count` items that are worked on at the same time."""
+        return max(1, self.threads // max(1, count))
+
+    @staticmethod
+    def _each(function: Callable[[_T], _R], items: list[_T]) -> list[_R]:
+        results = []
+        for item in items:
+            poll_stop()
+            results.append(function(item))
+        return results
+
+    @staticmethod
+    def _watch(futures: list[Future[list[_R]]]) -> None:
+        """Wait until all are done or one has failed; only this thread can look whether they have to stop."""
+        waiting: set[Future[list[_R]]] = set(futures)
+        while waiting:
+            done, waiting = wait(waiting, BETWEEN_POLLS, "FIRST_EXCEPTION")
+            if any(future.exception() is not None for future in done):
+                return
+            poll_stop()
+
+    def _ask_caller(self) -> None:
+        """Report the last step, and note if the caller or the clock wants an end."""
+        if self.stopped_by is not None:
+            return
+        answer = None
+        if self._progress is not None:
+            answer = self._progress(Progress(self._stage, self._done, self._total, self._parts, self.elapsed))
+        cancelled = answer is not None and not answer
+        if self._is_finishing:
+            if cancelled:
+                self._hurry()
+        elif self.elapsed > self._timeout or self.stop.is_tripped:
+            self._stop_by("timeout")
+        elif cancelled:
+            self._stop_by("cancel")
+
+    def _hurry(self) -> None:
+        if self.elapsed + GRACE < self._finish_by:
+            self._finish_by = self.elapsed + GRACE
+            self.stop.arm(GRACE)
+
+    def _stop_by(self, reason: StoppedBy) -> None:
+        self.stopped_by, self.stopped_in, self._stopped_at = reason, self._stage, self.elapsed
+        self.stop.trip()
+
+    def _look(self) -> None:
+        self.may_continue()
+
+
+def available_cpus() -> int:
+    """Count the processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@cache
+def _start_booleans(threads: int) -> None:
+    """Let manifold3d have no more threads of its own than we may use: idle ones spin, for a seventh of the CPU time.
+
+    It counts the processors of the process when it is first used, and never again: only the first call matters, and
+    only where a process can be given fewer of them.
+    """
+    if not hasattr(os, "sched_setaffinity"):
+        return
+    process = os.getpid()
+    with contextlib.suppress(OSError):  # not allowed to: then it has as many as it likes
+        allowed = os.sched_getaffinity(process)
+        if threads < len(allowed):
+            os.sched_setaffinity(process, set(sorted(allowed)[:threads]))
+        try:
+            Manifold.tetrahedron()
+        finally:
+            os.sched_setaffinity(process, allowed)
