@@ -16,11 +16,13 @@ from rlacd.clock import Clock
 from rlacd.criteria import Concavity
 from rlacd.criteria.navigable import Navigable, NavigableSpace
 from rlacd.criteria.screen import Feasibility
-from rlacd.merge import merge_parts, merge_to_count
+from rlacd.merge import merge_parts
+from rlacd.merge.merge import united_in_turn
 from rlacd.solid.balls import Balls
 from rlacd.solid.component import ClippedPart, Component, Part, Plane
 from rlacd.solid.hull import Hull
 from rlacd.solid.reunite import reunite
+from rlacd.work import Work
 from rlacd.workers import Workers
 from tests.shapes import strangers
 
@@ -105,7 +107,7 @@ def test_what_is_united_with_a_share_is_a_share(workers: Workers) -> None:
     """Gluing would count what two of them have in common twice."""
     root, parts = arms_and_beam(CROSS)
     merged = merge_parts(parts, TIGHT, workers, Clock(), solid=root)
-    (whole,) = merge_to_count(merged, 1, TIGHT, workers, Clock()) or []
+    *_, ((whole,), _) = united_in_turn(merged, Part.glued, TIGHT, Work(), workers, Clock())
     assert isinstance(whole, ClippedPart)
     assert whole.volume == pytest.approx(CROSS.volume())
     united = reunite(strangers(whole.members))

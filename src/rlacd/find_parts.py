@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from functools import partial
+from dataclasses import dataclass
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from rlacd.clock import Clock
 from rlacd.criteria import AddedVolume, Concavity, Criterion, NavigableSpace
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
-from rlacd.merge import merge_lifted, merge_to_count, with_limits
+from rlacd.merge import LimitedCriterion, best_within, drop_slivers, merge_lifted, with_limits
 from rlacd.options import VOLUME, Options
 from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
@@ -26,21 +27,16 @@ from rlacd.proxy import FEW, Lift, Proxy, simplify
 from rlacd.repair.repair import repair
 from rlacd.repair.tangles import TangledError, refuse_tangles
 from rlacd.report import HONEST_WITHIN
-from rlacd.search import SearchContext, eliminate_parts, level, search
+from rlacd.search import LEVELS, SearchContext, eliminate_parts, level, search
 from rlacd.search.levels import SearchSummary
 from rlacd.solid.component import Component, Part
 from rlacd.solid.cover import cover
 from rlacd.solid.distance import hull_union
+from rlacd.solid.hull import Hull
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import Shape, Solid
 from rlacd.solid.topology import IntArray
 from rlacd.workers import Workers
-
-COARSER = 1.5
-"""With `max_hulls`, thresholds that grow by this factor are tried, and the best decomposition is kept."""
-
-MOST_COARSER = 8e6
-"""Units of work after which no coarser pass is tried any more, if the hulls are few enough: those of a tangle only."""
 
 FEW_TO_DOUBT = 2000
 """Solids of at most this many triangles are sampled at as many points after a stop: do the hulls cover them?"""
@@ -115,14 +111,14 @@ def _repaired_and_cut(
         solid, parts = cover(source, clock)
         options = options.at_scale(solid.frame.scale)
         return Reached(solid, options, _unprepared(options, solid), parts)
-    if options.max_hulls is None:  # otherwise the threshold may be exceeded anyway
-        goal = with_limits(goal, options.max_vertices, options.max_faces)
+    goal = with_limits(goal, options.max_vertices, options.max_faces)
+    if options.max_hulls == 1:
+        pieces = drop_slivers(root.pieces(), workers)
+        return Reached(solid, options, goal, pieces if len(pieces) == 1 else [root], None, root)
     doubt = None if tangled is not None else partial(refuse_tangles, solid, workers.threads)
     proxy = _proxy(root, solid.pieces, goal, options, workers, clock)
     solid.pieces.clear()
-    if proxy is not None:
-        return _through_proxy(solid, root, proxy, goal, options, workers, clock, doubt)
-    parts, goal, found = _cut_and_searched(root, goal, options, workers, clock, doubt)
+    parts, goal, found = _Pipeline(root, proxy, goal, options, workers, clock, doubt).run()
     if _lost_in_cuts(solid, parts, workers, clock):
         solid, parts = cover(source, clock)
         return Reached(solid, options, _unprepared(options, solid), parts)
@@ -154,59 +150,111 @@ def _proxy(
         return None
 
 
-def _through_proxy(
-    solid: Solid,
-    root: Component,
-    proxy: Proxy,
-    goal: Criterion,
-    options: Options,
-    workers: Workers,
-    clock: Clock,
-    doubt: Callable[[bool], None] | None,
-) -> Reached:
-    """Decompose a proxy under a tighter criterion, and carry the parts to the solid."""
-    share = proxy.deviation / options.threshold
-    on_proxy = goal.scaled(1 - MARGIN * share)
-    parts, _, found = _cut_and_searched(proxy.component, on_proxy, options, workers, clock, doubt)
-    policy = make_policy(options.policy, SweepCache(), _scale(goal))
-    with clock.stage("lift"):
-        lift = Lift(root, proxy.deviation, goal, on_proxy, policy, workers, clock)
-        parts = lift(parts, mend=options.max_hulls is None and clock.stopped_by is None)
-        if options.merge and clock.stopped_by is None:  # the margin may have kept some apart
-            rehearsal = goal.scaled(1 + MARGIN * share)
-            parts = merge_lifted(parts, proxy.component, rehearsal, lift.confirmed, workers, clock)
-    return Reached(solid, options, goal, parts, found, root)
+@dataclass
+class _Pipeline:
+    """Cuts, merges and searches a solid, or a proxy of it; under coarser and coarser goals, on the same tree of cuts.
 
+    Attributes
+    ----------
+    root : Component
+        The solid.
+    proxy : Proxy, optional
+    goal : Criterion
+        What parts of the solid have to meet.
+    options : Options
+    workers : Workers
+    clock : Clock
+    doubt : callable, optional
+        See `CutTree`.
+    """
 
-def _cut_and_searched(
-    root: Component,
-    goal: Criterion,
-    options: Options,
-    workers: Workers,
-    clock: Clock,
-    doubt: Callable[[bool], None] | None,
-) -> tuple[list[Part], Criterion, SearchSummary | None]:
-    """The parts of a solid, the criterion as settled on them, and a summary of the search."""
-    sweeps = SweepCache()
-    second = Greedy("hull-sum", sweeps=sweeps) if options.policy == "greedy" else None
-    tree = CutTree(root, make_policy(options.policy, sweeps, _scale(goal)), workers, doubt=doubt, second=second)
-    parts, goal = _parts(tree, goal, options, workers, clock)
-    policy = options.policy if isinstance(options.policy, str) else ""
-    may_be_divided = options.merge and goal.obstacles is not None and policy not in AS_PUBLISHED
-    context = SearchContext(root, goal, workers, options.seed, sweeps)
-    found = None
-    try:
-        if may_be_divided and clock.stopped_by is None:
-            with clock.stage("search"):
-                parts = eliminate_parts(context, parts, clock)
-        assert options.quality is not None
-        if options.quality != "fast" and clock.stopped_by is None:
-            bounds = level(options.quality, options.budget, options.search_steps)
-            with clock.stage("search"):
-                parts, found = search(context, parts, bounds, clock, most_parts=options.max_hulls, first=policy)
-    except Stopped:
-        clock.note_stop()
-    return parts, goal, found
+    root: Component
+    proxy: Proxy | None
+    goal: Criterion
+    options: Options
+    workers: Workers
+    clock: Clock
+    doubt: Callable[[bool], None] | None
+
+    @cached_property
+    def _sweeps(self) -> SweepCache:
+        return SweepCache()
+
+    @cached_property
+    def _tree(self) -> CutTree:
+        second = Greedy("hull-sum", sweeps=self._sweeps) if self.options.policy == "greedy" else None
+        body, goal = (self.root, self.goal) if self.proxy is None else (self.proxy.component, self._on_proxy(1.0))
+        policy = make_policy(self.options.policy, self._sweeps, _scale(goal))
+        return CutTree(body, policy, self.workers, doubt=self.doubt, second=second)
+
+    def run(self) -> tuple[list[Part], Criterion, SearchSummary | None]:
+        """The parts, the criterion as settled on them, and a summary of the search."""
+        parts, goal, found = self._parts(1.0)
+        most = self.options.max_hulls
+        with self.clock.shielded():
+            if most is None or len(parts) <= most or len(drop_slivers(parts, self.workers)) <= most:
+                return parts, goal, found
+        self.goal = goal
+        measured = LimitedCriterion(goal, self.options.max_vertices, self.options.max_faces)
+
+        def coarser(factor: float) -> list[Part]:
+            return self._parts(factor)[0]
+
+        def unite(first: Part, second: Part) -> Part:
+            if self.proxy is None:
+                return Part.glued(first, second)
+            return self.root.inside(Hull.around(first.hull, second.hull))
+
+        parts = best_within(parts, most, self.root, coarser, unite, measured, self.workers, self.clock)
+        return parts, goal, found
+
+    def _parts(self, factor: float) -> tuple[list[Part], Criterion, SearchSummary | None]:
+        """The same under a threshold larger by a factor, whatever was done before."""
+        with self.clock.allowance(math.inf):
+            if self.proxy is None:
+                return self._cut_and_searched(self.goal.scaled(factor), factor)
+            parts, _, found = self._cut_and_searched(self._on_proxy(factor), factor)
+            return self._lifted(parts, factor), self.goal, found
+
+    def _on_proxy(self, factor: float, sign: int = -1) -> Criterion:
+        """The goal, tighter by a margin, or looser."""
+        assert self.proxy is not None
+        return self.goal.scaled(factor + sign * MARGIN * self.proxy.deviation / self.options.threshold)
+
+    def _lifted(self, parts: list[Part], factor: float) -> list[Part]:
+        """Carry parts of the proxy to the solid."""
+        assert self.proxy is not None
+        goal, clock = self.goal.scaled(factor), self.clock
+        policy = make_policy(self.options.policy, SweepCache(), _scale(self.goal))
+        with clock.stage("lift"):
+            lift = Lift(self.root, self.proxy.deviation, goal, self._on_proxy(factor), policy, self.workers, clock)
+            parts = lift(parts, mend=clock.stopped_by is None)
+            if self.options.merge and clock.stopped_by is None:  # the margin may have kept some apart
+                rehearsal = self._on_proxy(factor, 1)
+                parts = merge_lifted(parts, self.proxy.component, rehearsal, lift.confirmed, self.workers, clock)
+        return parts
+
+    def _cut_and_searched(self, goal: Criterion, factor: float) -> tuple[list[Part], Criterion, SearchSummary | None]:
+        options, workers, clock = self.options, self.workers, self.clock
+        done = cut_and_merge(self._tree, goal, workers, clock, merge=options.merge)
+        parts, goal = done.parts, done.criterion
+        policy = options.policy if isinstance(options.policy, str) else ""
+        may_be_divided = options.merge and goal.obstacles is not None and policy not in AS_PUBLISHED
+        context = SearchContext(self._tree.root, goal, workers, options.seed, self._sweeps)
+        found = None
+        try:
+            if may_be_divided and clock.stopped_by is None:
+                with clock.stage("search"):
+                    parts = eliminate_parts(context, parts, clock)
+            assert options.quality is not None
+            if options.quality != "fast" and clock.stopped_by is None:
+                bounds = level(options.quality, options.budget, options.search_steps)
+                with clock.stage("search"):
+                    bounds = bounds if factor == 1 else LEVELS["balanced"]
+                    parts, found = search(context, parts, bounds, clock, first=policy)
+        except Stopped:
+            clock.note_stop()
+        return parts, goal, found
 
 
 def _scale(criterion: Criterion) -> float | None:
@@ -229,39 +277,3 @@ def _unprepared(options: Options, solid: Solid) -> Criterion:
     if options.criterion == VOLUME:
         return AddedVolume(options.volume_tolerance, None, 0.0)
     return Concavity(options.threshold)
-
-
-def _parts(
-    tree: CutTree, criterion: Criterion, options: Options, workers: Workers, clock: Clock
-) -> tuple[list[Part], Criterion]:
-    """The parts, and the criterion as settled on them."""
-    if options.max_hulls == 1:
-        return [tree.root], criterion.settled([tree.root])
-    parts, criterion = _one_pass(tree, criterion, options, workers, clock)
-    if options.max_hulls is None or len(parts) <= options.max_hulls:
-        return parts, criterion
-    best: list[Part] = []
-    least = np.inf
-    coarser, begin = criterion, clock.work.done
-    while True:
-        with clock.stage("merge"):
-            few = merge_to_count(parts, options.max_hulls, criterion, workers, clock, worst=least)
-            try:
-                error = max(workers.map(criterion.error, few)) if few else np.inf
-            except Stopped:
-                clock.note_stop()
-                error = np.inf
-        if few and (not best or (len(few) <= options.max_hulls and error < least)):
-            best, least = few, error
-        enough = len(best) <= options.max_hulls and clock.work.done - begin > MOST_COARSER
-        if len(parts) <= options.max_hulls or clock.stopped_by is not None or enough:
-            return best, criterion
-        coarser = coarser.scaled(COARSER)
-        parts, _ = _one_pass(tree, coarser, options, workers, clock)
-
-
-def _one_pass(
-    tree: CutTree, criterion: Criterion, options: Options, workers: Workers, clock: Clock
-) -> tuple[list[Part], Criterion]:
-    done = cut_and_merge(tree, criterion, workers, clock, merge=options.merge)
-    return done.parts, done.criterion

@@ -15,7 +15,6 @@ from rlacd.merge import drop_slivers
 from rlacd.search.budget import SearchBudget
 from rlacd.search.context import Ranking, SearchContext
 from rlacd.search.neighbourhood import Neighbourhood, SearchOutcome, cost
-from rlacd.search.tighten import tighten
 from rlacd.solid.component import Part
 from rlacd.work import Work
 
@@ -133,8 +132,6 @@ def search(
     parts: Sequence[Part],
     level: Level,
     clock: Clock,
-    *,
-    most_parts: int | None = None,
     first: str = "",
 ) -> tuple[list[Part], SearchSummary]:
     """Search for fewer parts, or for equally many with a smaller total hull volume.
@@ -148,9 +145,6 @@ def search(
         Limits of the search.
     clock : Clock
         Its work so far is taken as the work of the first pass.
-    most_parts : int, optional
-        Limit on the number of parts. If there are no more parts than this and some do not meet the criterion, search
-        for parts that come closer to meeting it instead.
     first : str
         The policy of the first pass, which is not repeated.
 
@@ -166,38 +160,29 @@ def search(
     # Slivers would be dropped at the end anyway; if they counted here, a level could end with more hulls than the one
     # below it.
     parts = drop_slivers(parts, context.workers)
-    at_a_limit = most_parts is not None and not all(context.workers.map(context.criterion.is_met, parts))
     first_pass = clock.work.done
-    bounded = level.bounded and not (at_a_limit and level.seconds is not None)
     allowed = TIMES_STEPPED * first_pass + MOST_WORK + WORK_OF_A_STEP * steps if level.seconds is None else math.inf
-    if bounded:
+    if level.bounded:
         allowed = min(max(TIMES_FIRST_PASS * first_pass, LEAST_WORK), MOST_WORK)
-    budget = SearchBudget(clock, level.seconds, len(parts), patient=bounded, work=Work(allowed))
-    if most_parts is not None and at_a_limit:
-        if len(parts) <= most_parts:
-            outcome = tighten(context, parts, most_parts, budget, steps)
-        else:  # merging could not reach the limit
-            outcome = SearchOutcome(parts, 0, 0, True)
-        from_portfolio = len(parts)
+    budget = SearchBudget(clock, level.seconds, len(parts), patient=level.bounded, work=Work(allowed))
+    # greedy has already used the first score
+    others = context.rankings[1:] if first == "greedy" else context.rankings
+    opening = others if not level.bounded else others[:1] if len(parts) <= FEW else []
+    a_pass = _seconds_of_a_pass(clock)
+    pieces = HOPELESS * len(parts)
+    starts = _portfolio(context, parts, opening, budget, a_pass, pieces, ANOTHER_PASS * first_pass)
+    from_portfolio = len(starts[0])
+    if level.bounded:
+        state = Neighbourhood(context, starts[0], BOUNDED_PATIENCE)
+        outcome = state.run(budget, steps)
     else:
-        # greedy has already used the first score
-        others = context.rankings[1:] if first == "greedy" else context.rankings
-        opening = others if not bounded else others[:1] if len(parts) <= FEW else []
-        a_pass = _seconds_of_a_pass(clock)
-        pieces = HOPELESS * len(parts)
-        starts = _portfolio(context, parts, opening, budget, a_pass, pieces, ANOTHER_PASS * first_pass)
-        from_portfolio = len(starts[0])
-        if bounded:
-            state = Neighbourhood(context, starts[0], BOUNDED_PATIENCE)
-            outcome = state.run(budget, steps)
-        else:
-            outcome = _from_all(context, starts, budget, steps)
-        if bounded and level.seconds is not None:
-            budget.hurry()
-            pieces = HOPELESS * len(outcome.parts)
-            starts = _portfolio(context, outcome.parts, others[len(opening) :], budget, a_pass, pieces)
-            further = replace(context, seed=context.seed + FURTHER)
-            outcome = outcome.then(_from_all(further, starts, budget, steps))
+        outcome = _from_all(context, starts, budget, steps)
+    if level.bounded and level.seconds is not None:
+        budget.hurry()
+        pieces = HOPELESS * len(outcome.parts)
+        starts = _portfolio(context, outcome.parts, others[len(opening) :], budget, a_pass, pieces)
+        further = replace(context, seed=context.seed + FURTHER)
+        outcome = outcome.then(_from_all(further, starts, budget, steps))
     summary = SearchSummary(
         level=level.name,
         seconds=time.perf_counter() - start,

@@ -117,35 +117,31 @@ class Neighbourhood:
         """The parts so far."""
         return list(self._graph.parts.values())
 
-    def run(self, budget: SearchBudget, most: float = math.inf, enough: int = 1) -> SearchOutcome:
-        """Search until nothing is left to try, the budget is used up, `most` steps are made or `enough` parts are left.
+    def run(self, budget: SearchBudget, most: float = math.inf) -> SearchOutcome:
+        """Search until nothing is left to try, the budget is used up, `most` steps are made or one part is left.
 
         It opens with a few steps followed by an attempt to eliminate every part. Eliminations do not count as steps.
         """
         exhausted = len(self._graph.parts) == 1
         try:
             if most > 0:
-                self.redistribute_all(budget, enough, SMALL)
+                self.redistribute_all(budget, SMALL)
                 with budget.share(OPENING_SHARE):
-                    self._walk(budget, min(most, OPENING), enough)
-                self.redistribute_all(budget, enough)
+                    self._walk(budget, min(most, OPENING))
+                self.redistribute_all(budget)
             exhausted = len(self._graph.parts) == 1
-            while not exhausted and self._steps < most and len(self._graph.parts) > enough and not budget.is_over:
-                exhausted = self._walk(budget, min(most, self._steps + STEPS_PER_PART * len(self._graph.parts)), enough)
-                self.redistribute_all(budget, enough)
+            while not exhausted and self._steps < most and len(self._graph.parts) > 1 and not budget.is_over:
+                exhausted = self._walk(budget, min(most, self._steps + STEPS_PER_PART * len(self._graph.parts)))
+                self.redistribute_all(budget)
         except Stopped:  # raised between two exchanges: the best state so far is kept
             budget.note_stop()
         return SearchOutcome(self._best, self._steps, self._accepted, exhausted)
 
-    def _walk(self, budget: SearchBudget, most: float, enough: int) -> bool:
+    def _walk(self, budget: SearchBudget, most: float) -> bool:
         """Make random trials until `most` steps are made in total; whether the search is exhausted."""
         graph = self._graph
         while self._dry < DRY and not self._gave_up and len(graph.parts) > 1:
-            if (
-                not budget.step(self._steps, None, len(graph.parts))
-                or self._steps >= most
-                or len(graph.parts) <= enough
-            ):
+            if not budget.step(self._steps, None, len(graph.parts)) or self._steps >= most:
                 return False
             batch = self._affordable(list(self._operators.draw(graph, self._random, self._near)), budget)
             self._dry = 0 if batch else self._dry + 1
@@ -160,16 +156,13 @@ class Neighbourhood:
     def _gave_up(self) -> bool:
         return self._without_gain >= max(self._patience * len(self._graph.parts), LEAST_TRIALS)
 
-    def redistribute_all(self, budget: SearchBudget, enough: int = 1, share: float = 1.0) -> None:
-        """Try to eliminate each part, or the smallest share of them, smallest first, until `enough` parts are left."""
+    def redistribute_all(self, budget: SearchBudget, share: float = 1.0) -> None:
+        """Try to eliminate each part, or the smallest share of them, smallest first."""
         graph = self._graph
         waiting = sorted(graph.parts, key=lambda i: (graph.parts[i].hull.volume, i))
         waiting = waiting[: math.ceil(share * len(waiting))]
         while (
-            waiting
-            and not self._gave_up
-            and len(graph.parts) > enough
-            and budget.step(self._steps, None, len(graph.parts))
+            waiting and not self._gave_up and len(graph.parts) > 1 and budget.step(self._steps, None, len(graph.parts))
         ):
             batch, waiting = waiting[:BATCH], waiting[BATCH:]
             trials = [
