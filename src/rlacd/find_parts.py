@@ -268,7 +268,7 @@ def _prepared(options: Options, solid: Solid, workers: Workers, clock: Clock) ->
             return options.criterion.prepare(solid, workers.threads)
     if options.criterion == VOLUME:
         return AddedVolume.of(options.volume_tolerance, options.volume_of, solid)
-    return Concavity(options.threshold)
+    return Concavity(options.threshold, _unit(options, solid))
 
 
 def _unprepared(options: Options, solid: Solid) -> Criterion:
@@ -276,4 +276,9 @@ def _unprepared(options: Options, solid: Solid) -> Criterion:
         return options.criterion.unprepared(solid.frame.scale)
     if options.criterion == VOLUME:
         return AddedVolume(options.volume_tolerance, None, 0.0)
-    return Concavity(options.threshold)
+    return Concavity(options.threshold, _unit(options, solid))
+
+
+def _unit(options: Options, solid: Solid) -> float:
+    """Length of the unit in which the threshold was given."""
+    return 1.0 if options.threshold_abs is None else solid.frame.scale
