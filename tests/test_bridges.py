@@ -15,8 +15,9 @@ from rlacd import _native
 from rlacd.criteria import Concavity
 from rlacd.criteria.navigable import Navigable, NavigableSpace
 from rlacd.criteria.screen import Feasibility
-from rlacd.merge import merge_parts, merge_to_count
-from rlacd.run import Run
+from rlacd.merge import merge_parts
+from rlacd.merge.merge import united_in_turn
+from rlacd.run import Run, Work
 from rlacd.solid.balls import Balls
 from rlacd.solid.component import ClippedPart, Component, Part, Plane
 from rlacd.solid.hull import Hull
@@ -104,7 +105,7 @@ def test_what_is_united_with_a_share_is_a_share(run: Run) -> None:
     """Gluing would count what two of them have in common twice."""
     root, parts = arms_and_beam(CROSS)
     merged = merge_parts(parts, TIGHT, run, solid=root)
-    (whole,) = merge_to_count(merged, 1, TIGHT, run) or []
+    *_, ((whole,), _) = united_in_turn(merged, Part.glued, TIGHT, Work(), run)
     assert isinstance(whole, ClippedPart)
     assert whole.volume == pytest.approx(CROSS.volume())
     united = reunite(strangers(whole.members))

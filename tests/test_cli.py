@@ -22,6 +22,7 @@ from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError, OptionError, OutputError
 from rlacd.run import Progress, ProgressCallback
+from rlacd.told_apart import told_apart
 from tests.hulls import hull_of
 
 ELL = [(2.0, 0.4, 0.4), (0.4, 0.4, 2.0)]
@@ -61,7 +62,7 @@ class StandIn:
             if not complete:
                 break
             self.during()
-        source = trimesh.load(mesh)
+        source = trimesh.load(mesh, force="mesh")
         report = {
             "name": mesh.stem,
             "complete": complete,
@@ -91,9 +92,35 @@ def test_hulls_go_beside_the_input_by_default_and_stdout_stays_empty(mesh: Path,
     run = rlacd("decompose", mesh)
     assert (run.exit_code, run.stdout) == (0, "")
     assert len(trimesh.load_scene(mesh.with_name("ell_hulls.glb")).geometry) == 1
-    for words in ("ell_hulls.glb", "1 hull,", "max concavity 0.0100 (threshold 0.05)", "0.30 s", "one body was open"):
+    for words in ("ell_hulls.glb", "1 hull,", "max concavity 0.01 (threshold 0.05)", "0.30 s", "one body was open"):
         assert words in run.stderr
     assert stand_in.calls == [{}], "defaults belong to rlacd.decompose"
+
+
+@pytest.mark.parametrize(
+    ("typed", "said"),
+    [
+        ("5mm", "max concavity 4.98 (threshold 5); hulls extend up to 20 beyond the input and cover it (in mm)"),
+        ("2.5%", "max concavity 2.49 (threshold 2.5); hulls extend up to 10 beyond the input and cover it (in %"),
+    ],
+)
+def test_lengths_are_said_in_the_unit_that_was_given(mesh: Path, stand_in: StandIn, typed: str, said: str) -> None:
+    stand_in.report = {"options": {"threshold": 0.05}, "concavity": {"max": 0.0498}, "scale": 10.0}
+    stand_in.report["hausdorff"] = {"over": 0.2, "under": 0.0}
+    glb = trimesh.load(mesh).export(mesh.with_suffix(".glb")) and mesh.with_suffix(".glb")
+    assert said in rlacd("decompose", glb, "--threshold", typed).stderr
+
+
+@pytest.mark.parametrize(
+    ("value", "limit", "words"),
+    [
+        (0.0110899, 0.0110901, ("0.01109", "0.01109")),
+        (0.0110902, 0.0110901, ("0.0110902", "0.0110901")),
+        (0.04, 0.05, ("0.04", "0.05")),
+    ],
+)
+def test_what_is_met_looks_met_and_what_is_not_does_not(value: float, limit: float, words: tuple[str, str]) -> None:
+    assert told_apart(value, limit) == words
 
 
 def test_quiet_says_nothing(mesh: Path, stand_in: StandIn) -> None:

@@ -141,26 +141,6 @@ def test_same_bytes_for_any_number_of_threads_and_any_run() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [1, 2, 3, 5, 40])
-def test_max_hulls(count: int) -> None:
-    free = rlacd.decompose(cup())
-    result = rlacd.decompose(cup(), max_hulls=count)
-    assert len(result) <= count
-    assert result.report["hausdorff"]["under"] < 0.005
-    if count < len(free):
-        assert result.report["concavity"]["max"] > 0.05
-        assert any("exceed" in warning for warning in result.report["warnings"])
-    else:
-        assert len(result) == len(free)
-
-
-@pytest.mark.slow
-def test_more_hulls_fit_better() -> None:
-    errors = [rlacd.decompose(cup(), max_hulls=n).report["concavity"]["max"] for n in (2, 4, 8)]
-    assert errors == sorted(errors, reverse=True)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("limit", [{"max_vertices": 24}, {"max_vertices": 32}, {"max_faces": 60}])
 def test_limits_hold_together_with_the_promises(limit: dict[str, int]) -> None:
     result = rlacd.decompose(SHAPES["torus"](), **limit)

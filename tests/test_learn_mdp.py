@@ -12,6 +12,8 @@ import pytest
 pytest.importorskip("torch", reason="needs the extra train")
 
 from rlacd.clock import Clock
+from rlacd.workers import Workers
+
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.errors import TrainingError
@@ -24,7 +26,6 @@ from rlacd.planes.sweep import sweep
 from rlacd.policies.observe import SCALE_INPUTS, observe, valid_planes
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component, Plane
-from rlacd.workers import Workers
 from tests.learning import GreedyOverMask, greedy_plane, small_solids, write_meshes
 
 CRITERION = Concavity(0.04)

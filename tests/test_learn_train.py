@@ -294,12 +294,13 @@ def test_the_exported_policy_computes_what_torch_does(meshes: Path, tmp_path: Pa
 def test_a_run_ends_with_a_policy_that_decomposes(meshes: Path, tmp_path: Path) -> None:
     path = run(meshes, tmp_path / "run", export=True)
     from rlacd.clock import Clock
+    from rlacd.workers import Workers
+
     from rlacd.criteria import Concavity
     from rlacd.cut import CutTree
     from rlacd.policies.q_network import OnnxQ
     from rlacd.policies.qpolicy import QPolicy
     from rlacd.solid.component import Component
-    from rlacd.workers import Workers
     from tests.learning import small_solids
 
     about = json.loads(path.with_suffix(".json").read_text())

@@ -8,7 +8,7 @@ from manifold3d import Manifold
 
 from rlacd.criteria import Concavity
 from rlacd.criteria.navigable import Navigable, NavigableSpace
-from rlacd.merge import boxes, merge_parts, merge_to_count
+from rlacd.merge import boxes, merge_parts
 from rlacd.merge.boxes import Boxes
 from rlacd.run import Run
 from rlacd.solid.balls import Balls
@@ -121,22 +121,6 @@ def test_what_a_ball_keeps_apart_is_not_asked_again() -> None:
         for a, b in zip(*results, strict=True):
             assert np.array_equal(a.hull.vertices, b.hull.vertices)
     assert asked[Counting] < 0.9 * asked[Forgetful]
-
-
-@pytest.mark.parametrize("count", [1, 2, 4])
-def test_merging_to_a_count(run, count: int) -> None:
-    boxes = [Component(Manifold.cube((1, 1, 1)).translate((3 * i, 0, 0))) for i in range(5)]
-    few = merge_to_count(boxes, count, Concavity(0.05), run)
-    assert few is not None
-    assert len(few) == count
-    assert sum(part.volume for part in few) == pytest.approx(5)
-
-
-def test_merging_to_a_count_gives_up_when_it_gets_too_bad(run) -> None:
-    boxes = [Component(Manifold.cube((1, 1, 1)).translate((3 * i, 0, 0))) for i in range(3)]
-    assert merge_to_count(boxes, 1, Concavity(0.05), run, worst=0.1) is None
-    with pytest.raises(ValueError, match="one part"):
-        merge_to_count(boxes, 0, Concavity(0.05), run)
 
 
 @pytest.mark.parametrize("at_once", [1, 7, boxes.AT_ONCE])

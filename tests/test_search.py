@@ -275,16 +275,6 @@ def test_levels_are_ordered(name: str, corpus: Path) -> None:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("count", [3, 8])
-def test_with_a_limit_on_hulls_the_error_falls(count: int, corpus: Path) -> None:
-    mesh = corpus / SHAPES[0]
-    fast = rlacd.decompose(mesh, max_hulls=count)
-    balanced = rlacd.decompose(mesh, max_hulls=count, quality="balanced")
-    assert len(balanced) <= count
-    assert balanced.report["concavity"]["max"] <= 1.02 * fast.report["concavity"]["max"]
-
-
-@pytest.mark.nightly
 def test_other_criteria_are_searched_too(corpus: Path) -> None:
     space = rlacd.NavigableSpace(0.025, 0.02)
     fast, best = (

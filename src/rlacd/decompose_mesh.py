@@ -101,12 +101,13 @@ def decompose(
     volume_of : "part" or "whole"
         Whether it is a share of each part's own volume, or of the whole solid's.
     max_hulls : int, optional
-        Maximum number of hulls: returns the decomposition with the least concavity among those found. It may exceed
-        the threshold; ``report["warnings"]`` then says by how much.
+        Maximum number of hulls. It has no effect if the decomposition has no more anyway; otherwise the one with the
+        least concavity among those found under coarser thresholds is returned, and ``report["warnings"]`` says by how
+        much it exceeds the threshold. A larger limit never leads to a larger concavity.
     max_vertices, max_faces : int, optional
         Limits on the vertices and triangles of each hull. A limited hull still contains its part, and the threshold
-        holds for it too, unless the limit is below 24 vertices or 44 triangles, or `max_hulls` is given: if the
-        threshold is then exceeded, a warning says by how much.
+        holds for it too, unless the limit is below 24 vertices or 44 triangles: if the threshold is then exceeded, a
+        warning says by how much.
     detail : "simple" or "full"
         ``simple``: hulls leave out corners that add little, so that they have few, as far as the part still meets the
         criterion. ``full``: the exact hulls of the parts.

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from functools import partial
+from dataclasses import dataclass
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from rlacd._native import Stopped
 from rlacd.criteria import AddedVolume, Concavity, Criterion, NavigableSpace
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
-from rlacd.merge import merge_lifted, merge_to_count, with_limits
+from rlacd.merge import LimitedCriterion, best_within, drop_slivers, merge_lifted, with_limits
 from rlacd.options import VOLUME, Options
 from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
@@ -30,15 +31,10 @@ from rlacd.search import SearchContext, SearchSummary, eliminate_parts, search
 from rlacd.solid.component import Component, Part
 from rlacd.solid.cover import cover
 from rlacd.solid.distance import hull_union
+from rlacd.solid.hull import Hull
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import Shape, Solid
 from rlacd.solid.topology import IntArray
-
-COARSER = 1.5
-"""With `max_hulls`, thresholds that grow by this factor are tried, and the best decomposition is kept."""
-
-MOST_COARSER = 8e6
-"""Units of work after which no coarser pass is tried any more, if the hulls are few enough: those of a tangle only."""
 
 FEW_TO_DOUBT = 2000
 """Solids of at most this many triangles are sampled at as many points after a stop: do the hulls cover them?"""
@@ -57,7 +53,7 @@ class Reached(NamedTuple):
     options : Options
         Those given, with lengths relative to the solid's size.
     goal : Criterion
-        What the parts meet, unless the run ended or `max_hulls` forbade it.
+        What the parts meet, unless a stop or `max_hulls` forbade it.
     parts : list of Part
     found : SearchSummary, optional
         What the search found, if there was one.
@@ -111,14 +107,14 @@ def _repaired_and_cut(source: InputMesh, options: Options, run: Run, tangled: In
         solid, parts = cover(source, run)
         options = options.at_scale(solid.frame.scale)
         return Reached(solid, options, _unprepared(options, solid), parts)
-    if options.max_hulls is None:  # otherwise the threshold may be exceeded anyway
-        goal = with_limits(goal, options.max_vertices, options.max_faces)
+    goal = with_limits(goal, options.max_vertices, options.max_faces)
+    if options.max_hulls == 1:
+        pieces = drop_slivers(root.pieces(), run)
+        return Reached(solid, options, goal, pieces if len(pieces) == 1 else [root], None, root)
     doubt = None if tangled is not None else partial(refuse_tangles, solid, run.threads)
     proxy = _proxy(root, solid.pieces, goal, options, run)
     solid.pieces.clear()
-    if proxy is not None:
-        return _through_proxy(solid, root, proxy, goal, options, run, doubt)
-    parts, goal, found = _cut_and_searched(root, goal, options, run, doubt)
+    parts, goal, found = _Pipeline(root, proxy, goal, options, run, doubt).at_most(options.max_hulls)
     if _lost_in_cuts(solid, parts, run):
         solid, parts = cover(source, run)
         return Reached(solid, options, _unprepared(options, solid), parts)
@@ -148,57 +144,107 @@ def _proxy(root: Component, pieces: Sequence[Shape], goal: Criterion, options: O
         return None
 
 
-def _through_proxy(
-    solid: Solid,
-    root: Component,
-    proxy: Proxy,
-    goal: Criterion,
-    options: Options,
-    run: Run,
-    doubt: Callable[[bool], None] | None,
-) -> Reached:
-    """Decompose a proxy under a tighter criterion, and carry the parts to the solid."""
-    share = proxy.deviation / options.threshold
-    on_proxy = goal.scaled(1 - MARGIN * share)
-    parts, _, found = _cut_and_searched(proxy.component, on_proxy, options, run, doubt)
-    policy = make_policy(options.policy, SweepCache(), _scale(goal))
-    with run.stage("lift"):
-        lift = Lift(root, proxy.deviation, goal, on_proxy, policy, run)
-        parts = lift(parts, mend=options.max_hulls is None and run.stopped_by is None)
-        if options.merge and run.stopped_by is None:  # the margin may have kept some apart
-            rehearsal = goal.scaled(1 + MARGIN * share)
-            parts = merge_lifted(parts, proxy.component, rehearsal, lift.confirmed, run)
-    return Reached(solid, options, goal, parts, found, root)
+@dataclass
+class _Pipeline:
+    """Cuts, merges and searches a solid, or a proxy of it; under coarser and coarser goals, on the same tree of cuts.
 
+    Attributes
+    ----------
+    root : Component
+        The solid.
+    proxy : Proxy, optional
+    goal : Criterion
+        What parts of the solid have to meet.
+    options : Options
+    run : Run
+    doubt : callable, optional
+        See `CutTree`.
+    """
 
-def _cut_and_searched(
-    root: Component,
-    goal: Criterion,
-    options: Options,
-    run: Run,
-    doubt: Callable[[bool], None] | None,
-) -> tuple[list[Part], Criterion, SearchSummary | None]:
-    """The parts of a solid, the criterion as settled on them, and a summary of the search."""
-    sweeps = SweepCache()
-    second = Greedy("hull-sum", sweeps=sweeps) if options.policy == "greedy" else None
-    tree = CutTree(root, make_policy(options.policy, sweeps, _scale(goal)), run, doubt=doubt, second=second)
-    parts, goal = _parts(tree, goal, options, run)
-    policy = options.policy if isinstance(options.policy, str) else ""
-    may_be_divided = options.merge and goal.obstacles is not None and policy not in AS_PUBLISHED
-    context = SearchContext(root, goal, options.seed, sweeps)
-    found = None
-    try:
-        if may_be_divided and run.stopped_by is None:
-            with run.stage("search"):
-                parts = eliminate_parts(context, parts, run)
-        assert options.quality is not None
-        if options.quality != "fast" and run.stopped_by is None:
-            with run.stage("search"):
-                bounds = options.quality, options.budget, options.search_steps
-                parts, found = search(context, parts, run, *bounds, options.max_hulls)
-    except Stopped:
-        run.note_stop()
-    return parts, goal, found
+    root: Component
+    proxy: Proxy | None
+    goal: Criterion
+    options: Options
+    run: Run
+    doubt: Callable[[bool], None] | None
+
+    @cached_property
+    def _sweeps(self) -> SweepCache:
+        return SweepCache()
+
+    @cached_property
+    def _tree(self) -> CutTree:
+        second = Greedy("hull-sum", sweeps=self._sweeps) if self.options.policy == "greedy" else None
+        body, goal = (self.root, self.goal) if self.proxy is None else (self.proxy.component, self._on_proxy(1.0))
+        policy = make_policy(self.options.policy, self._sweeps, _scale(goal))
+        return CutTree(body, policy, self.run, doubt=self.doubt, second=second)
+
+    def at_most(self, most: int | None) -> tuple[list[Part], Criterion, SearchSummary | None]:
+        """At most so many parts, the criterion as settled on them, and a summary of the search."""
+        parts, goal, found = self._parts(1.0)
+        with self.run.shielded():
+            if most is None or len(parts) <= most or len(drop_slivers(parts, self.run)) <= most:
+                return parts, goal, found
+        self.goal = goal
+        measured = LimitedCriterion(goal, self.options.max_vertices, self.options.max_faces)
+
+        def coarser(factor: float) -> list[Part]:
+            return self._parts(factor)[0]
+
+        def unite(first: Part, second: Part) -> Part:
+            if self.proxy is None:
+                return Part.glued(first, second)
+            return self.root.inside(Hull.around(first.hull, second.hull))
+
+        parts = best_within(parts, most, self.root, coarser, unite, measured, self.run)
+        return parts, goal, found
+
+    def _parts(self, factor: float) -> tuple[list[Part], Criterion, SearchSummary | None]:
+        """The same under a threshold larger by a factor, whatever was done before."""
+        with self.run.limited(math.inf):
+            if self.proxy is None:
+                return self._cut_and_searched(self.goal.scaled(factor), factor)
+            parts, _, found = self._cut_and_searched(self._on_proxy(factor), factor)
+            return self._lifted(parts, factor), self.goal, found
+
+    def _on_proxy(self, factor: float, sign: int = -1) -> Criterion:
+        """The goal, tighter by a margin, or looser."""
+        assert self.proxy is not None
+        return self.goal.scaled(factor + sign * MARGIN * self.proxy.deviation / self.options.threshold)
+
+    def _lifted(self, parts: list[Part], factor: float) -> list[Part]:
+        """Carry parts of the proxy to the solid."""
+        assert self.proxy is not None
+        goal, run = self.goal.scaled(factor), self.run
+        policy = make_policy(self.options.policy, SweepCache(), _scale(self.goal))
+        with run.stage("lift"):
+            lift = Lift(self.root, self.proxy.deviation, goal, self._on_proxy(factor), policy, self.run)
+            parts = lift(parts, mend=run.stopped_by is None)
+            if self.options.merge and run.stopped_by is None:  # the margin may have kept some apart
+                rehearsal = self._on_proxy(factor, 1)
+                parts = merge_lifted(parts, self.proxy.component, rehearsal, lift.confirmed, self.run)
+        return parts
+
+    def _cut_and_searched(self, goal: Criterion, factor: float) -> tuple[list[Part], Criterion, SearchSummary | None]:
+        options, run = self.options, self.run
+        done = cut_and_merge(self._tree, goal, run, merge=options.merge)
+        parts, goal = done.parts, done.criterion
+        policy = options.policy if isinstance(options.policy, str) else ""
+        may_be_divided = options.merge and goal.obstacles is not None and policy not in AS_PUBLISHED
+        context = SearchContext(self._tree.root, goal, options.seed, self._sweeps)
+        found = None
+        try:
+            if may_be_divided and run.stopped_by is None:
+                with run.stage("search"):
+                    parts = eliminate_parts(context, parts, run)
+            assert options.quality is not None
+            if options.quality != "fast" and run.stopped_by is None:
+                own = (options.quality, options.budget, options.search_steps) if factor == 1 else ("balanced",)
+                with run.stage("search"):
+                    parts, found = search(context, parts, run, *own)
+        except Stopped:
+            run.note_stop()
+        return parts, goal, found
 
 
 def _scale(criterion: Criterion) -> float | None:
@@ -212,7 +258,7 @@ def _prepared(options: Options, solid: Solid, run: Run) -> Criterion:
             return options.criterion.prepare(solid, run.threads)
     if options.criterion == VOLUME:
         return AddedVolume.of(options.volume_tolerance, options.volume_of, solid)
-    return Concavity(options.threshold)
+    return Concavity(options.threshold, _unit(options, solid))
 
 
 def _unprepared(options: Options, solid: Solid) -> Criterion:
@@ -220,36 +266,9 @@ def _unprepared(options: Options, solid: Solid) -> Criterion:
         return options.criterion.unprepared(solid.frame.scale)
     if options.criterion == VOLUME:
         return AddedVolume(options.volume_tolerance, None, 0.0)
-    return Concavity(options.threshold)
+    return Concavity(options.threshold, _unit(options, solid))
 
 
-def _parts(tree: CutTree, criterion: Criterion, options: Options, run: Run) -> tuple[list[Part], Criterion]:
-    """The parts, and the criterion as settled on them."""
-    if options.max_hulls == 1:
-        return [tree.root], criterion.settled([tree.root])
-    parts, criterion = _one_pass(tree, criterion, options, run)
-    if options.max_hulls is None or len(parts) <= options.max_hulls:
-        return parts, criterion
-    best: list[Part] = []
-    least = np.inf
-    coarser, begin = criterion, run.work.done
-    while True:
-        with run.stage("merge"):
-            few = merge_to_count(parts, options.max_hulls, criterion, run, worst=least)
-            try:
-                error = max(run.map(criterion.error, few)) if few else np.inf
-            except Stopped:
-                run.note_stop()
-                error = np.inf
-        if few and (not best or (len(few) <= options.max_hulls and error < least)):
-            best, least = few, error
-        enough = len(best) <= options.max_hulls and run.work.done - begin > MOST_COARSER
-        if len(parts) <= options.max_hulls or run.stopped_by is not None or enough:
-            return best, criterion
-        coarser = coarser.scaled(COARSER)
-        parts, _ = _one_pass(tree, coarser, options, run)
-
-
-def _one_pass(tree: CutTree, criterion: Criterion, options: Options, run: Run) -> tuple[list[Part], Criterion]:
-    done = cut_and_merge(tree, criterion, run, merge=options.merge)
-    return done.parts, done.criterion
+def _unit(options: Options, solid: Solid) -> float:
+    """Length of the unit in which the threshold was given."""
+    return 1.0 if options.threshold_abs is None else solid.frame.scale

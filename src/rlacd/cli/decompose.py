@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from rlacd.cli.exit_codes import ExitCode, exit_codes
-from rlacd.cli.options import decompose_options, how_parameters
+from rlacd.cli.options import decompose_options, how_parameters, unit_given
 from rlacd.cli.parameters import REQUIRED, Parameters, chosen, command, option_parameters, taken
 from rlacd.errors import ImplausibleBodyWarning, MeshFileError, OptionError
 from rlacd.output_options import OutputOptions
@@ -67,11 +67,11 @@ def _decompose(mesh: Path, asked: OutputOptions, how: dict[str, Any]) -> None:
         raise OptionError("--balls needs --criterion navigable.")
     options = decompose_options(how, metres=mesh.suffix.lower() in IN_METRES, warn=say)
     run = _rewrite if robot else _write
-    if not run(mesh, wanted, options):
+    if not run(mesh, wanted, options, unit_given(how)):
         raise typer.Exit(ExitCode.STOPPED_EARLY)
 
 
-def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any]) -> bool:
+def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any], unit: str | None) -> bool:
     """Decompose a mesh and write all requested files; returns whether it is complete."""
     from rlacd.cli.terminal import Watch, say, summary, writing
     from rlacd.decompose_mesh import decompose
@@ -89,7 +89,7 @@ def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any]) -> bool:
         warnings.simplefilter("always", ImplausibleBodyWarning)
         result.save(place, up=up, **written)
     if not quiet:
-        say(summary(result, place))
+        say(summary(result, place, unit))
     for doubt in doubts:
         say(f"  warning: {doubt.message}")
     if wanted.report == STDOUT:
@@ -109,7 +109,7 @@ def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any]) -> bool:
     return bool(result.report.get("complete", True))
 
 
-def _rewrite(robot: Path, wanted: OutputOptions, options: dict[str, Any]) -> bool:
+def _rewrite(robot: Path, wanted: OutputOptions, options: dict[str, Any], unit: str | None) -> bool:
     """Replace the collision meshes of a robot; returns whether all are complete."""
     from rlacd.cli.terminal import Watch, rewrite_summary, say, writing
     from rlacd.io.robots import rewrite_robot
@@ -120,7 +120,7 @@ def _rewrite(robot: Path, wanted: OutputOptions, options: dict[str, Any]) -> boo
         packages = wanted.package_dirs or ()
         done = rewrite_robot(robot, str(wanted.output), package_dirs=packages, **options, progress=watch)
     if not wanted.quiet:
-        say(rewrite_summary(done))
+        say(rewrite_summary(done, unit))
     measured = to_json({str(mesh.path): mesh.result.report for mesh in done.meshes})
     if wanted.report == STDOUT:
         typer.echo(measured, nl=False)

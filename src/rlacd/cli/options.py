@@ -17,7 +17,7 @@ from rlacd.space_options import NAVIGABLE, SpaceOptions
 _SPACE = tuple(field.name for field in dataclasses.fields(SpaceOptions))
 
 _LENGTH = re.compile(r"([-+.\deE]+)\s*(%|m|cm|mm)")
-_METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
 def how_parameters() -> Parameters:
@@ -114,7 +114,7 @@ def _lengths(given: dict[str, Any], metres: bool) -> dict[str, Any]:
                 f"--{name} is {word!r}; it has to be a number, a share such as 5%, or a length in metres."
             )
         unit = found[2] if found else None
-        if unit in _METRES:
+        if unit in METRES:
             if not metres:
                 raise OptionError(
                     f"--{name} is {word}, but the file does not say its unit; give --{name}-abs in the file's own unit."
@@ -122,10 +122,16 @@ def _lengths(given: dict[str, Any], metres: bool) -> dict[str, Any]:
             if f"{name}_abs" in taken:
                 raise OptionError(f"--{name} and --{name}-abs are both lengths; give one of the two.")
             del taken[name]
-            taken[f"{name}_abs"] = value * _METRES[unit]
+            taken[f"{name}_abs"] = value * METRES[unit]
         else:
             taken[name] = value / 100 * of_longest if unit == "%" else value
     return taken
+
+
+def unit_given(how: dict[str, Any]) -> str | None:
+    """The unit in which the threshold was given; None if in the frame or the input's own."""
+    found = _LENGTH.fullmatch(str(how.get("threshold") or "").strip())
+    return found[2] if found else None
 
 
 def _number(word: str) -> float | None:

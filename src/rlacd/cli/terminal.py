@@ -15,8 +15,10 @@ from rich.console import Console
 from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bars
 
+from rlacd.cli.options import METRES
 from rlacd.decomposition import Decomposition
 from rlacd.run import Progress
+from rlacd.told_apart import told_apart
 
 if TYPE_CHECKING:
     from rlacd.io.robots import Rewritten
@@ -88,22 +90,24 @@ def writing(what: str, path: str, *, quiet: bool) -> Iterator[None]:
         say(f"  {what}: {path}")
 
 
-def summary(result: Decomposition, written: str) -> str:
+def summary(result: Decomposition, written: str, unit: str | None = None) -> str:
     """Summarise the result in a few lines: its size, its quality, and any warnings."""
     report = result.report
     triangles = sum(len(hull.faces) for hull in result)
     lines = [f"{written}: {_count(len(result))}, {triangles} triangles{_time(report)}"]
-    lines += [f"  {fit}" for fit in [_fit(report)] if fit]
+    lines += [f"  {fit}" for fit in [_fit(report, unit)] if fit]
     lines += [f"  of them {kinds}" for kinds in [_primitives(result)] if kinds]
     lines += [f"  warning: {warning}" for warning in report.get("warnings", [])]
     return "\n".join(lines)
 
 
-def rewrite_summary(done: Rewritten) -> str:
+def rewrite_summary(done: Rewritten, unit: str | None = None) -> str:
     """Summarise the result for a robot: its meshes, each with its number of hulls."""
     total = sum(len(mesh.files) for mesh in done.meshes)
     lines = [f"{done.path}: {counted(len(done.meshes), 'mesh', 'meshes')}, {_count(total)} in {done.folder}"]
-    lines += [f"  {mesh.path.name}: {_count(len(mesh.files))}; {_fit(mesh.result.report)}" for mesh in done.meshes]
+    lines += [
+        f"  {mesh.path.name}: {_count(len(mesh.files))}; {_fit(mesh.result.report, unit)}" for mesh in done.meshes
+    ]
     lines += [f"  warning: {warning}" for warning in done.warnings]
     return "\n".join(lines)
 
@@ -135,16 +139,19 @@ def _time(report: dict[str, Any]) -> str:
     return ("" if total is None else f", {total:.2f} s") + reason
 
 
-def _fit(report: dict[str, Any]) -> str:
+def _fit(report: dict[str, Any], unit: str | None = None) -> str:
+    """How well the hulls fit; lengths in `unit`, in the input's if the threshold was given in that, or in the frame."""
     words = []
+    scale, in_words = _unit(report, unit)
     worst = report.get("concavity", {}).get("max")
     if worst is not None:
-        threshold = report.get("options", {}).get("threshold")
-        verdict = "" if threshold is None else f" (threshold {threshold:.4g}{', exceeded' * (worst > threshold)})"
-        words.append(f"max concavity {worst:.4f}{verdict}")
+        threshold = report.get("options", {}).get("threshold", worst)
+        measured, limit = told_apart(worst / scale, threshold / scale)
+        words.append(f"max concavity {measured} (threshold {limit}{', exceeded' * (worst > threshold)})")
     added = report.get("volume")
     if added is not None and added["max"] is not None:
-        words.append(f"hulls add up to {100 * added['max']:.2f} % of volume (tolerance {100 * added['tolerance']:g} %)")
+        most, tolerance = told_apart(100 * added["max"], 100 * added["tolerance"])
+        words.append(f"hulls add up to {most} % of volume (tolerance {tolerance} %)")
     space = report.get("navigable")
     if space is not None:
         intruding = space["intrusion"]["max"]
@@ -153,11 +160,22 @@ def _fit(report: dict[str, Any]) -> str:
             if intruding is None
             else f"no hull touches any of the {space['balls']} balls"
             if intruding <= 0
-            else f"hulls reach {intruding:.4f} into the {space['balls']} balls"
+            else f"hulls reach {intruding / scale:.4g} into the {space['balls']} balls"
         )
     reach = report.get("hausdorff", {})
     if reach.get("over") is not None:
-        missed = f"{reach['under']:.4f}"
-        covered = "and cover it" if missed == "0.0000" else f"and miss it by up to {missed}"
-        words.append(f"hulls extend up to {reach['over']:.4f} beyond the input {covered}")
-    return "; ".join(words) + (" (longest side = 2)" if words else "")
+        missed = reach["under"] / scale
+        covered = "and cover it" if reach["under"] < 5e-5 else f"and miss it by up to {missed:.4g}"
+        words.append(f"hulls extend up to {reach['over'] / scale:.4g} beyond the input {covered}")
+    return "; ".join(words) + (f" ({in_words})" if words else "")
+
+
+def _unit(report: dict[str, Any], unit: str | None) -> tuple[float, str]:
+    """Frame units per unit that lengths are written in, and what that is."""
+    if unit == "%":
+        return 0.02, "in % of the longest side"
+    if unit is not None:
+        return report["scale"] * METRES[unit], f"in {unit}"
+    if report.get("options", {}).get("threshold_abs") is not None:
+        return report["scale"], "in the input's unit"
+    return 1.0, "longest side = 2"

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rlacd import _native
 from rlacd.criteria.criterion import CriterionSummary
@@ -18,6 +18,7 @@ from rlacd.criteria.screen import Feasibility, Part, Screen
 from rlacd.errors import OptionError
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.hull import Hull
+from rlacd.told_apart import told_apart
 
 VOLUME_WEIGHT = 0.3
 """The weight of ``R_v``, as in the original definition."""
@@ -101,6 +102,8 @@ class Concavity:
     ----------
     threshold
         In the frame where the input's bounding box is centred and its longest side is 2.
+    unit
+        Length in the frame of the unit in which warnings give lengths.
 
     Raises
     ------
@@ -119,6 +122,7 @@ class Concavity:
     """
 
     threshold: float = 0.05
+    unit: float = 1.0
 
     def __post_init__(self) -> None:
         if not self.threshold > 0:
@@ -140,7 +144,7 @@ class Concavity:
 
     def scaled(self, factor: float) -> Concavity:
         """The same criterion with ``factor`` times the threshold."""
-        return Concavity(self.threshold * factor)
+        return replace(self, threshold=self.threshold * factor)
 
     @property
     def overhang(self) -> float:
@@ -157,10 +161,8 @@ class Concavity:
             sentence = "There was no time to measure the concavity of the parts."
             return CriterionSummary({"concavity": {"per_part": None, "max": None}}, (sentence,))
         exceeding = [error for error in errors if error > self.threshold]
-        warning = (
-            f"{len(exceeding)} of {len(errors)} parts exceed the concavity {self.threshold:.4g}; "
-            f"the worst has {max(exceeding, default=0):.4g}."
-        )
+        worst, threshold = told_apart(max(errors) / self.unit, self.threshold / self.unit)
+        warning = f"{len(exceeding)} of {len(errors)} parts exceed the concavity {threshold}; the worst has {worst}."
         entries = {"concavity": {"per_part": list(errors), "max": max(errors)}}
         return CriterionSummary(entries, (warning,) if exceeding else ())
 

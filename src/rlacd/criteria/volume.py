@@ -15,6 +15,7 @@ from rlacd.criteria.criterion import CriterionSummary
 from rlacd.criteria.screen import Part, Screen
 from rlacd.solid.hull import Hull
 from rlacd.solid.solid import Solid
+from rlacd.told_apart import told_apart
 
 LEAST = 1e-3
 """Of the volume of the whole's convex hull: parts smaller than this count as this large."""
@@ -124,8 +125,8 @@ class AddedVolume:
         if errors is None:
             return CriterionSummary({"volume": entries}, ("There was no time to measure what the hulls add.",))
         exceeding = [error for error in errors if error > self.tolerance]
+        worst, tolerance = told_apart(100 * max(errors), 100 * self.tolerance)
         warning = (
-            f"{len(exceeding)} of {len(errors)} hulls add more than {100 * self.tolerance:.3g} % of volume; "
-            f"the worst adds {100 * max(exceeding, default=0):.3g} %."
+            f"{len(exceeding)} of {len(errors)} hulls add more than {tolerance} % of volume; the worst adds {worst} %."
         )
         return CriterionSummary({"volume": entries}, (warning,) if exceeding else ())

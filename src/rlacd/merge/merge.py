@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -22,9 +23,6 @@ from rlacd.solid.hull import Hull
 FEW = 100
 """Up to this many parts, any pair may be united across other parts; with more, only pairs near each other or near a
 common third part."""
-
-MEASURING = 5e6
-"""Work spent on measuring pairs where parts are united down to a number."""
 
 AT_ONCE = 512
 """Number of pairs tested against the solid between two checks of the run."""
@@ -406,64 +404,52 @@ def _sum_over(alive: Mapping[int, Part], pairs: IntArray, price: Callable[[int],
     return sum(price(corners[i] + corners[j]) for i, j in pairs.tolist())
 
 
-def merge_to_count(
+def united_in_turn(
     parts: Sequence[Part],
-    count: int,
+    unite: Callable[[Part, Part], Part],
     criterion: Criterion,
+    account: Work,
     run: Run,
-    worst: float = np.inf,
-) -> list[Part] | None:
-    """Unite parts, always the pair whose union has the least error, until at most `count` are left.
+) -> Iterator[tuple[list[Part], float]]:
+    """Unite parts, always the pair whose union has the least error, until one is left; yield each state and its error.
 
     Errors are measured only for pairs whose lower bound could make them the best (lazy best-first search), first among
-    neighbours, then among all parts. After `MEASURING` units of work, bounds stand in for errors.
+    neighbours, then among all parts.
 
     Parameters
     ----------
     parts : sequence of Part
-    count : int
-        At least 1.
+    unite : callable
+        Returns the union of two parts.
     criterion : Criterion
         Measures the errors; unions need not meet it.
+    account : Work
+        Pays for measuring. When it is spent, or the run ends, nothing is united any more.
     run : Run
-        When it stops, the parts reached so far are returned, which may be more than `count`.
-    worst : float
-        Give up and return None as soon as a union would have an error of at least this.
-
-    Raises
-    ------
-    ValueError
-        `count` is less than 1.
     """
-    if count < 1:
-        raise ValueError("at least one part has to be left")
     alive: dict[int, Part] = dict(enumerate(parts))
     origin = {i: i for i in alive}
-    newest = len(parts)
-    reach = criterion.screen.reach
-    account = Work(MEASURING)
     try:
+        errors = dict(zip(alive, run.map(criterion.error, parts), strict=True))
+        reach = criterion.screen.reach
         queue = _bounded_pairs(alive, list(alive), reach, criterion, run)
-        while len(alive) > count and run.step(len(parts) - len(alive), len(parts) - count, len(alive)):
-            pair = _pop_least(queue, alive, criterion, account)
-            if pair is None:
-                if reach == np.inf:
-                    break
-                reach = np.inf
+        while True:
+            yield [alive[i] for i in sorted(alive, key=origin.__getitem__)], max(errors.values())
+            pair = _pop_least(queue, alive, unite, criterion, account)
+            if pair is None and math.isfinite(reach):
+                reach = math.inf
                 queue = _bounded_pairs(alive, list(alive), reach, criterion, run)
-                continue
-            if pair.error >= worst:
-                return None
-            union = Part.glued(alive[pair.first], alive[pair.second])
-            del alive[pair.first], alive[pair.second]
+                pair = _pop_least(queue, alive, unite, criterion, account)
+            if pair is None or not run.step(len(parts) - len(alive), len(parts), len(alive)):
+                return
+            newest = len(origin)
             origin[newest] = min(origin[pair.first], origin[pair.second])
-            alive[newest] = union
+            alive[newest] = unite(alive.pop(pair.first), alive.pop(pair.second))
+            errors = {i: errors[i] for i in alive if i in errors} | {newest: pair.error}
             for bounded in _bounded_pairs(alive, [newest], reach, criterion, run):
                 heapq.heappush(queue, bounded)
-            newest += 1
     except Stopped:  # between two unions
         run.note_stop()
-    return [alive[i] for i in sorted(alive, key=origin.__getitem__)]
 
 
 class _BoundedPair(NamedTuple):
@@ -486,15 +472,21 @@ def _bounded_pairs(
 
 
 def _pop_least(
-    queue: list[_BoundedPair], alive: dict[int, Part], criterion: Criterion, account: Work
+    queue: list[_BoundedPair],
+    alive: dict[int, Part],
+    unite: Callable[[Part, Part], Part],
+    criterion: Criterion,
+    account: Work,
 ) -> _BoundedPair | None:
-    """Pop the pair whose union has the least error; None if no pair is left."""
+    """Pop the pair whose union has the least error; None if no pair is left, or too little work to find it."""
     while queue:
         pair = heapq.heappop(queue)
         if pair.first not in alive or pair.second not in alive:
             continue
-        if pair.measured or not account.pay(price_of_gluing(alive[pair.first], alive[pair.second])):
+        if pair.measured:
             return pair
-        error = criterion.error(Part.glued(alive[pair.first], alive[pair.second]))
+        if not account.pay(price_of_gluing(alive[pair.first], alive[pair.second])):
+            return None
+        error = criterion.error(unite(alive[pair.first], alive[pair.second]))
         heapq.heappush(queue, _BoundedPair(max(error, pair.error), pair.first, pair.second, True))
     return None

@@ -111,36 +111,36 @@ class Neighbourhood:
         self._price = {"recut": 0.0, "redistribute": 0.0}  # units, of the last batch
         self._near = min(context.criterion.screen.reach, 2 * context.criterion.overhang)
 
-    def improve(self, most: float = math.inf, enough: int = 1) -> SearchOutcome:
-        """Search until nothing is left to try, the run is over, `most` recuts are made or `enough` parts are left."""
+    def improve(self, most: float = math.inf) -> SearchOutcome:
+        """Search until nothing is left to try, the run is over, `most` recuts are made or one part is left."""
         exhausted = len(self._graph.parts) == 1
         try:
             if most > 0:
-                self.redistribute_all(enough, SMALL)
-                self._recut_some(min(most, OPENING), enough)
-                self.redistribute_all(enough)
+                self.redistribute_all(SMALL)
+                self._recut_some(min(most, OPENING))
+                self.redistribute_all()
             exhausted = len(self._graph.parts) == 1
-            while not exhausted and self._steps < most and len(self._graph.parts) > enough and not self._run.is_over:
+            while not exhausted and self._steps < most and len(self._graph.parts) > 1 and not self._run.is_over:
                 target = self._steps + RECUTS_PER_PART * len(self._graph.parts)
-                exhausted = self._recut_some(min(most, target), enough) or self._gave_up
-                self.redistribute_all(enough)
+                exhausted = self._recut_some(min(most, target)) or self._gave_up
+                self.redistribute_all()
         except Stopped:  # raised between two exchanges: the best state so far is kept
             self._run.note_stop()
         return SearchOutcome(self._best, self._steps, self._accepted, exhausted)
 
-    def redistribute_all(self, enough: int = 1, share: float = 1.0) -> None:
-        """Offer each part, or the smallest share of them, to those around, until `enough` parts are left."""
+    def redistribute_all(self, share: float = 1.0) -> None:
+        """Offer each part, or the smallest share of them, to those around."""
         graph = self._graph
         waiting = sorted(graph.parts, key=lambda i: (graph.parts[i].hull.volume, i))
         waiting = waiting[: math.ceil(share * len(waiting))]
-        while waiting and len(graph.parts) > enough and not self._gave_up and self._may_continue():
+        while waiting and len(graph.parts) > 1 and not self._gave_up and self._may_continue():
             batch, waiting = waiting[:BATCH], waiting[BATCH:]
             self._make("redistribute", [trial for i in batch if (trial := self._redistributing(i)) is not None])
 
-    def _recut_some(self, most: float, enough: int) -> bool:
+    def _recut_some(self, most: float) -> bool:
         """Recut clusters until `most` steps are made in total; whether nothing new was left to recut."""
         graph = self._graph
-        while self._steps < most and len(graph.parts) > enough and not self._gave_up and self._may_continue():
+        while self._steps < most and len(graph.parts) > 1 and not self._gave_up and self._may_continue():
             taken: set[int] = set()
             trials = [trial for _ in range(BATCH) if (trial := self._recutting(taken)) is not None]
             if not trials:

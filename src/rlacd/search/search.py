@@ -14,7 +14,6 @@ from rlacd.merge import drop_slivers
 from rlacd.run import Run
 from rlacd.search.context import Ranking, SearchContext
 from rlacd.search.neighbourhood import PATIENCE, Neighbourhood, SearchOutcome, cost
-from rlacd.search.tighten import tighten
 from rlacd.solid.component import Part
 
 BEST_SECONDS = 5.0
@@ -94,7 +93,6 @@ def search(
     quality: str,
     seconds: float | None = None,
     steps: int | None = None,
-    most_parts: int | None = None,
 ) -> tuple[list[Part], SearchSummary]:
     """Search for fewer parts, or for equally many with a smaller total hull volume.
 
@@ -113,9 +111,6 @@ def search(
         Wall time of the search, in place of that bound.
     steps : int, optional
         Recuts of clusters, in place of that bound.
-    most_parts : int, optional
-        Limit on the number of parts. If there are no more parts than this and some do not meet the criterion, search
-        for parts that come closer to meeting it instead.
 
     Returns
     -------
@@ -136,10 +131,7 @@ def search(
     elif steps is not None and seconds is None:
         allowed = TIMES_FIRST_PASS * first_pass + MOST_WORK + WORK_OF_A_STEP * steps
     state = _Search(context, run, first_pass, a_pass, HOPELESS * len(parts))
-    if most_parts is not None and not all(run.map(context.criterion.is_met, parts)):
-        with run.limited(allowed, math.inf if seconds is None else seconds):
-            done = tighten(context, parts, most_parts, run, math.inf if steps is None else steps)
-    elif bounded:
+    if bounded:
         with run.limited(allowed):
             starts = state.passes(parts, context.rankings[1:2] if len(parts) <= FEW else [])
             done = Neighbourhood(context, starts[0], run, BOUNDED_PATIENCE).improve()

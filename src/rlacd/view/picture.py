@@ -19,6 +19,7 @@ from rlacd.io.write.palette import linear_from_srgb
 from rlacd.output_options import OutputOptions
 from rlacd.result import Result
 from rlacd.solid.balls import Balls
+from rlacd.told_apart import told_apart
 from rlacd.view.coloring import color_hulls
 from rlacd.view.render import Body, Spheres, render, require_extra
 
@@ -158,8 +159,8 @@ def caption(decomposition: Result) -> str:
     words = [f"{count} hull{'s' * (count != 1)}", f"{sum(len(hull.faces) for hull in decomposition)} triangles"]
     worst = report.get("concavity", {}).get("max")
     if worst is not None:
-        threshold = report.get("options", {}).get("threshold")
-        words.append(f"concavity {worst:.3f}" + (f" (threshold {threshold:g})" if threshold is not None else ""))
+        measured, limit = told_apart(worst, report.get("options", {}).get("threshold", worst))
+        words.append(f"concavity {measured} (threshold {limit})")
     if "navigable" in report:
         words.append(f"{report['navigable']['balls']} balls left free")
     total = report.get("seconds", {}).get("total")

@@ -1,0 +1,101 @@
+"""A limit on hulls: kept, without effect where the result keeps it anyway, and never worse for being larger."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from manifold3d import Manifold
+
+import rlacd
+from rlacd.criteria import Concavity
+from rlacd.merge.merge import united_in_turn
+from rlacd.run import Run, Work
+from rlacd.solid.component import Component, Part
+from tests.shapes import box, from_manifold
+
+
+def cabinet() -> Manifold:
+    rooms = [box((0.02, -0.1, 0.02 + 0.445 * i), (0.88, 0.43, 0.445 + 0.445 * i)) for i in range(4)]
+    return box((0, 0, 0), (0.9, 0.45, 1.8)) - sum(rooms[1:], rooms[0])
+
+
+def drawer() -> Manifold:
+    inside = box((-0.195, -0.145, 0.005), (0.195, 0.145, 0.2))
+    return box((-0.2, -0.15, 0), (0.2, 0.15, 0.12)) - inside + box((-0.22, -0.17, -0.01), (0.22, -0.15, 0.14))
+
+
+def plate_with_hole() -> Manifold:
+    return box((-50, -30, 0), (50, 30, 10)) - Manifold.cylinder(20, 10, 10, 24).translate((0, 0, -5))
+
+
+def cup() -> Manifold:
+    return Manifold.cylinder(9, 3.5, 4, 24) - Manifold.cylinder(9, 3.2, 3.75, 24).translate((0, 0, 0.4))
+
+
+def mug() -> Manifold:
+    handle = Manifold.cylinder(0.9, 2.6, 2.6, 24, True) - Manifold.cylinder(1, 1.8, 1.8, 24, True)
+    outside = Manifold.cylinder(9, 4, 4, 24) + handle.rotate((90, 0, 0)).translate((4, 0, 4.5))
+    return outside - Manifold.cylinder(10, 3.7, 3.7, 24).translate((0, 0, 0.4))
+
+
+SHAPES = [cabinet, drawer, plate_with_hole, cup, mug]
+CRITERIA: list[tuple[str, dict[str, Any]]] = [
+    ("concavity", {}),
+    ("concavity", {"quality": "fast", "max_vertices": 24}),
+    ("volume", {"criterion": "volume", "volume_tolerance": 0.05, "quality": "fast"}),
+    ("navigable", {"criterion": rlacd.NavigableSpace(0.05, 0.02), "quality": "fast"}),
+]
+
+
+def error(result: rlacd.Decomposition, criterion: str) -> float:
+    entry = result.report[criterion]
+    return float(entry["intrusion"]["max"] if criterion == "navigable" else entry["max"])
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize(("criterion", "options"), CRITERIA)
+def test_more_hulls_never_fit_worse(shape, criterion: str, options: dict[str, Any]) -> None:
+    check_limits(shape(), range(1, 40), criterion, options)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("shape", "criterion", "options"), [(drawer, *each) for each in CRITERIA])
+def test_a_limit_is_kept_and_a_larger_one_never_fits_worse(shape, criterion: str, options: dict[str, Any]) -> None:
+    check_limits(shape(), range(1, 9), criterion, options)
+
+
+def check_limits(solid: Manifold, limits: range, criterion: str, options: dict[str, Any]) -> None:
+    closed = from_manifold(solid)
+    mesh = closed.vertices, closed.faces
+    free = rlacd.decompose(mesh, **options)
+    last = np.inf
+    for most in limits:
+        result = rlacd.decompose(mesh, max_hulls=most, **options)
+        assert len(result) <= most
+        assert result.report["hausdorff"]["under"] < 0.005
+        if most >= len(free):
+            assert [hull.vertices.tobytes() for hull in result] == [hull.vertices.tobytes() for hull in free]
+            assert result.report["warnings"] == free.report["warnings"]
+            break
+        worst = error(result, criterion)
+        assert worst <= last
+        assert worst > error(free, criterion)
+        assert result.report["warnings"], "it says by how much"
+        last = worst
+
+
+def test_parts_are_united_one_by_one_until_one_is_left_or_the_work_is_spent() -> None:
+    boxes = [Component(Manifold.cube((1, 1, 1)).translate((3 * i, 0, 0))) for i in range(5)]
+
+    def united(work: float) -> list[tuple[int, float, float]]:
+        states = united_in_turn(boxes, Part.glued, Concavity(0.05), Work(work), Run(1))
+        return [(len(parts), sum(part.volume for part in parts), worst) for parts, worst in states]
+
+    every = united(1e9)
+    assert [count for count, _, _ in every] == [5, 4, 3, 2, 1]
+    assert [volume for _, volume, _ in every] == pytest.approx([5] * 5)
+    assert every[0][2] < 0.05 < every[1][2] < every[-1][2]
+    assert [count for count, _, _ in united(0)] == [5]
