@@ -165,7 +165,7 @@ def test_what_else_is_written_is_named(mesh: Path, stand_in: StandIn) -> None:
 def test_the_summary_says_how_far_hulls_and_input_are_apart(tmp_path: Path) -> None:
     trimesh.creation.icosphere(2).export(tmp_path / "ball.stl")
     run = CliRunner().invoke(
-        app, ["decompose", str(tmp_path / "ball.stl"), "-o", str(tmp_path / "b.glb"), "-t", "2.5%"]
+        app, ["decompose", str(tmp_path / "ball.stl"), "-o", str(tmp_path / "b.glb"), "-t", "0.05"]
     )
     reach = re.search(r"extend up to (0\.0\d+) beyond the input and cover it \(longest side = 2\)", run.stderr)
     assert reach is not None, run.stderr

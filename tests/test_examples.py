@@ -131,7 +131,7 @@ def test_the_table_names_every_option() -> None:
     command = typer.main.get_command(app).commands["decompose"]  # type: ignore[attr-defined]
     options = {name for p in command.params if not p.hidden for name in p.opts if name.startswith("--")} - {"--help"}
     assert {name for name in options if f"`{name}`" not in table and f"{name}/" not in table} == set()
-    arguments = set(inspect.signature(rlacd.decompose).parameters) - {"mesh", "threshold_m"}
+    arguments = set(inspect.signature(rlacd.decompose).parameters) - {"mesh"}
     assert {name for name in arguments if f"`{name}`" not in table} == set()
 
 
@@ -141,7 +141,7 @@ def test_the_function_has_the_options_as_they_are_stated_once() -> None:
         assert given[field.name].default == field.default
         if field.name != "criterion":  # a class that has the criterion's own methods
             assert given[field.name].annotation == field.type
-    assert set(given) == {field.name for field in dataclasses.fields(Options)} | {"mesh", "progress", "threshold_m"}
+    assert set(given) == {field.name for field in dataclasses.fields(Options)} | {"mesh", "progress"}
 
 
 def test_the_command_offers_every_argument_of_the_function() -> None:

@@ -13,10 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 from trimesh import creation
-from typer.testing import CliRunner
 
 import rlacd
-from rlacd.cli.main import app
 from rlacd.cli.options import decompose_options
 from rlacd.compat import coacd, vhacd
 from rlacd.errors import MeshFileError, OptionError, RlacdError, WeightsError
@@ -117,7 +115,7 @@ def assert_accepted_or_told(call: Any, *others: type[Exception]) -> None:
 @pytest.mark.filterwarnings("ignore:.*is now called:DeprecationWarning")
 @pytest.mark.parametrize("odd", ODD.values(), ids=ODD.keys())
 def test_options_of_decompose_are_checked_before_any_work(odd: Any) -> None:
-    for name in (*OPTION_NAMES, "progress", "threshold_m"):
+    for name in (*OPTION_NAMES, "progress"):
         # Python 3.13 takes a hostile object for a function that can be called: what it raises then is the caller's own.
         raised = (RuntimeError,) if name == "progress" and isinstance(odd, Hostile) else ()
         assert_accepted_or_told(
@@ -218,37 +216,6 @@ def test_shares_that_no_object_can_have_are_refused(given: dict[str, float]) -> 
 def test_lengths_that_do_not_fit_the_object_are_refused(given: dict[str, float]) -> None:
     with pytest.raises(OptionError, match=r"for this object it has to be between 0\.0001 and 10"):
         rlacd.decompose(creation.box(), criterion=rlacd.NavigableSpace(**given))
-
-
-# --- former names -----------------------------------------------------------------------------------------------------
-
-
-def test_former_names_are_taken_with_a_warning() -> None:
-    mesh = creation.box((1, 2, 20))
-    with pytest.warns(DeprecationWarning, match="threshold_m is now called threshold_abs") as caught:
-        former = rlacd.decompose(mesh, threshold_m=0.4)
-    assert caught[0].filename == __file__
-    now = rlacd.decompose(mesh, threshold_abs=0.4)
-    assert former.report["options"] == now.report["options"]
-    assert now.report["options"]["threshold_m"] == now.report["options"]["threshold_abs"] == 0.4
-    for name in ("volume", "centre", "inertia"):
-        assert now.report["mass"][f"{name}_m"] == now.report["mass"][f"{name}_abs"]
-    with pytest.warns(DeprecationWarning, match="radius_m is now called radius_abs") as caught:
-        space = rlacd.NavigableSpace(radius_m=0.1)
-    assert space == rlacd.NavigableSpace(radius_abs=0.1)
-    with pytest.raises(OptionError, match="one of the two"):
-        rlacd.decompose(mesh, threshold_m=0.4, threshold_abs=0.4)
-
-
-def test_former_names_on_the_command_line(tmp_path: Path) -> None:
-    said: list[str] = []
-    assert decompose_options({"threshold_m": 0.4}, warn=said.append) == {"threshold_abs": 0.4}
-    assert said == ["--threshold-m is now called --threshold-abs; the old name will be removed."]
-    mesh = tmp_path / "box.stl"
-    creation.box().export(mesh)
-    run = CliRunner().invoke(app, ["decompose", str(mesh), "--threshold-m", "0.1", "--quality", "fast"])
-    assert run.exit_code == 0
-    assert run.stderr.startswith("--threshold-m is now called --threshold-abs")
 
 
 # --- lengths in words -------------------------------------------------------------------------------------------------

@@ -37,7 +37,6 @@ from rlacd.options import (
 from rlacd.policies import Policy, make_policy
 from rlacd.presets import PresetName
 from rlacd.primitive_kinds import PrimitiveKind
-from rlacd.renamed import with_former
 from rlacd.report import joint_report
 from rlacd.run import ProgressCallback, Run
 from rlacd.solid.frame import Frame
@@ -79,7 +78,6 @@ def decompose(
     unit: UnitName | None = None,
     scale: float | None = None,
     progress: ProgressCallback | None = None,
-    threshold_m: float | None = None,
 ) -> Decomposition:
     """Decompose a mesh into few convex hulls that fit it tightly.
 
@@ -173,8 +171,6 @@ def decompose(
     progress : callable, optional
         Called with a `Progress` between steps, and several times a second during long ones; when it returns False, the
         decomposition reached so far is returned as promptly as after a timeout.
-    threshold_m : float, optional
-        The former name of `threshold_abs`.
 
     Returns
     -------
@@ -191,8 +187,7 @@ def decompose(
         A network is requested without the extra ``learned``.
     """
     given = locals()
-    chosen = with_former(Options, {name: given[name] for name in OPTION_NAMES}, {"threshold_m": threshold_m})
-    options = Options(**chosen)
+    options = Options(**{name: given[name] for name in OPTION_NAMES})
     check_callback("progress", progress, "a `rlacd.Progress`")
     make_policy(options.policy)  # reports a bad network before any work is done
     with Run(options.threads, options.timeout, progress, options.seed) as run:

@@ -183,8 +183,6 @@ class About:
         How Python gives it, where that is not its name as an argument; empty where Python has no such option.
     repeated
         Whether the command line takes it several times.
-    former
-        Its name until lately, which is still taken, with a warning.
     """
 
     help: str
@@ -196,7 +194,6 @@ class About:
     metavar: str | None = None
     python: str | None = None
     repeated: bool = False
-    former: str | None = None
 
 
 def option(default: Any, help: str, kind: Kind | None = None, *, keyword: bool = False, **about: Any) -> Any:

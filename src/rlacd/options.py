@@ -123,7 +123,6 @@ class Options:
         "The same as a length in the mesh's own unit, such as 2 for 2 mm in a file in millimetres.",
         number(above=0, rule="a positive length in the input's unit"),
         panel=TIGHT,
-        former="threshold_m",
     )
     volume_tolerance: float = option(
         0.01,

@@ -75,7 +75,7 @@ def make_report(
         mass = mass_of(*concatenated(stands_for_mass), solid.frame)
         return {
             "version": __version__,
-            "options": _options(options),
+            "options": options.as_plain(),
             "complete": run.stopped_by is None,
             "stopped_by": run.stopped_by,
             "parts": len(hulls),
@@ -235,19 +235,10 @@ def _read_mass(plain: dict[str, Any]) -> Mass:
     return Mass(plain["volume_abs"], np.array(plain["centre_abs"]), np.array(plain["inertia_abs"]))
 
 
-def _options(options: Options) -> dict[str, Any]:
-    """The options used; lengths also appear under their former names, ending in ``_m``, for one more version."""
-    plain = options.as_plain()
-    if isinstance(plain["criterion"], dict):
-        plain["criterion"] |= {f"{name}_m": plain["criterion"][f"{name}_abs"] for name in ("radius", "tolerance")}
-    return plain | {"threshold_m": options.threshold_abs}
-
-
 def _mass(mass: Mass) -> dict[str, Any]:
-    """The mass in the input's unit; also under its former names for one more version."""
-    volume, centre, inertia = mass.volume_abs, mass.centre_abs.tolist(), mass.inertia_abs.tolist()
-    now = {"volume_abs": volume, "centre_abs": centre, "inertia_abs": inertia}
-    return now | {"volume_m": volume, "centre_m": centre, "inertia_m": inertia}
+    """The mass in the input's unit."""
+    centre, inertia = mass.centre_abs.tolist(), mass.inertia_abs.tolist()
+    return {"volume_abs": mass.volume_abs, "centre_abs": centre, "inertia_abs": inertia}
 
 
 def _distances(solid: Solid, parts: Sequence[Part], run: Run, root: Component | None, overhang: float) -> _Distances:

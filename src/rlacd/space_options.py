@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import InitVar, dataclass
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from rlacd.errors import OptionError
 from rlacd.fields import check_fields, custom, number, option
-from rlacd.renamed import take_former
 
 Point: TypeAlias = tuple[float, float, float]
 
@@ -135,7 +134,6 @@ class SpaceOptions:
         number(above=0, rule=_LENGTH),
         keyword=True,
         panel=PANEL,
-        former="radius_m",
         python="NavigableSpace(radius_abs=)",
     )
     tolerance_abs: float | None = option(
@@ -144,14 +142,10 @@ class SpaceOptions:
         number(above=0, rule=_LENGTH),
         keyword=True,
         panel=PANEL,
-        former="tolerance_m",
         python="NavigableSpace(tolerance_abs=)",
     )
-    radius_m: InitVar[float | None] = None
-    tolerance_m: InitVar[float | None] = None
 
-    def __post_init__(self, radius_m: float | None, tolerance_m: float | None) -> None:
-        take_former(self, {"radius_m": radius_m, "tolerance_m": tolerance_m})
+    def __post_init__(self) -> None:
         absolute = [name for name in ("radius", "tolerance") if getattr(self, f"{name}_abs") is not None]
         for name in absolute:
             object.__setattr__(self, name, LENGTHS[1])  # anything in range, for the check

@@ -140,10 +140,9 @@ def _batch(own: dict[str, Any], given: dict[str, Any]) -> Batch:
         raise OptionError(f"--redo is {own['redo']!r}; it has to be one of {', '.join(REDO)}.")
     if own["out"] == "-":
         raise OptionError("a batch cannot be written to stdout; give -o a folder.")
-    from rlacd.cli.terminal import say
 
     written = OutputOptions(**{name: given.pop(name) for name in WRITTEN})
-    options = decompose_options({**given, "threads": own["threads"], "timeout": own["timeout"]}, warn=say)
+    options = decompose_options({**given, "threads": own["threads"], "timeout": own["timeout"]})
     spec = JobSpec.of(
         options,
         file_format=own["folder_format"],

@@ -56,8 +56,6 @@ def decompose_command() -> Callable[..., None]:
 
 
 def _decompose(mesh: Path, asked: OutputOptions, how: dict[str, Any]) -> None:
-    from rlacd.cli.terminal import say
-
     _check_input(mesh)
     wanted = _named(mesh, asked, how.get("preset"))
     robot = mesh.suffix.lower() in ROBOTS
@@ -65,7 +63,7 @@ def _decompose(mesh: Path, asked: OutputOptions, how: dict[str, Any]) -> None:
     _check_robot(asked, wanted) if robot else _check_mesh(wanted)
     if wanted.balls is not None and how.get("criterion") != "navigable":
         raise OptionError("--balls needs --criterion navigable.")
-    options = decompose_options(how, metres=mesh.suffix.lower() in IN_METRES, warn=say)
+    options = decompose_options(how, metres=mesh.suffix.lower() in IN_METRES)
     run = _rewrite if robot else _write
     if not run(mesh, wanted, options, unit_given(how)):
         raise typer.Exit(ExitCode.STOPPED_EARLY)

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Callable
 from typing import Any
 
 from rlacd.cli.parameters import Parameters, chosen, option_parameters
 from rlacd.errors import OptionError
 from rlacd.fields import about
 from rlacd.options import CONCAVITY, VOLUME, Options
-from rlacd.renamed import former_names
 from rlacd.space_options import NAVIGABLE, SpaceOptions
 
 _SPACE = tuple(field.name for field in dataclasses.fields(SpaceOptions))
@@ -25,9 +23,7 @@ def how_parameters() -> Parameters:
     return option_parameters(Options) | option_parameters(SpaceOptions)
 
 
-def decompose_options(
-    given: dict[str, Any], *, metres: bool = False, warn: Callable[[str], None] = lambda sentence: None
-) -> dict[str, Any]:
+def decompose_options(given: dict[str, Any], *, metres: bool = False) -> dict[str, Any]:
     """Keep the options that were given, and build the criterion from its own options.
 
     Parameters
@@ -36,8 +32,6 @@ def decompose_options(
         Options that control the decomposition, by name; None if not given.
     metres : bool
         Whether the mesh is in metres, so that lengths with a unit can be taken.
-    warn : callable
-        Receives a message about the use of a former name.
 
     Returns
     -------
@@ -49,8 +43,7 @@ def decompose_options(
     OptionError
         Options contradict each other or are malformed.
     """
-    given = _renamed(chosen(given), warn)
-    given = _lengths(given, metres)
+    given = _lengths(chosen(given), metres)
     space = {name: given.pop(name) for name in _SPACE if name in given}
     criterion = given.pop("criterion", CONCAVITY)
     if criterion not in (CONCAVITY, VOLUME, NAVIGABLE):
@@ -86,18 +79,6 @@ def _typed(name: str, space: dict[str, Any]) -> str:
     flags = about(SpaceOptions, name).flags or (f"--{name.replace('_', '-')}",)
     yes, _, no = flags[0].partition("/")
     return no if space[name] is False else yes
-
-
-def _renamed(given: dict[str, Any], warn: Callable[[str], None]) -> dict[str, Any]:
-    for old, new in (former_names(Options) | former_names(SpaceOptions)).items():
-        if old not in given:
-            continue
-        typed_old, typed_new = (f"--{name.replace('_', '-')}" for name in (old, new))
-        if new in given:
-            raise OptionError(f"{typed_old} is the former name of {typed_new}; give one of the two.")
-        warn(f"{typed_old} is now called {typed_new}; the old name will be removed.")
-        given[new] = given.pop(old)
-    return given
 
 
 def _lengths(given: dict[str, Any], metres: bool) -> dict[str, Any]:

@@ -34,7 +34,7 @@ def command(run: Callable[..., None], text: str, parameters: Parameters) -> Call
 def option_parameters(
     options: type[Any], *, only: Collection[str] | None = None, note: str = "default: ", panel: str | None = None
 ) -> Parameters:
-    """Make a parameter for each field of a dataclass, and for its former name; the default is None.
+    """Make a parameter for each field of a dataclass; the default is None.
 
     Parameters
     ----------
@@ -62,9 +62,6 @@ def option_parameters(
             show_default=False,
         )
         parameters[field.name] = (None, Annotated[kind | None, declared])
-        if known.former is not None:
-            hidden = typer.Option(f"--{known.former.replace('_', '-')}", hidden=True)
-            parameters[known.former] = (None, Annotated[kind | None, hidden])
     return parameters
 
 

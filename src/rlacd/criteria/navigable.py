@@ -68,8 +68,6 @@ class NavigableSpace(SpaceOptions):
         at z = 0. The normal need not have length 1; the offset refers to the normal as given.
     radius_abs, tolerance_abs : float, optional
         The same lengths in the input's unit; they replace `radius` and `tolerance`.
-    radius_m, tolerance_m : float, optional
-        The former names of `radius_abs` and `tolerance_abs`.
 
     Raises
     ------

@@ -199,7 +199,7 @@ def _fewer(meshes: Mapping[MeshUse, RewrittenMesh], options: Mapping[str, Any]) 
     """Say what one threshold for the whole robot would give, if each mesh's own made many hulls of small ones."""
     hulls = sum(len(mesh.files) for mesh in meshes.values())
     of_meshes = "criterion" not in options or options["criterion"] == CONCAVITY
-    stated = any(options.get(name) is not None for name in ("threshold_abs", "threshold_m", "max_hulls", "timeout"))
+    stated = any(options.get(name) is not None for name in ("threshold_abs", "max_hulls", "timeout"))
     if not of_meshes or stated or len(meshes) < 2 or hulls < MANY * len(meshes):
         return []
     largest = min(mesh.result.report["scale"] for mesh in meshes.values())
