@@ -446,6 +446,22 @@ def test_a_mesh_without_volume_compiles_once_it_is_rewritten(tmp_path: Path, ine
     assert any("no volume" in warning for warning in done.warnings)
 
 
+@pytest.mark.parametrize("ending", ["dae", "ply", "stl"])
+def test_a_mesh_that_mujoco_cannot_read_is_copied_for_it(tmp_path: Path, ending: str) -> None:
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    table().export(tmp_path / f"table.{ending}", file_type="stl_ascii" if ending == "stl" else ending)
+    (tmp_path / "in.xml").write_text(
+        f"<mujoco><asset><mesh name='t' file='table.{ending}' scale='1 1 -2' inertia='exact'/></asset>"
+        "<worldbody><body><freejoint/>"
+        "<geom type='mesh' mesh='t' density='7'/></body></worldbody></mujoco>"
+    )
+    with pytest.raises(ValueError, match="decoder"):
+        mujoco.MjModel.from_xml_path(str(tmp_path / "in.xml"))
+    done = rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "out.xml", quality="fast", threads=1)
+    model = mujoco.MjModel.from_xml_path(str(done.path))
+    assert model.body_mass[1] == pytest.approx(table().volume * 2 * 7, rel=0.01)
+
+
 def test_a_model_split_over_files_is_rewritten_into_one(tmp_path: Path) -> None:
     """Assets, defaults, settings and bodies each in a file, found from the main file's folder or from their own."""
     mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")

@@ -34,6 +34,9 @@ FILES = ("mesh", "texture", "hfield", "skin", "include", "model")
 NAMED_BY = {"geom1": None, "geom2": None, "objname": "objtype", "refname": "reftype"}
 """Attributes that may name a geom, and those that then say so."""
 
+MOST_STL_FACES = 200_000
+"""Triangles of the largest STL file that MuJoCo reads."""
+
 LEAST_VOLUME = 1e-14
 """A mesh with less volume is refused by MuJoCo 4.0, unless its inertia is that of a shell."""
 
@@ -204,7 +207,7 @@ def plan_mjcf(compiler: Compiler, references: References, named: Callable[[str, 
         if (file := defaults.full(element).get("file")) and not Path(file).is_absolute()
     ]
 
-    def edit(hulls: HullFiles, sources: Mapping[MeshUse, trimesh.Trimesh]) -> list[Edit]:
+    def edit(hulls: HullFiles, sources: Mapping[MeshUse, trimesh.Trimesh], copies: Mapping[MeshUse, str]) -> list[Edit]:
         taken = {*assets, *(str(e.attributes.get("name")) for e in root.walk() if e.tag == "geom")}
         names = {name: _fresh(name, len(hulls[use]), taken) for name, use in uses.items()}
         edits = []
@@ -214,6 +217,8 @@ def plan_mjcf(compiler: Compiler, references: References, named: Callable[[str, 
             edits.append(_asset_edit(asset, full, named, (names[name], hulls[use])))
             moved = compiler.relocated(asset)
             values = {} if moved is None else {"file": moved}
+            if use in copies:
+                values["file"] = named(full["file"], copies[use])
             if _lacks_volume(sources[use], full.get("inertia", "legacy")):
                 values["inertia"] = "shell"
                 density = " Its mass is its area times the density." if weighed else ""
@@ -302,6 +307,16 @@ def _lacks_volume(mesh: trimesh.Trimesh, inertia: str) -> bool:
     if inertia == "exact":
         return bool(volumes.sum() < LEAST_VOLUME or not mesh.is_winding_consistent)
     return bool(np.abs(volumes).sum() < LEAST_VOLUME)
+
+
+def mujoco_reads(path: Path) -> bool:
+    """Tell whether MuJoCo reads a mesh file: OBJ, its own MSH, and binary STL of at most 200,000 triangles."""
+    ending = path.suffix.lower()
+    if ending != ".stl":
+        return ending in (".obj", ".msh")
+    with path.open("rb") as file:
+        count = int.from_bytes(file.read(84)[80:], "little")
+    return count <= MOST_STL_FACES and path.stat().st_size == 84 + 50 * count
 
 
 def _unused(name: str, taken: set[str]) -> str:

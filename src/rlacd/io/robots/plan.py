@@ -43,7 +43,8 @@ class Plan:
     uses
         The meshes to decompose, in the order of the file, each once.
     edit
-        Takes the hull files of each and its mesh at scale; returns the edits of the file and of those it includes.
+        Takes the hull files of each and its mesh at scale, and the copies
+        of meshes that the consumer cannot read; returns the edits of the file and of those it includes.
     relative
         Paths that other parts of the file name relative to its folder: they break if the result goes elsewhere.
     warnings
@@ -51,6 +52,6 @@ class Plan:
     """
 
     uses: list[MeshUse]
-    edit: Callable[[HullFiles, Mapping[MeshUse, trimesh.Trimesh]], list[Edit]]
+    edit: Callable[[HullFiles, Mapping[MeshUse, trimesh.Trimesh], Mapping[MeshUse, str]], list[Edit]]
     relative: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)

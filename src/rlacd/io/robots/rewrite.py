@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import trimesh
+from numpy.typing import NDArray
 
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
@@ -18,7 +19,7 @@ from rlacd.fields import checked, path_like, read, shown
 from rlacd.io.read.load import load_mesh
 from rlacd.io.read.open_file import read_file
 from rlacd.io.robots.collada import collada_unit
-from rlacd.io.robots.mjcf import plan_mjcf, read_model
+from rlacd.io.robots.mjcf import mujoco_reads, plan_mjcf, read_model
 from rlacd.io.robots.plan import MeshUse, Plan
 from rlacd.io.robots.references import References
 from rlacd.io.robots.spans import LARGEST_DESCRIPTION, Element, edited, parse
@@ -131,6 +132,7 @@ def rewrite_robot(
     names = _stems([use.path for use in plan.uses])
     meshes: dict[MeshUse, RewrittenMesh] = {}
     files: dict[str, bytes] = {}
+    copies: dict[MeshUse, str] = {}
     for use, name in zip(plan.uses, names, strict=True):
         unit, said = collada_unit(use.path)
         warnings += said
@@ -139,10 +141,15 @@ def rewrite_robot(
             f"{stem}_{name}_{i:03d}.obj": encode_plain_obj(_unscaled(h, use)) for i, h in enumerate(result.hulls)
         }
         files.update(written)
+        if kind == "mjcf" and not mujoco_reads(use.path):
+            faces = _oriented(result.source.faces, use)
+            mesh = trimesh.Trimesh(result.source.vertices / use.scale, faces, process=False)
+            copies[use] = f"{stem}_{name}_visual.obj"
+            files[copies[use]] = encode_plain_obj(mesh)
         meshes[use] = RewrittenMesh(use.path, list(written), result)
         warnings += [f"{use.path.name}: {warning}" for warning in result.report.get("warnings", [])]
     named = {use: mesh.files for use, mesh in meshes.items()}
-    edits = plan.edit(named, {use: mesh.result.source for use, mesh in meshes.items()})
+    edits = plan.edit(named, {use: mesh.result.source for use, mesh in meshes.items()}, copies)
     data = edited(root, edits, [element for element in root.walk() if element.included is not None])
     warnings += [warning for warning in plan.warnings if warning not in warnings] + _fewer(meshes, options)
     check_names(folder, stem, list(files))
@@ -241,8 +248,8 @@ def _coarse(mesh: trimesh.Trimesh, options: Mapping[str, Any]) -> Decomposition:
 def _decomposed(use: MeshUse, unit: float, options: Mapping[str, Any]) -> Decomposition:
     try:
         mesh = load_mesh(use.path)
-        faces = mesh.faces if np.prod(np.sign(use.scale)) > 0 else mesh.faces[:, ::-1]
-        return _coarse(trimesh.Trimesh(mesh.vertices * unit * use.scale, faces, process=False), options)
+        mesh = trimesh.Trimesh(mesh.vertices * unit * use.scale, _oriented(mesh.faces, use), process=False)
+        return _coarse(mesh, options)
     except MeshError as error:
         if str(use.path) in str(error):
             raise
@@ -258,8 +265,12 @@ def _unscaled(hull: trimesh.Trimesh, use: MeshUse) -> trimesh.Trimesh:
     exact = Hull.of(points)
     if exact is not None:
         return trimesh.Trimesh(exact.vertices, exact.faces, process=False)
-    faces = hull.faces if np.prod(np.sign(use.scale)) > 0 else hull.faces[:, ::-1]
-    return trimesh.Trimesh(points, faces, process=False)
+    return trimesh.Trimesh(points, _oriented(hull.faces, use), process=False)
+
+
+def _oriented(faces: NDArray[Any], use: MeshUse) -> NDArray[Any]:
+    """Turn faces around if the scale mirrors."""
+    return faces if np.prod(np.sign(use.scale)) > 0 else faces[:, ::-1]
 
 
 def _stems(paths: Sequence[Path]) -> list[str]:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-
-import trimesh
+from collections.abc import Callable
 
 from rlacd.errors import MeshFileError
 from rlacd.io.robots.plan import HullFiles, MeshUse, Plan, Scale
@@ -53,7 +51,7 @@ def plan_urdf(root: Element, references: References, named: Callable[[str, str],
         and _is_relative(mesh.attributes.get("filename"))
     ]
 
-    def edit(hulls: HullFiles, _: Mapping[MeshUse, trimesh.Trimesh]) -> list[Edit]:
+    def edit(hulls: HullFiles, *_: object) -> list[Edit]:
         edits = []
         for collision, mesh, use in found:
             pieces = []
