@@ -331,11 +331,11 @@ def test_mujoco_reads_the_rewritten_mjcf(arm: Path) -> None:
     done = rlacd.rewrite_robot(arm, arm.with_name("out.xml"), threads=1)
     after = mujoco.MjModel.from_xml_path(str(done.path))
     table_hulls, big_hulls = (len(mesh.files) for mesh in done.meshes)
-    # "upper" swaps its collision geom for the hulls; "lower" keeps the red geom to look at, with hulls beside it.
-    assert after.ngeom == before.ngeom - 1 + table_hulls + big_hulls
+    # "upper" keeps its collision geom for its mass, "lower" the red one to look at too, with hulls beside them.
+    assert after.ngeom == before.ngeom + table_hulls + big_hulls
+    elbow = mujoco.mj_name2id(after, mujoco.mjtObj.mjOBJ_GEOM, "elbow_mass")
+    assert after.geom_rgba[elbow, 3] == 0.0, "what stays for its mass is not drawn"
     assert int(after.geom_contype.astype(bool).sum()) == table_hulls + big_hulls + 2, "and tetrahedron and sphere"
-    upper = mujoco.mj_name2id(after, mujoco.mjtObj.mjOBJ_BODY, "upper")
-    assert after.body_mass[upper] == pytest.approx(before.body_mass[upper], rel=1e-5), "mass is shared out"
     red = mujoco.mj_name2id(after, mujoco.mjtObj.mjOBJ_GEOM, "both_visual")
     assert after.geom_contype[red] == after.geom_conaffinity[red] == 0
     assert after.geom_rgba[red].tolist() == [1.0, 0.0, 0.0, 1.0]
@@ -380,14 +380,144 @@ def test_an_mjcf_keeps_every_byte_but_meshes_and_their_geoms(arm: Path) -> None:
     assert sum(line.endswith("<!-- kept -->") for line in new) == 1
     assert "<sensor> names" not in " ".join(done.warnings)
     assert any("elbow" in warning and "<user>" in warning for warning in done.warnings)
-    assert any("lower" in warning and "mass" in warning for warning in done.warnings)
     assert any("tetrahedron" in warning and "no file" in warning for warning in done.warnings)
 
 
-def test_what_is_included_is_reported_as_left(arm: Path) -> None:
-    arm.write_text(ARM.replace("<worldbody>", '<include file="more.xml"/>\n  <worldbody>'), encoding="utf-8")
-    done = rlacd.rewrite_robot(arm, arm.with_name("out.xml"), threads=1)
-    assert any("<include>" in warning for warning in done.warnings)
+GEOM = "<mujoco><compiler {compiler}/><default><default class='c'><geom {default}/></default></default><asset>\
+<mesh name='t' file='table.stl' scale='1 -1 2' refpos='0.1 0 0' refquat='1 1 0 0' {asset}/></asset><worldbody>\
+<body name='b' pos='0 0 3'><freejoint/>{inertial}<frame pos='1 0 0' euler='10 20 30'>\
+<geom class='c' type='mesh' mesh='t' group='{group}' {geom}/></frame><geom size='0.2' density='300'/>\
+<replicate count='2' offset='1 0 0'><geom class='c' type='mesh' mesh='t' pos='0 1 0' group='3'/></replicate></body>\
+</worldbody></mujoco>"
+
+
+@pytest.mark.parametrize("group", ["0", "3"])
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"geom": "mass='3'"},
+        {"geom": "density='7'"},
+        {"default": "mass='2'"},
+        {"default": "density='40'"},
+        *({"asset": f"inertia='{inertia}'"} for inertia in ("exact", "shell", "legacy", "convex")),
+        {"compiler": "inertiagrouprange='0 2'"},
+        {"compiler": "inertiagrouprange='3 5'"},
+        {"compiler": "inertiafromgeom='true'", "inertial": "<inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>"},
+        {"inertial": "<inertial pos='1 0 0' mass='1' diaginertia='1 1 1'/>"},
+        {"compiler": "settotalmass='9' balanceinertia='true' boundmass='0.1' boundinertia='0.1'"},
+    ],
+    ids=str,
+)
+def test_no_body_changes_its_mass_centre_or_inertia(tmp_path: Path, how: dict[str, str], group: str) -> None:
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    table().export(tmp_path / "table.stl")
+    blank = dict.fromkeys(("compiler", "default", "asset", "inertial", "geom"), "")
+    (tmp_path / "in.xml").write_text(GEOM.format(**{**blank, **how, "group": group}))
+    done = rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "out.xml", quality="fast", threads=1)
+    before, after = (mujoco.MjModel.from_xml_path(str(path)) for path in (tmp_path / "in.xml", done.path))
+    assert after.ngeom > before.ngeom
+    for name, size in (("body_mass", 1e-6), ("body_ipos", 1e-6)):
+        assert getattr(after, name) == pytest.approx(getattr(before, name), rel=size, abs=1e-9)
+    assert tensors(mujoco, after) == pytest.approx(
+        tensors(mujoco, before), rel=1e-6, abs=1e-6 * before.body_inertia.max()
+    )
+
+
+def tensors(mujoco: object, model: object) -> np.ndarray:
+    """The inertia of each body along the axes of its frame."""
+    found = []
+    for quaternion, inertia in zip(model.body_iquat, model.body_inertia, strict=True):  # type: ignore[attr-defined]
+        turn = np.zeros(9)
+        mujoco.mju_quat2Mat(turn, quaternion)  # type: ignore[attr-defined]
+        found.append(turn.reshape(3, 3) * inertia @ turn.reshape(3, 3).T)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("inertia", ["", "inertia='exact'", "inertia='convex'"])
+def test_a_mesh_without_volume_compiles_once_it_is_rewritten(tmp_path: Path, inertia: str) -> None:
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]).export(tmp_path / "flat.stl")
+    (tmp_path / "in.xml").write_text(
+        f"<mujoco><asset><mesh file='flat.stl' {inertia}/></asset><worldbody><body><freejoint/><inertial pos='0 0 0'"
+        " mass='1' diaginertia='1 1 1'/><geom type='mesh' mesh='flat'/></body></worldbody></mujoco>"
+    )
+    done = rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "out.xml", threads=1)
+    assert mujoco.MjModel.from_xml_path(str(done.path)).body_mass[1] == 1.0
+    assert any("no volume" in warning for warning in done.warnings)
+
+
+@pytest.mark.parametrize("ending", ["dae", "ply", "stl"])
+def test_a_mesh_that_mujoco_cannot_read_is_copied_for_it(tmp_path: Path, ending: str) -> None:
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    table().export(tmp_path / f"table.{ending}", file_type="stl_ascii" if ending == "stl" else ending)
+    (tmp_path / "in.xml").write_text(
+        f"<mujoco><asset><mesh name='t' file='table.{ending}' scale='1 1 -2' inertia='exact'/></asset>"
+        "<worldbody><body><freejoint/>"
+        "<geom type='mesh' mesh='t' density='7'/></body></worldbody></mujoco>"
+    )
+    with pytest.raises(ValueError, match="decoder"):
+        mujoco.MjModel.from_xml_path(str(tmp_path / "in.xml"))
+    done = rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "out.xml", quality="fast", threads=1)
+    model = mujoco.MjModel.from_xml_path(str(done.path))
+    assert model.body_mass[1] == pytest.approx(table().volume * 2 * 7, rel=0.01)
+
+
+def test_a_model_split_over_files_is_rewritten_into_one(tmp_path: Path) -> None:
+    """Assets, defaults, settings and bodies each in a file, found from the main file's folder or from their own."""
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    (tmp_path / "parts" / "meshes").mkdir(parents=True)
+    table().export(tmp_path / "parts" / "table.stl")
+    table().export(tmp_path / "parts" / "other.stl")
+    parts = {
+        "in.xml": '<mujoco>\n <!-- scene -->\n <include file="parts/robot.xml"/>'
+        '\n <include file="floor.xml"/>\n</mujoco>',
+        "floor.xml": '<mujocoinclude><worldbody><geom type="plane" size="1 1 1"/></worldbody></mujocoinclude>',
+        "parts/robot.xml": '<?xml version="1.0"?><mujoco><!-- für --><compiler meshdir="nowhere"/>'
+        '<include file="assets.xml"/><worldbody><body name="b"><freejoint/><include file="parts/body.xml"/></body>'
+        "</worldbody></mujoco>",
+        "parts/assets.xml": '<mujoco><compiler meshdir="."/><asset><mesh file="table.stl"/><mesh file="other.stl"/>'
+        '</asset><default><default class="c"><geom mesh="table" type="mesh" mass="2"/></default></default></mujoco>',
+        "parts/body.xml": '<x><geom class="c" name="g" group="3"/></x>',
+    }
+    for name, text in parts.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    before = mujoco.MjModel.from_xml_path(str(tmp_path / "in.xml"))
+    done = rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "out.xml", threads=1)
+    after = mujoco.MjModel.from_xml_path(str(done.path))
+    assert after.ngeom == before.ngeom + len(done.meshes[0].files)
+    assert after.body_mass == pytest.approx(before.body_mass)
+    text = done.path.read_text(encoding="utf-8")
+    assert text.startswith("<mujoco>\n <!-- scene -->\n <!-- für -->")
+    assert text.endswith('\n <include file="floor.xml"/>\n</mujoco>'), "what does not change stays included"
+    assert 'file="parts/other.stl"' in text, "paths of inlined files follow"
+    assert {path: (tmp_path / path).read_text(encoding="utf-8") for path in parts} == parts
+    (tmp_path / "floor.xml").write_text('<mujoco><include file="parts/robot.xml"/></mujoco>')
+    with pytest.raises(MeshFileError, match="twice"):
+        rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "again.xml")
+
+
+def test_a_robot_of_primitives_is_copied(tmp_path: Path) -> None:
+    text = "<robot name='r'><link name='l'/></robot>"
+    (tmp_path / "r.urdf").write_text(text)
+    run = CliRunner().invoke(app, ["decompose", str(tmp_path / "r.urdf"), "-o", str(tmp_path / "out.urdf")])
+    assert run.exit_code == 0, run.output
+    assert "no collision mesh" in run.stderr
+    assert (tmp_path / "out.urdf").read_text() == text
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "says"),
+    [
+        ("a.urdf.xacro", "<robot/>", "xacro macros.*expand it"),
+        ("w.sdf", "<sdf/>", "rewritten are .urdf and .xml"),
+        ("a.urdf", EAR.replace("meshes/table.stl", "package:///x.stl"), "names no package"),
+    ],
+)
+def test_robots_that_cannot_be_rewritten_say_what_to_do(tmp_path: Path, name: str, text: str, says: str) -> None:
+    (tmp_path / name).write_text(text)
+    run = CliRunner().invoke(app, ["decompose", str(tmp_path / name)])
+    assert run.exit_code == 2
+    assert re.search(says, " ".join(run.stderr.split())), run.stderr
 
 
 # --- files that must not be trusted -----------------------------------------------------------------------------------
@@ -405,7 +535,6 @@ STEAL = """<?xml version="1.0"?><!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/pass
         ("", "not well-formed"),
         ("<a>" * 2000 + "</a>" * 2000, "more than 500 deep"),
         ('<robot xmlns:xacro="x"><xacro:macro name="m"/></robot>', "xacro"),
-        ("<robot name='r'><link name='l'/></robot>", "no collision mesh"),
         ("<sdf/>", "is not URDF: it starts with <sdf>"),
         ('<?xml version="1.0" encoding="klingon"?><robot/>', "klingon|encoding"),
         ("<robot><link name='l'><collision><geometry><mesh/></geometry></collision></link></robot>", "no filename"),

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
 
-from rlacd.io.robots.spans import Element, parse, replaced
+from rlacd.io.robots.spans import Edit, edited, parse
 
 NOWHERE = Path("test.xml")
 words = st.text(st.sampled_from("aé机-.9_"), max_size=5).map(lambda w: "t" + w)
@@ -39,35 +39,35 @@ documents = st.tuples(starts, elements()).map("".join)
 @given(documents)
 def test_every_element_is_at_its_reported_place(text: str) -> None:
     """Its bytes alone parse, with lxml, to the same tag, attributes and number of children."""
-    document = parse(NOWHERE, text.encode())
+    root = parse(NOWHERE, text.encode())
     theirs = [node for node in etree.fromstring(text.encode()).iter() if isinstance(node.tag, str)]
-    ours = list(document.root.walk())
+    ours = list(root.walk())
     assert len(ours) == len(theirs)
     for mine, node in zip(ours, theirs, strict=True):
-        alone = etree.fromstring(document.text(mine))
+        alone = etree.fromstring(mine.text)
         assert (mine.tag, mine.attributes) == (alone.tag, dict(alone.attrib)) == (node.tag, dict(node.attrib))
         assert len(mine.children) == len([child for child in alone if isinstance(child.tag, str)])
 
 
 @given(documents, st.data())
 def test_setting_attributes_changes_nothing_else(text: str, data: st.DataObject) -> None:
-    document = parse(NOWHERE, text.encode())
-    element: Element = data.draw(st.sampled_from(list(document.root.walk())))
+    root = parse(NOWHERE, text.encode())
+    element = data.draw(st.sampled_from(list(root.walk())))
     wanted = data.draw(st.dictionaries(st.sampled_from([*element.attributes, "tnew"]), values, min_size=1))
-    edited = document.with_attributes(element, wanted)
-    after = parse(NOWHERE, replaced(document.data, [(element.start, element.end, edited)]))
-    before_elements, after_elements = list(document.root.walk()), list(after.root.walk())
+    edit = Edit(root.file, element.start, element.end, element.with_attributes(wanted))
+    after = parse(NOWHERE, edited(root, [edit]))
+    before_elements, after_elements = list(root.walk()), list(after.walk())
     for before, now in zip(before_elements, after_elements, strict=True):
         assert now.attributes == ({**before.attributes, **wanted} if before is element else before.attributes)
-    rest = document.data[: element.start], document.data[element.end :]
-    assert after.data.startswith(rest[0])
-    assert after.data.endswith(rest[1])
-    assert document.data[element.head : element.end] in after.data
+    before = root.file.data
+    assert after.file.data.startswith(before[: element.start])
+    assert after.file.data.endswith(before[element.end :])
+    assert before[element.head : element.end] in after.file.data
 
 
 @pytest.mark.slow
 @given(documents)
 def test_replacing_nothing_is_nothing(text: str) -> None:
-    document = parse(NOWHERE, text.encode())
-    same = [(element.end, element.end, b"") for element in document.root.walk()]
-    assert replaced(document.data, same) == document.data
+    root = parse(NOWHERE, text.encode())
+    same = [Edit(root.file, element.end, element.end, b"") for element in root.walk()]
+    assert edited(root, same) == root.file.data

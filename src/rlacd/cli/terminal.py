@@ -105,6 +105,8 @@ def rewrite_summary(done: Rewritten, unit: str | None = None) -> str:
     """Summarise the result for a robot: its meshes, each with its number of hulls."""
     total = sum(len(mesh.files) for mesh in done.meshes)
     lines = [f"{done.path}: {counted(len(done.meshes), 'mesh', 'meshes')}, {_count(total)} in {done.folder}"]
+    if not done.meshes:
+        lines = [f"{done.path}: written"]
     lines += [
         f"  {mesh.path.name}: {_count(len(mesh.files))}; {_fit(mesh.result.report, unit)}" for mesh in done.meshes
     ]

@@ -3,26 +3,45 @@
 A geom's settings come from its own attributes and from defaults: its class, or the nearest ``childclass`` above it, and
 the classes that contain that class (https://mujoco.readthedocs.io, "Default settings").
 
-A geom in a group that MuJoCo shows by default (0, 1, 2) may be the only visible one of its body. Unless another geom
-shows the same mesh there, it stays, without contacts and mass, and the hulls go to group 3.
+Hulls weigh nothing. A geom stays, without contacts, if its body's mass follows from it: then mass, centre and inertia
+are the original's, however they were given. A geom in a group that MuJoCo shows by default (0, 1, 2) may also be the
+only visible one of its body; unless another geom shows the same mesh there, it stays and remains visible.
+
+Files that ``<include>`` names are part of the model. Their paths are relative to the folder of the main file, or if
+nothing is there, to that of the file that names them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+import trimesh
+
 from rlacd.errors import MeshFileError
-from rlacd.io.robots.plan import Edits, HullFile, HullFiles, MeshUse, Plan
+from rlacd.io.robots.plan import HullFiles, MeshUse, Plan
 from rlacd.io.robots.references import References
-from rlacd.io.robots.spans import Document, Element
+from rlacd.io.robots.spans import Edit, Element, expand
 from rlacd.io.robots.urdf import read_scale
 
-HIDDEN_GROUP = "3"
+SHOWN, HIDDEN = ("0", "1", "2"), "3"
+"""Groups that MuJoCo shows by default, and one that it does not."""
+
 BODIES = ("worldbody", "body", "frame", "replicate")
+FILES = ("mesh", "texture", "hfield", "skin", "include", "model")
 NAMED_BY = {"geom1": None, "geom2": None, "objname": "objtype", "refname": "reftype"}
 """Attributes that may name a geom, and those that then say so."""
+
+MOST_STL_FACES = 200_000
+"""Triangles of the largest STL file that MuJoCo reads."""
+
+LEAST_VOLUME = 1e-14
+"""A mesh with less volume is refused by MuJoCo 4.0, unless its inertia is that of a shell."""
+
+
+TOP = "main"
 
 
 @dataclass
@@ -31,15 +50,13 @@ class Defaults:
 
     parents: dict[str, str | None] = field(default_factory=dict)
     own: dict[tuple[str, str], dict[str, str]] = field(default_factory=dict)
-    top: str = "main"
 
     @classmethod
     def of(cls, root: Element) -> Defaults:
-        """Collect the ``<default>`` sections of a file."""
-        defaults = cls({"main": None})
+        """Collect the ``<default>`` sections of a model; those at the top are one class, whatever its name."""
+        defaults = cls({TOP: None})
         for section in root.named("default"):
-            defaults.top = section.attributes.get("class", defaults.top)
-            defaults._gather(section, section.attributes.get("class", "main"), None)
+            defaults._gather(section, TOP, None)
         return defaults
 
     def _gather(self, section: Element, name: str, parent: str | None) -> None:
@@ -52,7 +69,8 @@ class Defaults:
 
     def full(self, element: Element, childclass: str | None = None) -> dict[str, str]:
         """Return the element's attributes, completed by those of its classes."""
-        name: str | None = element.attributes.get("class", childclass or self.top)
+        name: str | None = element.attributes.get("class", childclass)
+        name = name if name in self.parents else TOP
         chain: list[dict[str, str]] = []
         while name is not None and name in self.parents and len(chain) <= len(self.parents):
             chain.append(self.own.get((name, element.tag), {}))
@@ -65,149 +83,281 @@ class Defaults:
 
 @dataclass(frozen=True)
 class _Geom:
+    """A geom that collides as a mesh.
+
+    Attributes
+    ----------
+    attributes
+        Its own, completed by those of its classes.
+    is_seen, is_weighed
+        Whether it is the only one to show its mesh; whether the mass of its body follows from it.
+    """
+
     element: Element
     attributes: Mapping[str, str]
     mesh: str
-    stays: bool
+    is_seen: bool
+    is_weighed: bool
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether it stays, without contacts; a shape for fluids belongs to the whole, not to its hulls."""
+        return self.is_seen or self.is_weighed or self.attributes.get("fluidshape", "none") != "none"
 
 
-def plan_mjcf(document: Document, references: References, named: Callable[[str, str], str]) -> Plan:
-    """Find the collision meshes of an MJCF file; parameters and errors as for `rlacd.io.robots.urdf.plan_urdf`."""
-    root = document.root
-    defaults = Defaults.of(root)
-    folder = mesh_folder(document)
-    assets = {_mesh_name(mesh, defaults): mesh for mesh in _assets(root)}
-    warnings = [
-        f"What <{kind}> brings in is left unchanged: rewrite that file too."
-        for kind in ("include", "model", "attach")
-        if any(element.tag == kind for element in root.walk())
-    ]
-    geoms = []
-    for body in (element for element in root.walk() if element.tag in BODIES):
-        geoms += [geom for geom in _colliding(body, defaults) if _is_file(assets, geom, defaults, warnings)]
-    for geom in geoms:
-        _mass(geom.attributes)  # fail before any work
-    uses = {
-        name: _use(assets[name], defaults, references, folder, document)
-        for name in dict.fromkeys(geom.mesh for geom in geoms)
-    }
-    warnings += _caveats(root, geoms)
-    rewritten = {assets[name] for name in uses}
-    relative = [
-        str(full["file"])
-        for element in root.walk()
-        if element.tag in ("mesh", "texture", "hfield", "skin", "include", "model")
-        and (full := defaults.full(element)).get("file")
-        and not Path(full["file"]).is_absolute()
-        and element not in rewritten
-    ]
+@dataclass(frozen=True)
+class Compiler:
+    """What all ``<compiler>`` elements of a model say together: later ones overrule."""
 
-    def edit(hulls: HullFiles) -> Edits:
-        taken = {*assets, *(str(e.attributes.get("name")) for e in root.walk() if e.tag == "geom")}
-        names = {name: _fresh(name, len(hulls[use]), taken) for name, use in uses.items()}
-        edits: Edits = []
-        for name, use in uses.items():
-            asset = assets[name]
-            file = defaults.full(asset)["file"]
-            copies = [
-                document.with_attributes(asset, {"name": new, "file": named(file, hull.name)})
-                for new, hull in zip(names[name], hulls[use], strict=True)
-            ]
-            gap = document.indent(asset)
-            edits.append((asset.end, asset.end, b"".join(gap + copy for copy in copies)))
-        for geom in geoms:
-            edits.append(_geom_edit(document, geom, names[geom.mesh], list(hulls[uses[geom.mesh]])))
-        return edits
+    settings: Mapping[str, str]
+    root: Element
 
-    return Plan(list(dict.fromkeys(uses.values())), edit, relative, warnings)
+    @classmethod
+    def of(cls, root: Element) -> Compiler:
+        """Collect the settings.
+
+        Raises
+        ------
+        MeshFileError
+            Paths are to be stripped from the names of meshes.
+        """
+        settings: dict[str, str] = {}
+        for compiler in root.named("compiler"):
+            new = dict(compiler.attributes)
+            if "assetdir" in new:
+                new = {"meshdir": new["assetdir"], "texturedir": new["assetdir"], **new}
+            settings.update(new)
+        if settings.get("strippath") == "true":
+            raise MeshFileError(
+                f'{root.file.path} has strippath="true", with which meshes cannot be in a folder of their own: '
+                "remove it, and write the paths out."
+            )
+        return cls(settings, root)
+
+    @property
+    def mesh_folder(self) -> str:
+        """The folder of meshes, relative to that of the main file."""
+        return self.settings.get("meshdir", "")
+
+    def relocated(self, element: Element) -> str | None:
+        """The file that an element of an included file names, seen from the main file, if its text is not that."""
+        name, main = element.attributes.get("file", ""), self.root.file.folder
+        where = {"include": "", "texture": "texturedir"}.get(element.tag, "meshdir")
+        folder = main / self.settings.get(where, "")
+        inner = element.file.folder
+        if not name or inner == main or not inner.is_relative_to(main) or (folder / name).exists():
+            return None
+        moved = inner.relative_to(main) / name
+        return moved.as_posix() if (folder / moved).exists() else None
+
+    def is_weighed(self, geom: Element, full: Mapping[str, str]) -> bool:
+        """Tell whether the mass of the geom's body follows from the geom."""
+        body = next((element for element in geom.up() if element.tag in ("body", "worldbody")), None)
+        when = self.settings.get("inertiafromgeom", "auto")
+        if body is None or body.tag == "worldbody" or when == "false":
+            return False
+        if when != "true" and any(body.named("inertial")):
+            return False
+        first, last = (*_numbers(geom, self.settings, "inertiagrouprange", "0 5"), 5.0)[:2]
+        if not first <= _numbers(geom, full, "group", "0")[0] <= last:
+            return False
+        return _numbers(geom, full, "mass" if "mass" in full else "density", "1000")[0] != 0
 
 
-def mesh_folder(document: Document) -> Path:
-    """Return the folder that mesh file names are relative to.
+def read_model(root: Element, references: References, read: Callable[[Path], bytes]) -> Compiler:
+    """Bring in what the model includes, and return the settings of the whole.
 
     Raises
     ------
     MeshFileError
-        The file asks for paths to be stripped from the names of its meshes.
+        A file cannot be read, may not be, or is included twice; or the settings are not supported.
     """
-    settings: dict[str, str] = {}
-    for compiler in document.root.named("compiler"):
-        settings.update(compiler.attributes)
-    if settings.get("strippath") == "true":
-        raise MeshFileError(
-            f'{document.path} has strippath="true", with which meshes cannot be in a folder of their own: '
-            "remove it, and write the paths out."
-        )
-    named = settings.get("meshdir", settings.get("assetdir", ""))
-    return document.path.absolute().parent / named
+
+    def find(name: str, element: Element) -> Path:
+        main = root.file.folder
+        return references.find(name, main if (main / name).is_file() else element.file.folder)
+
+    expand(root, find, read)
+    return Compiler.of(root)
 
 
-def _geom_edit(document: Document, geom: _Geom, names: list[str], hulls: list[HullFile]) -> tuple[int, int, bytes]:
+def plan_mjcf(compiler: Compiler, references: References, named: Callable[[str, str], str]) -> Plan:
+    """Find the collision meshes of an MJCF model; the rest is as for `rlacd.io.robots.urdf.plan_urdf`."""
+    root = compiler.root
+    defaults = Defaults.of(root)
+    assets = {_mesh_name(mesh, defaults): mesh for mesh in _assets(root)}
+    warnings = [
+        f"What <{kind}> brings in is left unchanged: rewrite that file too."
+        for kind in ("model", "attach")
+        if any(element.tag == kind for element in root.walk())
+    ]
+    geoms: list[_Geom] = []
+    for body in (element for element in root.walk() if element.tag in BODIES):
+        found = _colliding(body, defaults, compiler)
+        geoms += [geom for geom in found if _is_file(assets, geom, defaults, warnings)]
+    uses = {
+        name: _use(assets[name], defaults, references, compiler) for name in dict.fromkeys(geom.mesh for geom in geoms)
+    }
+    warnings += _caveats(root, geoms)
+    rewritten = {assets[name] for name in uses}
+    relative = [
+        file
+        for element in root.walk()
+        if element.tag in FILES and element not in rewritten
+        if (file := defaults.full(element).get("file")) and not Path(file).is_absolute()
+    ]
+
+    def edit(hulls: HullFiles, sources: Mapping[MeshUse, trimesh.Trimesh], copies: Mapping[MeshUse, str]) -> list[Edit]:
+        taken = {*assets, *(str(e.attributes.get("name")) for e in root.walk() if e.tag == "geom")}
+        names = {name: _fresh(name, len(hulls[use]), taken) for name, use in uses.items()}
+        edits = []
+        for name, use in uses.items():
+            weighed = any(geom.mesh == name and geom.is_weighed and "mass" not in geom.attributes for geom in geoms)
+            asset, full = assets[name], defaults.full(assets[name])
+            edits.append(_asset_edit(asset, full, named, (names[name], hulls[use])))
+            moved = compiler.relocated(asset)
+            values = {} if moved is None else {"file": moved}
+            if use in copies:
+                values["file"] = named(full["file"], copies[use])
+            if _lacks_volume(sources[use], full.get("inertia", "legacy")):
+                values["inertia"] = "shell"
+                density = " Its mass is its area times the density." if weighed else ""
+                warnings.append(f'{use.path.name} has no volume, so its mesh got inertia="shell".{density}')
+            if values:
+                edits.append(Edit(asset.file, asset.start, asset.end, asset.with_attributes(values)))
+        edits += [_geom_edit(geom, names[geom.mesh], taken) for geom in geoms]
+        return edits + _relocations(compiler, edits, rewritten)
+
+    return Plan(list(dict.fromkeys(uses.values())), edit, relative, warnings)
+
+
+def _asset_edit(
+    asset: Element, full: Mapping[str, str], named: Callable[[str, str], str], hulls: tuple[list[str], Sequence[str]]
+) -> Edit:
+    """Add the hulls' assets behind that of their mesh."""
+    shell = {"inertia": "shell"} if "inertia" in full else {}  # hulls weigh nothing, and may be too thin for the others
+    copies = [
+        asset.with_attributes({"name": new, "file": named(full["file"], file), **shell})
+        for new, file in zip(*hulls, strict=True)
+    ]
+    return Edit(asset.file, asset.end, asset.end, b"".join(asset.indent + copy for copy in copies))
+
+
+def _relocations(compiler: Compiler, edits: Sequence[Edit], done: set[Element]) -> list[Edit]:
+    """Correct the paths in included files that are to be written into the main file, where another folder counts."""
+    changed = {id(edit.file) for edit in edits}
+    includes = [element for element in compiler.root.walk() if element.included is not None]
+    for element in reversed(includes):  # what an inner file changes, the outer ones hold
+        if element.included is not None and id(element.included.file) in changed:
+            changed.add(id(element.file))
+    moved = []
+    for element in compiler.root.walk():
+        if element.tag in FILES and id(element.file) in changed and element not in done:
+            if element.included is not None and id(element.included.file) in changed:
+                continue
+            name = compiler.relocated(element)
+            if name is not None:
+                new = element.with_attributes({"file": name})
+                moved.append(Edit(element.file, element.start, element.end, new))
+    return moved
+
+
+def _geom_edit(geom: _Geom, meshes: list[str], taken: set[str]) -> Edit:
     element = geom.element
     own = element.attributes.get("name")
     pieces = []
-    if geom.stays:
-        seen = {"contype": "0", "conaffinity": "0", "mass": "0"}
-        pieces.append(document.with_attributes(element, seen if own is None else {**seen, "name": f"{own}_visual"}))
-    for index, (mesh, hull) in enumerate(zip(names, hulls, strict=True)):
-        values = {"mesh": mesh}
+    if geom.is_kept:
+        values = {"contype": "0", "conaffinity": "0"}
+        if own is not None:
+            values["name"] = _unused(f"{own}_visual" if geom.is_seen else f"{own}_mass", taken)
+        if not geom.is_seen:
+            values["rgba"] = "0 0 0 0"  # neither drawn nor hit by rays
+        pieces.append(element.with_attributes(values))
+    for index, mesh in enumerate(meshes):
+        values = {"mesh": mesh, "mass": "0"}
         if own is not None and index:  # the first keeps the name, since other elements may refer to it
-            values["name"] = f"{own}_{index:03d}"
-        if geom.stays:
-            values["group"] = HIDDEN_GROUP
-        if "mass" in geom.attributes:
-            values["mass"] = repr(_mass(geom.attributes) * hull.share)
-        pieces.append(document.with_attributes(element, values))
-    return element.start, element.end, document.indent(element).join(pieces)
+            values["name"] = _unused(f"{own}_{index:03d}", taken)
+        if geom.is_seen:
+            values["group"] = HIDDEN
+        if "fluidshape" in geom.attributes and geom.is_kept:
+            values["fluidshape"] = "none"
+        pieces.append(element.with_attributes(values))
+    return Edit(element.file, element.start, element.end, element.indent.join(pieces))
 
 
-def _mass(attributes: Mapping[str, str]) -> float:
+def _numbers(geom: Element, attributes: Mapping[str, str], name: str, default: str) -> list[float]:
+    """Read the numbers of an attribute, at least one."""
+    text = attributes.get(name, default)
     try:
-        return float(attributes.get("mass", "0"))
+        return [float(word) for word in text.split()] or [float(text)]
     except ValueError as error:
-        name, mass = attributes.get("name", "without a name"), attributes["mass"]
-        raise MeshFileError(f"the mass of the geom {name} is {mass!r}, which is not a number: correct it.") from error
+        where = geom.attributes.get("name", "without a name")
+        raise MeshFileError(
+            f"the {name} of the geom {where} is {text!r}, which is not a number: correct it."
+        ) from error
 
 
-def _colliding(body: Element, defaults: Defaults) -> Iterator[_Geom]:
+def _lacks_volume(mesh: trimesh.Trimesh, inertia: str) -> bool:
+    """Tell whether MuJoCo would refuse to find the inertia of the mesh in this way."""
+    if inertia == "shell" or not len(mesh.faces):
+        return False
+    corners = mesh.vertices.astype(np.float32).astype(float)[mesh.faces]
+    corners -= corners.reshape(-1, 3).mean(axis=0)
+    volumes = np.linalg.det(corners) / 6
+    if inertia == "exact":
+        return bool(volumes.sum() < LEAST_VOLUME or not mesh.is_winding_consistent)
+    return bool(np.abs(volumes).sum() < LEAST_VOLUME)
+
+
+def mujoco_reads(path: Path) -> bool:
+    """Tell whether MuJoCo reads a mesh file: OBJ, its own MSH, and binary STL of at most 200,000 triangles."""
+    ending = path.suffix.lower()
+    if ending != ".stl":
+        return ending in (".obj", ".msh")
+    with path.open("rb") as file:
+        count = int.from_bytes(file.read(84)[80:], "little")
+    return count <= MOST_STL_FACES and path.stat().st_size == 84 + 50 * count
+
+
+def _unused(name: str, taken: set[str]) -> str:
+    while name in taken:
+        name += "_"
+    taken.add(name)
+    return name
+
+
+def _colliding(body: Element, defaults: Defaults, compiler: Compiler) -> Iterator[_Geom]:
     """Yield the geoms of one body that collide as meshes."""
-    childclass = _childclass(body)
+    childclass = next((e.attributes["childclass"] for e in body.up() if "childclass" in e.attributes), None)
     geoms = [(geom, defaults.full(geom, childclass)) for geom in body.named("geom")]
     seen = {full.get("mesh") for _, full in geoms if not _collides(full)}
     for geom, full in geoms:
         if full.get("type") == "mesh" and "mesh" in full and _collides(full):
-            shown = full.get("group", "0").strip() in ("0", "1", "2")
-            yield _Geom(geom, full, full["mesh"], shown and full["mesh"] not in seen)
+            is_seen = full.get("group", "0").strip() in SHOWN and full["mesh"] not in seen
+            yield _Geom(geom, full, full["mesh"], is_seen, compiler.is_weighed(geom, full))
 
 
 def _collides(attributes: Mapping[str, str]) -> bool:
     return any(attributes.get(name, "1").strip() != "0" for name in ("contype", "conaffinity"))
 
 
-def _childclass(body: Element) -> str | None:
-    element: Element | None = body
-    while element is not None:
-        if "childclass" in element.attributes:
-            return element.attributes["childclass"]
-        element = element.parent
-    return None
-
-
 def _is_file(assets: Mapping[str, Element], geom: _Geom, defaults: Defaults, warnings: list[str]) -> bool:
     asset = assets.get(geom.mesh)
     if asset is not None and "file" in defaults.full(asset):
         return True
-    why = "is not in this file" if asset is None else "has no file of its own"
+    why = "is not in the file" if asset is None else "has no file of its own"
     sentence = f"The mesh {geom.mesh} is left unchanged: it {why}."
     if sentence not in warnings:
         warnings.append(sentence)
     return False
 
 
-def _use(asset: Element, defaults: Defaults, references: References, folder: Path, document: Document) -> MeshUse:
+def _use(asset: Element, defaults: Defaults, references: References, compiler: Compiler) -> MeshUse:
     full = defaults.full(asset)
-    where = f"mesh {_mesh_name(asset, defaults)} of {document.path}"
-    return MeshUse(references.find(full["file"], folder), read_scale(full.get("scale"), where))
+    where = f"mesh {_mesh_name(asset, defaults)} of {asset.file.path}"
+    folder = compiler.root.file.folder / compiler.mesh_folder
+    place = references.find(compiler.relocated(asset) or full["file"], folder)
+    return MeshUse(place, read_scale(full.get("scale"), where))
 
 
 def _assets(root: Element) -> Iterator[Element]:
@@ -234,10 +384,3 @@ def _caveats(root: Element, geoms: list[_Geom]) -> Iterator[str]:
             name = element.attributes.get(attribute)
             if name in names and (kind is None or element.attributes.get(kind) == "geom"):
                 yield f"<{element.tag}> names the geom {name}: it now means the first of its hulls only."
-    bodies = {
-        geom.element.parent for geom in geoms if geom.element.parent is not None and "mass" not in geom.attributes
-    }
-    unsaid = [body for body in bodies if body.tag == "body" and not any(body.named("inertial"))]
-    if unsaid:
-        listed = ", ".join(sorted(body.attributes.get("name", "without a name") for body in unsaid))
-        yield f"The mass of some bodies follows from their geoms, so it is now that of the hulls: {listed}."

@@ -7,6 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
 
+import trimesh
+
+from rlacd.io.robots.spans import Edit
+
 Scale: TypeAlias = tuple[float, float, float]
 
 
@@ -26,16 +30,8 @@ class MeshUse:
     scale: Scale
 
 
-@dataclass(frozen=True)
-class HullFile:
-    """A hull on disk: its file's name, and its share of the volume of all hulls of its mesh."""
-
-    name: str
-    share: float
-
-
-Edits: TypeAlias = list[tuple[int, int, bytes]]
-HullFiles: TypeAlias = Mapping[MeshUse, Sequence[HullFile]]
+HullFiles: TypeAlias = Mapping[MeshUse, Sequence[str]]
+"""The names of the files of each mesh's hulls."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +43,8 @@ class Plan:
     uses
         The meshes to decompose, in the order of the file, each once.
     edit
-        Takes the hull files of each and returns the edits of the file's bytes.
+        Takes the hull files of each and its mesh at scale, and the copies
+        of meshes that the consumer cannot read; returns the edits of the file and of those it includes.
     relative
         Paths that other parts of the file name relative to its folder: they break if the result goes elsewhere.
     warnings
@@ -55,6 +52,6 @@ class Plan:
     """
 
     uses: list[MeshUse]
-    edit: Callable[[HullFiles], Edits]
+    edit: Callable[[HullFiles, Mapping[MeshUse, trimesh.Trimesh], Mapping[MeshUse, str]], list[Edit]]
     relative: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)

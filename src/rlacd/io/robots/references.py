@@ -93,6 +93,10 @@ class References:
         if "://" not in reference or urlsplit(reference).scheme not in PACKAGE_SCHEMES:
             return None
         name = reference.split("://", 1)[1].split("/", 1)[0]
+        if not name:
+            raise MeshFileError(
+                f"{self._robot} refers to {reference}, which names no package: package://NAME/FILE does."
+            )
         if name in self._named:
             return self._named[name]
         if name.strip(". ") and not set(name) & {"\\", "\0"}:
@@ -122,14 +126,14 @@ def _package_name(folder: Path) -> str | None:
     if not place.is_file():
         return None
     try:
-        document = parse(place, read_file(place, LARGEST_DESCRIPTION))
+        root = parse(place, read_file(place, LARGEST_DESCRIPTION))
     except (MeshFileError, OSError):
         return None
-    found = next(document.root.named("name"), None)
+    found = next(root.named("name"), None)
     if found is None:
         return None
-    inner = document.data[found.head : found.end].split(b"<")[0]
-    return inner.decode(document.encoding, "replace").strip()
+    inner = root.file.data[found.head : found.end].split(b"<")[0]
+    return inner.decode(root.file.encoding, "replace").strip()
 
 
 def _paths(variable: str) -> list[Path]:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import trimesh
+from numpy.typing import NDArray
 
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
@@ -18,10 +19,10 @@ from rlacd.fields import checked, path_like, read, shown
 from rlacd.io.read.load import load_mesh
 from rlacd.io.read.open_file import read_file
 from rlacd.io.robots.collada import collada_unit
-from rlacd.io.robots.mjcf import mesh_folder, plan_mjcf
-from rlacd.io.robots.plan import HullFile, MeshUse, Plan
+from rlacd.io.robots.mjcf import mujoco_reads, plan_mjcf, read_model
+from rlacd.io.robots.plan import MeshUse, Plan
 from rlacd.io.robots.references import References
-from rlacd.io.robots.spans import LARGEST_DESCRIPTION, Document, parse, replaced
+from rlacd.io.robots.spans import LARGEST_DESCRIPTION, Element, edited, parse
 from rlacd.io.robots.urdf import plan_urdf
 from rlacd.io.write import check_file, check_name, file_stem, write_file
 from rlacd.io.write.encode import encode_plain_obj
@@ -115,24 +116,23 @@ def rewrite_robot(
     packages = checked(OutputOptions, "package_dirs", package_dirs, called="package_dirs") or ()
     check_rewrite(source, place)
     kind = ENDINGS[source.suffix.lower()]
-    document = parse(source, _read(source))
-    if document.root.tag != ROOTS[kind]:
-        raise MeshFileError(
-            f"{source} is not {kind.upper()}: it starts with <{document.root.tag}>, not <{ROOTS[kind]}>."
-        )
+    root = parse(source, _read(source))
+    if root.tag != ROOTS[kind]:
+        raise MeshFileError(f"{source} is not {kind.upper()}: it starts with <{root.tag}>, not <{ROOTS[kind]}>.")
     for name in ("unit", "scale", "per_node"):
         if options.get(name):
             raise OptionError(f"{name} is for a single mesh; a robot file states it for each of its meshes.")
     references = References(source, packages)
     folder = place.with_name(f"{place.stem}_{kind}")
-    plan, warnings = _plan(document, kind, references, place, folder)
+    plan, warnings = _plan(root, kind, references, place, folder)
     if not plan.uses:
-        raise MeshFileError(f"{source} has no collision mesh to decompose: there is nothing to do.")
+        write_file(place, root.file.data)
+        return Rewritten(place, folder, [], [f"{source} has no collision mesh, so this is a copy.", *warnings])
     stem = file_stem(place.stem)
     names = _stems([use.path for use in plan.uses])
     meshes: dict[MeshUse, RewrittenMesh] = {}
-    shares: dict[MeshUse, list[HullFile]] = {}
     files: dict[str, bytes] = {}
+    copies: dict[MeshUse, str] = {}
     for use, name in zip(plan.uses, names, strict=True):
         unit, said = collada_unit(use.path)
         warnings += said
@@ -141,12 +141,17 @@ def rewrite_robot(
             f"{stem}_{name}_{i:03d}.obj": encode_plain_obj(_unscaled(h, use)) for i, h in enumerate(result.hulls)
         }
         files.update(written)
-        volumes = np.array([hull.volume for hull in result.hulls])
-        shares[use] = [HullFile(*pair) for pair in zip(written, (volumes / volumes.sum()).tolist(), strict=True)]
+        if kind == "mjcf" and not mujoco_reads(use.path):
+            faces = _oriented(result.source.faces, use)
+            mesh = trimesh.Trimesh(result.source.vertices / use.scale, faces, process=False)
+            copies[use] = f"{stem}_{name}_visual.obj"
+            files[copies[use]] = encode_plain_obj(mesh)
         meshes[use] = RewrittenMesh(use.path, list(written), result)
         warnings += [f"{use.path.name}: {warning}" for warning in result.report.get("warnings", [])]
-    warnings += _fewer(meshes, options)
-    data = replaced(document.data, plan.edit(shares))
+    named = {use: mesh.files for use, mesh in meshes.items()}
+    edits = plan.edit(named, {use: mesh.result.source for use, mesh in meshes.items()}, copies)
+    data = edited(root, edits, [element for element in root.walk() if element.included is not None])
+    warnings += [warning for warning in plan.warnings if warning not in warnings] + _fewer(meshes, options)
     check_names(folder, stem, list(files))
     write_folder(folder, stem, files, then=lambda: write_file(place, data))
     return Rewritten(place, folder, list(meshes.values()), warnings)
@@ -167,19 +172,20 @@ def check_rewrite(source: Path, place: Path) -> None:
         raise OutputError(f"cannot write into {folder}: it is a file, not a folder; choose another name.")
 
 
-def _plan(document: Document, kind: str, references: References, place: Path, folder: Path) -> tuple[Plan, list[str]]:
+def _plan(root: Element, kind: str, references: References, place: Path, folder: Path) -> tuple[Plan, list[str]]:
+    source = root.file.folder
     if kind == "urdf":
-        plan = plan_urdf(document, references, lambda old, hull: _reference(old, hull, references, folder))
+        plan = plan_urdf(root, references, lambda old, hull: _reference(old, hull, references, folder))
     else:
-        source = Path(os.path.abspath(document.path)).parent
-        within = os.path.relpath(mesh_folder(document), source)  # the same from the new file
+        compiler = read_model(root, references, _read)
+        within = os.path.relpath(source / compiler.mesh_folder, source)  # the same from the new file
         target = os.path.relpath(folder.absolute(), Path(os.path.abspath(place.absolute().parent / within)))
-        plan = plan_mjcf(document, references, lambda old, hull: (Path(target) / hull).as_posix())
+        plan = plan_mjcf(compiler, references, lambda _, hull: (Path(target) / hull).as_posix())
     warnings = list(plan.warnings)
-    if plan.relative and os.path.realpath(place.absolute().parent) != os.path.realpath(document.path.absolute().parent):
+    if plan.relative and os.path.realpath(place.absolute().parent) != os.path.realpath(source):
         warnings.append(
             f"{len(plan.relative)} other files, such as {plan.relative[0]}, are referred to relative to "
-            f"{document.path.absolute().parent} and will not be found from {place.absolute().parent}: write the result "
+            f"{source} and will not be found from {place.absolute().parent}: write the result "
             "beside the input, or copy them too."
         )
     return plan, warnings
@@ -242,8 +248,8 @@ def _coarse(mesh: trimesh.Trimesh, options: Mapping[str, Any]) -> Decomposition:
 def _decomposed(use: MeshUse, unit: float, options: Mapping[str, Any]) -> Decomposition:
     try:
         mesh = load_mesh(use.path)
-        faces = mesh.faces if np.prod(np.sign(use.scale)) > 0 else mesh.faces[:, ::-1]
-        return _coarse(trimesh.Trimesh(mesh.vertices * unit * use.scale, faces, process=False), options)
+        mesh = trimesh.Trimesh(mesh.vertices * unit * use.scale, _oriented(mesh.faces, use), process=False)
+        return _coarse(mesh, options)
     except MeshError as error:
         if str(use.path) in str(error):
             raise
@@ -259,8 +265,12 @@ def _unscaled(hull: trimesh.Trimesh, use: MeshUse) -> trimesh.Trimesh:
     exact = Hull.of(points)
     if exact is not None:
         return trimesh.Trimesh(exact.vertices, exact.faces, process=False)
-    faces = hull.faces if np.prod(np.sign(use.scale)) > 0 else hull.faces[:, ::-1]
-    return trimesh.Trimesh(points, faces, process=False)
+    return trimesh.Trimesh(points, _oriented(hull.faces, use), process=False)
+
+
+def _oriented(faces: NDArray[Any], use: MeshUse) -> NDArray[Any]:
+    """Turn faces around if the scale mirrors."""
+    return faces if np.prod(np.sign(use.scale)) > 0 else faces[:, ::-1]
 
 
 def _stems(paths: Sequence[Path]) -> list[str]:

@@ -1,6 +1,6 @@
 """XML with the byte range of every element, so that a part can be replaced and the rest kept as it is.
 
-Input: the bytes of a file. Output: a tree of `Element`, and `replaced`, which puts new bytes in place of old ones.
+Input: the bytes of a file. Output: a tree of `Element`, and `edited`, which puts new bytes in place of old ones.
 Python's expat is used because it reports byte positions, which lxml does not. A document type is refused, and with it
 every entity: no file can expand (the "billion laughs") or cause another file or address to be read.
 """
@@ -8,7 +8,7 @@ every entity: no file can expand (the "billion laughs") or cause another file or
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
@@ -31,17 +31,37 @@ _ATTRIBUTE = re.compile(rb"""(\s+)([^\s=/>"']+)(\s*=\s*)("[^"]*"|'[^']*')""")
 _TAG = re.compile(rb"""<(?:[^"'>]|"[^"]*"|'[^']*')*>""")
 
 
+@dataclass
+class File:
+    """A parsed file: where it is, its bytes, and the encoding that it declares."""
+
+    path: Path
+    data: bytes
+    encoding: str = "utf-8"
+
+    @property
+    def folder(self) -> Path:
+        """The folder that holds it."""
+        return self.path.absolute().parent
+
+
 @dataclass(eq=False)
 class Element:
-    """An element and its byte range: ``data[start:head]`` is its start tag, ``data[start:end]`` all of it."""
+    """An element and its byte range in its file: ``[start:head]`` is its start tag, ``[start:end]`` all of it.
+
+    `included` is the root of the file that an ``<include>`` brings in. Its children then follow the ``<include>`` among
+    the children of the parent, as if they had been written there.
+    """
 
     tag: str
     attributes: dict[str, str]
     parent: Element | None
+    file: File
     start: int
     head: int
     end: int = 0
     children: list[Element] = field(default_factory=list)
+    included: Element | None = None
 
     def walk(self) -> Iterator[Element]:
         """Yield this element and all below it, in the order of the file."""
@@ -49,39 +69,37 @@ class Element:
         for child in self.children:
             yield from child.walk()
 
+    def up(self) -> Iterator[Element]:
+        """Yield this element and those around it, innermost first."""
+        element: Element | None = self
+        while element is not None:
+            yield element
+            element = element.parent
+
     def named(self, *tags: str) -> Iterator[Element]:
         """Yield the children with one of these tags."""
         return (child for child in self.children if child.tag in tags)
 
+    @property
+    def text(self) -> bytes:
+        """The element's bytes."""
+        return self.file.data[self.start : self.end]
 
-@dataclass(frozen=True)
-class Document:
-    """A parsed file."""
-
-    path: Path
-    data: bytes
-    root: Element
-    encoding: str
-
-    def text(self, element: Element) -> bytes:
-        """Return the element's bytes."""
-        return self.data[element.start : element.end]
-
-    def indent(self, element: Element) -> bytes:
-        """Return the white space between the start of the line and the element; nothing if something else is there."""
-        start = element.start
-        while start and self.data[start - 1] in b" \t\r\n":
+    @property
+    def indent(self) -> bytes:
+        """The white space between the start of the line and the element; nothing if something else is there."""
+        data, start = self.file.data, self.start
+        while start and data[start - 1] in b" \t\r\n":
             start -= 1
-        space = self.data[start : element.start]
+        space = data[start : self.start]
         at = space.rfind(b"\n")
         return space[at - (space[at - 1 : at] == b"\r") :] if at >= 0 else b""
 
-    def with_attributes(self, element: Element, values: Mapping[str, str]) -> bytes:
+    def with_attributes(self, values: Mapping[str, str]) -> bytes:
         """Return the element's bytes with attributes set in its start tag, and the rest unchanged."""
-        head, rest = self.data[element.start : element.head], self.data[element.head : element.end]
-        left = {
-            name.encode(): quoteattr(value).encode(self.encoding, "xmlcharrefreplace") for name, value in values.items()
-        }
+        head, rest = self.file.data[self.start : self.head], self.file.data[self.head : self.end]
+        encoding = self.file.encoding
+        left = {name.encode(): quoteattr(value).encode(encoding, "xmlcharrefreplace") for name, value in values.items()}
         head = _ATTRIBUTE.sub(lambda m: m[1] + m[2] + m[3] + left.pop(m[2]) if m[2] in left else m[0], head)
         close = b"/>" if head.endswith(b"/>") else b">"
         kept = head[: -len(close)]
@@ -90,8 +108,18 @@ class Document:
         return kept.rstrip() + added + tail + close + rest
 
 
-def parse(path: Path, data: bytes) -> Document:
-    """Parse a file.
+@dataclass(frozen=True)
+class Edit:
+    """New bytes for the range ``[start:end]`` of a file."""
+
+    file: File
+    start: int
+    end: int
+    new: bytes
+
+
+def parse(path: Path, data: bytes, depth: int = 0) -> Element:
+    """Parse a file, to be placed `depth` elements deep; returns its root.
 
     Raises
     ------
@@ -102,7 +130,7 @@ def parse(path: Path, data: bytes) -> Document:
     parser = expat.ParserCreate()
     top: list[Element] = []
     open_elements: list[Element] = []
-    encodings, count = ["utf-8"], [0]
+    file, count = File(path, data), [0]
 
     def refuse(*_: object) -> None:
         raise MeshFileError(
@@ -110,16 +138,16 @@ def parse(path: Path, data: bytes) -> Document:
         )
 
     def declared(version: str, encoding: str | None, standalone: int) -> None:
-        encodings[0] = encoding or "utf-8"
+        file.encoding = encoding or "utf-8"
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         at = parser.CurrentByteIndex
-        if len(open_elements) >= DEEPEST:
+        if depth + len(open_elements) >= DEEPEST:
             raise MeshFileError(f"{path} nests elements more than {DEEPEST} deep, too deep for a robot file.")
         count[0] += 1
         if count[0] > MOST_ELEMENTS:
             raise MeshFileError(f"{path} has more than {MOST_ELEMENTS} elements, too many for a robot file.")
-        element = Element(tag, attributes, open_elements[-1] if open_elements else None, at, _tag_end(data, at))
+        element = Element(tag, attributes, open_elements[-1] if open_elements else None, file, at, _tag_end(data, at))
         (open_elements[-1].children if open_elements else top).append(element)
         open_elements.append(element)
 
@@ -141,16 +169,57 @@ def parse(path: Path, data: bytes) -> Document:
         raise MeshFileError(f"{path} is not well-formed XML ({error}): correct it first.") from error
     except (LookupError, ValueError) as error:
         raise MeshFileError(f"{path} is in an unknown encoding ({error}): save it as UTF-8.") from error
-    return Document(path, data, top[0], encodings[0])
+    return top[0]
 
 
-def replaced(data: bytes, edits: Sequence[tuple[int, int, bytes]]) -> bytes:
-    """Put the bytes of each edit ``(start, end, new)`` in place of ``data[start:end]``; edits do not overlap."""
+def expand(root: Element, find: Callable[[str, Element], Path], read: Callable[[Path], bytes]) -> None:
+    """Bring in what each ``<include>`` below `root` names, and what that includes.
+
+    Raises
+    ------
+    MeshFileError
+        `find` or `read` cannot find or open a file, or a file is included twice.
+    """
+    seen, total = {root.file.path.absolute()}, sum(1 for _ in root.walk())
+    waiting = [element for element in root.walk() if element.tag == "include"]
+    while waiting:
+        element = waiting.pop()
+        place = find(element.attributes.get("file", ""), element)
+        if place in seen or element.parent is None:
+            raise MeshFileError(f"{root.file.path} includes {place} twice, which MuJoCo refuses: include it once.")
+        seen.add(place)
+        element.included = parse(place, read(place), sum(1 for _ in element.up()))
+        total += sum(1 for _ in element.included.walk())
+        if total > MOST_ELEMENTS:
+            raise MeshFileError(f"{root.file.path} has more than {MOST_ELEMENTS} elements, too many for a robot file.")
+        around = element.parent.children
+        at = around.index(element) + 1
+        around[at:at] = element.included.children
+        for child in element.included.children:
+            child.parent = element.parent
+            waiting += [below for below in child.walk() if below.tag == "include"]
+
+
+def edited(root: Element, edits: Sequence[Edit], includes: Sequence[Element] = ()) -> bytes:
+    """Return the root's file with all edits, which do not overlap; an included file that changes is written into it.
+
+    `includes` are the ``<include>`` elements below `root`, those in other files too.
+    """
+    changes = [(edit.start, edit.end, edit.new) for edit in edits if edit.file is root.file]
+    for element in includes:
+        if element.file is root.file and element.included is not None:
+            inner = element.included
+            whole = edited(inner, edits, includes)
+            if whole != inner.file.data:
+                last = inner.end if inner.head == inner.end else inner.file.data.rindex(b"</", 0, inner.end)
+                content = whole[inner.head : len(whole) - (len(inner.file.data) - last)]
+                text = content.decode(inner.file.encoding)
+                changes.append((element.start, element.end, text.encode(root.file.encoding, "xmlcharrefreplace")))
     pieces, at = [], 0
-    for start, end, new in sorted(edits, key=lambda edit: edit[:2]):
-        pieces += [data[at:start], new]
+    for start, end, new in sorted(changes, key=lambda change: change[:2]):
+        pieces += [root.file.data[at:start], new]
         at = end
-    return b"".join([*pieces, data[at:]])
+    return b"".join([*pieces, root.file.data[at:]])
 
 
 def _tag_end(data: bytes, at: int) -> int:

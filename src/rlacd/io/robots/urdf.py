@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from rlacd.errors import MeshFileError
-from rlacd.io.robots.plan import Edits, HullFiles, MeshUse, Plan, Scale
+from rlacd.io.robots.plan import HullFiles, MeshUse, Plan, Scale
 from rlacd.io.robots.references import References
-from rlacd.io.robots.spans import Document, Element
+from rlacd.io.robots.spans import Edit, Element, File
 
 
-def plan_urdf(document: Document, references: References, named: Callable[[str, str], str]) -> Plan:
+def plan_urdf(root: Element, references: References, named: Callable[[str, str], str]) -> Plan:
     """Find the collision meshes of a URDF.
 
     Parameters
     ----------
-    document : Document
-        The file.
+    root : Element
+        The root of the file.
     references : References
         Resolves the files it refers to.
     named : callable
@@ -27,37 +27,38 @@ def plan_urdf(document: Document, references: References, named: Callable[[str, 
     MeshFileError
         A mesh cannot be found or its scale is unusable, or the file still holds macros.
     """
-    folder = document.path.absolute().parent
-    if any(element.tag.startswith("xacro:") for element in document.root.walk()):
-        raise MeshFileError(f"{document.path} holds xacro macros: expand it with the tool xacro first.")
+    if any(element.tag.startswith("xacro:") for element in root.walk()):
+        raise MeshFileError(f"{root.file.path} holds xacro macros: expand it with the tool xacro first.")
     found: list[tuple[Element, Element, MeshUse]] = []
-    for link in document.root.named("link"):
+    for link in root.named("link"):
         for collision in link.named("collision"):
             for geometry in collision.named("geometry"):
                 for mesh in geometry.named("mesh"):
                     reference = mesh.attributes.get("filename", "")
-                    where = f"link {link.attributes.get('name', '?')} of {document.path}"
+                    where = f"link {link.attributes.get('name', '?')} of {root.file.path}"
                     if not reference:
                         raise MeshFileError(f"a collision mesh of {where} has no filename: give it one.")
-                    use = MeshUse(references.find(reference, folder), read_scale(mesh.attributes.get("scale"), where))
+                    use = MeshUse(
+                        references.find(reference, root.file.folder), read_scale(mesh.attributes.get("scale"), where)
+                    )
                     found.append((collision, mesh, use))
     replaced_meshes = {mesh for _, mesh, _ in found}
     relative = [
         mesh.attributes["filename"]
-        for mesh in document.root.walk()
+        for mesh in root.walk()
         if mesh.tag in ("mesh", "texture")
         and mesh not in replaced_meshes
         and _is_relative(mesh.attributes.get("filename"))
     ]
 
-    def edit(hulls: HullFiles) -> Edits:
-        edits: Edits = []
+    def edit(hulls: HullFiles, *_: object) -> list[Edit]:
+        edits = []
         for collision, mesh, use in found:
             pieces = []
             for index, hull in enumerate(hulls[use]):
-                reference = named(mesh.attributes["filename"], hull.name)
-                pieces.append(_collision(document, collision, mesh, reference, index))
-            edits.append((collision.start, collision.end, document.indent(collision).join(pieces)))
+                reference = named(mesh.attributes["filename"], hull)
+                pieces.append(_collision(collision, mesh, reference, index))
+            edits.append(Edit(root.file, collision.start, collision.end, collision.indent.join(pieces)))
         return edits
 
     return Plan(list(dict.fromkeys(use for _, _, use in found)), edit, relative)
@@ -81,18 +82,18 @@ def read_scale(text: str | None, where: str) -> Scale:
     return (values[0], values[1], values[2])
 
 
-def _collision(document: Document, collision: Element, mesh: Element, reference: str, index: int) -> bytes:
+def _collision(collision: Element, mesh: Element, reference: str, index: int) -> bytes:
     """Return the bytes of the collision with another mesh; its name, if any, gets the hull's number as a suffix."""
-    whole = document.text(collision)
-    inner = document.with_attributes(mesh, {"filename": reference})
+    whole = collision.text
+    inner = mesh.with_attributes({"filename": reference})
     at, end = mesh.start - collision.start, mesh.end - collision.start
     whole = whole[:at] + inner + whole[end:]
     if "name" not in collision.attributes:
         return whole
     head = collision.head - collision.start  # the start tag comes before the mesh, so it has not moved
-    tag = Element(collision.tag, collision.attributes, None, 0, head, head)
-    name = f"{collision.attributes['name']}_{index:03d}"
-    return Document(document.path, whole, tag, document.encoding).with_attributes(tag, {"name": name}) + whole[head:]
+    file = File(collision.file.path, whole, collision.file.encoding)
+    tag = Element(collision.tag, collision.attributes, None, file, 0, head, head)
+    return tag.with_attributes({"name": f"{collision.attributes['name']}_{index:03d}"}) + whole[head:]
 
 
 def _is_relative(reference: str | None) -> bool:
