@@ -221,23 +221,24 @@ def _united(solids: list[Manifold]) -> Manifold:
     """
     waiting = [(solid.num_tri(), i, solid) for i, solid in enumerate(solids)]
     heapq.heapify(waiting)
-    newest = len(solids)
-    left = _MOST_CROSSINGS + _PER_TRIANGLE * sum(triangles for triangles, _, _ in waiting)
+    left = _MOST_CROSSINGS + _PER_TRIANGLE * sum(triangles for triangles, *_ in waiting)
+    at_once, newest = _AT_ONCE, len(solids)
     while len(waiting) > 1:
         group = [heapq.heappop(waiting), heapq.heappop(waiting)]
-        while waiting and sum(triangles for triangles, _, _ in group) + waiting[0][0] <= _AT_ONCE:
+        while waiting and sum(triangles for triangles, *_ in group) + waiting[0][0] <= at_once:
             group.append(heapq.heappop(waiting))
-        pairs, corners = _crossings([solid for *_, solid in group], left)
+        some = [solid for *_, solid in group]
+        pairs, corners = _crossings(some, left)
         if len(group) > 2 and (pairs > left or corners > _CORNERS_AT_ONCE):
-            for one in group[2:]:
+            at_once = 0  # two at a time from here on
+            for one in group:
                 heapq.heappush(waiting, one)
-            group = group[:2]
-            pairs, _ = _crossings([solid for *_, solid in group], left)
+            continue
         left -= pairs
         if left < 0:
             raise CrossingsError
-        require_time_for(sum(triangles for triangles, _, _ in group))
-        union = Manifold.batch_boolean([solid for *_, solid in group], OpType.Add)
+        require_time_for(sum(triangles for triangles, *_ in group))
+        union = Manifold.batch_boolean(some, OpType.Add)
         heapq.heappush(waiting, (union.num_tri(), newest, union))
         newest += 1
     return waiting[0][2]
