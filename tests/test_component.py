@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from manifold3d import Manifold
 
-from rlacd.merge.slivers import drop_slivers, is_film, is_sliver
+from rlacd.merge.slivers import MISSED, drop_slivers, is_film, is_sliver
 from rlacd.planes.candidates import OFFSETS_PER_AXIS, axis_and_principal
 from rlacd.policies import SCORES, Greedy
 from rlacd.run import Run
@@ -84,6 +84,16 @@ def test_a_sliver_goes_only_where_others_stand_for_it() -> None:
         assert drop_slivers([block, shaving, sheet], run) == [block, sheet]
         assert drop_slivers([block, shaving], run, suspects=[block]) == [block, shaving]
         assert drop_slivers([sheet], run) == [sheet]
+
+
+def test_of_a_stack_of_slivers_enough_stay_for_all_of_them() -> None:
+    stack = [box(1, 1, 0.001 + 1e-6 * i, (0, 0, 0.0015 * i)) for i in range(30)]
+    with Run(1) as run:
+        kept = drop_slivers(stack, run)
+    assert len(kept) < len(stack)
+    tops = np.array([part.vertices[:, 2].max() for part in kept])
+    for part in stack:
+        assert np.abs(tops - part.vertices[:, 2].max()).min() <= MISSED + 0.0015
 
 
 def test_many_slivers_are_compared_at_once(monkeypatch) -> None:

@@ -11,9 +11,6 @@ import pytest
 
 pytest.importorskip("torch", reason="needs the extra train")
 
-from rlacd.clock import Clock
-from rlacd.workers import Workers
-
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.errors import TrainingError
@@ -25,6 +22,7 @@ from rlacd.planes.candidates import axis_and_principal
 from rlacd.planes.sweep import sweep
 from rlacd.policies.observe import SCALE_INPUTS, observe, valid_planes
 from rlacd.repair.repair import repair
+from rlacd.run import Run
 from rlacd.solid.component import Component, Plane
 from tests.learning import GreedyOverMask, greedy_plane, small_solids, write_meshes
 
@@ -60,8 +58,8 @@ def cut_greedily(cutting: CutProcess) -> list[tuple[float, Reward]]:
 
 
 def check_same_as_decompose(solid: Component) -> None:
-    with Workers(1) as workers:
-        done, left = CutTree(solid, GreedyOverMask(), workers).cut_until(CRITERION, Clock())
+    with Run(1) as run:
+        done, left = CutTree(solid, GreedyOverMask(), run).cut_until(CRITERION, Clock())
     cutting = CutProcess(solid, CRITERION)
     start = sum(c.hull.volume for c in cutting.frontier + cutting.finished + cutting.stuck)
     earned = cut_greedily(cutting)

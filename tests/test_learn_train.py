@@ -293,22 +293,20 @@ def test_the_exported_policy_computes_what_torch_does(meshes: Path, tmp_path: Pa
 @pytest.mark.slow
 def test_a_run_ends_with_a_policy_that_decomposes(meshes: Path, tmp_path: Path) -> None:
     path = run(meshes, tmp_path / "run", export=True)
-    from rlacd.clock import Clock
-    from rlacd.workers import Workers
-
     from rlacd.criteria import Concavity
     from rlacd.cut import CutTree
     from rlacd.policies.q_network import OnnxQ
     from rlacd.policies.qpolicy import QPolicy
+    from rlacd.run import Run
     from rlacd.solid.component import Component
     from tests.learning import small_solids
 
     about = json.loads(path.with_suffix(".json").read_text())
     assert about["options"] == dataclasses.asdict(TrainOptions(**TINY))
     policy = QPolicy(OnnxQ(path), 0.04, about["options"]["points"], shortlist=10, concave_edges=4)
-    with Workers(1) as workers:
+    with Run(1) as run:
         solid = Component(small_solids()["cross"])
-        done, left = CutTree(solid, policy, workers).cut_until(Concavity(0.04), Clock())
+        done, left = CutTree(solid, policy, run).cut_until(Concavity(0.04), Clock())
     # Planes of concave edges are asked too, and the least hull sum finds them: no volume is left to save.
     assert sum(c.hull.volume for c in done) == pytest.approx(solid.volume)
     assert 3 <= len(done) <= 4

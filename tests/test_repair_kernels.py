@@ -13,7 +13,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from rlacd import _native
-from rlacd.repair.distance import SurfaceQuery, shared_faces
+from rlacd.repair.distance import SurfaceQuery, points_covering, shared_faces
 from rlacd.repair.measure import inside_by_balls
 from rlacd.repair.voxels import Reach, _grown, _steps_away
 from rlacd.solid.topology import Edges
@@ -193,3 +193,39 @@ def test_the_nearest_room(seed: int) -> None:
     for label in np.unique(found[found > 0]):  # the room is as near as any
         own = ndimage.distance_transform_edt(room != label).ravel()
         assert (own[found == label] == away.ravel()[found == label]).all()
+
+
+@pytest.mark.parametrize("spacing", [0.05, 0.5])
+def test_marked_cells_are_those_that_hold_points_of_the_faces(spacing: float) -> None:
+    pitch, margin = 0.04, 3
+    origin, marks, shape = _native.mark_cells(VERTICES, FACES, spacing, pitch, margin)
+    points, _ = points_covering(VERTICES, FACES, spacing)
+    assert np.array_equal(origin, points.min(axis=0) - margin * pitch)
+    wanted = np.zeros(shape, dtype=bool)
+    wanted[tuple(np.rint((points - origin) / pitch).astype(int).T)] = True
+    assert np.array_equal(np.frombuffer(marks, dtype=bool).reshape(shape), wanted)
+    assert shape == tuple(np.argwhere(wanted).max(axis=0) + 1 + margin)
+
+
+def _edges_through(corners: np.ndarray, other: np.ndarray) -> bool:
+    """Whether an edge of one triangle passes through another."""
+    for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        columns = np.stack([start - end, other[1] - other[0], other[2] - other[0]], axis=1)
+        t, u, v = np.linalg.solve(columns, start - other[0])
+        if 0 <= t <= 1 and u >= 0 and v >= 0 and u + v <= 1:
+            return True
+    return False
+
+
+def test_crossing_faces_of_different_bodies_are_counted() -> None:
+    rng = np.random.default_rng(0)
+    corners = rng.uniform(size=(60, 3, 3))
+    faces, body = np.arange(180, dtype=np.int32).reshape(-1, 3), rng.integers(4, size=60)
+    crossed = np.zeros((60, 60), dtype=bool)
+    for i, j in product(range(60), repeat=2):
+        crossed[i, j] = body[i] != body[j] and _edges_through(corners[i], corners[j])
+    crossed |= crossed.T
+    each = crossed.sum(axis=1)
+    found = _native.crossings(corners.reshape(-1, 3), faces, body, 10_000)
+    assert found == (each.sum() // 2, (each * (each - 1) // 2).sum() // 3)
+    assert _native.crossings(corners.reshape(-1, 3), faces, body, 10)[0] < each.sum() // 2

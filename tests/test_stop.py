@@ -313,3 +313,48 @@ def test_ctrl_c_is_heeded_in_the_middle_of_a_stage(name: str, tmp_path: Path) ->
         assert (tmp_path / "hulls.glb").exists()
     finally:
         run.kill()
+
+
+@pytest.mark.nightly
+@pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT to one process")
+@pytest.mark.parametrize("begun", [0.2, 1.2, 1.6, 2.0, 3.0, 5.0])  # CPU seconds
+def test_ctrl_c_twice_ends_the_command_at_any_moment(begun: float, tmp_path: Path) -> None:
+    trimesh.Trimesh(*LARGE["boxes"](), process=False).export(tmp_path / "mesh.ply")
+    code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from rlacd.cli.main import main; main()"
+    run = subprocess.Popen([sys.executable, "-c", code, "decompose", "mesh.ply", "--budget", "20"], cwd=tmp_path)
+    try:
+        used = psutil.Process(run.pid).cpu_times
+        while run.poll() is None and used().user < begun:
+            time.sleep(0.05)
+        for _ in range(2):
+            run.send_signal(signal.SIGINT)
+            time.sleep(0.2)
+        assert run.wait(2 + PATIENCE) in (4, 130, -signal.SIGINT)  # the last while Python starts
+        assert not list(tmp_path.glob(".*")), "no file is left half-written"
+    finally:
+        run.kill()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT to one process")
+def test_ctrl_c_twice_ends_a_command_that_no_handler_of_python_can_interrupt() -> None:
+    code = """if True:
+        import signal
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        from rlacd.cli.terminal import Watch
+        with Watch(quiet=True):
+            print("busy", flush=True)
+            sum(range(10**12))  # holds the GIL for hours, as a boolean of manifold3d may
+    """
+    run = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    try:
+        assert run.stdout is not None
+        assert run.stdout.readline() == "busy\n"
+        time.sleep(0.2)
+        run.send_signal(signal.SIGINT)
+        with pytest.raises(subprocess.TimeoutExpired):
+            run.wait(2)
+        run.send_signal(signal.SIGINT)
+        assert run.wait(PATIENCE) == 130
+    finally:
+        run.kill()

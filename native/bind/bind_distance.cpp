@@ -1,12 +1,15 @@
 // Python bindings of the surface queries: closest points, winding numbers, samples, one-sided Hausdorff distance.
 #include "base/arrays.hpp"
 #include "base/parallel.hpp"
+#include "distance/crossings.hpp"
 #include "distance/hausdorff.hpp"
 #include "distance/sample.hpp"
 #include "distance/surface.hpp"
 
 namespace rlacd {
 namespace {
+
+using LabelsIn = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
 constexpr std::size_t kChunk = 256;
 
@@ -140,6 +143,23 @@ void bind_distance(nb::module_& m) {
       nb::arg("vertices"), nb::arg("faces"), nb::arg("surface"), nb::arg("tolerance"), nb::arg("threads") = 0,
       "(lower, upper) around the greatest distance from a point of the mesh's faces to the surface;\n"
       "upper - lower <= tolerance.");
+
+  m.def(
+      "crossings",
+      [](const PointsIn& vertices, const FacesIn& faces, const LabelsIn& array, std::int64_t most) {
+        const Mesh mesh = to_finite_mesh(vertices, faces);
+        if (array.shape(0) != mesh.faces.size()) throw std::invalid_argument("one body for every face");
+        const std::vector<std::int64_t> body(array.data(), array.data() + array.shape(0));
+        Crossings found;
+        if (!mesh.faces.empty()) {
+          nb::gil_scoped_release release;
+          found = crossings(mesh, body, most);
+        }
+        return nb::make_tuple(found.pairs, found.corners);
+      },
+      nb::arg("vertices"), nb::arg("faces"), nb::arg("body"), nb::arg("most"),
+      "How many pairs of faces of different bodies [F] touch, and a bound on the corners of their arrangement.\n"
+      "Stops to count once there are more than `most` pairs.");
 }
 
 }  // namespace rlacd

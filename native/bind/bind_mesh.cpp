@@ -238,6 +238,25 @@ void bind_mesh(nb::module_& m) {
       "the\n"
       "face [N] each lies on, ascending.");
   m.def(
+      "mark_cells",
+      [](const PointsIn& vertices, const WideFacesIn& faces, double spacing, double pitch, std::int64_t margin) {
+        const Mesh mesh = to_wide_mesh(vertices, faces);
+        if (mesh.faces.empty()) throw std::invalid_argument("no faces, no cells");
+        if (!(spacing > 0 && pitch > 0 && margin >= 0)) throw std::invalid_argument("sizes must be positive");
+        MarkedCells cells;
+        {
+          nb::gil_scoped_release release;
+          cells = mark_cells(mesh, spacing, pitch, margin);
+        }
+        const std::vector<double> origin = {cells.origin.x, cells.origin.y, cells.origin.z};
+        return nb::make_tuple(to_array<double>(std::vector<double>(origin)),
+                              nb::bytes(cells.marks.data(), cells.marks.size()),
+                              nb::make_tuple(cells.shape[0], cells.shape[1], cells.shape[2]));
+      },
+      nb::arg("vertices"), nb::arg("faces"), nb::arg("spacing"), nb::arg("pitch"), nb::arg("margin"),
+      "A grid of cells around a mesh: the middle of the first, which of them hold points of faces spread at this\n"
+      "spacing, as bytes, and how many there are along each axis. So many at each end are free.");
+  m.def(
       "closed_bodies",
       [](const PointsIn& vertices, const FacesIn& faces) -> nb::object {
         const Mesh mesh = to_mesh(vertices, faces);

@@ -3,6 +3,7 @@
 
 #include <limits>
 
+#include "base/interrupts.hpp"
 #include "base/stop.hpp"
 
 namespace rlacd {
@@ -48,6 +49,11 @@ void bind_stop(nb::module_& m) {
       "seconds_left",
       [] { return this_stop != nullptr ? this_stop->seconds_left() : std::numeric_limits<double>::infinity(); },
       "Until this thread's work has to stop; infinity where it never has to.");
+  m.def("count_interrupts", &count_interrupts, nb::arg("code"), nb::arg("grace"),
+        nb::call_guard<nb::gil_scoped_release>(),
+        "Exit with `code` some seconds after the second Ctrl-C from now on, whatever holds the GIL.");
+  m.def("forget_interrupts", &forget_interrupts, nb::call_guard<nb::gil_scoped_release>(),
+        "Let Ctrl-C be as it was before `count_interrupts`.");
   m.def("poll_stop", [] { poll_stop(); }, "Raise `Stopped` if this thread's work has to stop.");
 }
 

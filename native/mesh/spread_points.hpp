@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/geometry.hpp"
+#include "mesh/cells.hpp"
 
 namespace rlacd {
 
@@ -14,5 +15,14 @@ struct SpreadPoints {
 };
 // The spacing is positive. Grids have at most 768 rows and columns.
 SpreadPoints spread_points(const Mesh& mesh, double spacing);
+
+// A grid of cells of size `pitch`, the first of them around `origin`, with those marked that hold any of these points:
+// of faces no larger than the spacing, the corners are enough. `margin` cells around them are free.
+struct MarkedCells {
+  Vec3 origin;
+  Cell shape = {0, 0, 0};
+  std::vector<char> marks;
+};
+MarkedCells mark_cells(const Mesh& mesh, double spacing, double pitch, std::int64_t margin);
 
 }  // namespace rlacd

@@ -24,7 +24,6 @@ from rlacd.policies.observe import observe
 from rlacd.policies.shortlist import generator_of, least_hulls
 from rlacd.policy_names import WEIGHTS_ENDING
 from rlacd.repair.repair import repair
-from rlacd.run import Clock, Workers
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Plane
 from rlacd.solid.hull import Hull
@@ -138,8 +137,8 @@ def decompose_as_deployed(
         In the input's frame and unit.
     """
     solid = repair(load_mesh((vertices, faces)), threads=threads)
-    with Workers(threads) as workers:
-        tree = CutTree(Component(solid.shape), Deployed(deployment, threshold), workers)
-        parts = cut_and_merge(tree, Concavity(threshold), workers, Clock()).parts
+    with Run(threads) as run:
+        tree = CutTree(Component(solid.shape), Deployed(deployment, threshold), run)
+        parts = cut_and_merge(tree, Concavity(threshold), run).parts
     there = [Hull.of(solid.frame.to_input(limit_part(part, None, None).hull.vertices)) for part in parts]
     return [(hull.vertices, hull.faces) for hull in there if hull is not None]

@@ -199,8 +199,9 @@ def _run(batch: Batch, own: dict[str, Any], *, quiet: bool) -> None:
     stop = threading.Event()
 
     def on_interrupt(number: int, frame: FrameType | None) -> None:
+        if stop.is_set():
+            raise KeyboardInterrupt
         stop.set()
-        signal.signal(signal.SIGINT, signal.default_int_handler)
         say("stopping; what is running will be finished (Ctrl-C again to quit at once)")
 
     previous: Any = None

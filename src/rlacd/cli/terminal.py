@@ -15,6 +15,8 @@ from rich.console import Console
 from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bars
 
+from rlacd._native import count_interrupts, forget_interrupts
+from rlacd.cli.exit_codes import ExitCode
 from rlacd.cli.options import METRES
 from rlacd.decomposition import Decomposition
 from rlacd.run import Progress
@@ -22,6 +24,10 @@ from rlacd.told_apart import told_apart
 
 if TYPE_CHECKING:
     from rlacd.io.robots import Rewritten
+
+
+GRACE = 1.0
+"""Seconds that the second Ctrl-C leaves to end in good order, before the process ends all the same."""
 
 
 def say(text: str) -> None:
@@ -55,12 +61,14 @@ class Watch:
         # Python runs signal handlers only in the main thread, and refuses to set them from any other.
         if threading.current_thread() is threading.main_thread():
             self._previous = signal.signal(signal.SIGINT, self._on_interrupt)
+            count_interrupts(ExitCode.INTERRUPTED, GRACE)
         self._bars.start()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self._bars.stop()
         if self._previous is not None:
+            forget_interrupts()
             signal.signal(signal.SIGINT, self._previous)
 
     def __call__(self, progress: Progress) -> bool:
@@ -75,8 +83,9 @@ class Watch:
         return not self.interrupted
 
     def _on_interrupt(self, number: int, frame: FrameType | None) -> None:
+        if self.interrupted:
+            raise KeyboardInterrupt
         self.interrupted = True
-        signal.signal(signal.SIGINT, signal.default_int_handler)
         say("stopping; the result so far will be written (Ctrl-C again to quit at once)")
 
 

@@ -52,10 +52,20 @@ def drop_slivers(parts: Sequence[Part], run: Run, suspects: Sequence[Part] | Non
     union = hull_union([part.hull for part in compress(parts, concerned)], run.threads)
     number = np.cumsum(concerned, dtype=np.int32) - 1
     kept = np.ones(len(parts), dtype=bool)
-    for own in sorted(slivers, key=lambda i: parts[i].hull.volume):
+    stood_in: dict[int, BoolArray] = {}  # what there was in place of each that was dropped
+
+    def is_missed(own: int) -> bool:
+        others = stood_in[own] = kept & _near(boxes, boxes[own])
+        some = np.flatnonzero(others)
+        return len(some) == 0 or _misses(union.only(number[some]), parts[own], run.threads)
+
+    smallest_first = sorted(slivers, key=lambda i: parts[i].hull.volume)
+    for own in smallest_first:
         kept[own] = False
-        others = np.flatnonzero(kept & _near(boxes, boxes[own]))
-        kept[own] = len(others) == 0 or _misses(union.only(number[others]), parts[own], run.threads)
+        kept[own] = is_missed(own)
+    for own in reversed(smallest_first):  # of a stack of slivers, each would stand in for the next
+        if not kept[own] and (stood_in[own] & ~kept).any():
+            kept[own] = is_missed(own)
     return [parts[i] for i in np.flatnonzero(kept)]
 
 

@@ -19,7 +19,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from rlacd import _native
-from rlacd.repair.union import unite
+from rlacd.repair.union import CrossingsError, unite
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component
 from rlacd.solid.solid import Shape, mesh_of
@@ -129,7 +129,10 @@ def _of_pieces(pieces: Sequence[Shape], solid: Component, threshold: float, thre
         copies.append(copy or _Copy(mesh, np.zeros(1)))
     if sum(len(copy.mesh[1]) for copy in copies) > WORTHWHILE * size:
         return None
-    union = mesh_of(unite([copy.mesh for copy in copies]))
+    try:
+        union = mesh_of(unite([copy.mesh for copy in copies]))
+    except CrossingsError:
+        return None
     if len(union[1]) > WORTHWHILE * len(solid.faces) or not _is_alike(union, solid.volume, LOST_OF_PIECES):
         return None
     return _Copy(union, np.concatenate([copy.distances for copy in copies]))

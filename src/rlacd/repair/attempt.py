@@ -15,7 +15,14 @@ from rlacd.repair.measure import faces_outside, measure
 from rlacd.repair.record import STEPS, Record
 from rlacd.repair.slabs import hull_of_points
 from rlacd.repair.soup import FLAPS, FLAT, Soup, hidden_faces, trust_windings
-from rlacd.repair.union import as_manifold, split_labels, unite, unite_around_cavities, volume_of
+from rlacd.repair.union import (
+    CrossingsError,
+    as_manifold,
+    split_labels,
+    unite,
+    unite_around_cavities,
+    volume_of,
+)
 from rlacd.repair.voxels import GAP
 from rlacd.repair.wraps import Built, Wraps
 from rlacd.solid.frame import FloatArray, Frame
@@ -66,6 +73,8 @@ class Attempt:
         How far what a capped body lost lies from the solid, or a wrapped one beyond what wraps may lose.
     lost_at : str
         Where.
+    is_crossed : bool
+        Whether the bodies cross each other too often to be united, so that all of them were wrapped at once.
     warnings : list of str
     holes : list of Hole
         The most doubtful first.
@@ -109,7 +118,17 @@ class Attempt:
         self._wraps = Wraps(surface, self.record, gap, resolution, sheets, tangled, by_faces)
 
         poll_stop()
-        self.solid, self.pieces = self._built(Soup(surface.vertices, faces, body, known_edges=edges))
+        soup = Soup(surface.vertices, faces, body, known_edges=edges)
+        try:
+            self.solid, self.pieces = self._built(soup)
+            self.is_crossed = False
+        except CrossingsError:
+            self.solid, self.pieces = self._wraps.all_wrapped(soup), []
+            self.is_crossed = True
+            self.warnings.append(
+                "The surface crosses itself too often to be united exactly, so the solid is what a ball of radius "
+                f"{gap:g} (longest side = 2) cannot reach from outside."
+            )
         if volume_of(self.solid) == 0:
             self.warnings.append("The surface could not be closed, so the convex hull of its points is used instead.")
             self.record.step[:] = STEPS.index("hull")
@@ -127,7 +146,10 @@ class Attempt:
         if not 0 < bodies_of(soup.faces, soup.edges)[0] <= _MOST_KEPT:
             return
         slabs = [slab for slab, _ in skins(soup, self.record)]
-        self.solid = unite([as_manifold(self.solid), *slabs], keep_cavities=self._keep_cavities)
+        try:
+            self.solid = unite([as_manifold(self.solid), *slabs], keep_cavities=self._keep_cavities)
+        except CrossingsError:  # they stay lost
+            return
         self.pieces = [*self.pieces, *slabs] if self.pieces else []
         self.record.lost[body] = HALF_THICKNESS
 

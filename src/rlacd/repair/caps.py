@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rlacd._native import poll_stop
-from rlacd.repair.distance import SurfaceQuery, spread_points
+from rlacd.repair.distance import SurfaceQuery, affordable, spread_points
 from rlacd.repair.holes import LONGEST_EXACT_LOOP, cap
 from rlacd.repair.rims import Rims, rims_of
 from rlacd.repair.soup import FLAPS, Soup, crossed_parts, face_normals, trust_windings
@@ -137,7 +137,7 @@ def close_holes(
 
     cap_area = face_areas(soup.vertices, caps)
     body_area = np.bincount(body, soup.area, bodies)
-    points, on = spread_points(soup.vertices, caps, gap / 2)
+    points, on = spread_points(soup.vertices, caps, affordable(gap / 2, cap_area.sum()))
     # Corners lie on the surface, and how far points are matters only beyond a certain distance.
     beyond = (np.linalg.norm(points[:, None] - soup.vertices[caps[on]], axis=2) > min(gap, HOLE)).all(axis=1)
     distance = np.zeros(len(points))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import cached_property
 
@@ -14,6 +15,9 @@ from rlacd.solid.topology import BoolArray, IntArray, first_of_doubled
 
 # Points of a triangle at which it is looked whether it lies inside a body: near its corners, its edges, its middle.
 _PROBES = np.array([(18, 1, 1), (1, 18, 1), (1, 1, 18), (9, 9, 2), (9, 2, 9), (2, 9, 9), (7, 7, 6)]) / 20
+
+MOST_POINTS = 100_000
+"""Points spread over a surface in the usual spacing are fewer, unless it is a stack of hundreds of sheets."""
 
 
 class SurfaceQuery:
@@ -99,6 +103,11 @@ def once_in_each_place(ask: Callable[[FloatArray], BoolArray], points: FloatArra
     answers = np.zeros(len(points), dtype=bool)
     answers[asked] = ask(points[asked])
     return answers[first]
+
+
+def affordable(spacing: float, area: float) -> float:
+    """Widen a spacing of points on an area so that there are no more than about `MOST_POINTS`."""
+    return max(spacing, math.sqrt(area / MOST_POINTS))
 
 
 def shared_faces(

@@ -10,6 +10,7 @@ from rlacd import _native
 from rlacd._native import PointTree, poll_stop
 from rlacd.repair.distance import (
     SurfaceQuery,
+    affordable,
     once_in_each_place,
     points_covering,
     shared_faces,
@@ -19,7 +20,7 @@ from rlacd.repair.record import STEPS, Record
 from rlacd.repair.voxels import GAP
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.thickness import HALF_THICKNESS
-from rlacd.solid.topology import BoolArray, IntArray, marked
+from rlacd.solid.topology import BoolArray, IntArray, face_areas, marked
 
 # Farther away from a solid, what is outside is lost: the middle of a slab is half as far from its surface.
 _OFF = 2 * HALF_THICKNESS
@@ -58,21 +59,23 @@ def measure(record: Record, surface: SurfaceQuery, solid: SurfaceQuery) -> Measu
         return found
     kept, taken_over = shared_faces(solid.vertices, solid.faces, surface.vertices, surface.faces)
     poll_stop()
-    points, _ = points_covering(solid.vertices, solid.faces[~kept], GAP)
+    own = solid.faces[~kept]
+    points, _ = points_covering(solid.vertices, own, affordable(GAP, float(face_areas(solid.vertices, own).sum())))
     closest, face = surface.closest(points)
     np.maximum.at(record.beyond, record.body_of_input[face], np.linalg.norm(points - closest, axis=1))
 
     replaced = np.flatnonzero((record.step[record.body_of_input] >= STEPS.index("outer skin")) & ~taken_over)
     faces = surface.faces[replaced]
-    points, on = points_covering(surface.vertices, faces, GAP)
+    spacing = affordable(GAP, float(face_areas(surface.vertices, faces).sum()))
+    points, on = points_covering(surface.vertices, faces, spacing)
     distance = solid.distance(points)
     lost = _outside(solid, points, distance)
     longest = _native.longest_edges(surface.vertices, faces)
-    corners = np.unique(faces[longest <= GAP])  # the first of the points
+    corners = np.unique(faces[longest <= spacing])  # the first of the points
     is_out = marked(corners[lost[lost < len(corners)]], len(surface.vertices))
     leads_out = np.asarray(is_out[faces].any(axis=1))
     leads_out[on[lost]] = True
-    doubted = ~leads_out & (longest > GAP / _BETWEEN) & (longest <= GAP)
+    doubted = ~leads_out & (longest > GAP / _BETWEEN) & (longest <= spacing)
     found = found._replace(outside=replaced[leads_out], doubted=replaced[doubted])
 
     body = record.body_of_input[replaced[on[lost]]]

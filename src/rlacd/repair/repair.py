@@ -156,6 +156,8 @@ def _attempted(attempt: Callable[..., Attempt], open_bodies: str, tangled: IntAr
         "tangled": np.empty(0, dtype=np.int64) if tangled is None else tangled,
     }
     work = attempt(**how)
+    if work.is_crossed:
+        return work
     if work.lost > _LOST:
         # A cap that bends little can cross the body's own faces, which turns some of it inside out: try small caps.
         other = attempt(**how, bend=0.0)

@@ -15,6 +15,7 @@ from rlacd._native import poll_stop
 from rlacd.repair.soup import FLAT
 from rlacd.solid.arrays import IntArray as Indices
 from rlacd.solid.boolean_time import require_time_for
+from rlacd.solid.component import concatenated
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import Shape, mesh_of, surface_of
@@ -29,8 +30,17 @@ _THIN = 1e-11
 # Uniting takes time per mesh even without overlaps; above this number, disjoint meshes are composed instead.
 MOST_UNITED = 4000
 
-# Number of triangles united at once; the work may be stopped between batches.
-_AT_ONCE = 20_000
+# Number of triangles united at once, and of corners that their arrangement may have; the work may be stopped between
+# batches.
+_AT_ONCE, _CORNERS_AT_ONCE = 20_000, 300_000
+
+# Pairs of crossing triangles after which solids are not united exactly, and more per triangle: manifold3d takes about
+# 6 microseconds for each, and the unions of solids that cross themselves have ever more of them.
+_MOST_CROSSINGS, _PER_TRIANGLE = 200_000, 5
+
+
+class CrossingsError(Exception):
+    """Solids cross each other so often that uniting them would take too long."""
 
 
 def to_arrays(solid: Shape) -> tuple[FloatArray, IntArray]:
@@ -97,7 +107,13 @@ def split_labels(vertices: FloatArray, faces: IntArray, label: IntArray) -> list
 
 
 def unite(solids: Sequence[Shape], *, keep_cavities: bool = False) -> Shape:
-    """Unite solids and fill the cavities nothing can reach; one that is no manifold has none (`one_body`)."""
+    """Unite solids and fill the cavities nothing can reach; one that is no manifold has none (`one_body`).
+
+    Raises
+    ------
+    CrossingsError
+        They cross each other too often.
+    """
     if len(solids) == 1 and not isinstance(solids[0], Manifold):
         return solids[0]
     manifolds = [manifold for solid in solids if not (manifold := as_manifold(solid)).is_empty()]
@@ -199,25 +215,37 @@ def _of_faces(vertices: FloatArray, faces: NDArray[Index]) -> tuple[FloatArray, 
 
 
 def _united(solids: list[Manifold]) -> Manifold:
-    """Unite solids, always those with the fewest triangles first: what is large takes part in few booleans."""
+    """Unite solids, always those with the fewest triangles first: what is large takes part in few booleans.
+
+    manifold3d cannot be interrupted: how long a union takes is known by its crossings before it is begun.
+    """
     waiting = [(solid.num_tri(), i, solid) for i, solid in enumerate(solids)]
     heapq.heapify(waiting)
-    newest = len(solids)
+    left = _MOST_CROSSINGS + _PER_TRIANGLE * sum(triangles for triangles, *_ in waiting)
+    at_once, newest = _AT_ONCE, len(solids)
     while len(waiting) > 1:
-        group: list[Manifold] = []
-        triangles = 0
-        while waiting and (len(group) < 2 or triangles + waiting[0][0] <= _AT_ONCE):
-            more, _, solid = heapq.heappop(waiting)
-            group.append(solid)
-            triangles += more
-        union = _united_at_once(group, triangles)
+        group = [heapq.heappop(waiting), heapq.heappop(waiting)]
+        while waiting and sum(triangles for triangles, *_ in group) + waiting[0][0] <= at_once:
+            group.append(heapq.heappop(waiting))
+        some = [solid for *_, solid in group]
+        pairs, corners = _crossings(some, left)
+        if len(group) > 2 and (pairs > left or corners > _CORNERS_AT_ONCE):
+            at_once = 0  # two at a time from here on
+            for one in group:
+                heapq.heappush(waiting, one)
+            continue
+        left -= pairs
+        if left < 0:
+            raise CrossingsError
+        require_time_for(sum(triangles for triangles, *_ in group))
+        union = Manifold.batch_boolean(some, OpType.Add)
         heapq.heappush(waiting, (union.num_tri(), newest, union))
         newest += 1
     return waiting[0][2]
 
 
-def _united_at_once(solids: list[Manifold], triangles: int) -> Manifold:
-    if len(solids) == 1:
-        return solids[0]
-    require_time_for(triangles)
-    return Manifold.batch_boolean(solids, OpType.Add)
+def _crossings(solids: list[Manifold], most: int) -> tuple[int, int]:
+    """How many pairs of triangles of different solids touch, and a bound on the corners of their arrangement."""
+    meshes = [surface_of(solid) for solid in solids]
+    body = np.repeat(np.arange(len(meshes)), [len(faces) for _, faces in meshes])
+    return _native.crossings(*concatenated(meshes), body, most)

@@ -178,6 +178,15 @@ class Wraps:
             parts.append((solid, body))
         return parts
 
+    def all_wrapped(self, soup: Soup) -> Manifold:
+        """Take what the ball cannot reach from outside all bodies to be solid."""
+        solid = self._wrapped(soup)
+        self._sheets, self._slabs = no_faces(soup.vertices), []
+        self._record.note(soup.body, "wrapped")
+        self._record.faces_out[:] = 0
+        self._record.faces_out[0] = solid.num_tri()
+        return solid
+
     def with_rooms(self, built: Built, soup: Soup, parts: list[tuple[Shape, int]], by_room: BoolArray) -> Built:
         """Fill rooms with openings too narrow for the ball: all rooms that sheets enclose, large ones in outer skins.
 

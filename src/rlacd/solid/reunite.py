@@ -14,7 +14,7 @@ from manifold3d import Manifold, Mesh64, OpType
 from rlacd import _native
 from rlacd.solid.arrays import BoolArray, FloatArray
 from rlacd.solid.boolean_time import require_time_for
-from rlacd.solid.component import LOST, ClippedPart, Component, Part
+from rlacd.solid.component import LOST, ClippedPart, Component, Part, concatenated
 
 TOUCHING = 1e-8
 """Distance at which faces count as touching (see native/distance/glue.hpp)."""
@@ -30,6 +30,9 @@ FILM = 4 * OVERLAP
 
 GROWN, SOME = 1.3, 100
 """More faces than this multiple of the components', plus a few, mean undetected crumbs, which would pile up."""
+
+MOST_TOUCHING = 100
+"""Pairs of touching triangles per triangle, above which components cross instead of lying side by side."""
 
 FOLDED, OFF = 1e-3, 1e-6
 """Or by this share of it, where the components overlap themselves or each other, as those of a solid with folds do; no
@@ -47,7 +50,12 @@ def reunite(components: Sequence[Component]) -> Component | None:
     components = _joined_again(components)
     if len(components) == 1:
         return components[0]
-    require_time_for(sum(len(component.faces) for component in components))
+    faces = sum(len(component.faces) for component in components)
+    require_time_for(faces)
+    body = np.repeat(np.arange(len(components)), [len(component.faces) for component in components])
+    surfaces = concatenated([(component.vertices, component.faces) for component in components])
+    if _native.crossings(*surfaces, body, MOST_TOUCHING * faces)[0] > MOST_TOUCHING * faces:
+        return None  # they cross each other: a boolean could take long, and cannot be interrupted
     united = Manifold.batch_boolean(_overlapping(components), OpType.Add)
     volume = sum(component.volume for component in components)
     area = sum(_native.mesh_area(component.vertices, component.faces) for component in components)

@@ -1,0 +1,74 @@
+#include "distance/crossings.hpp"
+
+#include "base/stop.hpp"
+#include "distance/bvh.hpp"
+
+namespace rlacd {
+namespace {
+
+using Corners = std::array<Vec3, 3>;
+
+Corners corners_of(const TriangleFrame& t) { return {t.a, t.a + t.ab, t.a + t.ac}; }
+
+bool do_boxes_meet(const Box& a, const Box& b) {
+  for (int axis = 0; axis < 3; ++axis)
+    if (a.lower[axis] > b.upper[axis] || b.lower[axis] > a.upper[axis]) return false;
+  return true;
+}
+
+bool is_separating(Vec3 axis, const Corners& a, const Corners& b) {
+  const auto [low_a, high_a] = std::minmax({dot(axis, a[0]), dot(axis, a[1]), dot(axis, a[2])});
+  const auto [low_b, high_b] = std::minmax({dot(axis, b[0]), dot(axis, b[1]), dot(axis, b[2])});
+  return high_a < low_b || high_b < low_a;
+}
+
+bool do_touch(const Corners& a, const Corners& b) {
+  const Vec3 normal_a = cross(a[1] - a[0], a[2] - a[0]), normal_b = cross(b[1] - b[0], b[2] - b[0]);
+  if (is_separating(normal_a, a, b) || is_separating(normal_b, a, b)) return false;
+  for (int i = 0; i < 3; ++i) {
+    const Vec3 edge = a[(i + 1) % 3] - a[i];
+    if (is_separating(cross(normal_a, edge), a, b)) return false;  // of triangles in one plane
+    for (int j = 0; j < 3; ++j)
+      if (is_separating(cross(edge, b[(j + 1) % 3] - b[j]), a, b)) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+Crossings crossings(const Mesh& mesh, const std::vector<std::int64_t>& body, std::int64_t most) {
+  Crossings found;
+  const Bvh bvh(mesh);
+  std::vector<std::int64_t> touching(bvh.size());
+  std::vector<std::int32_t> open;
+  for (std::int32_t slot = 0; slot < static_cast<std::int32_t>(bvh.size()) && found.pairs <= most; ++slot) {
+    poll_stop();
+    const Corners own = corners_of(bvh.triangle(slot));
+    Box box;
+    for (const Vec3 corner : own) box.extend(corner);
+    open.push_back(0);
+    while (!open.empty()) {
+      const Bvh::Node& node = bvh.nodes()[open.back()];
+      open.pop_back();
+      for (int side = 0; side < 2; ++side) {
+        if (!do_boxes_meet(node.box[side], box)) continue;
+        if (node.child[side] >= 0) {
+          open.push_back(node.child[side]);
+          continue;
+        }
+        for (std::int32_t other = ~node.child[side]; other < ~node.child[side] + node.leaf_size[side]; ++other) {
+          if (other <= slot || body[bvh.face(other)] == body[bvh.face(slot)]) continue;
+          if (!do_touch(own, corners_of(bvh.triangle(other)))) continue;
+          ++found.pairs;
+          ++touching[slot];
+          ++touching[other];
+        }
+      }
+    }
+  }
+  for (const std::int64_t count : touching) found.corners += count * (count - 1) / 2;
+  found.corners /= 3;
+  return found;
+}
+
+}  // namespace rlacd
