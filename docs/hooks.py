@@ -1,4 +1,4 @@
-"""What the site is generated from at each build: the command line's own help, and a decomposition to turn."""
+"""What the site is made from at each build: the command line's help, the tests of the promises, a mesh to turn."""
 
 from __future__ import annotations
 
@@ -11,10 +11,15 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Put every command, its arguments and options where the page asks for them."""
-    return (
-        markdown.replace("<!-- commands -->", _commands()) if page.file.src_uri == "reference/commands.md" else markdown
-    )
+    """Put the commands with their options, and the tests that hold the promises, into their pages."""
+    if page.file.src_uri == "reference/commands.md":
+        return markdown.replace("<!-- commands -->", _commands())
+    if page.file.src_uri == "promises.md":
+        sys.path.insert(0, str(ROOT))
+        from tests.promises import with_tests
+
+        return with_tests(markdown)
+    return markdown
 
 
 def on_post_build(config: Any) -> None:

@@ -126,6 +126,7 @@ def test_the_readme_works_outside_the_repository() -> None:
             assert any((ROOT / "docs" / f"{page}{end}").is_file() for end in (".md", "/index.md")), target
 
 
+@pytest.mark.promise("all-options")
 def test_the_table_names_every_option() -> None:
     table = options_table()
     command = typer.main.get_command(app).commands["decompose"]  # type: ignore[attr-defined]
@@ -144,6 +145,7 @@ def test_the_function_has_the_options_as_they_are_stated_once() -> None:
     assert set(given) == {field.name for field in dataclasses.fields(Options)} | {"mesh", "progress", "threshold_m"}
 
 
+@pytest.mark.promise("all-options")
 def test_the_command_offers_every_argument_of_the_function() -> None:
     command = typer.main.get_command(app).commands["decompose"]  # type: ignore[attr-defined]
     offered = {parameter.name for parameter in command.params}

@@ -1,4 +1,4 @@
-"""The list of promises: each names tests that exist; and the promises that have no other place."""
+"""Every promise of the documentation is held by tests; and the tests of promises that have no other place."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import shlex
 import shutil
 import subprocess
 import sys
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -21,49 +20,24 @@ import rlacd
 from fuzz.faults import Fault, command, tree
 from rlacd.cli.exit_codes import ExitCode
 from rlacd.cli.main import app
+from tests.promises import PAGE, holders, promises, with_tests
 
 ROOT = Path(__file__).resolve().parent.parent
-TEST = re.compile(r"`(tests/\w+\.py)::(\w+)`")
+PROMISES = promises(PAGE.read_text(encoding="utf-8"))
+HOLDERS = holders()
 
 
-def promises() -> dict[str, str]:
-    """The text of every promise by its name."""
-    text = (ROOT / "docs" / "promises.md").read_text(encoding="utf-8")
-    found = re.findall(r"^- \*\*([\w-]+)\*\*: (.*?)(?=^- \*\*|^## |\Z)", text, re.MULTILINE | re.DOTALL)
-    assert len(found) == len(dict(found)), "a name stands twice"
-    assert len(found) == text.count("\n- "), "an item is not of the form '- **name**: sentence'"
-    return dict(found)
+def test_every_promise_is_held_on_every_push() -> None:
+    assert len(PROMISES) > 40
+    assert set(HOLDERS) == set(PROMISES), "a promise without a test, or a test of a promise that the page lacks"
+    assert {name for name, tests in HOLDERS.items() if not any(test.on_push for test in tests)} == set()
 
 
-@cache
-def runs_on_push(path: str) -> dict[str, bool]:
-    """The tests of a file, and whether each is run on every push."""
-    module = ast.parse((ROOT / path).read_text(encoding="utf-8"))
-    found: dict[str, bool] = {}
-
-    def look(body: list[ast.stmt], pushed: bool) -> None:
-        for node in body:
-            if isinstance(node, ast.FunctionDef | ast.ClassDef):
-                on_push = pushed and not any("mark.nightly" in ast.unparse(mark) for mark in node.decorator_list)
-                if isinstance(node, ast.ClassDef):
-                    look(node.body, on_push)
-                elif node.name.startswith("test_"):
-                    found[node.name] = on_push
-
-    look(module.body, "pytestmark = pytest.mark.nightly" not in map(ast.unparse, module.body))
-    return found
-
-
-@pytest.mark.parametrize("name", promises())
-def test_a_promise_names_tests_that_exist(name: str) -> None:
-    named = TEST.findall(promises()[name])
-    assert named, "no test holds it"
-    assert promises()[name].count("::") == len(named), "a test is not written as `tests/test_x.py::test_y`"
-    missing = [
-        f"{path}::{test}" for path, test in named if not (ROOT / path).is_file() or test not in runs_on_push(path)
-    ]
-    assert missing == []
-    assert any(runs_on_push(path)[test] for path, test in named), "no test holds it on every push"
+def test_the_page_of_promises_names_their_tests() -> None:
+    page = with_tests(PAGE.read_text(encoding="utf-8"))
+    rows = [line for line in page.splitlines() if line.startswith("| ")]
+    assert {line.count(" | ") for line in rows} == {2}
+    assert all(test.link in page for tests in HOLDERS.values() for test in tests)
 
 
 @pytest.fixture
@@ -75,6 +49,7 @@ def mesh(tmp_path: Path) -> Path:
 
 
 @pytest.mark.slow
+@pytest.mark.promise("no-network")
 def test_no_network_no_display_no_gpu(mesh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A connection to any address would end the process, whatever library asks for it."""
     monkeypatch.delenv("DISPLAY", raising=False)
@@ -88,6 +63,7 @@ def test_no_network_no_display_no_gpu(mesh: Path, monkeypatch: pytest.MonkeyPatc
 
 @pytest.mark.slow
 @pytest.mark.parametrize("jump", ["0,-100000000", "20,100000000"])
+@pytest.mark.promise("clock")
 def test_a_clock_that_jumps_changes_no_bytes(jump: str, mesh: Path) -> None:
     words = ["decompose", str(mesh), "--quality", "best", "--search-steps", "5", "--timeout", "300", "-o"]
     assert command([*words, str(mesh.with_name("calm.glb"))]).code == 0
@@ -140,6 +116,7 @@ def test_the_reference_names_every_key_of_a_report_and_no_other() -> None:
     assert found == documented
 
 
+@pytest.mark.promise("exit-codes")
 def test_the_reference_names_every_exit_code() -> None:
     assert [int(code) for (code,) in rows("reference/exit_codes.md")] == sorted(ExitCode)
 
@@ -212,6 +189,7 @@ def test_a_benchmark_names_its_command_date_and_commit(text: str) -> None:
         ("mujoco", "sim", "bench physics FOLDER -o OUT"),
     ],
 )
+@pytest.mark.promise("before-work")
 def test_a_command_without_its_extra_names_it(hidden: str, extra: str, words: str, mesh: Path) -> None:
     """In a fresh interpreter, where no earlier import of the library is in the way."""
     folder, out = mesh.parent, mesh.parent / "out"
