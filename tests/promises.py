@@ -66,4 +66,4 @@ def with_tests(page: str) -> str:
     """The page with a column that names the tests of every promise."""
     held = holders()
     page = ROW.sub(lambda row: f"{row[0]} {'<br>'.join(test.link for test in held[row[1]])} |", page)
-    return page.replace("| promise | |\n|---|---|", "| promise | | tests |\n|---|---|---|")
+    return page.replace("| what holds |\n|---|---|", "| what holds | tests |\n|---|---|---|")

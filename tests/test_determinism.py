@@ -70,6 +70,7 @@ def watch_nothing() -> object:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("file_format", "ending"), FORMATS)
+@pytest.mark.promise("batch-bytes")
 def test_a_batch_of_real_meshes_writes_what_decompose_writes(
     file_format: str, ending: str, corpus: Path, tmp_path: Path
 ) -> None:

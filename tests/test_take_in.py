@@ -33,6 +33,7 @@ def test_each_point_goes_to_the_hull_that_has_to_grow_least() -> None:
     assert grown[2] is parts[2]
 
 
+@pytest.mark.promise("covered")
 def test_a_hull_grows_only_if_its_part_then_meets_the_criterion() -> None:
     parts, points = [box(0), box(1)], np.array([(0.5, 0, 1.004), (1.5, 0, 1.001)])
     grown = take_in(parts, points, Concavity(0.05))
