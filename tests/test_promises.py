@@ -219,3 +219,11 @@ def test_bash_completes_commands_and_options(tmp_path: Path, monkeypatch: pytest
     assert command == "decompose"
     assert {"--threshold", "--threads"} <= set(options.split())
     assert all(option.startswith("--thre") for option in options.split())
+
+
+def test_pages_that_the_source_names_exist() -> None:
+    """In comments and docstrings: the pages that a number or a decision rests on."""
+    for path in (*ROOT.glob("src/**/*.py"), *ROOT.glob("benchmarks/*"), *ROOT.glob("native/**/*.[ch]pp")):
+        if path.is_file():
+            for page in re.findall(r"\b(?:docs|research)/[\w/]+\.md\b", path.read_text(encoding="utf-8")):
+                assert (ROOT / page).is_file(), f"{path.relative_to(ROOT)} names {page}"

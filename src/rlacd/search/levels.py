@@ -42,7 +42,7 @@ FEW = 20
 """With more parts than this, searching around the first pass gains more per unit of work than another pass."""
 
 BOUNDED_PATIENCE = 4
-"""A bounded search gives up after this many trials per part without a gain (docs/research/search.md)."""
+"""A bounded search gives up after this many trials per part without a gain (research/search.md)."""
 
 ROUNDS = 3
 """If time allows, the search starts this many times from every pass of the portfolio, each time with another seed."""

@@ -35,7 +35,7 @@ class Operator(Enum):
 
 
 EXPECTED = {Operator.RECUT: 0.06, Operator.TRANSFER: 0.03, Operator.REDISTRIBUTE: 0.1}
-"""Prior estimate of the parts a trial saves (measured: docs/search.md)."""
+"""Prior estimate of the parts a trial saves (measured: research/search.md)."""
 
 EXPECTED_OF_LARGE = 0.015
 """The same for recuts of clusters larger than the smallest."""
