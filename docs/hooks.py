@@ -11,7 +11,10 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Put the commands with their options, and the tests that hold the promises, into their pages."""
+    """Put the commands, the tests that hold the promises, and the README's table into the pages that ask for them."""
+    if page.file.src_uri == "index.md":
+        readme = (ROOT / "README.md").read_text(encoding="utf-8")
+        return markdown.replace("<!-- table -->", re.findall(r"(?:^\|.*\n)+", readme, re.MULTILINE)[0])
     if page.file.src_uri == "reference/commands.md":
         return markdown.replace("<!-- commands -->", _commands())
     if page.file.src_uri == "promises.md":
@@ -50,7 +53,8 @@ def _commands() -> str:
             if parameter.param_type_name == "argument" or parameter.hidden or "--help" in parameter.opts:
                 continue
             names = ", ".join(f"`{name}`" for name in [*parameter.opts, *parameter.secondary_opts])
-            lines.append(f"| {names} | {_plain(parameter.help or '').replace('|', chr(92) + '|')} |")
+            meaning = re.sub(r"--[a-z][a-z-]*", r"`\g<0>`", _plain(parameter.help or ""))
+            lines.append(f"| {names} | {meaning.replace('|', chr(92) + '|')} |")
         parts.append("\n".join([*lines, ""]))
     return "\n".join(parts)
 

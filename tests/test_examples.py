@@ -128,7 +128,7 @@ def test_the_readme_works_outside_the_repository() -> None:
 
 @pytest.mark.promise("all-options")
 def test_the_table_names_every_option() -> None:
-    table = options_table()
+    table = "".join(line.split("|")[1] for line in options_table().splitlines())
     command = typer.main.get_command(app).commands["decompose"]  # type: ignore[attr-defined]
     options = {name for p in command.params if not p.hidden for name in p.opts if name.startswith("--")} - {"--help"}
     assert {name for name in options if f"`{name}`" not in table and f"{name}/" not in table} == set()
