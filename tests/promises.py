@@ -65,5 +65,5 @@ def _tests(body: list[ast.stmt], on_push: bool) -> Iterator[tuple[ast.FunctionDe
 def with_tests(page: str) -> str:
     """The page with a column that names the tests of every promise."""
     held = holders()
-    page = ROW.sub(lambda row: f"{row[0]} {'<br>'.join(test.link for test in held[row[1]])} |", page)
+    page = ROW.sub(lambda row: f"{row[0]} {' · '.join(test.link for test in held[row[1]])} |", page)
     return page.replace("| what holds |\n|---|---|", "| what holds | tests |\n|---|---|---|")
