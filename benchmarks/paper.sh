@@ -1,7 +1,7 @@
 #!/bin/sh
-# Everything docs/research/results.md shows, in one go: sh benchmarks/paper.sh MESHES LIST TRAINING_MESHES RUN
+# Everything research/comparison.md shows, in one go: sh benchmarks/paper.sh MESHES LIST TRAINING_MESHES RUN
 # What is finished is not done again, so it can be stopped and started. CoACD takes most of the time.
-# Then  python benchmarks/results.py RUN docs/research/results.md  puts the tables into the document.
+# Then  python benchmarks/results.py RUN research/comparison.md  puts the tables into the document.
 set -eu
 meshes=$1 list=$2 training=$3 run=$4
 

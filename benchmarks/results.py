@@ -1,7 +1,7 @@
-"""Copy the tables of a run into docs/research/results.md, so that each is exactly what a command printed.
+"""Copy the tables of a run into research/comparison.md, so that each is exactly what a command printed.
 
     sh benchmarks/paper.sh MESHES LIST TRAINING_MESHES RUN
-    python benchmarks/results.py RUN docs/research/results.md
+    python benchmarks/results.py RUN research/comparison.md
 
 The document names the source of each table: the lines between ``<!-- PAGE.md, table N -->`` and ``<!-- end -->`` are
 replaced by the N-th table of RUN/PAGE.md. The chart it shows is copied beside it.

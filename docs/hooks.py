@@ -1,4 +1,4 @@
-"""What the site is generated from at each build: the command line's own help, and a decomposition to turn."""
+"""What the site is made from at each build: the command line's help, the tests of the promises, a mesh to turn."""
 
 from __future__ import annotations
 
@@ -11,10 +11,18 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Put every command, its arguments and options where the page asks for them."""
-    return (
-        markdown.replace("<!-- commands -->", _commands()) if page.file.src_uri == "reference/commands.md" else markdown
-    )
+    """Put the commands, the tests that hold the promises, and the README's table into the pages that ask for them."""
+    if page.file.src_uri == "index.md":
+        readme = (ROOT / "README.md").read_text(encoding="utf-8")
+        return markdown.replace("<!-- table -->", re.findall(r"(?:^\|.*\n)+", readme, re.MULTILINE)[0])
+    if page.file.src_uri == "reference/commands.md":
+        return markdown.replace("<!-- commands -->", _commands())
+    if page.file.src_uri == "promises.md":
+        sys.path.insert(0, str(ROOT))
+        from tests.promises import with_tests
+
+        return with_tests(markdown)
+    return markdown
 
 
 def on_post_build(config: Any) -> None:
@@ -45,7 +53,8 @@ def _commands() -> str:
             if parameter.param_type_name == "argument" or parameter.hidden or "--help" in parameter.opts:
                 continue
             names = ", ".join(f"`{name}`" for name in [*parameter.opts, *parameter.secondary_opts])
-            lines.append(f"| {names} | {_plain(parameter.help or '').replace('|', chr(92) + '|')} |")
+            meaning = re.sub(r"--[a-z][a-z-]*", r"`\g<0>`", _plain(parameter.help or ""))
+            lines.append(f"| {names} | {meaning.replace('|', chr(92) + '|')} |")
         parts.append("\n".join([*lines, ""]))
     return "\n".join(parts)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,9 +16,11 @@ from rlacd.space_options import SpaceOptions
 
 PAGE = Path(__file__).parents[1] / "docs" / "reference" / "options.md"
 
-HEAD = ["| command line | Python | default | values | meaning |", "|---|---|---|---|---|"]
+HEAD = ["| command line, Python | default | values | meaning |", "|---|---|---|---|"]
 
-PROGRESS = "| – | `progress` | – | | a function called between steps; returning `False` stops |"
+FLAG = re.compile(r"--[a-z][a-z-]*")
+
+PROGRESS = "| `progress` | – | | a function called between steps; returning `False` stops |"
 
 
 def options_table() -> str:
@@ -32,15 +35,16 @@ def _rows(options: type[Any]) -> Iterator[str]:
         names = known.flags or (f"--{field.name.replace('_', '-')}",)
         typed = ", ".join(f"`{name}`" for name in sorted(names, key=len))
         called = field.name if known.python is None else known.python
-        python = f"`{called}`".replace(", ", "`, `") if called else "–"
-        cells = [typed, python, usual_value(field) or "–", known.kind.values, known.help]
+        python = f"<br>`{called}`".replace(", ", "`, `") if called else ""
+        meaning = FLAG.sub(r"`\g<0>`", known.help)
+        cells = [typed + python, usual_value(field) or "–", known.kind.values, meaning]
         yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
 def written(page: str) -> str:
     """The page with the table in place of the one it has."""
     lines = page.splitlines()
-    begin = next(i for i, line in enumerate(lines) if line.startswith("| command line | Python |"))
+    begin = next(i for i, line in enumerate(lines) if line.startswith("| command line"))
     end = next(i for i in range(begin, len(lines)) if not lines[i].startswith("|"))
     return "\n".join([*lines[:begin], *options_table().splitlines(), *lines[end:], ""])
 

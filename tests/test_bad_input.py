@@ -46,6 +46,7 @@ def is_one_sentence(text: str) -> bool:
 
 
 @pytest.mark.parametrize("exponent", [-300, -160, -100, -9, 9, 100, 150, 300, 307])
+@pytest.mark.promise("frame")
 def test_any_scale_gives_the_hulls_of_scale_one(exponent: int) -> None:
     expected = check((ELL, FACES))
     result = check((ELL * 10.0**exponent, FACES))
@@ -89,6 +90,7 @@ def test_a_far_offset_costs_precision_and_nothing_else(size: float) -> None:
         pytest.param(BOX[0] * [1, 1e-9, 1e-9], BOX[1], id="hair"),
     ],
 )
+@pytest.mark.promise("any-mesh")
 def test_what_has_no_volume_gives_one_thin_hull_around_it(vertices: Any, faces: Any) -> None:
     result = check((vertices, faces))
     points, size = np.asarray(vertices, dtype=float), 1e-9
@@ -151,6 +153,7 @@ def test_a_triangle_that_ends_far_away_is_kept() -> None:
     assert check(FAR).report["hausdorff"]["under"] < 1e-3
 
 
+@pytest.mark.promise("loss-named")
 def test_a_triangle_that_is_given_up_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(attempt, "_MOST_KEPT", 0)
     result = check(FAR)
@@ -190,6 +193,7 @@ def test_a_triangle_that_is_given_up_is_reported(monkeypatch: pytest.MonkeyPatch
         ),
     ],
 )
+@pytest.mark.promise("refused")
 def test_what_is_no_mesh_is_one_sentence(mesh: Any, error: type[RlacdError]) -> None:
     with pytest.raises(error) as caught:
         rlacd.decompose(mesh)
@@ -276,6 +280,7 @@ def test_a_timeout_too_short_for_anything_still_gives_hulls() -> None:
     assert any(sentence.startswith("Incomplete") for sentence in result.report["warnings"])
 
 
+@pytest.mark.promise("cancel")
 def test_cancelled_at_any_step_the_hulls_still_cover_the_solid() -> None:
     torus = arrays(creation.torus(1, 0.3, major_sections=12, minor_sections=6))
 
@@ -345,6 +350,7 @@ def assert_hulls_or_one_sentence(result: Result, output: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", FORMATS)
+@pytest.mark.promise("refused")
 def test_a_file_cut_off_anywhere(kind: str, tmp_path: Path) -> None:
     path = write(tmp_path, kind)
     content = path.read_bytes()
@@ -479,6 +485,7 @@ def test_the_library_refuses_names_that_no_file_can_have(tmp_path: Path) -> None
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.promise("input-kept")
 def test_links_are_followed_and_their_target_is_never_overwritten(tmp_path: Path) -> None:
     real, link = tmp_path / "box.stl", tmp_path / "link.stl"
     creation.box().export(real)
@@ -523,6 +530,7 @@ def test_an_input_that_is_no_file_has_code_2(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.promise("whole-files")
 def test_a_disk_that_is_full_leaves_the_old_file(tmp_path: Path) -> None:
     """In a process that may write no file larger than 100 bytes: what the system says then ends in one sentence."""
     resource = pytest.importorskip("resource")

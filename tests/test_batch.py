@@ -51,6 +51,7 @@ def assets(tmp_path: Path) -> Path:
 
 
 @pytest.mark.slow
+@pytest.mark.promise("input-kept")
 def test_no_result_goes_over_a_mesh(tmp_path: Path) -> None:
     """The results' folder holds the meshes', which holds one of its own name."""
     inner = tmp_path / "in" / "in"
@@ -67,6 +68,7 @@ def test_no_result_goes_over_a_mesh(tmp_path: Path) -> None:
     assert batch(inner.parent, "-o", tmp_path, "--glob", "x.glb", "--dry-run").exit_code == 0
 
 
+@pytest.mark.promise("batch-resumes")
 def test_every_mesh_gets_hulls_and_a_row_and_is_not_done_again(assets: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     run = batch(assets, "-o", out, "--jobs", 2)
@@ -172,6 +174,7 @@ def test_mistakes_are_one_sentence_and_leave_nothing(assets: Path, words: list[s
 
 
 @pytest.mark.slow
+@pytest.mark.promise("batch-alone")
 def test_no_mesh_stops_the_others(trouble: dict[str, str], tmp_path: Path) -> None:
     assets, out = tmp_path / "assets", tmp_path / "out"
     names = ["dies", "dies_once", "grows", "hangs", "prints", "bug", "well"]
@@ -241,6 +244,7 @@ def wait_for_rows(out: Path, count: int, process: subprocess.Popen[str]) -> int:
 
 
 @pytest.mark.nightly
+@pytest.mark.promise("batch-resumes")
 def test_killed_again_and_again_it_ends_as_if_undisturbed(trouble: dict[str, str], tmp_path: Path) -> None:
     assets = tmp_path / "assets"
     for number in range(5):
@@ -323,6 +327,7 @@ def test_results_can_go_to_any_address(assets: Path) -> None:
 
 
 @pytest.mark.nightly
+@pytest.mark.promise("batch-bytes")
 def test_real_meshes_give_the_same_bytes_with_one_job_and_two(corpus: Path, tmp_path: Path) -> None:
     assets = tmp_path / "assets"
     assets.mkdir()

@@ -200,13 +200,13 @@ class TestCommands:
         assert "no.stl" in bench("compare", meshes, "-o", tmp_path / "run", "--list", tmp_path / "list.txt", code=2)
 
 
-class TestResultsInTheDocs:
-    """docs/research/results.md shows tables that commands printed, and no others."""
+class TestResultsInTheArchive:
+    """research/comparison.md shows tables that commands printed, and no others."""
 
     ROOT = Path(__file__).resolve().parents[1]
 
     def test_every_table_says_where_it_comes_from(self) -> None:
-        document = (self.ROOT / "docs" / "research" / "results.md").read_text()
+        document = (self.ROOT / "research" / "comparison.md").read_text()
         places = re.compile(r"<!-- \S+\.md, table \d+ -->\n.*?<!-- end -->", re.DOTALL)
         assert len(places.findall(document)) > 5
         assert "|---" not in places.sub("", document)

@@ -30,6 +30,7 @@ def older_processor() -> dict[str, str]:
 
 @pytest.mark.slow
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the variables are those of x86")
+@pytest.mark.promise("processor")
 def test_an_older_processor_makes_the_same_hulls() -> None:
     command = [sys.executable, "-m", "tests.bits"]
     runs = [

@@ -222,6 +222,7 @@ def test_a_concavity_above_the_threshold_is_reported(mesh: Path, stand_in: Stand
         (["--wrong"], 2, "--wrong"),
     ],
 )
+@pytest.mark.promise("before-work")
 def test_mistakes_are_found_before_the_work(
     mesh: Path, stand_in: StandIn, words: list[str], code: int, says: str
 ) -> None:
@@ -243,6 +244,7 @@ def test_mistakes_are_found_before_the_work(
         (KeyboardInterrupt(), 130),
     ],
 )
+@pytest.mark.promise("exit-codes")
 def test_errors_are_one_sentence_and_a_code(mesh: Path, stand_in: StandIn, error: BaseException, code: int) -> None:
     def fail() -> None:
         raise error
@@ -301,6 +303,7 @@ def test_debugging_lets_the_traceback_through(mesh: Path, stand_in: StandIn, mon
     assert isinstance(rlacd("decompose", mesh).exception, RuntimeError)
 
 
+@pytest.mark.promise("ctrl-c")
 def test_ctrl_c_once_writes_what_is_reached(mesh: Path, stand_in: StandIn) -> None:
     stand_in.during = lambda: signal.raise_signal(signal.SIGINT)
     before = signal.getsignal(signal.SIGINT)
@@ -311,6 +314,7 @@ def test_ctrl_c_once_writes_what_is_reached(mesh: Path, stand_in: StandIn) -> No
     assert signal.getsignal(signal.SIGINT) is before
 
 
+@pytest.mark.promise("ctrl-c")
 def test_ctrl_c_twice_quits_and_writes_nothing(mesh: Path, stand_in: StandIn) -> None:
     def twice() -> None:
         signal.raise_signal(signal.SIGINT)
@@ -395,6 +399,7 @@ def test_a_real_timeout_still_writes_hulls(mesh: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.promise("repair-said")
 def test_info_tells_bodies_and_repair(mesh: Path) -> None:
     text = shell("info", mesh)
     assert text.returncode == 0, text.stderr

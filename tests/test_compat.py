@@ -34,6 +34,7 @@ def triangles_with_threes(mesh: trimesh.Trimesh) -> np.ndarray:
 # --- CoACD ------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.promise("drop-in")
 def test_run_coacd_has_the_originals_signature() -> None:
     coacd = pytest.importorskip("coacd", reason="the extra bench is not installed")
     theirs, ours = (inspect.signature(function).parameters for function in (coacd.run_coacd, our_coacd.run_coacd))
@@ -120,6 +121,7 @@ def test_options_without_meaning_are_reported_once_each() -> None:
 # --- V-HACD and trimesh -----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.promise("drop-in")
 def test_compute_vhacd_has_the_originals_signature() -> None:
     vhacdx = pytest.importorskip("vhacdx", reason="the extra bench is not installed")
     ours = inspect.signature(compute_vhacd).parameters

@@ -183,6 +183,7 @@ def cut_meshes(corpus: Path, count: int, seed: int) -> Iterator[Closed]:
 
 
 @pytest.mark.nightly
+@pytest.mark.promise("certified")
 def test_real_parts_against_dense_sampling(corpus: Path) -> None:
     parts = list(cut_meshes(corpus, 60, seed=0))
     assert len(parts) > 100
@@ -191,6 +192,7 @@ def test_real_parts_against_dense_sampling(corpus: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.promise("certified")
 def test_yes_is_never_contradicted_by_samples(corpus: Path) -> None:
     met = 0
     for part in cut_meshes(corpus, 40, seed=1):

@@ -59,11 +59,13 @@ def assert_keeps_promises(result: rlacd.Decomposition, threshold: float) -> None
 
 @pytest.mark.parametrize("threshold", [0.02, 0.05, 0.2])
 @pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.promise("convex", "threshold")
 def test_promises_hold_on_known_shapes(shape: str, threshold: float) -> None:
     result = rlacd.decompose(SHAPES[shape](), threshold=threshold)
     assert_keeps_promises(result, threshold)
 
 
+@pytest.mark.promise("convex-input")
 def test_convex_input_is_one_hull_exactly() -> None:
     ball = trimesh.creation.icosphere(3)
     result = rlacd.decompose(ball, detail="full")
@@ -89,6 +91,7 @@ def test_a_cavity_costs_nothing() -> None:
     assert len(rlacd.decompose(hollow)) == 1
 
 
+@pytest.mark.promise("frame")
 def test_input_frame_and_unit_are_kept() -> None:
     placed = table()
     placed.apply_scale(1000)
@@ -130,6 +133,7 @@ def test_every_kind_of_input_gives_the_same(source: str, tmp_path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.promise("same-bytes")
 def test_same_bytes_for_any_number_of_threads_and_any_run() -> None:
     runs = [rlacd.decompose(SHAPES["cup"](), threads=threads) for threads in (1, 1, 4)]
     for other in runs[1:]:
@@ -150,6 +154,7 @@ def test_limits_hold_together_with_the_promises(limit: dict[str, int]) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.promise("limits")
 def test_limits_too_low_for_the_threshold_keep_the_count_and_warn() -> None:
     free, result = (rlacd.decompose(SHAPES["torus"](), max_vertices=limit) for limit in (None, 8))
     assert len(result) == len(free)
@@ -159,6 +164,7 @@ def test_limits_too_low_for_the_threshold_keep_the_count_and_warn() -> None:
     assert result.report["hausdorff"]["under"] < 0.005
 
 
+@pytest.mark.promise("clock")
 def test_a_timeout_after_the_work_is_done_changes_nothing() -> None:
     stages: list[str] = []
     result = rlacd.decompose(cup(), progress=lambda p: stages.append(p.stage) or p.stage not in ("finish", "measure"))
@@ -259,6 +265,7 @@ def _manifold(vertices: np.ndarray, faces: np.ndarray) -> Manifold:
 
 
 @pytest.mark.nightly
+@pytest.mark.promise("threshold")
 def test_real_meshes(corpus) -> None:
     for name in (corpus / "quick.txt").read_text().split():
         result = rlacd.decompose(corpus / name)

@@ -70,6 +70,7 @@ def watch_nothing() -> object:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("file_format", "ending"), FORMATS)
+@pytest.mark.promise("batch-bytes")
 def test_a_batch_of_real_meshes_writes_what_decompose_writes(
     file_format: str, ending: str, corpus: Path, tmp_path: Path
 ) -> None:
@@ -87,6 +88,7 @@ def test_a_batch_of_real_meshes_writes_what_decompose_writes(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MESHES)
+@pytest.mark.promise("same-bytes")
 def test_the_same_bytes_in_every_process_and_for_any_number_of_threads(name: str, corpus: Path, tmp_path: Path) -> None:
     digits = set()
     for seed, threads in enumerate((1, 5)):
@@ -125,6 +127,7 @@ def compare(meshes: Path, tmp_path: Path, file_format: str, ending: str, *words:
 
 @pytest.mark.nightly
 @pytest.mark.parametrize(("file_format", "ending"), FORMATS)
+@pytest.mark.promise("batch-bytes")
 def test_the_same_files_one_by_one_and_in_a_batch(file_format: str, ending: str, corpus: Path, tmp_path: Path) -> None:
     if file_format == "usd":
         pytest.importorskip("pxr", reason="the extra usd is not installed")

@@ -126,6 +126,7 @@ clouds = st.lists(st.tuples(unit, unit, unit), min_size=4, max_size=8)
 @pytest.mark.slow
 @settings(deadline=None, max_examples=80)
 @given(st.lists(clouds, min_size=1, max_size=5), st.integers(0, 3))
+@pytest.mark.promise("report-true")
 def test_unions_against_dense_sampling(points: list[list[tuple[float, float, float]]], levels: int) -> None:
     hulls = [hull for cloud in points if (hull := Hull.of(np.array(cloud))) is not None and hull.volume > 1e-4]
     assume(hulls)

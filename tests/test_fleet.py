@@ -240,6 +240,7 @@ def test_files_go_in_and_come_out(store: ResultStore) -> None:
     assert store.read("a/b.bin") is None
 
 
+@pytest.mark.promise("batch-resumes")
 def test_rows_outlive_a_run_that_never_ended(store: ResultStore) -> None:
     first = Ledger(store, "m.jsonl")
     first.add({"mesh": "b", "n": 1})

@@ -118,6 +118,7 @@ def test_one_stl_hull_is_binary_and_many_are_solids(tmp_path: Path) -> None:
     distance=st.sampled_from([0.0, 1.0, 1e3, 1e6]),
     squash=st.sampled_from([1.0, 1e-3]),
 )
+@pytest.mark.promise("convex-in-files")
 def test_hulls_stay_hulls_in_the_file(
     tmp_path: Path, ending: str, seed: int, scale: float, distance: float, squash: float
 ) -> None:
@@ -153,6 +154,7 @@ def test_far_from_the_origin_a_glb_keeps_the_shape(tmp_path: Path) -> None:
     assert mesh.bounds == pytest.approx(box.bounds, abs=1e-8)
 
 
+@pytest.mark.promise("convex-in-files")
 def test_too_thin_for_single_precision_is_reported_and_double_precision_formats_work(tmp_path: Path) -> None:
     # Thinner than the spacing of float32 numbers at its corners, on a slant so that no axis helps.
     plate = trimesh.creation.box((1.0, 1.0, 1e-9))
@@ -238,6 +240,7 @@ def test_contradicting_formats_are_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("ending", FORMATS)
 @pytest.mark.parametrize("stage", ["fsync", "replace"])
+@pytest.mark.promise("whole-files")
 def test_a_failing_disk_leaves_the_old_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str, stage: str
 ) -> None:
@@ -305,6 +308,7 @@ def test_a_format_makes_a_name_without_ending_a_folder(tmp_path: Path) -> None:
     assert files_of(folder) == ["chair_000.ply", "chair_hulls.json"]
 
 
+@pytest.mark.promise("own-files")
 def test_an_existing_folder_needs_no_slash_and_loses_only_our_older_hulls(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("mine")
     (tmp_path / "chair_007.obj").write_text("also mine: no run wrote it")

@@ -153,6 +153,7 @@ CAREFUL = settings(
 @pytest.mark.nightly
 @CAREFUL
 @given(soups(), st.sampled_from([0.05, 0.05, 0.2]))
+@pytest.mark.promise("any-mesh", "covered")
 def test_promises_hold_for_any_soup(mesh: tuple[Floats, Any], threshold: float) -> None:
     one = check_promises(mesh, threshold=threshold, threads=1, timeout=20)
     if one.report["complete"]:

@@ -72,6 +72,7 @@ def untyped(kind: str, folder: Path) -> dict[int, str]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["obj", "stl", "ply", "off", "glb", "gltf", "dae", "3mf", "xyz", "urdf", "xml"])
+@pytest.mark.promise("hostile-files")
 def test_a_damaged_file_is_read_or_refused(kind: str, tmp_path: Path) -> None:
     creation.box().export(tmp_path / "box.stl")
     assert bounded(untyped, kind, tmp_path, seconds=300) == {}

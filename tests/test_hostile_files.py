@@ -53,6 +53,7 @@ def check_refused(error: type[RlacdError], says: str, function: Callable[..., An
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", REFUSED)
+@pytest.mark.promise("hostile-files")
 def test_a_hostile_mesh_is_refused_with_its_reason(name: str, tmp_path: Path) -> None:
     build, says = REFUSED[name]
     path = build(tmp_path)
@@ -144,6 +145,7 @@ def robot(folder: Path, text: str, ending: str = ".urdf") -> Path:
     ],
     ids=["laughs", "quadratic", "external", "outside", "parameter"],
 )
+@pytest.mark.promise("hostile-robots")
 def test_a_robot_with_entities_is_refused(doctype: str, used: str, ending: str, tmp_path: Path) -> None:
     tag = "robot" if ending == ".urdf" else "mujoco"
     path = robot(tmp_path, f"{doctype}<{tag}>{used}</{tag}>", ending)
@@ -308,6 +310,7 @@ def test_weights_in_another_file_are_not_looked_for(
     [{"points": 10**9}, {"points": -1}, {"points": 0.5}, {"threshold": float("nan")}, {"threshold": "many"}],
     ids=json.dumps,
 )
+@pytest.mark.promise("hostile-weights")
 def test_weights_that_ask_for_too_much_are_refused(change: dict[str, Any], tmp_path: Path) -> None:
     OnnxQ(network(tmp_path, {}))
     check_refused(WeightsError, "metadata", OnnxQ, network(tmp_path, change))
@@ -340,6 +343,7 @@ def array_header(shape: tuple[int, ...]) -> bytes:
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("trap", ["bomb", "shape", "objects", "depth", "header"])
+@pytest.mark.promise("hostile-weights")
 def test_a_hostile_checkpoint_is_refused(trap: str, tmp_path: Path) -> None:
     place = checkpoint(tmp_path)
     replay = place / "replay.npz"

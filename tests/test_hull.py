@@ -46,6 +46,7 @@ lattice = hnp.arrays(np.float64, st.tuples(st.integers(4, 60), st.just(3)), elem
 
 @pytest.mark.slow
 @pytest.mark.parametrize("strategy", ["clouds", "lattice"])
+@pytest.mark.promise("convex")
 def test_hull_is_exact_and_agrees_with_qhull(strategy: str) -> None:
     @settings(max_examples=400 if os.environ.get("RLACD_RANDOM") else 100, deadline=None)
     @given({"clouds": clouds, "lattice": lattice}[strategy])

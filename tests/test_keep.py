@@ -46,6 +46,7 @@ def without_hulls(header: Json, before: Json) -> Json:
 
 @pytest.mark.parametrize("file_format", NAMES)
 @pytest.mark.parametrize("stored", ["glb", "gltf", "embedded"])
+@pytest.mark.promise("scene")
 def test_a_textured_animated_scene_comes_back_node_by_node(
     tmp_path: Path, stored: str, file_format: str | None
 ) -> None:
@@ -79,6 +80,7 @@ def test_a_textured_animated_scene_comes_back_node_by_node(
         assert sorted(added) == ["UCX_axle_00", "UCX_flag_00", "UCX_wheel_00", "UCX_wheel_01"]
 
 
+@pytest.mark.promise("scene")
 def test_hulls_lie_around_their_node_wherever_it_goes(tmp_path: Path, cart: Path, apart: rlacd.Decomposition) -> None:
     """Placed by a reader of its own, each hull covers what its node shows; the scene is stretched, turned, mirrored."""
     read = trimesh.load_scene(apart.save(tmp_path / "out.glb", file_format="unreal"), process=False)
@@ -105,6 +107,7 @@ def test_hulls_of_a_scene_as_a_whole_know_their_node(tmp_path: Path, cart: Path)
     assert sum(node.get("name", "").endswith("-convcolonly") for node in header["nodes"]) == len(result)
 
 
+@pytest.mark.promise("per-node")
 def test_nodes_apart_share_the_threshold_of_the_scene() -> None:
     """A bracket that is small in its scene needs no cut there, but does on its own."""
     bracket = trimesh.util.concatenate(

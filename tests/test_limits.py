@@ -73,6 +73,7 @@ points = hnp.arrays(np.float64, st.tuples(st.integers(5, 40), st.just(3)), eleme
 @pytest.mark.slow
 @settings(deadline=None, max_examples=300)
 @given(points, st.integers(4, 20))
+@pytest.mark.promise("limits")
 def test_any_hull_within_any_limit(cloud: np.ndarray, most: int) -> None:
     hull = Hull.of(cloud)
     assume(hull is not None and hull.volume >= 1e-9)

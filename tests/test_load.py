@@ -43,6 +43,7 @@ def triangles(mesh):
 
 
 @pytest.mark.parametrize("extension", FORMATS)
+@pytest.mark.promise("formats")
 def test_every_format_gives_the_same_triangles(box, tmp_path, extension):
     source = trimesh.Scene(box) if extension in ("glb", "3mf") else box
     path = tmp_path / f"box.{extension}"

@@ -145,6 +145,7 @@ def test_an_l_of_usd(tmp_path: Path) -> None:
     seed=st.integers(0, 2**32 - 1),
     size=st.sampled_from([1e-3, 1.0, 1e4]),
 )
+@pytest.mark.promise("formats")
 def test_prisms_over_stars_keep_area_and_volume(tmp_path_factory, radii, kind, seed, size) -> None:
     angles = np.linspace(0, 2 * np.pi, len(radii), endpoint=False)
     outline = size * np.array(radii)[:, None] * np.c_[np.cos(angles), np.sin(angles)]

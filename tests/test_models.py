@@ -45,10 +45,12 @@ def assert_stands(rest: Rest, result: Decomposition, density: float = 1000.0) ->
 # --- simulators -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.promise("simulators")
 def test_mujoco_simulates_mjcf(tmp_path: Path, wooden: Decomposition) -> None:
     assert_stands(fall_in_mujoco(wooden.save(tmp_path / "table.xml")), wooden)
 
 
+@pytest.mark.promise("simulators")
 def test_bullet_simulates_urdf(tmp_path: Path, wooden: Decomposition) -> None:
     assert_stands(fall_in_bullet(wooden.save(tmp_path / "table.urdf")), wooden)
 
@@ -76,6 +78,7 @@ def test_bullet_reads_the_objects_of_one_mesh_as_hulls(tmp_path: Path, wooden: D
         bullet.disconnect(client)
 
 
+@pytest.mark.promise("simulators")
 def test_drake_simulates_sdf(tmp_path: Path, wooden: Decomposition) -> None:
     assert_stands(fall_in_drake(wooden.save(tmp_path / "table.sdf")), wooden)
 
@@ -102,6 +105,7 @@ def test_yourdfpy_reads_urdf(tmp_path: Path, wooden: Decomposition) -> None:
 
 
 @pytest.mark.parametrize("density", [8.0, 7850.0])
+@pytest.mark.promise("mass")
 def test_mass_and_inertia_are_those_of_the_solid(tmp_path: Path, wooden: Decomposition, density: float) -> None:
     """Compared with trimesh's integrals over the closed input, which knows nothing of hulls."""
     mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
@@ -388,6 +392,7 @@ def test_folders_that_may_not_be_written_to_are_reported_before_any_work(
     assert [path.name for path in tmp_path.iterdir()] == ["table_urdf"]
 
 
+@pytest.mark.promise("own-files")
 def test_what_others_put_in_the_folder_of_meshes_is_not_replaced(tmp_path: Path, wooden: Decomposition) -> None:
     (tmp_path / "table_urdf").mkdir()
     theirs = tmp_path / "table_urdf" / "mesh_000.obj"

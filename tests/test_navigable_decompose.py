@@ -98,6 +98,7 @@ def test_seeds_open_a_sealed_room() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("ball", [0.9, 1.1])
+@pytest.mark.promise("navigable")
 def test_the_hole_of_a_torus_is_free_exactly_when_the_ball_fits(ball: float) -> None:
     torus = trimesh.creation.torus(0.75, 0.25, major_sections=96, minor_sections=64)  # a hole of radius 0.5
     size, tolerance = 2.0, 0.02
@@ -298,6 +299,7 @@ def test_bad_spaces_are_refused(make: Callable[[], Any]) -> None:
 
 
 @pytest.mark.nightly
+@pytest.mark.promise("navigable")
 def test_no_hull_overlaps_a_final_ball_on_real_meshes(corpus: Path) -> None:
     for name in (corpus / "quick.txt").read_text().split()[::4]:
         result = rlacd.decompose(corpus / name, criterion=rlacd.NavigableSpace(0.05, 0.01), policy="navacd")

@@ -114,6 +114,7 @@ def assert_accepted_or_told(call: Any, *others: type[Exception]) -> None:
 
 @pytest.mark.filterwarnings("ignore:.*is now called:DeprecationWarning")
 @pytest.mark.parametrize("odd", ODD.values(), ids=ODD.keys())
+@pytest.mark.promise("options")
 def test_options_of_decompose_are_checked_before_any_work(odd: Any) -> None:
     for name in (*OPTION_NAMES, "progress"):
         # Python 3.13 takes a hostile object for a function that can be called: what it raises then is the caller's own.
@@ -191,6 +192,7 @@ def test_options_of_the_other_functions_are_checked(odd: Any, tmp_path: Path) ->
         ({"progress": int}, "progress is <class 'int'>"),
     ],
 )
+@pytest.mark.promise("options")
 def test_the_message_shows_the_value_and_what_it_has_to_be(given: dict[str, Any], says: str) -> None:
     with pytest.raises(OptionError, match=says):
         rlacd.decompose("no such file.obj", **given)

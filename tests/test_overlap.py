@@ -100,6 +100,7 @@ def test_no_needle_slips_between_hulls_that_overlap(options: dict[str, Any]) -> 
         assert len(hull.vertices) <= options.get("max_vertices", np.inf)
 
 
+@pytest.mark.promise("overlap")
 def test_the_threshold_holds_and_each_hull_contains_its_own() -> None:
     flush, result = (rlacd.decompose(stool(), quality="fast", threads=1, overlap=depth) for depth in (0.0, OVERLAP))
     assert len(flush) == len(result)
@@ -189,6 +190,7 @@ def test_parts_that_do_not_touch_or_share_only_an_edge_stay_as_they_are() -> Non
         assert all(before is after for before, after in zip(parts, grown, strict=True))
 
 
+@pytest.mark.promise("overlap")
 def test_a_seam_without_room_is_told() -> None:
     """Two blocks of a stair: what either takes in of the other spans the step between them."""
     mesh = solid(Manifold.cube((1.0, 1.0, 1.0)) + Manifold.cube((1.0, 1.0, 1.0)).translate((1.0, 0.5, 0.5)))

@@ -23,6 +23,7 @@ def ball() -> trimesh.Trimesh:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.promise("presets")
 def test_round_bodies_are_brought_inside_the_limits(name: str) -> None:
     preset = PRESETS[name]
     result = rlacd.decompose(ball(), preset=name, threads=1, quality="fast")
@@ -80,6 +81,7 @@ def test_a_sheet_that_a_gpu_refuses_is_reported() -> None:
     assert warning.startswith("1 hull is thinner than 1/100")
 
 
+@pytest.mark.promise("presets")
 def test_every_broken_limit_is_counted() -> None:
     hulls = [Hull.of(np.asarray(trimesh.creation.icosphere(subdivisions=level).vertices)) for level in (1, 2, 3)]
     known = [hull for hull in hulls if hull is not None]

@@ -130,6 +130,7 @@ def test_a_primitive_of_any_pose_is_found_again(kind: PrimitiveKind, seed: int) 
 
 
 @given(st.integers(0, 2**32 - 1))
+@pytest.mark.promise("primitives")
 def test_fits_and_their_polyhedra_contain_any_hull(seed: int) -> None:
     random = np.random.default_rng(seed)
     hull = Hull.of(random.normal(size=(random.integers(4, 60), 3)) * random.choice([1e-3, 0.1, 1.0], 3))
@@ -150,6 +151,7 @@ def test_fits_and_their_polyhedra_contain_any_hull(seed: int) -> None:
 
 
 @pytest.mark.parametrize("kind", PRIMITIVE_KINDS)
+@pytest.mark.promise("primitives")
 def test_a_solid_that_is_a_primitive_becomes_it(kind: PrimitiveKind) -> None:
     mesh = solid(kind)
     result = rlacd.decompose(mesh, primitives=True, quality="fast", threads=1)

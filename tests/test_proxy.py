@@ -74,6 +74,7 @@ def in_frame(hulls: list[trimesh.Trimesh], mesh: trimesh.Trimesh) -> list[Hull]:
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("quality", ["fast", "balanced"])
+@pytest.mark.promise("dense")
 def test_promises_hold_on_the_solid_itself(shape: str, quality: rlacd.QualityName) -> None:
     mesh = SHAPES[shape]()
     result = rlacd.decompose(mesh, quality=quality)
@@ -188,6 +189,7 @@ def test_limits_hold_and_are_met_by_the_threshold() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.promise("dense")
 def test_stopped_at_any_time_the_hulls_cover_the_solid() -> None:
     mesh = ring()
     for stage in ("simplify", "cut", "merge", "lift"):

@@ -38,6 +38,7 @@ SHAPES = {
 @pytest.mark.parametrize("name", SHAPES)
 @given(seed=st.integers(0, 10**6), flip=st.sampled_from(["none", "all", "some"]), split=st.booleans())
 @settings(max_examples=15, deadline=None)
+@pytest.mark.promise("repair-keeps")
 def test_a_closed_body_keeps_every_face_whatever_its_windings(name, seed, flip, split):
     mesh = SHAPES[name].copy()
     random = np.random.default_rng(seed)

@@ -46,6 +46,7 @@ def test_a_pinhole_is_closed_without_a_word():
     assert not solid.warnings
 
 
+@pytest.mark.promise("repair-said")
 def test_a_small_hole_in_a_scan_is_closed_and_reported():
     mesh, full = with_hole(0.08)
     solid = solid_of(mesh)
@@ -404,6 +405,7 @@ def test_what_caps_leave_of_a_room_that_nothing_can_enter_is_filled(apart):
 @pytest.mark.parametrize("share", [0.05, 0.1, 0.2])
 @pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize("name", ["ball", "torus"])
+@pytest.mark.promise("repair-keeps")
 def test_a_damaged_solid_stays_the_solid_it_was(name, family, share):
     """Where whole patches are gone, it may not; then a warning says where."""
     mesh = {
@@ -421,6 +423,7 @@ def test_a_damaged_solid_stays_the_solid_it_was(name, family, share):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("family", ["moth holes", "missing patches"])
+@pytest.mark.promise("loss-named")
 def test_warnings_and_report_name_where_a_damaged_scan_may_have_lost_something(family):
     """Of four bodies the first two are damaged. What is lost is no farther from the middle of a hole than that is wide.
 

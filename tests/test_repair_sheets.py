@@ -216,6 +216,7 @@ def test_profiles_thinner_than_a_slab_that_cross_leave_no_wedge(tilt):
 @pytest.mark.slow
 @given(st.integers(0, 10**6), st.integers(1, 12))
 @settings(max_examples=25, deadline=None)
+@pytest.mark.promise("any-mesh")
 def test_random_soup_gives_a_closed_solid_near_it(seed, count):
     random = np.random.default_rng(seed)
     vertices = random.uniform(-1, 1, (max(3, count // 2), 3)).round(1)

@@ -95,6 +95,7 @@ def test_the_scene_lies_about_the_origin_and_knows_its_up(result: Decomposition)
         assert corners.min(axis=0) == pytest.approx([-1.0, -0.2, -0.5], abs=1e-6)
 
 
+@pytest.mark.promise("no-network")
 def test_nothing_is_fetched(result: Decomposition) -> None:
     reader = Reader(report_page(result, picture=False))
     policy = next(a["content"] for tag, a in reader.elements if a.get("http-equiv") == "Content-Security-Policy")

@@ -72,6 +72,7 @@ def collisions(path: Path) -> list[trimesh.Trimesh]:
 # --- URDF -------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.promise("robots")
 def test_a_urdf_keeps_every_byte_but_its_collision_meshes(ear: Path) -> None:
     done = rlacd.rewrite_robot(ear, ear.with_name("out.urdf"), threads=1)
     after = done.path.read_text()
@@ -83,6 +84,7 @@ def test_a_urdf_keeps_every_byte_but_its_collision_meshes(ear: Path) -> None:
     assert done.warnings == []
 
 
+@pytest.mark.promise("robot-hulls")
 def test_hulls_fill_the_same_space_at_every_scale(ear: Path) -> None:
     done = rlacd.rewrite_robot(ear, ear.with_name("out.urdf"), threads=1)
     assert len(done.meshes) == 2, "one mesh at two scales; the one that is used twice is decomposed once"
@@ -345,6 +347,7 @@ def test_mujoco_reads_the_rewritten_mjcf(arm: Path) -> None:
     assert np.isfinite(data.qpos).all()
 
 
+@pytest.mark.promise("robot-hulls")
 def test_hulls_lie_where_the_mesh_lay(arm: Path) -> None:
     """MuJoCo moves every mesh into its own frame of inertia; placed by it, mesh and hulls still coincide."""
     mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
@@ -370,6 +373,7 @@ def bounds_of(mujoco: object, model: object, body: str) -> np.ndarray:
     return np.array([stacked.min(axis=0), stacked.max(axis=0)])
 
 
+@pytest.mark.promise("robots")
 def test_an_mjcf_keeps_every_byte_but_meshes_and_their_geoms(arm: Path) -> None:
     done = rlacd.rewrite_robot(arm, arm.with_name("out.xml"), threads=1)
     before, after = ARM.splitlines(), done.path.read_text().splitlines()
@@ -564,6 +568,7 @@ def test_bad_files_are_refused_in_one_sentence(tmp_path: Path, text: str, says: 
         "meshes",
     ],
 )
+@pytest.mark.promise("hostile-robots")
 def test_a_robot_cannot_name_what_lies_outside_its_package(tmp_path: Path, reference: str) -> None:
     outside = tmp_path / "outside.stl"
     trimesh.creation.box().export(outside)

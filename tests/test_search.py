@@ -246,6 +246,7 @@ def test_the_same_hulls_for_any_number_of_threads(name: str, options: dict[str, 
 
 
 @pytest.mark.slow
+@pytest.mark.promise("levels")
 def test_no_level_makes_more_hulls_than_the_one_before() -> None:
     for solid in (frame(), frame() + frame().rotate([0, 90, 0])):
         shape = from_manifold(solid)

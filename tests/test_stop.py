@@ -69,6 +69,7 @@ def stops(most: int, ratio: float = 1.7) -> list[int]:
     [pytest.param(name, 4, marks=pytest.mark.slow) if name in LONG else (name, 2.5) for name in SMALL]
     + [pytest.param(name, 1.7, marks=pytest.mark.nightly) for name in SMALL],
 )
+@pytest.mark.promise("timeout")
 def test_stopped_at_any_poll_the_hulls_cover_the_input(polls: list[int], name: str, ratio: float) -> None:
     stages = set()
     for number in stops(10**7, ratio):
@@ -203,6 +204,7 @@ def test_a_body_whose_hull_takes_too_long_gets_a_wider_one(flat: bool) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LARGE)
+@pytest.mark.promise("timeout")
 def test_a_timeout_ends_the_work_however_large_the_input(name: str) -> None:
     mesh = LARGE[name]()
     seen: list[rlacd.Progress] = []
@@ -296,6 +298,7 @@ AT_WORK = 4.0
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT to one process")
 @pytest.mark.parametrize("name", ["terrain", "boxes"])
+@pytest.mark.promise("ctrl-c")
 def test_ctrl_c_is_heeded_in_the_middle_of_a_stage(name: str, tmp_path: Path) -> None:
     trimesh.Trimesh(*LARGE[name](), process=False).export(tmp_path / "mesh.ply")
     code = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN); from rlacd.cli.main import main; main()"
@@ -317,7 +320,8 @@ def test_ctrl_c_is_heeded_in_the_middle_of_a_stage(name: str, tmp_path: Path) ->
 
 @pytest.mark.nightly
 @pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT to one process")
-@pytest.mark.parametrize("begun", [0.2, 1.2, 1.6, 2.0, 3.0, 5.0])  # CPU seconds
+    code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    code += "from rlacd.cli.main import main; main()"
 def test_ctrl_c_twice_ends_the_command_at_any_moment(begun: float, tmp_path: Path) -> None:
     trimesh.Trimesh(*LARGE["boxes"](), process=False).export(tmp_path / "mesh.ply")
     code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from rlacd.cli.main import main; main()"

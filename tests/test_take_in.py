@@ -33,6 +33,7 @@ def test_each_point_goes_to_the_hull_that_has_to_grow_least() -> None:
     assert grown[2] is parts[2]
 
 
+@pytest.mark.promise("covered")
 def test_a_hull_grows_only_if_its_part_then_meets_the_criterion() -> None:
     parts, points = [box(0), box(1)], np.array([(0.5, 0, 1.004), (1.5, 0, 1.001)])
     grown = take_in(parts, points, Concavity(0.05))
@@ -50,6 +51,7 @@ def test_a_hull_that_is_going_to_be_dropped_does_not_keep_others_from_growing() 
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", ["class5__m54", "class5__m55", "class5__m58"])
+@pytest.mark.promise("covered")
 def test_nothing_of_a_plant_of_many_leaves_lies_outside(corpus, name: str) -> None:
     """Its wrap is 0.0017 off in places, between the corners of faces too."""
     report = rlacd.decompose(corpus / f"test/capod/{name}.ply", quality="fast").report

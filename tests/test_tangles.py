@@ -201,6 +201,7 @@ def test_a_body_with_large_faces_that_is_inside_out_here_and_there_is_a_tangle()
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.promise("bounded")
 def test_a_tangle_takes_bounded_work(seed: int) -> None:
     mesh = tangle(seed)
     with pytest.raises(TangledError):

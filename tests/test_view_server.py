@@ -406,6 +406,7 @@ def test_what_is_not_there_is_reported(viewer: Viewer, monkeypatch: pytest.Monke
     assert "choose one of glb" in answer.json["error"]
 
 
+@pytest.mark.promise("viewer-private")
 def test_pages_of_other_sites_are_turned_away(viewer: Viewer) -> None:
     own = urllib.parse.urlsplit(viewer.address).netloc
     options = {"threshold": 1.9}
@@ -423,6 +424,7 @@ def test_pages_of_other_sites_are_turned_away(viewer: Viewer) -> None:
     assert ask(viewer, "POST", "/decompose", options, Origin=f"http://{own}").status == 202
 
 
+@pytest.mark.promise("viewer-private")
 def test_no_other_machine_can_reach_it(viewer: Viewer) -> None:
     port = int(urllib.parse.urlsplit(viewer.address).port or 0)
     assert urllib.parse.urlsplit(viewer.address).hostname == "127.0.0.1"

@@ -39,6 +39,7 @@ def torus() -> trimesh.Trimesh:
 @pytest.mark.slow
 @pytest.mark.parametrize("tolerance", [0.02, 0.1, 0.5])
 @pytest.mark.parametrize("shape", [table, torus, cup])
+@pytest.mark.promise("volume")
 def test_no_hull_adds_more_than_the_share(shape: object, tolerance: float) -> None:
     mesh: trimesh.Trimesh = shape()  # type: ignore[operator]
     result = rlacd.decompose(mesh, criterion="volume", volume_tolerance=tolerance, threads=1)

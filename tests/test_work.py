@@ -73,6 +73,7 @@ def boxes() -> trimesh.Trimesh:
 
 
 @pytest.mark.parametrize("shape", [*(pytest.param(shape, marks=pytest.mark.slow) for shape in (grate, sponge)), boxes])
+@pytest.mark.promise("bounded")
 def test_the_default_stays_within_its_account(shape: Callable[[], Manifold | trimesh.Trimesh]) -> None:
     solid = shape()
     if isinstance(solid, Manifold):

@@ -29,7 +29,7 @@ FAILING = 3
 
 MANY = 1000
 """With more components than this, the policy may have failed: there are solids that one breaks into thousands of parts
-and another into tens (docs/research/learning.md). So a second one is tried, ..."""
+and another into tens (research/learning.md). So a second one is tried, ..."""
 
 FAR_FEWER = 1 / 2
 """... and abandoned at this share of the components, or of the work done for them."""

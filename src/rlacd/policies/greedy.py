@@ -15,7 +15,7 @@ from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
 
 EXPONENT = 1.3
-"""Exponent of the norm that gives the fewest parts (docs/research/measurements.md)."""
+"""Exponent of the norm that gives the fewest parts (research/search.md)."""
 
 
 def hull_sum(s: Sweep) -> FloatArray:

@@ -16,7 +16,7 @@ class ProfileEncoder(nn.Module):
     of the component's surface in it, the same of the hull's, and the root mean square distance of both from the axis
     through the centre of the component's box. A plane between two slabs that differ much is a promising cut; a slab
     where component and hull agree is convex. The features line up with the planes whose values are predicted, an
-    alignment that an order-free set encoder first has to learn (docs/research/experiments.md compares them).
+    alignment that an order-free set encoder first has to learn (research/learning.md compares them).
     """
 
     dim = 6 * SLABS * 4

@@ -175,4 +175,4 @@ PRESETS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
     }
 )
 """Changes to the defaults: the paper's run; the same scaled to two cores; a component's number of cuts, learned from
-whole episodes and used in lookahead (docs/research/learning.md); and a run of a few minutes to try the paper's."""
+whole episodes and used in lookahead (research/learning.md); and a run of a few minutes to try the paper's."""
