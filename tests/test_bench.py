@@ -16,12 +16,10 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 import trimesh
-
-import rlacd
-from rlacd.bench import Bench, BenchLimits, BenchStore, BenchTask, find_meshes, make_method, tables, tuning
-from rlacd.bench.deployed import Deployment, decompose_as_deployed
-from rlacd.bench.store import load_hulls, save_hulls
-from rlacd.bench.tables import (
+from benchmarks import Bench, BenchLimits, BenchStore, BenchTask, find_meshes, make_method, tables, tuning
+from benchmarks.deployed import Deployment, decompose_as_deployed
+from benchmarks.store import load_hulls, save_hulls
+from benchmarks.tables import (
     Spread,
     Table,
     as_csv,
@@ -32,7 +30,9 @@ from rlacd.bench.tables import (
     ratio_of_parts,
     short_names,
 )
-from rlacd.bench.tuning import CLOSE, next_setting, tune
+from benchmarks.tuning import CLOSE, next_setting, tune
+
+import rlacd
 from rlacd.errors import MissingExtraError, OptionError, OutputError
 from tests.shapes import box, from_manifold
 
@@ -281,7 +281,7 @@ class TestRunner:
         for name in ("a.ply", "b.ply"):
             trimesh.util.concatenate([sphere, sphere.copy().apply_translation((1.5, 0, 0))]).export(folder / name)
         program = (
-            "import signal, sys; from pathlib import Path; from rlacd.bench import Bench, BenchStore, find_meshes;"
+            "import signal, sys; from pathlib import Path; from benchmarks import Bench, BenchStore, find_meshes;"
             "signal.signal(signal.SIGINT, signal.default_int_handler);"  # ignored by what runs in a shell's background
             "m, o = map(Path, sys.argv[1:]);"
             "Bench(m, find_meshes(m), BenchStore(o)).run('greedy', 0.002)"

@@ -13,14 +13,14 @@ from typing import Any
 
 import pytest
 import trimesh
+from benchmarks.__main__ import app
+from benchmarks.arms import ARMS, LARGEST_WEIGHT, _options, train_arms
+from benchmarks.charts import Curve, curves_chart, pareto_chart, pareto_front
+from benchmarks.page import Code, Figure, Heading, Page, Text
+from benchmarks.sheets import draw_sheet
+from benchmarks.tables import Table
 from typer.testing import CliRunner
 
-from rlacd.bench.arms import ARMS, LARGEST_WEIGHT, _options, train_arms
-from rlacd.bench.charts import Curve, curves_chart, pareto_chart, pareto_front
-from rlacd.bench.page import Code, Figure, Heading, Page, Text
-from rlacd.bench.sheets import draw_sheet
-from rlacd.bench.tables import Table
-from rlacd.cli.main import app
 from rlacd.errors import OptionError
 from tests.shapes import box, from_manifold
 
@@ -39,7 +39,7 @@ def meshes(tmp_path: Path) -> Path:
 
 
 def bench(*words: object, code: int = 0) -> str:
-    result = CliRunner().invoke(app, ["bench", *map(str, words)])
+    result = CliRunner().invoke(app, [*map(str, words)])
     assert result.exit_code == code, result.output
     return result.output
 

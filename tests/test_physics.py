@@ -1,4 +1,4 @@
-"""`rlacd bench physics`: balls fall where the exact mesh lets them, and piles settle."""
+"""`python -m benchmarks physics`: balls fall where the exact mesh lets them, and piles settle."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from benchmarks import simulate
+from benchmarks.__main__ import app
+from benchmarks.handle import handle_in_mujoco
+from benchmarks.physics import OURS
 from typer.testing import CliRunner
 
 import rlacd
-from rlacd.bench import simulate
-from rlacd.bench.handle import handle_in_mujoco
-from rlacd.bench.physics import OURS
-from rlacd.cli.main import app
 
 pytest.importorskip("mujoco", reason="the extra sim is not installed")
 
@@ -105,7 +105,7 @@ def test_hulls_beside_primitives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(simulate, "COPIES", 4)
     trimesh.creation.box((1, 2, 3)).export(tmp_path / "box.ply")
     trimesh.creation.icosphere(4).export(tmp_path / "ball.ply")
-    given = ["bench", "primitives", str(tmp_path), "--out", str(tmp_path / "run"), "--piles", "2"]
+    given = ["primitives", str(tmp_path), "--out", str(tmp_path / "run"), "--piles", "2"]
     done = CliRunner().invoke(app, given)
     assert done.exit_code == 0, done.output
     lines = (tmp_path / "run" / "primitives.md").read_text().splitlines()
@@ -123,7 +123,7 @@ def test_hulls_beside_primitives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 def test_the_command_writes_a_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(simulate, "SECONDS", 0.1)
     cup().export(tmp_path / "cup.ply")
-    given = ["bench", "physics", str(tmp_path), "--out", str(tmp_path / "run")]
+    given = ["physics", str(tmp_path), "--out", str(tmp_path / "run")]
     done = CliRunner().invoke(app, [*given, "--ways", "one-hull,fast:primitives"])
     assert done.exit_code == 0, done.output
     page = (tmp_path / "run" / "physics.md").read_text()

@@ -134,7 +134,7 @@ assert 2**23 < peak_memory() < 2**33
 def test_meshes_are_compared_in_processes(ring: Path) -> None:
     out = ring.parents[1] / "run"
     program = """
-import sys; from pathlib import Path; from rlacd.bench import Bench, BenchStore, find_meshes
+import sys; from pathlib import Path; from benchmarks import Bench, BenchStore, find_meshes
 meshes, out = map(Path, sys.argv[1:])
 print(Bench(meshes, find_meshes(meshes), BenchStore(out), say=lambda _: None).run("greedy", 0.05)[0]["parts"])
 """

@@ -209,7 +209,6 @@ def test_a_benchmark_names_its_command_date_and_commit(text: str) -> None:
         ("ray", "fleet", "batch FOLDER -o OUT --ray local"),
         ("fsspec", "fleet", "batch FOLDER -o memory://out"),
         ("torch", "train", "train FOLDER --run OUT --preset quick"),
-        ("mujoco", "sim", "bench physics FOLDER -o OUT"),
     ],
 )
 def test_a_command_without_its_extra_names_it(hidden: str, extra: str, words: str, mesh: Path) -> None:

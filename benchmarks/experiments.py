@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from rlacd.bench.compare import Entry, about, curve_chart, mesh_by_mesh, trade_off
-from rlacd.bench.page import Heading, Page, Text
-from rlacd.bench.runner import Bench
-from rlacd.bench.store import BenchTask, Row
-from rlacd.bench.tables import Table, common_meshes, comparison, details, failures
-from rlacd.bench.tuning import CLOSE, Point, tune
+from benchmarks.compare import Entry, about, curve_chart, mesh_by_mesh, trade_off
+from benchmarks.page import Heading, Page, Text
+from benchmarks.runner import Bench
+from benchmarks.store import BenchTask, Row
+from benchmarks.tables import Table, common_meshes, comparison, details, failures
+from benchmarks.tuning import CLOSE, Point, tune
 from rlacd.errors import OptionError
 
 TARGETS = (0.15, 0.10)

@@ -23,7 +23,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from rlacd.bench.deployed import Deployment, decompose_as_deployed
+from benchmarks.deployed import Deployment, decompose_as_deployed
 from rlacd.errors import MissingExtraError, OptionError
 from rlacd.options import QUALITIES
 from rlacd.policies import is_policy

@@ -10,12 +10,12 @@ from typing import Any
 
 import trimesh
 
-from rlacd.bench.compare import machine
-from rlacd.bench.handle import Handling, handle_in_mujoco
-from rlacd.bench.methods import make_method
-from rlacd.bench.page import Heading, Page, Text
-from rlacd.bench.runner import Bench
-from rlacd.bench.simulate import (
+from benchmarks.compare import machine
+from benchmarks.handle import Handling, handle_in_mujoco
+from benchmarks.methods import make_method
+from benchmarks.page import Heading, Page, Text
+from benchmarks.runner import Bench
+from benchmarks.simulate import (
     COPIES,
     NEAR,
     SECONDS,
@@ -29,8 +29,8 @@ from rlacd.bench.simulate import (
     pile_in_mujoco,
     scaled_source,
 )
-from rlacd.bench.store import BenchTask, load_hulls
-from rlacd.bench.tables import Table
+from benchmarks.store import BenchTask, load_hulls
+from benchmarks.tables import Table
 from rlacd.decompose_mesh import decompose
 from rlacd.errors import MissingExtraError, OptionError, RlacdError
 from rlacd.result import Result

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
-from rlacd.bench.store import Row
+from benchmarks.store import Row
 
 COLUMNS = (
     "mesh",

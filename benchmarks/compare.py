@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from rlacd.bench.charts import Curve, curves_chart, pareto_chart
-from rlacd.bench.methods import make_method
-from rlacd.bench.page import Figure, Heading, Page, Text
-from rlacd.bench.runner import Bench
-from rlacd.bench.sheets import draw_sheet
-from rlacd.bench.store import BenchTask, Row, load_hulls
-from rlacd.bench.tables import Table, as_csv, common_meshes, comparison, details, failures, short_names
-from rlacd.bench.tuning import Point, known_curve
+from benchmarks.charts import Curve, curves_chart, pareto_chart
+from benchmarks.methods import make_method
+from benchmarks.page import Figure, Heading, Page, Text
+from benchmarks.runner import Bench
+from benchmarks.sheets import draw_sheet
+from benchmarks.store import BenchTask, Row, load_hulls
+from benchmarks.tables import Table, as_csv, common_meshes, comparison, details, failures, short_names
+from benchmarks.tuning import Point, known_curve
 from rlacd.errors import MissingExtraError
 from rlacd.io.write import write_file
 
@@ -28,7 +28,7 @@ DEFAULT_METHODS = (
     "greedy:balanced",
     "greedy:best",
 )
-"""The methods that `rlacd bench compare` runs by default."""
+"""The methods that `python -m benchmarks compare` runs by default."""
 
 
 @dataclass(frozen=True)

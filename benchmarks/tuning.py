@@ -10,9 +10,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rlacd.bench.methods import Method, make_method
-from rlacd.bench.runner import Bench, is_outdated
-from rlacd.bench.store import Row
+from benchmarks.methods import Method, make_method
+from benchmarks.runner import Bench, is_outdated
+from benchmarks.store import Row
 from rlacd.errors import OptionError
 
 CLOSE = 0.02

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
 
-from rlacd.bench.tables import Table
+from benchmarks.tables import Table
 from rlacd.io.write import write_file
 
 

@@ -1,4 +1,4 @@
-"""The process that runs a tool and measures its hulls: ``python -m rlacd.bench.child``, one task per process.
+"""The process that runs a tool and measures its hulls: ``python -m benchmarks.child``, one task per process.
 
 A tool that crashes, hangs, exhausts memory or prints to stdout does so here; the results go to a file.
 """
@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rlacd.bench.methods import make_method
-from rlacd.bench.metrics import measure
-from rlacd.bench.store import Row, load_hulls, save_hulls
+from benchmarks.methods import make_method
+from benchmarks.metrics import measure
+from benchmarks.store import Row, load_hulls, save_hulls
 from rlacd.io.read.load import load_mesh
 from rlacd.pool.process import peak_memory
 from rlacd.repair.repair import repair

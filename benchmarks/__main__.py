@@ -1,4 +1,4 @@
-"""The commands `rlacd bench ...`: comparison with other tools, and the paper's experiments."""
+"""The commands `python -m benchmarks ...`: comparison with other tools, and the paper's experiments."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from rlacd.cli.parameters import REQUIRED, Parameters, command
 from rlacd.errors import MeshFileError, OptionError, OutputError
 
 if TYPE_CHECKING:
-    from rlacd.bench import Bench
-    from rlacd.bench.page import Page
+    from benchmarks import Bench
+    from benchmarks.page import Page
 
 HELP = """Compare rlacd with other tools: number of hulls, how tight they are, and time.
 
@@ -69,7 +69,7 @@ Runs: Parameters = {
 
 
 def _require_simulator() -> None:
-    from rlacd.bench.simulate import get_mujoco
+    from benchmarks.simulate import get_mujoco
 
     get_mujoco()
 
@@ -112,9 +112,9 @@ def compare(
 
     \b
     [bold]Example[/bold]
-      rlacd bench compare meshes/ --out run/ --jobs 2
+      python -m benchmarks compare meshes/ --out run/ --jobs 2
     """
-    from rlacd.bench.compare import DEFAULT_METHODS, at_settings, compare_page
+    from benchmarks.compare import DEFAULT_METHODS, at_settings, compare_page
 
     if up not in ("x", "y", "z"):
         raise OptionError(f"--up is {up!r}; it has to be x, y or z.")
@@ -139,9 +139,9 @@ def physics(
 
     \b
     [bold]Example[/bold]
-      rlacd bench physics meshes/ --out run/
+      python -m benchmarks physics meshes/ --out run/
     """
-    from rlacd.bench.physics import WAYS, physics_page
+    from benchmarks.physics import WAYS, physics_page
 
     chosen = WAYS if ways is None else [word.strip() for word in ways.split(",") if word.strip()]
     return physics_page(bench, chosen, bullet, typer.echo)
@@ -157,9 +157,9 @@ def primitives(
 
     \b
     [bold]Example[/bold]
-      rlacd bench primitives meshes/ --list meshes/quick.txt --out run/
+      python -m benchmarks primitives meshes/ --list meshes/quick.txt --out run/
     """
-    from rlacd.bench.primitives import primitives_page
+    from benchmarks.primitives import primitives_page
 
     return primitives_page(bench, piles, threshold, typer.echo)
 
@@ -186,7 +186,7 @@ def table_4(bench: Bench, methods: Methods = None, at: MeanError = None, close: 
 
 
 def _equal_accuracy(bench: Bench, title: str, methods: str | None, at: list[float] | None, close: float) -> Page:
-    from rlacd.bench.experiments import TABLE_1_METHODS, TARGETS, equal_accuracy
+    from benchmarks.experiments import TABLE_1_METHODS, TARGETS, equal_accuracy
 
     return equal_accuracy(bench, _names(methods, TABLE_1_METHODS), at or TARGETS, title, close)
 
@@ -198,7 +198,7 @@ def vhacd(
     threshold: Threshold = 0.05,
 ) -> Page:
     """Give V-HACD as many hulls as rlacd made of each mesh, and compare how tight they are (4.4.2)."""
-    from rlacd.bench.experiments import vhacd_at_equal_parts
+    from benchmarks.experiments import vhacd_at_equal_parts
 
     return vhacd_at_equal_parts(bench, reference, threshold)
 
@@ -206,7 +206,7 @@ def vhacd(
 @experiment("paper-table-2")
 def table_2(bench: Bench, ranking: Ranking = "excess", threshold: Threshold = 0.05) -> Page:
     """Leave out spatial planes, PCA planes, planes of concave edges (Table 2)."""
-    from rlacd.bench.experiments import kinds_of_planes
+    from benchmarks.experiments import kinds_of_planes
 
     return kinds_of_planes(bench, ranking, threshold)
 
@@ -220,7 +220,7 @@ def table_3(
     threshold: Threshold = 0.05,
 ) -> Page:
     """Vary the numbers of planes and of concave edges (Table 3)."""
-    from rlacd.bench.experiments import numbers_of_planes
+    from benchmarks.experiments import numbers_of_planes
 
     return numbers_of_planes(bench, ranking, threshold, _counts(planes), _counts(edges))
 
@@ -235,7 +235,7 @@ def _trained(name: str, about: str) -> None:
         seeds: Annotated[int, typer.Option(min=1, help="Training runs of each arm.")] = 1,
     ) -> None:
         with exit_codes():
-            from rlacd.bench.arms import train_arms
+            from benchmarks.arms import train_arms
 
             _need_folder(meshes)
             _make_folder(out)
@@ -257,8 +257,8 @@ def discounts(
 ) -> None:
     """Find by tabular Q-learning on real cut trees which discounts converge (appendix A)."""
     with exit_codes():
-        from rlacd.bench import find_meshes
-        from rlacd.bench.discounts import discounts_page
+        from benchmarks import find_meshes
+        from benchmarks.discounts import discounts_page
 
         _need_folder(meshes)
         _make_folder(out)
@@ -276,7 +276,7 @@ def _open(
     threads: int,
     jobs: int,
 ) -> Iterator[Bench]:
-    from rlacd.bench import Bench, BenchLimits, BenchStore, find_meshes
+    from benchmarks import Bench, BenchLimits, BenchStore, find_meshes
 
     _need_folder(meshes)
     if listed is not None and not listed.is_file():
@@ -307,7 +307,7 @@ def _make_folder(folder: Path) -> None:
 
 
 def _save(bench: Bench, page: Page, name: str) -> None:
-    from rlacd.bench.compare import save_csv
+    from benchmarks.compare import save_csv
 
     _write(page, bench.store.folder, name)
     save_csv(bench, bench.store.folder)
@@ -320,7 +320,7 @@ def _write(page: Page, folder: Path, name: str) -> None:
 
 
 def _names(given: str | None, usual: tuple[str, ...]) -> list[str]:
-    from rlacd.bench import make_method
+    from benchmarks import make_method
 
     names = list(usual) if given is None else [word.strip() for word in given.split(",") if word.strip()]
     if not names:
@@ -335,3 +335,7 @@ def _counts(text: str) -> list[int]:
     if not all(word.isdecimal() for word in words):
         raise OptionError(f"{text!r} should be whole numbers with commas between.")
     return [int(word) for word in words]
+
+
+if __name__ == "__main__":
+    app(prog_name="python -m benchmarks")

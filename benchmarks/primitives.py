@@ -10,11 +10,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rlacd.bench.compare import machine
-from rlacd.bench.page import Heading, Page, Text
-from rlacd.bench.runner import Bench
-from rlacd.bench.simulate import COPIES, SECONDS, SIZE, STEP, model_size, pile_in_mujoco, scaled_source
-from rlacd.bench.tables import Table
+from benchmarks.compare import machine
+from benchmarks.page import Heading, Page, Text
+from benchmarks.runner import Bench
+from benchmarks.simulate import COPIES, SECONDS, SIZE, STEP, model_size, pile_in_mujoco, scaled_source
+from benchmarks.tables import Table
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.primitive_kinds import PRIMITIVE_KINDS

@@ -12,8 +12,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from rlacd.bench.methods import make_method
-from rlacd.bench.store import BenchStore, BenchTask, Row
+from benchmarks.methods import make_method
+from benchmarks.store import BenchStore, BenchTask, Row
 from rlacd.pool.process import kill_group, start, why_it_ended
 
 Say = Callable[[str], None]
@@ -122,11 +122,11 @@ class Bench:
             "hulls": str(hulls),
             "answer": str(answer),
         }
-        command = [sys.executable, "-m", "rlacd.bench.child", json.dumps(job)]
+        command = [sys.executable, "-m", "benchmarks.child", json.dumps(job)]
         # The child reads a pipe that is never written to: when this process dies, the pipe closes and the child exits.
         read_end, write_end = os.pipe()
         try:
-            environment = {"OMP_NUM_THREADS": str(self.limits.threads)}
+            environment = {"OMP_NUM_THREADS": str(self.limits.threads), "PYTHONPATH": _with_root()}
             process = start(command, read_end, subprocess.DEVNULL, subprocess.PIPE, environment)
             os.close(read_end)
             self._running.add(process)
@@ -144,6 +144,12 @@ class Bench:
         if process.returncode < 0:
             return f"{why_it_ended(process.returncode)} {last}".strip()
         return (last or why_it_ended(process.returncode)) if process.returncode else None
+
+
+def _with_root() -> str:
+    """PYTHONPATH with the folder of this package in front, wherever the command was started."""
+    root = str(Path(__file__).resolve().parents[1])
+    return os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
 
 
 def is_outdated(row: Row) -> bool:

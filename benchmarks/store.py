@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from rlacd.bench.methods import RawHull
+from benchmarks.methods import RawHull
 from rlacd.errors import OutputError
 from rlacd.io.write.atomic import output_errors
 from rlacd.io.write.lock import lock_folder

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rlacd.bench.charts import Curve, curves_chart
-from rlacd.bench.page import Figure, Page, Text
-from rlacd.bench.tables import Table
+from benchmarks.charts import Curve, curves_chart
+from benchmarks.page import Figure, Page, Text
+from benchmarks.tables import Table
 from rlacd.criteria import Concavity
 from rlacd.errors import MeshError, RlacdError
 from rlacd.io.read.load import load_mesh

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from rlacd.bench.charts import Curve, curves_chart
-from rlacd.bench.page import Figure, Heading, Page, Text
-from rlacd.bench.tables import Spread, Table
+from benchmarks.charts import Curve, curves_chart
+from benchmarks.page import Figure, Heading, Page, Text
+from benchmarks.tables import Spread, Table
 from rlacd.errors import MissingExtraError, OptionError
 from rlacd.learn.paper.options import TrainOptions
 

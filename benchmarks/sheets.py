@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from rlacd.bench.methods import RawHull
-from rlacd.bench.store import Row
+from benchmarks.methods import RawHull
+from benchmarks.store import Row
 from rlacd.io.read.load import load_mesh
 from rlacd.io.write.palette import hull_colors, linear_from_srgb
 from rlacd.view.picture import FADED, INK, INPUT_COLOR, PAPER, TO_Z_UP
