@@ -1,15 +1,17 @@
 """The methods compared: every tool behind one interface, with one setting that controls how tight its hulls are.
 
-========================  ============================================  =======================================
-name                      tool                                          setting
-========================  ============================================  =======================================
-``coacd``                 CoACD, default options                        concavity threshold
-``vhacdx``                V-HACD 4, up to 1,024 hulls                   volume error, percent
-``vhacdx:hulls``          V-HACD 4, default options                     most hulls
-``POLICY[:QUALITY]``      rlacd; see `rlacd.policies.make_policy`       concavity threshold
-``POLICY:space[:...]``    rlacd with the navigable space criterion      tolerance; the radius is half of it
-``planes[:...]``          the paper's deployment; see `deployed`        concavity threshold
-========================  ============================================  =======================================
+==============================  ============================================  =====================================
+name                            tool                                          setting (default)
+==============================  ============================================  =====================================
+``default``                     ``rlacd.decompose(mesh)``                     concavity threshold (its own)
+``fast``, ``best``              the same with that ``quality``                concavity threshold (its own)
+``...:OPTION=VALUE``            the same with that option, any number         concavity threshold (its own)
+``...:space``                   the same with navigable space                 tolerance (0.1); the radius is half
+``coacd``                       CoACD                                         concavity threshold (its own)
+``vhacd``                       V-HACD 4                                      most hulls (its own)
+``disjoint``                    `benchmarks.disjoint`                         concavity threshold (rlacd's)
+``planes[:...]``                the paper's deployment; see `deployed`        concavity threshold (rlacd's)
+==============================  ============================================  =====================================
 
 Lengths are in the frame where the longest side is 2.
 """
@@ -17,16 +19,16 @@ Lengths are in the frame where the longest side is 2.
 from __future__ import annotations
 
 import importlib.metadata
+import inspect
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from benchmarks.deployed import Deployment, decompose_as_deployed
 from rlacd.errors import MissingExtraError, OptionError
-from rlacd.options import QUALITIES
-from rlacd.policies import is_policy
+from rlacd.options import DEFAULT_THRESHOLD
 from rlacd.solid.arrays import FloatArray, IntArray
 
 RawHull: TypeAlias = tuple[FloatArray, IntArray]
@@ -35,11 +37,7 @@ RawHull: TypeAlias = tuple[FloatArray, IntArray]
 Run: TypeAlias = Callable[[FloatArray, IntArray, float, int], list[RawHull]]
 """(vertices, faces, setting, threads) -> hulls."""
 
-STEPS = {"balanced": 24, "best": 100}
-"""Steps of the search: a time budget, the default of ``best``, would make results depend on the machine."""
-
-MOST_VHACD_HULLS = 1024
-"""Hull limit of V-HACD when its setting is the volume error: ten levels of halving."""
+QUALITIES: dict[str, dict[str, Any]] = {"default": {}, "fast": {"quality": "fast"}, "best": {"quality": "best"}}
 
 
 @dataclass(frozen=True)
@@ -52,7 +50,7 @@ class Method:
     version : str
         Version of its package.
     setting : str
-        Meaning of its setting: "threshold", "tolerance", "percent" or "hulls".
+        Meaning of its setting: "threshold", "tolerance" or "hulls".
     default : float
         The default of the tool's authors.
     run : callable
@@ -64,11 +62,6 @@ class Method:
     setting: str
     default: float
     run: Run
-
-    @property
-    def falls(self) -> bool:
-        """Whether a larger setting asks for tighter hulls."""
-        return self.setting == "hulls"
 
     def concavity(self, number: float) -> float | None:
         """The concavity that the method claims to keep; None if it claims none."""
@@ -85,41 +78,81 @@ def make_method(name: str) -> Method:
     MissingExtraError
         The method's tool is not installed.
     """
-    base, *tags = name.split(":")
+    base, *words = name.split(":")
     if name == "coacd":
-        return Method(name, _version("coacd"), "threshold", 0.05, _coacd)
-    if name == "vhacdx":
-        return Method(name, _version("vhacdx"), "percent", 1.0, _vhacd_by_error)
-    if name == "vhacdx:hulls":
-        return Method(name, _version("vhacdx"), "hulls", 64, _vhacd_by_hulls)
+        return Method(name, version_of("coacd"), "threshold", 0.05, _coacd)
+    if name == "vhacd":
+        return Method(name, version_of("vhacdx"), "hulls", 64, _vhacd)
+    if name == "disjoint":
+        from benchmarks.disjoint import decompose_disjoint
+
+        return Method(name, version_of("rlacd"), "threshold", DEFAULT_THRESHOLD, decompose_disjoint)
     if base == "planes":
-        deployment = Deployment.parse(tags)
-        return Method(
-            name, _version("rlacd"), "threshold", 0.05, lambda v, f, t, n: decompose_as_deployed(deployment, v, f, t, n)
-        )
-    qualities = [tag for tag in tags if tag in QUALITIES]
-    space = tags.count("space")
-    if not is_policy(base) or len(qualities) > 1 or space > 1 or len(qualities) + space != len(tags):
+        from benchmarks.deployed import Deployment, decompose_as_deployed
+
+        deployment = Deployment.parse(words)
+
+        def run(v: FloatArray, f: IntArray, threshold: float, threads: int) -> list[RawHull]:
+            return decompose_as_deployed(deployment, v, f, threshold, threads)
+
+        return Method(name, version_of("rlacd"), "threshold", DEFAULT_THRESHOLD, run)
+    setting, default = ("tolerance", 0.1) if "space" in words else ("threshold", DEFAULT_THRESHOLD)
+    return Method(name, version_of("rlacd"), setting, default, _rlacd(name))
+
+
+def rlacd_options(name: str) -> dict[str, Any]:
+    """The options of ``rlacd.decompose`` that a name such as ``fast:max_vertices=32`` stands for.
+
+    Raises
+    ------
+    OptionError
+        The name stands for none.
+    """
+    from rlacd.decompose_mesh import decompose
+
+    base, *words = name.split(":")
+    if base not in QUALITIES:
         raise OptionError(
-            f"there is no method {name!r}; it has to be coacd, vhacdx, vhacdx:hulls, planes[:...], or a policy of "
-            "rlacd, if need be followed by :balanced or :best and by :space."
+            f"there is no method {name!r}; it has to be default, fast or best, if need be followed by :OPTION=VALUE or "
+            "by :space; or coacd, vhacd, disjoint, planes[:...]."
         )
-    return Method(
-        name,
-        _version("rlacd"),
-        "tolerance" if space else "threshold",
-        0.1 if space else 0.05,
-        _rlacd(base, qualities[0] if qualities else "fast", bool(space)),
-    )
+    options = dict(QUALITIES[base])
+    for word in words:
+        option, is_given, value = word.partition("=")
+        if word == "space":
+            continue
+        if not is_given or option not in inspect.signature(decompose).parameters:
+            raise OptionError(
+                f"{word!r} in {name!r} has to be an option of rlacd.decompose and its value, as policy=navacd."
+            )
+        try:
+            options[option] = json.loads(value)
+        except ValueError:
+            options[option] = value
+    return options
 
 
-def _version(package: str) -> str:
+def version_of(package: str) -> str:
+    """The version of an installed package."""
     try:
         return importlib.metadata.version(package)
     except importlib.metadata.PackageNotFoundError as error:
-        raise MissingExtraError(
-            f"{package} is not installed: run  pip install 'rlacd[bench]'  and try again."
-        ) from error
+        raise MissingExtraError(f"{package} is not installed: run  pip install {package}  and try again.") from error
+
+
+def _rlacd(name: str) -> Run:
+    options, is_space = rlacd_options(name), "space" in name.split(":")
+
+    def run(vertices: FloatArray, faces: IntArray, number: float, threads: int) -> list[RawHull]:
+        import rlacd
+
+        goal: dict[str, Any] = {} if number == DEFAULT_THRESHOLD else {"threshold": number}
+        if is_space:
+            goal = {"criterion": rlacd.NavigableSpace(number / 4, number / 2)}  # shares of the longest side
+        result = rlacd.decompose((vertices, faces), threads=threads, **goal, **options)
+        return [_as_arrays(hull.vertices, hull.faces) for hull in result]
+
+    return run
 
 
 def _coacd(vertices: FloatArray, faces: IntArray, number: float, threads: int) -> list[RawHull]:
@@ -130,43 +163,14 @@ def _coacd(vertices: FloatArray, faces: IntArray, number: float, threads: int) -
     return [_as_arrays(v, f) for v, f in found]
 
 
-def _vhacd_by_error(vertices: FloatArray, faces: IntArray, number: float, threads: int) -> list[RawHull]:
-    return _vhacd(vertices, faces, threads, minimumVolumePercentErrorAllowed=number, maxConvexHulls=MOST_VHACD_HULLS)
-
-
-def _vhacd_by_hulls(vertices: FloatArray, faces: IntArray, number: float, threads: int) -> list[RawHull]:
-    return _vhacd(vertices, faces, threads, maxConvexHulls=round(number))
-
-
-def _vhacd(vertices: FloatArray, faces: IntArray, threads: int, **options: float) -> list[RawHull]:
+def _vhacd(vertices: FloatArray, faces: IntArray, number: float, threads: int) -> list[RawHull]:
     import vhacdx
 
     # vhacdx takes faces in VTK's flat layout: a count of 3 before each triangle.
     counted = np.column_stack([np.full(len(faces), 3), faces]).astype(np.uint32).ravel()
-    found = vhacdx.compute_vhacd(np.asarray(vertices, dtype=np.float64), counted, asyncACD=threads > 1, **options)
+    given = np.asarray(vertices, dtype=np.float64)
+    found = vhacdx.compute_vhacd(given, counted, maxConvexHulls=round(number), asyncACD=threads > 1)
     return [_as_arrays(v, np.asarray(f).reshape(-1, 3)) for v, f in found]
-
-
-def _rlacd(policy: str, quality: str, space: bool) -> Run:
-    def run(vertices: FloatArray, faces: IntArray, number: float, threads: int) -> list[RawHull]:
-        from rlacd.criteria import NavigableSpace
-        from rlacd.decompose_mesh import decompose
-
-        if space:
-            goal: dict[str, object] = {"criterion": NavigableSpace(number / 4, number / 2)}  # shares of the side
-        else:
-            goal = {"threshold": number}
-        result = decompose(
-            (vertices, faces),
-            policy=policy,
-            quality=quality,  # type: ignore[arg-type]
-            search_steps=STEPS.get(quality),
-            threads=threads,
-            **goal,  # type: ignore[arg-type]
-        )
-        return [_as_arrays(hull.vertices, hull.faces) for hull in result]
-
-    return run
 
 
 def _as_arrays(vertices: object, faces: object) -> RawHull:

@@ -1,4 +1,4 @@
-"""Runs every method on every mesh, each in its own process, with limits; finished tasks are not repeated."""
+"""Runs every method on every mesh, in processes of their own, with limits; finished tasks are not repeated."""
 
 from __future__ import annotations
 
@@ -7,38 +7,44 @@ import os
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from benchmarks.methods import make_method
-from benchmarks.store import BenchStore, BenchTask, Row
+from benchmarks.store import Row, Store, Task
+from rlacd.errors import MeshFileError
 from rlacd.pool.process import kill_group, start, why_it_ended
 
-Say = Callable[[str], None]
+ENDINGS = {".ply", ".obj", ".stl", ".off", ".glb", ".gltf", ".dae", ".3mf"}
+
+LAST_WORDS = 300
+"""Characters of a failed process's last line that are kept."""
 
 
 @dataclass(frozen=True)
-class BenchLimits:
+class Limits:
     """Limits of a task.
 
     Attributes
     ----------
     seconds : float
-        Wall time of each process: for running a method, and again for measuring its hulls in a second process.
+        Wall time for running a method, and again for measuring its hulls in a second process.
     memory : int
         Bytes of address space, on Linux; 0 for no limit.
-    threads : int
-        Threads per process.
     jobs : int
         Number of concurrent processes.
+    tasks : int
+        Tasks that a process does before it is replaced. Peak memory is that of its largest so far.
     """
 
     seconds: float = 600.0
     memory: int = 12 * 2**30
-    threads: int = 1
     jobs: int = 1
+    tasks: int = 1
 
 
 class Bench:
@@ -50,28 +56,35 @@ class Bench:
         Folder that mesh names are relative to.
     names : sequence of str
         The meshes.
-    store : BenchStore
-    limits : BenchLimits
+    store : Store
+    limits : Limits
     say : callable
         Receives lines of progress.
     """
 
     def __init__(
-        self, meshes: Path, names: Sequence[str], store: BenchStore, limits: BenchLimits | None = None, say: Say = print
+        self,
+        meshes: Path,
+        names: Sequence[str],
+        store: Store,
+        limits: Limits | None = None,
+        say: Callable[[str], None] = print,
     ) -> None:
         self.meshes = meshes
         self.names = list(names)
         self.store = store
-        self.limits = limits or BenchLimits()
-        self._say = say
-        self._running: set[subprocess.Popen[bytes]] = set()
+        self.limits = limits or Limits()
+        self.say = say
+        self._children: set[_Child] = set()
+        self._own = threading.local()
         self._stopping = False
 
-    def run(self, method: str, setting: float) -> list[Row]:
-        """Run one method on all meshes; rows in the order of the names."""
-        return self.run_tasks([BenchTask(name, method, setting) for name in self.names])
+    def run(self, method: str, setting: float | None = None) -> list[Row]:
+        """Run one method on all meshes, by default at its own setting; rows in the order of the names."""
+        number = make_method(method).default if setting is None else setting
+        return self.run_tasks([Task(name, method, number) for name in self.names])
 
-    def run_tasks(self, tasks: Iterable[BenchTask]) -> list[Row]:
+    def run_tasks(self, tasks: Iterable[Task]) -> list[Row]:
         """Run unfinished tasks, and return the rows of all tasks in order."""
         tasks = list(tasks)
         waiting = [task for task in dict.fromkeys(tasks) if self.known(task) is None]
@@ -80,76 +93,100 @@ class Bench:
         try:
             for number, row in enumerate(pool.map(self._finish, waiting), 1):
                 what = row.get("error") or f"{row['parts']} parts, {row['cpu']:.1f} s, D_h {row['hausdorff']:.3f}"
-                self._say(f"{number}/{len(waiting)} {row['mesh']}  {row['method']} {row['setting']:g}  {what}")
-        except BaseException:
-            self._stopping = True  # processes killed from here on have not failed
-            for process in list(self._running):
-                kill_group(process)
-            raise
+                self.say(f"{number}/{len(waiting)} {row['mesh']}  {row['method']} {row['setting']:g}  {what}")
         finally:
+            self._stopping = True  # processes killed from here on have not failed
+            for child in list(self._children):
+                child.kill()
+            self._children.clear()
             pool.shutdown(cancel_futures=True)
         return [found for task in tasks if (found := self.store.get(task)) is not None]
 
-    def known(self, task: BenchTask) -> Row | None:
+    def known(self, task: Task) -> Row | None:
         """The row of a finished task, unless another version of its tool made it."""
         row = self.store.get(task)
         return None if row is None or is_outdated(row) else row
 
-    def _finish(self, task: BenchTask) -> Row:
+    def _finish(self, task: Task) -> Row:
         row: Row = {"mesh": task.mesh, "method": task.method, "setting": task.setting}
         hulls = self.store.hulls_of(task)
         if self.store.get(task) is not None:
             hulls.unlink(missing_ok=True)  # made by another version
         with tempfile.TemporaryDirectory() as folder:
             answer = Path(folder) / "answer.json"
-            failure = self._child(task, hulls, answer)
+            failure = self._ask(task, hulls, answer)
             if failure is not None and hulls.exists():  # the tool has finished; measuring gets its own limits
-                failure = self._child(task, hulls, answer)
+                failure = self._ask(task, hulls, answer)
                 failure = failure and f"measuring: {failure}"
             row |= {"error": failure} if failure else json.loads(answer.read_text(encoding="utf-8"))
         if not self._stopping:
             self.store.add(row)
         return row
 
-    def _child(self, task: BenchTask, hulls: Path, answer: Path) -> str | None:
-        """Run one process, which reuses hulls that exist; returns None, or a description of its failure."""
+    def _ask(self, task: Task, hulls: Path, answer: Path) -> str | None:
+        """Give a task to a process, which reuses hulls that exist; returns None, or a description of its failure."""
+        child: _Child | None = getattr(self._own, "child", None)
+        if child is None or child.process.poll() is not None or child.done >= self.limits.tasks:
+            if child is not None:
+                child.kill()
+                self._children.discard(child)
+            child = self._own.child = _Child()
+            self._children.add(child)
         job = {
             "mesh": str(self.meshes / task.mesh),
             "method": task.method,
             "setting": task.setting,
-            "threads": self.limits.threads,
             "memory": self.limits.memory,
             "hulls": str(hulls),
             "answer": str(answer),
         }
-        command = [sys.executable, "-m", "benchmarks.child", json.dumps(job)]
-        # The child reads a pipe that is never written to: when this process dies, the pipe closes and the child exits.
-        read_end, write_end = os.pipe()
+        return child.do(job, self.limits.seconds)
+
+
+class _Child:
+    """A process that does tasks one after the other, and exits when this one does."""
+
+    def __init__(self) -> None:
+        root = str(Path(__file__).resolve().parents[1])
+        path = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
+        environment = {"OMP_NUM_THREADS": "1", "PYTHONPATH": path}
+        command = [sys.executable, "-m", "benchmarks.child"]
+        self._said = tempfile.TemporaryFile()  # noqa: SIM115
+        self.process = start(command, subprocess.PIPE, subprocess.PIPE, self._said, environment)
+        self.done = 0
+
+    def do(self, job: dict[str, Any], seconds: float) -> str | None:
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        late = threading.Event()
+
+        def give_up() -> None:
+            late.set()
+            kill_group(self.process)
+
+        watch = threading.Timer(seconds, give_up)
+        watch.start()
         try:
-            environment = {"OMP_NUM_THREADS": str(self.limits.threads), "PYTHONPATH": _with_root()}
-            process = start(command, read_end, subprocess.DEVNULL, subprocess.PIPE, environment)
-            os.close(read_end)
-            self._running.add(process)
-            try:
-                _, complaint = process.communicate(timeout=self.limits.seconds)
-            except subprocess.TimeoutExpired:
-                kill_group(process)
-                process.communicate()
-                return f"more than {self.limits.seconds:g} s"
-            finally:
-                self._running.discard(process)
+            self.process.stdin.write(json.dumps(job).encode() + b"\n")
+            self.process.stdin.flush()
+            is_done = bool(self.process.stdout.readline())
+        except BrokenPipeError:
+            is_done = False
         finally:
-            os.close(write_end)
-        last = (complaint.decode(errors="replace").strip().splitlines() or [""])[-1][-300:]
-        if process.returncode < 0:
-            return f"{why_it_ended(process.returncode)} {last}".strip()
-        return (last or why_it_ended(process.returncode)) if process.returncode else None
+            watch.cancel()
+        self.done += 1
+        if is_done:
+            return None
+        code = self.process.wait()
+        if late.is_set():
+            return f"more than {seconds:g} s"
+        self._said.seek(0)
+        last = (self._said.read().decode(errors="replace").strip().splitlines() or [""])[-1][-LAST_WORDS:]
+        return f"{why_it_ended(code)} {last}".strip()
 
-
-def _with_root() -> str:
-    """PYTHONPATH with the folder of this package in front, wherever the command was started."""
-    root = str(Path(__file__).resolve().parents[1])
-    return os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
+    def kill(self) -> None:
+        kill_group(self.process)
+        self.process.wait()
 
 
 def is_outdated(row: Row) -> bool:
@@ -160,14 +197,23 @@ def is_outdated(row: Row) -> bool:
 def find_meshes(folder: Path, listed: Path | None = None) -> list[str]:
     """Names of the meshes in a folder, at any depth, or of those in a list, one per line.
 
-    ShapeNetCore (v1 and v2), HumanBody and COSEG are read as distributed: nested folders with voxels, pictures and
-    labels between the meshes.
+    Raises
+    ------
+    MeshFileError
+        The folder or the list does not exist, lists what is not in the folder, or there are no meshes.
     """
-    if listed is not None:
-        return [
-            line
-            for line in listed.read_text(encoding="utf-8").splitlines()
-            if line.strip() and not line.startswith("#")
-        ]
-    endings = {".ply", ".obj", ".stl", ".off", ".glb", ".gltf", ".dae", ".3mf"}
-    return sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.suffix.lower() in endings)
+    if not folder.is_dir():
+        raise MeshFileError(f"{folder} is not a folder; give the folder that holds the meshes.")
+    if listed is None:
+        names = sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.suffix.lower() in ENDINGS)
+    elif listed.is_file():
+        lines = listed.read_text(encoding="utf-8").splitlines()
+        names = [line for line in lines if line.strip() and not line.startswith("#")]
+    else:
+        raise MeshFileError(f"the list {listed} does not exist; give a file with one mesh a line.")
+    missing = [name for name in names if not (folder / name).is_file()]
+    if missing:
+        raise MeshFileError(f"{len(missing)} of the meshes listed, such as {missing[0]}, are not in {folder}.")
+    if not names:
+        raise MeshFileError(f"there are no meshes in {folder}.")
+    return names

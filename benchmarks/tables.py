@@ -1,70 +1,24 @@
-"""Tables of results: Markdown as in the paper (mean, max, ± standard deviation), and CSV."""
+"""Tables as Markdown, pages of them, and ratios of paired measurements with intervals; tables put into documents."""
 
 from __future__ import annotations
 
-import csv
-import io
-import math
+import re
+import shutil
 import statistics
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any, TypeAlias
+
+import numpy as np
+import typer
 
 from benchmarks.store import Row
+from rlacd.io.write import write_file
 
-COLUMNS = (
-    "mesh",
-    "method",
-    "setting",
-    "version",
-    "input_faces",
-    "threads",
-    "parts",
-    "faces",
-    "vertices",
-    "hausdorff",
-    "over",
-    "under",
-    "concavity",
-    "exceeding",
-    "volume",
-    "uncovered",
-    "invalid",
-    "empty",
-    "wall",
-    "cpu",
-    "peak_mb",
-    "error",
-)
-"""Columns of the CSV file."""
+app = typer.Typer(add_completion=False)
 
-
-@dataclass(frozen=True)
-class Spread:
-    """Mean, maximum and standard deviation of a number over the meshes."""
-
-    mean: float
-    most: float
-    deviation: float
-
-    @classmethod
-    def of(cls, values: Sequence[float]) -> Spread:
-        """Of at least one value; the deviation is the sample standard deviation, 0 for one value."""
-        return cls(statistics.fmean(values), max(values), statistics.stdev(values) if len(values) > 1 else 0.0)
-
-    def text(self, digits: int) -> str:
-        """Format as in the paper: mean (max, ± deviation), with `digits` decimals."""
-        return f"{self.mean:.{digits}f} ({self.most:.{digits}f}, ± {self.deviation:.{digits}f})"
-
-
-def common_meshes(groups: Iterable[Sequence[Row]]) -> set[str]:
-    """The meshes on which every group of rows succeeded; averages are comparable only on these."""
-    sets = [{row["mesh"] for row in rows if "error" not in row} for rows in groups]
-    return set.intersection(*sets) if sets else set()
+RESAMPLES = 10_000
+"""Resamples of the meshes for an interval; its ends then vary by less than a hundredth of its width."""
 
 
 @dataclass(frozen=True)
@@ -84,8 +38,7 @@ class Table:
     lines: Sequence[Sequence[object]]
     note: str = ""
 
-    def markdown(self) -> str:
-        """Format as Markdown; the first column is left-aligned, the others right-aligned."""
+    def __str__(self) -> str:
         header, *rows = (
             " | ".join(str(cell).replace("|", "\\|") for cell in line) for line in (self.header, *self.lines)
         )
@@ -94,139 +47,124 @@ class Table:
         return f"{text}\n\n{self.note}" if self.note else text
 
 
-def comparison(groups: Sequence[tuple[str, Sequence[Row]]]) -> Table:
-    """Compare methods on the meshes that all of them solved, one line each, as in the paper's Table 1.
+@dataclass
+class Page:
+    """A page of results: paragraphs and tables in Markdown, with charts beside it.
 
-    Parameters
+    Attributes
     ----------
-    groups : sequence of (label, rows)
-        The first is the reference for the ratio of parts.
+    title : str
+    blocks : list
+        Shown by ``str``.
+    charts : dict of str to bytes
+        File name to content.
     """
-    good = _managed(groups)
-    first = next(iter(good.values()), [])
-    lines = []
-    for label, rows in good.items():
-        cells = [show(rows) if rows else "–" for show in _COMPARED.values()]
-        ratio = "1" if rows is first and rows else ratio_of_parts(rows, first)
-        lines.append([label, cells[0], ratio, *cells[1:]])
-    parts, *others = _COMPARED
-    note = (
-        "The meshes that every method managed; mean (max, ± standard deviation); the ratio is a geometric mean over "
-        "them, ± its standard error."
-    )
-    return Table([f"{len(first)} meshes", parts, f"{parts} / first line's", *others], lines, note)
+
+    title: str
+    blocks: list[object] = field(default_factory=list)
+    charts: dict[str, bytes] = field(default_factory=dict)
+
+    def add(self, *blocks: object) -> None:
+        """Append blocks."""
+        self.blocks += blocks
+
+    def chart(self, name: str, content: bytes, caption: str) -> None:
+        """Append a chart."""
+        self.charts[name] = content
+        self.add(f"![{caption}]({name})")
+
+    def __str__(self) -> str:
+        return "\n\n".join(map(str, [f"# {self.title}", *self.blocks])) + "\n"
+
+    def save(self, folder: Path, name: str) -> Path:
+        """Write ``NAME.md`` and the charts; OutputError if the folder cannot be written to."""
+        for file_name, content in {**self.charts, f"{name}.md": str(self).encode()}.items():
+            write_file(folder / file_name, content)
+        return folder / f"{name}.md"
 
 
-def details(groups: Sequence[tuple[str, Sequence[Row]]]) -> Table:
-    """Show the remaining metrics on the meshes that all methods solved, and each method's number of failures."""
-    failed = {label: f"{sum('error' in row for row in rows)} of {len(rows)}" for label, rows in groups}
-    lines = [
-        [label, *(show(rows) if rows else "–" for show in _DETAILS.values()), failed[label]]
-        for label, rows in _managed(groups).items()
-    ]
-    return Table(["the same meshes", *_DETAILS, "failed"], lines)
+@dataclass(frozen=True)
+class Ratio:
+    """Geometric mean of paired ratios, and its 95 % interval by resampling the pairs."""
+
+    mean: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, values: Sequence[float], reference: Sequence[float]) -> Ratio:
+        """Of at least one pair of positive numbers."""
+        logs = np.log(np.asarray(values, dtype=float) / np.asarray(reference, dtype=float))
+        drawn = np.random.default_rng(0).integers(len(logs), size=(RESAMPLES, len(logs)))
+        low, high = np.exp(np.quantile(logs[drawn].mean(axis=1), (0.025, 0.975)))
+        return cls(float(np.exp(logs.mean())), float(low), float(high))
+
+    def __str__(self) -> str:
+        return f"{self.mean:.3f} ({self.low:.3f} to {self.high:.3f})"
 
 
-def _managed(groups: Sequence[tuple[str, Sequence[Row]]]) -> dict[str, list[Row]]:
-    shared = common_meshes(rows for _, rows in groups)
-    return {label: [row for row in rows if row["mesh"] in shared] for label, rows in groups}
-
-
-Show: TypeAlias = Callable[[Sequence[Row]], object]
-"""Computes a column from the rows of one method."""
-
-
-def _spread(key: str, digits: int) -> Show:
-    return lambda rows: Spread.of([row[key] for row in rows]).text(digits)
-
-
-def _mean_and_worst(key: str, digits: int) -> Show:
-    def show(rows: Sequence[Row]) -> str:
-        spread = Spread.of([row[key] for row in rows])
-        return f"{spread.mean:.{digits}f}, {spread.most:.{digits}f}"
-
-    return show
-
-
-def _share(key: str) -> Show:
-    return lambda rows: f"{100 * statistics.fmean(row[key] for row in rows):.1f} %"
-
-
-_COMPARED: Mapping[str, Show] = MappingProxyType(
-    {
-        "#P": _spread("parts", 1),
-        "#F": _spread("faces", 0),
-        "D_h": _spread("hausdorff", 3),
-        "concavity: mean, worst": _mean_and_worst("concavity", 3),
-        "CPU s": _spread("cpu", 2),
-    }
-)
-
-_DETAILS: Mapping[str, Show] = MappingProxyType(
-    {
-        "over": _spread("over", 3),
-        "under": _spread("under", 3),
-        "uncovered": _share("uncovered"),
-        "Σ hull / solid, median": lambda rows: f"{statistics.median(row['volume'] for row in rows):.2f}",
-        "invalid hulls": lambda rows: sum(row["invalid"] for row in rows),
-        "wall s: mean, worst": _mean_and_worst("wall", 2),
-        "CPU s: median, sum": lambda rows: (
-            f"{statistics.median(row['cpu'] for row in rows):.2f}, {sum(row['cpu'] for row in rows):.0f}"
-        ),
-        "peak MB": lambda rows: f"{max(row['peak_mb'] for row in rows):.0f}",
-    }
-)
-
-
-def ratio_of_parts(rows: Sequence[Row], reference: Sequence[Row]) -> str:
-    """Geometric mean over the meshes of the ratio of parts to the reference's, with its standard error."""
+def ratio_of(rows: Sequence[Row], reference: Sequence[Row], key: str = "parts") -> str:
+    """The ratio of a column to the reference's, over the meshes that both managed."""
     shared = common_meshes([rows, reference])
-    parts = {row["mesh"]: row["parts"] for row in rows if row["mesh"] in shared}
-    logs = [math.log(parts[row["mesh"]] / row["parts"]) for row in reference if row["mesh"] in shared]
-    if not logs:
-        return "–"
-    mean = math.exp(statistics.fmean(logs))
-    error = mean * statistics.stdev(logs) / math.sqrt(len(logs)) if len(logs) > 1 else 0.0
-    return f"{mean:.2f} ± {error:.2f}"
+    here, there = ({row["mesh"]: row[key] for row in some if row["mesh"] in shared} for some in (rows, reference))
+    return str(Ratio.of([here[mesh] for mesh in there], list(there.values()))) if shared else "–"
+
+
+def common_meshes(groups: Iterable[Sequence[Row]]) -> set[str]:
+    """The meshes on which every group of rows succeeded; averages are comparable only on these."""
+    sets = [{row["mesh"] for row in rows if "error" not in row} for rows in groups]
+    return set.intersection(*sets) if sets else set()
+
+
+def managed(groups: Mapping[str, Sequence[Row]]) -> dict[str, list[Row]]:
+    """By label, the rows of the meshes that all groups managed."""
+    shared = common_meshes(groups.values())
+    return {label: [row for row in rows if row["mesh"] in shared] for label, rows in groups.items()}
+
+
+def mean(rows: Iterable[Row], key: str) -> float:
+    """Mean of a column."""
+    return statistics.fmean(row[key] for row in rows)
 
 
 def failures(rows: Iterable[Row]) -> str:
-    """List all failures in one line; "none" if there are none."""
+    """List all failures, one a line; "none" if there are none."""
     found = [f"- {r['mesh']}, {r['method']} {r['setting']:g}: {r['error']}" for r in rows if "error" in r]
     return "\n".join(found) or "none"
 
 
-def short_names(meshes: Sequence[str]) -> dict[str, str]:
-    """Shorten each mesh's path to the shortest name that is unique.
+PLACE = re.compile(r"(<!-- (?P<page>\S+\.md), table (?P<number>\d+) -->\n).*?(<!-- end -->)", re.DOTALL)
+CHARTS = {"quick/curves.svg": "parts_against_error.svg"}
+"""Charts, from their name in a run's folder to their name in the document."""
 
-    If all files have the same name, as ShapeNetCore's ``models/model_normalized.obj``, their folders name them.
+TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
+
+
+def fill(document: str, run: Path) -> str:
+    """Replace the tables of a document by those in a run's pages."""
+
+    def table(place: re.Match[str]) -> str:
+        page, number = run / place["page"], int(place["number"])
+        if not page.is_file():
+            raise SystemExit(f"{page} is not there; run its command first.")
+        tables = TABLE.findall(page.read_text())
+        if number > len(tables):
+            raise SystemExit(f"{page} has {len(tables)} tables, not {number}.")
+        return f"{place[1]}\n{tables[number - 1]}\n{place[4]}"
+
+    return PLACE.sub(table, document)
+
+
+@app.command()
+def tables(run: Path, document: Path) -> None:
+    """Replace the tables of a document by those of a run's pages, so that each is exactly what a command printed.
+
+    The document names the source of each table: the lines between ``<!-- PAGE.md, table N -->`` and ``<!-- end -->``
+    are replaced by the N-th table of RUN/PAGE.md. The chart it shows is copied beside it.
+
+    \b
+    python -m benchmarks tables RUN docs/research/results.md
     """
-    paths = {mesh: Path(mesh).with_suffix("").parts for mesh in meshes}
-    while len(paths) > 1 and len({path[-1] for path in paths.values()}) == 1 and min(map(len, paths.values())) > 1:
-        paths = {mesh: path[:-1] for mesh, path in paths.items()}
-
-    def tail(mesh: str, length: int) -> str:
-        return "/".join(paths[mesh][-length:])
-
-    @cache
-    def met(length: int) -> Counter[str]:
-        return Counter(tail(mesh, length) for mesh in paths)
-
-    def shortest(mesh: str) -> str:
-        lengths = range(1, len(paths[mesh]) + 1)
-        return next((tail(mesh, n) for n in lengths if met(n)[tail(mesh, n)] == 1), mesh)
-
-    return {mesh: shortest(mesh) for mesh in meshes}
-
-
-def as_csv(rows: Iterable[Row]) -> str:
-    """Every row with all its numbers; failed rows have empty cells."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, COLUMNS, extrasaction="ignore", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(_plain(row) for row in rows)
-    return text.getvalue()
-
-
-def _plain(row: Row) -> dict[str, Any]:
-    return {key: value for key, value in row.items() if value is not None}
+    document.write_text(fill(document.read_text(), run))
+    for source, name in CHARTS.items():
+        shutil.copyfile(run / source, document.parent / name)

@@ -9,8 +9,7 @@ import manifold3d
 import numpy as np
 import pytest
 import trimesh
-from benchmarks import Metrics, measure
-from benchmarks.metrics import COVERED, SAMPLES, TOLERANCE, is_valid
+from benchmarks.metrics import COVERED, SAMPLES, TOLERANCE, Metrics, is_valid, measure
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
