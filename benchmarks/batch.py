@@ -1,11 +1,4 @@
-"""The overhead of a batch: meshes per minute, CPU time per task beyond the mesh's own, memory.
-
-    python benchmarks/batch.py MESHES --count 60 --jobs 1 --jobs 2
-    python benchmarks/batch.py MESHES --count 0 --jobs 2 --keep RESULTS
-
-MESHES is a folder; every n-th of its meshes by name is taken, or all of them (0). Wall times are meaningful only on an
-idle machine; CPU times barely depend on the load.
-"""
+"""The overhead of a batch: meshes per minute, CPU seconds per task beyond the mesh's own, memory."""
 
 from __future__ import annotations
 
@@ -23,7 +16,10 @@ import numpy as np
 import psutil
 import typer
 
+from benchmarks.tables import Table
 from rlacd.batch import find_assets
+
+app = typer.Typer(add_completion=False)
 
 MB = 2**20
 
@@ -47,49 +43,42 @@ def measured(command: list[str]) -> tuple[float, float, float, float]:
     return time.perf_counter() - start, cpu, own / MB, together / MB
 
 
-def main(
+@app.command()
+def batch(
     meshes: Path,
-    count: int = 60,
-    jobs: Annotated[list[int] | None, typer.Option()] = None,
-    keep: Annotated[Path | None, typer.Option(help="Keep the results here.")] = None,
-    option: Annotated[list[str] | None, typer.Option(help="Of rlacd batch, such as --option=--quality=best.")] = None,
+    count: Annotated[int, typer.Option(help="Every n-th mesh by name, so many of them; 0: all.")] = 60,
+    jobs: Annotated[list[int] | None, typer.Option(help="May be repeated; default: 1 and 2.")] = None,
+    option: Annotated[list[str] | None, typer.Option(help="Of rlacd batch, such as --option=--ray=local.")] = None,
 ) -> None:
+    """Run a batch in other numbers of processes, twice each: the second time, all results exist.
+
+    Wall times are meaningful only on an idle machine; CPU seconds barely depend on the load.
+
+    \b
+    python -m benchmarks batch ../shared/meshes/test --count 60 --jobs 1 --jobs 2 --option=--quality=fast
+    """
     assets = find_assets(meshes)
     chosen = assets[:: max(1, len(assets) // count)][:count] if count else assets
+    lines = []
     with tempfile.TemporaryDirectory() as folder:
         links = Path(folder, "meshes")
-        links.mkdir()
         for asset in chosen:
             link = links / asset.name
             link.parent.mkdir(parents=True, exist_ok=True)
             link.symlink_to(asset.path.resolve())
-        print(f"{len(chosen)} meshes of {meshes}, {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}\n")
-        print("| jobs | meshes/min | CPU s/mesh: median | mean | most | beside it, s/mesh | MB run | MB all |")
-        print("|---|---|---|---|---|---|---|---|")
         for number in jobs or [1, 2]:
-            out = Path(keep or folder, f"jobs{number}")
-            command = [
-                sys.executable,
-                "-c",
-                "from rlacd.cli.main import main; main()",
-                "batch",
-                str(links),
-                "-o",
-                str(out),
-            ]
-            command += ["--jobs", str(number), *(option or [])]
+            out = Path(folder, f"jobs{number}")
+            command = [sys.executable, "-m", "rlacd", "batch", str(links), "-o", str(out), "--jobs", str(number)]
+            command += option or []
             wall, cpu, own, together = measured(command)
-            _, idle, _, _ = measured(command)  # all results exist: starting, reading and hashing
+            again = measured(command)[1]
             rows = [json.loads(line) for line in (out / "timings.jsonl").read_text().splitlines()]
             spent = np.array([row.get("cpu", 0.0) for row in rows])
-            beside = (cpu - spent.sum()) / len(rows)
-            print(
-                f"| {number} | {60 * len(rows) / wall:.0f} | {np.median(spent):.2f} | {spent.mean():.2f} "
-                f"| {spent.max():.2f} | {beside:.3f} | {own:.0f} | {together:.0f} |"
+            seconds = f"{np.median(spent):.2f}, {spent.mean():.2f}, {spent.max():.2f}"
+            beside = f"{(cpu - spent.sum()) / len(rows):.3f}"
+            lines.append(
+                [number, f"{60 * len(rows) / wall:.0f}", seconds, beside, f"{again:.2f}", f"{own:.0f}, {together:.0f}"]
             )
-            statuses = [json.loads(line)["status"] for line in (out / "manifest.jsonl").read_text().splitlines()]
-            print(f"<!-- {idle:.2f} s CPU to pass over all; {dict((s, statuses.count(s)) for s in set(statuses))} -->")
-
-
-if __name__ == "__main__":
-    typer.run(main)
+    header = ["jobs", "meshes/min", "CPU s: median, mean, most", "beside it, each", "again, all", "MB: run, all"]
+    note = f"{len(chosen)} meshes, {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}."
+    print(Table(header, lines, note))

@@ -33,9 +33,7 @@ def test_errors_can_be_caught_without_loading_a_library() -> None:
     assert not modules_after("from rlacd import OptionError, RlacdError") & HEAVY
 
 
-@pytest.mark.parametrize(
-    "arguments", [[], ["--help"], ["decompose", "--help"], ["batch", "--help"], ["bench", "--help"]]
-)
+@pytest.mark.parametrize("arguments", [[], ["--help"], ["decompose", "--help"], ["batch", "--help"]])
 def test_help_does_not_wait_for_the_geometry(arguments: list[str]) -> None:
     run = f"from rlacd.cli.main import app\ntry:\n    app({arguments!r})\nexcept SystemExit:\n    pass"
     assert not modules_after(run) & {"numpy", "scipy", "trimesh", "onnxruntime", "torch"}

@@ -1,4 +1,4 @@
-"""What `rlacd.bench` says of hulls, against shapes with known answers and against an independent reference."""
+"""What `benchmarks` says of hulls, against shapes with known answers and against an independent reference."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ import manifold3d
 import numpy as np
 import pytest
 import trimesh
+from benchmarks.metrics import COVERED, SAMPLES, TOLERANCE, Metrics, is_valid, measure
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rlacd
 from rlacd import report
-from rlacd.bench import Metrics, measure
-from rlacd.bench.metrics import COVERED, SAMPLES, TOLERANCE, is_valid
 from rlacd.errors import OptionError
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair

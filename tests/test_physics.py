@@ -1,19 +1,19 @@
-"""`rlacd bench physics`: balls fall where the exact mesh lets them, and piles settle."""
+"""`python -m benchmarks physics`: balls fall where the exact mesh lets them, and piles settle."""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
+from benchmarks import simulate
+from benchmarks.handle import handle_in_mujoco
+from benchmarks.physics import app
 from typer.testing import CliRunner
 
 import rlacd
-from rlacd.bench import simulate
-from rlacd.bench.handle import handle_in_mujoco
-from rlacd.bench.physics import OURS
-from rlacd.cli.main import app
 
 pytest.importorskip("mujoco", reason="the extra sim is not installed")
 
@@ -99,37 +99,34 @@ def test_a_pile_settles_alike_in_both_engines(monkeypatch: pytest.MonkeyPatch) -
         assert pile.drift < 0.1
 
 
-def test_hulls_beside_primitives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of a box and a ball, both parts become primitives, within the threshold and in fewer bytes."""
+@pytest.mark.slow
+def test_the_command_writes_a_page_with_hulls_beside_primitives(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a box and a ball, both parts become primitives, in fewer bytes."""
     monkeypatch.setattr(simulate, "SECONDS", 0.05)
     monkeypatch.setattr(simulate, "COPIES", 4)
-    trimesh.creation.box((1, 2, 3)).export(tmp_path / "box.ply")
-    trimesh.creation.icosphere(4).export(tmp_path / "ball.ply")
-    given = ["bench", "primitives", str(tmp_path), "--out", str(tmp_path / "run"), "--piles", "2"]
-    done = CliRunner().invoke(app, given)
+    (tmp_path / "meshes").mkdir()
+    trimesh.creation.box((1, 2, 3)).export(tmp_path / "meshes" / "box.ply")
+    trimesh.creation.icosphere(4).export(tmp_path / "meshes" / "ball.ply")
+    given = [str(tmp_path / "meshes"), "--out", str(tmp_path / "run"), "--no-bullet"]
+    done = CliRunner().invoke(app, [*given, "--piles", "2", "--methods", "fast,fast:primitives=true"])
     assert done.exit_code == 0, done.output
-    lines = (tmp_path / "run" / "primitives.md").read_text().splitlines()
+    lines = (tmp_path / "run" / "physics.md").read_text().splitlines()
     cells = {line.split(" | ")[0].strip("| "): line.strip("| ").split(" | ")[1:] for line in lines if " | " in line}
-    assert cells["parts"] == ["2", "2"]
-    assert cells["of these primitives"] == ["0", "2 (1 sphere, 1 box)"]
-    hulls, others = (int(value.replace(",", "")) for value in cells["bytes"])
-    assert others < hulls
-    assert max(map(float, cells["worst concavity"])) <= 0.05
-    assert float(cells["steps/s"][0]) > 0
-    assert cells["box.ply"][:2] == ["1", "1"]
+    assert cells["parts"] == ["1.0", "1.0"]
+    assert cells["of these primitives"] == ["0.0", "1.0"]
+    assert float(cells["kB"][1]) < float(cells["kB"][0])
+    assert float(cells["MuJoCo steps/s"][0]) > 0
+    assert cells["box.ply, fast:primitives=true"][:2] == ["1", "1"]
+    wrong = CliRunner().invoke(app, [*given, "--methods", "slow"])
+    assert wrong.exit_code == 2
+    assert "there is no method 'slow'" in wrong.output
 
 
-@pytest.mark.slow
-def test_the_command_writes_a_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(simulate, "SECONDS", 0.1)
-    cup().export(tmp_path / "cup.ply")
-    given = ["bench", "physics", str(tmp_path), "--out", str(tmp_path / "run")]
-    done = CliRunner().invoke(app, [*given, "--ways", "one-hull,fast:primitives"])
-    assert done.exit_code == 0, done.output
-    page = (tmp_path / "run" / "physics.md").read_text()
-    assert "| one-hull | 1.0 |" in page
-    assert "cup.ply, fast:primitives" in page
-    wrong = CliRunner().invoke(app, [*given, "--ways", "slow"])
-    assert wrong.exit_code != 0
-    assert "there is no way 'slow'" in wrong.output
-    assert {"one-hull", "fast", "balanced"} <= set(OURS)
+def test_a_missing_simulator_is_named_before_any_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    done = CliRunner().invoke(app, [str(tmp_path), "--out", str(tmp_path / "run")])
+    assert done.exit_code == 2
+    assert "pip install 'rlacd[sim]'" in done.output
+    assert not (tmp_path / "run").exists()

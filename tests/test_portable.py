@@ -131,19 +131,6 @@ assert 2**23 < peak_memory() < 2**33
 
 
 @pytest.mark.slow
-def test_meshes_are_compared_in_processes(ring: Path) -> None:
-    out = ring.parents[1] / "run"
-    program = """
-import sys; from pathlib import Path; from rlacd.bench import Bench, BenchStore, find_meshes
-meshes, out = map(Path, sys.argv[1:])
-print(Bench(meshes, find_meshes(meshes), BenchStore(out), say=lambda _: None).run("greedy", 0.05)[0]["parts"])
-"""
-    run = elsewhere("-c", program, ring.parent, out)
-    assert run.returncode == 0, run.stderr
-    assert int(run.stdout) > 2
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "marks"),
     [(f"test_{name}.py", "not slow and not nightly") for name in ("load", "formats", "options", "decomposition")]

@@ -16,7 +16,6 @@ from typer.core import TyperGroup
 
 from rlacd._version import __version__
 from rlacd.cli.batch import BATCH_EPILOG, batch_command
-from rlacd.cli.bench import app as bench
 from rlacd.cli.decompose import decompose_command
 from rlacd.cli.exit_codes import EPILOG, ExitCode, exit_codes
 from rlacd.cli.train import train_command
@@ -106,5 +105,4 @@ def info(
 
 app.command("view", epilog=EPILOG)(view)
 app.command("batch", epilog=BATCH_EPILOG)(batch_command())
-app.add_typer(bench, name="bench")
 app.command("train", epilog=EPILOG)(train_command())

@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from manifold3d import Manifold, OpType
 
 from rlacd import _native
 from rlacd.criteria import Concavity
@@ -63,6 +64,9 @@ class Metrics:
         Parts that exceed the requested concavity by more than 0.001; None if none was requested.
     volume : float
         Sum of the hulls' volumes over the repaired input's: 1 is perfect, overlaps count twice.
+    overlap : float
+        Volume that lies in several hulls, counted once for each but one, over that of their union; 0 if they are
+        disjoint.
     uncovered : float
         Fraction of the input's surface outside the union.
     invalid : int
@@ -80,6 +84,7 @@ class Metrics:
     concavity: float
     exceeding: int | None
     volume: float
+    overlap: float
     uncovered: float
     invalid: int
     empty: int
@@ -134,10 +139,17 @@ def measure(
         concavity=concavity,
         exceeding=exceeding,
         volume=sum(hull.volume for hull in usable) / solid.manifold.volume(),
+        overlap=_overlap(usable),
         uncovered=float((union.distance(points, threads) > COVERED).mean()),
         invalid=sum(not is_valid(v, f) for v, f in hulls),
         empty=empty,
     )
+
+
+def _overlap(hulls: Sequence[Hull]) -> float:
+    bodies = [to_manifold(hull.vertices, hull.faces.astype(np.int64)) for hull in hulls]
+    union: float = Manifold.batch_boolean(bodies, OpType.Add).volume()
+    return max(0.0, sum(body.volume() for body in bodies) / union - 1)
 
 
 def _concavity(solid: Solid, hulls: Sequence[Hull], promised: float | None) -> tuple[float, int | None, int]:

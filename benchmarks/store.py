@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from rlacd.bench.methods import RawHull
+from benchmarks.methods import RawHull
 from rlacd.errors import OutputError
 from rlacd.io.write.atomic import output_errors
 from rlacd.io.write.lock import lock_folder
@@ -23,7 +23,7 @@ Row: TypeAlias = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class BenchTask:
+class Task:
     """One mesh, one method and its setting.
 
     Attributes
@@ -52,7 +52,7 @@ class BenchTask:
         return f"{Path(self.mesh).stem[:40]}-{digest}.npz"
 
 
-class BenchStore:
+class Store:
     """A folder of results: ``results.jsonl`` and ``hulls/``.
 
     Parameters
@@ -84,10 +84,7 @@ class BenchStore:
             self.close()
             raise
 
-    def __len__(self) -> int:
-        return len(self._rows)
-
-    def get(self, task: BenchTask) -> Row | None:
+    def get(self, task: Task) -> Row | None:
         """The row of a task; None if it is not finished."""
         return self._rows.get(task.key)
 
@@ -109,7 +106,7 @@ class BenchStore:
         self._held.close()
         self._run.release()
 
-    def hulls_of(self, task: BenchTask) -> Path:
+    def hulls_of(self, task: Task) -> Path:
         """Path of the hulls of a task, whether they exist yet or not."""
         return self.folder / "hulls" / task.file_name
 

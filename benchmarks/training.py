@@ -1,24 +1,38 @@
-"""The paper's experiments that train one policy per arm: all arms equally long, with the same seed and meshes.
+"""The paper's experiments that train one policy per arm: all arms equally long, with the same seeds and meshes.
 
 They are short compared with the paper's million cuts; the page states their length. With the presets of the paper an
 arm learns the values of planes by one-step targets; with `counting` the same rewards, discounts and inputs are learned
 as values of components from whole episodes. An interrupted arm is resumed, and a finished one is not trained again.
+
+Of ``rlacd.learn`` this module uses ``TrainOptions.preset``, ``train``, the ``curves.jsonl`` of a run, and for the
+discounts ``rlacd.learn.paper.tabular``.
 """
 
 from __future__ import annotations
 
 import json
+import statistics
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 
-from rlacd.bench.charts import Curve, curves_chart
-from rlacd.bench.page import Figure, Heading, Page, Text
-from rlacd.bench.tables import Spread, Table
-from rlacd.errors import MissingExtraError, OptionError
+from benchmarks.charts import Curve, curves_chart, need_charts
+from benchmarks.cli import Meshes, Out, write
+from benchmarks.runner import find_meshes
+from benchmarks.tables import Page, Table
+from rlacd.cli.exit_codes import exit_codes
+from rlacd.criteria import Concavity
+from rlacd.errors import MeshError, MissingExtraError, OptionError, RlacdError
+from rlacd.io.read.load import load_mesh
 from rlacd.learn.paper.options import TrainOptions
+from rlacd.learn.paper.tabular import Node, grow, middle_planes, process_of, q_learning
+from rlacd.repair.repair import repair
+from rlacd.solid.component import Component
+
+app = typer.Typer(add_completion=False, no_args_is_help=True, help="The paper's tables that train, one policy an arm.")
 
 Changes = Mapping[str, Any]
 
@@ -48,18 +62,18 @@ def _ratio(ratio: float) -> Changes:
 
 
 ARMS: Mapping[str, Mapping[str, Changes]] = {
-    "paper-rewards": {
+    "rewards": {
         **{f"λ1/λ2 = {ratio:g}": {**_ratio(ratio), **HULL} for ratio in RATIOS},
         "without r1": {**_weights(0.0, LARGEST_WEIGHT), **HULL},
         "without r2": {**_weights(LARGEST_WEIGHT, 0.0), **HULL},
         "-1 a cut (not paper)": {**_weights(0.0, 0.0, 1.0), **_static(1.0)},
     },
-    "paper-encoding": {
+    "encoding": {
         "component and hull": {"scale_input": False},
         "component alone": {"scale_input": False, "encoder": "profile-without-hull"},
         "component and hull, sizes and creases (not paper)": {"scale_input": True},
     },
-    "paper-curves": {
+    "curves": {
         "share of the hull (eq. 9)": HULL,
         **{f"{share:g} + {share:g}": _static(share) for share in (0.5, 0.9, 0.99)},
     },
@@ -68,9 +82,9 @@ ARMS: Mapping[str, Mapping[str, Changes]] = {
 every preset."""
 
 TITLES = {
-    "paper-rewards": "Weights of the rewards (4.5.3)",
-    "paper-encoding": "State encoding without the hull (4.5.2)",
-    "paper-curves": "Training curves by discount (Fig. 7)",
+    "rewards": "Weights of the rewards (4.5.3)",
+    "encoding": "State encoding without the hull (4.5.2)",
+    "curves": "Training curves by discount (Fig. 7)",
 }
 
 VALIDATIONS = 2
@@ -121,7 +135,7 @@ def train_arms(
             curves[label].append(_train(meshes, run, _options(preset, iterations, seed, changes), say))
     page = Page(TITLES[experiment])
     page.add(
-        Text(
+        (
             f"Every arm: preset {preset}, {first.iterations:,} cuts (the paper: 1,000,000), {seeds} seeds, meshes of "
             f"up to {first.max_faces} triangles, concavity {first.threshold:g}, {first.validation} meshes held out by "
             "each seed. Ratios are geometric means over those, to greedy over 150 planes by the least sum of hull "
@@ -129,13 +143,13 @@ def train_arms(
             "± their standard deviation; a single seed says nothing of differences of a few percent."
         ),
         _last_validations(curves),
-        Heading("Curves"),
+        "## Curves",
     )
     for key, name in (("loss", "loss"), ("value", "mean greatest value"), ("validation_merged_ratio", "merged parts")):
         drawn = [curve for label, runs in curves.items() if (curve := _mean_curve(label, runs, key)).x]
         if drawn:
             chart = curves_chart(drawn, "cuts", name, log_y=key == "loss")
-            page.add(Figure(f"{experiment}-{key}.svg", chart, name))
+            page.chart(f"{experiment}-{key}.svg", chart, name)
     return page
 
 
@@ -184,5 +198,129 @@ def _over_seeds(runs: list[Points], key: str, form: str) -> str:
     known = [value for value in last if value is not None]
     if not known:
         return "–"
-    spread = Spread.of(known)
-    return f"{spread.mean:{form}}" + (f" ± {spread.deviation:{form}}" if len(known) > 1 else "")
+    return f"{statistics.fmean(known):{form}}" + (f" ± {statistics.stdev(known):{form}}" if len(known) > 1 else "")
+
+
+DISCOUNTS = {
+    "share of the hull (eq. 9)": None,
+    "0.4 + 0.4": 0.4,
+    "0.5 + 0.5": 0.5,
+    "0.7 + 0.7": 0.7,
+    "0.9 + 0.9": 0.9,
+    "0.99 + 0.99": 0.99,
+}
+THRESHOLD = 0.02
+SMALL_FILE = 15_000
+"""Bytes: cut trees of small meshes take little time to build."""
+
+POINTS = 300
+"""Number of points on each curve."""
+
+ENDLESS = 1e12
+"""Values beyond this are not drawn."""
+
+
+def discounts_page(meshes: Path, names: list[str], count: int = 12, depth: int = 4, steps: int = 300_000) -> Page:
+    """Solve the cut trees of `count` small meshes exactly and by tabular Q-learning, for several discounts.
+
+    Parameters
+    ----------
+    meshes : Path
+    names : list of str
+        Meshes in that folder. A fixed sample is taken of those that are small and need a cut.
+    count, depth, steps : int
+        Number of meshes, depth of the cut trees, steps of Q-learning.
+
+    Raises
+    ------
+    MeshError
+        None of the meshes needs a cut.
+    """
+    roots = _trees(meshes, names, count, depth)
+    every = max(1, steps // POINTS)
+    sizes, errors, lines = [], [], []
+    for name, discount in DISCOUNTS.items():
+        process = process_of(roots, alike=True, static_discount=discount)
+        exact = process.solve()
+        history = q_learning(process, steps, np.random.default_rng(0), every=every)
+        at = every * np.arange(1, len(history) + 1)
+        size = np.array([np.abs(q).max() for q in history])
+        shown = (size > 0) & (size < ENDLESS)
+        sizes.append(Curve(name, at[shown].tolist(), size[shown].tolist()))
+        cells = ["does not exist", f"|Q| {size[-1]:.3g}"]
+        if exact is not None:
+            away = np.array([np.abs(q - exact)[process.possible].max() for q in history])
+            errors.append(Curve(name, at[away > 0].tolist(), away[away > 0].tolist()))
+            cells = [f"{np.abs(exact).max():.3g}", f"error {away[-1]:.3g}"]
+        lines.append([name, process.states, *cells])
+    page = Page("Which discounts converge (appendix A)")
+    page.add(
+        (
+            f"All that three planes can make of {count} real solids in {depth} cuts, concavity {THRESHOLD:g}. "
+            "Components that look alike (share of the hull filled and proportions, in thirds) are one state. Tabular "
+            f"Q-learning of {steps:,} steps against exact dynamic programming."
+        ),
+        Table(["discounts", "states", "greatest |Q*|", f"after {steps:,} steps"], lines),
+    )
+    page.chart("discounts-size.svg", *_drawn(sizes, "greatest |Q|"))
+    page.chart("discounts-error.svg", *_drawn(errors, "greatest |Q − Q*|, where Q* exists"))
+    return page
+
+
+def _drawn(curves: list[Curve], what: str) -> tuple[bytes, str]:
+    return curves_chart(curves, "steps of Q-learning", what, log_x=True, log_y=True, markers=False), what
+
+
+def _trees(meshes: Path, names: list[str], count: int, depth: int) -> list[Node]:
+    """Cut trees of the first `count` small meshes that need a cut, in a fixed random order."""
+    roots: list[Node] = []
+    used = 0
+    small = [name for name in sorted(names) if (meshes / name).stat().st_size < SMALL_FILE]
+    for name in [small[i] for i in np.random.default_rng(0).permutation(len(small))]:
+        try:
+            solid = Component(repair(load_mesh(meshes / name)).shape)
+            found = grow(solid, Concavity(THRESHOLD), middle_planes(), depth)
+        except (RlacdError, ValueError):
+            continue
+        if any(node.outcomes for node in found):
+            roots += found
+            used += 1
+        if used == count:
+            break
+    if not roots:
+        raise MeshError(f"none of the {len(names)} meshes is small and needs a cut; give a folder with others.")
+    return roots
+
+
+def _command(name: str, about: str) -> None:
+    @app.command(name, help=about)
+    def run(
+        meshes: Meshes,
+        out: Out,
+        preset: Annotated[str, typer.Option(help="Of `rlacd train`.")] = "quick",
+        iterations: Annotated[int | None, typer.Option(help="Cuts an arm.", show_default=False)] = None,
+        seeds: Annotated[int, typer.Option(min=1, help="Training runs of each arm.")] = 1,
+    ) -> None:
+        with exit_codes():
+            need_charts()
+            find_meshes(meshes)
+            write(train_arms(name, meshes, out, preset, iterations, seeds, typer.echo), out, name)
+
+
+_command("rewards", "Train with other weights of the two rewards, and without each (4.5.3).")
+_command("encoding", "Train with a network that does not see the hull (4.5.2).")
+_command("curves", "Train with other discounts, and draw the curves (Fig. 7).")
+
+
+@app.command("discounts")
+def discounts(
+    meshes: Meshes,
+    out: Out,
+    count: Annotated[int, typer.Option(min=1, help="Small meshes whose cut trees are grown.")] = 12,
+    depth: Annotated[int, typer.Option(min=1, help="Cuts deep.")] = 4,
+    steps: Annotated[int, typer.Option(min=1, help="Steps of Q-learning.")] = 300_000,
+) -> None:
+    """Find by tabular Q-learning on real cut trees which discounts converge (appendix A)."""
+    with exit_codes():
+        need_charts()
+        write(discounts_page(meshes, find_meshes(meshes), count, depth, steps), out, "discounts")

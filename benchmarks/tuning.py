@@ -10,9 +10,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rlacd.bench.methods import Method, make_method
-from rlacd.bench.runner import Bench, is_outdated
-from rlacd.bench.store import Row
+from benchmarks.methods import Method, make_method
+from benchmarks.runner import Bench, is_outdated
+from benchmarks.store import Row
 from rlacd.errors import OptionError
 
 CLOSE = 0.02
@@ -24,7 +24,7 @@ TRIES = 8
 STRIDE = 1.6
 """Factor between settings while the target is not bracketed."""
 
-RANGES = {"threshold": (0.005, 1.0), "tolerance": (0.005, 1.0), "percent": (0.01, 100.0), "hulls": (1.0, 1024.0)}
+RANGES = {"threshold": (0.005, 1.0), "tolerance": (0.005, 1.0), "hulls": (1.0, 1024.0)}
 """Valid settings, by their meaning."""
 
 
@@ -52,11 +52,6 @@ class Point:
         """Mean D_h; nan if all meshes failed."""
         good = self.good
         return sum(row["hausdorff"] for row in good) / len(good) if good else math.nan
-
-
-def curve(bench: Bench, method: str, settings: Sequence[float]) -> list[Point]:
-    """Run a method at several settings."""
-    return [Point(setting, bench.run(method, setting)) for setting in settings]
 
 
 def known_curve(bench: Bench, method: str) -> list[Point]:
@@ -108,7 +103,7 @@ def next_setting(tool: Method, known: Sequence[tuple[float, float]], target: flo
     lowest, highest = RANGES[tool.setting]
     if not known:
         return _rounded(tool, target if tool.setting in ("threshold", "tolerance") else tool.default)
-    sign = -1 if tool.falls else 1
+    sign = -1 if tool.setting == "hulls" else 1  # more hulls are tighter
     looser = [(s, d) for s, d in known if d > target]
     tighter = [(s, d) for s, d in known if d < target]
     if looser and tighter:

@@ -148,10 +148,7 @@ def pile_in_mujoco(result: Result, seed: int = 0) -> Pile:
 
 def pile_in_bullet(result: Result) -> Pile:
     """Drop copies of a body whose longest side is `SIZE` into a bin, in PyBullet."""
-    try:
-        import pybullet as bullet
-    except ImportError as error:
-        raise MissingExtraError("PyBullet is missing: run  pip install 'rlacd[sim]'  and try again.") from error
+    bullet = get_bullet()
     client = bullet.connect(bullet.DIRECT)
     at = {"physicsClientId": client}
     try:
@@ -301,3 +298,12 @@ def get_mujoco() -> Any:
     except ImportError as error:
         raise MissingExtraError("MuJoCo is missing: run  pip install 'rlacd[sim]'  and try again.") from error
     return mujoco
+
+
+def get_bullet() -> Any:
+    """Import PyBullet, or say how to install it."""
+    try:
+        import pybullet
+    except ImportError as error:
+        raise MissingExtraError("PyBullet is missing: run  pip install 'rlacd[sim]'  and try again.") from error
+    return pybullet

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.simulate import BALL, NEAR, SIZE, above, exact_depths, get_mujoco, surface_of
 from rlacd import _native
-from rlacd.bench.simulate import BALL, NEAR, SIZE, above, exact_depths, get_mujoco, surface_of
 from rlacd.io.write import save
 from rlacd.result import Result
 from rlacd.solid.arrays import BoolArray, FloatArray

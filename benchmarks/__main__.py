@@ -1,0 +1,50 @@
+"""``python -m benchmarks COMMAND``; see `COMMANDS`."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+
+COMMANDS = {
+    "compare": "rlacd beside CoACD, V-HACD and itself with other options: README's table, quality levels, dense meshes",
+    "vhacd-set": "the V-HACD set, on which VisACD and CoACD publish their figures",
+    "corpus": "whole corpora: failures, invalid hulls, parts over the threshold, the worst meshes",
+    "hard": "shapes that are hard for the defaults: sponges, lattices, sheets, thousands of bodies",
+    "damaged": "closed meshes with a share of their surface destroyed: what repair recovers",
+    "late": "how late a decomposition ends after a timeout or Ctrl-C",
+    "batch": "the overhead of a batch beside its meshes",
+    "physics": "the hulls in simulators: piles, balls dropped into holes, grasps, pegs; primitives",
+    "paper": "the paper's tables without a training: equal accuracy, V-HACD, kinds and numbers of planes",
+    "training": "the paper's tables that train: rewards, encoding, discounts",
+    "prices": "the prices of rlacd.work against measured times",
+    "tables": "copies the tables of pages into a document that names them",
+}
+"""Name to purpose; each is a module of that name with a typer ``app``."""
+
+HELP = f"""Usage: python -m benchmarks COMMAND --help
+
+Every published number comes from one of these commands. Meshes and methods run in processes of their own, with
+limits. Results are kept in a folder and never computed twice: a run that was stopped goes on. CPU seconds are those of
+one thread and barely depend on what else the machine does. `--group bench` of pip installs the tools compared.
+
+Start with:  python -m benchmarks compare MESHES --list MESHES/quick.txt --out RUN
+
+Commands:
+{chr(10).join(f"  {name:10} {what}" for name, what in COMMANDS.items())}
+"""
+
+
+def main(arguments: list[str]) -> None:
+    """Run the command that the arguments start with."""
+    if not arguments or arguments[0] in ("-h", "--help"):
+        print(HELP)
+        return
+    name, *others = arguments
+    if name not in COMMANDS:
+        raise SystemExit(f"there is no command {name!r}; it has to be {', '.join(COMMANDS)}.")
+    module = import_module(f"benchmarks.{name.replace('-', '_')}")
+    module.app(others, prog_name=f"python -m benchmarks {name}")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

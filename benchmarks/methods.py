@@ -1,0 +1,177 @@
+"""The methods compared: every tool behind one interface, with one setting that controls how tight its hulls are.
+
+==============================  ============================================  =====================================
+name                            tool                                          setting (default)
+==============================  ============================================  =====================================
+``default``                     ``rlacd.decompose(mesh)``                     concavity threshold (its own)
+``fast``, ``best``              the same with that ``quality``                concavity threshold (its own)
+``...:OPTION=VALUE``            the same with that option, any number         concavity threshold (its own)
+``...:space``                   the same with navigable space                 tolerance (0.1); the radius is half
+``coacd``                       CoACD                                         concavity threshold (its own)
+``vhacd``                       V-HACD 4                                      most hulls (its own)
+``disjoint``                    `benchmarks.disjoint`                         concavity threshold (rlacd's)
+``planes[:...]``                the paper's deployment; see `deployed`        concavity threshold (rlacd's)
+==============================  ============================================  =====================================
+
+Lengths are in the frame where the longest side is 2.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import inspect
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from rlacd.errors import MissingExtraError, OptionError
+from rlacd.options import DEFAULT_THRESHOLD
+from rlacd.solid.arrays import FloatArray, IntArray
+
+RawHull: TypeAlias = tuple[FloatArray, IntArray]
+"""Vertices [V, 3] and faces [F, 3] of a hull as a tool returned it, in the input's frame and unit."""
+
+Run: TypeAlias = Callable[[FloatArray, IntArray, float, int], list[RawHull]]
+"""(vertices, faces, setting, threads) -> hulls."""
+
+QUALITIES: dict[str, dict[str, Any]] = {"default": {}, "fast": {"quality": "fast"}, "best": {"quality": "best"}}
+
+
+@dataclass(frozen=True)
+class Method:
+    """A tool with all options but its setting fixed.
+
+    Attributes
+    ----------
+    name : str
+    version : str
+        Version of its package.
+    setting : str
+        Meaning of its setting: "threshold", "tolerance" or "hulls".
+    default : float
+        The default of the tool's authors.
+    run : callable
+        (vertices [V, 3], faces [F, 3], setting, threads) -> hulls.
+    """
+
+    name: str
+    version: str
+    setting: str
+    default: float
+    run: Run
+
+    def concavity(self, number: float) -> float | None:
+        """The concavity that the method claims to keep; None if it claims none."""
+        return number if self.setting == "threshold" else None
+
+
+def make_method(name: str) -> Method:
+    """Find the method called `name`.
+
+    Raises
+    ------
+    OptionError
+        There is none.
+    MissingExtraError
+        The method's tool is not installed.
+    """
+    base, *words = name.split(":")
+    if name == "coacd":
+        return Method(name, version_of("coacd"), "threshold", 0.05, _coacd)
+    if name == "vhacd":
+        return Method(name, version_of("vhacdx"), "hulls", 64, _vhacd)
+    if name == "disjoint":
+        from benchmarks.disjoint import decompose_disjoint
+
+        return Method(name, version_of("rlacd"), "threshold", DEFAULT_THRESHOLD, decompose_disjoint)
+    if base == "planes":
+        from benchmarks.deployed import Deployment, decompose_as_deployed
+
+        deployment = Deployment.parse(words)
+
+        def run(v: FloatArray, f: IntArray, threshold: float, threads: int) -> list[RawHull]:
+            return decompose_as_deployed(deployment, v, f, threshold, threads)
+
+        return Method(name, version_of("rlacd"), "threshold", DEFAULT_THRESHOLD, run)
+    setting, default = ("tolerance", 0.1) if "space" in words else ("threshold", DEFAULT_THRESHOLD)
+    return Method(name, version_of("rlacd"), setting, default, _rlacd(name))
+
+
+def rlacd_options(name: str) -> dict[str, Any]:
+    """The options of ``rlacd.decompose`` that a name such as ``fast:max_vertices=32`` stands for.
+
+    Raises
+    ------
+    OptionError
+        The name stands for none.
+    """
+    from rlacd.decompose_mesh import decompose
+
+    base, *words = name.split(":")
+    if base not in QUALITIES:
+        raise OptionError(
+            f"there is no method {name!r}; it has to be default, fast or best, if need be followed by :OPTION=VALUE or "
+            "by :space; or coacd, vhacd, disjoint, planes[:...]."
+        )
+    options = dict(QUALITIES[base])
+    for word in words:
+        option, is_given, value = word.partition("=")
+        if word == "space":
+            continue
+        if not is_given or option not in inspect.signature(decompose).parameters:
+            raise OptionError(
+                f"{word!r} in {name!r} has to be an option of rlacd.decompose and its value, as policy=navacd."
+            )
+        try:
+            options[option] = json.loads(value)
+        except ValueError:
+            options[option] = value
+    return options
+
+
+def version_of(package: str) -> str:
+    """The version of an installed package."""
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError as error:
+        raise MissingExtraError(f"{package} is not installed: run  pip install {package}  and try again.") from error
+
+
+def _rlacd(name: str) -> Run:
+    options, is_space = rlacd_options(name), "space" in name.split(":")
+
+    def run(vertices: FloatArray, faces: IntArray, number: float, threads: int) -> list[RawHull]:
+        import rlacd
+
+        goal: dict[str, Any] = {} if number == DEFAULT_THRESHOLD else {"threshold": number}
+        if is_space:
+            goal = {"criterion": rlacd.NavigableSpace(number / 4, number / 2)}  # shares of the longest side
+        result = rlacd.decompose((vertices, faces), threads=threads, **goal, **options)
+        return [_as_arrays(hull.vertices, hull.faces) for hull in result]
+
+    return run
+
+
+def _coacd(vertices: FloatArray, faces: IntArray, number: float, threads: int) -> list[RawHull]:
+    import coacd
+
+    coacd.set_log_level("error")
+    found = coacd.run_coacd(coacd.Mesh(vertices, faces), threshold=number)
+    return [_as_arrays(v, f) for v, f in found]
+
+
+def _vhacd(vertices: FloatArray, faces: IntArray, number: float, threads: int) -> list[RawHull]:
+    import vhacdx
+
+    # vhacdx takes faces in VTK's flat layout: a count of 3 before each triangle.
+    counted = np.column_stack([np.full(len(faces), 3), faces]).astype(np.uint32).ravel()
+    given = np.asarray(vertices, dtype=np.float64)
+    found = vhacdx.compute_vhacd(given, counted, maxConvexHulls=round(number), asyncACD=threads > 1)
+    return [_as_arrays(v, np.asarray(f).reshape(-1, 3)) for v, f in found]
+
+
+def _as_arrays(vertices: object, faces: object) -> RawHull:
+    return np.array(vertices, dtype=np.float64), np.array(faces, dtype=np.int32)

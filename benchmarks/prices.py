@@ -1,0 +1,112 @@
+"""The prices of `rlacd.work` against measured times."""
+
+from __future__ import annotations
+
+import random
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+import rlacd
+from benchmarks.cli import Meshes
+from benchmarks.runner import find_meshes
+from benchmarks.tables import Table
+from rlacd.run import work
+from rlacd.cli.exit_codes import exit_codes
+from rlacd.criteria.concavity import Concavity, ConcavityScreen
+from rlacd.policies import Greedy
+from rlacd.search import recut
+from rlacd.solid.component import ClippedPart, Component, Part
+from rlacd.solid.hull import Hull
+
+app = typer.Typer(add_completion=False)
+
+Sizes = tuple[int, ...]
+
+KERNELS: dict[str, tuple[Any, str, Callable[..., Sizes], Callable[..., float]]] = {
+    "choosing": (Greedy, "choose", lambda policy, component, threads: (len(component.faces),), work.choosing),
+    "cutting": (Component, "cut", lambda part, plane: (part.size,), work.cutting),
+    "judging": (Concavity, "is_met", lambda goal, part: (len(part.faces), len(part.hull.faces)), work.judging),
+    "joining": (Hull, "around", lambda *hulls: (sum(len(hull.vertices) for hull in hulls),), work.joining),
+    "testing": (ConcavityScreen, "feasibility", lambda screen, solid, hull: (len(hull.vertices),), work.testing),
+    "screening": (
+        ConcavityScreen,
+        "feasibilities",
+        lambda screen, solid, hulls, pairs, threads: (
+            len(pairs),
+            sum(len(hulls[i].vertices) for i in pairs.ravel().tolist()),
+        ),
+        lambda pairs, vertices: pairs * work.screening(0) + work.screening(vertices) - work.screening(0),
+    ),
+    "probing": (ConcavityScreen, "forbids", lambda screen, solid, hull: (len(hull.vertices),), work.probing),
+    "gluing": (Part, "glued", lambda a, b, hull=None: (a.size + b.size,), work.gluing),
+    "filling": (
+        ClippedPart,
+        "__init__",
+        lambda part, solid, a, b, hull: (a.size + b.size, len(hull.faces)),
+        work.filling,
+    ),
+    "reuniting": (recut, "reunite", lambda members: (sum(m.size for m in members), len(members)), work.reuniting),
+}
+"""By the name of its price: where the kernel is, and the sizes of a call."""
+
+
+def timed(owner: Any, name: str, note: Callable[..., None]) -> None:
+    """Replace a function by one that reports its CPU seconds and its arguments."""
+    original = getattr(owner, name)
+
+    def replacement(*arguments: Any) -> Any:
+        start = time.thread_time()
+        result = original(*arguments)
+        note(time.thread_time() - start, *arguments)
+        return result
+
+    setattr(owner, name, staticmethod(replacement) if isinstance(vars(owner).get(name), staticmethod) else replacement)
+
+
+def measure_kernels() -> dict[str, list[tuple[Sizes, float]]]:
+    calls: dict[str, list[tuple[Sizes, float]]] = {name: [] for name in KERNELS}
+    for kernel, (owner, name, sizes, _) in KERNELS.items():
+        own = calls[kernel]
+        timed(owner, name, lambda t, *a, own=own, sizes=sizes: own.append((sizes(*a), 1e6 * t)))
+    return calls
+
+
+@app.command()
+def prices(
+    meshes: Meshes,
+    listed: Annotated[
+        Path | None, typer.Option("--list", help="File with a mesh a line, relative to the folder.")
+    ] = None,
+    count: Annotated[int, typer.Option(help="Meshes, drawn at random, the same ones each time.")] = 14,
+) -> None:
+    """Decompose meshes at the default level, one thread; compare each kernel's CPU seconds with what it was priced at.
+
+    Fit: nonnegative least squares of a call's microseconds to the sizes that its price depends on, constant first.
+
+    \b
+    python -m benchmarks prices ../shared/meshes/train
+    """
+    from scipy.optimize import nnls  # of the tests' dependencies
+
+    with exit_codes():
+        calls = measure_kernels()
+        names = find_meshes(meshes, listed)
+        random.Random(5).shuffle(names)
+        for name in names[:count]:
+            rlacd.decompose(meshes / name, threads=1)
+        lines = []
+        for kernel, own in calls.items():
+            if own:
+                sizes, times = np.array([s for s, _ in own], dtype=float), np.array([t for _, t in own])
+                priced = sum(KERNELS[kernel][3](*s) for s, _ in own)
+                terms = np.c_[np.ones(len(own)), sizes]
+                weight = 1 / np.sqrt(50 + sizes.sum(axis=1))  # longer calls vary more
+                fit, _ = nnls(terms * weight[:, None], times * weight)
+                shown = [round(float(x), 2) for x in fit]
+                lines.append([kernel, len(own), f"{times.sum() / 1e6:.2f}", f"{priced / 1e6:.2f}", shown])
+        print(Table(["kernel", "calls", "CPU s", "priced", "fit, µs"], lines))
