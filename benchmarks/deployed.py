@@ -24,6 +24,7 @@ from rlacd.policies.observe import observe
 from rlacd.policies.shortlist import generator_of, least_hulls
 from rlacd.policy_names import WEIGHTS_ENDING
 from rlacd.repair.repair import repair
+from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Plane
 from rlacd.solid.hull import Hull

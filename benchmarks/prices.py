@@ -15,10 +15,10 @@ import rlacd
 from benchmarks.cli import Meshes
 from benchmarks.runner import find_meshes
 from benchmarks.tables import Table
-from rlacd.run import work
 from rlacd.cli.exit_codes import exit_codes
 from rlacd.criteria.concavity import Concavity, ConcavityScreen
 from rlacd.policies import Greedy
+from rlacd.run import work
 from rlacd.search import recut
 from rlacd.solid.component import ClippedPart, Component, Part
 from rlacd.solid.hull import Hull

@@ -66,6 +66,7 @@ def test_more_hulls_never_fit_worse(shape, criterion: str, options: dict[str, An
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("shape", "criterion", "options"), [(drawer, *each) for each in CRITERIA])
+@pytest.mark.promise("max-hulls")
 def test_a_limit_is_kept_and_a_larger_one_never_fits_worse(shape, criterion: str, options: dict[str, Any]) -> None:
     check_limits(shape(), range(1, 9), criterion, options)
 

@@ -158,11 +158,9 @@ BENCHMARKS = re.split(r"^## ", (ROOT / "docs" / "benchmarks.md").read_text(encod
 
 
 def benchmarks_app() -> Any:
-    try:
-        from benchmarks.__main__ import app as commands
-    except ImportError:  # until `rlacd bench` has moved there
-        from rlacd.cli.bench import app as commands
-    return commands
+    from benchmarks.__main__ import app
+
+    return app
 
 
 @pytest.mark.parametrize("text", BENCHMARKS, ids=[text.splitlines()[0] for text in BENCHMARKS])

@@ -412,6 +412,7 @@ GEOM = "<mujoco><compiler {compiler}/><default><default class='c'><geom {default
     ],
     ids=str,
 )
+@pytest.mark.promise("robot-mass")
 def test_no_body_changes_its_mass_centre_or_inertia(tmp_path: Path, how: dict[str, str], group: str) -> None:
     mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
     table().export(tmp_path / "table.stl")

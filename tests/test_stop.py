@@ -320,11 +320,10 @@ def test_ctrl_c_is_heeded_in_the_middle_of_a_stage(name: str, tmp_path: Path) ->
 
 @pytest.mark.nightly
 @pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT to one process")
-    code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
-    code += "from rlacd.cli.main import main; main()"
 def test_ctrl_c_twice_ends_the_command_at_any_moment(begun: float, tmp_path: Path) -> None:
     trimesh.Trimesh(*LARGE["boxes"](), process=False).export(tmp_path / "mesh.ply")
-    code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from rlacd.cli.main import main; main()"
+    code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    code += "from rlacd.cli.main import main; main()"
     run = subprocess.Popen([sys.executable, "-c", code, "decompose", "mesh.ply", "--budget", "20"], cwd=tmp_path)
     try:
         used = psutil.Process(run.pid).cpu_times
