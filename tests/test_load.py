@@ -520,3 +520,10 @@ def test_what_a_gltf_adds_to_its_triangles_is_read_refused_or_named(tmp_path):
             load(extensionsRequired=[name])
     nodes = [{**node, "skin": 0, "extensions": {"EXT_mesh_gpu_instancing": {}}} for node in tree["nodes"]]
     assert [said.split(" ", 1)[1][:15] for said in load(nodes=nodes).warnings] == ["skinned meshes ", "nodes have inst"]
+
+
+def test_what_is_left_out_of_a_collada_file_is_named(box, tmp_path):
+    path = tmp_path / "box.dae"
+    content = box.export(file_type="dae")
+    path.write_bytes(content.replace(b"</node>", b"<skew>45 1 0 0 0 1 0</skew></node>", 1))
+    assert load_mesh(path).warnings == ("skews of box.dae were left out",)

@@ -58,8 +58,8 @@ def load_mesh(source: Source) -> InputMesh:
     Parameters
     ----------
     source
-        A path (obj, msh, stl, ply, off, glb, gltf, vrm, dae, zae, 3mf, xyz, usd), a mesh or scene of trimesh, or vertices
-        ``[V, 3]`` with faces ``[F, 3]`` (or quads ``[F, 4]``). Scenes are baked: every instance of a geometry is placed
+        A path (obj, msh, stl, ply, off, glb, gltf, vrm, dae, zae, 3mf, xyz, usd), a mesh or scene of trimesh, or
+        vertices ``[V, 3]`` with faces ``[F, 3]`` (or quads ``[F, 4]``). Scenes are baked: every instance of a geometry is placed
         by its transform. Paths and curves are ignored; point clouds give vertices without faces. Nodes of a scene that
         are hulls for an engine, by their names, are left out with a warning if there are others.
 
@@ -119,6 +119,15 @@ def _left_out(path: Path, content: bytes, extension: str) -> list[str]:
     if extension == "stl" and not is_text(content, extension):
         more = len(content) - 84 - 50 * int.from_bytes(content[80:84], "little")
         return [f"{more} bytes after the last triangle of {path.name} were left out"] if more > 0 else []
+    if extension == "dae":
+        unread = {
+            b"<skew": "skews",
+            b"<instance_controller": "skinned or morphed meshes",
+            b"<ph>": "polygons with holes",
+        }
+        return [f"{what} of {path.name} were left out" for tag, what in unread.items() if tag in content]
+    if extension == "ply" and b"element tristrips" in content[: content.find(b"end_header") + 1]:
+        return [f"the triangle strips of {path.name} were left out"]
     return unread_in(path, content) if extension in ("glb", "gltf") else []
 
 
