@@ -59,9 +59,9 @@ def load_mesh(source: Source) -> InputMesh:
     ----------
     source
         A path (obj, msh, stl, ply, off, glb, gltf, vrm, dae, zae, 3mf, xyz, usd), a mesh or scene of trimesh, or
-        vertices ``[V, 3]`` with faces ``[F, 3]`` (or quads ``[F, 4]``). Scenes are baked: every instance of a geometry is
-        placed by its transform. Paths and curves are ignored; point clouds give vertices without faces. Nodes of a scene that
-        are hulls for an engine, by their names, are left out with a warning if there are others.
+        vertices ``[V, 3]`` with faces ``[F, 3]`` (or quads ``[F, 4]``). Scenes are baked: every instance of a geometry
+        is placed by its transform. Paths and curves are ignored; point clouds give vertices without faces. Nodes of a
+        scene that are hulls for an engine, by their names, are left out with a warning if there are others.
 
     Returns
     -------
