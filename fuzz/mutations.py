@@ -47,6 +47,9 @@ VALUES: list[Any] = [
     {},
     [0],
     "../mesh.bin",
+    ["FOO_bar"],
+    5,
+    6,
     5120,
     5126,
 ]
@@ -97,7 +100,7 @@ def _ways(kind: str, data: bytes) -> list[Mutation]:
     if kind == "gltf":
         return [*rough, number, *[in_json] * 10]
     if kind in TEXT or b"\0" not in data[:200]:
-        return [*rough, *[number] * 8, head, head, *[lines] * 4, tags, tags]
+        return [*rough, *[number] * 8, head, head, *[lines] * 4, tags, tags, encoding]
     return [*rough, double, head, *[overwrite] * 10]
 
 
@@ -125,6 +128,23 @@ def overwrite(data: bytes, _: bytes, rng: Rng) -> bytes:
     at = int(rng.integers(end - 4)) // 4 * 4 + int(rng.integers(4)) * int(rng.random() < 0.3)
     packed = struct.pack("<I", int(rng.choice(BITS)))
     return data[:at] + packed[: 4 if rng.random() < 0.7 else 2] + data[at + (4 if len(packed) == 4 else 2) :]
+
+
+def encoding(data: bytes, _: bytes, rng: Rng) -> bytes:
+    """Write text as other programs do: with a byte order mark, other line ends, tabs, or letters of Latin-1."""
+    match rng.integers(6):
+        case 0:
+            return b"\xef\xbb\xbf" + data
+        case 1:
+            return data.replace(b"\n", b"\r")
+        case 2:
+            return data.replace(b"\n", b"\r\n")
+        case 3:
+            return data.replace(b" ", b"\t")
+        case 4:
+            return data.replace(b" ", b" \\\n", int(rng.integers(1, 4)))
+        case _:
+            return b"# K\xf6rper\n" + data
 
 
 def cut_off(data: bytes, _: bytes, rng: Rng) -> bytes:

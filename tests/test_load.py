@@ -443,3 +443,88 @@ def test_a_vrm_is_a_glb_under_another_name(box, tmp_path):
     mesh = load_mesh(tmp_path / "who.vrm")
     assert (mesh.up, mesh.metres, len(mesh.faces)) == ("y", 1.0, 12)
     assert mesh.asset.is_gltf
+
+
+BOX = trimesh.creation.box()
+OBJ = "".join(f"v {x} {y} {z}\n" for x, y, z in BOX.vertices.tolist())
+OBJ += "v 0 0 0\n" + "".join(f"f {a} {b} {c}\n" for a, b, c in (BOX.faces + 1).tolist())
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"\xef\xbb\xbf" + OBJ.encode(),
+        OBJ.replace("v ", "v\t").encode(),
+        b"# K\xf6rper\n" + OBJ.encode(),
+        OBJ.replace("\n", "\r").encode(),
+        OBJ.replace("\n", "\r\n").replace("f ", "f \\\r\n", 3).encode(),
+    ],
+)
+def test_an_obj_is_read_whole_whatever_its_encoding_and_line_ends(tmp_path, content):
+    (tmp_path / "box.obj").write_bytes(content)
+    np.testing.assert_array_equal(triangles(load_mesh(tmp_path / "box.obj")), triangles(BOX))
+
+
+@pytest.mark.parametrize("corner", ["0", "0/1", "-0", "0//1 # 1"])
+def test_an_obj_counted_from_zero_is_refused(tmp_path, corner):
+    (tmp_path / "box.obj").write_text(OBJ + f"f 1 2 {corner}\n")
+    with pytest.raises(MeshFileError, match="counts from 1"):
+        load_mesh(tmp_path / "box.obj")
+
+
+def test_an_stl_is_read_whole_whatever_its_encoding_and_line_ends(tmp_path):
+    text_stl = b"solid K\xf6rper\n" + BOX.export(file_type="stl_ascii").encode().split(b"\n", 1)[1]
+    for content in (text_stl, text_stl.replace(b"\n", b"\r"), BOX.export(file_type="stl") + b"more"):
+        (tmp_path / "box.stl").write_bytes(content)
+        loaded = load_mesh(tmp_path / "box.stl")
+        np.testing.assert_array_equal(triangles(loaded), triangles(BOX))
+    assert loaded.warnings == ("4 bytes after the last triangle of box.stl were left out",)
+
+
+def test_msh_of_mujoco_is_read_and_damage_in_it_refused(tmp_path):
+    points, faces = BOX.vertices.astype("<f4"), BOX.faces.astype("<i4")
+    whole = np.array([8, 8, 8, 12], "<i4").tobytes() + points.tobytes() + bytes(8 * 20) + faces.tobytes()
+    (tmp_path / "box.msh").write_bytes(whole)
+    np.testing.assert_array_equal(triangles(load_mesh(tmp_path / "box.msh")), triangles(BOX))
+    for content in (whole[:-1], whole + b"\0", whole[:7], b"\xff" * 16 + whole[16:], b"$MeshFormat\n4.1 0 8\n"):
+        (tmp_path / "box.msh").write_bytes(content)
+        with pytest.raises(MeshFileError, match=r"again|Gmsh"):
+            load_mesh(tmp_path / "box.msh")
+
+
+def test_what_a_gltf_adds_to_its_triangles_is_read_refused_or_named(tmp_path):
+    files = trimesh.Scene(BOX).export(file_type="gltf")
+    tree = json.loads(files.pop("model.gltf"))
+    for name, content in files.items():
+        (tmp_path / name).write_bytes(content)
+
+    def load(**changes):
+        (tmp_path / "box.gltf").write_text(json.dumps(tree | changes))
+        return load_mesh(tmp_path / "box.gltf")
+
+    (primitive,) = tree["meshes"][0]["primitives"]
+    corners = load().faces.ravel()
+    for mode in (5, 6):
+        loaded = load(meshes=[{"primitives": [primitive, primitive | {"mode": mode}]}])
+        if mode == 5:
+            rows = [corners[i : i + 3][:: -1 if i % 2 else 1] for i in range(34)]
+        else:
+            rows = [[corners[0], corners[i], corners[i + 1]] for i in range(1, 35)]
+        expected = np.concatenate([BOX.faces, rows])
+        assert len(loaded.faces) == 46
+        areas = trimesh.triangles.area(loaded.vertices[loaded.faces])
+        assert areas.sum() == pytest.approx(trimesh.triangles.area(BOX.vertices[expected]).sum())
+    assert "lines" in load(meshes=[{"primitives": [primitive, primitive | {"mode": 1}]}]).warnings[0]
+    assert load(extensionsRequired=["KHR_texture_transform", "EXT_texture_webp"]).warnings == ()
+    for name in ("FOO_bar", "EXT_mesh_gpu_instancing"):
+        with pytest.raises(MeshFileError, match=f"requires the extension '{name}'"):
+            load(extensionsRequired=[name])
+    nodes = [{**node, "skin": 0, "extensions": {"EXT_mesh_gpu_instancing": {}}} for node in tree["nodes"]]
+    assert [said.split(" ", 1)[1][:15] for said in load(nodes=nodes).warnings] == ["skinned meshes ", "nodes have inst"]
+
+
+def test_what_is_left_out_of_a_collada_file_is_named(box, tmp_path):
+    path = tmp_path / "box.dae"
+    content = box.export(file_type="dae")
+    path.write_bytes(content.replace(b"</node>", b"<skew>45 1 0 0 0 1 0</skew></node>", 1))
+    assert load_mesh(path).warnings == ("skews of box.dae were left out",)

@@ -194,6 +194,9 @@ def decompose(
         with run.stage("load"):
             source = in_metres(load_mesh(mesh), options)
         apart = options.per_node and len(source.nodes) > 1
+        if options.per_node and not apart:
+            said = f"per_node had no effect: {source.name} was read as one node"
+            source = replace(source, warnings=(*source.warnings, said))
         done = _each_node(source, options, run) if apart else _as_one(source, options, run)
     report = {
         "name": Path(source.name).stem if isinstance(mesh, (str, os.PathLike)) else "mesh",

@@ -8,6 +8,7 @@ attached to a mesh for each of its primitives. So the parser receives only the t
 from __future__ import annotations
 
 import json
+import re
 import struct
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -29,6 +30,14 @@ DRACO = "KHR_draco_mesh_compression"
 UNREAD = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 """Extensions that encode the triangles: without the decoder, the file holds zeros in their place. Draco is decoded
 before (`gltf_encoded.py`), so that its name is gone."""
+
+INSTANCES = "EXT_mesh_gpu_instancing"
+
+HARMLESS = re.compile(
+    r"(KHR|EXT|MSFT)_(materials|texture|lights|xmp|animation)_\w+|KHR_(mesh_quantization|xmp|draco_mesh_compression)"
+    r"|EXT_(mesh_features|instance_features|structural_metadata)|VRM\w*"
+)
+"""Extensions that leave the triangles as they are, or that are decoded before."""
 
 KEPT = {
     "buffers": ("byteLength", "uri"),
@@ -123,6 +132,23 @@ def split(path: Path, content: bytes) -> tuple[Json, bytes | None]:
     return header, rest
 
 
+def unread_in(path: Path, content: bytes) -> list[str]:
+    """A sentence for each kind of content that is not read: lines, points, poses, instances, morphs."""
+    header, _ = split(path, content)
+    nodes, meshes = header.get("nodes", []), header.get("meshes", [])
+    modes = [primitive.get("mode", 4) for mesh in meshes for primitive in mesh["primitives"]]
+    skinned = sum(1 for node in nodes if "skin" in node and "mesh" in node)
+    instanced = sum(1 for node in nodes if INSTANCES in node.get("extensions", {}))
+    morphed = sum(1 for holder in (*meshes, *nodes) if any(holder.get("weights", ())))
+    said = {
+        "primitives are points or lines, and were left out": sum(1 for mode in modes if mode in (0, 1, 2, 3)),
+        "skinned meshes were placed by their nodes, not by their joints": skinned,
+        f"nodes have instances by {INSTANCES}, which were left out": instanced,
+        "morph weights were left out, so that those meshes have their basic shape": morphed,
+    }
+    return [f"{count} {what}" for what, count in said.items() if count]
+
+
 def refuse_hidden(path: Path, header: Json, extensions: Sequence[str] = UNREAD) -> None:
     """Refuse a file that requires one of these extensions to find its triangles."""
     for name in extensions:
@@ -135,6 +161,9 @@ def refuse_hidden(path: Path, header: Json, extensions: Sequence[str] = UNREAD) 
 
 def _plain(path: Path, header: Json) -> Json:
     refuse_hidden(path, header, (*UNREAD, DRACO))
+    for name in header.get("extensionsRequired", []):
+        if HARMLESS.fullmatch(str(name)) is None:
+            raise MeshFileError(f"{path} requires the extension {name!r:.60}, which is not read: export it without it")
     plain: Json = {key: header[key] for key in ("scene",) if key in header}
     plain["asset"] = {"version": header.get("asset", {}).get("version", "2.0")}
     for key, fields in KEPT.items():

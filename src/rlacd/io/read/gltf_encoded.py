@@ -7,6 +7,7 @@ not normalised (KHR_mesh_quantization) need nothing: a node's scale makes them l
 from __future__ import annotations
 
 import base64
+import re
 import struct
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
@@ -29,6 +30,11 @@ _INTEGERS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2"}
 
 _FLOAT, _UNSIGNED = 5126, 5125
 
+STRIP, FAN = 5, 6
+"""Modes of primitives whose triangles share corners."""
+
+FANS = re.compile(rb'"mode"\s*:\s*[56]')
+
 
 def decoded_gltf(path: Path, content: bytes, beside: Callable[[str], bytes]) -> bytes:
     """Return a glTF file with the same triangles as plain numbers; the file itself if they are.
@@ -49,7 +55,7 @@ def decoded_gltf(path: Path, content: bytes, beside: Callable[[str], bytes]) -> 
     MissingExtraError
         It is compressed with Draco, and the extra ``draco`` is not installed.
     """
-    if DRACO.encode() not in content and b'"normalized"' not in content:
+    if DRACO.encode() not in content and b'"normalized"' not in content and FANS.search(content) is None:
         return content
     header, rest = split(path, content)
     try:
@@ -57,6 +63,7 @@ def decoded_gltf(path: Path, content: bytes, beside: Callable[[str], bytes]) -> 
         file = _File(path, header, rest, len(content), beside)
         changed = file.decode_draco()
         changed |= file.spread_integers()
+        changed |= file.spread_fans()
         return joined(file.finished(), rest) if changed else content
     except MeshFileError:
         raise
@@ -161,6 +168,30 @@ class _File:
             primitive["attributes"] = {**primitive["attributes"], "POSITION": replaced[index]}
         return bool(replaced)
 
+    def spread_fans(self) -> bool:
+        """Replace strips and fans by their triangles; False if there are none."""
+        found = False
+        for primitive in self._primitives:
+            if primitive.get("mode") not in (STRIP, FAN):
+                continue
+            if "indices" in primitive:
+                corners = self._scalars(self._accessors[primitive["indices"]])
+            else:
+                count = self._accessors[primitive["attributes"]["POSITION"]]["count"]
+                self._need(12 * count)
+                corners = np.arange(count)
+            first = np.arange(max(len(corners) - 2, 0))
+            if primitive["mode"] == STRIP:  # every other triangle of a strip is turned
+                odd = first % 2
+                rows = np.stack([first, first + 1 + odd, first + 2 - odd], axis=1)
+            else:
+                rows = np.stack([np.zeros_like(first), first + 1, first + 2], axis=1)
+            triangles = corners[rows].astype("<u4").tobytes()
+            self._need(len(triangles))
+            primitive["indices"], primitive["mode"] = self._add(triangles, _UNSIGNED, "SCALAR"), 4
+            found = True
+        return found
+
     def finished(self) -> Json:
         """The file's JSON."""
         data = b"".join(self._added)
@@ -197,6 +228,12 @@ class _File:
             raise ValueError("rows overlap")
         data = self._bytes_of(accessor["bufferView"])
         return np.ndarray((count, 3), kind, data, accessor.get("byteOffset", 0), (stride, kind.itemsize))
+
+    def _scalars(self, accessor: Json) -> np.ndarray[Any, Any]:
+        """The indices of an accessor, ``[N]``."""
+        kind = {5121: "<u1", 5123: "<u2", _UNSIGNED: "<u4"}[accessor["componentType"]]
+        data = self._bytes_of(accessor["bufferView"])
+        return np.frombuffer(data, kind, accessor["count"], accessor.get("byteOffset", 0)).astype(np.int64)
 
     def _bytes_of(self, index: int) -> bytes:
         """The bytes of a view of the file."""

@@ -22,13 +22,14 @@ from rlacd.errors import EmptyMeshError, MeshDataError, MeshFileError, MissingEx
 from rlacd.io.read.beside import FolderFiles
 from rlacd.io.read.conventions import stated
 from rlacd.io.read.engine_hulls import without_engine_hulls
-from rlacd.io.read.gltf import node_names, plain_gltf
+from rlacd.io.read.gltf import node_names, plain_gltf, unread_in
 from rlacd.io.read.gltf_encoded import decoded_gltf
 from rlacd.io.read.limits import MOST_TRIANGLES
 from rlacd.io.read.looks import has_looks
+from rlacd.io.read.msh import msh_as_ply
 from rlacd.io.read.off import is_off, plain_off
 from rlacd.io.read.open_file import read_file
-from rlacd.io.read.text import check_text, declared_triangles, plain_obj, plain_ply, plain_stl
+from rlacd.io.read.text import check_text, declared_triangles, is_text, plain_obj, plain_ply, plain_stl, plain_text
 from rlacd.io.read.usd import USD, usd_scene
 from rlacd.io.read.xml import check_3mf, collada_of
 from rlacd.memory import BYTES_READ, require_memory
@@ -39,7 +40,7 @@ from rlacd.solid.topology import BoolArray, IntArray
 
 Source: TypeAlias = str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]
 
-FORMATS = ("obj", "stl", "ply", "off", "glb", "gltf", "vrm", "dae", "zae", "3mf", "xyz", *USD)
+FORMATS = ("obj", "msh", "stl", "ply", "off", "glb", "gltf", "vrm", "dae", "zae", "3mf", "xyz", *USD)
 """The formats that are read. trimesh parses more, but those parsers have not been reviewed against hostile files."""
 
 CONVERTERS = {
@@ -57,10 +58,10 @@ def load_mesh(source: Source) -> InputMesh:
     Parameters
     ----------
     source
-        A path (obj, stl, ply, off, glb, gltf, vrm, dae, zae, 3mf, xyz, usd), a mesh or scene of trimesh, or vertices
-        ``[V, 3]`` with faces ``[F, 3]`` (or quads ``[F, 4]``). Scenes are baked: every instance of a geometry is placed
-        by its transform. Paths and curves are ignored; point clouds give vertices without faces. Nodes of a scene that
-        are hulls for an engine, by their names, are left out with a warning if there are others.
+        A path (obj, msh, stl, ply, off, glb, gltf, vrm, dae, zae, 3mf, xyz, usd), a mesh or scene of trimesh, or
+        vertices ``[V, 3]`` with faces ``[F, 3]`` (or quads ``[F, 4]``). Scenes are baked: every instance of a geometry
+        is placed by its transform. Paths and curves are ignored; point clouds give vertices without faces. Nodes of a
+        scene that are hulls for an engine, by their names, are left out with a warning if there are others.
 
     Returns
     -------
@@ -97,7 +98,7 @@ def _from_file(path: Path) -> InputMesh:
     content, extension, scene = _read(path)
     mesh = _clean(_bake(scene, path.name), path.name)
     up, metres = stated(extension, content, scene)
-    mesh = replace(mesh, up=up, metres=metres)
+    mesh = replace(mesh, up=up, metres=metres, warnings=(*mesh.warnings, *_left_out(path, content, extension)))
     if extension in USD:
         kept = len(mesh.nodes) > 1 or any(one.visual.defined for one in scene.geometry.values())
         return replace(mesh, asset=Asset(scene, extension=extension) if kept else None)
@@ -111,6 +112,23 @@ def _from_file(path: Path) -> InputMesh:
     keys = [int(str(node.key).partition("_")[0]) for node in mesh.nodes]
     nodes = tuple(replace(node, name=names[key], key=key) for node, key in zip(mesh.nodes, keys, strict=True))
     return replace(_joined(replace(mesh, nodes=nodes)), asset=Asset(content, path, extension))
+
+
+def _left_out(path: Path, content: bytes, extension: str) -> list[str]:
+    """A sentence for each kind of content of a file that was not read."""
+    if extension == "stl" and not is_text(content, extension):
+        more = len(content) - 84 - 50 * int.from_bytes(content[80:84], "little")
+        return [f"{more} bytes after the last triangle of {path.name} were left out"] if more > 0 else []
+    if extension == "dae":
+        unread = {
+            b"<skew": "skews",
+            b"<instance_controller": "skinned or morphed meshes",
+            b"<ph>": "polygons with holes",
+        }
+        return [f"{what} of {path.name} were left out" for tag, what in unread.items() if tag in content]
+    if extension == "ply" and b"element tristrips" in content[: content.find(b"end_header") + 1]:
+        return [f"the triangle strips of {path.name} were left out"]
+    return unread_in(path, content) if extension in ("glb", "gltf") else []
 
 
 def _joined(mesh: InputMesh) -> InputMesh:
@@ -148,6 +166,8 @@ def _read(path: Path) -> tuple[bytes, str, trimesh.Scene]:
     extension = "glb" if extension == "vrm" else extension  # a VRM file is a GLB file
     if (declared := declared_triangles(content, extension)) is not None:
         require_memory(declared, BYTES_READ, path.name)
+    if is_text(content, extension):
+        content = plain_text(content)
     named = extension  # a zae file is unpacked to a dae file
     beside = FolderFiles(path.parent)
     try:
@@ -198,6 +218,8 @@ def _checked(path: Path, content: bytes, extension: str, beside: FolderFiles) ->
             return plain_ply(path, content), extension
         case "obj":
             return plain_obj(path, content), extension
+        case "msh":
+            return msh_as_ply(path, content), "ply"
         case "off":
             return plain_off(path, content), extension
         case _ if extension not in USD:

@@ -56,7 +56,7 @@ def triangles_ply(header: bytes, body: bytes) -> bytes | None:
     mixed = order is not None and (counts != counts[0]).any()
     if not mixed and not folds(positions, counts, corners):
         return None
-    return _encoded(positions, triangles_of(positions, counts, corners))
+    return encoded_ply(positions, triangles_of(positions, counts, corners))
 
 
 def _elements(header: bytes) -> tuple[str | None, tuple[_Element, _Element]] | None:
@@ -155,7 +155,8 @@ def _text(body: bytes, points: _Element, faces: _Element, order: str) -> _Polygo
     return positions, np.array(counts, dtype=np.int64), corners
 
 
-def _encoded(points: FloatArray, faces: npt.NDArray[np.int64]) -> bytes:
+def encoded_ply(points: FloatArray, faces: npt.NDArray[np.int64]) -> bytes:
+    """Write points and triangles as a binary PLY file."""
     records = np.empty(len(faces), dtype=[("count", "u1"), ("corners", "<i4", 3)])
     records["count"], records["corners"] = 3, faces
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}"]

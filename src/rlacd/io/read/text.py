@@ -17,6 +17,7 @@ from rlacd.io.read.limits import MOST_TRIANGLES
 from rlacd.io.read.polygons import obj_without_folds
 from rlacd.io.read.polygons_ply import triangles_ply
 
+OBJ_ZERO = re.compile(rb"^[ \t]*f[^\n#]*[ \t]-?0+(?=[/\s]|$)", re.MULTILINE)
 OBJ_BLANKS = re.compile(rb"^[ \t]*(v[nt]?|f)[ \t]+", re.MULTILINE)
 
 MOST_FIELDS = 2000
@@ -49,6 +50,29 @@ def check_text(path: Path, content: bytes) -> None:
         raise MeshFileError(f"{path} has {lines} lines, more than {MOST_TRIANGLES}: simplify it first")
 
 
+def plain_text(content: bytes) -> bytes:
+    """Return text as UTF-8 without a byte order mark, with line feeds only; what is no UTF-8 is Latin-1."""
+    content = content.removeprefix(b"\xef\xbb\xbf")
+    if b"\r" in content:
+        content = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    try:
+        content.decode()
+    except UnicodeDecodeError:
+        return content.decode("latin-1").encode()
+    return content
+
+
+def is_text(content: bytes, extension: str) -> bool:
+    """Whether a file of this format is text: STL and PLY may be binary."""
+    match extension:
+        case "stl":
+            return b"\0" not in content[:512] and len(content) != 84 + 50 * int.from_bytes(content[80:84], "little")
+        case "ply":
+            return b"format ascii" in content[:1000]
+        case _:
+            return extension in ("obj", "off", "xyz")
+
+
 def declared_triangles(content: bytes, extension: str) -> int | None:
     """Return how many triangles a file holds by its own account, before anything is parsed.
 
@@ -74,12 +98,17 @@ def plain_obj(path: Path, content: bytes) -> bytes:
     Concave faces become triangles, as the parser makes fans.
     """
     check_text(path, content)
+    content = content.replace(b"\\\n", b" ")
+    if OBJ_ZERO.search(content) is not None:
+        raise MeshFileError(f"{path} has a face that uses vertex 0, but OBJ counts from 1: export it again")
     return obj_without_folds(spaced_obj(content).replace(b"usemtl ", b"# "))
 
 
 def spaced_obj(content: bytes) -> bytes:
     """Take blanks from before the words of an OBJ file, and tabs from behind them: the parser skips such lines."""
-    if any(mark in content for mark in (b"\n ", b"\n\t", b"\nv\t", b"\nf\t", b"\nvt\t", b"\nvn\t")):
+    if OBJ_BLANKS.match(content) or any(
+        mark in content for mark in (b"\n ", b"\n\t", b"\nv\t", b"\nf\t", b"\nvt\t", b"\nvn\t")
+    ):
         return OBJ_BLANKS.sub(rb"\1 ", content)
     return content
 
@@ -90,7 +119,7 @@ def plain_stl(path: Path, content: bytes) -> bytes:
         count = int.from_bytes(content[80:84], "little")
         if len(content) < 84 + 50 * count:
             raise MeshFileError(f"{path} is cut off: its header declares {count} triangles; export it again")
-        return content
+        return content[: 84 + 50 * count]
     if len(content) == 84 + 50 * int.from_bytes(content[80:84], "little"):
         return content
     check_text(path, content)
