@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -189,18 +190,22 @@ def test_a_benchmark_names_its_command_date_and_commit(text: str) -> None:
     assert re.search(r"\d November 2026", text)
     assert re.search(r"\b[0-9a-f]{7}\b", text)
     for program, *words in commands:
-        script = next((word for word in words if re.match(r"[\w/.]*(benchmarks|fuzz)[/.]\w+", word)), None)
-        if program == "python":
-            assert script is not None
-            path = ROOT / (script if script.endswith(".py") else script.replace(".", "/") + ".py")
-            known = path.read_text(encoding="utf-8")
-            assert [word for word in words if word.startswith("--") and f'"{word}"' not in known] == []
+        at: Any
+        if words[:2] == ["-m", "benchmarks"]:
+            at = typer.main.get_command(import_module(f"benchmarks.{words[2].replace('-', '_')}").app)
+            words = words[3:]
         elif program == "rlacd" and len(words) > 1:
-            at: Any = typer.main.get_command(app)
-            while isinstance(at, typer.core.TyperGroup):
-                _, at, words = at.resolve_command(typer.Context(at), words)
-            options = {option for parameter in at.params for option in parameter.opts}
-            assert {word for word in words if word.startswith("--")} <= options
+            at = typer.main.get_command(app)
+        elif program == "python":
+            known = ROOT.joinpath(*words[1].split(".")).with_suffix(".py").read_text(encoding="utf-8")
+            assert [word for word in words if word.startswith("--") and f'"{word}"' not in known] == []
+            continue
+        else:
+            continue
+        while isinstance(at, typer.core.TyperGroup):
+            _, at, words = at.resolve_command(typer.Context(at), words)
+        options = {option for parameter in at.params for option in parameter.opts}
+        assert {word for word in words if word.startswith("--")} <= options
 
 
 @pytest.mark.parametrize(
