@@ -35,7 +35,7 @@ $(VENV)/installed: $(VENV)/tools $(NATIVE_SOURCES)
 	touch $@
 
 $(VENV)/test-extras: $(VENV)/installed
-	$(RLACD_INSTALL) --editable '.[learned,view,train,usd,draco,sim,bench,fleet]' --group test
+	$(RLACD_INSTALL) --editable '.[learned,view,train,usd,draco,sim,fleet]' --group test --group bench
 	touch $@
 
 demo: install

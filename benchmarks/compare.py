@@ -35,7 +35,7 @@ def compare(
     \b
     default                rlacd.decompose(mesh)
     fast, best             with that quality; fast:policy=navacd:max_vertices=32  with other options
-    fast:space             with navigable space (tolerance 5 %, radius 2.5 %)
+    fast:space[=RADIUS]    with navigable space (tolerance 0.1, half of it as radius; longest side 2)
     coacd, vhacd           other tools with their default options
     disjoint               rlacd's cuts, united only where hulls stay disjoint
     planes[:ap=N][:ce=N][:no-spatial][:no-principal][:excess|:random|:FILE.onnx]

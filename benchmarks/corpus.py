@@ -30,16 +30,18 @@ COLUMNS = {
 }
 
 
-@experiment(app, "corpus", lambda method: check_methods(method), TASKS)
+@experiment(app, "corpus", lambda method, **_: check_methods(method), TASKS)
 def corpus(
-    bench: Bench, method: Annotated[str, typer.Option(help="As for compare, such as fast:max_vertices=32.")] = "fast"
+    bench: Bench,
+    method: Annotated[str, typer.Option(help="As for compare, such as fast:max_vertices=32.")] = "fast",
+    setting: Annotated[float | None, typer.Option(help="Its threshold or tolerance; default: its own.")] = None,
 ) -> Page:
     """Decompose every mesh of a folder, and report failures and what is worst.
 
     \b
     python -m benchmarks corpus ../shared/meshes/test --out RUN
     """
-    rows = bench.run(method)
+    rows = bench.run(method, setting)
     page = Page(f"Corpus, {method}", [about(bench)])
     page.add(*summary(rows), "## Failures", failures(rows))
     return page
@@ -56,7 +58,7 @@ def summary(rows: Sequence[Row]) -> list[object]:
         "parts over the threshold": sum(row["exceeding"] or 0 for row in good),
         "CPU s, all": f"{sum(row['cpu'] for row in good):.0f}",
     }
-    blocks: list[object] = [Table(["meshes", len(rows)], list(promises.items()))]
+    blocks: list[object] = [Table(["meshes", str(len(rows))], list(promises.items()))]
     if good:
         values = {name: np.array([row[key] for row in good], dtype=float) for name, key in COLUMNS.items()}
         lines = [

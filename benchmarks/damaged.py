@@ -51,12 +51,13 @@ def measure(vertices: Any, faces: Any, family: str, share: float) -> dict[str, A
                 nearest = np.minimum(nearest, distance)
         return nearest
 
-    points, _ = spread_points(*solid.surface, SPACING)
+    surface: Any = solid.surface
+    points, _ = spread_points(*surface, SPACING)
     missed = apart(points)
     under, lost = missed.max(), frame.to_input(points[missed.argmax()])
     holes = result.report["holes"]
     is_hole = any(np.linalg.norm(lost - hole["at_abs"]) <= hole["width_abs"] for hole in holes)
-    inputs = [SurfaceQuery(*solid.surface), SurfaceQuery(frame.to_frame(damaged[0]), damaged[1])]
+    inputs = [SurfaceQuery(*surface), SurfaceQuery(frame.to_frame(damaged[0]), damaged[1])]
     over = 0.0
     for i, hull in enumerate(hulls):
         points, _ = spread_points(*hull, SPACING)

@@ -17,7 +17,6 @@ from benchmarks.runner import Bench, Limits
 from benchmarks.store import Store
 from benchmarks.tables import Page, failures
 from rlacd.cli.exit_codes import exit_codes
-from rlacd.errors import OptionError
 
 app = typer.Typer(add_completion=False)
 
@@ -50,7 +49,6 @@ SHAPES: dict[str, Callable[[], large.Mesh]] = {
 def hard(
     out: Out,
     methods: Annotated[str, typer.Option(help="As for compare.")] = "fast,default",
-    only: Annotated[str, typer.Option(help="Some of the default's.")] = ",".join(SHAPES),
     limit: Annotated[float, typer.Option(help="Seconds a method may take for one shape.")] = 600.0,
 ) -> None:
     """Write the shapes to OUT/shapes and compare methods on them.
@@ -60,13 +58,11 @@ def hard(
     """
     with exit_codes():
         check_methods(methods)
-        if unknown := [name for name in words(only) if name not in SHAPES]:
-            raise OptionError(f"there is no shape {unknown[0]!r}; take some of {', '.join(SHAPES)}.")
         store = Store(out)
         (out / "shapes").mkdir(exist_ok=True)
-        for name in words(only):
-            trimesh.Trimesh(*SHAPES[name](), process=False).export(out / "shapes" / f"{name}.ply")
-        names = [f"{name}.ply" for name in words(only)]
+        for name, make in SHAPES.items():
+            trimesh.Trimesh(*make(), process=False).export(out / "shapes" / f"{name}.ply")
+        names = [f"{name}.ply" for name in SHAPES]
         bench = Bench(out / "shapes", names, store, Limits(limit), typer.echo)
         groups = {method: bench.run(method) for method in words(methods)}
         page = Page("Hard shapes", [about(bench), mesh_by_mesh(groups), comparison(groups)])

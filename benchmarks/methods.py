@@ -6,14 +6,14 @@ name                            tool                                          se
 ``default``                     ``rlacd.decompose(mesh)``                     concavity threshold (its own)
 ``fast``, ``best``              the same with that ``quality``                concavity threshold (its own)
 ``...:OPTION=VALUE``            the same with that option, any number         concavity threshold (its own)
-``...:space``                   the same with navigable space                 tolerance (0.1); the radius is half
+``...:space[=RADIUS]``          the same with navigable space                 tolerance (0.1)
 ``coacd``                       CoACD                                         concavity threshold (its own)
 ``vhacd``                       V-HACD 4                                      most hulls (its own)
 ``disjoint``                    `benchmarks.disjoint`                         concavity threshold (rlacd's)
 ``planes[:...]``                the paper's deployment; see `deployed`        concavity threshold (rlacd's)
 ==============================  ============================================  =====================================
 
-Lengths are in the frame where the longest side is 2.
+Lengths are in the frame where the longest side is 2. The default radius is half the tolerance.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ def make_method(name: str) -> Method:
             return decompose_as_deployed(deployment, v, f, threshold, threads)
 
         return Method(name, version_of("rlacd"), "threshold", DEFAULT_THRESHOLD, run)
-    setting, default = ("tolerance", 0.1) if "space" in words else ("threshold", DEFAULT_THRESHOLD)
+    setting, default = ("tolerance", 0.1) if _space(name) else ("threshold", DEFAULT_THRESHOLD)
     return Method(name, version_of("rlacd"), setting, default, _rlacd(name))
 
 
@@ -114,12 +114,12 @@ def rlacd_options(name: str) -> dict[str, Any]:
     if base not in QUALITIES:
         raise OptionError(
             f"there is no method {name!r}; it has to be default, fast or best, if need be followed by :OPTION=VALUE or "
-            "by :space; or coacd, vhacd, disjoint, planes[:...]."
+            "by :space[=RADIUS]; or coacd, vhacd, disjoint, planes[:...]."
         )
     options = dict(QUALITIES[base])
     for word in words:
         option, is_given, value = word.partition("=")
-        if word == "space":
+        if option == "space":
             continue
         if not is_given or option not in inspect.signature(decompose).parameters:
             raise OptionError(
@@ -132,6 +132,11 @@ def rlacd_options(name: str) -> dict[str, Any]:
     return options
 
 
+def _space(name: str) -> list[str]:
+    """The word that asks for navigable space, if there is one."""
+    return [word for word in name.split(":") if word.partition("=")[0] == "space"]
+
+
 def version_of(package: str) -> str:
     """The version of an installed package."""
     try:
@@ -141,14 +146,15 @@ def version_of(package: str) -> str:
 
 
 def _rlacd(name: str) -> Run:
-    options, is_space = rlacd_options(name), "space" in name.split(":")
+    options, space = rlacd_options(name), _space(name)
 
     def run(vertices: FloatArray, faces: IntArray, number: float, threads: int) -> list[RawHull]:
         import rlacd
 
         goal: dict[str, Any] = {} if number == DEFAULT_THRESHOLD else {"threshold": number}
-        if is_space:
-            goal = {"criterion": rlacd.NavigableSpace(number / 4, number / 2)}  # shares of the longest side
+        if space:
+            radius = float(space[0].partition("=")[2] or number / 2)
+            goal = {"criterion": rlacd.NavigableSpace(radius / 2, number / 2)}  # shares of the longest side
         result = rlacd.decompose((vertices, faces), threads=threads, **goal, **options)
         return [_as_arrays(hull.vertices, hull.faces) for hull in result]
 

@@ -149,7 +149,8 @@ def measure(
 def _overlap(hulls: Sequence[Hull]) -> float:
     bodies = [to_manifold(hull.vertices, hull.faces.astype(np.int64)) for hull in hulls]
     union: float = Manifold.batch_boolean(bodies, OpType.Add).volume()
-    return max(0.0, sum(body.volume() for body in bodies) / union - 1)
+    total: float = sum(body.volume() for body in bodies)
+    return max(0.0, total / union - 1)
 
 
 def _concavity(solid: Solid, hulls: Sequence[Hull], promised: float | None) -> tuple[float, int | None, int]:

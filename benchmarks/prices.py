@@ -5,7 +5,6 @@ from __future__ import annotations
 import random
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -79,9 +78,6 @@ def measure_kernels() -> dict[str, list[tuple[Sizes, float]]]:
 @app.command()
 def prices(
     meshes: Meshes,
-    listed: Annotated[
-        Path | None, typer.Option("--list", help="File with a mesh a line, relative to the folder.")
-    ] = None,
     count: Annotated[int, typer.Option(help="Meshes, drawn at random, the same ones each time.")] = 14,
 ) -> None:
     """Decompose meshes at the default level, one thread; compare each kernel's CPU seconds with what it was priced at.
@@ -95,7 +91,7 @@ def prices(
 
     with exit_codes():
         calls = measure_kernels()
-        names = find_meshes(meshes, listed)
+        names = find_meshes(meshes)
         random.Random(5).shuffle(names)
         for name in names[:count]:
             rlacd.decompose(meshes / name, threads=1)

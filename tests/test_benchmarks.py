@@ -149,8 +149,8 @@ class TestMethods:
 
 def test_other_tools_run_at_their_own_defaults(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing is passed but the setting compared, at the default it has there, and the input."""
-    coacd = pytest.importorskip("coacd", reason="CoACD is not installed")
-    vhacdx = pytest.importorskip("vhacdx", reason="V-HACD is not installed")
+    coacd = pytest.importorskip("coacd", reason="the group bench is not installed")
+    vhacdx = pytest.importorskip("vhacdx", reason="the group bench is not installed")
     threshold = inspect.signature(coacd.run_coacd).parameters["threshold"].default
     hulls = int(vhacdx.compute_vhacd.__doc__.split("maxConvexHulls")[1].split(" = ")[1].split(",")[0])
     passed: list[dict[str, Any]] = []

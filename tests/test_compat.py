@@ -36,14 +36,14 @@ def triangles_with_threes(mesh: trimesh.Trimesh) -> np.ndarray:
 
 @pytest.mark.promise("drop-in")
 def test_run_coacd_has_the_originals_signature() -> None:
-    coacd = pytest.importorskip("coacd", reason="the extra bench is not installed")
+    coacd = pytest.importorskip("coacd", reason="the group bench is not installed")
     theirs, ours = (inspect.signature(function).parameters for function in (coacd.run_coacd, our_coacd.run_coacd))
     assert [(p.name, p.default) for p in ours.values()] == [(p.name, p.default) for p in theirs.values()]
 
 
 @pytest.mark.slow
 def test_run_coacd_gives_the_originals_kind_of_result() -> None:
-    coacd = pytest.importorskip("coacd", reason="the extra bench is not installed")
+    coacd = pytest.importorskip("coacd", reason="the group bench is not installed")
     mesh = table()
     coacd.set_log_level("error")
     our_coacd.set_log_level("error")
@@ -123,7 +123,7 @@ def test_options_without_meaning_are_reported_once_each() -> None:
 
 @pytest.mark.promise("drop-in")
 def test_compute_vhacd_has_the_originals_signature() -> None:
-    vhacdx = pytest.importorskip("vhacdx", reason="the extra bench is not installed")
+    vhacdx = pytest.importorskip("vhacdx", reason="the group bench is not installed")
     ours = inspect.signature(compute_vhacd).parameters
     said = vhacdx.compute_vhacd.__doc__.splitlines()[0]
     position = 0
@@ -137,7 +137,7 @@ def test_compute_vhacd_has_the_originals_signature() -> None:
 
 
 def test_compute_vhacd_gives_the_originals_kind_of_result() -> None:
-    vhacdx = pytest.importorskip("vhacdx", reason="the extra bench is not installed")
+    vhacdx = pytest.importorskip("vhacdx", reason="the group bench is not installed")
     mesh = table()
     faces = triangles_with_threes(mesh).astype(np.uint32)
     theirs = vhacdx.compute_vhacd(mesh.vertices, faces, maxConvexHulls=6, resolution=10_000)

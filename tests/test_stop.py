@@ -209,7 +209,7 @@ def test_a_timeout_ends_the_work_however_large_the_input(name: str) -> None:
     mesh = LARGE[name]()
     seen: list[rlacd.Progress] = []
     result = rlacd.decompose(mesh, timeout=1.0, progress=seen.append)
-    # The step that notices the timeout is the last: how late that is depends on the machine (benchmarks/timeout.py).
+    # The step that notices the timeout is the last: see `python -m benchmarks late`.
     assert sum(step.seconds > 1.0 for step in seen) <= 1
     assert result.report["stopped_by"] == "timeout"
     # All corners: for the surface between them there is no time here either.
