@@ -163,7 +163,7 @@ def tables(run: Path, document: Path) -> None:
     are replaced by the N-th table of RUN/PAGE.md. The chart it shows is copied beside it.
 
     \b
-    python -m benchmarks tables RUN docs/research/results.md
+    python -m benchmarks tables RUN research/comparison.md
     """
     document.write_text(fill(document.read_text(), run))
     for source, name in CHARTS.items():
