@@ -104,10 +104,8 @@ class Clock:
         """Report a step of the current stage; True if the work may continue."""
         self._done, self._total, self._parts = done, total, parts
         if self.stopped_by is None:
-            cancelled = (
-                self._progress is not None
-                and self._progress(Progress(self._stage, done, total, parts, self.elapsed)) is False
-            )
+            go_on = self._progress and self._progress(Progress(self._stage, done, total, parts, self.elapsed))
+            cancelled = go_on is not None and not go_on
             if self._nothing_left_to_stop:
                 if cancelled:
                     self._hurry()

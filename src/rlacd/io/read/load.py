@@ -78,7 +78,9 @@ def load_mesh(source: Source) -> InputMesh:
     MissingExtraError
         A USD file or one that Draco compressed, and the extra ``usd`` or ``draco`` is not installed.
     """
-    if isinstance(source, str | os.PathLike):
+    if isinstance(source, os.PathLike):
+        source = os.fspath(source)  # bytes are refused below
+    if isinstance(source, str):
         return without_engine_hulls(_from_file(Path(source)))
     if isinstance(source, trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud):
         kind = type(source).__name__
@@ -321,6 +323,8 @@ def _placed_otherwise(graph: Any, node: Any, name: str) -> FloatArray:
 
 def _arrays(vertices: Any, faces: Any) -> tuple[FloatArray, IntArray]:
     """Check the shapes and dtypes of arrays; quads become two triangles each."""
+    if np.iscomplexobj(vertices) or np.ma.is_masked(vertices) or np.ma.is_masked(faces):
+        raise MeshDataError("vertices are complex, or vertices or faces are masked: give plain real arrays")
     try:
         v = np.asarray(vertices, dtype=np.float64)
         f = np.asarray(faces)
