@@ -323,11 +323,13 @@ def _placed_otherwise(graph: Any, node: Any, name: str) -> FloatArray:
 
 def _arrays(vertices: Any, faces: Any) -> tuple[FloatArray, IntArray]:
     """Check the shapes and dtypes of arrays; quads become two triangles each."""
-    if np.iscomplexobj(vertices) or np.ma.is_masked(vertices) or np.ma.is_masked(faces):
-        raise MeshDataError("vertices are complex, or vertices or faces are masked: give plain real arrays")
     try:
+        if np.iscomplexobj(vertices) or np.ma.is_masked(vertices) or np.ma.is_masked(faces):
+            raise MeshDataError("vertices are complex, or vertices or faces are masked: give plain real arrays")
         v = np.asarray(vertices, dtype=np.float64)
         f = np.asarray(faces)
+    except MeshDataError:
+        raise
     except (TypeError, ValueError) as error:
         raise MeshDataError("vertices and faces must be rectangular arrays of numbers: [V, 3] and [F, 3]") from error
     v = v.reshape(-1, 3) if v.size == 0 else v
