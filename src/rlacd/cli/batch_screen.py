@@ -11,7 +11,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bars
 
-from rlacd.cli.terminal import counted, say
+from rlacd.cli.exit_codes import say
+from rlacd.cli.terminal import counted
 from rlacd.plain_json import printable
 
 if TYPE_CHECKING:

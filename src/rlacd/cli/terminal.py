@@ -10,21 +10,16 @@ from contextlib import contextmanager, nullcontext
 from types import FrameType, TracebackType
 from typing import TYPE_CHECKING, Any
 
-import typer
 from rich.console import Console
 from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bars
 
+from rlacd.cli.exit_codes import say
 from rlacd.decomposition import Decomposition
 from rlacd.progress import Progress
 
 if TYPE_CHECKING:
     from rlacd.io.robots import Rewritten
-
-
-def say(text: str) -> None:
-    """Print a line to stderr; stdout is reserved for requested output."""
-    typer.echo(text, err=True)
 
 
 class Watch:
