@@ -32,7 +32,8 @@ HELP = """Decompose every mesh in a folder, skipping those already done.
   rlacd batch assets/ -o hulls/ --dry-run
   rlacd batch assets/ -o s3://bucket/hulls --ray auto
 
-A mesh whose process dies, hangs or needs too much memory is tried once more alone, and is then given its convex hull.
+A mesh whose process dies, hangs or needs too much memory is given its convex hull, unless a second
+try succeeds; one that hangs has no second try.
 OUT/manifest.jsonl records the outcome for each mesh. To resume after an interruption, run the same command again.
 Ctrl-C once finishes what is running; twice quits at once.
 """
@@ -179,13 +180,15 @@ def _print_large(batch: Batch) -> None:
 
 
 def _print_plan(batch: Batch) -> None:
+    from rlacd.batch.assets import result_ending
     from rlacd.cli.terminal import counted
     from rlacd.plain_json import printable
 
     plan = batch.plan()
     for asset, finished in plan:
         if not finished:
-            give(printable(f"{asset.name} -> {asset.place}{batch.spec.ending or '/'}") + "\n")
+            result = asset.place + (result_ending(asset.name, batch.spec.ending) or "/")
+            give(printable(f"{asset.name} -> {result}") + "\n")
     done = sum(finished for _, finished in plan)
     say(f"{counted(len(plan), 'mesh', 'meshes')}: {done} done, {len(plan) - done} to do; nothing was written")
 
