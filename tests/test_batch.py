@@ -125,6 +125,67 @@ def test_a_folder_a_mesh(assets: Path, tmp_path: Path) -> None:
     assert names[:2] == ["a.stl_000.stl", "a.stl_001.stl"] or names[:2] == ["a_000.stl", "a_001.stl"]
 
 
+def box(path: Path, content: bytes = b"") -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content or trimesh.creation.box().export(file_type=path.suffix[1:]).encode())
+
+
+@pytest.mark.promise("own-files")
+def test_no_name_stops_a_batch_and_no_file_of_others_is_replaced(tmp_path: Path) -> None:
+    names = ["a.obj", "a.glb/b.obj", "manifest.jsonl.obj", "x.obj", "linked.obj", "z.obj"]
+    for name in names:
+        box(tmp_path / "in" / name)
+    box(tmp_path / "in" / "notes.txt", b"no mesh")
+    for words, ending in (([], ".glb"), (["--folders"], "/x_000.obj")):
+        out = tmp_path / f"out{len(words)}"
+        taken = out / ("x" + ending)
+        box(taken, b"precious")
+        box(tmp_path / "elsewhere", b"precious too")
+        if not words:
+            (out / "linked.glb").symlink_to(tmp_path / "elsewhere")
+        run = batch(tmp_path / "in", "-o", out, "--jobs", 1, "--quality", "fast", *words)
+        assert run.exit_code == 5, run.output
+        assert "1 file (1 .txt)" in run.stderr
+        told = rows(out)
+        refused = {"x.obj"} if words else {"x.obj", "linked.obj"}
+        assert {name for name, row in told.items() if row["status"] != "done"} == refused
+        assert "is there already" in told["x.obj"]["error"]
+        assert str(tmp_path) not in (out / "manifest.jsonl").read_text()
+        assert (taken.read_bytes(), (tmp_path / "elsewhere").read_bytes()) == (b"precious", b"precious too")
+        taken.unlink()
+        batch(tmp_path / "in", "-o", out, "--jobs", 1, "--quality", "fast", *words)
+        assert rows(out)["x.obj"]["status"] == "done", "tried again by the next run"
+
+
+URDF = """<robot name="r"><link name="l"><collision><geometry><mesh filename="meshes/l.obj"/></geometry></collision>
+</link></robot>"""
+MJCF = """<mujoco><asset><mesh name="m" file="meshes/l.obj"/></asset>
+<worldbody><body><geom type="mesh" mesh="m"/></body></worldbody></mujoco>"""
+
+
+def test_robots_are_worked_on_like_meshes_and_other_xml_is_passed_over(tmp_path: Path) -> None:
+    assets, out = tmp_path / "in", tmp_path / "out"
+    box(assets / "meshes" / "l.obj")
+    for name, text in (("r.urdf", URDF), ("r.xml", MJCF), ("package.xml", "<package/>"), ("bad.urdf", "no robot")):
+        box(assets / name, text.encode())
+    run = batch(assets, "-o", out, "--jobs", 1, "--quality", "fast")
+    assert run.exit_code == 5, run.output
+    assert "1 file (1 .xml)" in run.stderr
+    told = rows(out)
+    assert {name: row["status"] for name, row in told.items()} == {
+        **dict.fromkeys(["r.urdf", "r.xml", "meshes/l.obj"], "done"),
+        "bad.urdf": "failed",
+    }
+    assert set(told["r.urdf"]["outputs"]) == {"r.urdf", "r_urdf/r_l_000.obj", "r_urdf/r_hulls.json"}
+    assert b"r_urdf/r_l_000.obj" in (out / "r.urdf").read_bytes()
+    again = batch(assets, "-o", out, "--glob", "*.urdf", "--quality", "fast")
+    assert "0 now" in again.stderr
+    write_ell(assets / "meshes" / "l.obj")
+    changed = batch(assets, "-o", out, "--glob", "r.*", "--jobs", 1, "--quality", "fast")
+    assert "2 of 2 meshes are done" in changed.stderr
+    assert rows(out)["r.urdf"]["parts"] > 1, "done again when a mesh has changed"
+
+
 def test_a_dry_run_tells_and_writes_nothing(assets: Path, tmp_path: Path) -> None:
     run = batch(assets, "-o", tmp_path / "out", "--dry-run", "--format", "urdf")
     assert run.exit_code == 0
@@ -193,6 +254,7 @@ def test_no_mesh_stops_the_others(trouble: dict[str, str], tmp_path: Path) -> No
     }
     assert told["dies.obj"]["error"] == "its process died of SIGSEGV"
     assert told["hangs.obj"]["error"] == "it took more than 12 s"
+    assert "slowest: hangs.obj " in run.stderr
     assert told["grows.obj"]["error"] == "it needed more than 1 GB of memory"
     assert "surprise" in told["bug.obj"]["error"]
     assert "does not exist" in told["gone.obj"]["error"]
@@ -205,6 +267,7 @@ def test_no_mesh_stops_the_others(trouble: dict[str, str], tmp_path: Path) -> No
     times = rows(out, TIMES)
     assert times["dies.obj"]["attempts"] == times["dies_once.obj"]["attempts"] == 2
     assert "last words" in times["dies.obj"]["last_words"]
+    assert times["hangs.obj"]["attempts"] == 1, "it would take too long again"
     assert "attempts" not in times["well.obj"]
 
     again = batch(assets, "-o", out, "--limit", 12, "--memory", 1)  # the same limits: it would end the same

@@ -354,6 +354,17 @@ def shell(*words: object, **options: Any) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
+@pytest.mark.parametrize(("out", "says"), [(">/dev/full", "No space left"), (">&-", "it is closed")])
+def test_a_report_that_cannot_be_printed_is_an_error_of_one_sentence(mesh: Path, out: str, says: str) -> None:
+    words = f"{sys.executable} -m rlacd decompose {mesh} --quiet --report - {out}"
+    run = subprocess.run(["sh", "-c", words], stderr=subprocess.PIPE, text=True, timeout=120, check=False)
+    assert (run.returncode, len(run.stderr.splitlines())) == (3, 1), run.stderr
+    assert "cannot write to stdout" in run.stderr
+    assert says in run.stderr
+
+
+@pytest.mark.slow
 def test_a_real_run_in_a_pipe(mesh: Path) -> None:
     run = shell("decompose", mesh, "-o", mesh.with_name("out.obj"), "--report", "-")
     assert run.returncode == 0, run.stderr

@@ -198,10 +198,10 @@ def test_progress_names_the_stages_and_counts_parts() -> None:
     assert all(a.seconds <= b.seconds for a, b in itertools.pairwise(seen))
 
 
-@pytest.mark.parametrize("steps", [0, 3, 6, 9])
-def test_cancel_returns_what_is_reached(steps: int) -> None:
+@pytest.mark.parametrize(("steps", "stop"), [(0, False), (3, np.False_), (6, 0), (9, False)])
+def test_cancel_returns_what_is_reached(steps: int, stop: object) -> None:
     calls = iter(range(10**6))
-    result = rlacd.decompose(cup(), progress=lambda _: next(calls) < steps)
+    result = rlacd.decompose(cup(), progress=lambda _: None if next(calls) < steps else stop)
     assert not result.report["complete"]
     assert result.report["stopped_by"] == "cancel"
     under = result.report["hausdorff"]["under"]

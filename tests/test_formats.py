@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import json
 import os
 import struct
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -334,9 +337,61 @@ def test_a_list_that_somebody_changed_removes_nothing_else(tmp_path: Path, names
     for path in (tmp_path / "precious_000.obj", folder / "notes.txt"):
         path.write_text("mine")
     (folder / "chair_hulls.json").write_text(json.dumps({"files": names}))
-    save_hulls(THREE[:1], folder, stem="chair")
+    with contextlib.suppress(OutputError):  # where its own hull is listed no longer
+        save_hulls(THREE[:1], folder, stem="chair")
     assert files_of(tmp_path) == ["hulls", "precious_000.obj"]
     assert files_of(folder) == ["chair_000.obj", "chair_hulls.json", "notes.txt"]
+
+
+@pytest.mark.parametrize("foreign", ["chair_001.obj", "chair_hulls.json"])
+@pytest.mark.promise("own-files")
+def test_a_file_of_somebody_else_in_the_folder_is_never_replaced(tmp_path: Path, foreign: str) -> None:
+    (tmp_path / foreign).write_text("precious")
+    with pytest.raises(OutputError, match=f"{foreign}: a file of that name is there that rlacd did not write"):
+        save_hulls(THREE, tmp_path, stem="chair")
+    assert files_of(tmp_path) == [foreign]
+    (tmp_path / foreign).rename(tmp_path / "precious")
+    (tmp_path / foreign).symlink_to(tmp_path / "precious")
+    with pytest.raises(OutputError, match="did not write"):
+        save_hulls(THREE, tmp_path, stem="chair")
+    assert (tmp_path / "precious").read_text() == "precious"
+
+
+AT_ONCE = """
+import sys, pathlib, trimesh
+from rlacd.io.write import save_hulls
+place, count, go = pathlib.Path(sys.argv[1]), int(sys.argv[2]), pathlib.Path(sys.argv[3])
+hulls = [trimesh.creation.box((count, 1, 1))] * count
+print(flush=True)
+for turn in range(20):
+    while not (go / str(turn)).exists():
+        pass
+    save_hulls(hulls, f"{place}/{turn}/", stem="chair")
+    save_hulls(hulls, place / f"{turn}.obj")
+    print(flush=True)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.promise("at-once")
+def test_of_several_runs_at_once_each_writes_a_whole_result(tmp_path: Path) -> None:
+    go, counts = tmp_path / "go", (1, 3, 5)
+    go.mkdir()
+    runs = [
+        subprocess.Popen([sys.executable, "-c", AT_ONCE, tmp_path, str(count), go], stdout=subprocess.PIPE)
+        for count in counts
+    ]
+    for turn in range(20):
+        assert all(run.stdout is not None and run.stdout.readline() for run in runs)
+        (go / str(turn)).touch()
+    assert [run.communicate()[0].count(b"\n") for run in runs] == [1] * len(runs)
+    for turn in range(20):
+        names = json.loads((tmp_path / str(turn) / "chair_hulls.json").read_bytes())["files"]
+        assert files_of(tmp_path / str(turn)) == [*names, "chair_hulls.json"]
+        lengths = {float(next(iter(load(tmp_path / str(turn) / name).values())).extents[0]) for name in names}
+        assert lengths == {len(names)}, "the hulls of one run"
+        assert len(load(tmp_path / f"{turn}.obj")) in counts
+    assert not list(tmp_path.rglob(".rlacd*"))
 
 
 @pytest.mark.parametrize("exists", [False, True])

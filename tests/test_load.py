@@ -243,11 +243,23 @@ def test_faces_with_vertices_that_are_not_finite_are_left_out(bad):
         ([[0, 0, 0]] * 3, [[0.5, 1, 2]]),
         ([[0, 0, 0], [1, 2]], [[0, 1, 0]]),
         ("abc", [[0, 1, 2]]),
+        (np.eye(3) * 1j, [[0, 1, 2]]),
+        (np.ma.masked_equal(np.eye(3), 1), [[0, 1, 2]]),
+        (np.eye(3), np.ma.masked_equal([[0, 1, 2]], 1)),
     ],
 )
 def test_unusable_arrays_are_one_sentence(vertices, faces):
     with pytest.raises(MeshDataError):
         load_mesh((vertices, faces))
+
+
+def test_a_path_of_bytes_is_refused():
+    class Place:
+        def __fspath__(self):
+            return b"box.obj"
+
+    with pytest.raises(MeshDataError, match="give a path"):
+        load_mesh(Place())
 
 
 def test_indices_out_of_range_in_a_file(tmp_path):

@@ -21,6 +21,7 @@ from rlacd.pool import (
     ProcessLimits,
     Request,
     Shared,
+    TimeLimitError,
     WorkerDiedError,
     answers,
     open_pool,
@@ -121,6 +122,10 @@ def test_a_process_stays_unless_a_new_one_is_wanted(one: LocalPool) -> None:
 
 
 def test_a_second_chance_is_one(one: LocalPool, tmp_path: Path) -> None:
+    begun = time.monotonic()
+    with pytest.raises(TimeLimitError) as late:
+        submit_with_retry(one, ask("hang", seconds=2)).result()
+    assert 2 <= late.value.seconds <= time.monotonic() - begun < 4, "what takes too long would do so again"
     before = pid(one)
     assert submit_with_retry(one, ask("die once", mark=str(tmp_path / "mark"))).result().values["pid"] != before
     with pytest.raises(WorkerDiedError, match="SIGKILL"):

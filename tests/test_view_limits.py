@@ -20,6 +20,7 @@ import trimesh
 
 from rlacd.viewer import connections
 from rlacd.viewer.connections import LONGEST_HEAD, MOST_CONNECTIONS, MOST_STREAMS
+from rlacd.viewer.server import UPLOADS
 from rlacd.viewer.viewer import Viewer, open_viewer
 
 PATIENCE = 60.0
@@ -156,6 +157,8 @@ def test_a_request_that_trickles_in_is_ended(viewer: Viewer, trickle: bytes, mon
         (head("/", method="DELETE"), 501),
         (head("/", "Host: 127.0.0.1"), 403),
         (b"GET / HTTP/1.1\r\n\r\n", 403),
+        (b"GET / HTTP/1.1\r\nHost: [\r\n\r\n", 400),
+        (head("http://["), 400),
         (b"nonsense\r\n\r\n", 400),
         (b"\x16\x03\x01\x02\x00\x01\x00\r\n\r\n", 400),
     ],
@@ -168,6 +171,17 @@ def test_what_is_too_long_or_no_request_is_refused(viewer: Viewer, request_: byt
     with connected(viewer) as connection:
         connection.sendall(head("/state", "Connection: close"))
         assert status_of(all_of(connection)) == 200, "others are served"
+
+
+def test_slow_uploads_keep_nothing_else_waiting(viewer: Viewer) -> None:
+    upload = head("/open?name=a.stl", "Content-Type: application/octet-stream", "Content-Length: 1000", method="POST")
+    with ExitStack() as stack:
+        for _ in range(UPLOADS):
+            stack.enter_context(connected(viewer)).sendall(upload + b"x")
+        wait_until(lambda: viewer.connections == UPLOADS)
+        with connected(viewer) as page:
+            page.sendall(head("/scene", "Connection: close"))
+            assert status_of(all_of(page)) == 200
 
 
 @pytest.fixture(scope="module")

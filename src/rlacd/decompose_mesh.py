@@ -169,8 +169,8 @@ def decompose(
     scale : float, optional
         Factor to multiply the input's coordinates by, also after a conversion by `unit`.
     progress : callable, optional
-        Called with a `Progress` between steps, and several times a second during long ones; when it returns False, the
-        decomposition reached so far is returned as promptly as after a timeout.
+        Called with a `Progress` between steps, and several times a second during long ones; when it returns False
+        (or 0, but not None), the decomposition reached so far is returned as promptly as after a timeout.
 
     Returns
     -------

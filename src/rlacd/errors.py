@@ -31,6 +31,10 @@ class OutputError(RlacdError, OSError):
     """The result cannot be written where it was asked for."""
 
 
+class OutputNameError(OutputError):
+    """The name of a result is taken by something else, or no file can have it."""
+
+
 class TrainingError(RlacdError, RuntimeError):
     """Training cannot start or go on: no usable meshes, a damaged checkpoint, a worker that died."""
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
+import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
+from typing import Literal
+from xml.parsers import expat
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.companions import mesh_files
@@ -18,6 +22,12 @@ from rlacd.io.write.folder import listed_hulls
 
 ENDINGS = (".obj", ".stl", ".ply", ".off", ".glb", ".gltf", ".vrm", ".dae", ".3mf", ".usd", ".usda", ".usdc", ".usdz")
 """File endings that count as meshes, in upper or lower case."""
+
+ROBOTS = (".urdf", ".xml")
+"""File endings of robots; an ``.xml`` is one only if it is MJCF."""
+
+RESERVED = ("manifest.jsonl", "timings.jsonl", ".rlacd")
+"""What a batch writes beside its results."""
 
 EVERYTHING = "**"
 
@@ -31,6 +41,9 @@ _MARKS = {
     ".ply": f"comment {GENERATOR}".encode(),
 }
 _HEAD = 128
+
+_XML_HEAD = 2**16
+"""Bytes within which the root element of an XML file has to begin."""
 
 
 @dataclass(frozen=True)
@@ -54,12 +67,38 @@ class Asset:
     def files(self) -> dict[str, bytes]:
         """Read every file the mesh depends on, by name relative to its folder; the mesh file comes first.
 
+        For a robot these are all files of the batch's folder that have the name of one it refers to.
+
         Raises
         ------
         MeshFileError
             The mesh file cannot be opened.
         """
-        return mesh_files(self.path, self.name)
+        files = mesh_files(self.path, self.name)
+        if not self.is_robot:
+            return files
+        root = self.path.parents[self.name.count("/")]
+        there = sorted(path for path in root.rglob("*") if path.is_file())
+        wanted, read = _names_in(files[self.path.name]), {self.path}
+        while found := [path for path in there if path.name in wanted and path not in read]:
+            for path in found:
+                files |= {path.relative_to(root).as_posix(): content for content in mesh_files(path).values()}
+                wanted |= _names_in(path.read_bytes()) if path.suffix.lower() in ROBOTS else set()
+            read.update(found)
+        return files
+
+    @property
+    def is_robot(self) -> bool:
+        """Whether it is a robot, whose collision meshes are replaced."""
+        return self.path.suffix.lower() in ROBOTS
+
+
+_REFERENCE = re.compile(rb"""\bfile(?:name)?\s*=\s*["'](?:[^"'<>]*[/\\\\])?([^"'<>/\\\\]+)["']""")
+
+
+def _names_in(robot: bytes) -> set[str]:
+    """The names, without folders, of all files that a robot refers to."""
+    return {name.decode(errors="replace") for name in _REFERENCE.findall(robot)}
 
 
 def content_hash(files: dict[str, bytes]) -> str:
@@ -72,8 +111,10 @@ def content_hash(files: dict[str, bytes]) -> str:
     return digest.hexdigest()
 
 
-def find_assets(folder: Path, glob: str = EVERYTHING, leave_out: Path | None = None) -> list[Asset]:
-    """List the meshes of a folder of any depth, sorted by name.
+def find_assets(
+    folder: Path, glob: str = EVERYTHING, leave_out: Path | None = None, ending: str = ".glb"
+) -> list[Asset]:
+    """List the meshes and robots of a folder of any depth, sorted by name.
 
     Parameters
     ----------
@@ -85,31 +126,60 @@ def find_assets(folder: Path, glob: str = EVERYTHING, leave_out: Path | None = N
         matches slashes too.
     leave_out : Path, optional
         A folder inside `folder` to skip, such as the folder of results.
+    ending : str
+        Ending of a mesh's result; empty for a folder.
 
     Raises
     ------
     MeshFileError
         `folder` does not exist or is not a folder, or a folder in it cannot be read.
     """
-    if not folder.is_dir():
-        raise MeshFileError(f"{folder} is not a folder; give the folder that holds the meshes.")
     # Names of results depend on all meshes of the folder, not only on the selected ones, so that a mesh's result has
     # the same name in every run.
-    names = sorted(_names(folder, None if leave_out is None else leave_out.resolve()))
-    places = _places(names)
+    names = sorted(name for name, kind in _files(folder, leave_out) if kind == "asset")
+    places = _places(names, ending)
     return [Asset(name, folder / name, places[name]) for name in names if _matches(name, glob)]
 
 
-def _names(folder: Path, leave_out: Path | None) -> Iterator[str]:
+def other_files(folder: Path, glob: str = EVERYTHING, leave_out: Path | None = None) -> Counter[str]:
+    """Count the files that `find_assets` skips though `glob` selects them, by their endings."""
+    kinds = {"ours": "written by rlacd", "other": ""}
+    return Counter(
+        kinds[kind] or PurePosixPath(name).suffix.lower() or "no ending"
+        for name, kind in _files(folder, leave_out)
+        if kind != "asset" and _matches(name, glob)
+    )
+
+
+def _files(folder: Path, leave_out: Path | None) -> Iterator[tuple[str, Literal["asset", "ours", "other"]]]:
+    if not folder.is_dir():
+        raise MeshFileError(f"{folder} is not a folder; give the folder that holds the meshes.")
+    skipped = None if leave_out is None else leave_out.resolve()
     for at, folders, files in os.walk(folder, onerror=_refuse):
         here = Path(at)
-        folders[:] = [f for f in folders if not f.startswith(".") and (here / f).resolve() != leave_out]
+        folders[:] = [f for f in folders if not f.startswith(".") and (here / f).resolve() != skipped]
         hulls = _written_hulls(here, files)
-        for file in files:
-            if file.startswith(".") or PurePosixPath(file).suffix.lower() not in ENDINGS or file in hulls:
-                continue
-            if not _is_written(here / file):
-                yield (here / file).relative_to(folder).as_posix()
+        for file in (file for file in files if not file.startswith(".")):
+            name = (here / file).relative_to(folder).as_posix()
+            if not _is_asset(here / file):
+                yield name, "other"
+            else:
+                yield name, "ours" if file in hulls or _is_written(here / file) else "asset"
+
+
+def _is_asset(path: Path) -> bool:
+    ending = path.suffix.lower()
+    return ending in (*ENDINGS, ".urdf") or (ending == ".xml" and _root(path) == "mujoco")
+
+
+def _root(path: Path) -> str:
+    """The name of an XML file's root element; empty if it is not XML."""
+    found: list[str] = []
+    parser = expat.ParserCreate()
+    parser.StartElementHandler = lambda tag, _: found.append(tag)
+    with contextlib.suppress(OSError, expat.ExpatError, ValueError), path.open("rb") as file:
+        parser.Parse(file.read(_XML_HEAD), False)
+    return found[0] if found else ""
 
 
 def _written_hulls(folder: Path, files: Sequence[str]) -> set[str]:
@@ -123,7 +193,10 @@ def _written_hulls(folder: Path, files: Sequence[str]) -> set[str]:
 
 
 def _is_written(path: Path) -> bool:
-    """Whether a file says that rlacd wrote it: hulls, balls, and meshes of models, under any name."""
+    """Whether a file says that rlacd wrote it: hulls, balls, models and their meshes, under any name."""
+    if path.suffix.lower() in ROBOTS:  # the hulls of models and rewritten robots are listed in a folder beside them
+        kind = "mjcf" if path.suffix.lower() == ".xml" else "urdf"
+        return any(path.with_name(f"{path.stem}_{kind}").glob(f"*{HULLS}.json"))
     mark = _MARKS.get(path.suffix.lower())
     if mark is None or not path.is_file():
         return False
@@ -145,19 +218,37 @@ def _matches(name: str, glob: str) -> bool:
     return fnmatchcase(name if "/" in pattern else PurePosixPath(name).name, pattern)
 
 
-def _places(names: Sequence[str]) -> dict[str, str]:
+def _places(names: Sequence[str], ending: str) -> dict[str, str]:
     """Name results: without the mesh's ending, or with it where two names would clash (``a.obj`` and ``a.stl``).
 
-    Names that differ only in case clash too, because some file systems ignore case.
+    A result clashes too with a folder that another one lies in (``a.obj``, and ``b.obj`` in the folder ``a.glb``).
+    Names that differ only in case clash, because some file systems ignore case. What the batch itself writes is avoided
+    by an underscore in front.
     """
-    places = {name: str(PurePosixPath(name).with_suffix("")) for name in names}
+    places = {name: _free(str(PurePosixPath(name).with_suffix(""))) for name in names}
     while True:
-        count = Counter(place.casefold() for place in places.values())
-        shared = [name for name in names if count[places[name].casefold()] > 1]
-        fuller = {name: name if places[name] != name else f"{name}-{_digest(name)}" for name in shared}
-        if not shared:
+        results = {name: (place + result_ending(name, ending)).casefold() for name, place in places.items()}
+        count = Counter(results.values())
+        folders = {str(parent).casefold() for place in places.values() for parent in PurePosixPath(place).parents}
+        shared = [
+            name
+            for name, result in results.items()
+            if count[result] > 1 or (result in folders and result_ending(name, ending))
+        ]
+        fuller = {name: _free(name) if places[name] != _free(name) else f"{name}-{_digest(name)}" for name in shared}
+        if fuller.items() <= places.items():  # what still clashes is reported where it is written
             return places
         places |= fuller
+
+
+def result_ending(name: str, ending: str) -> str:
+    """Ending of an asset's result: robots keep theirs."""
+    own = PurePosixPath(name).suffix.lower()
+    return own if own in ROBOTS else ending
+
+
+def _free(place: str) -> str:
+    return f"_{place}" if place.partition("/")[0].casefold() in RESERVED else place
 
 
 def _digest(name: str) -> str:

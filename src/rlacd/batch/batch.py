@@ -6,11 +6,11 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal, Protocol
 
-from rlacd.batch.assets import EVERYTHING, Asset, content_hash, find_assets
+from rlacd.batch.assets import EVERYTHING, Asset, content_hash, find_assets, other_files
 from rlacd.batch.context import BatchContext
 from rlacd.batch.engine import Engine
 from rlacd.batch.job_spec import JobSpec
@@ -66,6 +66,8 @@ class Summary:
         Rows of the meshes found that failed or fell back to their convex hull.
     slowest
         Names and seconds of the slowest meshes of this run.
+    others
+        Number of files that are not meshes, by ending.
     """
 
     meshes: int
@@ -75,6 +77,7 @@ class Summary:
     seconds: float = 0.0
     failures: list[Row] = field(default_factory=list)
     slowest: list[tuple[str, float]] = field(default_factory=list)
+    others: Counter[str] = field(default_factory=Counter)
 
 
 @dataclass(frozen=True)
@@ -159,15 +162,18 @@ class Batch:
         try:
             shared = self.spec.shared()
             work = BatchContext(
-                self.spec, self.limits, self.fallback, self.out, store, stop or threading.Event(), shared
+                self.spec, self.limits, self.fallback, self.out, store, stop=stop or threading.Event(), shared=shared
             )
-            return self._run(assets, work, pool, watcher)
+            summary = self._run(assets, work, pool, watcher)
+            summary.others = other_files(self.assets, self.glob, Path(self.out))
+            return summary
         finally:
             store.close()
 
     def _run(self, assets: list[Asset], work: BatchContext, pool: Pool, watcher: Watcher) -> Summary:
         summary, start = Summary(len(assets)), time.monotonic()
         manifest, timings = Ledger(work.store, MANIFEST), Ledger(work.store, TIMINGS)
+        work = replace(work, owns=manifest.owns)
         seen: list[str] = []
 
         def waiting() -> Iterator[MeshTask]:
@@ -212,7 +218,7 @@ class Batch:
         here = store.folder if isinstance(store, FolderStore) else None
         if here is not None and here.resolve() == self.assets.resolve():
             raise OptionError(f"the results would lie among the meshes of {self.assets}; choose another folder.")
-        assets = find_assets(self.assets, self.glob, here)
+        assets = find_assets(self.assets, self.glob, here, self.spec.ending)
         if not assets:
             which = "" if self.glob == EVERYTHING else f" whose name fits {self.glob!r}"
             raise MeshFileError(
@@ -251,7 +257,7 @@ class Batch:
         """Collect everything that is the same in every run."""
         row: Row = {"mesh": task.asset.name, "status": outcome.status, "place": task.asset.place, "key": task.key}
         if outcome.error is not None:
-            row |= {"error": outcome.error, "limits": self._refusal()}
+            row |= {"error": outcome.error, "limits": None if outcome.name_taken else self._refusal()}
         return {**row, **outcome.report, "outputs": dict(sorted(outcome.outputs.items()))}
 
     def _refusal(self) -> Row:

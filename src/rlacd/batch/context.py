@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from rlacd.batch.job_spec import JobSpec
@@ -28,6 +29,8 @@ class BatchContext:
         The store opened for `out`.
     stop
         Once set, no further mesh is started.
+    owns
+        Tells of a file among the results whether an earlier run wrote it.
     shared
         What all processes need: the network, if the policy is a file.
     """
@@ -37,5 +40,6 @@ class BatchContext:
     fallback: bool
     out: str
     store: ResultStore
+    owns: Callable[[str], bool] = lambda name: False
     stop: threading.Event = field(default_factory=threading.Event)
     shared: dict[str, Shared] = field(default_factory=dict)

@@ -44,6 +44,10 @@ class Ledger:
         """The row of a mesh."""
         return self._rows.get(mesh)
 
+    def owns(self, output: str) -> bool:
+        """Whether a row names this file."""
+        return output in self._owner
+
     def rows(self) -> list[Row]:
         """All rows, sorted by mesh."""
         return [self._rows[mesh] for mesh in sorted(self._rows)]

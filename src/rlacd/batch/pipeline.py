@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Generator
 from dataclasses import dataclass, field, replace
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 from typing import Any, Literal, TypeAlias
 
 from rlacd.batch.assets import Asset
 from rlacd.batch.context import BatchContext
 from rlacd.batch.server import SERVER
 from rlacd.batch.store import put_files, under
-from rlacd.errors import MeshFileError
-from rlacd.pool import Answer, MachineLostError, Request, WorkerDiedError
+from rlacd.errors import MeshFileError, OutputNameError
+from rlacd.pool import Answer, MachineLostError, Request, TimeLimitError, WorkerDiedError
 
 Status = Literal["done", "fallback", "failed"]
 
@@ -60,6 +61,8 @@ class MeshOutcome:
         Why the decomposition failed.
     unusable
         Whether the mesh itself is at fault; then there is no fallback either.
+    name_taken
+        Whether its result could not be written for its name; it is tried again by every run.
     files
         Files still to be written, by name relative to the results.
     outputs
@@ -73,13 +76,18 @@ class MeshOutcome:
     report: dict[str, Any] = field(default_factory=dict)
     error: str | None = None
     unusable: bool = False
+    name_taken: bool = False
     files: dict[str, bytes] = field(default_factory=dict)
     outputs: dict[str, int] = field(default_factory=dict)
     timing: dict[str, Any] = field(default_factory=dict)
 
     def put(self, work: BatchContext) -> MeshOutcome:
-        """Write the files."""
-        self.outputs |= put_files(work.store, self.files)
+        """Write the files; a name that cannot be used fails this mesh only."""
+        try:
+            self.outputs |= put_files(work.store, self.files, work.owns)
+        except OutputNameError as error:
+            said = str(error).replace(f"{Path(work.out)}{os.sep}", "")  # the same wherever the results are
+            return MeshOutcome("failed", error=said, name_taken=True, timing=self.timing)
         self.files = {}
         return self
 
@@ -114,25 +122,30 @@ def pipeline(task: MeshTask, work: BatchContext, *, brought: bool) -> Pipeline:
         Whether the mesh's files travel with every request, and results for a shared place are written by the process
         that made them.
     """
+    if brought and task.asset.is_robot:
+        return MeshOutcome("failed", error="robots are not sent to other machines; leave out --ray", unusable=True)
     try:
         request = _request(task, work, brought)
     except MeshFileError as error:
         return MeshOutcome("failed", error=str(error), unusable=True)
-    died = None
     answer = yield Step(request)
-    if isinstance(answer, WorkerDiedError) and not isinstance(answer, MachineLostError):
-        died = answer
+    deaths = [answer] if isinstance(answer, WorkerDiedError) else []
+    attempts = 2 if deaths and not isinstance(answer, MachineLostError | TimeLimitError) else 1
+    if attempts == 2:
         answer = yield Step(replace(request, fresh=True), last=True)
+        deaths += [answer] if isinstance(answer, WorkerDiedError) else []
     outcome = _outcome(answer, task)
     if outcome.status == "failed" and not outcome.unusable and work.fallback:
-        patient = replace(work.limits, seconds=max(work.limits.seconds, HULL_SECONDS))
+        lost_time = isinstance(answer, TimeLimitError)
+        limits = replace(work.limits, seconds=HULL_SECONDS if lost_time else max(work.limits.seconds, HULL_SECONDS))
         values = {**request.values, "hull_only": True}
-        hull = _outcome((yield Step(replace(request, values=values, limits=patient, fresh=True))), task)
+        hull = _outcome((yield Step(replace(request, values=values, limits=limits, fresh=True))), task)
         if hull.status == "done":
             outcome = replace(hull, status="fallback", error=outcome.error, timing={**hull.timing, **outcome.timing})
-    if died is not None:
-        last = answer if isinstance(answer, WorkerDiedError) else died
-        outcome.timing |= {"attempts": 2, "died": last.reason, "last_words": last.last_words}
+    if deaths:
+        spent = outcome.timing.get("seconds", 0.0) + sum(died.seconds for died in deaths)
+        outcome.timing |= {"seconds": round(spent, 4), "attempts": attempts}
+        outcome.timing |= {"died": deaths[-1].reason, "last_words": deaths[-1].last_words}
     return outcome
 
 

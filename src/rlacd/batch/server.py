@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 import warnings
 from collections.abc import Mapping
@@ -16,9 +17,10 @@ from rlacd.batch.job_spec import POLICY, JobSpec
 from rlacd.batch.store import open_store, put_files, under
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
-from rlacd.errors import ImplausibleBodyWarning, MeshError, RlacdError
+from rlacd.errors import ImplausibleBodyWarning, MeshError, OutputNameError, RlacdError
 from rlacd.io.read.companions import lay_out
 from rlacd.io.read.load import load_mesh
+from rlacd.io.robots import is_robot, rewrite_robot
 from rlacd.pool import Blobs, Shared
 from rlacd.pool.process import peak_memory
 
@@ -55,28 +57,56 @@ def make(
     RlacdError
         The mesh cannot be used, or its hulls cannot be written.
     """
-    result = _hull(spec, mesh) if hull_only else decompose(mesh, **spec.arguments())
     with TemporaryDirectory(dir=staging) as folder:
+        if is_robot(mesh):
+            facts = _robot(spec, mesh, Path(folder, f"{stem}{mesh.suffix}"), hull_only)
+            return facts, _files_in(Path(folder))
+        result = _hull(spec, mesh) if hull_only else decompose(mesh, **spec.arguments())
         place = f"{folder}/{stem}{spec.ending or '/'}"
         names = ("file_format", "density", "mass", "up", "one_mesh", "keep_input")
         with warnings.catch_warnings(record=True) as doubts:
             warnings.simplefilter("always", ImplausibleBodyWarning)
             result.save(place, **{name: getattr(spec, name) for name in names})
-        paths = sorted(path for path in Path(folder).rglob("*") if path.is_file())
-        paths.sort(key=lambda path: -len(path.relative_to(folder).parts))
-        files = {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
+        files = _files_in(Path(folder))
     facts = _summary(result.report)
     return facts | {"warnings": [*facts["warnings"], *(str(doubt.message) for doubt in doubts)]}, files
+
+
+def _files_in(folder: Path) -> dict[str, bytes]:
+    """Read all files, those in folders first: others refer to them."""
+    paths = sorted(path for path in folder.rglob("*") if path.is_file())
+    paths.sort(key=lambda path: -len(path.relative_to(folder).parts))
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
+
+
+def _robot(spec: JobSpec, robot: Path, place: Path, hull_only: bool) -> dict[str, Any]:
+    """Rewrite a robot with hulls in place of its collision meshes; returns facts."""
+    options = {**_limits(spec), "max_hulls": 1, "quality": "fast"} if hull_only else spec.arguments()
+    done = rewrite_robot(robot, place, **options)
+    here = {str(place.parent): "the results", str(robot.absolute().parent): "the robot's folder"}
+    warnings = [STAND_IN] if hull_only else []
+    for warning in done.warnings:
+        for path, name in here.items():
+            warning = warning.replace(path, name)
+        warnings.append(warning)
+    reports = [mesh.result.report for mesh in done.meshes]
+    facts = {what: sum(report[what] for report in reports) for what in ("parts", "faces", "vertices")}
+    worst = [report["concavity"]["max"] for report in reports if "concavity" in report]
+    if worst and None not in worst:
+        facts["concavity"] = max(worst)
+    return {**facts, "complete": done.complete and not hull_only, "warnings": warnings}
+
+
+def _limits(spec: JobSpec) -> dict[str, Any]:
+    """The options that hold for a convex hull too."""
+    return {name: spec.options.get(name) for name in ("max_vertices", "max_faces", "preset", "threads")}
 
 
 def _hull(spec: JobSpec, mesh: Path) -> Decomposition:
     """Make a single hull of all points, which works for point clouds too."""
     source = load_mesh(mesh)
     used = source.vertices[np.unique(source.faces)] if len(source.faces) else source.vertices
-    limits: dict[str, Any] = {
-        name: spec.options.get(name) for name in ("max_vertices", "max_faces", "preset", "threads")
-    }
-    around = decompose((used, np.empty((0, 3), dtype=np.int64)), max_hulls=1, quality="fast", **limits)
+    around = decompose((used, np.empty((0, 3), dtype=np.int64)), max_hulls=1, quality="fast", **_limits(spec))
     report = {what: around.report[what] for what in ("parts", "faces", "vertices")}
     report |= {"name": mesh.stem, "complete": False, "warnings": [STAND_IN]}
     return Decomposition(around.hulls, report, trimesh.Trimesh(source.vertices, source.faces, process=False))
@@ -154,7 +184,10 @@ class MeshServer:
                 sentence = self._sentence(error, path, values["name"])
                 answer = {"error": f"a bug in rlacd ({type(error).__name__}: {sentence})"}
         if values["out"] is not None:
-            answer["outputs"], files = put_files(open_store(values["out"]), under(values["parent"], files)), {}
+            with contextlib.suppress(OutputNameError):  # left to the batch, which knows what it owns
+                there = under(values["parent"], files)
+                answer["outputs"] = put_files(open_store(values["out"]), there, lambda name: False)
+                files = {}
         answer["seconds"] = round(time.perf_counter() - wall, 4)
         answer["cpu"] = round(time.process_time() - cpu, 4)
         answer["peak_mb"] = peak_memory() // 2**20

@@ -7,13 +7,13 @@ import io
 import os
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any, Protocol
 
 from filelock import FileLock
 
-from rlacd.errors import MissingExtraError, OptionError, OutputError
+from rlacd.errors import MissingExtraError, OptionError, OutputError, OutputNameError
 from rlacd.io.read.open_file import read_file
 from rlacd.io.write.atomic import output_errors, write_file
 from rlacd.io.write.lock import lock_folder
@@ -96,8 +96,21 @@ def under(parent: str, files: Mapping[str, bytes]) -> dict[str, bytes]:
     return {str(PurePosixPath(parent) / name): data for name, data in files.items()}
 
 
-def put_files(store: ResultStore, files: Mapping[str, bytes]) -> dict[str, int]:
-    """Write files; one that refers to others is written last. Returns their lengths."""
+def put_files(store: ResultStore, files: Mapping[str, bytes], owns: Callable[[str], bool]) -> dict[str, int]:
+    """Write files; one that refers to others is written last. Returns their lengths.
+
+    Raises
+    ------
+    OutputNameError
+        Something else is there that this batch does not own. The very same bytes are: they are left by a run that was
+        killed before it could say so.
+    """
+    for name, data in files.items():
+        if not owns(name) and store.read(name) not in (None, data):
+            raise OutputNameError(
+                f"{name} is there already, and no row of the manifest says that this batch wrote it; "
+                "move it away or choose another folder."
+            )
     for name, data in files.items():
         store.write(name, data)
     return {name: len(data) for name, data in files.items()}
@@ -116,6 +129,8 @@ class FolderStore:
         """See `ResultStore`."""
         path = self.folder / name
         with output_errors(path):
+            if path.is_symlink():
+                raise OutputNameError(f"{name} is a link, and what it leads to may be somebody else's; move it away.")
             path.parent.mkdir(parents=True, exist_ok=True)
         write_file(path, data)
 
@@ -124,10 +139,10 @@ class FolderStore:
         path = self.folder / name
         try:
             return read_file(path, sys.maxsize)
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             return None
         except OSError as error:
-            raise OutputError(f"cannot read {path} ({error.strerror}); move it away.") from error
+            raise OutputNameError(f"cannot read {path} ({error.strerror}); move it away.") from error
 
     def size(self, name: str) -> int | None:
         """See `ResultStore`."""
@@ -139,7 +154,9 @@ class FolderStore:
     def remove(self, name: str) -> None:
         """See `ResultStore`."""
         path = self.folder / name
-        with output_errors(path):
+        if path.is_dir() and not path.is_symlink():
+            return  # somebody has put a folder there since
+        with output_errors(path), contextlib.suppress(NotADirectoryError):
             path.unlink(missing_ok=True)
         with contextlib.suppress(OSError):  # stops at the first folder that is not empty
             for parent in path.parents:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rlacd.cli.exit_codes import ExitCode, exit_codes
+from rlacd.cli.exit_codes import ExitCode, exit_codes, give, say
 from rlacd.cli.options import decompose_options, how_parameters
 from rlacd.cli.parameters import REQUIRED, Parameters, command, option_parameters
 from rlacd.errors import OptionError
@@ -32,7 +32,8 @@ HELP = """Decompose every mesh in a folder, skipping those already done.
   rlacd batch assets/ -o hulls/ --dry-run
   rlacd batch assets/ -o s3://bucket/hulls --ray auto
 
-A mesh whose process dies, hangs or needs too much memory is tried once more alone, and is then given its convex hull.
+A mesh whose process dies, hangs or needs too much memory is given its convex hull, unless a second
+try succeeds; one that hangs has no second try.
 OUT/manifest.jsonl records the outcome for each mesh. To resume after an interruption, run the same command again.
 Ctrl-C once finishes what is running; twice quits at once.
 """
@@ -140,7 +141,6 @@ def _batch(own: dict[str, Any], given: dict[str, Any]) -> Batch:
         raise OptionError(f"--redo is {own['redo']!r}; it has to be one of {', '.join(REDO)}.")
     if own["out"] == "-":
         raise OptionError("a batch cannot be written to stdout; give -o a folder.")
-
     written = OutputOptions(**{name: given.pop(name) for name in WRITTEN})
     options = decompose_options({**given, "threads": own["threads"], "timeout": own["timeout"]})
     spec = JobSpec.of(
@@ -169,7 +169,6 @@ NAMED = 5
 
 def _print_large(batch: Batch) -> None:
     """Print one line that lists the large meshes, before any work."""
-    from rlacd.cli.terminal import say
     from rlacd.plain_json import printable
 
     large = batch.large()
@@ -181,20 +180,21 @@ def _print_large(batch: Batch) -> None:
 
 
 def _print_plan(batch: Batch) -> None:
-    from rlacd.cli.terminal import counted, say
+    from rlacd.batch.assets import result_ending
+    from rlacd.cli.terminal import counted
     from rlacd.plain_json import printable
 
     plan = batch.plan()
     for asset, finished in plan:
         if not finished:
-            typer.echo(printable(f"{asset.name} -> {asset.place}{batch.spec.ending or '/'}"))
+            result = asset.place + (result_ending(asset.name, batch.spec.ending) or "/")
+            give(printable(f"{asset.name} -> {result}") + "\n")
     done = sum(finished for _, finished in plan)
     say(f"{counted(len(plan), 'mesh', 'meshes')}: {done} done, {len(plan) - done} to do; nothing was written")
 
 
 def _run(batch: Batch, own: dict[str, Any], *, quiet: bool) -> None:
     from rlacd.cli.batch_screen import Screen, summary_lines
-    from rlacd.cli.terminal import say
 
     stop = threading.Event()
 

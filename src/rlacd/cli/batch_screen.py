@@ -11,7 +11,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bars
 
-from rlacd.cli.terminal import counted, say
+from rlacd.cli.exit_codes import say
+from rlacd.cli.terminal import counted
 from rlacd.plain_json import printable
 
 if TYPE_CHECKING:
@@ -126,6 +127,11 @@ def summary_lines(summary: Summary, out: str) -> list[str]:
     lines += [printable(failure_line(row)) for row in summary.failures[:SHOWN]]
     if len(summary.failures) > SHOWN:
         lines.append(f"  ... and {len(summary.failures) - SHOWN} more: see manifest.jsonl")
+    if summary.others:
+        kinds = ", ".join(f"{count} {ending}" for ending, count in summary.others.most_common())
+        lines.append(
+            printable(f"  passed over, since not meshes: {counted(summary.others.total(), 'file', 'files')} ({kinds})")
+        )
     if summary.slowest:
         lines.append(printable("  slowest: " + ", ".join(f"{name} {spent:.1f} s" for name, spent in summary.slowest)))
     if summary.stopped:

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rlacd.cli.exit_codes import ExitCode, exit_codes
+from rlacd.cli.exit_codes import ExitCode, exit_codes, give, say
 from rlacd.cli.options import decompose_options, how_parameters, unit_given
 from rlacd.cli.parameters import REQUIRED, Parameters, chosen, command, option_parameters, taken
 from rlacd.errors import ImplausibleBodyWarning, MeshFileError, OptionError
@@ -63,10 +63,12 @@ def decompose_command() -> Callable[..., None]:
 
 def _decompose(mesh: Path, asked: OutputOptions, how: dict[str, Any]) -> None:
     _check_input(mesh)
+    if asked.report == STDOUT:
+        give("")  # before any work
     wanted = _named(mesh, asked, how.get("preset"))
     robot = mesh.suffix.lower() in ROBOTS
     _check_output(mesh, wanted)
-    _check_robot(asked, wanted) if robot else _check_mesh(wanted)
+    _check_robot(asked, wanted) if robot else _check_mesh(mesh, wanted)
     if wanted.balls is not None and how.get("criterion") != "navigable":
         raise OptionError("--balls needs --criterion navigable.")
     options = decompose_options(how, metres=mesh.suffix.lower() in IN_METRES)
@@ -77,7 +79,7 @@ def _decompose(mesh: Path, asked: OutputOptions, how: dict[str, Any]) -> None:
 
 def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any], unit: str | None) -> bool:
     """Decompose a mesh and write all requested files; returns whether it is complete."""
-    from rlacd.cli.terminal import Watch, say, summary, writing
+    from rlacd.cli.terminal import Watch, summary, writing
     from rlacd.decompose_mesh import decompose
     from rlacd.io.write import write_file
     from rlacd.plain_json import to_json
@@ -97,7 +99,7 @@ def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any], unit: str
     for doubt in doubts:
         say(f"  warning: {doubt.message}")
     if wanted.report == STDOUT:
-        typer.echo(to_json(result.report), nl=False)
+        give(to_json(result.report))
     elif wanted.report is not None:
         with writing("report", wanted.report, quiet=quiet):
             if is_html(wanted.report):
@@ -115,7 +117,7 @@ def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any], unit: str
 
 def _rewrite(robot: Path, wanted: OutputOptions, options: dict[str, Any], unit: str | None) -> bool:
     """Replace the collision meshes of a robot; returns whether all are complete."""
-    from rlacd.cli.terminal import Watch, rewrite_summary, say, writing
+    from rlacd.cli.terminal import Watch, rewrite_summary, writing
     from rlacd.io.robots import rewrite_robot
     from rlacd.io.write import write_file
     from rlacd.plain_json import to_json
@@ -127,7 +129,7 @@ def _rewrite(robot: Path, wanted: OutputOptions, options: dict[str, Any], unit: 
         say(rewrite_summary(done, unit))
     measured = to_json({str(mesh.path): mesh.result.report for mesh in done.meshes})
     if wanted.report == STDOUT:
-        typer.echo(measured, nl=False)
+        give(measured)
     elif wanted.report is not None:
         with writing("report", wanted.report, quiet=bool(wanted.quiet)):
             write_file(Path(wanted.report), measured.encode())
@@ -156,13 +158,17 @@ def _named(mesh: Path, asked: OutputOptions, preset: str | None) -> OutputOption
     return dataclasses.replace(asked, output=output, file_format=file_format)
 
 
-def _check_mesh(wanted: OutputOptions) -> None:
+def _check_mesh(mesh: Path, wanted: OutputOptions) -> None:
     """Check before any work that all outputs can be written."""
-    from rlacd.io.write import check_balls, check_file, hull_target
+    from rlacd.io.write import check_balls, check_file, file_stem, hull_target
+    from rlacd.io.write.folder import check_names
     from rlacd.view import check_picture
 
     flags = {"one_mesh": bool(wanted.one_mesh), "keep_input": bool(wanted.keep_input), "scene": bool(wanted.scene)}
-    hull_target(str(wanted.output), wanted.file_format, **flags)
+    target = hull_target(str(wanted.output), wanted.file_format, **flags)
+    if target.is_folder:
+        stem = file_stem(mesh.stem)
+        check_names(target.path, stem, [f"{stem}_000.{target.file_format}"])  # the one that every result has
     if wanted.package_dirs:
         raise OptionError("--package-dir is for robots, a .urdf or .xml file as input.")
     if wanted.report not in (None, STDOUT):

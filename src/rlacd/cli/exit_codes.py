@@ -54,8 +54,7 @@ def exit_codes() -> Iterator[None]:
     except KeyboardInterrupt:
         _fail("interrupted; no file is left half-written.", ExitCode.INTERRUPTED)
     except BrokenPipeError:
-        # The reader of stdout (head, jq) has closed it; print nothing more, not even when Python flushes at exit.
-        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+        _silence_stdout()  # its reader (head, jq) has closed it
         raise typer.Exit(ExitCode.CANNOT_WRITE) from None
     except OutputError as error:
         _fail(error, ExitCode.CANNOT_WRITE)
@@ -66,6 +65,37 @@ def exit_codes() -> Iterator[None]:
     except Exception as error:
         message = f"a bug in rlacd ({type(error).__name__}: {_first_line(error)}); "
         _fail(message + "run again with RLACD_DEBUG=1 for the traceback, and please report it.", ExitCode.BUG)
+
+
+def give(text: str) -> None:
+    """Print what was asked for to stdout.
+
+    Raises
+    ------
+    OutputError
+        It is closed, or its disk is full; a `BrokenPipeError` is passed on.
+    """
+    if sys.stdout is None:
+        raise OutputError("cannot write to stdout: it is closed.")
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        _silence_stdout()
+        raise OutputError(f"cannot write to stdout ({error.strerror}).") from error
+
+
+def say(text: str) -> None:
+    """Print a line to stderr; stdout is reserved for requested output. A stderr that nobody can read loses it."""
+    with contextlib.suppress(OSError):
+        typer.echo(text, err=True)
+
+
+def _silence_stdout() -> None:
+    """Print nothing more, not even when Python flushes at exit."""
+    sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
 
 
 def leave(code: int) -> NoReturn:
@@ -79,7 +109,7 @@ def leave(code: int) -> NoReturn:
 def _fail(message: object, code: ExitCode) -> None:
     if os.environ.get("RLACD_DEBUG") == "1":
         raise
-    typer.echo(f"rlacd: {message}", err=True)
+    say(f"rlacd: {message}")
     raise typer.Exit(code)
 
 

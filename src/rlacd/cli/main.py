@@ -17,7 +17,7 @@ from typer.core import TyperGroup
 from rlacd._version import __version__
 from rlacd.cli.batch import BATCH_EPILOG, batch_command
 from rlacd.cli.decompose import decompose_command
-from rlacd.cli.exit_codes import EPILOG, ExitCode, exit_codes
+from rlacd.cli.exit_codes import EPILOG, ExitCode, exit_codes, give
 from rlacd.cli.train import train_command
 from rlacd.cli.view import view
 from rlacd.plain_json import printable
@@ -67,7 +67,8 @@ def main() -> None:
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"rlacd {__version__}")
+        with exit_codes():
+            give(f"rlacd {__version__}\n")
         raise typer.Exit
 
 
@@ -100,7 +101,7 @@ def info(
         from rlacd.plain_json import printable, to_json
 
         facts = describe(mesh)
-        typer.echo(to_json(facts) if as_json else printable(describe_text(facts)), nl=False)
+        give(to_json(facts) if as_json else printable(describe_text(facts)))
 
 
 app.command("view", epilog=EPILOG)(view)

@@ -10,13 +10,12 @@ from contextlib import contextmanager, nullcontext
 from types import FrameType, TracebackType
 from typing import TYPE_CHECKING, Any
 
-import typer
 from rich.console import Console
 from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bars
 
 from rlacd._native import count_interrupts, forget_interrupts
-from rlacd.cli.exit_codes import ExitCode
+from rlacd.cli.exit_codes import ExitCode, say
 from rlacd.cli.options import METRES
 from rlacd.decomposition import Decomposition
 from rlacd.run import Progress
@@ -28,11 +27,6 @@ if TYPE_CHECKING:
 
 GRACE = 1.0
 """Seconds that the second Ctrl-C leaves to end in good order, before the process ends all the same."""
-
-
-def say(text: str) -> None:
-    """Print a line to stderr; stdout is reserved for requested output."""
-    typer.echo(text, err=True)
 
 
 class Watch:

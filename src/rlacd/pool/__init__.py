@@ -3,7 +3,17 @@
 from rlacd.pool.in_process import InProcessPool
 from rlacd.pool.local import LocalPool
 from rlacd.pool.open import open_pool
-from rlacd.pool.request import Answer, Blobs, MachineLostError, Pool, ProcessLimits, Request, Shared, WorkerDiedError
+from rlacd.pool.request import (
+    Answer,
+    Blobs,
+    MachineLostError,
+    Pool,
+    ProcessLimits,
+    Request,
+    Shared,
+    TimeLimitError,
+    WorkerDiedError,
+)
 from rlacd.pool.retry import answers, submit_with_retry
 
 __all__ = [
@@ -16,6 +26,7 @@ __all__ = [
     "ProcessLimits",
     "Request",
     "Shared",
+    "TimeLimitError",
     "WorkerDiedError",
     "answers",
     "open_pool",

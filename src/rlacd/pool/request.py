@@ -121,7 +121,11 @@ class WorkerDiedError(Exception):
         Why, in the same words every time.
     last_words : str
         The end of its stderr.
+    seconds : float
+        How long it had the request.
     """
+
+    seconds = 0.0
 
     def __init__(self, reason: str, last_words: str = "") -> None:
         super().__init__(reason, last_words)  # both, or pickling loses one
@@ -130,6 +134,10 @@ class WorkerDiedError(Exception):
 
     def __str__(self) -> str:
         return self.reason
+
+
+class TimeLimitError(WorkerDiedError):
+    """A process was ended because it took too long: it would again, so it gets no second try."""
 
 
 class MachineLostError(WorkerDiedError):

@@ -7,7 +7,7 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from dataclasses import replace
 from typing import TypeVar
 
-from rlacd.pool.request import Answer, MachineLostError, Pool, Request, WorkerDiedError
+from rlacd.pool.request import Answer, MachineLostError, Pool, Request, TimeLimitError, WorkerDiedError
 
 _K = TypeVar("_K")
 
@@ -16,7 +16,7 @@ AHEAD = 2
 
 
 def submit_with_retry(pool: Pool, request: Request) -> Future[Answer]:
-    """Submit a request, and retry it once in a new process if its process dies; see `Pool.submit`."""
+    """Submit a request; if its process dies before its time is up, retry once in a new one. See `Pool.submit`."""
     outcome: Future[Answer] = Future()
     outcome.set_running_or_notify_cancel()
 
@@ -24,7 +24,7 @@ def submit_with_retry(pool: Pool, request: Request) -> Future[Answer]:
         try:
             outcome.set_result(done.result())
         except WorkerDiedError as died:
-            if last or isinstance(died, MachineLostError):
+            if last or isinstance(died, MachineLostError | TimeLimitError):
                 outcome.set_exception(died)
             else:
                 again(replace(request, fresh=True), last=True)

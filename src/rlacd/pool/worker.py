@@ -22,7 +22,7 @@ from rlacd import errors
 from rlacd.pool.child import READY
 from rlacd.pool.message import receive, send
 from rlacd.pool.process import end, kill_group, start, why_it_ended
-from rlacd.pool.request import Answer, Request, Values, WorkerDiedError
+from rlacd.pool.request import Answer, Request, TimeLimitError, Values, WorkerDiedError
 
 POLL_SECONDS = 0.05
 """Seconds between checks of a busy process."""
@@ -56,6 +56,14 @@ class Worker:
         RlacdError
             Raised by the server.
         """
+        begun = time.monotonic()
+        try:
+            return self._ask(request)
+        except WorkerDiedError as died:
+            died.seconds = time.monotonic() - begun
+            raise
+
+    def _ask(self, request: Request) -> Answer:
         if request.fresh or request.server != self._server:
             self.close()
         if self._process is None:
@@ -65,7 +73,7 @@ class Worker:
         self._stderr.truncate()
         try:
             self._send(request)
-            too_late = f"it took more than {limits.seconds:g} s"
+            too_late = TimeLimitError(f"it took more than {limits.seconds:g} s")
             header, blobs = self._receive(time.monotonic() + limits.seconds, too_late, limits.memory)
         except (EOFError, OSError) as error:
             raise self._death() from error
@@ -115,8 +123,9 @@ class Worker:
         self._answers: queue.SimpleQueue[tuple[Values, dict[str, bytes]] | None] = queue.SimpleQueue()
         self._reader = threading.Thread(target=_read, args=(self._process.stdout, self._answers), daemon=True)
         self._reader.start()
+        too_late = WorkerDiedError(f"its process did not start within {START:g} s")
         try:
-            header, _ = self._receive(time.monotonic() + START, f"its process did not start within {START:g} s", 0)
+            header, _ = self._receive(time.monotonic() + START, too_late, 0)
             if header != READY:
                 raise EOFError
         except (EOFError, OSError) as error:
@@ -132,7 +141,7 @@ class Worker:
         self._given = {name: shared.key for name, shared in request.shared.items()}
         send(self._requests, {"shares": "", "values": request.values, "shared": list(request.shared)}, request.blobs)
 
-    def _receive(self, until: float, too_late: str, memory: int) -> tuple[Values, dict[str, bytes]]:
+    def _receive(self, until: float, too_late: WorkerDiedError, memory: int) -> tuple[Values, dict[str, bytes]]:
         """Wait for a message; raise EOFError if the process has ended instead."""
         while True:
             with contextlib.suppress(queue.Empty):
@@ -141,7 +150,7 @@ class Worker:
                     raise EOFError
                 return message
             if time.monotonic() > until:
-                raise WorkerDiedError(too_late)
+                raise too_late
             if memory and self._memory() > memory:
                 raise WorkerDiedError(f"it needed more than {memory / 2**30:g} GB of memory")
 

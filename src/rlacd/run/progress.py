@@ -31,6 +31,6 @@ class Progress:
     seconds: float
 
 
-ProgressCallback = Callable[[Progress], bool | None]
-"""Called between steps and several times a second in long ones; returning False (not None) stops the work and keeps
-what was reached."""
+ProgressCallback = Callable[[Progress], object]
+"""Called between steps and several times a second in long ones. To stop and keep what was reached it returns False, or
+anything else that counts as false; None, as from a function that returns nothing, goes on."""

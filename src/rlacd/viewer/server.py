@@ -13,8 +13,8 @@
 
 It listens on the loopback address alone. Pages of other sites are kept out: a request's Host header must name this
 server, which defeats DNS rebinding, and the request must not come from a page of another origin. Resources are bounded:
-connections and their time in `rlacd.viewer.connections`, one input of at most `LARGEST_MESH` bytes, one decomposition
-with its scene and heat map, and `HEAVY` costly answers at a time.
+connections and their time in `rlacd.viewer.connections`, `UPLOADS` of at most `LARGEST_MESH` bytes at a time, one
+decomposition with its scene and heat map, and `HEAVY` costly answers at a time.
 """
 
 from __future__ import annotations
@@ -57,6 +57,7 @@ LARGEST_MESH = 2**28  # bytes of an uploaded file
 QUICKEST = 0.05  # seconds between two reports of progress
 HEARTBEAT = 3.0  # seconds of silence before a stream sends a sign of life, which shows whether the client still reads
 HEAVY = 2  # concurrent answers that take much memory and time
+UPLOADS = 4  # concurrent uploads, each in memory; slow ones keep nothing else waiting
 
 HARDENING = {
     "Cache-Control": "no-store",
@@ -103,7 +104,7 @@ class ViewServer(BoundedServer):
         read: Callable[[Path], Subject],
     ) -> None:
         self.session, self.subject, self.accept, self._read = session, subject, accept, read
-        self.heavy = threading.BoundedSemaphore(HEAVY)
+        self.heavy, self.uploads = threading.BoundedSemaphore(HEAVY), threading.BoundedSemaphore(UPLOADS)
         self._made: dict[str, tuple[int, bytes]] = {}
         self._making = threading.Lock()
         self._opening = threading.Lock()
@@ -209,10 +210,10 @@ class _Handler(BoundedHandler):
     server: ViewServer
 
     def do_GET(self) -> None:
-        place = urllib.parse.urlsplit(self.path)
-        query = urllib.parse.parse_qs(place.query)
         with self._answered():
             self._check_sender()
+            place = _split(self.path)
+            query = urllib.parse.parse_qs(place.query)
             if place.path == "/":
                 self._send(self.server.page, "text/html", {"Content-Security-Policy": self.server.policy})
             elif place.path == "/events":
@@ -237,7 +238,7 @@ class _Handler(BoundedHandler):
     def do_POST(self) -> None:
         with self._answered():
             self._check_sender()
-            place = urllib.parse.urlsplit(self.path)
+            place = _split(self.path)
             answer: dict[str, Any] = {}
             if place.path == "/open":
                 self._open(urllib.parse.parse_qs(place.query))
@@ -257,8 +258,13 @@ class _Handler(BoundedHandler):
             raise _Refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "send the mesh as application/octet-stream.")
         controls = self.server.accept(_object(query.get("options", ["{}"])[0]))
         controls.options()
-        with self.server.heavy:
+        if not self.server.uploads.acquire(blocking=False):
+            raise _Refused(HTTPStatus.SERVICE_UNAVAILABLE, FULL)
+        try:
             content = self._read(LARGEST_MESH, ANSWER_SECONDS)
+        finally:
+            self.server.uploads.release()
+        with self.server.heavy:
             self.server.open_mesh(query.get("name", [""])[0], content, controls)
 
     def _command(self, given: dict[str, Any]) -> str:
@@ -288,7 +294,7 @@ class _Handler(BoundedHandler):
     def _check_sender(self) -> None:
         """Refuse requests for another host, and those from pages of other origins."""
         hosts = self.headers.get_all("Host") or []
-        if len(hosts) != 1 or urllib.parse.urlsplit(f"//{hosts[0]}").hostname not in (ADDRESS, "localhost"):
+        if len(hosts) != 1 or _split(f"//{hosts[0]}").hostname not in (ADDRESS, "localhost"):
             raise _Refused(HTTPStatus.FORBIDDEN, f"this viewer answers to {ADDRESS} and localhost only.")
         origin = self.headers.get("Origin")
         followed = self.command == "GET" and self.headers.get("Sec-Fetch-Mode") == "navigate"  # a link in another page
@@ -370,6 +376,13 @@ class _Refused(Exception):
     def __init__(self, status: HTTPStatus, sentence: str) -> None:
         super().__init__(sentence)
         self.status = status
+
+
+def _split(address: str) -> urllib.parse.SplitResult:
+    try:
+        return urllib.parse.urlsplit(address)
+    except ValueError as error:  # a bracket without its partner
+        raise _Refused(HTTPStatus.BAD_REQUEST, f"{address!r} is not an address.") from error
 
 
 def _object(text: str | bytes) -> dict[str, Any]:

@@ -79,7 +79,9 @@ def load_mesh(source: Source) -> InputMesh:
     MissingExtraError
         A USD file or one that Draco compressed, and the extra ``usd`` or ``draco`` is not installed.
     """
-    if isinstance(source, str | os.PathLike):
+    if isinstance(source, os.PathLike):
+        source = os.fspath(source)  # bytes are refused below
+    if isinstance(source, str):
         return without_engine_hulls(_from_file(Path(source)))
     if isinstance(source, trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud):
         kind = type(source).__name__
@@ -344,8 +346,12 @@ def _placed_otherwise(graph: Any, node: Any, name: str) -> FloatArray:
 def _arrays(vertices: Any, faces: Any) -> tuple[FloatArray, IntArray]:
     """Check the shapes and dtypes of arrays; quads become two triangles each."""
     try:
+        if np.iscomplexobj(vertices) or np.ma.is_masked(vertices) or np.ma.is_masked(faces):
+            raise MeshDataError("vertices are complex, or vertices or faces are masked: give plain real arrays")
         v = np.asarray(vertices, dtype=np.float64)
         f = np.asarray(faces)
+    except MeshDataError:
+        raise
     except (TypeError, ValueError) as error:
         raise MeshDataError("vertices and faces must be rectangular arrays of numbers: [V, 3] and [F, 3]") from error
     v = v.reshape(-1, 3) if v.size == 0 else v

@@ -16,7 +16,7 @@ from rlacd.io.write.atomic import write_file
 from rlacd.io.write.balls import check_balls, save_balls
 from rlacd.io.write.encode import ENCODERS, encode_glb, hull_name
 from rlacd.io.write.engines import ENGINE_NAMES, encode_engine
-from rlacd.io.write.folder import check_names, write_folder
+from rlacd.io.write.folder import write_folder
 from rlacd.io.write.keep import encode_kept, is_kept
 from rlacd.io.write.mjcf import encode_mjcf
 from rlacd.io.write.model import (
@@ -126,7 +126,6 @@ def _save_with_meshes(model: Model, target: Target, one_mesh: bool) -> None:
     shapes, visual = shapes_of(model, stem, _PRIMITIVES[target.file_format], one_mesh=one_mesh)
     meshes = [shape for shape in (visual, *shapes) if isinstance(shape, MeshFile)]
     files = {file.name: file.data for file in meshes}
-    check_names(folder, stem, list(files))
     described = _WITH_MESHES[target.file_format](model, shapes, visual, folder.name)
     write_folder(folder, stem, files, then=lambda: write_file(target.path, described))
 

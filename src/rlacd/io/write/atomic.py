@@ -9,7 +9,10 @@ import secrets
 from collections.abc import Iterator
 from pathlib import Path
 
-from rlacd.errors import OutputError
+from rlacd.errors import OutputError, OutputNameError
+
+_OF_NAMES = (errno.EISDIR, errno.ENOTDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.ELOOP)
+"""Errors that another name would not have."""
 
 
 def write_file(path: Path, data: bytes) -> None:
@@ -48,9 +51,10 @@ def output_errors(path: Path) -> Iterator[None]:
     except OutputError:
         raise
     except OSError as error:
-        raise OutputError(f"cannot write {path}: {_reason(error)}.") from error
+        kind = OutputNameError if error.errno in _OF_NAMES else OutputError
+        raise kind(f"cannot write {path}: {_reason(error)}.") from error
     except (RuntimeError, ValueError) as error:  # raised by pathlib for circular links and null characters
-        raise OutputError(f"cannot write {str(path)!r}: {error}; choose another name.") from error
+        raise OutputNameError(f"cannot write {str(path)!r}: {error}; choose another name.") from error
 
 
 def sync_folder(folder: Path) -> None:
