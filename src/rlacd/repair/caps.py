@@ -45,8 +45,8 @@ _WOUND_EDGES, _WOUND, _MISSING_FACE = 12, 0.1, 0.2
 _RING, _ROUND = 6, 0.1
 # A body with at most this many radii of a ring as volume per area is a tube that ends there, no bottle with a neck.
 _TUBE = 0.7
-# The caps at the ends of a bar have at most this share of its area: it is four times as long as wide, eight times with two
-# open ends. These lie nearer to each other than this share of its length: the bar is bent, or has one open end.
+# The caps of a bar have at most this share of its area: it is four times as long as wide, eight times with two open
+# ends. These lie nearer to each other than this share of its length: the bar is bent, or has one open end.
 _END, _STRAIGHT = 0.06, 0.9
 # Along at least this share of its rim, the cap turns by less than this from the adjacent faces (cosine of 45 degrees).
 _SMOOTH_SHARE, _SMOOTH = 0.3, 0.7
@@ -227,18 +227,19 @@ def _ends(
     soup: Soup,
     rims: Rims,
     loop_body: IntArray,
-    body_area: FloatArray,
+    area: FloatArray,
     radius: FloatArray,
     small: BoolArray,
 ) -> BoolArray:
     """Return ``[L]`` which loops are the ends of bars; all of a body's have to be `small` openings of a tube."""
     centre = np.array([soup.vertices[loop].mean(axis=0) for loop in rims.loops])
     _, first = np.unique(loop_body, return_index=True)
-    of_body = np.zeros(len(body_area), dtype=np.int64)
+    of_body = np.zeros(len(area), dtype=np.int64)
     of_body[loop_body[first]] = first
     apart = np.linalg.norm(centre - centre[of_body[loop_body]], axis=1)
-    odd = ~small | (2 * np.pi * radius * apart > _STRAIGHT * body_area[loop_body])
-    return np.bincount(loop_body, odd, len(body_area))[loop_body] == 0
+    odd = ~small | (2 * np.pi * radius * apart > _STRAIGHT * area[loop_body])
+    ends: BoolArray = np.bincount(loop_body, odd, len(area))[loop_body] == 0
+    return ends
 
 
 def _holes(
