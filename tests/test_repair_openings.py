@@ -134,7 +134,20 @@ LAMPSHADE = ((0.6, 0), (0.3, 0.8))
 PIPE = ((0.3, 0), (0.5, 0), (0.5, 2), (0.3, 2))
 
 
-HOLLOW = [(PIPE, 8), (BOTTLE, 24), (BOTTLE, 8), (WINE_BOTTLE, 24), (CUP, 24), (CUP, 8), (LAMPSHADE, 24), (LAMPSHADE, 8)]
+LONG_PIPE = ((0.08, 0), (0.08, 2))
+
+
+HOLLOW = [
+    (PIPE, 8),
+    (LONG_PIPE, 24),
+    (BOTTLE, 24),
+    (BOTTLE, 8),
+    (WINE_BOTTLE, 24),
+    (CUP, 24),
+    (CUP, 8),
+    (LAMPSHADE, 24),
+    (LAMPSHADE, 8),
+]
 
 
 @pytest.mark.parametrize(("profile", "sections"), HOLLOW)
@@ -165,12 +178,20 @@ def bent_tube(radii, sections=8):
     )
 
 
-@pytest.mark.parametrize(("bulge", "step"), [(0.0, "capped"), (0.3, "slab")])
-def test_the_ends_of_a_tube_are_closed_and_the_necks_of_a_flask_are_not(bulge, step):
-    """Both have the same two round openings, as far from a point of the surface and as small beside the body."""
-    solid = solid_of(bent_tube(0.055 + bulge * np.sin(np.linspace(0, np.pi, 25)) ** 2))
+@pytest.mark.parametrize(
+    ("radius", "bulge", "step"),
+    [(0.055, 0.0, "capped"), (0.055, 0.3, "slab"), (0.1, 0.0, "capped"), (0.25, 0.0, "slab")],
+)
+def test_the_ends_of_a_bent_bar_are_closed_and_those_of_a_flask_or_an_elbow_are_not(radius, bulge, step):
+    """All have two round openings; nothing straight passes through a long bent bar."""
+    solid = solid_of(bent_tube(radius + bulge * np.sin(np.linspace(0, np.pi, 25)) ** 2))
     assert steps(solid) == [step]
     assert ("Holes were closed" if step == "capped" else "--open solid fills it") in solid.warnings[0]
+
+
+@pytest.mark.parametrize(("radius", "step"), [(0.095, "capped"), (0.2, "slab")])
+def test_the_one_open_end_of_a_handle_is_closed_and_the_mouth_of_a_wide_glass_is_not(radius, step):
+    assert steps(solid_of(revolved((0, 0), (radius, 0), (radius, 2)))) == [step]
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.3])

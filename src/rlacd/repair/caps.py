@@ -4,8 +4,9 @@ Input: a soup, its input surface, and where a ball can go around it. Output: the
 
 A body is closed only if every one of its holes may be closed: a cap that leaves another hole open would be one more
 sheet. A hole may be closed if its cap stays near the surface, if the ball cannot reach it, if it is small relative to
-the body, or if it is a wound: few edges, and a cap that smoothly continues the faces around it, as at missing faces.
-Around the mouth of a bottle, faces turn away from the cap. A body with many wounds gets its other small holes closed.
+the body, if it is an end of a long bar through which nothing straight passes, or if it is a wound: few edges, and a cap
+that smoothly continues the faces around it, as at missing faces. Around the mouth of a bottle, faces turn away from the
+cap. A body with many wounds gets its other small holes closed.
 A hole with another body all along its rim, such as a counter's with a basin in it, is no wound.
 """
 
@@ -44,6 +45,9 @@ _WOUND_EDGES, _WOUND, _MISSING_FACE = 12, 0.1, 0.2
 _RING, _ROUND = 6, 0.1
 # A body with at most this many radii of a ring as volume per area is a tube that ends there, no bottle with a neck.
 _TUBE = 0.7
+# The caps of a bar have at most this share of its area: it is four times as long as wide, eight times with two open
+# ends. These lie nearer to each other than this share of its length: the bar is bent, or has one open end.
+_END, _STRAIGHT = 0.06, 0.9
 # Along at least this share of its rim, the cap turns by less than this from the adjacent faces (cosine of 45 degrees).
 _SMOOTH_SHARE, _SMOOTH = 0.3, 0.7
 # If there are this many wounds, and at least this share of all holes, then all holes within these limits are wounds.
@@ -148,7 +152,6 @@ def close_holes(
         far[far] = covers(points[far])
         unreachable &= ~far
     place = owner[on]  # the loop of a point
-    nearly_closed = np.bincount(loop_body[owner], cap_area, bodies) <= HOLE_SHARE * body_area
     by_loop = np.bincount(owner, cap_area, len(rims.loops))
     depth = np.zeros(len(rims.loops))
     np.maximum.at(depth, place, distance)
@@ -164,7 +167,10 @@ def close_holes(
     # A tube has half its radius of volume per area; a bottle, which is wider than its neck, has more.
     radius = np.sqrt(by_loop / np.pi)
     tube = np.abs(enclosed / np.maximum(body_area, np.finfo(float).tiny))[loop_body] <= _TUBE * radius
-    hole = nearly_closed[loop_body] & (smooth | ~ring | tube)
+    share = (np.bincount(loop_body[owner], cap_area, bodies) / np.maximum(body_area, np.finfo(float).tiny))[loop_body]
+    hole = ((share <= HOLE_SHARE) & (smooth | ~ring | tube)) | _ends(
+        soup, rims, loop_body, body_area, radius, tube & (share <= _END)
+    )
     excused = wound[place] | (hole[place] & (distance <= HOLE))
     chosen = np.zeros(bodies, dtype=bool)
     chosen[loop_body] = True
@@ -215,6 +221,25 @@ def close_holes(
         across,
         [hole for hole in holes if hole.is_closed or hole.body in hollow],
     )
+
+
+def _ends(
+    soup: Soup,
+    rims: Rims,
+    loop_body: IntArray,
+    area: FloatArray,
+    radius: FloatArray,
+    small: BoolArray,
+) -> BoolArray:
+    """Return ``[L]`` which loops are the ends of bars; all of a body's have to be `small` openings of a tube."""
+    centre = np.array([soup.vertices[loop].mean(axis=0) for loop in rims.loops])
+    _, first = np.unique(loop_body, return_index=True)
+    of_body = np.zeros(len(area), dtype=np.int64)
+    of_body[loop_body[first]] = first
+    apart = np.linalg.norm(centre - centre[of_body[loop_body]], axis=1)
+    odd = ~small | (2 * np.pi * radius * apart > _STRAIGHT * area[loop_body])
+    ends: BoolArray = np.bincount(loop_body, odd, len(area))[loop_body] == 0
+    return ends
 
 
 def _holes(
