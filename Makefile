@@ -20,7 +20,7 @@ SEED    ?= 0
 MESHES  ?= ../shared/meshes
 SECONDS_TO_FUZZ = $(shell expr 60 \* $(MINUTES))
 
-.PHONY: install demo docs test test-fast test-all nightly lint soak soak-light soak-totals fuzz-files fuzz-shapes sanitize sanitize-address sanitize-thread format clean
+.PHONY: install demo docs benchmarks test test-fast test-all nightly lint soak soak-light soak-totals fuzz-files fuzz-shapes sanitize sanitize-address sanitize-thread format clean
 
 install: $(VENV)/installed
 
@@ -48,6 +48,10 @@ docs: $(VENV)/docs
 $(VENV)/docs: $(VENV)/installed
 	$(BIN)/pip install --quiet --constraint constraints-dev.txt --group docs
 	touch $@
+
+# The table of README; `python -m benchmarks --help` lists what else is published. CoACD takes most of an hour.
+benchmarks: $(VENV)/test-extras
+	$(BIN)/python -m benchmarks compare $(MESHES) --list $(MESHES)/quick.txt --out build/benchmarks
 
 lint: $(VENV)/test-extras
 	$(BIN)/ruff check .

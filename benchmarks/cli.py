@@ -53,10 +53,6 @@ def experiment(
     def register(make_page: Callable[..., Page]) -> Callable[..., Page]:
         hints = get_type_hints(make_page, include_extras=True)
         own = {key: (p.default, hints[key]) for key, p in list(inspect.signature(make_page).parameters.items())[1:]}
-        own = {
-            key: (REQUIRED if default is inspect.Parameter.empty else default, hint)
-            for key, (default, hint) in own.items()
-        }
 
         def run(meshes: Path, out: Path, **given: Any) -> None:
             chosen = {key: given.pop(key) for key in own}

@@ -98,8 +98,8 @@ def _column(rows: Sequence[Row], reference: Sequence[Row]) -> dict[str, str]:
         return f"{mean(rows, key):.3f}, {max(row[key] for row in rows):.3f}"
 
     is_first = rows is reference
-    before = {row["mesh"]: row["cpu"] for row in reference}
-    faster = statistics.median(before[row["mesh"]] / max(row["cpu"], 1e-9) for row in rows)
+    pairs = zip(reference, rows, strict=True)  # in the order of the meshes, both
+    faster = statistics.median(before["cpu"] / max(row["cpu"], 1e-9) for before, row in pairs)
     parts = sum(row["parts"] for row in rows)
     exceeding = [row["exceeding"] for row in rows if row["exceeding"] is not None]
     return {

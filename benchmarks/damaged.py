@@ -51,7 +51,7 @@ def measure(vertices: Any, faces: Any, family: str, share: float) -> dict[str, A
                 nearest = np.minimum(nearest, distance)
         return nearest
 
-    surface: Any = solid.surface
+    surface: tuple[Any, Any] = solid.surface
     points, _ = spread_points(*surface, SPACING)
     missed = apart(points)
     under, lost = missed.max(), frame.to_input(points[missed.argmax()])

@@ -10,6 +10,7 @@ import sys
 import tempfile
 import threading
 import time
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -83,8 +84,9 @@ def _after_timeout(path: Path, seconds: float) -> list[Any]:
 
 def _after_interrupt(path: Path, out: Path, seconds: float) -> list[Any]:
     command = [sys.executable, "-m", "rlacd", "decompose", str(path), "-o", str(out), "--report", "-"]
+    ignoring = partial(signal.signal, signal.SIGINT, signal.SIG_IGN)  # until it sets its own
     with tempfile.TemporaryFile() as report:
-        run = subprocess.Popen(command, stdout=report, stderr=subprocess.DEVNULL, preexec_fn=_ignore_interrupts)
+        run = subprocess.Popen(command, stdout=report, stderr=subprocess.DEVNULL, preexec_fn=ignoring)
         while run.poll() is None and _ignores_interrupts(run.pid):  # it listens once its work starts
             time.sleep(0.01)
         time.sleep(seconds)
@@ -101,10 +103,6 @@ def _after_interrupt(path: Path, out: Path, seconds: float) -> list[Any]:
         report.seek(0)
         hulls = json.loads(report.read())["parts"] if code in (0, 4) else "–"
     return [f"{late:.2f}", f"{used.ru_utime + used.ru_stime - before:.2f}", hulls, code]
-
-
-def _ignore_interrupts() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _ignores_interrupts(process: int) -> bool:

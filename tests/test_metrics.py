@@ -55,6 +55,15 @@ def test_a_crack_of_a_cut_is_no_surface(gap: float) -> None:
     assert measured(box(*SLAB), *halves).over < 2 * TOLERANCE
 
 
+def test_overlap_is_what_lies_in_several_hulls() -> None:
+    """Halves of a slab that overlap by a tenth of its length, and a third hull in one of them."""
+    halves = box(SLAB[0], (0.1, 0.5, 0.25)), box((-0.1, -0.5, -0.25), SLAB[1])
+    assert measured(box(*SLAB), *halves).overlap == pytest.approx(0.1)
+    inner = box((-0.9, -0.5, -0.25), (-0.7, 0.5, 0.25))
+    assert measured(box(*SLAB), *halves, inner).overlap == pytest.approx(0.2)
+    assert measured(box(*SLAB), box(*SLAB)).overlap == 0
+
+
 def test_a_wide_gap_is_surface() -> None:
     found = measured(box(*SLAB), box(SLAB[0], (0.2, 0.5, 0.25)), box((0.4, -0.5, -0.25), SLAB[1]))
     assert near(found.over, 0.25)  # the middle of the walls of the gap

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from importlib import import_module
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
@@ -31,13 +32,14 @@ PAGES = {
     if (found := SNIPPET.findall(page.read_text(encoding="utf-8")))
 }
 
-COMMAND = re.compile(r"^ *rlacd ([a-z].*)$", re.MULTILINE)
+COMMAND = re.compile(r"^ *(?:rlacd|python -m) ([a-z].*)$", re.MULTILINE)
 COMMANDS = sorted(
     {
         line
         for page in PAGES_OF_TEXT
         for block in SHELL.findall(page.read_text(encoding="utf-8"))
         for line in COMMAND.findall(block)
+        if not line.startswith(("fuzz", "tests", "pip"))
     }
 )
 
@@ -79,6 +81,9 @@ def test_commands_have_the_options_that_pages_use(line: str) -> None:
         takewhile(lambda word: word not in {"|", ">", "&&", ";"}, shlex.split(line.replace("SEED", "1"), comments=True))
     )
     at: Any = typer.main.get_command(app)
+    if words[0] == "benchmarks":
+        _, name, *words = words
+        at = typer.main.get_command(import_module(f"benchmarks.{name.replace('-', '_')}").app)
     while isinstance(at, typer.core.TyperGroup):
         _, at, words = at.resolve_command(typer.Context(at), words)
     at.make_context("rlacd", words)
