@@ -140,7 +140,7 @@ def close_holes(
     body = joined[soup.body]
 
     cap_area = face_areas(soup.vertices, caps)
-    body_area = np.bincount(body, soup.area, bodies)
+    body_area: FloatArray = np.bincount(body, soup.area, bodies)
     points, on = spread_points(soup.vertices, caps, gap / 2)
     # Corners lie on the surface, and how far points are matters only beyond a certain distance.
     beyond = (np.linalg.norm(points[:, None] - soup.vertices[caps[on]], axis=2) > min(gap, HOLE)).all(axis=1)
