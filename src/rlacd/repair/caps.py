@@ -140,7 +140,7 @@ def close_holes(
     body = joined[soup.body]
 
     cap_area = face_areas(soup.vertices, caps)
-    body_area: FloatArray = np.bincount(body, soup.area, bodies)
+    body_area = np.bincount(body, soup.area, bodies)
     points, on = spread_points(soup.vertices, caps, gap / 2)
     # Corners lie on the surface, and how far points are matters only beyond a certain distance.
     beyond = (np.linalg.norm(points[:, None] - soup.vertices[caps[on]], axis=2) > min(gap, HOLE)).all(axis=1)
@@ -169,7 +169,7 @@ def close_holes(
     tube = np.abs(enclosed / np.maximum(body_area, np.finfo(float).tiny))[loop_body] <= _TUBE * radius
     share = (np.bincount(loop_body[owner], cap_area, bodies) / np.maximum(body_area, np.finfo(float).tiny))[loop_body]
     hole = ((share <= HOLE_SHARE) & (smooth | ~ring | tube)) | _ends(
-        soup, rims, loop_body, body_area, radius, tube & (share <= _END)
+        soup, rims, loop_body, body_area.astype(float), radius, tube & (share <= _END)
     )
     excused = wound[place] | (hole[place] & (distance <= HOLE))
     chosen = np.zeros(bodies, dtype=bool)
