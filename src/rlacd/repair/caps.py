@@ -169,7 +169,7 @@ def close_holes(
     tube = np.abs(enclosed / np.maximum(body_area, np.finfo(float).tiny))[loop_body] <= _TUBE * radius
     share = (np.bincount(loop_body[owner], cap_area, bodies) / np.maximum(body_area, np.finfo(float).tiny))[loop_body]
     hole = ((share <= HOLE_SHARE) & (smooth | ~ring | tube)) | _ends(
-        soup, rims, loop_body, body_area, radius, tube & (share <= _END)
+        soup, rims, loop_body, body_area.astype(float), radius, tube & (share <= _END)
     )
     excused = wound[place] | (hole[place] & (distance <= HOLE))
     chosen = np.zeros(bodies, dtype=bool)
