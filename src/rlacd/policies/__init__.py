@@ -2,6 +2,7 @@
 
 from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies.greedy import SCORES, Greedy
+from rlacd.policies.learned import Learned
 from rlacd.policies.navacd import CONCAVE_EDGES, NavACD
 from rlacd.policies.policy import CheckedPolicy, Policy
 from rlacd.policies.qpolicy import deployed
@@ -18,6 +19,7 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
     - ``navacd``: the plane with the least sum of hull volumes, among three planes and those of four concave edges.
     - ``random-N+edges``: the plane with the least sum of hull volumes among N random ones of the 150 and those of four
       concave edges; ``random-N``: among the random ones alone. Controls for learned policies.
+    - ``learned``: of greedy's 40 most promising planes, the one after which networks predict the fewest parts.
     - ``rl-acd``, or the path of a Q network as written by ``rlacd train`` (.npz): the paper's rule, the plane with the
       least sum of hull volumes among the network's ten best planes and those of four concave edges.
 
@@ -42,6 +44,8 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
         return Greedy(sweeps=sweeps)
     if name == "navacd":
         return NavACD()
+    if name == "learned":
+        return Learned(sweeps, scale)
     if name == "rl-acd" or name.endswith(WEIGHTS_ENDING):
         return deployed(None if name == "rl-acd" else name, scale)
     family, _, score = name.partition("-")
