@@ -77,7 +77,7 @@ def seeds_of(meshes: Path) -> dict[str, list[Seed]]:
         mesh = trimesh.load_mesh(meshes / name, process=False)
         for kind, seed in chain(written(mesh), written_by_extras(mesh)):
             found.setdefault(kind, []).append(seed)
-    found["onnx"] = [Seed(q_network())]
+    found["npz"] = [Seed(q_network())]
     return found
 
 
@@ -158,7 +158,7 @@ class Fuzzer:
     def result(self, path: Path) -> Row:
         """Return the outcome (see `ENDS`), its message, and the CPU seconds."""
         mesh, options = path, dict(BUDGET)
-        if path.suffix == ".onnx":
+        if path.suffix == ".npz":
             mesh = path.with_suffix(".stl")
             BOX.export(mesh)
             options["policy"] = str(path)

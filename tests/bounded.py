@@ -21,7 +21,7 @@ PRELOADED = [
     "tests.bounded",
     "rlacd.io.read.load",
     "rlacd.io.robots",
-    "rlacd.policies.q_network",
+    "rlacd.policies.network",
     "trimesh.exchange.load",
 ]
 

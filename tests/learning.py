@@ -8,9 +8,8 @@ import numpy as np
 import trimesh
 from manifold3d import Manifold
 
-from rlacd.planes.candidates import axis_and_principal
 from rlacd.planes.sweep import sweep
-from rlacd.policies.observe import valid_planes
+from rlacd.policies.observe import paper_planes, valid_planes
 from rlacd.solid.component import Component, Plane
 from tests.shapes import box, from_manifold
 
@@ -43,7 +42,7 @@ def write_meshes(folder: Path) -> Path:
 
 def greedy_plane(component: Component) -> int | None:
     """Number of the valid plane of least hull sum."""
-    candidates = axis_and_principal(component)
+    candidates = paper_planes(component)
     scored = sweep(component, candidates)
     cost = np.where(valid_planes(component, candidates), scored.hull_below + scored.hull_above, np.inf)
     return int(cost.argmin()) if np.isfinite(cost).any() else None
@@ -54,4 +53,4 @@ class GreedyOverMask:
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         number = greedy_plane(component)
-        return None if number is None else axis_and_principal(component).plane(number)
+        return None if number is None else paper_planes(component).plane(number)

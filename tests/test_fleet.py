@@ -139,9 +139,8 @@ def test_a_buffer_outside_the_folder_is_not_read(tmp_path: Path) -> None:
 
 
 def test_all_that_decides_the_bytes_is_in_the_key_and_nothing_else(tmp_path: Path) -> None:
-    policies = [tmp_path / "here.onnx", tmp_path / "there" / "p.onnx"]
+    policies = [tmp_path / "here.npz", tmp_path / "there" / "p.npz"]
     policies[1].parent.mkdir()
-    pytest.importorskip("onnx", reason="the extra train is not installed")
     from fuzz.networks import q_network
 
     for policy in policies:
@@ -202,7 +201,7 @@ def test_an_order_survives_the_way_to_another_process() -> None:
     [
         ({"threshold": -1}, {}, OptionError),
         ({"preset": "doom"}, {}, OptionError),
-        ({"policy": "nowhere.onnx"}, {}, WeightsError),
+        ({"policy": "nowhere.npz"}, {}, WeightsError),
         ({}, {"file_format": "fbx"}, OptionError),
         ({}, {"file_format": "mjcf", "folders": True}, OptionError),
         ({}, {"density": -1.0}, OptionError),

@@ -9,7 +9,7 @@ import json
 import os
 import re
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,7 @@ from rlacd.errors import MeshFileError, OutputError, RlacdError, TrainingError, 
 from rlacd.io.read.load import load_mesh
 from rlacd.io.read.open_file import LARGEST
 from rlacd.io.robots import rewrite_robot
-from rlacd.policies.q_network import OnnxQ
+from rlacd.policies.network import load_network
 from tests.bounded import bounded
 from tests.hostile import HARMLESS, REFUSED
 from tests.hostile.gltf import gltf, named_often, reference
@@ -109,9 +109,13 @@ def test_a_robot_that_never_ends_is_refused(kind: str, ending: str, tmp_path: Pa
     check_refused(MeshFileError, KINDS[kind], rewrite_robot, path, tmp_path / f"out{ending}")
 
 
+def load_q(path: Path) -> object:
+    return load_network(path, "rl-acd", 906, 150)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_weights_that_never_end_are_refused(kind: str, tmp_path: Path) -> None:
-    check_refused(WeightsError, KINDS[kind], OnnxQ, special(tmp_path, kind, ".onnx"))
+    check_refused(WeightsError, KINDS[kind], load_q, special(tmp_path, kind, ".npz"))
 
 
 def test_a_link_to_an_ordinary_mesh_is_followed(tmp_path: Path) -> None:
@@ -283,49 +287,16 @@ def test_a_manifest_that_is_a_pipe_is_refused(tmp_path: Path) -> None:
 # --- weights and checkpoints ------------------------------------------------------------------------------------------
 
 
-def network(folder: Path, change: Mapping[str, Any], location: str | None = None) -> Path:
-    """A Q network with changed metadata; its weights may be in another file."""
-    pytest.importorskip("onnx", reason="the extra train is not installed")
-    from fuzz.networks import ABOUT, q_network
-
-    path = folder / "net.onnx"
-    path.write_bytes(q_network({**ABOUT, **change}, location))
-    return path
-
-
-@pytest.mark.parametrize("location", ["beside.bin", "../secret.bin", "/etc/passwd", "/dev/zero"])
-def test_weights_in_another_file_are_not_looked_for(
-    location: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    inside = tmp_path / "inside"
-    inside.mkdir()
-    for place in (inside / "beside.bin", tmp_path / "secret.bin"):
-        place.write_bytes(bytes(16))
-    monkeypatch.chdir(inside)
-    check_refused(WeightsError, "damaged", OnnxQ, network(inside, {}, location))
-
-
-@pytest.mark.parametrize(
-    "change",
-    [{"points": 10**9}, {"points": -1}, {"points": 0.5}, {"threshold": float("nan")}, {"threshold": "many"}],
-    ids=json.dumps,
-)
-@pytest.mark.promise("hostile-weights")
-def test_weights_that_ask_for_too_much_are_refused(change: dict[str, Any], tmp_path: Path) -> None:
-    OnnxQ(network(tmp_path, {}))
-    check_refused(WeightsError, "metadata", OnnxQ, network(tmp_path, change))
-
-
 def checkpoint(folder: Path) -> Path:
     """A sound one."""
-    torch = pytest.importorskip("torch", reason="the extra train is not installed")
-    from rlacd.learn.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+    pytest.importorskip("torch", reason="the extra train is not installed")
+    from rlacd.learn.checkpoint import load_checkpoint, save_checkpoint
 
-    place = folder / "checkpoint"
-    save_checkpoint(place, Checkpoint({"w": torch.zeros(3)}, {"a": np.arange(4)}, {"step": 1}))
+    place = folder / "checkpoint.npz"
+    save_checkpoint(place, {"a": np.arange(4)}, {"step": 1})
     found = load_checkpoint(place)
     assert found is not None
-    assert found.state["step"] == 1
+    assert found[1]["step"] == 1
     return place
 
 
@@ -342,21 +313,18 @@ def array_header(shape: tuple[int, ...]) -> bytes:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("trap", ["bomb", "shape", "objects", "depth", "header"])
+@pytest.mark.parametrize("trap", ["bomb", "shape", "objects", "depth"])
 @pytest.mark.promise("hostile-weights")
 def test_a_hostile_checkpoint_is_refused(trap: str, tmp_path: Path) -> None:
     place = checkpoint(tmp_path)
-    replay = place / "replay.npz"
     if trap == "bomb":
-        with zipfile.ZipFile(replay, "w", zipfile.ZIP_DEFLATED) as archive:
+        with zipfile.ZipFile(place, "w", zipfile.ZIP_DEFLATED) as archive:
             archive.writestr("a.npy", array_header((2**25,)) + bytes(2**28))
     elif trap == "shape":
-        with zipfile.ZipFile(replay, "w") as archive:
+        with zipfile.ZipFile(place, "w") as archive:
             archive.writestr("a.npy", array_header((10**12,)) + bytes(80))
     elif trap == "objects":
-        np.savez(replay, a=np.array([{}], dtype=object))
-    elif trap == "depth":
-        (place / "state.json").write_text("[" * 10**6)
+        np.savez(place, a=np.array([{}], dtype=object))
     else:
-        (place / "weights.safetensors").write_bytes((2**62).to_bytes(8, "little") + b"{}")
+        np.savez(place, state=np.frombuffer(b"[" * 10**6, np.uint8))
     check_refused(TrainingError, "is damaged", restore, place, needs="rlacd.learn.checkpoint")

@@ -1,4 +1,4 @@
-"""The I2P-MAE encoder: the official features to the digit, in torch and ONNX, and clear words about unusable files."""
+"""The I2P-MAE encoder: the official features to the digit, and clear words about unusable files."""
 
 from __future__ import annotations
 
@@ -23,11 +23,9 @@ pytest.importorskip("torch", reason="needs the extra train")
 import torch
 from safetensors.torch import save_file
 
-from rlacd.learn.encoders import Encoder, I2PMAEEncoder, describe, make_encoder
-from rlacd.learn.encoders.i2p_mae import HierarchicalEncoder, Sizes, seen_below
+from rlacd.learn.encoders import PublishedEncoder
+from rlacd.learn.encoders.i2p_mae import HierarchicalEncoder, I2PMAEEncoder, Sizes, seen_below
 from rlacd.learn.encoders.point_groups import farthest_points, gather, nearest_points
-from rlacd.planes.candidates import axis_and_principal
-from rlacd.policies.observe import observe
 from rlacd.solid.component import Component
 from tests.encoding import TINY, clouds, tiny_encoder, write_tiny_weights
 from tests.learning import small_solids, write_meshes
@@ -101,30 +99,6 @@ def test_a_safetensors_file_of_the_same_weights_gives_the_same(
     assert I2PMAEEncoder.from_checkpoint(tmp_path / "weights.safetensors").digest() == official.digest()
 
 
-@pytest.mark.nightly
-def test_onnxruntime_gives_the_features_of_the_official_code(
-    official: I2PMAEEncoder, features: tuple[torch.Tensor, np.ndarray]
-) -> None:
-    import onnxruntime
-
-    from rlacd.learn.onnx_file import to_onnx
-
-    class Features(torch.nn.Module):
-        def __init__(self) -> None:
-            super().__init__()
-            self.encoder = official
-
-        def forward(self, clouds: torch.Tensor) -> torch.Tensor:
-            return self.encoder.features(clouds)
-
-    points, expected = features
-    model = to_onnx(Features().eval(), (torch.randn(2, *points.shape[1:]),), ("clouds",), ("features",))
-    session = onnxruntime.InferenceSession(model.SerializeToString(), providers=["CPUExecutionProvider"])
-    assert np.abs(session.run(None, {"clouds": points.numpy()})[0] - expected).max() < 1e-3
-    for i in range(len(points)):
-        assert np.abs(session.run(None, {"clouds": points[i : i + 1].numpy()})[0] - expected[i]).max() < 1e-3
-
-
 # Grouping
 
 
@@ -181,38 +155,15 @@ def test_a_group_without_members_changes_nothing() -> None:
 # As an encoder of components
 
 
-def test_the_encoder_keeps_the_protocol_and_ignores_size_and_place() -> None:
-    encoder = tiny_encoder()
-    assert isinstance(encoder, Encoder)
+def test_features_ignore_size_and_place_and_are_the_same_each_time() -> None:
+    encoder = PublishedEncoder(tiny_encoder(), 512)
     solid = small_solids()["table"]
-    both = [Component(solid), Component(solid.scale([0.25] * 3).translate([0.5, -0.25, 2]))]
-    seen = [observe(c, axis_and_principal(c), 0.04, 512) for c in both]
-    features = describe(encoder, seen, scale_input=False)
-    assert features.shape == (2, encoder.dim)
-    assert features[0] == pytest.approx(features[1], abs=0.05)
-    other = Component(small_solids()["angle"])
-    unlike = describe(encoder, [observe(other, axis_and_principal(other), 0.04, 512)], scale_input=False)
-    assert np.abs(unlike[0] - features[0]).max() > 0.2
-
-
-def test_features_do_not_depend_on_what_comes_along_or_came_before() -> None:
-    points = clouds(6, 64).reshape(3, 2, 64, 3)
-    directions = torch.eye(3).repeat(3, 2, 1)
-    with torch.inference_mode():
-        together = tiny_encoder().encode(points, directions)
-        encoder = tiny_encoder()
-        alone = [encoder.encode(points[i : i + 1], directions[:1])[0] for i in (2, 0, 1)]
-        again = encoder.encode(points[[2, 2, 0]], directions)
-    assert torch.equal(together, torch.stack([alone[1], alone[2], alone[0]]))
-    assert torch.equal(again, together[[2, 2, 0]])
-
-
-def test_known_components_are_not_encoded_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    encoder = tiny_encoder()
-    points, directions = clouds(4, 64).reshape(2, 2, 64, 3), torch.eye(3).repeat(2, 2, 1)
-    first = encoder.encode(points, directions)
-    monkeypatch.setattr(encoder, "features", lambda clouds: pytest.fail("encoded again"))
-    assert torch.equal(encoder.encode(points, directions), first)
+    one = encoder.describe(Component(solid))
+    moved = encoder.describe(Component(solid.scale([0.25] * 3).translate([0.5, -0.25, 2])))
+    assert one.shape == (encoder.dim,)
+    assert one == pytest.approx(moved, abs=0.05)
+    assert np.abs(encoder.describe(Component(small_solids()["angle"])) - one).max() > 0.2
+    assert np.array_equal(encoder.describe(Component(solid)), one)
 
 
 def test_too_few_points_are_reported() -> None:
@@ -304,15 +255,11 @@ def test_nothing_in_a_checkpoint_is_run(tmp_path: Path) -> None:
 
 
 def test_without_weights_the_error_says_where_to_get_them(tmp_path: Path) -> None:
-    with pytest.raises(OptionError, match="takes no weights"):
-        make_encoder("profile", "weights.pth")
-    with pytest.raises(OptionError, match="or i2p-mae"):
-        make_encoder("best")
     meshes = write_meshes(tmp_path / "meshes")
     for asked in (["--encoder", "i2p-mae"], ["--preset", "paper"]):
         shown = CliRunner().invoke(app, ["train", str(meshes), "--run", str(tmp_path / "run"), *asked])
         assert shown.exit_code == 2
-        for word in ("--encoder-weights FILE", "https://", "--encoder profile"):
+        for word in ("--encoder-weights FILE", "https://", "--encoder sweep"):
             assert word in shown.output
         assert "Traceback" not in shown.output
-        assert not (tmp_path / "run").exists()
+        assert not (tmp_path / "run" / "checkpoint.npz").exists()

@@ -6,7 +6,6 @@ import csv
 import math
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 pytest.importorskip("torch", reason="needs the extra train")
@@ -15,12 +14,10 @@ from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.errors import TrainingError
 from rlacd.io.read.load import load_mesh
-from rlacd.learn.encoders import Encoder, describe, make_encoder
 from rlacd.learn.meshes import list_meshes
-from rlacd.learn.paper.mdp import CutProcess, Reward, terminal_reward
-from rlacd.planes.candidates import axis_and_principal
+from rlacd.learn.process import CutProcess, Reward, terminal_reward
 from rlacd.planes.sweep import sweep
-from rlacd.policies.observe import SCALE_INPUTS, observe, valid_planes
+from rlacd.policies.observe import paper_planes, valid_planes
 from rlacd.repair.repair import repair
 from rlacd.run import Run
 from rlacd.solid.component import Component, Plane
@@ -59,14 +56,14 @@ def cut_greedily(cutting: CutProcess) -> list[tuple[float, Reward]]:
 
 def check_same_as_decompose(solid: Component) -> None:
     with Run(1) as run:
-        done, left = CutTree(solid, GreedyOverMask(), run).cut_until(CRITERION, Clock())
+        done, left = CutTree(solid, GreedyOverMask(), run).cut_until(CRITERION)
     cutting = CutProcess(solid, CRITERION)
     start = sum(c.hull.volume for c in cutting.frontier + cutting.finished + cutting.stuck)
     earned = cut_greedily(cutting)
     assert volumes(cutting.finished) == volumes(done)
     assert volumes(cutting.stuck) == volumes(left)
     end = sum(c.hull.volume for c in cutting.finished + cutting.stuck)
-    assert sum(hull * reward.saved for hull, reward in earned) == pytest.approx(start - end, abs=1e-9)
+    assert sum(hull * reward.own_saved for hull, reward in earned) == pytest.approx(start - end, abs=1e-9)
     paid = terminal_reward(len(cutting.finished)) if earned and cutting.terminal else 0
     assert sum(reward.finished for _, reward in earned) == paid
 
@@ -90,9 +87,20 @@ def test_reward_of_an_angle_by_hand() -> None:
     hull = (2 * 1.5 - (2 - 0.3) * (1.5 - 0.3) / 2) * 1.0
     assert solid.hull.volume == pytest.approx(hull)
     assert cut.reward.saved == pytest.approx((hull - 0.6 - 0.36) / hull)
+    assert cut.reward.own_saved == cut.reward.saved
     assert cut.reward.finished == cut.reward.sides_finished == 1
     assert cutting.terminal
     assert (cut.unfinished, cut.discounts, len(cut.finished)) == ([], [], 2)
+
+
+def test_rewards_are_relative_to_the_whole_solids_hull() -> None:
+    cutting = CutProcess(Component(small_solids()["table"]), CRITERION)
+    hull, before = cutting.frontier[0].hull.volume, cutting.frontier[0].hull.volume
+    while not cutting.over:
+        cut = cutting.cut(0, cutting.candidates(cutting.frontier[0]).plane(greedy_plane(cutting.frontier[0]) or 0))
+        after = sum(c.hull.volume for c in cutting.frontier + cutting.finished + cutting.stuck)
+        assert cut.reward.saved == pytest.approx((before - after) / hull)
+        before = after
 
 
 def test_terminal_reward_falls_with_the_number_of_parts() -> None:
@@ -116,7 +124,7 @@ def test_valid_planes_need_no_sweep_and_are_valid_by_it(corpus: Path) -> None:
     differ = total = 0
     for solid in real_solids(corpus, 5):
         for piece in solid.pieces():
-            candidates = axis_and_principal(piece)
+            candidates = paper_planes(piece)
             cheap, exact = valid_planes(piece, candidates), sweep(piece, candidates).valid()
             assert not exact.any() or not (cheap & ~exact).any()
             differ += int((cheap != exact).sum())
@@ -136,31 +144,3 @@ def test_unreadable_meshes_are_left_out_and_counted(meshes: Path) -> None:
 def test_folders_without_anything_to_learn_are_one_clear_error(tmp_path: Path) -> None:
     with pytest.raises(TrainingError, match="holds 0 meshes"):
         list_meshes(tmp_path / "none", max_faces=1000, validation=0, seed=0)
-
-
-@pytest.mark.parametrize("name", ["profile", "profile-without-hull"])
-def test_encoders_keep_the_protocol_and_ignore_size_and_place(name: str) -> None:
-    encoder = make_encoder(name)
-    assert isinstance(encoder, Encoder)
-    solid = small_solids()["table"]
-    both = [Component(solid), Component(solid.scale([0.25] * 3).translate([0.5, -0.25, 2]))]
-    seen = [observe(c, axis_and_principal(c), 0.04, 512) for c in both]
-    features = describe(encoder, seen, scale_input=False)
-    assert features.shape == (2, encoder.dim)
-    assert features[0] == pytest.approx(features[1], abs=0.05)
-    assert seen[1].scale[0] == pytest.approx(seen[0].scale[0] - 2)
-    assert describe(encoder, seen, scale_input=True).shape == (2, encoder.dim + SCALE_INPUTS)
-
-
-def test_profiles_count_points_between_the_planes() -> None:
-    component = Component(small_solids()["table"])
-    candidates = axis_and_principal(component)
-    seen = observe(component, candidates, 0.04, 2048)
-    profile = describe(make_encoder("profile"), [seen], scale_input=False).reshape(6, 2, 2, 26)
-    lower, upper = component.box
-    world = seen.points * (upper - lower).max() / 2 + (lower + upper) / 2
-    for k in (0, 2):
-        for surface in (0, 1):
-            slab = np.searchsorted(candidates.offsets[k], world[surface] @ candidates.directions[k])
-            share = np.bincount(slab, minlength=26) / 2048
-            assert np.abs(profile[k, 0, surface] / 26 - share).sum() < 0.02

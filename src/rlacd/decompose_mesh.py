@@ -183,8 +183,6 @@ def decompose(
         The input cannot be read or contains nothing to decompose.
     OptionError
         An option has the wrong type or is out of range; raised before any work is done.
-    MissingExtraError
-        A network is requested without the extra ``learned``.
     """
     given = locals()
     options = Options(**{name: given[name] for name in OPTION_NAMES})

@@ -196,11 +196,11 @@ class Options:
     )
     policy: str | Policy = option(
         "greedy",
-        "What chooses the next cut: navacd is the quickest, FILE.onnx is your own network (extra rlacd[learned]).",
+        "What chooses the next cut: navacd is the quickest, rl-acd a network; FILE.npz is your own.",
         custom(
-            f"one of {', '.join(POLICIES)}, an .onnx file, or (in Python) an object with a method `choose`",
+            f"one of {', '.join(POLICIES)}, an .npz file, or (in Python) an object with a method `choose`",
             read_policy,
-            "greedy navacd FILE.onnx …",
+            "greedy navacd rl-acd FILE.npz …",
         ),
         panel=METHOD,
         metavar="NAME",

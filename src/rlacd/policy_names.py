@@ -16,9 +16,12 @@ AS_PUBLISHED = (*(f"greedy-{score}" for score in SCORES), *(f"greedy-{score}{EDG
 CONTROLS = (f"random-10{EDGES}", f"random-1{EDGES}", "random-10")
 """The paper's deployment with random planes in place of the network's best: what a learned policy has to beat."""
 
-POLICIES = ("greedy", *AS_PUBLISHED, *CONTROLS)
+LEARNED = ("learned",)
+"""Networks in the package."""
 
-WEIGHTS_ENDING = ".onnx"
+POLICIES = ("greedy", *LEARNED, *AS_PUBLISHED, *CONTROLS)
+
+WEIGHTS_ENDING = ".npz"
 """A policy's name that ends so is the path of a network."""
 
 

@@ -20,7 +20,7 @@ from rlacd.policies import make_policy
 from rlacd.pool import Shared
 from rlacd.presets import find_preset
 
-WEIGHTS_ENDING = ".onnx"
+WEIGHTS_ENDING = ".npz"
 DEFAULT_FORMAT = "glb"
 FOLDER_FORMAT = "obj"
 
@@ -153,7 +153,7 @@ class JobSpec:
         policy = str(self.options.get("policy", ""))
         if not policy.endswith(WEIGHTS_ENDING):
             return {}
-        return {POLICY: Shared({"onnx": Path(policy).read_bytes()}, key=self.weights)}
+        return {POLICY: Shared({"network": Path(policy).read_bytes()}, key=self.weights)}
 
     def as_plain(self) -> dict[str, Any]:
         """Convert to plain values; ``JobSpec(**plain)`` restores the job."""

@@ -197,9 +197,9 @@ class MeshServer:
         spec = JobSpec(**plain)
         if POLICY not in shared:
             return spec
-        network = self._staging / f"{shared[POLICY].key}.onnx"  # kept, so that it is read only once
+        network = self._staging / f"{shared[POLICY].key}.npz"  # kept, so that it is read only once
         if not network.exists():
-            network.write_bytes(shared[POLICY].blobs["onnx"])
+            network.write_bytes(shared[POLICY].blobs["network"])
         return spec.with_policy(network)
 
     def _sentence(self, error: Exception, path: Path, name: str) -> str:

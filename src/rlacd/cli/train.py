@@ -12,9 +12,9 @@ import typer
 from rlacd.cli.exit_codes import exit_codes
 from rlacd.cli.parameters import REQUIRED, Parameters, chosen, command, option_parameters
 from rlacd.errors import MissingExtraError, OptionError
-from rlacd.learn.paper.options import PRESETS, TrainOptions
+from rlacd.learn.options import PRESETS, TrainOptions
 
-EXTRA = ("torch", "tensorboard", "safetensors", "onnx", "onnxscript", "onnxruntime")
+EXTRA = ("torch", "safetensors")
 
 DEFAULT_PRESET = "two-cores"
 
@@ -22,15 +22,14 @@ TRAIN_HELP = """Train a policy that chooses cuts, by the paper's reinforcement l
 
 \b
 [bold]Examples[/bold]
-  rlacd train meshes/ --run run/ --preset quick
+  rlacd train one_mesh/ --run run/ --preset one-mesh
   rlacd train meshes/ --run run/ --seed 1
   rlacd train meshes/ --run run/ --seed 1 --resume --jobs 8
   rlacd train meshes/ --run run/ --environments 256 --ray auto
   rlacd train meshes/ --run run/ --preset paper --encoder-weights i2p_mae.pth
-  tensorboard --logdir run/tensorboard
 
-The run's folder gets the curves, a checkpoint to --resume from, and in the end policy.onnx, which decompose takes as
---policy. A preset sets all options; those given beside it change it.
+The run's folder gets the curves, a checkpoint to --resume from, and policy.npz, the best network so far, which
+decompose takes as --policy. A preset sets all options; those given beside it change it.
 """
 
 MESHES = (REQUIRED, Annotated[Path, typer.Argument(help="A folder of meshes, of any depth.")])
@@ -76,7 +75,7 @@ def train_command() -> Callable[..., None]:
             options = TrainOptions.preset(preset, **chosen(given))
             if run.exists() and not run.is_dir():
                 raise OptionError(f"--run {run} is a file; give a folder.")
-            learn, limits = _learn("rlacd.learn.paper.train", "train"), ProcessLimits(limit, int(memory * 2**30))
+            learn, limits = _learn("rlacd.learn.train", "train"), ProcessLimits(limit, int(memory * 2**30))
             with open_pool(jobs, ray) as pool:
                 learn(meshes, run, options, resume=resume, say=typer.echo, pool=pool, limits=limits)
 

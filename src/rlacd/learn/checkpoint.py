@@ -1,89 +1,43 @@
-"""Checkpoints: a folder with the complete state of a run, replaced atomically and read without pickle.
-
-``weights.safetensors`` holds the networks and Adam's moments, ``replay.npz`` the buffer, ``rollouts.npz`` the episodes
-not yet learned from, ``state.json`` the rest.
-"""
+"""Checkpoints: the complete state of a run in one .npz, replaced atomically and read without pickle."""
 
 from __future__ import annotations
 
 import json
-import os
-import shutil
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from safetensors import SafetensorError
-from safetensors.torch import load_file, save_file
-from torch import Tensor
 
 from rlacd.errors import OutputError, TrainingError
-from rlacd.io.read.open_file import read_file
+from rlacd.learn.files import packed, save_bytes
 
-FORMAT = 3
+FORMAT = 4
 
-DAMAGE = (OSError, ValueError, KeyError, TypeError, RecursionError, MemoryError)
-"""Exceptions that reading a damaged file may raise, beyond those of its format."""
-
-
-@dataclass(frozen=True)
-class Checkpoint:
-    """The state of a run between two rounds.
-
-    Attributes
-    ----------
-    weights : dict of Tensor
-    replay : dict of ndarray
-    state : dict
-        Plain JSON values.
-    rollouts : dict of ndarray
-    """
-
-    weights: Mapping[str, Tensor]
-    replay: Mapping[str, NDArray[Any]]
-    state: Mapping[str, Any]
-    rollouts: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+Arrays = Mapping[str, NDArray[Any]]
 
 
-def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
-    """Write a checkpoint; if the process dies at any moment, a complete one remains, the old or the new.
+def save_checkpoint(path: Path, arrays: Arrays, state: Mapping[str, Any]) -> None:
+    """Write arrays and plain JSON values; if the process dies at any moment, the old file or the new one remains.
 
     Raises
     ------
     OutputError
         The disk is full or the folder is not writable.
     """
-    fresh, old = folder.with_name(folder.name + ".new"), folder.with_name(folder.name + ".old")
+    text = np.frombuffer(json.dumps({"format": FORMAT, **state}).encode(), np.uint8)
     try:
-        shutil.rmtree(fresh, ignore_errors=True)
-        fresh.mkdir(parents=True)
-        save_file(
-            {name: t.detach().cpu().contiguous() for name, t in checkpoint.weights.items()},
-            fresh / "weights.safetensors",
-        )
-        np.savez(fresh / "replay.npz", allow_pickle=False, **checkpoint.replay)
-        np.savez(fresh / "rollouts.npz", allow_pickle=False, **checkpoint.rollouts)
-        (fresh / "state.json").write_text(json.dumps({"format": FORMAT, **checkpoint.state}), encoding="utf-8")
-        for path in fresh.iterdir():
-            with open(path, "rb") as file:
-                os.fsync(file.fileno())
-        shutil.rmtree(old, ignore_errors=True)
-        if folder.exists():
-            folder.rename(old)
-        fresh.rename(folder)
-        shutil.rmtree(old, ignore_errors=True)
+        save_bytes(path, packed({"state": text, **arrays}))
     except OSError as error:
         raise OutputError(
-            f"the checkpoint {folder} cannot be written ({error}); free some space and use --resume."
+            f"the checkpoint {path} cannot be written ({error}); free some space and use --resume."
         ) from error
 
 
-def load_checkpoint(folder: Path) -> Checkpoint | None:
+def load_checkpoint(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]] | None:
     """Read a checkpoint; None if there is none.
 
     Raises
@@ -91,45 +45,50 @@ def load_checkpoint(folder: Path) -> Checkpoint | None:
     TrainingError
         It is damaged, or was written by another version.
     """
-    if not folder.exists():  # the process died between the two renames
-        folder = folder.with_name(folder.name + ".old")
-    if not folder.exists():
+    if not path.exists():
         return None
+    damage = (OSError, ValueError, KeyError, TypeError, EOFError, RecursionError, MemoryError, zipfile.BadZipFile)
     try:
-        state = json.loads(read_file(folder / "state.json"))
-        weights = load_file(folder / "weights.safetensors")
-        if state["format"] != FORMAT:
-            raise TrainingError(f"{folder} has format {state['format']}, not {FORMAT}; train again from the beginning.")
-        replay, rollouts = (_arrays(folder / name) for name in ("replay.npz", "rollouts.npz"))
-    except (*DAMAGE, SafetensorError, zipfile.BadZipFile) as error:
-        raise TrainingError(f"the checkpoint {folder} is damaged ({error}); remove it to train again.") from error
-    return Checkpoint(weights, replay, state, rollouts)
+        with zipfile.ZipFile(path) as archive:
+            if any(member.compress_type != zipfile.ZIP_STORED for member in archive.infolist()):
+                raise ValueError("it is compressed")  # a small file must not expand in memory
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        state = json.loads(arrays.pop("state").tobytes())
+        version = state["format"]
+    except damage as error:
+        raise TrainingError(f"the checkpoint {path} is damaged ({error}); remove it to train again.") from error
+    if version != FORMAT:
+        raise TrainingError(f"{path} has format {version}, not {FORMAT}; train again from the beginning.")
+    return arrays, state
 
 
-def _arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """Read arrays; they are stored uncompressed, so a small file cannot expand in memory."""
-    with zipfile.ZipFile(path) as archive:
-        if any(member.compress_type != zipfile.ZIP_STORED for member in archive.infolist()):
-            raise ValueError(f"{path.name} is compressed")
-    with np.load(path, allow_pickle=False) as arrays:
-        return {name: arrays[name] for name in arrays.files}
+def under(prefix: str, arrays: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
+    """The same arrays or tensors, with a prefix to their names."""
+    plain = {k: v.detach().cpu().numpy() if isinstance(v, torch.Tensor) else v for k, v in arrays.items()}
+    return {f"{prefix}.{name}": np.asarray(value) for name, value in plain.items()}
 
 
-def adam_state(optimizer: torch.optim.Adam) -> dict[str, Tensor]:
+def of(prefix: str, arrays: Arrays) -> dict[str, NDArray[Any]]:
+    """The arrays whose names have a prefix, without it."""
+    return {k.removeprefix(f"{prefix}."): v for k, v in arrays.items() if k.startswith(f"{prefix}.")}
+
+
+def tensors(arrays: Arrays) -> dict[str, torch.Tensor]:
+    """The same as tensors."""
+    return {name: torch.from_numpy(np.array(value)) for name, value in arrays.items()}
+
+
+def adam_state(optimizer: torch.optim.Adam) -> dict[str, torch.Tensor]:
     """Get Adam's moments and counts, by name."""
-    parameters = optimizer.param_groups[0]["params"]
-    return {
-        f"adam.{i}.{key}": value
-        for i, parameter in enumerate(parameters)
-        for key, value in optimizer.state.get(parameter, {}).items()
-    }
+    parameters = enumerate(optimizer.param_groups[0]["params"])
+    return {f"{i}.{key}": v for i, parameter in parameters for key, v in optimizer.state.get(parameter, {}).items()}
 
 
-def restore_adam(optimizer: torch.optim.Adam, weights: Mapping[str, Tensor]) -> None:
+def restore_adam(optimizer: torch.optim.Adam, saved: Mapping[str, torch.Tensor]) -> None:
     """Restore the result of `adam_state`."""
-    state: dict[int, dict[str, Tensor]] = {}
-    for name, value in weights.items():
-        if name.startswith("adam."):
-            _, i, key = name.split(".", 2)
-            state.setdefault(int(i), {})[key] = value
+    state: dict[int, dict[str, torch.Tensor]] = {}
+    for name, value in saved.items():
+        i, key = name.split(".", 1)
+        state.setdefault(int(i), {})[key] = value
     optimizer.load_state_dict({"state": state, "param_groups": optimizer.state_dict()["param_groups"]})

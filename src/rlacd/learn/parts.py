@@ -21,17 +21,10 @@ class Score:
     raw: list[int]
     merged: list[int]
 
-    def against(self, other: Score) -> dict[str, float]:
-        """Return this score's mean counts, and the geometric mean of their ratios to another policy's."""
-        return {
-            "parts": sum(self.raw) / len(self.raw),
-            "merged": sum(self.merged) / len(self.merged),
-            "parts_ratio": mean_ratio(self.raw, other.raw),
-            "merged_ratio": mean_ratio(self.merged, other.merged),
-        }
 
-
-def count_parts(policy: Policy, solids: Sequence[Component], criterion: Concavity, most: float = math.inf) -> Score:
+def count_parts(
+    policy: Policy, solids: Sequence[Component], criterion: Concavity, most: float = math.inf, *, merge: bool = True
+) -> Score:
     """Decompose solids and count parts, on one thread.
 
     Parameters
@@ -39,6 +32,8 @@ def count_parts(policy: Policy, solids: Sequence[Component], criterion: Concavit
     policy : Policy
     solids : sequence of Component
     criterion : Concavity
+    merge : bool
+        Whether to merge; otherwise `merged` repeats `raw`.
     most : float
         Number of parts at which a decomposition is stopped, since some never end. The counts are then too small, not
         too large.
@@ -46,7 +41,7 @@ def count_parts(policy: Policy, solids: Sequence[Component], criterion: Concavit
     raw, merged = [], []
     with Run(1) as run:
         for solid in solids:
-            done = cut_and_merge(CutTree(solid, policy, run), criterion, run, most=most)
+            done = cut_and_merge(CutTree(solid, policy, run), criterion, run, merge=merge, most=most)
             raw.append(len(done.pieces))
             merged.append(len(done.parts))
     return Score(raw, merged)

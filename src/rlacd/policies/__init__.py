@@ -2,9 +2,10 @@
 
 from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies.greedy import SCORES, Greedy
+from rlacd.policies.learned import Learned
 from rlacd.policies.navacd import CONCAVE_EDGES, NavACD
 from rlacd.policies.policy import CheckedPolicy, Policy
-from rlacd.policies.qpolicy import QPolicy
+from rlacd.policies.qpolicy import deployed
 from rlacd.policies.shortlist import RandomShortlist
 from rlacd.policy_names import AS_PUBLISHED, CONTROLS, EDGES, POLICIES, WEIGHTS_ENDING, is_policy
 
@@ -18,7 +19,8 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
     - ``navacd``: the plane with the least sum of hull volumes, among three planes and those of four concave edges.
     - ``random-N+edges``: the plane with the least sum of hull volumes among N random ones of the 150 and those of four
       concave edges; ``random-N``: among the random ones alone. Controls for learned policies.
-    - the path of a Q network in an ONNX file, as exported by ``rlacd train``: the paper's rule, the plane with the
+    - ``learned``: of greedy's 40 most promising planes, the one after which networks predict the fewest parts.
+    - ``rl-acd``, or the path of a Q network as written by ``rlacd train`` (.npz): the paper's rule, the plane with the
       least sum of hull volumes among the network's ten best planes and those of four concave edges.
 
     Parameters
@@ -35,8 +37,6 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
         No policy has this name.
     WeightsError
         The network cannot be loaded.
-    MissingExtraError
-        A network is requested without the extra ``learned``.
     """
     if not isinstance(name, str):
         return CheckedPolicy(name)
@@ -44,10 +44,10 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
         return Greedy(sweeps=sweeps)
     if name == "navacd":
         return NavACD()
-    if name.endswith(WEIGHTS_ENDING):
-        from rlacd.policies.q_network import load_q_network  # onnxruntime takes a while to import
-
-        return QPolicy.deployed(load_q_network(name), scale)
+    if name == "learned":
+        return Learned(sweeps, scale)
+    if name == "rl-acd" or name.endswith(WEIGHTS_ENDING):
+        return deployed(None if name == "rl-acd" else name, scale)
     family, _, score = name.partition("-")
     if family == "greedy" and score.removesuffix(EDGES) in SCORES:
         return Greedy(score.removesuffix(EDGES), concave_edges=CONCAVE_EDGES if score.endswith(EDGES) else 0)

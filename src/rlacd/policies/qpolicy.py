@@ -1,26 +1,27 @@
-"""Choosing a plane by a Q network: the best of the 150 planes, or by the paper's deployment rule."""
+"""Choosing a plane by the paper's Q network: the best of the 150 planes, or by the paper's deployment rule (4.2)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from importlib.resources import as_file, files
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rlacd.policies.navacd import CONCAVE_EDGES
-from rlacd.policies.observe import Float32Array, Observation, candidates_of, observe
+from rlacd.policies.network import load_network
+from rlacd.policies.observe import Float32Array, paper_planes, valid_planes
 from rlacd.policies.shortlist import least_hulls
+from rlacd.policies.sweep_features import FEATURES, PLANES, sweep_features
 from rlacd.solid.component import Component, Plane
-
-if TYPE_CHECKING:
-    from rlacd.policies.q_network import OnnxQ  # onnxruntime takes a while to import
 
 SHORTLIST = 10
 """Number of planes of greatest value from which the paper takes the one with the least sum of hull volumes."""
 
-QFunction = Callable[[Observation], Float32Array]
-"""Values [150] of the planes of an observed component."""
+KIND = "rl-acd"
+
+QFunction = Callable[[Component], Float32Array]
+"""Values [150] of a component's planes (`paper_planes`)."""
 
 
 class QPolicy:
@@ -29,42 +30,46 @@ class QPolicy:
     Parameters
     ----------
     values : callable
-        The Q network, in torch (`rlacd.learn.paper.torch_policy`) or exported (`rlacd.policies.q_network.OnnxQ`).
-    threshold : float
-        The criterion's threshold.
-    points : int
-        Number of points on each of the two surfaces.
     shortlist : int
         Number of best planes from which the one with the least sum of hull volumes is taken (paper: 10).
     concave_edges : int
         Number of concave edges whose planes join the shortlist (paper: 4, three planes each).
     """
 
-    def __init__(
-        self, values: QFunction, threshold: float, points: int = 2048, shortlist: int = 1, concave_edges: int = 0
-    ) -> None:
+    def __init__(self, values: QFunction, shortlist: int = 1, concave_edges: int = 0) -> None:
         self._values = values
-        self._threshold = threshold
-        self._points = points
         self._shortlist = shortlist
         self._concave_edges = concave_edges
 
-    @classmethod
-    def deployed(cls, network: OnnxQ, scale: float | None = None) -> QPolicy:
-        """Use an exported network as the paper does; `scale` is the criterion's length, if it has one."""
-        threshold = network.threshold if scale is None else scale
-        return cls(network, threshold, network.points, SHORTLIST, CONCAVE_EDGES)
-
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None if no candidate is valid."""
-        candidates = candidates_of(component)
-        seen = observe(component, candidates, self._threshold, self._points)
-        if not seen.mask.any():
+        candidates = paper_planes(component)
+        valid = valid_planes(component, candidates)
+        if not valid.any():
             return None
-        best = best_planes(self._values(seen), seen.mask, self._shortlist)
+        best = best_planes(self._values(component), valid, self._shortlist)
         if len(best) == 1 and not self._concave_edges:
             return candidates.plane(int(best[0]))
         return least_hulls(component, candidates, best, self._concave_edges, threads)
+
+
+def deployed(path: str | None = None, scale: float | None = None) -> QPolicy:
+    """Deploy a network as the paper does: that of a file written by ``rlacd train``, or the one in the package.
+
+    Parameters
+    ----------
+    path : str, optional
+    scale : float, optional
+        The criterion's length in the frame; the network's own by default.
+    """
+    if path is None:
+        with as_file(files("rlacd.policies") / "rl_acd.npz") as own:
+            return deployed(str(own), scale)
+    network = load_network(path, KIND, FEATURES, PLANES)
+    threshold = network.threshold if scale is None else scale
+    return QPolicy(
+        lambda c: network(sweep_features(c, threshold, bool(network.about.get("hull", True)))), SHORTLIST, CONCAVE_EDGES
+    )
 
 
 def best_planes(values: Float32Array, mask: NDArray[np.bool_], count: int) -> NDArray[np.intp]:

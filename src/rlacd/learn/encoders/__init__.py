@@ -1,17 +1,104 @@
-"""State encoders, which describe a component to the Q network, by name."""
+"""State encoders: what the Q network sees of a component, s(m) = (F(m), F(CH(m))) in the paper's 3.3."""
 
-from rlacd.learn.encoders.encoder import Encoder, describe
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Protocol
+
+import torch
+
+from rlacd.errors import OptionError
 from rlacd.learn.encoders.i2p_mae import I2PMAEEncoder
-from rlacd.learn.encoders.named import I2P_MAE, AnyEncoder, make_encoder
-from rlacd.learn.encoders.profile import ProfileEncoder, ProfileWithoutHull
+from rlacd.learn.options import TrainOptions
+from rlacd.policies.observe import Float32Array, surface_points
+from rlacd.policies.sweep_features import FEATURES, sweep_features
+from rlacd.solid.component import Component
 
-__all__ = [
-    "I2P_MAE",
-    "AnyEncoder",
-    "Encoder",
-    "I2PMAEEncoder",
-    "ProfileEncoder",
-    "ProfileWithoutHull",
-    "describe",
-    "make_encoder",
-]
+PUBLISHED = "https://github.com/ZrrSkywalker/I2P-MAE"
+
+
+class Encoder(Protocol):
+    """Describes components; nothing of it is learned."""
+
+    @property
+    def dim(self) -> int:
+        """Number of features."""
+
+    def describe(self, component: Component) -> Float32Array:
+        """Features [dim] of a component; the same component always has the same."""
+
+    def digest(self) -> str:
+        """Identify the encoder's weights; empty if it has none."""
+
+
+class SweepEncoder:
+    """The cheap default: see `sweep_features`."""
+
+    dim = FEATURES
+
+    def __init__(self, threshold: float, hull: bool) -> None:
+        self._threshold, self._hull = threshold, hull
+
+    def describe(self, component: Component) -> Float32Array:
+        """See `Encoder`."""
+        return sweep_features(component, self._threshold, self._hull)
+
+    def digest(self) -> str:
+        """See `Encoder`."""
+        return ""
+
+
+class PublishedEncoder:
+    """I2P-MAE of the component's surface and of its hull's, as in the paper."""
+
+    def __init__(self, network: I2PMAEEncoder, points: int) -> None:
+        network.require_points(points)
+        self.dim, self._network, self._points = network.dim, network, points
+
+    def describe(self, component: Component) -> Float32Array:
+        """See `Encoder`."""
+        points = torch.from_numpy(surface_points(component, self._points))
+        with torch.inference_mode():
+            features: Float32Array = self._network.encode(points[None])[0].numpy()
+        return features
+
+    def digest(self) -> str:
+        """See `Encoder`."""
+        return self._network.digest()
+
+
+def make_encoder(options: TrainOptions) -> Encoder:
+    """Build the encoder that the options name.
+
+    Raises
+    ------
+    OptionError
+        The encoder lacks weights that it needs or is given weights that it cannot use.
+    WeightsError
+        The file of weights cannot be used.
+    """
+    weights = options.encoder_weights
+    if options.encoder == "i2p-mae":
+        if not weights:
+            raise OptionError(
+                "encoder i2p-mae needs weights: give --encoder-weights FILE, the pre-trained checkpoint that "
+                f"{PUBLISHED} links to, or use --encoder sweep, which needs none."
+            )
+        network = I2PMAEEncoder.from_checkpoint(Path(weights)).to(pick_device(options.device))
+        return PublishedEncoder(network, options.points)
+    if weights:
+        raise OptionError(f"encoder {options.encoder} takes no weights; leave --encoder-weights out, or use i2p-mae.")
+    return SweepEncoder(options.threshold, hull=options.encoder == "sweep")
+
+
+def pick_device(name: str) -> torch.device:
+    """Get the device for ``cpu``, ``cuda`` or ``auto``: a GPU when there is one.
+
+    Raises
+    ------
+    OptionError
+        A GPU is requested and there is none.
+    """
+    if name == "cuda" and not torch.cuda.is_available():
+        raise OptionError("device is 'cuda', but torch finds no GPU; use cpu, or install torch for CUDA.")
+    return torch.device("cuda" if name != "cpu" and torch.cuda.is_available() else "cpu")

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -24,16 +23,10 @@ from rlacd.learn.encoders.point_groups import farthest_points, gather, nearest_p
 from rlacd.learn.encoders.transformer import Blocks, position_embedding
 from rlacd.learn.encoders.weights_file import load_weights
 
-REMEMBERED = 8192
-"""Size of the feature cache, in components: the same solids return in every episode and validation."""
-
 SCALES = 3
 
 LARGEST = 65536
 """Upper bound of every size."""
-
-AT_ONCE = 16
-"""Batch size of components on a GPU."""
 
 
 @dataclass(frozen=True)
@@ -192,7 +185,6 @@ class I2PMAEEncoder(nn.Module):
         self.sizes = sizes = sizes or Sizes()
         self.dim = 2 * sizes.widths[-1]
         self.h_encoder = HierarchicalEncoder(sizes)
-        self._known: OrderedDict[bytes, Tensor] = OrderedDict()
         self.eval().requires_grad_(False)
 
     @classmethod
@@ -234,36 +226,18 @@ class I2PMAEEncoder(nn.Module):
                 f"there are {count} points; this encoder needs at least {self.sizes.groups[0]} (--points)."
             )
 
-    def forward(self, points: Tensor, directions: Tensor) -> Tensor:
-        """See `Encoder.encode`; the directions are ignored.
+    def encode(self, points: Tensor) -> Tensor:
+        """Features [B, 768] of components by points [B, 2, N, 3] of their surface and their hull's, on the CPU.
 
-        Component and hull are scaled together into the unit ball, as the published pretraining does.
-        """
-        batch, _, count, _ = points.shape
-        radius = points.square().sum(-1).amax(dim=(1, 2)).sqrt().clamp_min(1e-12)
-        clouds = (points / radius[:, None, None, None]).reshape(2 * batch, count, 3)
-        return self.features(clouds).reshape(batch, self.dim)
-
-    def encode(self, points: Tensor, directions: Tensor) -> Tensor:
-        """See `Encoder.encode`; features are returned on the CPU and cached.
-
-        On a CPU components are encoded one by one, so that neither the cache nor the other components of a call affect
-        a component's bits.
+        Component and hull are scaled together into the unit ball, as the published pretraining does. Each component is
+        encoded alone, so that the others of a call do not affect its bits.
         """
         device = next(self.parameters()).device
-        at_once = 1 if device.type == "cpu" else AT_ONCE
-        keys = [hashlib.sha256(cloud.cpu().contiguous().numpy().tobytes()).digest() for cloud in points]
-        unknown = list({key: i for i, key in enumerate(keys) if key not in self._known}.values())
-        for first in range(0, len(unknown), at_once):
-            rows = unknown[first : first + at_once]
-            found = self(points[rows].to(device), directions[rows].to(device)).cpu()
-            self._known.update(zip((keys[i] for i in rows), found, strict=True))
-        for key in keys:
-            self._known.move_to_end(key)
-        features = torch.stack([self._known[key] for key in keys])
-        while len(self._known) > REMEMBERED:
-            self._known.popitem(last=False)
-        return features
+        found = []
+        for pair in points:
+            radius = pair.square().sum(-1).amax().sqrt().clamp_min(1e-12)
+            found.append(self.features((pair / radius).to(device)).reshape(self.dim).cpu())
+        return torch.stack(found)
 
     def digest(self) -> str:
         """Identify sizes and weights, independent of the device and the file they came from."""

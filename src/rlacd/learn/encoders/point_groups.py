@@ -2,7 +2,7 @@
 
 Squared distances are written as explicit products and sums in a fixed order. A library's reduction may use another, and
 one different bit makes farthest-point sampling pick another point, after which all later ones differ. Written this way,
-CPU, GPU and onnxruntime choose the same points.
+CPU and GPU choose the same points.
 """
 
 from __future__ import annotations
@@ -11,12 +11,8 @@ import torch
 from torch import Tensor
 
 
-@torch.library.custom_op("rlacd::farthest_points", mutates_args=())
 def farthest_points(points: Tensor, count: int) -> Tensor:
     """Farthest-point sampling: take the first point, then repeatedly the one farthest from those chosen.
-
-    This is a custom torch operator, so that it is exported as a loop (`rlacd.learn.paper.export`) instead of `count`
-    copies of the loop's body.
 
     Parameters
     ----------
@@ -38,11 +34,6 @@ def farthest_points(points: Tensor, count: int) -> Tensor:
         torch.argmax(nearest, dim=1, out=chosen[:, i])
         last = chosen[None, :, i : i + 1]
     return chosen
-
-
-@farthest_points.register_fake
-def _(points: Tensor, count: int) -> Tensor:
-    return points.new_empty(points.shape[0], count, dtype=torch.long)
 
 
 def nearest_points(points: Tensor, centers: Tensor, count: int) -> Tensor:

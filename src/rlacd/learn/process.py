@@ -8,12 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from rlacd.criteria import Criterion
 from rlacd.cut import CutCache
-from rlacd.learn.paper.options import TrainOptions
+from rlacd.learn.options import TrainOptions
 from rlacd.planes.candidates import Candidates
-from rlacd.policies.observe import candidates_of, valid_planes
+from rlacd.policies.observe import paper_planes, valid_planes
 from rlacd.solid.component import Component, Plane
 
 
@@ -24,8 +25,9 @@ class Reward:
     Attributes
     ----------
     saved : float
-        Eq. 2, relative to the component's own hull: (|CH(m_i)| - the sum of |CH| over its pieces) / |CH(m_i)|.
-        This is the reward of the decision process whose solid is m_i, consistent with the partial observation.
+        Eq. 2: (|CH(m_i)| - the sum of |CH| over its pieces) / |CH(m)|, where m is the original solid.
+    own_saved : float
+        The same for the process whose solid is m_i: relative to |CH(m_i)|.
     finished : float
         Eq. 3: 1 / (1 + log(|M'| - 1)) if this cut leaves every component of the solid finished, else 0.
     sides_finished : float
@@ -33,13 +35,15 @@ class Reward:
     """
 
     saved: float
+    own_saved: float
     finished: float
     sides_finished: float
 
     def worth(self, options: TrainOptions) -> float:
-        """r = lambda_1 r_1 + lambda_2 r_2 less the cost of a cut, as the component's own decision process sees it."""
+        """r = lambda_1 r_1 + lambda_2 r_2, less the cost of a cut."""
+        saved = self.saved if options.volume_of == "solid" else self.own_saved
         finished = self.finished if options.finish_counts == "solid" else self.sides_finished
-        return options.volume_reward * self.saved + options.finish_reward * finished - options.cut_cost
+        return options.volume_reward * saved + options.finish_reward * finished - options.cut_cost
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +91,16 @@ def terminal_reward(parts: int) -> float:
     return 1 / (1 + math.log(max(parts - 1, 1)))
 
 
+class Memory:
+    """Cuts, candidates, verdicts and features of components seen before: episodes of the same solid share them."""
+
+    def __init__(self) -> None:
+        self.cache = CutCache()
+        self.candidates: dict[Component, Candidates] = {}
+        self.met: dict[Component, bool] = {}
+        self.features: dict[Component, Any] = {}
+
+
 class CutProcess:
     """The decision process of one solid.
 
@@ -99,12 +113,14 @@ class CutProcess:
     solid : Component
     criterion : Criterion
         Decides when a component is finished.
+    memory : Memory, optional
+        That of earlier episodes with the same `solid` and criterion; affects only the time taken.
     """
 
-    def __init__(self, solid: Component, criterion: Criterion) -> None:
+    def __init__(self, solid: Component, criterion: Criterion, memory: Memory | None = None) -> None:
         self._criterion = criterion
-        self._candidates: dict[Component, Candidates] = {}
-        self._cache = CutCache()
+        self.memory = memory or Memory()
+        self._hull_volume = solid.hull.volume
         settled = self._settle(solid)
         self.frontier: list[Component] = settled.unfinished
         self.finished: list[Component] = settled.finished
@@ -127,9 +143,10 @@ class CutProcess:
 
     def candidates(self, component: Component) -> Candidates:
         """Get the candidate planes of a component of the frontier."""
-        if component not in self._candidates:
-            self._candidates[component] = candidates_of(component)
-        return self._candidates[component]
+        known = self.memory.candidates
+        if component not in known:
+            known[component] = paper_planes(component)
+        return known[component]
 
     def largest(self) -> int:
         """Index in the frontier of the component with the largest hull, so that coarse cuts come first."""
@@ -138,7 +155,7 @@ class CutProcess:
     def cut(self, index: int, plane: Plane) -> Cut:
         """Cut component `index` of the frontier by a plane."""
         cut = self.outcome(self.frontier[index], plane)
-        self._candidates.pop(self.frontier.pop(index), None)
+        self.frontier.pop(index)
         self.frontier += cut.unfinished
         self.finished += cut.finished
         self.stuck += cut.stuck
@@ -146,14 +163,15 @@ class CutProcess:
 
     def outcome(self, component: Component, plane: Plane) -> Cut:
         """Work out what cutting a component of the frontier by a plane would leave and earn."""
-        sides = self._cache.sides(component, plane)
+        sides = self.memory.cache.sides(component, plane)
         made = bool(sides)
         settled = _together([self._settle(side) for side in sides]) if made else CutResult(stuck=[component])
         own, children = component.hull.volume, [child.hull.volume for child in settled.all] if made else []
         all_finished = len(settled.finished) == len(settled.all)
         last = all_finished and len(self.frontier) == 1 and not self.stuck
         reward = Reward(
-            saved=(own - sum(children)) / own if made else 0.0,
+            saved=(own - sum(children)) / self._hull_volume if made else 0.0,
+            own_saved=(own - sum(children)) / own if made else 0.0,
             finished=terminal_reward(len(self.finished) + len(settled.finished)) if last else 0.0,
             sides_finished=terminal_reward(len(children)) if all_finished else 0.0,
         )
@@ -164,9 +182,12 @@ class CutProcess:
 
     def _settle(self, component: Component) -> CutResult:
         """Evaluate a component, split it if it has to be cut, and evaluate its pieces."""
-        if self._criterion.is_met(component):
+        met = self.memory.met
+        if component not in met:
+            met[component] = self._criterion.is_met(component)
+        if met[component]:
             return CutResult(finished=[component])
-        pieces = self._cache.pieces(component)
+        pieces = self.memory.cache.pieces(component)
         if pieces != [component]:
             return _together([self._settle(piece) for piece in pieces])
         if valid_planes(component, self.candidates(component)).any():

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd.criteria import Criterion
-from rlacd.learn.paper.mdp import CutProcess
+from rlacd.learn.process import CutProcess
 from rlacd.planes.candidates import OFFSETS_PER_AXIS
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component
@@ -96,7 +96,7 @@ def _grow(component: Component, criterion: Criterion, planes: Sequence[int], dep
         if cut.made:
             children = [_grow(child, criterion, planes, depth - 1, bins) for child in cut.unfinished]
             node.outcomes.append(
-                TabularOutcome(action, cut.reward.saved, cut.reward.sides_finished, children, list(cut.discounts))
+                TabularOutcome(action, cut.reward.own_saved, cut.reward.sides_finished, children, list(cut.discounts))
             )
     return node
 

@@ -1,0 +1,119 @@
+"""Compare policies on meshes: `python benchmarks/learned/compare.py MESHES OUT.jsonl [--split test] [--count 150] ...`.
+
+For each mesh, policy and criterion: parts before and after merging, and the CPU seconds of cutting. A run that was
+interrupted goes on where it stopped. In the end, geometric means of the ratios to the first policy's numbers, with
+95 % intervals by resampling meshes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import time
+from pathlib import Path
+
+import numpy as np
+
+from rlacd.criteria import Concavity, Criterion, NavigableSpace
+from rlacd.cut import CutTree
+from rlacd.errors import RlacdError
+from rlacd.io.read.load import load_mesh
+from rlacd.merge import drop_slivers, merge_parts
+from rlacd.policies import make_policy
+from rlacd.repair.repair import repair
+from rlacd.run import Run
+from rlacd.solid.component import Component
+from rlacd.solid.solid import Solid
+
+MOST_PARTS = 500
+"""Meshes of which the first policy makes more parts are left out."""
+
+SAMPLES = 4000
+
+
+def criterion_of(name: str, solid: Solid) -> tuple[Criterion, float | None]:
+    """Get a criterion and its length: ``navigable`` (5 %, 1 %), or a concavity threshold."""
+    if name == "navigable":
+        return NavigableSpace(radius=0.05, tolerance=0.01).prepare(solid, 1), None
+    return Concavity(float(name)), float(name)
+
+
+def measure(solid: Solid, policy: str, criterion: str, merge: bool) -> dict[str, float] | None:
+    """Cut and merge; None if there is nothing to cut, or too many parts."""
+    decides, length = criterion_of(criterion, solid)
+    root = Component(solid.shape)
+    if decides.is_met(root):
+        return None
+    with Run(1) as run:
+        begin = time.process_time()
+        done, left = CutTree(root, make_policy(policy, scale=length), run).cut_until(decides, MOST_PARTS)
+        row = {"cut_s": time.process_time() - begin, "raw": float(len(done) + len(left))}
+        if left and row["raw"] >= MOST_PARTS:
+            return None
+        if merge:
+            pieces = drop_slivers([*done, *left], run, suspects=left)
+            settled = decides.settled(pieces)
+            row["merged"] = float(len(drop_slivers(merge_parts(pieces, settled, run, solid=root), run)))
+    return row
+
+
+def summary(rows: list[dict[str, object]], policies: list[str], criteria: list[str]) -> None:
+    """Print the ratios."""
+    rng = np.random.default_rng(0)
+    for criterion in criteria:
+        of = {(r["file"], r["policy"]): r for r in rows if r["criterion"] == criterion and "raw" in r}
+        names = [f for f in dict.fromkeys(f for f, _ in of) if all((f, p) in of for p in policies)]
+        for policy in policies[1:] if names else ():
+            for key in ("raw", "merged", "cut_s"):
+                pairs = [(of[f, policy].get(key), of[f, policies[0]].get(key)) for f in names]
+                logs = np.array([np.log(float(a) / float(b)) for a, b in pairs if a and b])  # type: ignore[arg-type]
+                if not len(logs):
+                    continue
+                drawn = logs[rng.integers(len(logs), size=(SAMPLES, len(logs)))].mean(axis=1)
+                low, high = np.exp(np.quantile(drawn, [0.025, 0.975]))
+                total = sum(float(a) for a, _ in pairs if a) / sum(float(b) for _, b in pairs if b)  # type: ignore[arg-type]
+                print(
+                    f"{criterion:9s} {policy:22s} {key:6s} {np.exp(logs.mean()):.3f} ({low:.3f} to {high:.3f})"
+                    f"  of totals {total:.3f}  {len(logs)} meshes"
+                )
+
+
+def main() -> None:
+    """Measure what is missing and print the summary."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("meshes", type=Path)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--split", default="test")
+    parser.add_argument("--count", type=int, default=10**6)
+    parser.add_argument("--faces", type=int, default=10**6)
+    parser.add_argument("--merge", action="store_true")
+    parser.add_argument("--criteria", nargs="+", default=["0.05"])
+    parser.add_argument("--policies", nargs="+", default=["greedy-hull-sum+edges", "greedy", "learned"])
+    args = parser.parse_args()
+    with open(args.meshes / "index.csv", encoding="utf-8") as file:
+        listed = [r for r in csv.DictReader(file) if r["split"] == args.split]
+    names = sorted((int(r["faces"]), r["file"]) for r in listed if int(r["faces"]) <= args.faces)
+    names = [names[i] for i in np.sort(np.random.default_rng(0).permutation(len(names))[: args.count])]
+    rows = [json.loads(line) for line in args.out.read_text().splitlines()] if args.out.exists() else []
+    known = {(r["file"], r["policy"], r["criterion"]) for r in rows}
+    with open(args.out, "a") as out:
+        for _, name in names:
+            wanted = [(p, c) for c in args.criteria for p in args.policies if (name, p, c) not in known]
+            try:
+                solid = repair(load_mesh(args.meshes / name), threads=1) if wanted else None
+            except RlacdError:
+                continue
+            for policy, criterion in wanted:
+                assert solid is not None
+                row = {"file": name, "policy": policy, "criterion": criterion}
+                row |= measure(solid, policy, criterion, args.merge) or {}
+                rows.append(row)
+                print(json.dumps(row), file=out, flush=True)
+                if "raw" not in row and policy == args.policies[0]:
+                    break
+    summary(rows, args.policies, args.criteria)
+
+
+if __name__ == "__main__":
+    main()

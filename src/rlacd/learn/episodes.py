@@ -1,0 +1,168 @@
+"""An episode: a solid is cut until nothing is left to cut, and every cut is recorded as arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rlacd.learn.encoders import Encoder
+from rlacd.learn.files import packed, unpacked
+from rlacd.learn.options import TrainOptions
+from rlacd.learn.process import CutProcess
+from rlacd.policies.network import Network
+from rlacd.policies.observe import Float32Array, valid_planes
+from rlacd.solid.arrays import BoolArray, FloatArray
+from rlacd.solid.component import Component
+
+Longs = NDArray[np.int64]
+
+ENDED = ("terminal", "stuck", "cap", "nothing", "lost")
+"""Ways to end: all parts finished; some cannot be cut; truncated; nothing to cut; the episode could not be played."""
+
+
+@dataclass(frozen=True, eq=False)
+class Episode:
+    """T cuts of N components, with C unfinished children.
+
+    Attributes
+    ----------
+    features : float16 [N, D]
+    masks : bool [N, A]
+        Their valid planes.
+    state, planes : int64 [T]
+        The component that each cut divided, by its number, and the plane.
+    rewards : float64 [T]
+    child, owner : int64 [C]
+        Components that cuts left unfinished, and the cut of each.
+    discounts : float64 [C]
+    parts, ended : int
+        Number of components at the end; index into `ENDED`.
+    """
+
+    features: NDArray[np.float16]
+    masks: BoolArray
+    state: Longs
+    planes: Longs
+    rewards: FloatArray
+    child: Longs
+    owner: Longs
+    discounts: FloatArray
+    parts: int
+    ended: int
+
+    @classmethod
+    def empty(cls, ended: str) -> Episode:
+        """Create an episode without a cut."""
+        ints, floats = np.empty(0, np.int64), np.empty(0)
+        none = np.empty((0, 0), np.float16), np.empty((0, 0), np.bool_)
+        return cls(*none, ints, ints, floats, ints, ints, floats, 0, ENDED.index(ended))
+
+    @property
+    def how(self) -> str:
+        """How it ended."""
+        return ENDED[self.ended]
+
+    def children(self) -> list[dict[int, float]]:
+        """Discounts of the unfinished children of each cut, by their numbers."""
+        left: list[dict[int, float]] = [{} for _ in self.state]
+        for child, owner, discount in zip(*(a.tolist() for a in (self.child, self.owner, self.discounts)), strict=True):
+            left[owner][child] = discount
+        return left
+
+    def returns(self) -> list[tuple[float, dict[int, float]]]:
+        """For each cut, the discounted sum of its reward and of all later ones of the same component.
+
+        Returned with the components that were left uncut when the episode was broken off, and their discounts.
+        """
+        of: dict[int, tuple[float, dict[int, float]]] = {}
+        backwards = zip(self.state[::-1].tolist(), self.rewards[::-1].tolist(), self.children()[::-1], strict=True)
+        for state, total, children in backwards:
+            left: dict[int, float] = {}
+            for child, discount in children.items():
+                gained, below = of.get(child, (0.0, {child: 1.0}))
+                total += discount * gained
+                left |= {row: discount * weight for row, weight in below.items()}
+            of[state] = total, left
+        return [of[state] for state in self.state.tolist()]
+
+    def to_bytes(self) -> bytes:
+        """Pack it for `from_bytes`."""
+        return packed({name: np.asarray(value) for name, value in vars(self).items()})
+
+    @classmethod
+    def from_bytes(cls, content: bytes) -> Episode:
+        """Unpack the result of `to_bytes`."""
+        return cls(**{name: a if a.ndim else int(a) for name, a in unpacked(content).items()})
+
+
+@dataclass
+class Player:
+    """Plays one episode, a pure function of the attributes.
+
+    Attributes
+    ----------
+    cutting : CutProcess
+        The uncut solid; it must need a cut.
+    network : Network or None
+        None for uniformly random valid planes.
+    epsilon : float
+        Fraction of cuts that are uniformly random anyway.
+    rng : Generator
+        Generator of this episode only.
+    """
+
+    cutting: CutProcess
+    options: TrainOptions
+    encoder: Encoder
+    network: Network | None
+    epsilon: float
+    rng: np.random.Generator
+
+    def play(self) -> Episode:
+        """Cut the largest component again and again, epsilon-greedily."""
+        cutting, numbers = self.cutting, {c: i for i, c in enumerate(self.cutting.frontier)}
+        cuts: list[tuple[int, int, float]] = []
+        children: list[tuple[int, int, float]] = []
+        static = self.options.static_discount if self.options.discount == "static" else None
+        while not (ended := self._ended(len(cuts))):
+            component = cutting.frontier[cutting.largest()]
+            plane = self._choose(component)
+            cut = cutting.cut(cutting.largest(), cutting.candidates(component).plane(plane))
+            for child, share in zip(cut.unfinished, cut.discounts, strict=True):
+                numbers[child] = len(numbers)
+                children.append((numbers[child], len(cuts), share if static is None else static))
+            cuts.append((numbers[component], plane, cut.reward.worth(self.options)))
+        seen = [self._see(component) for component in numbers]
+        state, planes, rewards = (np.array(column) for column in zip(*cuts, strict=True))
+        child, owner, discounts = (np.array([c[i] for c in children]) for i in range(3))
+        return Episode(
+            np.stack([features for features, _ in seen]).astype(np.float16),
+            np.stack([mask for _, mask in seen]),
+            *(state, planes, rewards, child.astype(np.int64), owner.astype(np.int64), discounts),
+            parts=cutting.count,
+            ended=ENDED.index(ended),
+        )
+
+    def _ended(self, cuts: int) -> str:
+        if self.cutting.over:
+            return "terminal" if self.cutting.terminal else "stuck"
+        return "cap" if cuts and self.cutting.count >= self.options.max_parts else ""
+
+    def _see(self, component: Component) -> tuple[Float32Array, BoolArray]:
+        """Features, as exact as they are stored, and valid planes."""
+        known: dict[Component, Any] = self.cutting.memory.features
+        if component not in known:
+            features = self.encoder.describe(component).astype(np.float16).astype(np.float32)
+            known[component] = features, valid_planes(component, self.cutting.candidates(component))
+        seen: tuple[Float32Array, BoolArray] = known[component]
+        return seen
+
+    def _choose(self, component: Component) -> int:
+        """Choose a valid plane: the best, or a random one."""
+        features, mask = self._see(component)
+        if self.network is None or self.rng.random() < self.epsilon:
+            return int(self.rng.choice(np.flatnonzero(mask)))
+        return int(np.where(mask, self.network(features), -np.inf).argmax())

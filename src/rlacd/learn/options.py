@@ -1,0 +1,152 @@
+"""The options of a training run: one dataclass, whose fields also define the command line and its help.
+
+Commands of the published results (`docs/training.md` explains them)::
+
+    rlacd train MESHES --run RUN --preset paper --encoder-weights i2p_mae.pth           # Table 1
+    rlacd train MESHES --run RUN --preset paper ... --encoder sweep-without-hull        # 4.5.2, on cheap features
+    rlacd train MESHES --run RUN --preset paper ... --volume-reward 0                   # 4.5.3, without r1
+    rlacd train MESHES --run RUN --preset paper ... --finish-reward 0                   # 4.5.3, without r2
+    rlacd train MESHES --run RUN --preset paper ... --discount static                   # Fig. 7, diverges
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+from rlacd.errors import OptionError
+from rlacd.fields import check_fields, option, refuse_unknown
+
+
+@dataclass(frozen=True)
+class TrainOptions:
+    """All options that affect the outcome of a training run; defaults are the paper's where it states a value.
+
+    Raises
+    ------
+    OptionError
+        A value is of the wrong type or out of its range.
+    """
+
+    # The decision process (3.1)
+    threshold: float = option(
+        0.04, "Concavity at which a component is finished (paper, 4.1: 4 %).", least=0.001, most=1
+    )
+    volume_reward: float = option(1000.0, "Weight of the reward for hull volume saved, lambda 1 (4.1).", least=0)
+    volume_of: str = option(
+        "solid",
+        "What that volume is relative to: the hull of the whole solid (paper, eq. 2), or the component's own.",
+        one_of=("solid", "component"),
+    )
+    finish_reward: float = option(1000.0, "Weight of the reward for finishing, lambda 2 (4.1).", least=0)
+    finish_counts: str = option(
+        "solid",
+        "What has to be finished for that reward: the whole solid (paper, eq. 3), or the component's own two sides.",
+        one_of=("solid", "component"),
+    )
+    cut_cost: float = option(0.0, "Reward every cut costs (the paper: none).", least=0)
+    max_parts: int = option(512, "Components after which an episode is broken off.", least=2)
+    rotate: bool = option(True, "Turn each solid about a random axis by 0, 45, 90 or 180 degrees (4.3).")
+    max_faces: int = option(2000, "Leave out meshes with more triangles than this.", least=4)
+
+    # What the network sees (3.3)
+    encoder: str = option(
+        "sweep",
+        "What describes a component: the volumes on both sides of each plane, or the paper's pre-trained I2P-MAE.",
+        one_of=("sweep", "sweep-without-hull", "i2p-mae"),
+    )
+    encoder_weights: str = option("", "The file of i2p-mae's weights: the published checkpoint.")
+    points: int = option(2048, "i2p-mae: points on a component's surface and on its hull (4.1).", least=16, most=65536)
+
+    # Q-learning (3.5, 4.1)
+    iterations: int = option(1_000_000, "Cuts made, each followed by learning (4.1).", least=1)
+    warmup: int = option(10_000, "First cuts, made at random without learning (4.1).", least=0)
+    epsilon: float = option(0.2, "Share of random cuts after them (4.1).", least=0, most=1)
+    epsilon_decay: float = option(0.99, "Factor on it every 1000 cuts (4.1).", least=0, most=1)
+    replay: int = option(100_000, "Transitions kept (4.1).", least=1)
+    batch: int = option(256, "Transitions a gradient step.", least=1)
+    learn_every: int = option(1, "Cuts between gradient steps.", least=1)
+    learning_rate: float = option(1e-4, "Of Adam.", least=0)
+    target_every: int = option(1000, "Gradient steps between copies to the target network.", least=1)
+    temperature: float = option(0.0, "Of the soft value, in rewards; 0: the greatest value (eq. 7).", least=0, most=0.1)
+    discount: str = option(
+        "hull",
+        "What the values of the sides are weighted by: their share of the hull volume (eq. 9), or a constant.",
+        one_of=("hull", "static"),
+    )
+    static_discount: float = option(0.99, "That constant, for each side.", least=0, most=1)
+    returns: str = option(
+        "one-step",
+        "What the network learns from: a cut's reward and the values of its sides (eq. 8), or the rewards of the rest "
+        "of the episode.",
+        one_of=("one-step", "episode"),
+    )
+
+    # The run
+    seed: int = option(0, "The same seed, meshes and options give the same weights on CPU.", least=0, most=2**63 - 1)
+    environments: int = option(
+        4,
+        "Episodes played side by side; each begins once the one this many before it has been learned from.",
+        least=1,
+        most=4096,
+    )
+    threads: int = option(1, "Threads of the training process.", least=1, most=1024)
+    device: str = option("auto", "cpu, cuda, or auto: a GPU when there is one.", one_of=("auto", "cpu", "cuda"))
+    log_every: int = option(500, "Cuts between points of the curves.", least=1)
+    validate_every: int = option(10_000, "Cuts between validations.", least=1)
+    validation: int = option(16, "Meshes held out for validation; 0: validate with those learned from.", least=0)
+    checkpoint_seconds: float = option(300.0, "Seconds between checkpoints.", least=0)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.volume_reward == self.finish_reward == self.cut_cost == 0:
+            raise OptionError("volume_reward, finish_reward and cut_cost are all 0; there is nothing to learn from.")
+
+    @property
+    def unit(self) -> float:
+        """Scale of the values: the network predicts them in this unit, so that its outputs are of order 1."""
+        return max(self.volume_reward, self.finish_reward, 10 * self.cut_cost, 1e-9)
+
+    @classmethod
+    def preset(cls, name: str, **changes: Any) -> TrainOptions:
+        """Get the preset `name` from `PRESETS` with the given changes.
+
+        Raises
+        ------
+        OptionError
+            There is no such preset or option, or a value is out of range.
+        """
+        if name not in PRESETS:
+            raise OptionError(f"preset is {name!r}; it has to be one of {', '.join(PRESETS)}.")
+        refuse_unknown(cls, changes, "train")
+        return cls(**{**PRESETS[name], **changes})
+
+
+_TWO_CORES: Mapping[str, Any] = {"batch": 64, "learn_every": 4, "learning_rate": 3e-4, "max_faces": 700}
+
+PRESETS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
+    {
+        "paper": {"encoder": "i2p-mae"},
+        "two-cores": _TWO_CORES,
+        "one-mesh": {
+            **_TWO_CORES,
+            "returns": "episode",
+            "finish_counts": "component",
+            "volume_of": "component",
+            "learn_every": 2,
+            "learning_rate": 1e-3,
+            "target_every": 200,
+            "iterations": 20_000,
+            "warmup": 500,
+            "rotate": False,
+            "max_faces": 5000,
+            "environments": 1,
+            "validation": 0,
+            "validate_every": 1000,
+        },
+    }
+)
+"""Changes to the defaults: the paper's run; the same with cheap features, for two cores; a run of minutes that has to
+learn the few meshes it is given by heart."""

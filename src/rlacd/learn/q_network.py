@@ -1,0 +1,105 @@
+"""The Q network and its loss: values of all 150 planes of a component from its features (paper, 3.3, 3.5, 4.1)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from rlacd.errors import OptionError
+from rlacd.learn.encoders import Encoder, make_encoder
+from rlacd.learn.options import TrainOptions
+from rlacd.policies.network import Network, load_network
+from rlacd.policies.observe import Float32Array
+from rlacd.policies.qpolicy import KIND, QPolicy
+from rlacd.policies.sweep_features import PLANES
+from rlacd.solid.component import Component
+
+HIDDEN = (1024, 512, 256, 128)
+"""Widths of the paper's layers."""
+
+
+class QNetwork(nn.Module):
+    """A multilayer perceptron with ReLU.
+
+    Parameters
+    ----------
+    inputs : int
+        Number of features per component.
+    unit : float
+        Factor applied to the outputs. Rewards are weighted by 1000; without the factor the last layer needs the first
+        hundred thousand steps just to reach that scale.
+    """
+
+    def __init__(self, inputs: int, unit: float = 1.0, hidden: Sequence[int] = HIDDEN, outputs: int = PLANES) -> None:
+        super().__init__()
+        self.unit = unit
+        layers: list[nn.Module] = []
+        for before, after in pairwise((inputs, *hidden)):
+            layers += [nn.Linear(before, after), nn.ReLU()]
+        self.layers = nn.Sequential(*layers, nn.Linear((inputs, *hidden)[-1], outputs))
+
+    def forward(self, features: Tensor) -> Tensor:
+        """Values Q(p, m) [B, 150] of features [B, inputs]."""
+        out: Tensor = self.unit * self.layers(features)
+        return out
+
+    def plain(self, about: Mapping[str, Any]) -> Network:
+        """Copy the network for a file (`rlacd.policies.network`); its values are in units of `unit`."""
+        linear = [layer for layer in self.layers if isinstance(layer, nn.Linear)]
+        return Network([(x.weight.detach().cpu().numpy(), x.bias.detach().cpu().numpy()) for x in linear], about)
+
+
+def soft_value(q: Tensor, mask: Tensor, temperature: float) -> Tensor:
+    """V [B] = T log sum_p exp(Q(p) / T) over the planes in `mask` [B, A]; T = 0 gives the maximum (eq. 7).
+
+    Every row needs a valid plane.
+    """
+    q = q.masked_fill(~mask, -torch.inf)
+    if temperature == 0:
+        return q.amax(dim=1)
+    return temperature * torch.logsumexp(q / temperature, dim=1)
+
+
+def dual_state_target(reward: Tensor, values: Tensor, discounts: Tensor, owner: Tensor) -> Tensor:
+    """Right-hand side of eq. 8 [B]: each reward, plus the discounted values of the unfinished children of its cut.
+
+    Parameters
+    ----------
+    reward : float32 [B]
+    values, discounts : float32 [C]
+        Of all unfinished children in the batch. Finished ones have value 0 and are not listed.
+    owner : int64 [C]
+        The transition of each child.
+    """
+    return reward.index_add(0, owner, discounts * values)
+
+
+def bellman_loss(q: Tensor, planes: Tensor, target: Tensor, unit: float) -> Tensor:
+    """Half the mean squared error of Q(p, m), in units of `unit`: q [B, A], planes taken int64 [B], target [B]."""
+    taken = q.gather(1, planes[:, None])[:, 0]
+    return 0.5 * ((taken - target) / unit).square().mean()
+
+
+def policy_of(network: QNetwork | Network, encoder: Encoder, **deployment: int) -> QPolicy:
+    """Make a policy of a network; `deployment` is `QPolicy`'s shortlist and concave_edges."""
+    fixed = network if isinstance(network, Network) else network.plain({"threshold": 1.0})
+
+    def values(component: Component) -> Float32Array:
+        return fixed(encoder.describe(component))
+
+    return QPolicy(values, **deployment)
+
+
+def load_policy(run: Path, **deployment: int) -> QPolicy:
+    """Get the best network of a run as a policy, whatever its encoder; `deployment` as in `policy_of`."""
+    if not (run / "options.json").is_file():
+        raise OptionError(f"{run} holds no run.")
+    options = TrainOptions(**json.loads((run / "options.json").read_text(encoding="utf-8")))
+    encoder = make_encoder(options)
+    return policy_of(load_network(str(run / "policy.npz"), KIND, encoder.dim, PLANES), encoder, **deployment)

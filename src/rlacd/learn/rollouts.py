@@ -1,0 +1,238 @@
+"""Episodes played by a pool, some ahead of the learner, and consumed in order of their numbers.
+
+Episode n is drawn from the seed and n alone, and is played by the network as of the moment when episode n - E has been
+consumed, where E is the number of concurrent episodes. So the result of learning does not depend on the number, place
+or speed of the processes, or on the death of one: its episode is played again.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections import OrderedDict, deque
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rlacd.criteria import Concavity
+from rlacd.errors import TrainingError
+from rlacd.learn.encoders import make_encoder
+from rlacd.learn.episodes import Episode, Player
+from rlacd.learn.meshes import SOLID, TURNS, Solids, take_solid, turned
+from rlacd.learn.options import TrainOptions
+from rlacd.learn.process import CutProcess, Memory
+from rlacd.learn.q_network import QNetwork
+from rlacd.policies.network import Network, parse_network
+from rlacd.pool import Answer, Blobs, Pool, ProcessLimits, Request, Shared, WorkerDiedError, submit_with_retry
+from rlacd.solid.component import Component
+
+LOST = 10
+"""Training stops after this many consecutive episodes that could not be played, since the meshes cannot be at fault."""
+
+TRIES = 1000
+"""Training stops after this many consecutive solids without anything to cut."""
+
+REMEMBERED = 10_000
+"""Number of components of which a process remembers the cuts: a few hundred megabytes."""
+
+MESH, ACT = 1, 2
+"""Random streams of an episode."""
+
+
+@dataclass(frozen=True)
+class Acting:
+    """How cuts are chosen: the file of a network, None for random cuts; and the fraction that is random anyway."""
+
+    network: Shared | None
+    epsilon: float
+
+    @classmethod
+    def by(cls, network: QNetwork, epsilon: float) -> Acting:
+        """Let a network choose."""
+        return cls(Shared({"network": network.plain({"threshold": 1.0}).to_bytes()}), epsilon)
+
+
+class Rollouts:
+    """An endless sequence of episodes.
+
+    Parameters
+    ----------
+    pool : Pool
+        Closed by the caller.
+    solids : Solids
+    names : sequence of str
+        The meshes to draw from.
+    options : TrainOptions
+    limits : ProcessLimits
+        Limits of one episode.
+    say : callable
+        Receives messages about episodes that could not be played.
+    """
+
+    def __init__(
+        self,
+        pool: Pool,
+        solids: Solids,
+        names: Sequence[str],
+        options: TrainOptions,
+        limits: ProcessLimits,
+        say: Callable[[str], None],
+    ) -> None:
+        self._pool, self._solids, self._names, self._options = pool, solids, names, options
+        self._limits, self._say = limits, say
+        setting = {"options": json.dumps(dataclasses.asdict(options)).encode()}
+        if options.encoder_weights:
+            setting["encoder"] = Path(options.encoder_weights).read_bytes()
+        self._setting = Shared(setting)
+        self._ahead: deque[tuple[int, str, Future[Answer]] | Episode] = deque()
+        self._begun = self._without_cuts = self._lost = 0
+
+    def begin(self, acting: Acting) -> None:
+        """Start episodes until the required number is ahead."""
+        while len(self._ahead) < self._options.environments:
+            self._ahead.append(self._start(self._begun, acting))
+            self._begun += 1
+
+    def take(self) -> Episode:
+        """Wait for the next episode in order.
+
+        Raises
+        ------
+        TrainingError
+            Many consecutive episodes had no cut, or none of them could be played.
+        RlacdError
+            The error of all of them, such as a missing GPU.
+        """
+        episode = self._played(self._ahead.popleft())
+        self._without_cuts = 0 if len(episode.planes) else self._without_cuts + 1
+        self._lost = self._lost + 1 if episode.how == "lost" else 0
+        if self._lost == LOST:
+            raise TrainingError(
+                f"{LOST} episodes in a row were lost with their processes; give more --memory or a longer --limit, or "
+                "fewer --jobs, and use --resume."
+            )
+        if self._without_cuts == TRIES:
+            raise TrainingError(
+                f"none of {TRIES} solids drawn from {len(self._names)} meshes needs a cut; give other meshes, or a "
+                "smaller threshold."
+            )
+        return episode
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Wait for all episodes ahead, and return everything as arrays."""
+        self._ahead = deque(self._played(episode) for episode in self._ahead)
+        arrays = {f"ahead.{i}": np.frombuffer(self._played(e).to_bytes(), np.uint8) for i, e in enumerate(self._ahead)}
+        return {"counts": np.array([self._begun, len(self._ahead), self._without_cuts]), **arrays}
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Restore the result of `state`."""
+        self._begun, ahead, self._without_cuts = (int(count) for count in arrays["counts"])
+        self._ahead = deque(Episode.from_bytes(arrays[f"ahead.{i}"].tobytes()) for i in range(ahead))
+
+    def _start(self, number: int, acting: Acting) -> tuple[int, str, Future[Answer]]:
+        options = self._options
+        rng = np.random.default_rng([options.seed, MESH, number])
+        name, axis, turn = self._names[int(rng.integers(len(self._names)))], int(rng.integers(3)), int(rng.integers(4))
+        values = {
+            "name": name,
+            "axis": axis,
+            "degrees": TURNS[turn] if options.rotate else 0.0,
+            "epsilon": acting.epsilon,
+            "seed": [options.seed, ACT, number],
+        }
+        shared = {"setting": self._setting} | ({} if acting.network is None else {"network": acting.network})
+        request = Request(SERVER, values, self._solids.files(name), shared, self._limits)
+        return number, name, submit_with_retry(self._pool, request)
+
+    def _played(self, episode: tuple[int, str, Future[Answer]] | Episode) -> Episode:
+        if isinstance(episode, Episode):
+            return episode
+        number, name, future = episode
+        try:
+            answer = future.result()
+        except WorkerDiedError as died:
+            words = (died.last_words.splitlines() or [""])[-1]
+            self._say(f"episode {number}, {name}, is left out: {died} {words}".rstrip())
+            return Episode.empty("lost")
+        if SOLID in answer.blobs:
+            self._solids.keep(name, answer.blobs[SOLID])
+        return Episode.from_bytes(answer.blobs["episode"])
+
+
+SERVER = "rlacd.learn.rollouts:RolloutServer"
+
+
+class RolloutServer:
+    """Plays episodes in a process of the pool.
+
+    Parameters
+    ----------
+    staging : Path
+        A folder for temporary files.
+    """
+
+    def __init__(self, staging: Path) -> None:
+        self._staging = staging
+        self._setting = self._key = ""
+        self._options: TrainOptions
+        self._network: Network
+        self._known: OrderedDict[str, tuple[Component, Memory]] = OrderedDict()
+
+    def __call__(
+        self, values: dict[str, Any], blobs: Blobs, shared: Mapping[str, Shared]
+    ) -> tuple[dict[str, Any], dict[str, bytes]]:
+        """Play an episode.
+
+        Parameters
+        ----------
+        values : dict
+            See `Rollouts`.
+        blobs : dict of bytes
+            The repaired solid (`rlacd.learn.meshes.SOLID`), or the files of the mesh.
+        shared : dict of Shared
+            ``setting``: ``options`` as JSON, and the ``encoder``'s file of weights if it has one. ``network``: that of
+            `Acting`.
+
+        Returns
+        -------
+        dict
+            Empty.
+        dict of bytes
+            ``episode``, and `SOLID` if it had to be repaired.
+        """
+        self._take_over(shared)
+        solid, kept = take_solid(blobs, self._staging)
+        if solid is None:
+            return {}, {"episode": Episode.empty("nothing").to_bytes(), **kept}
+        key = f"{values['name']} {values['axis'] if values['degrees'] else 0} {values['degrees']}"
+        component, memory = self._known.pop(key, None) or (turned(solid, values["axis"], values["degrees"]), Memory())
+        cutting = CutProcess(component, Concavity(self._options.threshold), memory)
+        if cutting.over or cutting.count > self._options.max_parts:
+            return {}, {"episode": Episode.empty("nothing").to_bytes(), **kept}
+        network = self._network if "network" in shared else None
+        rng = np.random.default_rng(values["seed"])
+        player = Player(cutting, self._options, self._encoder, network, values["epsilon"], rng)
+        episode = player.play()
+        self._known[key] = component, memory
+        while sum(len(memory.met) for _, memory in self._known.values()) > REMEMBERED:
+            self._known.popitem(last=False)
+        return {}, {"episode": episode.to_bytes(), **kept}
+
+    def _take_over(self, shared: Mapping[str, Shared]) -> None:
+        """Rebuild whatever changed in the shared data since the last request."""
+        setting = shared["setting"]
+        if setting.key != self._setting:
+            options = TrainOptions(**json.loads(setting.blobs["options"]))
+            if "encoder" in setting.blobs:
+                file = self._staging / Path(options.encoder_weights).name
+                file.write_bytes(setting.blobs["encoder"])
+                options = dataclasses.replace(options, encoder_weights=str(file))
+            self._options, self._encoder, self._setting, self._key = options, make_encoder(options), setting.key, ""
+            self._known.clear()
+        if "network" in shared and shared["network"].key != self._key:
+            self._network, self._key = parse_network(shared["network"].blobs["network"]), shared["network"].key

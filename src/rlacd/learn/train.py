@@ -1,0 +1,310 @@
+"""RL-ACD's training (the paper's 3.5 and 4.1), from top to bottom: cut, store, learn from the children of each cut.
+
+A pool of processes plays episodes (`rlacd.learn.rollouts`), and this process learns from them. On CPU the same meshes,
+options and seed give the same weights bit for bit, wherever episodes are played and whether or not the run was
+interrupted: a checkpoint holds the complete state. The options, and the command of each published result:
+`rlacd.learn.options`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from rlacd.criteria import Concavity
+from rlacd.errors import OptionError, TrainingError
+from rlacd.fields import require_same
+from rlacd.learn.checkpoint import (
+    adam_state,
+    load_checkpoint,
+    of,
+    restore_adam,
+    save_checkpoint,
+    tensors,
+    under,
+)
+from rlacd.learn.encoders import Encoder, make_encoder, pick_device
+from rlacd.learn.episodes import Episode
+from rlacd.learn.files import save_bytes
+from rlacd.learn.meshes import MeshList, Solids, list_once
+from rlacd.learn.options import TrainOptions
+from rlacd.learn.parts import count_parts, mean_ratio
+from rlacd.learn.q_network import QNetwork, bellman_loss, dual_state_target, policy_of, soft_value
+from rlacd.learn.replay import Replay, Seen, Transition
+from rlacd.learn.rollouts import Acting, Rollouts
+from rlacd.policies import make_policy
+from rlacd.policies.qpolicy import KIND, SHORTLIST
+from rlacd.policies.shortlist import RandomShortlist
+from rlacd.pool import InProcessPool, Pool, ProcessLimits
+
+VALIDATED = 16
+"""At most this many solids are validated with."""
+
+
+def train(
+    meshes: Path,
+    run: Path,
+    options: TrainOptions,
+    *,
+    resume: bool = False,
+    say: Callable[[str], None] = print,
+    pool: Pool | None = None,
+    limits: ProcessLimits | None = None,
+) -> Path:
+    """Train a Q network on a folder of meshes.
+
+    Parameters
+    ----------
+    meshes : Path
+        Folder of mesh files, searched to any depth.
+    run : Path
+        Folder for ``curves.jsonl``, the checkpoint and the policy.
+    options : TrainOptions
+    resume : bool
+        Continue exactly from the checkpoint in `run`; without one, start afresh.
+    say : callable
+        Receives lines of progress.
+    pool : Pool, optional
+        Where episodes are played; in this process by default. It affects only the time taken.
+    limits : ProcessLimits, optional
+        Limits of one episode.
+
+    Returns
+    -------
+    Path
+        The best network so far, ``run/policy.npz``.
+
+    Raises
+    ------
+    OptionError
+        `run` holds another run, or the options do not match the run to be resumed.
+    TrainingError
+        There are no usable meshes, the checkpoint is damaged, or episodes cannot be played.
+    """
+    torch.set_num_threads(options.threads)
+    if (run / "checkpoint.npz").exists() and not resume:
+        raise OptionError(f"{run} holds a run already; use --resume to go on with it, or another folder.")
+    listed = list_once(meshes, run, options.max_faces, options.validation, options.seed)
+    save_bytes(run / "options.json", json.dumps(dataclasses.asdict(options), indent=1).encode())
+    say(
+        f"{len(listed.training)} meshes to learn from, {len(listed.validation)} to validate with; "
+        f"{listed.unreadable} cannot be read, {listed.too_large} are too large"
+    )
+    with ExitStack() as stack:
+        where, solids = pool or stack.enter_context(InProcessPool()), Solids(meshes, run / "solids")
+        rollouts = Rollouts(where, solids, listed.training, options, limits or ProcessLimits(), say)
+        training = Training(run, options, rollouts, Validation(listed, solids, options), say)
+        training.restore()
+        training.run()
+    return run / "policy.npz"
+
+
+class Training:
+    """The state of a run, and the loop."""
+
+    def __init__(
+        self,
+        folder: Path,
+        options: TrainOptions,
+        rollouts: Rollouts,
+        validation: Validation,
+        say: Callable[[str], None],
+    ) -> None:
+        self.folder, self.options, self.rollouts, self.validation, self.say = folder, options, rollouts, validation, say
+        self.encoder = make_encoder(options)
+        self.device = pick_device(options.device)
+        torch.manual_seed(options.seed)
+        self.network = QNetwork(self.encoder.dim, options.unit).to(self.device)
+        self.target = QNetwork(self.encoder.dim, options.unit).to(self.device)
+        self.target.load_state_dict(self.network.state_dict())
+        self.optimizer = torch.optim.Adam(self.network.parameters(), lr=options.learning_rate, fused=True)
+        self.replay = Replay(options.replay)
+        self.rng = np.random.default_rng([options.seed, 0])
+        self.cuts = self.learned = 0
+        self.best = np.inf
+        self.seconds = 0.0
+        self.sums: dict[str, float] = {}  # since the last point of the curves, with their counts
+
+    # The algorithm
+
+    def run(self) -> None:
+        """Play episodes and learn from them until the last iteration."""
+        options, saved, before = self.options, time.perf_counter(), time.perf_counter() - self.seconds
+        while self.cuts < options.iterations:
+            cuts = self.cuts
+            self.rollouts.begin(self.acting())
+            self.learn_from(self.rollouts.take())
+            self.seconds = time.perf_counter() - before
+            if self.cuts // options.log_every > cuts // options.log_every:
+                self.log()
+            if self.cuts // options.validate_every > cuts // options.validate_every:
+                self.validate()
+            if time.perf_counter() - saved >= options.checkpoint_seconds:
+                self.save()
+                saved = time.perf_counter()
+        if not np.isfinite(self.best):
+            self.validate()
+        self.save()
+        self.say(self.validation.verdict(self.best, self.folder, options))
+
+    def acting(self) -> Acting:
+        """How new episodes are played (4.1): at random at first, then epsilon-greedily."""
+        if self.cuts < self.options.warmup:
+            return Acting(None, 1.0)
+        thousands = (self.cuts - self.options.warmup) // 1000
+        return Acting.by(self.network, self.options.epsilon * self.options.epsilon_decay**thousands)
+
+    def learn_from(self, episode: Episode) -> None:
+        """Add an episode to the replay buffer cut by cut, and learn after each."""
+        seen = [Seen(*pair) for pair in zip(episode.features, episode.masks, strict=True)]
+        targets = list(zip(episode.rewards.tolist(), episode.children(), strict=True))
+        if self.options.returns == "episode":
+            targets = episode.returns()
+        cuts = zip(episode.state.tolist(), episode.planes.tolist(), targets, strict=True)
+        for state, plane, (gained, children) in cuts:
+            left = tuple((seen[child], discount) for child, discount in children.items())
+            self.replay.add(Transition(seen[state], plane, gained, left))
+            self.cuts += 1
+            if self.cuts > self.options.warmup and self.cuts % self.options.learn_every == 0:
+                self.learn()
+        if len(episode.planes):
+            self._add(reward=float(episode.rewards.mean()), parts=float(episode.parts))
+        self._add(**{f"ended_{episode.how}": 1.0})
+
+    def learn(self) -> None:
+        """Take a gradient step on the dual-state Bellman loss (eq. 8) of one batch."""
+        options, batch = self.options, self.replay.sample(self.options.batch, self.rng)
+        tensor = {name: torch.from_numpy(array).to(self.device) for name, array in vars(batch).items()}
+        with torch.no_grad():
+            values = soft_value(self.target(tensor["child_features"]), tensor["child_masks"], options.temperature)
+            target = dual_state_target(tensor["rewards"], values, tensor["child_discounts"], tensor["owner"])
+        loss = bellman_loss(self.network(tensor["features"]), tensor["planes"], target, options.unit)
+        self.optimizer.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        self.optimizer.step()
+        self.learned += 1
+        if self.learned % options.target_every == 0:
+            self.target.load_state_dict(self.network.state_dict())
+        self._add(loss=float(loss.detach()), target=float(target.mean()))
+
+    # Curves, validation, checkpoints
+
+    def log(self) -> None:
+        """Append a point to the curves: means since the last one; for ways to end, counts."""
+        counts = {name: self.sums[f"n {name}"] for name in self.sums if not name.startswith("n ")}
+        means = {k: self.sums[k] if k.startswith("ended_") else self.sums[k] / n for k, n in counts.items()}
+        self.sums = {}
+        self._point(means)
+
+    def validate(self) -> None:
+        """Count the parts of the validation's solids; the network with the fewest is kept as the best."""
+        ratios = self.validation.ratios(self.network, self.encoder)
+        self._point({f"validation_{name}": value for name, value in ratios.items()})
+        if ratios["own_plane"] <= self.best:
+            self.best = ratios["own_plane"]
+            about = {"kind": KIND, "threshold": self.options.threshold, "hull": self.options.encoder == "sweep"}
+            about["encoder"] = self.options.encoder
+            save_bytes(self.folder / "policy.npz", self.network.plain(about).to_bytes())
+
+    def save(self) -> None:
+        """Write a checkpoint."""
+        arrays = under("network", self.network.state_dict()) | under("target", self.target.state_dict())
+        arrays |= under("adam", adam_state(self.optimizer)) | under("replay", self.replay.state())
+        arrays |= under("rollouts", self.rollouts.state())
+        state = {name: getattr(self, name) for name in ("cuts", "learned", "seconds", "sums", "best")}
+        state |= {"options": dataclasses.asdict(self.options), "encoder": self.encoder.digest()}
+        save_checkpoint(self.folder / "checkpoint.npz", arrays, {**state, "generator": self.rng.bit_generator.state})
+
+    def restore(self) -> None:
+        """Go on from the checkpoint, if there is one; the curves after it are dropped and will be computed again."""
+        curves = self.folder / "curves.jsonl"
+        found = load_checkpoint(self.folder / "checkpoint.npz")
+        if found is None:
+            curves.write_text("", encoding="utf-8")
+            return
+        arrays, state = found
+        require_same(state["options"], self.options, MAY_CHANGE)
+        if state["encoder"] != self.encoder.digest():
+            raise OptionError(
+                f"{self.options.encoder_weights} holds other weights than the run began with; give the same "
+                "--encoder-weights, or begin another run."
+            )
+        self.network.load_state_dict(tensors(of("network", arrays)))
+        self.target.load_state_dict(tensors(of("target", arrays)))
+        restore_adam(self.optimizer, tensors(of("adam", arrays)))
+        self.replay.restore(of("replay", arrays))
+        self.rollouts.restore(of("rollouts", arrays))
+        self.cuts, self.learned, self.seconds, self.best = (state[k] for k in ("cuts", "learned", "seconds", "best"))
+        self.sums, self.rng.bit_generator.state = state["sums"], state["generator"]
+        kept = [line for line in curves.read_text(encoding="utf-8").splitlines(keepends=True) if line.endswith("\n")]
+        curves.write_text("".join(x for x in kept if json.loads(x)["cuts"] <= self.cuts), encoding="utf-8")
+        self.say(f"resuming at cut {self.cuts}")
+
+    def _point(self, values: dict[str, float]) -> None:
+        with open(self.folder / "curves.jsonl", "a", encoding="utf-8") as file:
+            file.write(json.dumps({"cuts": self.cuts, **values, "seconds": round(self.seconds, 3)}) + "\n")
+        self.say(
+            f"cut {self.cuts}  " + "  ".join(f"{k} {v:.4g}" for k, v in values.items()) + f"  {self.seconds:.0f} s"
+        )
+
+    def _add(self, **values: float) -> None:
+        for name, value in values.items():
+            self.sums[name] = self.sums.get(name, 0.0) + value
+            self.sums[f"n {name}"] = self.sums.get(f"n {name}", 0) + 1
+
+
+class Validation:
+    """Raw parts of a few solids, as geometric means of their ratios to greedy's over the 150 planes alone."""
+
+    def __init__(self, listed: MeshList, solids: Solids, options: TrainOptions) -> None:
+        self._names = (listed.validation or listed.training)[:VALIDATED]
+        self._held_out = bool(listed.validation)
+        self._solids, self._options = solids, options
+        self._greedy: list[int] = []
+        self._random = np.nan
+
+    def ratios(self, network: QNetwork, encoder: Encoder) -> dict[str, float]:
+        """Ratios of the network's own plane, its ten best, and of random planes."""
+        criterion, most = Concavity(self._options.threshold), self._options.max_parts
+        solids = [solid for name in self._names if (solid := self._solids.get(name)) is not None]
+        if not solids:
+            raise TrainingError("none of the meshes held out for validation can be repaired; hold out more.")
+        if not self._greedy:
+            self._greedy = count_parts(make_policy("greedy-hull-sum"), solids, criterion, most, merge=False).raw
+            by_chance = count_parts(RandomShortlist(1, concave_edges=0), solids, criterion, most, merge=False).raw
+            self._random = mean_ratio(by_chance, self._greedy)
+        own, ten = (
+            count_parts(policy_of(network, encoder, shortlist=n), solids, criterion, most, merge=False).raw
+            for n in (1, SHORTLIST)
+        )
+        return {
+            "parts": sum(own) / len(own),
+            "own_plane": mean_ratio(own, self._greedy),
+            "ten_best": mean_ratio(ten, self._greedy),
+            "random": self._random,
+        }
+
+    def verdict(self, best: float, folder: Path, options: TrainOptions) -> str:
+        """Say what the run has reached, and the next command."""
+        where = "solids it has not seen" if self._held_out else "the solids it learned from"
+        text = (
+            f"On {where}, the network's own plane leaves {best:.3f} times greedy's parts (random: {self._random:.3f}). "
+        )
+        if best > 1:
+            return f"{text}Greedy is better: go on with  --resume --iterations {2 * options.iterations}  in {folder}."
+        if options.encoder == "i2p-mae":
+            return f"{text}Use it in Python:  rlacd.learn.q_network.load_policy({str(folder)!r}, shortlist=10)."
+        return f"{text}Use it:  rlacd decompose MESH --policy {folder / 'policy.npz'}"
+
+
+MAY_CHANGE = frozenset(
+    {"iterations", "checkpoint_seconds", "log_every", "validate_every", "device", "threads", "encoder_weights"}
+)
+"""Options that may change when a run is resumed: its length, its logging, its place and files."""

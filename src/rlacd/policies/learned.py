@@ -1,0 +1,89 @@
+"""The shipped policy: of greedy's most promising planes, the one after which the fewest parts are to be expected.
+
+An ensemble of small networks ranks planes by what the sweep gives for them. It was trained on the numbers of parts that
+greedy ends in after each of several planes (`learned.md` beside the weights).
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from importlib.resources import as_file, files
+
+import numpy as np
+
+from rlacd.planes.least_excess import SLIVERS
+from rlacd.planes.sweep import Sweep
+from rlacd.planes.sweep_cache import SweepCache
+from rlacd.policies.greedy import Greedy, excess_norm
+from rlacd.policies.network import Network, load_network
+from rlacd.policies.plane_features import FEATURES, plane_features
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.component import Component, Plane
+
+KIND = "learned"
+
+NETWORKS = 4
+"""Size of the ensemble."""
+
+PROMISING = 40
+"""Number of planes of least excess among which the networks choose: the labels know few others."""
+
+LEAST_GAIN = 0.02
+"""Predicted saving in log(parts) for which greedy's plane is given up: below it, predictions are noise."""
+
+SIMPLE = 3.0
+"""Excess of the component's hull, as the edge of a cube over the criterion's length, below which greedy decides:
+nearly all such components end in two parts, whatever the plane, and a sweep takes longer than greedy's bounds."""
+
+TYPICAL = 0.05
+"""Stands for the criterion's length if it has none."""
+
+
+class Learned:
+    """Chooses the plane of least predicted parts.
+
+    Parameters
+    ----------
+    sweeps : SweepCache, optional
+        Provides the 150 planes and those of concave edges.
+    scale : float, optional
+        The criterion's length in the frame, if it has one.
+    """
+
+    def __init__(self, sweeps: SweepCache | None = None, scale: float | None = None) -> None:
+        self._sweeps = sweeps or SweepCache()
+        self._scale = scale
+        self._networks = shipped_networks()
+        self._greedy = Greedy(sweeps=self._sweeps)
+
+    def choose(self, component: Component, threads: int = 1) -> Plane | None:
+        """Choose the plane to cut a component by; None if every candidate misses it or shaves off a film."""
+        excess = max(component.hull.volume - component.volume, 0.0)
+        if math.cbrt(excess) < SIMPLE * (self._scale or TYPICAL):
+            return self._greedy.choose(component, threads)
+        scored = self._sweeps.of(component, threads)
+        valid = next((v for sliver in SLIVERS if (v := scored.valid(sliver)).any()), None)
+        if valid is None:
+            return None
+        order = np.argsort(np.where(valid, excess_norm(scored), np.inf), kind="stable")[: min(PROMISING, valid.sum())]
+        features = features_of(component, scored, self._scale)[order].astype(np.float32)
+        predicted = np.mean([network(features)[:, 0] for network in self._networks], axis=0)
+        best = int(predicted.argmin())
+        return scored.candidates.plane(int(order[best if predicted[best] < predicted[0] - LEAST_GAIN else 0]))
+
+
+def features_of(component: Component, scored: Sweep, scale: float | None) -> FloatArray:
+    """Features [N, F] of all planes of a component's sweep."""
+    valid = next((v for sliver in SLIVERS if (v := scored.valid(sliver)).any()), scored.valid())
+    return plane_features(scored, valid, component.hull.volume, component.volume, np.ptp(component.box, axis=0), scale)
+
+
+@lru_cache(maxsize=1)
+def shipped_networks() -> list[Network]:
+    """The networks in the package."""
+    found = []
+    for number in range(NETWORKS):
+        with as_file(files("rlacd.policies") / f"learned_{number}.npz") as path:
+            found.append(load_network(str(path), KIND, FEATURES, 1))
+    return found

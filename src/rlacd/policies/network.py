@@ -1,0 +1,117 @@
+"""Networks as files: weights of linear layers in an uncompressed .npz without pickle, evaluated by numpy."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import os
+import zipfile
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rlacd.errors import WeightsError
+from rlacd.io.read.open_file import read_file
+from rlacd.policies.observe import Float32Array
+
+MOST_BYTES = 2**28
+"""Size of the largest file that is read; the paper's network has 7 MB."""
+
+
+DAMAGE = (
+    *(ValueError, KeyError, TypeError, AttributeError, EOFError, OSError, ArithmeticError, RecursionError),
+    *(MemoryError, NotImplementedError, zipfile.BadZipFile),
+)
+"""Exceptions that parsing a damaged file may raise."""
+
+
+class Network:
+    """Linear layers with ReLU between them.
+
+    Parameters
+    ----------
+    layers : sequence of (weight [outputs, inputs], bias [outputs])
+    about : mapping
+        What the file says of itself: ``kind``, and the length of the criterion it was trained with, ``threshold``.
+    """
+
+    def __init__(
+        self, layers: Sequence[tuple[NDArray[np.generic], NDArray[np.generic]]], about: Mapping[str, Any]
+    ) -> None:
+        self.layers = [(w.astype(np.float32), b.astype(np.float32)) for w, b in layers]
+        self.about = about
+        self.threshold = float(about["threshold"])
+
+    def __call__(self, features: Float32Array) -> Float32Array:
+        """Outputs [..., outputs] of features [..., inputs]."""
+        for weight, bias in self.layers[:-1]:
+            features = np.maximum(features @ weight.T + bias, 0)
+        weight, bias = self.layers[-1]
+        found: Float32Array = features @ weight.T + bias
+        return found
+
+    def to_bytes(self, *, small: bool = False) -> bytes:
+        """Make the content of a file; a small one holds bytes, scaled by rows."""
+        arrays: dict[str, NDArray[np.generic]] = {}
+        for i, (weight, bias) in enumerate(self.layers):
+            scale = np.abs(weight).max(axis=1, keepdims=True) / 127 + 1e-30
+            arrays |= {f"b{i}": bias, f"w{i}": weight}
+            if small:
+                arrays |= {f"w{i}": np.rint(weight / scale).astype(np.int8), f"s{i}": scale.astype(np.float32)}
+        file = io.BytesIO()
+        about = np.frombuffer(json.dumps(dict(self.about)).encode(), np.uint8)
+        np.savez(file, allow_pickle=False, about=about, **arrays)  # type: ignore[arg-type]
+        return file.getvalue()
+
+
+@lru_cache(maxsize=4)
+def load_network(path: str | os.PathLike[str], kind: str, inputs: int, outputs: int) -> Network:
+    """Read a network; the last four are cached.
+
+    Raises
+    ------
+    WeightsError
+        The file is missing, damaged, or not a network of this kind.
+    """
+    try:
+        content = read_file(path)
+    except OSError as error:
+        raise WeightsError(f"The policy {path} cannot be read ({error}); give another path.") from error
+    try:
+        network = parse_network(content)
+    except DAMAGE as error:
+        raise WeightsError(f"{path} is damaged or not a network of rlacd; train or fetch it again.") from error
+    shape = network.layers[0][0].shape[1], network.layers[-1][0].shape[0]
+    if network.about.get("kind") != kind or shape != (inputs, outputs):
+        raise WeightsError(f"{path} is not a network of this kind ({kind}, {inputs} inputs); give another path.")
+    return network
+
+
+def parse_network(content: bytes) -> Network:
+    """Parse the content of a file; anything but a network raises one of many exceptions."""
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        if len(content) > MOST_BYTES or any(m.compress_type != zipfile.ZIP_STORED for m in archive.infolist()):
+            raise ValueError
+    with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+        about = json.loads(arrays["about"].tobytes())
+        layers = []
+        for i in range(sum(name.startswith("w") for name in arrays.files)):
+            weight, bias = arrays[f"w{i}"], arrays[f"b{i}"]
+            if weight.dtype == np.int8:
+                weight = weight * arrays[f"s{i}"]
+            if weight.ndim != 2 or bias.shape != weight.shape[:1] or {weight.dtype.kind, bias.dtype.kind} != {"f"}:
+                raise ValueError
+            layers.append((weight, bias))
+    if not layers or any(a[0].shape[0] != b[0].shape[1] for a, b in pairwise(layers)):
+        raise ValueError
+    if not all(np.isfinite(a).all() for layer in layers for a in layer):
+        raise ValueError
+    network = Network(layers, about)
+    if not 0 < network.threshold < math.inf:
+        raise ValueError
+    return network

@@ -1,0 +1,88 @@
+"""What the shipped policy sees of a plane: what the sweep gives for it, its neighbours, and its component."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rlacd.planes.candidates import OFFSETS_PER_AXIS
+from rlacd.planes.sweep import Sweep
+from rlacd.policies.greedy import excess_norm
+from rlacd.solid.arrays import BoolArray, FloatArray
+
+STEPS = (1, 2)
+"""Distances of the neighbours that are looked at, in planes of the same direction."""
+
+TINY = 1e-12
+
+FEATURES = 38
+
+MOST = 8.0
+"""No feature is larger, whatever the mesh; ordinary ones are at most 5."""
+
+
+def plane_features(
+    s: Sweep, valid: BoolArray, hull: float, volume: float, box: FloatArray, length: float | None
+) -> FloatArray:
+    """Features [K * M, F] of candidate planes; they stay the same if below and above change places.
+
+    Parameters
+    ----------
+    s : Sweep
+        Of 25 planes along each of 6 directions, followed by those of concave edges.
+    valid : bool [K * M]
+    hull, volume : float
+        Of the component's hull and of the component.
+    box : float [3]
+        Its extents.
+    length : float, optional
+        The criterion's length, if it has one.
+    """
+    longest, excess = float(box.max()), max(hull - volume, TINY)
+    below, above = np.maximum(s.hull_below - s.solid_below, 0), np.maximum(s.hull_above - s.solid_above, 0)
+    small, large = np.minimum(below, above), np.maximum(below, above)
+    cost = excess_norm(s) / excess**1.3
+    saved = (s.hull_below + s.hull_above - volume) / excess
+    lowest = cost[valid].min() if valid.any() else 0.0
+    area, round_ = s.section_area / longest**2, 4 * np.pi * s.section_area / np.maximum(s.section_perimeter, TINY) ** 2
+    fill = np.stack([s.solid_below / np.maximum(s.hull_below, TINY), s.solid_above / np.maximum(s.hull_above, TINY)])
+    scale = length or 0.05
+    planes, along = np.arange(len(cost)), 6 * OFFSETS_PER_AXIS
+    axes = np.where(planes < along, planes // OFFSETS_PER_AXIS, planes)
+    columns = [
+        *(small / excess, large / excess, saved, cost, np.log(cost + 1e-3) - np.log(lowest + 1e-3)),
+        _rank(np.where(valid, cost, np.inf)),
+        _rank(np.where(valid, saved, np.inf)),
+        _rank(np.where(valid, large, np.inf)),
+        *(np.minimum(s.solid_below, s.solid_above) / max(volume, TINY), np.minimum(s.hull_below, s.hull_above) / hull),
+        *(area, s.section_perimeter / longest, round_, fill.min(axis=0), fill.max(axis=0)),
+        np.minimum(s.thickness_below, s.thickness_above) / np.maximum(s.thickness_below + s.thickness_above, TINY),
+        np.log(np.cbrt(small) / scale + 0.01),
+        np.log(np.cbrt(large) / scale + 0.01),
+        *_neighbours(cost, axes),
+        *_neighbours(area, axes),
+        *_neighbours(np.minimum(fill[0], fill[1]), axes),
+    ]
+    own = [
+        *(np.log(np.cbrt(excess) / scale), volume / hull, *(np.sort(box)[:2] / longest), np.log(longest / scale)),
+        *(float(length is None), valid.mean(), lowest),
+    ]
+    return np.column_stack([*columns, np.tile(own, (len(cost), 1))]).clip(-MOST, MOST)
+
+
+def _rank(cost: FloatArray) -> FloatArray:
+    rank = np.empty(len(cost))
+    rank[np.argsort(cost, kind="stable")] = np.arange(len(cost))
+    return rank / len(cost)
+
+
+def _neighbours(values: FloatArray, axes: NDArray[np.intp]) -> list[FloatArray]:
+    """Least and greatest difference from the neighbours at each distance; 0 for planes that have none."""
+    found: list[FloatArray] = []
+    for step in STEPS:
+        gaps = np.zeros((2, len(values)))
+        same = axes[step:] == axes[:-step]
+        gaps[0, :-step] = np.where(same, values[step:] - values[:-step], 0)
+        gaps[1, step:] = np.where(same, values[:-step] - values[step:], 0)
+        found += [gaps.min(axis=0), gaps.max(axis=0)]
+    return found
