@@ -31,6 +31,7 @@ from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import Greedy
 from rlacd.policies.greedy import excess_norm, hull_sum, max_excess
 from rlacd.repair.repair import repair
+from rlacd.run import Run
 from rlacd.solid.component import Component, Plane
 
 A_SHARD, FACES, LEAVES, NODES, NEAR = 8, (60, 2500), (3, 30), 4, 80
