@@ -15,8 +15,8 @@ from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.errors import OptionError
+from rlacd.finish.limit import limit_part
 from rlacd.io.read.load import load_mesh
-from rlacd.merge import limit_part
 from rlacd.planes.candidates import OFFSETS_PER_AXIS, axis_and_principal
 from rlacd.planes.sweep import SLIVER, Sweep, sweep
 from rlacd.policies.greedy import excess_norm

@@ -18,6 +18,8 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
+from rlacd.learn.paper.options import TrainOptions
+from rlacd.learn.paper.tabular import Node, grow, middle_planes, process_of, q_learning
 
 from benchmarks.charts import Curve, curves_chart, need_charts
 from benchmarks.cli import Meshes, Out, write
@@ -27,8 +29,6 @@ from rlacd.cli.exit_codes import exit_codes
 from rlacd.criteria import Concavity
 from rlacd.errors import MeshError, MissingExtraError, OptionError, RlacdError
 from rlacd.io.read.load import load_mesh
-from rlacd.learn.paper.options import TrainOptions
-from rlacd.learn.paper.tabular import Node, grow, middle_planes, process_of, q_learning
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component
 

@@ -30,7 +30,7 @@ from fuzz.geometry import (
 from fuzz.recipes import Shape
 from rlacd import PRESETS, NavigableSpace
 
-HONEST_WITHIN = 5e-3
+COVERAGE_TOLERANCE = 5e-3
 """Distance by which hulls may miss the input or exceed the threshold without a warning in the report."""
 
 ROUNDING = 1e-5
@@ -123,7 +123,7 @@ def coverage(
     found = []
     if reported is not None and missed.distance > reported + ROUNDING:
         found.append(f"the input leads {missed.distance:.6g} out of the hulls, the report says {reported:.6g}")
-    if missed.distance > HONEST_WITHIN + ROUNDING and not any(
+    if missed.distance > COVERAGE_TOLERANCE + ROUNDING and not any(
         word in case.warned for word in ("outside the hulls", "from the hulls")
     ):
         found.append(f"the input leads {missed.distance:.6g} out of the hulls, and no word of it")
@@ -142,7 +142,7 @@ def overhang(
     found = []
     if reported is not None and reached.distance > reported + 2 * ROUNDING:
         found.append(f"the hulls reach {reached.distance:.6g} beyond the input, the report says {reported:.6g}")
-    allowed = case.options.get("threshold", math.inf) + HONEST_WITHIN + ROUNDING
+    allowed = case.options.get("threshold", math.inf) + COVERAGE_TOLERANCE + ROUNDING
     is_warned_of = any(word in case.warned for word in ("exceed", "beyond the input", "Incomplete"))
     if reached.distance > allowed and not is_warned_of:
         found.append(f"the hulls reach {reached.distance:.6g} beyond the input, and no word of it")

@@ -16,10 +16,10 @@ from hypothesis.extra import numpy as hnp
 from rlacd import _native
 from rlacd.criteria import Concavity
 from rlacd.errors import OptionError
-from rlacd.merge import limit_part
-from rlacd.merge.limits import limit_hull
+from rlacd.finish.limit import limit_part
 from rlacd.solid.component import Part
 from rlacd.solid.hull import Hull
+from rlacd.solid.limit_hull import limit_hull
 
 
 def hull_of(points: np.ndarray) -> Hull:

@@ -211,7 +211,7 @@ def test_no_warning_is_due_to_how_coarsely_a_report_measures(side: int, monkeypa
     least, most = hull_distances(hulls, *surface, 1e-6, threads=1).over
     assert upper - most > 2e-4, "the usual interval is not wide enough for this test"
     limit = most + 1.5e-4 if side > 0 else least - 1.5e-4
-    monkeypatch.setattr(report, "HONEST_WITHIN", limit - 1.0)
+    monkeypatch.setattr(report, "COVERAGE_TOLERANCE", limit - 1.0)
     again = rlacd.decompose(ring, threshold=1.0, quality="fast", threads=1).report
     assert any("beyond the input's surface" in line for line in again["warnings"]) == (side < 0)
     assert lower <= again["hausdorff"]["over"] <= most + (1e-4 if side > 0 else 2e-3)

@@ -17,8 +17,8 @@ from rlacd.cli.options import decompose_options
 from rlacd.compat import coacd
 from rlacd.criteria import Concavity
 from rlacd.errors import OptionError
+from rlacd.finish.overlap import overlap_parts
 from rlacd.io.write import save
-from rlacd.merge.overlap import overlap_parts
 from rlacd.options import Options
 from rlacd.result import Result
 from rlacd.solid.component import Component, Plane

@@ -11,8 +11,8 @@ from scipy.optimize import linprog
 
 import rlacd
 from rlacd.errors import OptionError
+from rlacd.finish.report import engine_shortcomings
 from rlacd.presets import PRESETS, find_preset
-from rlacd.report import engine_shortcomings
 from rlacd.solid.hull import Hull
 
 

@@ -17,7 +17,7 @@ from lxml import etree
 
 import rlacd
 from rlacd.errors import OptionError
-from rlacd.merge.primitives import fit_primitives, smallest_ball
+from rlacd.finish.primitives import fit_primitives, smallest_ball
 from rlacd.primitive_kinds import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.solid.hull import Hull
 from tests.hulls import assert_convex_hull

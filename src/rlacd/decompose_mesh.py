@@ -16,8 +16,9 @@ from rlacd.criteria import NavigableSpace
 from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError
 from rlacd.fields import check_callback
-from rlacd.find_parts import find_parts
-from rlacd.finish_parts import Finished, finish_parts
+from rlacd.find_parts import Reached, covered, find_parts
+from rlacd.finish import Finished, finish, misses_some
+from rlacd.finish.report import joint_report
 from rlacd.io.read.conventions import UNITS
 from rlacd.io.read.load import load_mesh
 from rlacd.options import (
@@ -37,7 +38,6 @@ from rlacd.options import (
 from rlacd.policies import Policy, make_policy
 from rlacd.presets import PresetName
 from rlacd.primitive_kinds import PrimitiveKind
-from rlacd.report import joint_report
 from rlacd.run import ProgressCallback, Run
 from rlacd.solid.frame import Frame
 from rlacd.solid.input_mesh import InputMesh
@@ -209,14 +209,19 @@ def decompose(
 
 
 def _as_one(source: InputMesh, options: Options, run: Run) -> Finished:
-    reached = find_parts(source, options, run)
+    reached = _whole(find_parts(source, options, run), source, options, run)
     run.begin_finishing()
-    done = finish_parts(reached, run)
+    done = finish(reached, run)
     if (node_of := source.node_of) is not None:
         places = run.if_in_time(lambda: owners(done.hulls, source.vertices, source.faces, node_of), lambda: [])
         for hull, place in zip(done.hulls, places, strict=False):
             hull.metadata |= {"node": source.nodes[place].name, "node_index": place}
     return done
+
+
+def _whole(reached: Reached, source: InputMesh, options: Options, run: Run) -> Reached:
+    """What was reached; a cover of the input if a stop left parts that miss some of it (see `misses_some`)."""
+    return covered(source, options, run) if misses_some(reached, run) else reached
 
 
 def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
@@ -225,9 +230,12 @@ def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
     assert source.node_of is not None
     used = np.unique(source.node_of).tolist()
     meshes = [source.of_node(index) for index in used]
-    reached = [find_parts(mesh, options.for_node(scale, _scale_of(mesh)), run) for mesh in meshes]
+    reached = []
+    for mesh in meshes:
+        of_node = options.for_node(scale, _scale_of(mesh))
+        reached.append(_whole(find_parts(mesh, of_node, run), mesh, of_node, run))
     run.begin_finishing()
-    done = [finish_parts(one, run) for one in reached]
+    done = [finish(one, run) for one in reached]
     bodies = 0
     for place, one in zip(used, done, strict=True):
         for hull in one.hulls:

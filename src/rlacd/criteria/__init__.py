@@ -2,7 +2,8 @@
 
 from rlacd.criteria.concavity import Concavity
 from rlacd.criteria.criterion import Criterion
+from rlacd.criteria.limited import LimitedCriterion, with_limits
 from rlacd.criteria.navigable import Navigable, NavigableSpace
 from rlacd.criteria.volume import AddedVolume
 
-__all__ = ["AddedVolume", "Concavity", "Criterion", "Navigable", "NavigableSpace"]
+__all__ = ["AddedVolume", "Concavity", "Criterion", "LimitedCriterion", "Navigable", "NavigableSpace", "with_limits"]

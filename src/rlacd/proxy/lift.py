@@ -16,12 +16,12 @@ from rlacd._native import Stopped
 from rlacd.criteria import Criterion
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
-from rlacd.merge.limits import TOLERANCE, limit_hull
 from rlacd.policies import Policy
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part
 from rlacd.solid.hull import Hull
+from rlacd.solid.limit_hull import TOLERANCE, limit_hull
 from rlacd.solid.reunite import reunite
 
 GRAIN = 5e-4

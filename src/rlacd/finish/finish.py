@@ -10,22 +10,16 @@ import trimesh
 
 from rlacd import _native
 from rlacd.find_parts import Reached
-from rlacd.merge import (
-    as_carried,
-    drop_slivers,
-    in_input,
-    limit_part,
-    limit_roughly,
-    overlap_parts,
-    primitive_part,
-    simple_part,
-    take_in,
-)
-from rlacd.merge.overlap import Seams
-from rlacd.merge.primitives import SLACK
+from rlacd.finish.in_input import as_carried, in_input
+from rlacd.finish.limit import limit_part, limit_roughly
+from rlacd.finish.overlap import Seams, overlap_parts
+from rlacd.finish.primitives import SLACK, primitive_part
+from rlacd.finish.report import COVERAGE_TOLERANCE, NEARLY, make_report
+from rlacd.finish.simple import simple_part
+from rlacd.finish.take_in import take_in
+from rlacd.merge import drop_slivers
 from rlacd.options import SIMPLE
 from rlacd.primitive_kinds import PrimitiveKind
-from rlacd.report import HONEST_WITHIN, NEARLY, make_report
 from rlacd.run import Run
 from rlacd.solid.balls import Balls
 from rlacd.solid.component import Part
@@ -37,6 +31,10 @@ GRAIN = 2e-4
 """Hulls may grow by this more than they must to take in the input."""
 
 
+FEW_TO_DOUBT = 2000
+"""Solids of at most this many triangles are sampled at as many points after a stop: do the hulls cover them?"""
+
+
 class Finished(NamedTuple):
     """Hulls in the input's unit, with what was measured."""
 
@@ -45,11 +43,23 @@ class Finished(NamedTuple):
     balls: Balls | None = None
 
 
-def finish_parts(reached: Reached, run: Run) -> Finished:
+def misses_some(reached: Reached, run: Run) -> bool:
+    """Whether a stop left parts that miss some of a small solid, as happens to one that crosses itself."""
+    solid = reached.solid
+    if run.stopped_by is None or not 0 < len(solid.faces) <= FEW_TO_DOUBT:
+        return False
+    with run.shielded():
+        inner, _ = _native.sample_surface(solid.vertices, solid.faces, FEW_TO_DOUBT, 0)
+        hulls = hull_union([part.hull for part in reached.parts], run.threads)
+        away = hulls.distance(np.concatenate([solid.vertices, inner]), run.threads)
+        return bool(away.max() > COVERAGE_TOLERANCE)
+
+
+def finish(reached: Reached, run: Run) -> Finished:
     """Clean the parts, carry them to the input's unit, and measure them; again if hulls have to grow to the input."""
     done, parts = _finished(reached, run)
     under = done.report["hausdorff"]["under"]
-    if under is None or not NEARLY < under <= HONEST_WITHIN or run.stopped_by is not None:
+    if under is None or not NEARLY < under <= COVERAGE_TOLERANCE or run.stopped_by is not None:
         return done
     with run.stage("finish"):
         grown = run.if_in_time(lambda: _taking_in(reached, parts, run), lambda: None)
@@ -89,13 +99,13 @@ def _taking_in(reached: Reached, finished: Sequence[Part], run: Run) -> list[Par
         _native.Filling(*reached.solid.surface, run.threads).uncovered(
             [hull.vertices for hull in hulls],
             [hull.faces for hull in hulls],
-            HONEST_WITHIN,
+            COVERAGE_TOLERANCE,
             GRAIN,
             run.threads,
         )
     )
     distance = hull_union(hulls, run.threads).distance(points, run.threads)
-    missed = points[(distance > NEARLY / 2) & (distance <= HONEST_WITHIN)]
+    missed = points[(distance > NEARLY / 2) & (distance <= COVERAGE_TOLERANCE)]
     grown = take_in(reached.parts, missed, reached.goal) if len(missed) else reached.parts
     return None if all(new is old for new, old in zip(grown, reached.parts, strict=True)) else grown
 

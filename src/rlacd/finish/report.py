@@ -13,7 +13,7 @@ import trimesh
 from rlacd import _native
 from rlacd._version import __version__
 from rlacd.criteria import Criterion
-from rlacd.merge.overlap import Seams
+from rlacd.finish.overlap import Seams
 from rlacd.merge.slivers import is_sliver
 from rlacd.options import Options
 from rlacd.presets import Preset, find_preset
@@ -26,7 +26,7 @@ from rlacd.solid.hull import Hull
 from rlacd.solid.mass import Mass, joint_mass, mass_of
 from rlacd.solid.solid import Solid
 
-HONEST_WITHIN = 5e-3
+COVERAGE_TOLERANCE = 5e-3
 """How far the union of the hulls may reach beyond the threshold before the report warns: slack for repair and
 measurement."""
 
@@ -247,8 +247,8 @@ def _distances(solid: Solid, parts: Sequence[Part], run: Run, root: Component | 
     surface = surface or _native.Surface(*solid.surface, run.threads)
     hulls = [part.hull for part in parts]
     found = hull_distances(hulls, *solid.surface, threads=run.threads, surface=surface)
-    outside = any(_is_undecided(found.under, limit) for limit in (NEARLY, HONEST_WITHIN))
-    if outside or _is_undecided(found.over, overhang + HONEST_WITHIN):
+    outside = any(_is_undecided(found.under, limit) for limit in (NEARLY, COVERAGE_TOLERANCE))
+    if outside or _is_undecided(found.over, overhang + COVERAGE_TOLERANCE):
         found = hull_distances(hulls, *solid.surface, FINE, threads=run.threads, surface=surface)
 
     def place(point: Place) -> str:
@@ -268,13 +268,13 @@ def _is_undecided(interval: Interval, limit: float) -> bool:
 def _unmeasured(solid: Solid) -> list[str]:
     sentences = ["There was no time to measure how far hulls and input are apart."]
     moved = max((body.deviation for body in solid.bodies), default=0.0)
-    if moved > HONEST_WITHIN:
+    if moved > COVERAGE_TOLERANCE:
         sentences.append(f"Some of the input's surface may lie {moved:.4g} from the hulls: repair moved it that far.")
     return sentences
 
 
 def _coarse(solid: Solid) -> list[str]:
-    if solid.frame.resolution <= HONEST_WITHIN / 2:
+    if solid.frame.resolution <= COVERAGE_TOLERANCE / 2:
         return []
     return [
         f"So far from the origin, coordinates cannot resolve lengths below {solid.frame.resolution:.2g} (the longest "
@@ -286,7 +286,7 @@ def _out_of_the_box(hulls: Sequence[Hull], solid: Solid) -> list[str]:
     """Warn of limits that no tight hull can meet: the criterion cannot see it, as there are no balls so far out."""
     lower, upper = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
     beyond = max(float(max((lower - hull.box[0]).max(), (hull.box[1] - upper).max())) for hull in hulls)
-    if beyond <= HONEST_WITHIN:
+    if beyond <= COVERAGE_TOLERANCE:
         return []
     return [
         f"The hulls extend up to {beyond:.4g} outside the solid's bounding box, where a ball may go: the limits on "
@@ -319,12 +319,12 @@ def _shortcomings(
     sentences = [] if options.preset is None else engine_shortcomings(find_preset(options.preset), hulls)
     if options.max_hulls is not None and len(hulls) > options.max_hulls:
         sentences.append(f"{len(hulls)} hulls are left, more than the {options.max_hulls} asked for.")
-    if apart is not None and apart.under > HONEST_WITHIN:
+    if apart is not None and apart.under > COVERAGE_TOLERANCE:
         sentences.append(
             f"Some of the input's surface lies up to {apart.under:.4g} outside the hulls, farthest near "
             f"{apart.under_at}: repair dropped what it could not make solid (see `deviation` in `repair`)."
         )
-    if apart is not None and apart.over > overhang + HONEST_WITHIN:
+    if apart is not None and apart.over > overhang + COVERAGE_TOLERANCE:
         sentences.append(
             f"The hulls extend up to {apart.over:.4g} beyond the input's surface, more than the threshold, farthest "
             f"near {apart.over_at}: {_why_beyond(solid, options)}."

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from rlacd.criteria import Criterion
-from rlacd.merge.limits import limit_hull
 from rlacd.solid.component import Part
+from rlacd.solid.limit_hull import limit_hull
 
 ROOM = 0.2
 """A simple hull grows by at most this share of what the criterion allows beyond a part."""

@@ -8,12 +8,12 @@ import math
 import numpy as np
 import trimesh
 
-from rlacd.merge.limits import limit_hull
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
 from rlacd.solid.distance import hull_union
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
+from rlacd.solid.limit_hull import limit_hull
 from rlacd.solid.primitive import PRIMITIVE
 
 _LARGEST = float(np.finfo(np.float64).max)

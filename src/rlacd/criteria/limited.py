@@ -1,19 +1,14 @@
-"""Limits on vertices and faces of hulls: as part of the criterion, and applied to the final hulls."""
+"""A criterion that holds for hulls inside limits on vertices and faces too."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rlacd.criteria import Criterion
-from rlacd.criteria.criterion import CriterionSummary
-from rlacd.criteria.screen import Part as PartLike
-from rlacd.criteria.screen import Screen
-from rlacd.merge.in_input import plain_hull
-from rlacd.merge.limits import limit_hull
+from rlacd.criteria.criterion import Criterion, CriterionSummary
+from rlacd.criteria.screen import Part, Screen
 from rlacd.solid.balls import Balls
-from rlacd.solid.component import Part
+from rlacd.solid.limit_hull import limit_hull
 
 FEWEST_VERTICES, FEWEST_FACES = 24, 44
 """Lower limits are applied only at the end, with a warning if a hull then exceeds the threshold: to meet them, round
@@ -45,15 +40,15 @@ class LimitedCriterion:
         """That of the underlying criterion: limiting a hull only makes it larger."""
         return self.criterion.screen
 
-    def is_met(self, part: PartLike) -> bool:
+    def is_met(self, part: Part) -> bool:
         """Decide for the exact hull first, then for the limited one."""
         return self.criterion.is_met(part) and (self._fits(part) or self.criterion.is_met(self._limited(part)))
 
-    def error(self, part: PartLike) -> float:
+    def error(self, part: Part) -> float:
         """Measure the part against its limited hull."""
         return self.criterion.error(self._limited(part))
 
-    def settled(self, parts: Sequence[PartLike]) -> LimitedCriterion:
+    def settled(self, parts: Sequence[Part]) -> LimitedCriterion:
         """Settle the underlying criterion with the limited hulls."""
         return LimitedCriterion(
             self.criterion.settled([self._limited(part) for part in parts]), self.max_vertices, self.max_faces
@@ -77,12 +72,12 @@ class LimitedCriterion:
         """Get the same limits with a larger threshold."""
         return LimitedCriterion(self.criterion.scaled(factor), self.max_vertices, self.max_faces)
 
-    def _fits(self, part: PartLike) -> bool:
+    def _fits(self, part: Part) -> bool:
         return (self.max_vertices is None or len(part.hull.vertices) <= self.max_vertices) and (
             self.max_faces is None or len(part.hull.faces) <= self.max_faces
         )
 
-    def _limited(self, part: PartLike) -> PartLike:
+    def _limited(self, part: Part) -> Part:
         if self._fits(part):
             return part
         hull = limit_hull(part.hull, self.max_vertices, self.max_faces)
@@ -96,25 +91,3 @@ def with_limits(criterion: Criterion, max_vertices: int | None, max_faces: int |
     if (max_vertices or FEWEST_VERTICES) < FEWEST_VERTICES or (max_faces or FEWEST_FACES) < FEWEST_FACES:
         return criterion
     return LimitedCriterion(criterion, max_vertices, max_faces)
-
-
-def limit_roughly(part: Part, max_vertices: int | None, max_faces: int | None) -> Part:
-    """Get the part with a hull inside the limits, cheaply: if its hull exceeds them, a box or tetrahedron around it."""
-    vertices, faces = len(part.hull.vertices), len(part.hull.faces)
-    if vertices <= (max_vertices or vertices) and faces <= (max_faces or faces):
-        return part
-    return part.with_hull(plain_hull(part.hull.vertices, max_vertices, max_faces))
-
-
-def limit_part(part: Part, max_vertices: int | None, max_faces: int | None, criterion: Criterion | None = None) -> Part:
-    """Get the part with a hull inside the limits and without nearly redundant corners; the same part if unchanged.
-
-    Without such corners a hull is up to 1e-6 larger. They stay if the part would then no longer meet a given criterion.
-    """
-    hull = limit_hull(part.hull, max_vertices, max_faces)
-    if hull is part.hull:
-        return part
-    limited = part.with_hull(hull)
-    fits = len(part.hull.vertices) <= (max_vertices or math.inf) and len(part.hull.faces) <= (max_faces or math.inf)
-    spoilt = criterion is not None and fits and not criterion.is_met(limited) and criterion.is_met(part)
-    return part if spoilt else limited
