@@ -128,8 +128,8 @@ def soak(args: argparse.Namespace) -> int:
         finally:
             laboratory.close()
 
-    with ThreadPoolExecutor(args.run) as threads:
-        for worker in [threads.submit(work) for _ in range(args.run)]:
+    with ThreadPoolExecutor(args.workers) as threads:
+        for worker in [threads.submit(work) for _ in range(args.workers)]:
             worker.result()
     print(totals(ledger.rows))
     return len(list(folder.glob("*.json"))) - before

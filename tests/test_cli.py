@@ -338,7 +338,7 @@ def test_help_names_every_exit_code_and_version_is_printed() -> None:
 
 @pytest.mark.parametrize(
     ("words", "extra"),
-    [("decompose", "view"), ("decompose", "learned")],
+    [("decompose", "view")],
 )
 def test_help_names_extras_as_pip_takes_them(words: str, extra: str) -> None:
     """In help, brackets begin markup, which swallows what it does not know."""

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rlacd
-from rlacd import report
+from rlacd.finish import report
 from rlacd.errors import OptionError
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair

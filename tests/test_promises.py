@@ -175,7 +175,7 @@ def test_a_benchmark_names_its_command_and_date(text: str) -> None:
     [
         ("ray", "fleet", "batch FOLDER -o OUT --ray local"),
         ("fsspec", "fleet", "batch FOLDER -o memory://out"),
-        ("torch", "train", "train FOLDER --run OUT --preset quick"),
+        ("torch", "train", "train FOLDER --run OUT --preset one-mesh"),
     ],
 )
 @pytest.mark.promise("before-work")

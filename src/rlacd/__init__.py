@@ -65,7 +65,7 @@ _HOME = {
     "Decomposition": "decomposition",
     "PRESETS": "presets",
     "Preset": "presets",
-    "Progress": "progress",
+    "Progress": "run",
     "Rewritten": "io.robots",
     "rewrite_robot": "io.robots",
     "Policy": "policies",
