@@ -549,7 +549,7 @@ def test_nothing_is_left_open_that_would_be_emptied(left, taken):
         def __init__(self, open_bodies, tangled, bend=1.0):
             self.open_bodies, self.warnings, self.holes = open_bodies, [], []
             self.lost, self.lost_at = (0.0 if open_bodies == "thin" else 0.1), "(0, 0, 0)"
-            self.torn = 0.0
+            self.torn, self.is_crossed = 0.0, False
             self.solid = Manifold.cube((1, 1, left if open_bodies == "thin" else 1.0))
 
         def doubted(self):
