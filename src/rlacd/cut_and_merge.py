@@ -73,7 +73,7 @@ def cut_and_merge(
     """
     with run.stage("cut"):
         most_work = math.inf if strict else MOST_CUTTING + MOST_PER_FACE * tree.root.size
-        with run.limited(most_work, cuts="cut"):
+        with run.limited(most_work, cuts=None if strict else "cut"):
             done, left = tree.cut_until(criterion, most)
         pieces: list[Part] = [*done, *left]
         if strict and len(pieces) > most:
