@@ -57,8 +57,8 @@ def hull_sum(per_axis: int, edges: int) -> Callable[[float], Policy]:
 
 
 def named(name: str) -> Callable[[float], Policy]:
-    if Path(name, "best.safetensors").exists():
-        from rlacd.learn.paper.torch_policy import load_policy
+    if Path(name, "options.json").exists():
+        from rlacd.learn.q_network import load_policy
 
         return lambda scale: load_policy(Path(name))
     return lambda scale: make_policy(name, SweepCache(), scale)
