@@ -16,7 +16,7 @@ import rlacd
 from rlacd.planes.candidates import axis_and_principal
 from rlacd.planes.sweep import sweep
 from rlacd.policies import make_policy
-from rlacd.policies.greedy import excess_norm
+from rlacd.policies.greedy import excess_norm, hull_sum
 from rlacd.policies.learned import PROMISING, features_of
 from rlacd.policies.shortlist import RandomShortlist
 
@@ -83,7 +83,8 @@ def test_the_shipped_policy_takes_one_of_greedys_best_planes_and_ignores_what_wa
     component = rlacd.Component(hollow_table())
     chosen = make_policy("learned", scale=0.01).choose(component)
     scored = rlacd.SweepCache().of(component)
-    order = np.argsort(np.where(scored.valid(), excess_norm(scored), np.inf), kind="stable")[:PROMISING]
+    costs = [np.where(scored.valid(), score(scored), np.inf) for score in (hull_sum, excess_norm)]
+    order = np.concatenate([np.argsort(cost, kind="stable")[:PROMISING] for cost in costs])
     assert chosen in [scored.candidates.plane(int(i)) for i in order]
     policy = make_policy("learned", scale=0.01)
     policy.choose(component.cut(chosen)[0])
