@@ -65,7 +65,7 @@ class Network:
                 arrays |= {f"w{i}": np.rint(weight / scale).astype(np.int8), f"s{i}": scale.astype(np.float32)}
         file = io.BytesIO()
         about = np.frombuffer(json.dumps(dict(self.about)).encode(), np.uint8)
-        np.savez(file, allow_pickle=False, about=about, **arrays)  # type: ignore[arg-type]
+        np.savez(file, allow_pickle=False, about=about, **arrays)
         return file.getvalue()
 
 
