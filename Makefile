@@ -31,11 +31,11 @@ $(VENV)/tools: constraints-dev.txt
 	touch $@
 
 $(VENV)/installed: $(VENV)/tools $(NATIVE_SOURCES)
-	$(RLACD_INSTALL) --editable '.[learned,view]'
+	$(RLACD_INSTALL) --editable '.[view]'
 	touch $@
 
 $(VENV)/test-extras: $(VENV)/installed
-	$(RLACD_INSTALL) --editable '.[learned,view,train,usd,draco,sim,fleet]' --group test --group bench
+	$(RLACD_INSTALL) --editable '.[view,train,usd,draco,sim,fleet]' --group test --group bench
 	touch $@
 
 demo: install
@@ -82,7 +82,7 @@ build/sanitize-%/installed: $(NATIVE_SOURCES)
 	test -x build/sanitize-$*/bin/python || $(PYTHON) -m venv build/sanitize-$*
 	build/sanitize-$*/bin/pip install --quiet --constraint constraints-dev.txt \
 	  scikit-build-core nanobind cmake ninja pytest hypothesis point-cloud-utils
-	build/sanitize-$*/bin/pip install --quiet --constraint constraints-dev.txt --no-build-isolation --editable '.[learned]' \
+	build/sanitize-$*/bin/pip install --quiet --constraint constraints-dev.txt --no-build-isolation --editable . \
 	  --config-settings=build-dir=build/sanitize-$*/native --config-settings=cmake.build-type=RelWithDebInfo \
 	  --config-settings=cmake.define.RLACD_SANITIZE=$(SANITIZE_$*)
 	touch $@

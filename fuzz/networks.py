@@ -21,4 +21,4 @@ def q_network(about: Mapping[str, Any] = ABOUT, inputs: int = FEATURES, outputs:
     rng = np.random.default_rng(0)
     shapes = ((4, inputs), (outputs, 4))
     layers = [(rng.standard_normal(shape), rng.standard_normal(shape[0])) for shape in shapes]
-    return Network(layers, {"threshold": 1.0, **about}).to_bytes(small=True)
+    return Network(layers, {"threshold": 1.0, **about}).to_bytes()

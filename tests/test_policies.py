@@ -10,10 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from manifold3d import Manifold
+from manifold3d import Manifold, Mesh64
 
 import rlacd
+from rlacd.planes.candidates import axis_and_principal
+from rlacd.planes.sweep import sweep
 from rlacd.policies import make_policy
+from rlacd.policies.greedy import excess_norm, hull_sum
+from rlacd.policies.learned import PROMISING, features_of
 from rlacd.policies.shortlist import RandomShortlist
 
 DOCS = Path(__file__).parent.parent / "docs" / "policies.md"
@@ -66,6 +70,43 @@ class Answers:
 
     def choose(self, component: rlacd.Component, threads: int = 1) -> Any:
         return self.answer
+
+
+def hollow_table() -> Manifold:
+    """A table whose top is a frame: it takes more than a few cuts."""
+    mesh = table()
+    top = Manifold.cube((1.2, 0.6, 0.5), True).translate((0, 0, 1))
+    return Manifold(Mesh64(np.asarray(mesh.vertices), np.asarray(mesh.faces, np.uint64))) - top
+
+
+def test_the_shipped_policy_takes_one_of_greedys_best_planes_and_ignores_what_was_cut_before() -> None:
+    component = rlacd.Component(hollow_table())
+    chosen = make_policy("learned", scale=0.01).choose(component)
+    scored = rlacd.SweepCache().of(component)
+    costs = [np.where(scored.valid(), score(scored), np.inf) for score in (hull_sum, excess_norm)]
+    order = np.concatenate([np.argsort(cost, kind="stable")[:PROMISING] for cost in costs])
+    assert chosen in [scored.candidates.plane(int(i)) for i in order]
+    policy = make_policy("learned", scale=0.01)
+    policy.choose(component.cut(chosen)[0])
+    assert policy.choose(rlacd.Component(hollow_table())) == chosen
+
+
+def test_the_shipped_policy_sees_the_same_in_a_mirror() -> None:
+    seen = []
+    for solid in (hollow_table(), hollow_table().mirror((0, 0, 1))):
+        component = rlacd.Component(solid)
+        seen.append(features_of(component, sweep(component, axis_and_principal(component)), 0.05)[50:75])
+    np.testing.assert_allclose(seen[0], seen[1][::-1], atol=0.05)  # equal costs are ranked by their numbers
+
+
+@pytest.mark.parametrize("criterion", ["concavity", "navigable"])
+def test_decompose_takes_the_shipped_policy_with_any_criterion_and_number_of_threads(criterion: str) -> None:
+    mesh = hollow_table().to_mesh64()
+    given = (mesh.vert_properties[:, :3], mesh.tri_verts)
+    space = {"criterion": rlacd.NavigableSpace(radius=0.05)} if criterion == "navigable" else {"threshold": 0.02}
+    one, two = (rlacd.decompose(given, policy="learned", quality="fast", threads=n, **space) for n in (1, 2))
+    assert len(one) > 2
+    assert [hull.vertices.tobytes() for hull in one.hulls] == [hull.vertices.tobytes() for hull in two.hulls]
 
 
 def test_none_leaves_components_as_they_are() -> None:

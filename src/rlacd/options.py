@@ -196,11 +196,11 @@ class Options:
     )
     policy: str | Policy = option(
         "greedy",
-        "What chooses the next cut: navacd is the quickest, rl-acd a network; FILE.npz is your own.",
+        "What chooses the next cut: navacd is the quickest, learned asks a network; FILE.npz is your own.",
         custom(
             f"one of {', '.join(POLICIES)}, an .npz file, or (in Python) an object with a method `choose`",
             read_policy,
-            "greedy navacd rl-acd FILE.npz …",
+            "greedy navacd learned FILE.npz …",
         ),
         panel=METHOD,
         metavar="NAME",

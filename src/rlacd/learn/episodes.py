@@ -95,7 +95,8 @@ class Episode:
     @classmethod
     def from_bytes(cls, content: bytes) -> Episode:
         """Unpack the result of `to_bytes`."""
-        return cls(**{name: a if a.ndim else int(a) for name, a in unpacked(content).items()})
+        values: dict[str, Any] = {name: a if a.ndim else int(a) for name, a in unpacked(content).items()}
+        return cls(**values)
 
 
 @dataclass
@@ -137,11 +138,11 @@ class Player:
             cuts.append((numbers[component], plane, cut.reward.worth(self.options)))
         seen = [self._see(component) for component in numbers]
         state, planes, rewards = (np.array(column) for column in zip(*cuts, strict=True))
-        child, owner, discounts = (np.array([c[i] for c in children]) for i in range(3))
+        of_child, owner, discounts = (np.array([c[i] for c in children]) for i in range(3))
         return Episode(
             np.stack([features for features, _ in seen]).astype(np.float16),
             np.stack([mask for _, mask in seen]),
-            *(state, planes, rewards, child.astype(np.int64), owner.astype(np.int64), discounts),
+            *(state, planes, rewards, of_child.astype(np.int64), owner.astype(np.int64), discounts),
             parts=cutting.count,
             ended=ENDED.index(ended),
         )

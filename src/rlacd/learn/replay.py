@@ -114,7 +114,7 @@ class Replay:
     def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Restore the result of `state`."""
         self._next, actions = (int(x) for x in state["cursor"])
-        masks = np.unpackbits(state["masks"], axis=1, count=actions).astype(bool) if actions else []
+        masks: Any = np.unpackbits(state["masks"], axis=1, count=actions).astype(bool) if actions else []
         seen = [Seen(*pair) for pair in zip(state["features"], masks, strict=True)]
         children: list[list[tuple[Seen, float]]] = [[] for _ in state["cuts"]]
         for owner, child, discount in state["links"].tolist():

@@ -210,7 +210,9 @@ class RolloutServer:
         if solid is None:
             return {}, {"episode": Episode.empty("nothing").to_bytes(), **kept}
         key = f"{values['name']} {values['axis'] if values['degrees'] else 0} {values['degrees']}"
-        component, memory = self._known.pop(key, None) or (turned(solid, values["axis"], values["degrees"]), Memory())
+        if key not in self._known:
+            self._known[key] = turned(solid, values["axis"], values["degrees"]), Memory()
+        component, memory = self._known.pop(key)
         cutting = CutProcess(component, Concavity(self._options.threshold), memory)
         if cutting.over or cutting.count > self._options.max_parts:
             return {}, {"episode": Episode.empty("nothing").to_bytes(), **kept}

@@ -19,8 +19,8 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
     - ``navacd``: the plane with the least sum of hull volumes, among three planes and those of four concave edges.
     - ``random-N+edges``: the plane with the least sum of hull volumes among N random ones of the 150 and those of four
       concave edges; ``random-N``: among the random ones alone. Controls for learned policies.
-    - ``learned``: of greedy's 40 most promising planes, the one after which networks predict the fewest parts.
-    - ``rl-acd``, or the path of a Q network as written by ``rlacd train`` (.npz): the paper's rule, the plane with the
+    - ``learned``: of the most promising planes, the one after which networks predict the fewest parts.
+    - the path of a Q network as written by ``rlacd train`` (.npz): the paper's rule, the plane with the
       least sum of hull volumes among the network's ten best planes and those of four concave edges.
 
     Parameters
@@ -46,8 +46,8 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
         return NavACD()
     if name == "learned":
         return Learned(sweeps, scale)
-    if name == "rl-acd" or name.endswith(WEIGHTS_ENDING):
-        return deployed(None if name == "rl-acd" else name, scale)
+    if name.endswith(WEIGHTS_ENDING):
+        return deployed(name, scale)
     family, _, score = name.partition("-")
     if family == "greedy" and score.removesuffix(EDGES) in SCORES:
         return Greedy(score.removesuffix(EDGES), concave_edges=CONCAVE_EDGES if score.endswith(EDGES) else 0)

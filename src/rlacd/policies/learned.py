@@ -1,4 +1,4 @@
-"""The shipped policy: of greedy's most promising planes, the one after which the fewest parts are to be expected.
+"""The shipped policy: of the most promising planes, the one after which the fewest parts are to be expected.
 
 An ensemble of small networks ranks planes by what the sweep gives for them. It was trained on the numbers of parts that
 greedy ends in after each of several planes (`learned.md` beside the weights).
@@ -15,7 +15,7 @@ import numpy as np
 from rlacd.planes.least_excess import SLIVERS
 from rlacd.planes.sweep import Sweep
 from rlacd.planes.sweep_cache import SweepCache
-from rlacd.policies.greedy import Greedy, excess_norm
+from rlacd.policies.greedy import Greedy, excess_norm, hull_sum
 from rlacd.policies.network import Network, load_network
 from rlacd.policies.plane_features import FEATURES, plane_features
 from rlacd.solid.arrays import FloatArray
@@ -27,10 +27,11 @@ NETWORKS = 4
 """Size of the ensemble."""
 
 PROMISING = 40
-"""Number of planes of least excess among which the networks choose: the labels know few others."""
+"""Number of planes of least excess among which the networks choose, and as many of least hull sum: the labels know few
+others."""
 
 LEAST_GAIN = 0.02
-"""Predicted saving in log(parts) for which greedy's plane is given up: below it, predictions are noise."""
+"""Predicted saving in log(parts) for which the plane of least hull sum is given up: below it, predictions are noise."""
 
 SIMPLE = 3.0
 """Excess of the component's hull, as the edge of a cube over the criterion's length, below which greedy decides:
@@ -55,7 +56,7 @@ class Learned:
         self._sweeps = sweeps or SweepCache()
         self._scale = scale
         self._networks = shipped_networks()
-        self._greedy = Greedy(sweeps=self._sweeps)
+        self._greedy = Greedy("hull-sum", sweeps=self._sweeps)
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None if every candidate misses it or shaves off a film."""
@@ -66,11 +67,13 @@ class Learned:
         valid = next((v for sliver in SLIVERS if (v := scored.valid(sliver)).any()), None)
         if valid is None:
             return None
-        order = np.argsort(np.where(valid, excess_norm(scored), np.inf), kind="stable")[: min(PROMISING, valid.sum())]
-        features = features_of(component, scored, self._scale)[order].astype(np.float32)
+        costs = [np.where(valid, score(scored), np.inf) for score in (hull_sum, excess_norm)]
+        orders = [np.argsort(cost, kind="stable")[: min(PROMISING, int(valid.sum()))] for cost in costs]
+        planes = np.array(list(dict.fromkeys(np.concatenate(orders).tolist())))  # that of least hull sum comes first
+        features = features_of(component, scored, self._scale)[planes].astype(np.float32)
         predicted = np.mean([network(features)[:, 0] for network in self._networks], axis=0)
         best = int(predicted.argmin())
-        return scored.candidates.plane(int(order[best if predicted[best] < predicted[0] - LEAST_GAIN else 0]))
+        return scored.candidates.plane(int(planes[best if predicted[best] < predicted[0] - LEAST_GAIN else 0]))
 
 
 def features_of(component: Component, scored: Sweep, scale: float | None) -> FloatArray:

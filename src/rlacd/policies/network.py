@@ -55,14 +55,9 @@ class Network:
         found: Float32Array = features @ weight.T + bias
         return found
 
-    def to_bytes(self, *, small: bool = False) -> bytes:
-        """Make the content of a file; a small one holds bytes, scaled by rows."""
-        arrays: dict[str, NDArray[np.generic]] = {}
-        for i, (weight, bias) in enumerate(self.layers):
-            scale = np.abs(weight).max(axis=1, keepdims=True) / 127 + 1e-30
-            arrays |= {f"b{i}": bias, f"w{i}": weight}
-            if small:
-                arrays |= {f"w{i}": np.rint(weight / scale).astype(np.int8), f"s{i}": scale.astype(np.float32)}
+    def to_bytes(self) -> bytes:
+        """Make the content of a file."""
+        arrays = {f"{name}{i}": a for i, layer in enumerate(self.layers) for name, a in zip("wb", layer, strict=True)}
         file = io.BytesIO()
         about = np.frombuffer(json.dumps(dict(self.about)).encode(), np.uint8)
         np.savez(file, allow_pickle=False, about=about, **arrays)  # type: ignore[arg-type]
@@ -102,8 +97,6 @@ def parse_network(content: bytes) -> Network:
         layers = []
         for i in range(sum(name.startswith("w") for name in arrays.files)):
             weight, bias = arrays[f"w{i}"], arrays[f"b{i}"]
-            if weight.dtype == np.int8:
-                weight = weight * arrays[f"s{i}"]
             if weight.ndim != 2 or bias.shape != weight.shape[:1] or {weight.dtype.kind, bias.dtype.kind} != {"f"}:
                 raise ValueError
             layers.append((weight, bias))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib.resources import as_file, files
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,18 +52,11 @@ class QPolicy:
         return least_hulls(component, candidates, best, self._concave_edges, threads)
 
 
-def deployed(path: str | None = None, scale: float | None = None) -> QPolicy:
-    """Deploy a network as the paper does: that of a file written by ``rlacd train``, or the one in the package.
+def deployed(path: str, scale: float | None = None) -> QPolicy:
+    """Deploy a network as the paper does; `path` is a file written by ``rlacd train``.
 
-    Parameters
-    ----------
-    path : str, optional
-    scale : float, optional
-        The criterion's length in the frame; the network's own by default.
+    `scale` is the criterion's length in the frame; the network's own by default.
     """
-    if path is None:
-        with as_file(files("rlacd.policies") / "rl_acd.npz") as own:
-            return deployed(str(own), scale)
     network = load_network(path, KIND, FEATURES, PLANES)
     threshold = network.threshold if scale is None else scale
     return QPolicy(

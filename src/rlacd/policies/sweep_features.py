@@ -52,7 +52,8 @@ def sweep_features(component: Component, threshold: float, hull: bool = True) ->
         component.volume / component.hull.volume * hull,
         *(np.sort(np.ptp(component.box, axis=0))[:2] / longest),
     ]
-    return np.nan_to_num(np.concatenate([features.ravel(), own])).astype(np.float32)
+    found: Float32Array = np.nan_to_num(np.concatenate([features.ravel(), own])).astype(np.float32)
+    return found
 
 
 def _excess(scored: Sweep) -> tuple[Float32Array, Float32Array]:
