@@ -35,7 +35,7 @@ RUNS: Parameters = {
 
 
 def experiment(
-    app: typer.Typer, name: str, check: Callable[..., None] = lambda **_: None, tasks: int = 1
+    app: typer.Typer, name: str, check: Callable[..., object] = lambda **_: None, tasks: int = 1
 ) -> Callable[[Callable[..., Page]], Callable[..., Page]]:
     """Make a command of a function that takes a `Bench` and its own options, and returns a page.
 
