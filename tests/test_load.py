@@ -492,37 +492,6 @@ def test_msh_of_mujoco_is_read_and_damage_in_it_refused(tmp_path):
             load_mesh(tmp_path / "box.msh")
 
 
-def test_what_a_gltf_adds_to_its_triangles_is_read_refused_or_named(tmp_path):
-    files = trimesh.Scene(BOX).export(file_type="gltf")
-    tree = json.loads(files.pop("model.gltf"))
-    for name, content in files.items():
-        (tmp_path / name).write_bytes(content)
-
-    def load(**changes):
-        (tmp_path / "box.gltf").write_text(json.dumps(tree | changes))
-        return load_mesh(tmp_path / "box.gltf")
-
-    (primitive,) = tree["meshes"][0]["primitives"]
-    corners = load().faces.ravel()
-    for mode in (5, 6):
-        loaded = load(meshes=[{"primitives": [primitive, primitive | {"mode": mode}]}])
-        if mode == 5:
-            rows = [corners[i : i + 3][:: -1 if i % 2 else 1] for i in range(34)]
-        else:
-            rows = [[corners[0], corners[i], corners[i + 1]] for i in range(1, 35)]
-        expected = np.concatenate([BOX.faces, rows])
-        assert len(loaded.faces) == 46
-        areas = trimesh.triangles.area(loaded.vertices[loaded.faces])
-        assert areas.sum() == pytest.approx(trimesh.triangles.area(BOX.vertices[expected]).sum())
-    assert "lines" in load(meshes=[{"primitives": [primitive, primitive | {"mode": 1}]}]).warnings[0]
-    assert load(extensionsRequired=["KHR_texture_transform", "EXT_texture_webp"]).warnings == ()
-    for name in ("FOO_bar", "EXT_mesh_gpu_instancing"):
-        with pytest.raises(MeshFileError, match=f"requires the extension '{name}'"):
-            load(extensionsRequired=[name])
-    nodes = [{**node, "skin": 0, "extensions": {"EXT_mesh_gpu_instancing": {}}} for node in tree["nodes"]]
-    assert [said.split(" ", 1)[1][:15] for said in load(nodes=nodes).warnings] == ["skinned meshes ", "nodes have inst"]
-
-
 def test_what_is_left_out_of_a_collada_file_is_named(box, tmp_path):
     path = tmp_path / "box.dae"
     content = box.export(file_type="dae")

@@ -104,6 +104,13 @@ def _apart(ring: FloatArray) -> IntArray | None:
     return found if areas.min() >= -FOLDED * length else None
 
 
+def strip_triangles(corners: IntArray) -> IntArray:
+    """The triangles of a strip of corners: every other one is turned."""
+    first = np.arange(max(len(corners) - 2, 0))
+    odd = first % 2
+    return np.asarray(corners[np.stack([first, first + 1 + odd, first + 2 - odd], axis=1)])
+
+
 def folds(points: FloatArray, counts: IntArray, corners: IntArray) -> bool:
     """Whether the fan of any polygon folds over (arguments as for `triangles_of`)."""
     return len(_folded(points, *_fans(counts, corners), len(counts))) > 0
