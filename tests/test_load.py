@@ -490,10 +490,3 @@ def test_msh_of_mujoco_is_read_and_damage_in_it_refused(tmp_path):
         (tmp_path / "box.msh").write_bytes(content)
         with pytest.raises(MeshFileError, match=r"again|Gmsh"):
             load_mesh(tmp_path / "box.msh")
-
-
-def test_what_is_left_out_of_a_collada_file_is_named(box, tmp_path):
-    path = tmp_path / "box.dae"
-    content = box.export(file_type="dae")
-    path.write_bytes(content.replace(b"</node>", b"<skew>45 1 0 0 0 1 0</skew></node>", 1))
-    assert load_mesh(path).warnings == ("skews of box.dae were left out",)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -116,13 +117,15 @@ def _left_out(path: Path, content: bytes, extension: str, scene: trimesh.Scene |
         return [f"{more} bytes after the last triangle of {path.name} were left out"] if more > 0 else []
     if extension == "dae":
         unread = {
-            b"<skew": "skews",
-            b"<instance_controller": "skinned or morphed meshes",
-            b"<ph>": "polygons with holes",
+            rb"skew": "skews of {} were left out",
+            rb"instance_controller": "skinned or morphed meshes of {} have their bind shape, not that of their joints",
+            rb"ph": "polygons with holes of {} were left out",
         }
-        return [f"{what} of {path.name} were left out" for tag, what in unread.items() if tag in content]
-    if extension == "ply" and b"element tristrips" in content[: content.find(b"end_header") + 1]:
-        return [f"the triangle strips of {path.name} were left out"]
+        return [
+            said.format(path.name)
+            for tag, said in unread.items()
+            if re.search(rb"<([\w.-]+:)?" + tag + rb"[\s/>]", content)
+        ]
     return []
 
 
