@@ -74,7 +74,7 @@ class Rig:
             {"name": "Wheel", "mesh": 1, "translation": [0.5, 0, 0], "scale": [1, 1, -1]},
             {"mesh": 1, "translation": [-0.5, 0, 0]},
             {"name": "Flag pole", "mesh": 2, "skin": 0, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0.8, 0, 1]},
-            {"name": "bone"},
+            {"name": "bone", "translation": [0, 0.8, 0]},
         ]
         self.header["scenes"][0]["nodes"].append(4)
         inverse = self.accessor(np.eye(4, dtype="<f4").reshape(1, 16), "MAT4")

@@ -17,7 +17,7 @@ import trimesh
 import rlacd
 from rlacd.errors import MeshFileError, MissingExtraError
 from rlacd.io.read.apart import answer_of
-from rlacd.io.read.gltf_encoded import DECODER
+from rlacd.io.read.draco import DECODER
 from rlacd.io.read.load import load_mesh
 from rlacd.pool import Request, WorkerDiedError
 from rlacd.pool.worker import Worker
@@ -143,7 +143,7 @@ def test_hundreds_of_damaged_streams_end_in_arrays_or_our_error(compressed: Path
             stream = bytearray(seeds[number % 2])
             for _ in range(rng.integers(1, 5)):
                 stream[rng.integers(len(stream))] = rng.integers(256)
-            values = {"path": "a.glb", "attributes": {"a": 0}, "normalized": {"a": False}}
+            values = {"path": "a.glb", "attributes": {"a": 0}, "normalized": {"a": False}, "widths": {"a": 3}}
             try:
                 answer = worker.ask(Request(DECODER, values, {"a": bytes(stream[: rng.integers(1, 2 * len(stream))])}))
                 corners = np.frombuffer(answer.blobs["a.corners"], "<u4")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import struct
 from pathlib import Path
 
@@ -60,19 +61,20 @@ def off(solid: Prism) -> bytes:
     return "\n".join([*lines, *(" ".join(map(str, [len(p), *p])) for p in polygons), ""]).encode()
 
 
-def ply(solid: Prism, order: str) -> bytes:
+def ply(solid: Prism, order: str, corner: str = "I", element: str = "face") -> bytes:
     """As Blender and others write it: other fields beside the positions, and a field of its own on each face."""
     points, polygons = solid
     kind = {"": "ascii", "<": "binary_little_endian", ">": "binary_big_endian"}[order]
     head = f"ply\nformat {kind} 1.0\nelement vertex {len(points)}\nproperty uchar red\n"
     head += "".join(f"property double {axis}\n" for axis in "xyz")
-    head += f"element face {len(polygons)}\nproperty uchar flags\nproperty list uchar uint vertex_indices\nend_header\n"
+    head += f"element {element} {len(polygons)}\nproperty uchar flags\n"
+    head += f"property list uchar {'uint' if corner == 'I' else 'int'} vertex_indices\nend_header\n"
     if not order:
         rows = [" ".join(map(str, [7, *p])) for p in points.tolist()]
         rows += [" ".join(map(str, [1, len(p), *p])) for p in polygons]
         return (head + "\n".join(rows) + "\n").encode()
     body = b"".join(struct.pack(order + "B3d", 7, *p) for p in points.tolist())
-    return head.encode() + body + b"".join(struct.pack(f"{order}BB{len(p)}I", 1, len(p), *p) for p in polygons)
+    return head.encode() + body + b"".join(struct.pack(f"{order}BB{len(p)}{corner}", 1, len(p), *p) for p in polygons)
 
 
 def dae(solid: Prism, one_list: bool = True) -> bytes:
@@ -233,3 +235,78 @@ def test_damaged_polygons_are_refused_or_read(tmp_path_factory, kind, data) -> N
     path.write_bytes(bytes(content[: data.draw(st.integers(1, len(content)))]))
     with contextlib.suppress(MeshError):
         load_mesh(path)
+
+
+@pytest.mark.parametrize("order", ["", "<", ">"])
+def test_strips_of_a_ply_file_are_triangles_of_alternating_turn(tmp_path: Path, order: str) -> None:
+    """A box: strips that -1 ends, and one in a list of its own."""
+    points = np.array([[x, y, z] for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))], dtype=float)
+    strips = [[0, 1, 4, 5, -1, 1, 2, 5, 6, -1, 2, 3, 6, 7, -1, 3, 0, 7, 4, -1, 0, 3, 1, 2], [4, 5, 7, 6]]
+    content = ply((points, strips), order, "i", "tristrips")
+    (tmp_path / "box.ply").write_bytes(content)
+    mesh = load_mesh(tmp_path / "box.ply")
+    assert mesh.warnings == ()
+    solid = trimesh.Trimesh(mesh.vertices, mesh.faces)
+    assert solid.is_volume
+    assert solid.volume == pytest.approx(1)
+    (tmp_path / "box.ply").write_bytes(content.replace(b"property uchar flags", b"property list uchar uchar flags"))
+    with pytest.raises(MeshError, match="triangle strips"):
+        load_mesh(tmp_path / "box.ply")
+
+
+SQUARES = [[0, 3, 2, 1], [4, 5, 6, 7]], [[8, 11, 10, 9], [12, 13, 14, 15]]
+"""Bottom and top of a frame, whose corners run outward; and those of its hole."""
+
+
+def frame() -> bytes:
+    """A frame whose ends are polygons with a hole, one of which runs the same way as its outline."""
+    ring = np.array([[0, 0], [3, 0], [3, 3], [0, 3]], dtype=float)
+    points = np.concatenate([np.c_[np.concatenate([one, one]), [0] * 4 + [1] * 4] for one in (ring, ring / 3 + 1)])
+    sides = [[i, (i + 1) % 4, 4 + (i + 1) % 4, 4 + i] for i in range(4)]
+    sides += [[8 + i for i in side[::-1]] for side in sides]
+    content = dae((points, sides), one_list=False)
+    holed = ""
+    for outline, hole in zip(*SQUARES, strict=True):
+        outline, hole = (" ".join(f"0 {corner}" for corner in one) for one in (outline, hole))
+        holed += f"<ph><p>{outline}</p><h>{hole}</h></ph>"
+    return content.replace(b"</polygons>", holed.encode() + b"</polygons>")
+
+
+@pytest.mark.parametrize("prefix", [b"", b"c:"])
+def test_collada_is_read_as_it_defines(tmp_path: Path, prefix: bytes) -> None:
+    """Holes, skews, the layout of accessors, and controllers, whatever the prefix of the tags."""
+
+    def load(content: bytes) -> tuple[trimesh.Trimesh, tuple[str, ...]]:
+        content = content.replace(b"Z_UP", b"Y_UP")
+        if prefix:
+            content = re.sub(rb"<(/?)(?=[A-Za-z])", rb"<\1" + prefix, content).replace(b"xmlns=", b"xmlns:c=")
+        (tmp_path / "frame.dae").write_bytes(content)
+        mesh = load_mesh(tmp_path / "frame.dae")
+        assert mesh.up == "y"
+        return trimesh.Trimesh(mesh.vertices, mesh.faces), mesh.warnings
+
+    solid, warned = load(frame())
+    assert warned == ()
+    assert solid.is_volume
+    assert solid.volume == pytest.approx(8)
+    skewed, warned = load(frame().replace(b"<node>", b"<node><skew>45 1 0 0 0 2 0</skew>"))
+    assert warned == ()
+    np.testing.assert_allclose(skewed.vertices, solid.vertices + np.outer(solid.vertices[:, 0], [0, 1, 0]), atol=1e-6)
+
+    spread = frame().replace(b'count="16" stride="3">', b'count="16" stride="4" offset="2"><param type="float"/>', 1)
+    numbers = re.search(rb'<float_array id="p-a"[^>]*>([^<]*)', spread)
+    assert numbers is not None
+    rows = np.array(numbers[1].split()).reshape(-1, 3).tolist()
+    padded = b"9 9 " + b" ".join(b"9 " + b" ".join(row) for row in rows)
+    whole = spread.replace(numbers[1], padded)
+    np.testing.assert_array_equal(load(whole)[0].vertices, solid.vertices)
+    with pytest.raises(MeshError, match="leads out of its array"):
+        load(spread)
+
+    skin = b"""<library_controllers><controller id="c"><skin source="#g"><bind_shape_matrix>2 0 0 0 0 2 0 0 0 0 2 0
+        0 0 0 1</bind_shape_matrix></skin></controller></library_controllers><library_visual_scenes>"""
+    bent = frame().replace(b"<library_visual_scenes>", skin)
+    bent = bent.replace(b'<instance_geometry url="#g"/>', b'<instance_controller url="#c"/>')
+    twice, (warned_of,) = load(bent)
+    assert twice.volume == pytest.approx(8 * 8)
+    assert "bind shape" in warned_of

@@ -12,7 +12,7 @@ for ending in ("step", "stp"):
     refused(f"another format.{ending}", "export it from a CAD program")(lambda: b"anything")
 
 
-@refused("a node below one whose mesh there is not.gltf", "no place in its scene")
+@refused("a node below one whose mesh there is not.gltf", "no index")
 def _() -> bytes:
     return gltf(nodes=[{"mesh": -3, "children": [1]}, {"mesh": 0}])
 

@@ -12,8 +12,8 @@ from rlacd.output_options import Axis
 HEAD = 1 << 16
 """Bytes of a COLLADA file in which they are looked for: ``<asset>`` comes first."""
 
-_COLLADA_UNIT = re.compile(rb"""<unit\b[^>]*?\bmeter\s*=\s*["']\s*([0-9.eE+-]+)\s*["']""")
-_COLLADA_UP = re.compile(rb"<up_axis>\s*([XYZ])_UP\s*</up_axis>")
+_COLLADA_UNIT = re.compile(rb"""<(?:[\w.-]+:)?unit\b[^>]*?\bmeter\s*=\s*["']\s*([0-9.eE+-]+)\s*["']""")
+_COLLADA_UP = re.compile(rb"<(?:[\w.-]+:)?up_axis>\s*([XYZ])_UP\s*</")
 
 METRES = {
     "micron": 1e-6,

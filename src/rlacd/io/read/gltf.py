@@ -1,58 +1,63 @@
-"""What a glTF file declares, checked against what it holds.
-
-Its JSON may use one array for any number of meshes, take any part of a buffer any number of times, and declare arrays
-without any bytes behind them. A parser would allocate memory for all of them, and copy names and everything else
-attached to a mesh for each of its primitives. So the parser receives only the triangles and their transforms.
-"""
+"""glTF 2.0: the triangles that a file's scene shows, and the nodes that place them."""
 
 from __future__ import annotations
 
 import json
 import re
 import struct
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from rlacd.errors import MeshFileError
-from rlacd.io.read.limits import MOST_PLACES, most_in_memory
-
-Json: TypeAlias = dict[str, Any]
+from rlacd.io.read.draco import DRACO, decode_draco
+from rlacd.io.read.gltf_arrays import Arrays, Json, item
+from rlacd.io.read.limits import MOST_PLACES
+from rlacd.io.read.polygons import strip_triangles
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.input_mesh import SourceNode
+from rlacd.solid.products import dots, heights
+from rlacd.solid.topology import IntArray
 
 MAGIC, JSON_CHUNK = b"glTF", b"JSON"
 
-ITEM_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
-"""By component type; see "Accessor Data Types" in the specification."""
-
-ITEMS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-
-DRACO = "KHR_draco_mesh_compression"
-UNREAD = ("EXT_meshopt_compression", "KHR_meshopt_compression")
-"""Extensions that encode the triangles: without the decoder, the file holds zeros in their place. Draco is decoded
-before (`gltf_encoded.py`), so that its name is gone."""
-
 INSTANCES = "EXT_mesh_gpu_instancing"
 
-HARMLESS = re.compile(
+READ = re.compile(
     r"(KHR|EXT|MSFT)_(materials|texture|lights|xmp|animation)_\w+|KHR_(mesh_quantization|xmp|draco_mesh_compression)"
-    r"|EXT_(mesh_features|instance_features|structural_metadata)|VRM\w*"
+    rf"|EXT_(mesh_features|instance_features|structural_metadata)|VRM\w*|{INSTANCES}"
 )
-"""Extensions that leave the triangles as they are, or that are decoded before."""
+"""Extensions that leave the triangles as they are, or that are read."""
 
-KEPT = {
-    "buffers": ("byteLength", "uri"),
-    "bufferViews": ("buffer", "byteOffset", "byteLength", "byteStride"),
-    "accessors": ("bufferView", "byteOffset", "componentType", "count", "type"),
-    "nodes": ("children", "mesh", "matrix", "translation", "rotation", "scale"),
-    "scenes": ("nodes",),
-}
-"""The fields that determine the triangles and their transforms, besides the meshes."""
+ENCODED = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+"""Extensions that encode the triangles and are not read: without the decoder, the file holds zeros in their place."""
+
+POINTS, LINES, TRIANGLES, STRIP, FAN = (0,), (1, 2, 3), 4, 5, 6
+"""Modes of primitives."""
+
+SURFACES = (TRIANGLES, STRIP, FAN)
 
 UNREADABLE = "cannot be read as glTF: it is damaged or cut off"
 
 
-def plain_gltf(path: Path, content: bytes, beside: Callable[[str], bytes]) -> bytes:
-    """Return a glTF file with the same triangles and nothing else; refuse one that declares more than it holds.
+class Triangles(NamedTuple):
+    """Triangles as a node places them; points if there are no faces."""
+
+    vertices: FloatArray
+    faces: IntArray
+
+
+class Gltf(NamedTuple):
+    """What a file shows: nodes with what they place, and a sentence for each kind of content that is not read."""
+
+    geometry: list[tuple[SourceNode, Triangles]]
+    warnings: list[str]
+
+
+def read_gltf(path: Path, content: bytes, beside: Callable[[str], bytes]) -> Gltf:
+    """Read a glTF file.
 
     Parameters
     ----------
@@ -66,47 +71,25 @@ def plain_gltf(path: Path, content: bytes, beside: Callable[[str], bytes]) -> by
     Raises
     ------
     MeshFileError
-        It declares more than it holds, or more than is reasonable.
+        It is damaged, declares more than it holds or more than is reasonable, or requires what is not read.
+    MissingExtraError
+        It is compressed with Draco, and the extra ``draco`` is not installed.
     FileNotFoundError
         Raised by `beside`.
     """
     header, rest = split(path, content)
     try:
-        plain = _plain(path, header)
-        _check(path, plain, _bytes_given(path, plain, len(content), beside))
-    except (TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:
-        raise damaged(path, error) from error
-    return joined(plain, rest)
-
-
-def damaged(path: Path, error: Exception) -> MeshFileError:
-    """Build the error for a file whose parts are missing or of the wrong type, as an exception tells."""
-    return MeshFileError(f"{path} {UNREADABLE} ({type(error).__name__}: {error!s:.100}); export it again")
-
-
-def joined(header: Json, rest: bytes | None) -> bytes:
-    """Put together what `split` took apart."""
-    text = json.dumps(header).encode()
-    if rest is None:
-        return text
-    text += b" " * (-len(text) % 4)
-    head = struct.pack("<4sIII4s", MAGIC, 2, 20 + len(text) + len(rest), len(text), JSON_CHUNK)
-    return b"".join((head, text, rest))
-
-
-def node_names(path: Path, content: bytes) -> list[str]:
-    """Name every node of a glTF file: as it is called, like its mesh, or by its index."""
-    header, _ = split(path, content)
-    meshes = header.get("meshes", [])
-
-    def named(index: int, node: Json) -> str:
-        own = node.get("name")
-        mesh = node.get("mesh")
-        if not own and isinstance(mesh, int) and 0 <= mesh < len(meshes):
-            own = meshes[mesh].get("name")
-        return own if own and isinstance(own, str) else f"node_{index}"
-
-    return [named(index, node) for index, node in enumerate(header.get("nodes", []))]
+        primitives = _checked(path, header)
+        arrays = Arrays(path, header, rest, len(content), beside)
+        required = DRACO in header.get("extensionsRequired", [])
+        if not decode_draco(path, primitives, required, arrays) and required:
+            raise _hidden(path, DRACO)
+        with np.errstate(all="ignore"):  # what is not finite is left out, with a warning
+            return _Scene(path, header, arrays).read()
+    except MeshFileError:
+        raise
+    except (TypeError, KeyError, IndexError, AttributeError, OverflowError, ValueError) as error:
+        raise MeshFileError(f"{path} {UNREADABLE} ({type(error).__name__}: {error!s:.100}); export it again") from error
 
 
 def split(path: Path, content: bytes) -> tuple[Json, bytes | None]:
@@ -132,120 +115,234 @@ def split(path: Path, content: bytes) -> tuple[Json, bytes | None]:
     return header, rest
 
 
-def unread_in(path: Path, content: bytes) -> list[str]:
-    """A sentence for each kind of content that is not read: lines, points, poses, instances, morphs."""
-    header, _ = split(path, content)
-    nodes, meshes = header.get("nodes", []), header.get("meshes", [])
-    modes = [primitive.get("mode", 4) for mesh in meshes for primitive in mesh["primitives"]]
-    skinned = sum(1 for node in nodes if "skin" in node and "mesh" in node)
-    instanced = sum(1 for node in nodes if INSTANCES in node.get("extensions", {}))
-    morphed = sum(1 for holder in (*meshes, *nodes) if any(holder.get("weights", ())))
-    said = {
-        "primitives are points or lines, and were left out": sum(1 for mode in modes if mode in (0, 1, 2, 3)),
-        "skinned meshes were placed by their nodes, not by their joints": skinned,
-        f"nodes have instances by {INSTANCES}, which were left out": instanced,
-        "morph weights were left out, so that those meshes have their basic shape": morphed,
-    }
-    return [f"{count} {what}" for what, count in said.items() if count]
-
-
-def refuse_hidden(path: Path, header: Json, extensions: Sequence[str] = UNREAD) -> None:
-    """Refuse a file that requires one of these extensions to find its triangles."""
-    for name in extensions:
-        if name in header.get("extensionsRequired", []):
-            raise MeshFileError(
-                f"{path} hides its triangles by {name}, which is not read: export it again without that compression, "
-                "or run  npx @gltf-transform/cli copy IN.glb OUT.glb"
-            )
-
-
-def _plain(path: Path, header: Json) -> Json:
-    refuse_hidden(path, header, (*UNREAD, DRACO))
+def _checked(path: Path, header: Json) -> list[Json]:
+    """Refuse extensions that are not read, and more than is reasonable; returns all primitives."""
     for name in header.get("extensionsRequired", []):
-        if HARMLESS.fullmatch(str(name)) is None:
+        if name in ENCODED:
+            raise _hidden(path, name)
+        if READ.fullmatch(str(name)) is None:
             raise MeshFileError(f"{path} requires the extension {name!r:.60}, which is not read: export it without it")
-    plain: Json = {key: header[key] for key in ("scene",) if key in header}
-    plain["asset"] = {"version": header.get("asset", {}).get("version", "2.0")}
-    for key, fields in KEPT.items():
-        if key in header:
-            plain[key] = [_only(item, fields) for item in header[key]]
-    plain["meshes"] = [
-        {"primitives": [_plain_primitive(primitive) for primitive in mesh["primitives"]]}
-        for mesh in header.get("meshes", [])
-    ]
-    return plain
-
-
-def _plain_primitive(primitive: Json) -> Json:
-    return {**_only(primitive, ("indices", "mode")), "attributes": _only(primitive["attributes"], ("POSITION",))}
-
-
-def _only(item: Json, fields: tuple[str, ...]) -> Json:
-    if not isinstance(item, dict):  # the fields' names may be in a string, too
-        raise TypeError(f"{item!s:.40} is no object")
-    return {field: item[field] for field in fields if field in item}
-
-
-def _bytes_given(path: Path, header: Json, own: int, beside: Callable[[str], bytes]) -> int:
-    """Count the bytes of the file and of the files its buffers name."""
-    buffers = header.get("buffers", [])
-    if len(buffers) > MOST_PLACES:
-        raise MeshFileError(
-            f"{path} has {len(buffers)} buffers, more than {MOST_PLACES}: export it again with a single buffer"
-        )
-    named = {buffer["uri"] for buffer in buffers if "base64," not in buffer.get("uri", "base64,")}
-    return own + sum(len(beside(name)) for name in sorted(named))
-
-
-def _check(path: Path, header: Json, given: int) -> None:
-    primitives = [primitive for mesh in header["meshes"] for primitive in mesh["primitives"]]
     nodes = header.get("nodes", [])
+    primitives = [primitive for mesh in header.get("meshes", []) for primitive in mesh["primitives"]]
     edges = sum(len(node.get("children", [])) for node in nodes)
     edges += sum(len(scene.get("nodes", [])) for scene in header.get("scenes", []))
     counts = {"nodes": len(nodes), "references to nodes": edges, "primitives": len(primitives)}
     for what, count in counts.items():
         if count > MOST_PLACES:
             raise MeshFileError(f"{path} has {count} {what}, more than {MOST_PLACES}: join its meshes first")
-    views = header.get("bufferViews", [])
-    accessors = [_Accessor(path, accessor, views) for accessor in header.get("accessors", [])]
-    asked = sum(_natural(path, view.get("byteLength", 0), "byteLength") for view in views)
-    asked += sum(accessor.bytes for accessor in accessors)
-    asked += sum(accessors[index].as_loaded for primitive in primitives for index in _used(primitive))
-    if asked > most_in_memory(given):
-        raise MeshFileError(
-            f"{path} asks for {asked} bytes, though it holds {given}: export it again, with one buffer view per array"
-        )
+    return primitives
 
 
-class _Accessor:
-    """The size of an array: ``bytes`` in the file, and ``as_loaded`` in a mesh, with eight bytes per number."""
-
-    def __init__(self, path: Path, accessor: Json, views: list[Json]) -> None:
-        count = _natural(path, accessor["count"], "count")
-        row = ITEM_BYTES[accessor["componentType"]] * ITEMS[accessor["type"]]
-        self.bytes = count * row
-        self.as_loaded = 8 * count * ITEMS[accessor["type"]]
-        if "bufferView" not in accessor:
-            return  # zeros, or data of an extension
-        view = views[_natural(path, accessor["bufferView"], "bufferView")]
-        start = _natural(path, accessor.get("byteOffset", 0), "byteOffset")
-        _natural(path, view.get("byteOffset", 0), "byteOffset")
-        stride = _natural(path, view.get("byteStride", row), "byteStride")
-        length = start + (count - 1) * stride + row if count else 0
-        if stride < row or length > view["byteLength"]:
-            raise MeshFileError(f"{path} declares {count} rows but has no room for them; export it again")
+def _hidden(path: Path, extension: str) -> MeshFileError:
+    return MeshFileError(
+        f"{path} hides its triangles by {extension}, which is not read: export it again without that compression, "
+        "or run  npx @gltf-transform/cli copy IN.glb OUT.glb"
+    )
 
 
-def _used(primitive: Json) -> Iterator[int]:
-    """Yield the accessors of a primitive."""
-    yield from primitive["attributes"].values()
-    if "indices" in primitive:
-        yield primitive["indices"]
+class _Scene:
+    """The nodes of a file, as its scene places them."""
+
+    def __init__(self, path: Path, header: Json, arrays: Arrays) -> None:
+        self._header, self._arrays = header, arrays
+        self._nodes: list[Json] = header.get("nodes", [])
+        self._worlds = _worlds(path, self._nodes)
+        self._shapes: dict[Any, Triangles] = {}
+        self._unjointed: set[int] = set()
+
+    def read(self) -> Gltf:
+        """Read the triangles; the points if there are none."""
+        shown = [index for index in self._shown() if "mesh" in self._nodes[index]]
+        primitives = [one for index in shown for one in self._mesh(index)["primitives"]]
+        modes = [primitive.get("mode", TRIANGLES) for primitive in primitives]
+        if not set(modes) <= {*POINTS, *LINES, *SURFACES}:
+            raise ValueError("a primitive of an unknown mode")
+        found = [self._placed(index, SURFACES) for index in shown]
+        solid = any(len(triangles.faces) for _, triangles in found)
+        if not solid:
+            found = [self._placed(index, POINTS) for index in shown]
+        unread = (*LINES, *POINTS) if solid else LINES
+        said = {
+            "primitives are points or lines, and were left out": sum(mode in unread for mode in modes),
+            "meshes have a skin but no joints, and were placed by their nodes": len(self._unjointed),
+        }
+        warnings = [f"{count} {what}" for what, count in said.items() if count]
+        return Gltf([(node, shape) for node, shape in found if len(shape.vertices)], warnings)
+
+    def _shown(self) -> list[int]:
+        """The nodes of the scene, by index."""
+        scenes = self._header.get("scenes")
+        if not scenes:
+            return list(range(len(self._nodes)))
+        order = list(item(scenes, self._header.get("scene", 0)).get("nodes", ()))
+        found = set(order)
+        for index in order:
+            below = [child for child in item(self._nodes, index).get("children", ()) if child not in found]
+            found.update(below)
+            order.extend(below)
+        return sorted(found)
+
+    def _mesh(self, node: int) -> Json:
+        return dict(item(self._header["meshes"], self._nodes[node]["mesh"]))
+
+    def _placed(self, index: int, modes: Sequence[int]) -> tuple[SourceNode, Triangles]:
+        """What a node places: by the joints of its skin, in the coordinates of the scene, or else by itself."""
+        node, mesh = self._nodes[index], self._mesh(index)
+        parts = [one for one in mesh["primitives"] if one.get("mode", TRIANGLES) in modes]
+        skin = node.get("skin")
+        if skin is not None and not all("JOINTS_0" in part["attributes"] for part in parts):
+            self._unjointed.add(index)
+            skin = None
+        weights = node.get("weights", mesh.get("weights", ()))
+        key = (node["mesh"], tuple(weights) if any(weights) else (), skin, modes)
+        if key not in self._shapes:
+            self._shapes[key] = self._shape(parts, key[1], skin)
+        shape = self._shapes[key]
+        instances = node.get("extensions", {}).get(INSTANCES)
+        if instances is not None:
+            if skin is not None:
+                raise ValueError("instances of a skinned mesh")
+            shape = self._repeated(shape, instances["attributes"])
+        name = node.get("name") or mesh.get("name")
+        world = self._worlds[index] if skin is None else np.eye(4)
+        return SourceNode(name if name and isinstance(name, str) else f"node_{index}", index, world), shape
+
+    def _shape(self, parts: Sequence[Json], weights: Sequence[float], skin: int | None) -> Triangles:
+        """The triangles of primitives with the weights of their morph targets, as the joints of a skin bend them."""
+        vertices: list[FloatArray] = [np.empty((0, 3))]
+        faces: list[IntArray] = [np.empty((0, 3), dtype=np.int64)]
+        bones = None if skin is None else self._bones(item(self._header["skins"], skin))
+        first = 0
+        for part in parts:
+            if "POSITION" not in part["attributes"]:
+                continue  # nothing to show, as the specification says
+            points = self._arrays.floats(part["attributes"]["POSITION"])
+            for weight, target in zip(weights, part.get("targets", ()), strict=bool(weights) and "targets" in part):
+                if weight and "POSITION" in target:
+                    points = points + weight * self._arrays.more(target["POSITION"])
+            corners = self._corners(part, len(points))
+            if len(corners) and corners.max() >= len(points):
+                raise ValueError(f"a face uses vertex {corners.max()}, but there are {len(points)}")
+            if bones is not None:
+                points = self._skinned(points, part["attributes"], bones)
+                if (np.linalg.det(bones[:, :3, :3]) < 0).all():
+                    corners = corners[:, ::-1]
+            vertices.append(points)
+            faces.append(corners + first)
+            first += len(points)
+        return Triangles(np.concatenate(vertices), np.concatenate(faces))
+
+    def _corners(self, part: Json, count: int) -> IntArray:
+        mode = part.get("mode", TRIANGLES)
+        if mode in POINTS:
+            return np.empty((0, 3), dtype=np.int64)
+        corners = self._arrays.integers(part["indices"])[:, 0] if "indices" in part else np.arange(count)
+        if mode == TRIANGLES:
+            return corners.reshape(-1, 3)
+        self._arrays.need(3 * corners.nbytes)
+        return strip_triangles(corners) if mode == STRIP else _fan(corners)
+
+    def _bones(self, skin: Json) -> FloatArray:
+        """How each joint of a skin moves points ``[J, 4, 4]``."""
+        joints = skin["joints"]
+        self._arrays.need(2 * self._worlds[0].nbytes * len(joints))
+        bones = np.stack([item(self._worlds, joint) for joint in joints])
+        if "inverseBindMatrices" not in skin:
+            return bones
+        inverses = self._arrays.more(skin["inverseBindMatrices"], "MAT4").reshape(-1, 4, 4)
+        return np.asarray(bones @ inverses[: len(joints)].transpose(0, 2, 1))
+
+    def _skinned(self, points: FloatArray, attributes: Json, bones: FloatArray) -> FloatArray:
+        """Points as the joints of a skin place them: the mean of what each joint does, by its weight."""
+        sets = [name.removeprefix("JOINTS_") for name in sorted(attributes) if name.startswith("JOINTS_")]
+        self._arrays.need(2 * bones[0].nbytes * len(points))
+        joints = np.concatenate([self._arrays.integers(attributes[f"JOINTS_{one}"], "VEC4") for one in sets], axis=1)
+        weights = np.concatenate([self._arrays.more(attributes[f"WEIGHTS_{one}"], "VEC4") for one in sets], axis=1)
+        whole = weights.sum(axis=1)
+        weights[whole == 0, 0] = 1.0  # follow the first joint
+        weights /= np.where(whole == 0, 1.0, whole)[:, None]
+        placed = np.zeros_like(points)
+        for joint, weight in zip(joints.T, weights.T, strict=True):
+            used = np.flatnonzero(weight)
+            moves = bones[joint[used]]
+            moved = dots(moves[:, :3, :3], points[used, None, :]) + moves[:, :3, 3]
+            placed[used] += weight[used, None] * moved
+        return placed
+
+    def _repeated(self, shape: Triangles, attributes: Json) -> Triangles:
+        """All instances of a shape within its node."""
+        kinds = {"TRANSLATION": "VEC3", "ROTATION": "VEC4", "SCALE": "VEC3"}
+        given = {name: self._arrays.more(attributes[name], kinds[name]) for name in kinds if name in attributes}
+        (count,) = {len(rows) for rows in given.values()}
+        if count > MOST_PLACES:
+            raise ValueError(f"{count} instances of a mesh")
+        self._arrays.need(count * (shape.vertices.nbytes + shape.faces.nbytes))
+        moves = _placements(*(given.get(name, np.array([at])) for name, at in zip(kinds, UNMOVED, strict=True)))
+        vertices, faces = [], []
+        for number, move in enumerate(np.broadcast_to(moves, (count, 4, 4))):
+            vertices.append(heights(shape.vertices, move[:3, :3]) + move[:3, 3])
+            turned = shape.faces[:, ::-1] if np.linalg.det(move[:3, :3]) < 0 else shape.faces
+            faces.append(turned + number * len(shape.vertices))
+        return Triangles(np.concatenate(vertices), np.concatenate(faces)) if count else Triangles(*_NOTHING)
 
 
-def _natural(path: Path, number: Any, what: str) -> int:
-    if not isinstance(number, int) or number < 0:
-        raise MeshFileError(
-            f"{path} has {number!r:.40} as a {what}, which cannot be negative or fractional; export it again"
-        )
-    return number
+UNMOVED = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), (1.0, 1.0, 1.0))
+"""Translation, rotation and scale of a node that gives none."""
+
+_NOTHING = np.empty((0, 3)), np.empty((0, 3), dtype=np.int64)
+
+
+def _fan(corners: IntArray) -> IntArray:
+    middle = np.full(max(len(corners) - 2, 0), corners[0] if len(corners) else 0)
+    return np.stack([middle, corners[1:-1], corners[2:]], axis=1)
+
+
+def _worlds(path: Path, nodes: Sequence[Json]) -> FloatArray:
+    """The transform of each node to the coordinates of the scene ``[N, 4, 4]``."""
+    parents: list[int | None] = [None] * len(nodes)
+    for index, node in enumerate(nodes):
+        for child in node.get("children", ()):
+            if item(parents, child) not in (None, index):
+                raise MeshFileError(
+                    f"{path} places the node {child} below two others, or inside itself: export the scene again"
+                )
+            parents[child] = index
+    order = [index for index, parent in enumerate(parents) if parent is None]
+    for index in order:
+        order.extend(dict.fromkeys(nodes[index].get("children", ())))
+    if len(order) < len(nodes):
+        raise MeshFileError(f"{path} places a node inside itself: export the scene again")
+    worlds = _locals(nodes)
+    for index in order:
+        if (parent := parents[index]) is not None:
+            worlds[index] = worlds[parent] @ worlds[index]
+    return worlds
+
+
+def _locals(nodes: Sequence[Json]) -> FloatArray:
+    """The transform of each node to the coordinates of its parent."""
+    if not nodes:
+        return np.empty((0, 4, 4))
+    fields = zip(("translation", "rotation", "scale"), UNMOVED, strict=True)
+    placed = _placements(*(np.array([node.get(name, at) for node in nodes], float) for name, at in fields))
+    for index, node in enumerate(nodes):
+        if "matrix" in node:
+            placed[index] = np.array(node["matrix"], float).reshape(4, 4).T
+    return placed
+
+
+def _placements(moves: FloatArray, turns: FloatArray, sizes: FloatArray) -> FloatArray:
+    """Transforms ``[N, 4, 4]`` of translations, quaternions ``x, y, z, w`` and scales, one for each, or one for all."""
+    if (moves.shape[1:], turns.shape[1:], sizes.shape[1:]) != ((3,), (4,), (3,)):
+        raise ValueError("a transform of other numbers than it needs")
+    length = np.sqrt((turns * turns).sum(axis=1, keepdims=True))
+    x, y, z, w = np.where(length > 0, turns / length, UNMOVED[1]).T
+    rows = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
+        (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
+        (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
+    )
+    placed = np.tile(np.eye(4), (max(len(moves), len(turns), len(sizes)), 1, 1))
+    placed[:, :3, :3] = np.moveaxis(np.array(rows), 2, 0) * sizes[:, None, :]
+    placed[:, :3, 3] = moves
+    return placed

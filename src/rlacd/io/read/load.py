@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
@@ -22,8 +23,7 @@ from rlacd.errors import EmptyMeshError, MeshDataError, MeshFileError, MissingEx
 from rlacd.io.read.beside import FolderFiles
 from rlacd.io.read.conventions import stated
 from rlacd.io.read.engine_hulls import without_engine_hulls
-from rlacd.io.read.gltf import node_names, plain_gltf, unread_in
-from rlacd.io.read.gltf_encoded import decoded_gltf
+from rlacd.io.read.gltf import Gltf, Triangles, read_gltf
 from rlacd.io.read.limits import MOST_TRIANGLES
 from rlacd.io.read.looks import has_looks
 from rlacd.io.read.msh import msh_as_ply
@@ -100,50 +100,38 @@ def _from_file(path: Path) -> InputMesh:
     content, extension, scene = _read(path)
     mesh = _clean(_bake(scene, path.name), path.name)
     up, metres = stated(extension, content, scene)
-    mesh = replace(mesh, up=up, metres=metres, warnings=(*mesh.warnings, *_left_out(path, content, extension)))
+    mesh = replace(mesh, up=up, metres=metres, warnings=(*mesh.warnings, *_left_out(path, content, extension, scene)))
     if extension in USD:
         kept = len(mesh.nodes) > 1 or any(one.visual.defined for one in scene.geometry.values())
         return replace(mesh, asset=Asset(scene, extension=extension) if kept else None)
     if extension not in ("glb", "gltf"):
-        return replace(
-            mesh,
-            asset=Asset(content, path, extension) if has_looks(path, content, extension, len(mesh.nodes)) else None,
-        )
-    names = node_names(path, content)
-    # The triangles were read from a file without names, whose nodes are therefore called by their index.
-    keys = [int(str(node.key).partition("_")[0]) for node in mesh.nodes]
-    nodes = tuple(replace(node, name=names[key], key=key) for node, key in zip(mesh.nodes, keys, strict=True))
-    return replace(_joined(replace(mesh, nodes=nodes)), asset=Asset(content, path, extension))
+        kept = has_looks(path, content, extension, len(mesh.nodes))
+        return replace(mesh, asset=Asset(content, path, extension) if kept else None)
+    return replace(mesh, asset=Asset(content, path, extension))
 
 
-def _left_out(path: Path, content: bytes, extension: str) -> list[str]:
+def _left_out(path: Path, content: bytes, extension: str, scene: trimesh.Scene | Gltf) -> list[str]:
     """A sentence for each kind of content of a file that was not read."""
+    if isinstance(scene, Gltf):
+        return scene.warnings
     if extension == "stl" and not is_text(content, extension):
         more = len(content) - 84 - 50 * int.from_bytes(content[80:84], "little")
         return [f"{more} bytes after the last triangle of {path.name} were left out"] if more > 0 else []
     if extension == "dae":
         unread = {
-            b"<skew": "skews",
-            b"<instance_controller": "skinned or morphed meshes",
-            b"<ph>": "polygons with holes",
+            rb"skew": "skews of {} were left out",
+            rb"instance_controller": "skinned or morphed meshes of {} have their bind shape, not that of their joints",
+            rb"ph": "polygons with holes of {} were left out",
         }
-        return [f"{what} of {path.name} were left out" for tag, what in unread.items() if tag in content]
-    if extension == "ply" and b"element tristrips" in content[: content.find(b"end_header") + 1]:
-        return [f"the triangle strips of {path.name} were left out"]
-    return unread_in(path, content) if extension in ("glb", "gltf") else []
+        return [
+            said.format(path.name)
+            for tag, said in unread.items()
+            if re.search(rb"<([\w.-]+:)?" + tag + rb"[\s/>]", content)
+        ]
+    return []
 
 
-def _joined(mesh: InputMesh) -> InputMesh:
-    """Make one node of those with the same key, into which the primitives of a mesh are split."""
-    if mesh.node_of is None:
-        return mesh
-    first: dict[int | str, int] = {}
-    place = np.array([first.setdefault(node.key, len(first)) for node in mesh.nodes], dtype=np.int64)
-    kept = {node.key: node for node in reversed(mesh.nodes)}
-    return replace(mesh, nodes=tuple(kept[key] for key in first), node_of=place[mesh.node_of])
-
-
-def _read(path: Path) -> tuple[bytes, str, trimesh.Scene]:
+def _read(path: Path) -> tuple[bytes, str, trimesh.Scene | Gltf]:
     """Parse a file: its content, format and scene; raises MeshFileError with the most likely reason."""
     # Opened here, not by name in the parser: a name that looks like a URL must never be fetched.
     try:
@@ -173,8 +161,8 @@ def _read(path: Path) -> tuple[bytes, str, trimesh.Scene]:
     named = extension  # a zae file is unpacked to a dae file
     beside = FolderFiles(path.parent)
     try:
-        plain, extension = _checked(path, content, extension, beside)
-        scene = usd_scene(path) if extension in USD else _parsed(plain, extension, beside)
+        plain, extension = _checked(path, content, extension)
+        scene = _parsed(path, plain, extension, beside)
     except Exception as error:  # parsers may raise anything on damaged files
         if holds and holds not in (extension, named):
             raise MeshFileError(f"{path} is not {extension} but {holds}: rename it to .{holds}") from error
@@ -194,7 +182,11 @@ def _read(path: Path) -> tuple[bytes, str, trimesh.Scene]:
     return plain if extension == "dae" else content, extension, scene
 
 
-def _parsed(content: bytes, extension: str, beside: FolderFiles) -> trimesh.Scene:
+def _parsed(path: Path, content: bytes, extension: str, beside: FolderFiles) -> trimesh.Scene | Gltf:
+    if extension in ("glb", "gltf"):
+        return read_gltf(path, content, beside.get)
+    if extension in USD:
+        return usd_scene(path)
     return trimesh.load_scene(
         io.BytesIO(content),
         file_type=extension,
@@ -205,11 +197,9 @@ def _parsed(content: bytes, extension: str, beside: FolderFiles) -> trimesh.Scen
     )
 
 
-def _checked(path: Path, content: bytes, extension: str, beside: FolderFiles) -> tuple[bytes, str]:
+def _checked(path: Path, content: bytes, extension: str) -> tuple[bytes, str]:
     """Return the content to parse, in a form that is safe for the parser; raises MeshFileError."""
     match extension:
-        case "gltf" | "glb":
-            return plain_gltf(path, decoded_gltf(path, content, beside.get), beside.get), extension
         case "3mf":
             check_3mf(path, content)
         case "dae" | "zae":
@@ -224,7 +214,7 @@ def _checked(path: Path, content: bytes, extension: str, beside: FolderFiles) ->
             return msh_as_ply(path, content), "ply"
         case "off":
             return plain_off(path, content), extension
-        case _ if extension not in USD:
+        case _ if extension not in (*USD, "glb", "gltf"):
             check_text(path, content)
     return content, extension
 
@@ -267,52 +257,56 @@ class _Baked(NamedTuple):
     node_of: IntArray | None = None
 
 
-def _bake(source: trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud, name: str) -> _Baked:
+def _bake(source: trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud | Gltf, name: str) -> _Baked:
     """Concatenate all triangles of a scene, with every instance transformed; if there are none, its points."""
     vertices: list[FloatArray] = []
     faces: list[IntArray] = []
     points: list[FloatArray] = []
     nodes: list[SourceNode] = []
     count = 0
-    for node, geometry, transform in _instances(source, name):
-        if isinstance(geometry, trimesh.Trimesh):
-            v, f = _arrays(geometry.vertices, geometry.faces)
-            if transform is not None:
-                v = heights(v, transform[:3, :3]) + transform[:3, 3]
-                if np.linalg.det(transform[:3, :3]) < 0:
-                    f = f[:, ::-1]
-            if len(f) == 0:
-                points.append(v)
-                continue
-            if f.min() < 0 or f.max() >= len(v):
-                _raise_out_of_range(f, len(v))
-            vertices.append(v)
-            faces.append(f + count)
-            nodes.append(SourceNode(str(node), node, np.eye(4) if transform is None else transform))
-            count += len(v)
-        elif isinstance(geometry, trimesh.PointCloud):
-            v, _ = _arrays(geometry.vertices, [])
-            points.append(v if transform is None else heights(v, transform[:3, :3]) + transform[:3, 3])
+    for node, geometry in _instances(source, name):
+        if not isinstance(geometry, trimesh.Trimesh | trimesh.PointCloud | Triangles):
+            continue
+        v, f = _arrays(geometry.vertices, getattr(geometry, "faces", ()))
+        if not np.array_equal(node.transform, np.eye(4)):
+            v = heights(v, node.transform[:3, :3]) + node.transform[:3, 3]
+            if np.linalg.det(node.transform[:3, :3]) < 0:
+                f = f[:, ::-1]
+        if len(f) == 0:
+            points.append(v)
+            continue
+        if f.min() < 0 or f.max() >= len(v):
+            _raise_out_of_range(f, len(v))
+        vertices.append(v)
+        faces.append(f + count)
+        nodes.append(node)
+        count += len(v)
     if vertices:
         node_of = np.repeat(np.arange(len(nodes)), [len(f) for f in faces])
         return _Baked(np.concatenate(vertices), np.concatenate(faces), tuple(nodes), node_of)
     return _Baked(np.concatenate(points) if points else np.empty((0, 3)), np.empty((0, 3), dtype=np.int64))
 
 
-def _instances(source: Any, name: str) -> Iterator[tuple[Any, Any, FloatArray | None]]:
-    """Yield each node and its geometry with the transform, None for the identity, once per instance."""
-    if not isinstance(source, trimesh.Scene):
-        yield "mesh", source, None
-        return
-    data = source.graph.transforms.node_data
-    instances = [(node, source.geometry[data[node]["geometry"]]) for node in source.graph.nodes_geometry]
-    count = sum(len(getattr(geometry, "faces", ())) for _, geometry in instances)
+def _instances(source: Any, name: str) -> Iterator[tuple[SourceNode, Any]]:
+    """Yield each node and its geometry, once per instance."""
+    if isinstance(source, Gltf):
+        _require_few((geometry for _, geometry in source.geometry), name)
+        yield from source.geometry
+    elif not isinstance(source, trimesh.Scene):
+        yield SourceNode("mesh", "mesh", np.eye(4)), source
+    else:
+        data = source.graph.transforms.node_data
+        instances = [(node, source.geometry[data[node]["geometry"]]) for node in source.graph.nodes_geometry]
+        _require_few((geometry for _, geometry in instances), name)
+        placed = {source.graph.base_frame: np.eye(4)}
+        for node, geometry in instances:
+            yield SourceNode(str(node), node, _placed(source.graph, node, placed, name)), geometry
+
+
+def _require_few(geometries: Iterable[Any], name: str) -> None:
+    count = sum(len(getattr(geometry, "faces", ())) for geometry in geometries)
     if count > MOST_TRIANGLES:
         raise MeshDataError(f"{name} places {count} triangles, more than {MOST_TRIANGLES}: simplify it first")
-    placed = {source.graph.base_frame: np.eye(4)}
-    for node, geometry in instances:
-        transform = _placed(source.graph, node, placed, name)
-        yield node, geometry, None if np.array_equal(transform, np.eye(4)) else transform
 
 
 def _placed(graph: Any, node: Any, placed: dict[Any, FloatArray], name: str) -> FloatArray:

@@ -19,6 +19,7 @@ from rlacd.errors import MeshFileError
 from rlacd.io.read.beside import PICTURES, FolderFiles
 from rlacd.io.read.colors_3mf import Color, colors_3mf, has_colors
 from rlacd.io.read.polygons import obj_without_folds
+from rlacd.io.read.polygons_ply import STRIPS
 from rlacd.io.read.text import check_text, spaced_obj
 from rlacd.io.read.xml import collada_of
 
@@ -41,7 +42,8 @@ def has_looks(path: Path, content: bytes, extension: str, nodes: int) -> bool:
                 or _COLORED.search(content) is not None
             )
         case "ply":
-            return _DESCRIBED.search(content[: max(content.find(b"end_header"), 0)]) is not None
+            header = content[: max(content.find(b"end_header"), 0)]
+            return _DESCRIBED.search(header) is not None and STRIPS.encode() not in header
         case "dae":
             return True
         case _:

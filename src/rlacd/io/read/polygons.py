@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -57,7 +57,7 @@ def where_folded(points: FloatArray, counts: IntArray, corners: IntArray) -> Ite
     """
     first = np.cumsum(counts) - counts
     for polygon in _folded(points, *_fans(counts, corners), len(counts)).tolist():
-        apart = _apart(points[corners[first[polygon] : first[polygon] + counts[polygon]]])
+        apart = triangles_within(points[corners[first[polygon] : first[polygon] + counts[polygon]]])
         if apart is not None:
             yield polygon, apart
 
@@ -82,12 +82,17 @@ def _folded(points: FloatArray, fans: IntArray, owner: IntArray, polygons: int) 
     return np.unique(owner[turned])
 
 
-def _apart(ring: FloatArray) -> IntArray | None:
-    """Triangles of one polygon ``[N, 3]`` that do not fold over, ``[N - 2, 3]``; None if there are none."""
-    if len(ring) > MOST_CORNERS or not np.isfinite(ring).all():
+def triangles_within(ring: FloatArray, holes: Sequence[FloatArray] = ()) -> IntArray | None:
+    """Triangles of one polygon ``[N, 3]`` that do not fold over; None if there are none.
+
+    ``[N - 2, 3]`` without holes; each hole gives two more than it has corners, which count on after those of the ring.
+    """
+    total = len(ring) + sum(map(len, holes))
+    middle = ring.mean(axis=0)
+    rings = [one - middle for one in (ring, *holes)]
+    if total > MOST_CORNERS or not all(np.isfinite(one).all() for one in rings):
         return None
-    ring = ring - ring.mean(axis=0)
-    normal = np.cross(ring, np.roll(ring, -1, axis=0)).sum(axis=0)
+    normal = _normal(rings[0])
     length = float(np.linalg.norm(normal))
     if not length > 0:
         return None
@@ -95,13 +100,29 @@ def _apart(ring: FloatArray) -> IntArray | None:
     across = np.eye(3)[np.abs(normal).argmin()]
     right = np.cross(across, normal)
     right /= np.linalg.norm(right)
-    flat = np.ascontiguousarray(np.stack([ring @ right, ring @ np.cross(normal, right)], axis=1))
-    found = np.asarray(triangulate([flat]), dtype=np.int64)
-    if found.shape != (len(ring) - 2, 3):
+    flat = [np.ascontiguousarray(np.stack([one @ right, one @ np.cross(normal, right)], axis=1)) for one in rings]
+    places = np.split(np.arange(total), np.cumsum([len(one) for one in rings])[:-1])
+    for hole, one in enumerate(rings[1:], 1):
+        if _normal(one) @ normal > 0:  # holes run the other way
+            flat[hole], places[hole] = np.ascontiguousarray(flat[hole][::-1]), places[hole][::-1]
+    found = np.asarray(triangulate(flat), dtype=np.int64)
+    if found.shape != (total - 2 + 2 * len(holes), 3):
         return None
-    a, b, c = flat[found[:, 0]], flat[found[:, 1]], flat[found[:, 2]]
+    points = np.concatenate(flat)
+    a, b, c = points[found[:, 0]], points[found[:, 1]], points[found[:, 2]]
     areas = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    return found if areas.min() >= -FOLDED * length else None
+    return np.concatenate(places)[found] if areas.min() >= -FOLDED * length else None
+
+
+def _normal(ring: FloatArray) -> FloatArray:
+    return np.asarray(np.cross(ring, np.roll(ring, -1, axis=0)).sum(axis=0))
+
+
+def strip_triangles(corners: IntArray) -> IntArray:
+    """The triangles of a strip of corners: every other one is turned."""
+    first = np.arange(max(len(corners) - 2, 0))
+    odd = first % 2
+    return np.asarray(corners[np.stack([first, first + 1 + odd, first + 2 - odd], axis=1)])
 
 
 def folds(points: FloatArray, counts: IntArray, corners: IntArray) -> bool:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import copy
 from typing import Any
 
 import numpy as np
 from lxml import etree
 
-from rlacd.io.read.polygons import FloatArray, IntArray, where_folded
+from rlacd.io.read.polygons import FloatArray, IntArray, triangles_within, where_folded
 
 
 def collada_without_folds(root: Any) -> bool:
@@ -79,20 +78,30 @@ def _replace_in_list(primitive: Any, points: FloatArray, offset: int, width: int
 
 
 def _replace_polygons(primitive: Any, points: FloatArray, offset: int, width: int) -> bool:
-    """Replace elements ``p`` of ``polygons``, one for each; those with holes stay."""
+    """Replace elements ``p`` and ``ph`` of ``polygons``, one for each; those that cannot be taken apart stay."""
     found = False
-    for p in primitive.findall("{*}p"):
-        ring = _integers(p.text).reshape(-1, width)
-        if not _are_within(ring[:, offset], points):
+    for element in primitive.findall("{*}p") + primitive.findall("{*}ph"):
+        is_plain = etree.QName(element).localname == "p"
+        listed = [element] if is_plain else element.iterchildren("{*}p", "{*}h")
+        rings = [_integers(one.text).reshape(-1, width) for one in listed]
+        if not rings or not all(_are_within(ring[:, offset], points) for ring in rings):
             continue
-        for _, apart in where_folded(points, np.array([len(ring)]), np.ascontiguousarray(ring[:, offset])):
-            for face in apart[1:]:
-                other = copy.copy(p)
-                _write(other, ring[face].ravel())
-                p.addnext(other)
-            _write(p, ring[apart[0]].ravel())
-            primitive.set("count", str(int(primitive.get("count", 0)) + len(apart) - 1))
-            found = True
+        corners = np.concatenate(rings)
+        if is_plain:
+            folded = where_folded(points, np.array([len(corners)]), np.ascontiguousarray(corners[:, offset]))
+            apart = next((triangles for _, triangles in folded), None)
+        else:
+            outline, *holes = (points[ring[:, offset]] for ring in rings)
+            apart = triangles_within(outline, holes)
+        if apart is None:
+            continue
+        for face in apart:
+            other = etree.Element(etree.QName(etree.QName(element).namespace, "p"))
+            _write(other, corners[face].ravel())
+            element.addprevious(other)
+        primitive.remove(element)
+        primitive.set("count", str(int(primitive.get("count", 0)) + len(apart) - 1))
+        found = True
     return found
 
 

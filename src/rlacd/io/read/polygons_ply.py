@@ -1,4 +1,4 @@
-"""PLY files whose faces are polygons, rewritten as triangles: the parser takes no binary file of mixed ones."""
+"""PLY files of polygons or strips, rewritten as triangles: the parser takes no strips, and no mixed polygons."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from rlacd.io.read.polygons import FloatArray, IntArray, folds, triangles_of
+from rlacd.io.read.polygons import FloatArray, IntArray, folds, strip_triangles, triangles_of
 
 _KINDS = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -20,6 +20,9 @@ _KINDS = {
     **dict.fromkeys(("float", "float32"), "f4"),
     **dict.fromkeys(("double", "float64"), "f8"),
 }
+STRIPS = "tristrips"
+"""The element whose lists of corners are strips."""
+
 _CORNERS = ("vertex_indices", "vertex_index")
 
 
@@ -34,7 +37,7 @@ class _Element:
 
 
 def triangles_ply(header: bytes, body: bytes) -> bytes | None:
-    """Return a file's points and the triangles of its polygons as a binary PLY file.
+    """Return a file's points and the triangles of its polygons or strips as a binary PLY file.
 
     None if the parser itself reads it well: no fan folds over, and faces in binary form all have equally many corners;
     or if something is not as the commonest programs write it (points first, then faces with one list).
@@ -51,12 +54,25 @@ def triangles_ply(header: bytes, body: bytes) -> bytes | None:
     if parsed is None:
         return None
     positions, counts, corners = parsed
+    if faces.name == STRIPS:
+        corners = _of_strips(counts, corners)
+        counts = np.full(len(corners) // 3, 3)
     if not len(corners) or (counts < 0).any() or corners.min() < 0 or corners.max() >= len(positions):
         return None
     mixed = order is not None and (counts != counts[0]).any()
-    if not mixed and not folds(positions, counts, corners):
+    if not mixed and faces.name != STRIPS and not folds(positions, counts, corners):
         return None
     return encoded_ply(positions, triangles_of(positions, counts, corners))
+
+
+def _of_strips(counts: IntArray, corners: IntArray) -> IntArray:
+    """The corners of the triangles of strips; -1 ends a strip as well."""
+    strips = [
+        strip_triangles(part[part >= 0])
+        for row in np.split(corners, np.cumsum(counts)[:-1])
+        for part in np.split(row, np.flatnonzero(row == -1))
+    ]
+    return np.concatenate(strips).ravel()
 
 
 def _elements(header: bytes) -> tuple[str | None, tuple[_Element, _Element]] | None:
@@ -76,7 +92,7 @@ def _elements(header: bytes) -> tuple[str | None, tuple[_Element, _Element]] | N
             case ["property", *_]:
                 return None
     match elements:
-        case [points, faces, *_] if (points.name, faces.name) == ("vertex", "face"):
+        case [points, faces, *_] if points.name == "vertex" and faces.name in ("face", STRIPS):
             names = [name for name, _ in points.scalars]
             if points.lists or any(names.count(axis) != 1 for axis in "xyz"):
                 return None
@@ -99,7 +115,7 @@ def _binary(body: bytes, points: _Element, faces: _Element, order: str) -> _Poly
     number, width = struct.Struct(order + _LETTERS[count]), np.dtype(item).itemsize
     at = points.count * record.itemsize
     alike = _alike(body, faces, order, at, leading, trailing)
-    if alike is not None and alike[0][0] == 3:
+    if alike is not None and alike[0][0] == 3 and faces.name != STRIPS:
         return None
     read = np.frombuffer(body, record, points.count)
     positions = np.stack([read[axis].astype(np.float64) for axis in "xyz"], axis=1)

@@ -15,7 +15,7 @@ import numpy as np
 from rlacd.errors import MeshFileError
 from rlacd.io.read.limits import MOST_TRIANGLES
 from rlacd.io.read.polygons import obj_without_folds
-from rlacd.io.read.polygons_ply import triangles_ply
+from rlacd.io.read.polygons_ply import STRIPS, triangles_ply
 
 OBJ_ZERO = re.compile(rb"^[ \t]*f[^\n#]*[ \t]-?0+(?=[/\s]|$)", re.MULTILINE)
 OBJ_BLANKS = re.compile(rb"^[ \t]*(v[nt]?|f)[ \t]+", re.MULTILINE)
@@ -140,13 +140,17 @@ def plain_ply(path: Path, content: bytes) -> bytes:
     if fields > MOST_FIELDS:
         raise MeshFileError(f"{path} has a header of {fields} lines, more than {MOST_FIELDS}: export it again")
     counts = [count_in(path, word) for _, word in PLY_ELEMENT.findall(header)]
-    if b"ascii" not in header.lower().split(b"\n", 2)[1]:
-        return triangles_ply(header, content[end.end() :]) or content
-    check_text(path, content)
-    if (plain := binary_ply(header, content[end.end() :])) is not None:
-        return plain
+    is_ascii = b"ascii" in header.lower().split(b"\n", 2)[1]
+    if is_ascii:
+        check_text(path, content)
+        if (plain := binary_ply(header, content[end.end() :])) is not None:
+            return plain
     if (plain := triangles_ply(header, content[end.end() :])) is not None:
         return plain
+    if any(name == STRIPS.encode() and int(count) for name, count in PLY_ELEMENT.findall(header)):
+        raise MeshFileError(f"{path} holds triangle strips that are damaged, or not all it holds: export triangles")
+    if not is_ascii:
+        return content
     body = EMPTY_LINES.sub(b"\n", content[end.end() :].strip())
     if body.count(b"\n") + bool(body) < sum(counts):
         raise MeshFileError(f"{path} is cut off: its header declares {sum(counts)} lines; export it again")

@@ -22,6 +22,7 @@ from lxml import etree
 from rlacd.errors import MeshFileError
 from rlacd.io.read.archive import open_archive, unpack
 from rlacd.io.read.limits import DEEPEST, LONGEST_NAME, MOST_ITEMS, MOST_PLACES, MOST_TRIANGLES, most_in_memory
+from rlacd.io.read.plain_dae import in_plain_terms
 from rlacd.io.read.polygons_dae import collada_without_folds
 
 WORLD = ""
@@ -145,7 +146,7 @@ def _line_of(error: etree.XMLSyntaxError) -> str:
 
 
 def collada_of(path: Path, content: bytes, extension: str) -> bytes:
-    """Return the XML of a COLLADA file, unpacked if it is a ``zae``, checked, and with concave polygons taken apart.
+    """Return the XML of a COLLADA file, unpacked if it is a ``zae``, checked, in the terms that the parser reads.
 
     Raises
     ------
@@ -160,25 +161,21 @@ def collada_of(path: Path, content: bytes, extension: str) -> bytes:
         content = unpack(path, archive, names[0])
     if is_zipfile(io.BytesIO(content)):
         raise MeshFileError(f"{path} is an archive, not XML: rename it to .zae, or export it again")
-    root = checked_collada(path, content)
-    return etree.tostring(root, xml_declaration=True, encoding="utf-8") if collada_without_folds(root) else content
-
-
-def checked_collada(path: Path, data: bytes) -> Any:
-    """Return the document of a COLLADA file; refuse one that would expand or multiply to more than is reasonable.
-
-    Raises
-    ------
-    MeshFileError
-        It would.
-    """
-    check_prologue(path, data)
+    check_prologue(path, content)
     try:
-        root = etree.fromstring(data, etree.XMLParser(huge_tree=True, **PARSER))
+        root = etree.fromstring(content, etree.XMLParser(huge_tree=True, **PARSER))
     except etree.XMLSyntaxError as error:
         raise MeshFileError(
             f"{path} holds XML that is damaged or cut off ({_line_of(error)}); export it again"
         ) from error
+    changed = in_plain_terms(path, root)
+    _check_collada(path, root)
+    changed |= collada_without_folds(root)
+    return etree.tostring(root, xml_declaration=True, encoding="utf-8") if changed else content
+
+
+def _check_collada(path: Path, root: Any) -> None:
+    """Refuse a document that would expand or multiply to more than is reasonable."""
     parts = {WORLD: XmlPart()}
     for geometry in root.iter("{*}geometry"):
         _check_names(path, geometry, ("id",))
@@ -192,7 +189,6 @@ def checked_collada(path: Path, data: bytes) -> Any:
             if node.get("id") is not None:
                 parts[f"node {node.get('id')}"] = XmlPart(parts=_placed(node))
     check_instances(path, parts)
-    return root
 
 
 PRIMITIVES = ("{*}triangles", "{*}polylist", "{*}polygons", "{*}tristrips", "{*}trifans")

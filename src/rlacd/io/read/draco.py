@@ -1,0 +1,112 @@
+"""Triangles of glTF files that Draco compressed.
+
+Draco is decoded by DracoPy (extra ``draco``) in a process of its own: a damaged stream may crash it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+
+from rlacd.errors import MeshFileError, MissingExtraError
+from rlacd.io.read.apart import answer_of
+from rlacd.io.read.gltf_arrays import ITEMS, Arrays, Json, as_floats
+from rlacd.io.read.limits import MOST_TRIANGLES
+from rlacd.pool import Blobs, Shared
+from rlacd.pool.request import Values
+
+DRACO = "KHR_draco_mesh_compression"
+
+DECODER = "rlacd.io.read.draco:DracoDecoder"
+
+
+def decode_draco(path: Path, primitives: Sequence[Json], required: bool, arrays: Arrays) -> bool:
+    """Decode what Draco compressed, and let the primitives use the decoded arrays; whether there was anything.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file, for messages.
+    primitives : sequence of dict
+        All in the file, changed in place.
+    required : bool
+        Whether the file says that it cannot be read otherwise.
+    arrays : Arrays
+        Gets the decoded arrays.
+
+    Raises
+    ------
+    MeshFileError
+        It is damaged, or would need more memory than is reasonable.
+    MissingExtraError
+        The extra ``draco`` is not installed.
+    """
+    streams: dict[str, bytes] = {}
+    attributes: dict[str, int] = {}
+    normalized: dict[str, bool] = {}
+    widths: dict[str, int] = {}
+    users: list[tuple[Json, dict[str, str]]] = []
+    for primitive in primitives:
+        compressed = primitive.get("extensions", {}).get(DRACO)
+        if compressed is None:
+            continue
+        accessors = {name: arrays.accessor(index) for name, index in primitive["attributes"].items()}
+        if not required and "bufferView" in accessors["POSITION"]:
+            continue  # the same triangles, not compressed
+        names: dict[str, str] = {}
+        for attribute, number in {"POSITION": compressed["attributes"]["POSITION"], **compressed["attributes"]}.items():
+            if attribute.startswith(("POSITION", "JOINTS_", "WEIGHTS_")):
+                as_shares = bool(accessors[attribute].get("normalized"))
+                name = names[attribute] = f"{int(compressed['bufferView'])}.{int(number)}.{as_shares}"
+                streams[name] = bytes(arrays.view(compressed["bufferView"]))
+                attributes[name], normalized[name] = int(number), as_shares
+                widths[name] = ITEMS[accessors[attribute]["type"]]
+        users.append((primitive, names))
+    if not streams:
+        return False
+    if find_spec("DracoPy") is None:
+        raise MissingExtraError(f"{path} is compressed with Draco: run  pip install 'rlacd[draco]'  and try again.")
+    arrays.need(sum(map(len, streams.values())))
+    values = {"path": str(path), "attributes": attributes, "normalized": normalized, "widths": widths}
+    blobs = answer_of(DECODER, path, "glTF", values, streams).blobs
+    added: dict[str, int] = {}
+    for name in streams:
+        added[f"{name}.points"] = arrays.add(np.frombuffer(blobs[f"{name}.points"], "<f4"))
+        added[f"{name}.corners"] = arrays.add(np.frombuffer(blobs[f"{name}.corners"], "<u4"))
+    for primitive, names in users:
+        primitive["attributes"] |= {attribute: added[f"{name}.points"] for attribute, name in names.items()}
+        primitive["indices"], primitive["mode"] = added[f"{names['POSITION']}.corners"], 4
+    return True
+
+
+class DracoDecoder:
+    """The server of a process that decodes Draco's streams (see `rlacd.pool.request.Server`)."""
+
+    def __init__(self, folder: Path) -> None:
+        pass
+
+    def __call__(self, values: Values, blobs: Blobs, shared: Mapping[str, Shared]) -> tuple[Values, dict[str, bytes]]:
+        """Decode each stream: the attribute that `values` names for it as ``NAME.points``, and ``NAME.corners``."""
+        import DracoPy
+
+        arrays: dict[str, bytes] = {}
+        for name, stream in blobs.items():
+            try:
+                mesh = DracoPy.decode(stream)
+                points = np.asarray(mesh.get_attribute_by_unique_id(values["attributes"][name])["data"])
+                corners = np.asarray(mesh.faces).reshape(-1, 3)
+            except Exception as error:
+                raise MeshFileError(
+                    f"{values['path']} holds triangles that Draco cannot decode ({error!s:.100}): it is damaged; "
+                    "export it again"
+                ) from error
+            if points.shape != (len(points), values["widths"][name]) or (len(corners) and corners.max() >= len(points)):
+                raise MeshFileError(f"{values['path']} holds triangles without points: export it again")
+            if len(corners) > MOST_TRIANGLES:
+                raise MeshFileError(f"{values['path']} holds more than {MOST_TRIANGLES} triangles: simplify it first")
+            arrays[f"{name}.points"] = as_floats(points, values["normalized"][name]).astype("<f4").tobytes()
+            arrays[f"{name}.corners"] = corners.astype("<u4").tobytes()
+        return {}, arrays

@@ -1,0 +1,213 @@
+"""The arrays of a glTF file, checked against the bytes that it holds.
+
+Its JSON may use one array for any number of meshes, take any part of a buffer any number of times, and declare arrays
+without any bytes behind them. What all of that would take in memory is added up before anything is read.
+"""
+
+from __future__ import annotations
+
+import base64
+import struct
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from rlacd.errors import MeshFileError
+from rlacd.io.read.limits import MOST_PLACES, most_in_memory
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.topology import IntArray
+
+Json: TypeAlias = dict[str, Any]
+
+TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+"""By component type; see "Accessor Data Types" in the specification."""
+
+ITEMS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+
+
+class Arrays:
+    """The accessors of a file.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file, for messages.
+    header : dict
+        Its JSON.
+    rest : bytes
+        Of a binary file, what follows the JSON.
+    given : int
+        Bytes of the file.
+    beside : callable
+        Returns the content of a file that a buffer names.
+
+    Raises
+    ------
+    MeshFileError
+        It declares more than it holds, or more than is reasonable.
+    FileNotFoundError
+        Raised by `beside`.
+    """
+
+    def __init__(
+        self, path: Path, header: Json, rest: bytes | None, given: int, beside: Callable[[str], bytes]
+    ) -> None:
+        self._path, self._rest, self._beside = path, rest, beside
+        self._buffers: Sequence[Json] = header.get("buffers", [])
+        self._views: Sequence[Json] = header.get("bufferViews", [])
+        self._accessors: list[Json] = list(header.get("accessors", []))
+        self._content: dict[int, bytes] = {}
+        self._added: dict[int, npt.NDArray[Any]] = {}
+        given += self._bytes_beside()
+        asked = sum(natural(path, view.get("byteLength", 0), "byteLength") for view in self._views)
+        asked += sum(self._size(accessor) for accessor in self._accessors)
+        for mesh in header.get("meshes", []):
+            for primitive in mesh["primitives"]:
+                used = (primitive["attributes"].get("POSITION"), primitive.get("indices"))
+                asked += sum(self._as_loaded(index) for index in used if index is not None)
+        self._most = most_in_memory(given)
+        if asked > self._most:
+            raise MeshFileError(
+                f"{path} asks for {asked} bytes, though it holds {given}: export it again, with one buffer view per "
+                "array"
+            )
+
+    def need(self, count: int) -> None:
+        """Refuse a file once what is made of its arrays adds up to too many bytes."""
+        self._most -= count
+        if self._most < 0:
+            raise MeshFileError(f"{self._path} decodes to more than is reasonable for its length: export it again")
+
+    def add(self, rows: npt.NDArray[Any]) -> int:
+        """Add an array; returns the index of its accessor."""
+        self.need(8 * rows.size)
+        self._added[len(self._accessors)] = rows
+        self._accessors.append({})
+        return len(self._accessors) - 1
+
+    def accessor(self, index: int) -> Json:
+        """What the file says of an array."""
+        return dict(item(self._accessors, index))
+
+    def integers(self, index: int, kind: str = "SCALAR") -> IntArray:
+        """An array of indices, ``[N, K]``."""
+        rows = self._rows(index, kind)
+        if rows.dtype.kind != "u" and index not in self._added:
+            raise ValueError(f"accessor {index} holds no indices")
+        return rows.astype(np.int64)
+
+    def floats(self, index: int, kind: str = "VEC3") -> FloatArray:
+        """An array of numbers, ``[N, K]``."""
+        return as_floats(self._rows(index, kind), bool(self.accessor(index).get("normalized")))
+
+    def more(self, index: int, kind: str = "VEC3") -> FloatArray:
+        """An array beside positions and indices, which must be `need`-ed as it is read."""
+        self.need(self._as_loaded(index))
+        return self.floats(index, kind)
+
+    def view(self, index: int) -> memoryview:
+        """The bytes of a buffer view."""
+        view = item(self._views, index)
+        start = natural(self._path, view.get("byteOffset", 0), "byteOffset")
+        end = start + natural(self._path, view["byteLength"], "byteLength")
+        buffer = self._buffer(view["buffer"])
+        if end > len(buffer):
+            raise ValueError(f"view {index} is longer than its buffer")
+        return memoryview(buffer)[start:end]
+
+    def _rows(self, index: int, kind: str) -> npt.NDArray[Any]:
+        accessor, width = self.accessor(index), ITEMS[kind]
+        if index in self._added:
+            return self._added[index].reshape(-1, width)
+        if accessor["type"] != kind:
+            raise ValueError(f"accessor {index} is no {kind}")
+        dtype, count = np.dtype(TYPES[accessor["componentType"]]), accessor["count"]
+        rows = np.zeros((count, width), dtype)
+        if "bufferView" in accessor and count:
+            stride = item(self._views, accessor["bufferView"]).get("byteStride", width * dtype.itemsize)
+            rows = self._part(accessor, rows.shape, dtype, stride)
+        sparse = accessor.get("sparse")
+        if sparse is None:
+            return rows
+        changed = natural(self._path, sparse["count"], "count")
+        at = self._part(sparse["indices"], (changed, 1), np.dtype(TYPES[sparse["indices"]["componentType"]]))
+        rows = rows.copy()
+        rows[at[:, 0]] = self._part(sparse["values"], (changed, width), dtype)
+        return rows
+
+    def _part(
+        self, of: Json, shape: tuple[int, int], dtype: np.dtype[Any], stride: int | None = None
+    ) -> npt.NDArray[Any]:
+        """Rows in a buffer view; without a stride they lie close together."""
+        strides = (shape[1] * dtype.itemsize if stride is None else stride, dtype.itemsize)
+        return np.ndarray(shape, dtype, self.view(of["bufferView"]), of.get("byteOffset", 0), strides)
+
+    def _as_loaded(self, index: int) -> int:
+        """Bytes of an array in a mesh, with eight per number."""
+        if index in self._added:
+            return 0  # it was added up before
+        accessor = item(self._accessors, index)
+        return int(8 * accessor["count"] * ITEMS[accessor["type"]])
+
+    def _size(self, accessor: Json) -> int:
+        """Bytes of an array, for which its view has to have room."""
+        path = self._path
+        count = natural(path, accessor["count"], "count")
+        row = np.dtype(TYPES[accessor["componentType"]]).itemsize * ITEMS[accessor["type"]]
+        if "bufferView" in accessor:  # without one: zeros, or data of an extension
+            view = self._views[natural(path, accessor["bufferView"], "bufferView")]
+            start = natural(path, accessor.get("byteOffset", 0), "byteOffset")
+            natural(path, view.get("byteOffset", 0), "byteOffset")
+            stride = natural(path, view.get("byteStride", row), "byteStride")
+            length = start + (count - 1) * stride + row if count else 0
+            if stride < row or length > view["byteLength"]:
+                raise MeshFileError(f"{path} declares {count} rows but has no room for them; export it again")
+        return count * row
+
+    def _bytes_beside(self) -> int:
+        """Count the bytes of the files that the buffers name."""
+        if len(self._buffers) > MOST_PLACES:
+            raise MeshFileError(
+                f"{self._path} has {len(self._buffers)} buffers, more than {MOST_PLACES}: "
+                "export it again with a single buffer"
+            )
+        uris = {buffer.get("uri", "data:") for buffer in self._buffers}
+        return sum(len(self._beside(uri)) for uri in sorted(uris) if not uri.startswith("data:"))
+
+    def _buffer(self, index: int) -> bytes:
+        if index not in self._content:
+            uri = item(self._buffers, index).get("uri")
+            if uri is not None:
+                given = base64.b64decode(uri.partition(",")[2]) if uri.startswith("data:") else self._beside(uri)
+            elif index == 0 and self._rest and len(self._rest) >= 8:
+                given = self._rest[8 : 8 + struct.unpack_from("<I", self._rest)[0]]
+            else:
+                raise ValueError("a buffer without bytes")
+            self._content[index] = given
+        return self._content[index]
+
+
+def item(items: Sequence[Any], index: Any) -> Any:
+    """An item of a list by its index in the file: one below zero would count from the end."""
+    if not isinstance(index, int) or index < 0:
+        raise IndexError(f"{index!r:.40} is no index")
+    return items[index]
+
+
+def natural(path: Path, number: Any, what: str) -> int:
+    """Check a number that the file gives."""
+    if not isinstance(number, int) or number < 0:
+        raise MeshFileError(
+            f"{path} has {number!r:.40} as a {what}, which cannot be negative or fractional; export it again"
+        )
+    return number
+
+
+def as_floats(rows: npt.NDArray[Any], normalized: bool) -> FloatArray:
+    """Numbers as glTF means them: normalised integers are shares of the largest, others their own value."""
+    if not normalized or rows.dtype.kind not in "iu":
+        return rows.astype(np.float64)
+    return np.asarray(np.maximum(rows.astype(np.float64) / np.iinfo(rows.dtype).max, -1.0))
