@@ -20,8 +20,11 @@ from rlacd.io.read.load import load_mesh
 from rlacd.planes.candidates import OFFSETS_PER_AXIS, axis_and_principal
 from rlacd.planes.sweep import SLIVER, Sweep, sweep
 from rlacd.policies.greedy import excess_norm
-from rlacd.policies.observe import observe
+from rlacd.policies.network import load_network
+from rlacd.policies.observe import paper_planes
+from rlacd.policies.qpolicy import KIND
 from rlacd.policies.shortlist import generator_of, least_hulls
+from rlacd.policies.sweep_features import FEATURES, PLANES, sweep_features
 from rlacd.policy_names import WEIGHTS_ENDING
 from rlacd.repair.repair import repair
 from rlacd.run import Run
@@ -40,7 +43,7 @@ class Deployment:
     ----------
     ranking : str
         "excess": the greedy score ``rlacd.policies.greedy.excess_norm``; "random": a draw that the component alone
-        determines, the control; or the path of a Q network (ONNX).
+        determines, the control; or the path of a Q network .
     planes : int
         Number of best-ranked axis planes to evaluate (the paper's #AP).
     edges : int
@@ -57,7 +60,7 @@ class Deployment:
 
     def __post_init__(self) -> None:
         if self.ranking not in RANKINGS and not self.ranking.endswith(WEIGHTS_ENDING):
-            raise OptionError(f"ranking is {self.ranking!r}; it has to be {', '.join(RANKINGS)} or FILE.onnx.")
+            raise OptionError(f"ranking is {self.ranking!r}; it has to be {', '.join(RANKINGS)} or FILE.npz.")
         if self.planes < 0 or self.edges < 0:
             raise OptionError("planes and edges have to be at least 0.")
         if not (self.edges or (self.planes and (self.spatial or self.principal))):
@@ -84,7 +87,7 @@ class Deployment:
             else:
                 raise OptionError(
                     f"planes:{word} is not known; there are ap=N, ce=N, no-spatial, no-principal, "
-                    f"{', '.join(RANKINGS)} and FILE.onnx."
+                    f"{', '.join(RANKINGS)} and FILE.npz."
                 )
         return cls(**given)  # type: ignore[arg-type]
 
@@ -104,13 +107,11 @@ class Deployed:
         self._threshold = threshold
         self._network = None
         if deployment.ranking.endswith(WEIGHTS_ENDING):
-            from rlacd.policies.q_network import load_q_network  # needs an extra
-
-            self._network = load_q_network(deployment.ranking)
+            self._network = load_network(deployment.ranking, KIND, FEATURES, PLANES)
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None when no candidate is valid."""
-        candidates = axis_and_principal(component)
+        candidates = axis_and_principal(component) if self._network is None else paper_planes(component)
         swept = sweep(component, candidates, threads)
         exists = np.repeat([self._of.spatial, self._of.principal], 3 * OFFSETS_PER_AXIS)
         valid = next((v for s in (SLIVER, SLIVER / 100) if (v := exists & swept.valid(s)).any()), exists & False)
@@ -120,8 +121,8 @@ class Deployed:
 
     def _cost(self, component: Component, swept: Sweep) -> FloatArray:
         if self._network is not None:
-            seen = observe(component, swept.candidates, self._threshold, self._network.points)
-            return -self._network(seen).astype(np.float64)
+            features = sweep_features(component, self._threshold, bool(self._network.about.get("hull", True)))
+            return np.asarray(-self._network(features), dtype=np.float64)
         if self._of.ranking == "random":
             return generator_of(component).random(len(swept.candidates))
         return excess_norm(swept)

@@ -13,18 +13,17 @@ import numpy as np
 from manifold3d import Manifold
 
 from benchmarks.methods import RawHull
-from rlacd.clock import Clock
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.io.read.load import load_mesh
 from rlacd.policies import make_policy
 from rlacd.repair.repair import repair
+from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component
 from rlacd.solid.hull import Hull
 from rlacd.solid.manifold import to_manifold
-from rlacd.workers import Workers
 
 ENTERED = 1e-6
 """Hulls enter each other if they share more than this of the smaller one's volume; rounding makes up to 1e-9."""
@@ -34,9 +33,9 @@ def decompose_disjoint(vertices: FloatArray, faces: IntArray, threshold: float, 
     """Cut a mesh [V, 3], [F, 3] until each part has at most the concavity `threshold`; unite what stays disjoint."""
     solid = repair(load_mesh((vertices, faces)), threads=threads)
     root, goal = Component(solid.shape), Concavity(threshold)
-    with Workers(threads) as workers:
-        tree = CutTree(root, make_policy("greedy"), workers)
-        pieces = cut_and_merge(tree, goal, workers, Clock(), merge=False).parts
+    with Run(threads) as run:
+        tree = CutTree(root, make_policy("greedy"), run)
+        pieces = cut_and_merge(tree, goal, run, merge=False).parts
     united = _Uniting(root, goal, [piece.hull for piece in pieces]).run()
     there = [Hull.of(solid.frame.to_input(hull.vertices)) for hull in united]
     return [(hull.vertices, hull.faces) for hull in there if hull is not None]

@@ -18,17 +18,17 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from rlacd.learn.paper.options import TrainOptions
-from rlacd.learn.paper.tabular import Node, grow, middle_planes, process_of, q_learning
 
 from benchmarks.charts import Curve, curves_chart, need_charts
 from benchmarks.cli import Meshes, Out, write
 from benchmarks.runner import find_meshes
 from benchmarks.tables import Page, Table
+from benchmarks.tabular import Node, grow, middle_planes, process_of, q_learning
 from rlacd.cli.exit_codes import exit_codes
 from rlacd.criteria import Concavity
 from rlacd.errors import MeshError, MissingExtraError, OptionError, RlacdError
 from rlacd.io.read.load import load_mesh
+from rlacd.learn.options import TrainOptions
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component
 
@@ -70,7 +70,7 @@ ARMS: Mapping[str, Mapping[str, Changes]] = {
     },
     "encoding": {
         "component and hull": {"scale_input": False},
-        "component alone": {"scale_input": False, "encoder": "profile-without-hull"},
+        "component alone": {"scale_input": False, "encoder": "sweep-without-hull"},
         "component and hull, sizes and creases (not paper)": {"scale_input": True},
     },
     "curves": {
@@ -165,13 +165,13 @@ def _options(preset: str, iterations: int | None, seed: int, changes: Changes) -
 
 def _train(meshes: Path, run: Path, options: TrainOptions, say: Callable[[str], None]) -> Points:
     try:
-        from rlacd.learn.paper.train import train
+        from rlacd.learn.train import train
     except ModuleNotFoundError as error:
         raise MissingExtraError("training needs an extra: run  pip install 'rlacd[train]'  and try again.") from error
 
     finished = run / "finished"
     if not finished.exists():
-        train(meshes, run, options, resume=(run / "checkpoint").exists(), say=say)
+        train(meshes, run, options, resume=(run / "checkpoint.npz").exists(), say=say)
         finished.touch()
     return [json.loads(line) for line in (run / "curves.jsonl").read_text(encoding="utf-8").splitlines()]
 
@@ -297,7 +297,7 @@ def _command(name: str, about: str) -> None:
     def run(
         meshes: Meshes,
         out: Out,
-        preset: Annotated[str, typer.Option(help="Of `rlacd train`.")] = "quick",
+        preset: Annotated[str, typer.Option(help="Of `rlacd train`.")] = "two-cores",
         iterations: Annotated[int | None, typer.Option(help="Cuts an arm.", show_default=False)] = None,
         seeds: Annotated[int, typer.Option(min=1, help="Training runs of each arm.")] = 1,
     ) -> None:

@@ -14,8 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rlacd
-from rlacd.finish import report
 from rlacd.errors import OptionError
+from rlacd.finish import report
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
 from rlacd.solid.distance import hull_distances

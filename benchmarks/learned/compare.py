@@ -72,7 +72,7 @@ def summary(rows: list[dict[str, object]], policies: list[str], criteria: list[s
                     continue
                 drawn = logs[rng.integers(len(logs), size=(SAMPLES, len(logs)))].mean(axis=1)
                 low, high = np.exp(np.quantile(drawn, [0.025, 0.975]))
-                total = sum(float(a) for a, _ in pairs if a) / sum(float(b) for _, b in pairs if b)  # type: ignore[arg-type]
+                total = sum(float(a) for a, _ in pairs if a) / sum(float(b) for _, b in pairs if b)  # type: ignore[arg-type, misc]
                 print(
                     f"{criterion:9s} {policy:22s} {key:6s} {np.exp(logs.mean()):.3f} ({low:.3f} to {high:.3f})"
                     f"  of totals {total:.3f}  {len(logs)} meshes"

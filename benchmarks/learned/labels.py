@@ -176,7 +176,7 @@ def main() -> None:
         path = out / f"{number:05d}.npz"
         if not path.exists():
             partial = out / f"{number:05d}.part.npz"
-            np.savez(partial, allow_pickle=False, **shard(meshes, names, number))  # type: ignore[arg-type]
+            np.savez(partial, allow_pickle=False, **shard(meshes, names, number))
             os.replace(partial, path)
         number += 1
 

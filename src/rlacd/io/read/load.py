@@ -102,6 +102,7 @@ def _from_file(path: Path) -> InputMesh:
     up, metres = stated(extension, content, scene)
     mesh = replace(mesh, up=up, metres=metres, warnings=(*mesh.warnings, *_left_out(path, content, extension, scene)))
     if extension in USD:
+        assert not isinstance(scene, Gltf)
         kept = len(mesh.nodes) > 1 or any(one.visual.defined for one in scene.geometry.values())
         return replace(mesh, asset=Asset(scene, extension=extension) if kept else None)
     if extension not in ("glb", "gltf"):
