@@ -69,9 +69,8 @@ ARMS: Mapping[str, Mapping[str, Changes]] = {
         "-1 a cut (not paper)": {**_weights(0.0, 0.0, 1.0), **_static(1.0)},
     },
     "encoding": {
-        "component and hull": {"scale_input": False},
-        "component alone": {"scale_input": False, "encoder": "sweep-without-hull"},
-        "component and hull, sizes and creases (not paper)": {"scale_input": True},
+        "component and hull": {},
+        "component alone": {"encoder": "sweep-without-hull"},
     },
     "curves": {
         "share of the hull (eq. 9)": HULL,

@@ -19,7 +19,7 @@ from rlacd.solid.component import Part
 BEST_SECONDS = 5.0
 """What ``best`` may take by default, more if its first search takes longer."""
 
-TIMES_FIRST_PASS = 3.5
+TIMES_FIRST_PASS = 4.0
 """Limit on the work of a bounded search, as a multiple of the work of the first pass."""
 
 LEAST_WORK, MOST_WORK = 0.15e6, 6e6
