@@ -60,7 +60,7 @@ class Network:
         arrays = {f"{name}{i}": a for i, layer in enumerate(self.layers) for name, a in zip("wb", layer, strict=True)}
         file = io.BytesIO()
         about = np.frombuffer(json.dumps(dict(self.about)).encode(), np.uint8)
-        np.savez(file, allow_pickle=False, about=about, **arrays)  # type: ignore[arg-type]
+        np.savez(file, allow_pickle=False, about=about, **arrays)
         return file.getvalue()
 
 
