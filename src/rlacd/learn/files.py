@@ -12,13 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def packed(arrays: Mapping[str, NDArray[Any]], *, compressed: bool = False) -> bytes:
+def packed(arrays: Mapping[str, NDArray[Any]]) -> bytes:
     """Pack arrays as the content of an .npz file."""
     file = io.BytesIO()
-    if compressed:
-        np.savez_compressed(file, allow_pickle=False, **arrays)
-    else:
-        np.savez(file, allow_pickle=False, **arrays)
+    np.savez(file, allow_pickle=False, **arrays)
     return file.getvalue()
 
 
