@@ -193,7 +193,7 @@ class _Scene:
         if skin is not None and not all("JOINTS_0" in part["attributes"] for part in parts):
             self._unjointed.add(index)
             skin = None
-        weights = node.get("weights", mesh.get("weights", ()))
+        weights = node.get("weights", mesh.get("weights")) or ()
         key = (node["mesh"], tuple(weights) if any(weights) else (), skin, modes)
         if key not in self._shapes:
             self._shapes[key] = self._shape(parts, key[1], skin)

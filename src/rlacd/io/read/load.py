@@ -99,13 +99,13 @@ def _from_file(path: Path) -> InputMesh:
     mesh = _clean(_bake(scene, path.name), path.name)
     up, metres = stated(extension, content, scene)
     mesh = replace(mesh, up=up, metres=metres, warnings=(*mesh.warnings, *_left_out(path, content, extension, scene)))
+    if isinstance(scene, Gltf):
+        return replace(mesh, asset=Asset(content, path, extension))
     if extension in USD:
         kept = len(mesh.nodes) > 1 or any(one.visual.defined for one in scene.geometry.values())
         return replace(mesh, asset=Asset(scene, extension=extension) if kept else None)
-    if extension not in ("glb", "gltf"):
-        kept = has_looks(path, content, extension, len(mesh.nodes))
-        return replace(mesh, asset=Asset(content, path, extension) if kept else None)
-    return replace(mesh, asset=Asset(content, path, extension))
+    kept = has_looks(path, content, extension, len(mesh.nodes))
+    return replace(mesh, asset=Asset(content, path, extension) if kept else None)
 
 
 def _left_out(path: Path, content: bytes, extension: str, scene: trimesh.Scene | Gltf) -> list[str]:
