@@ -267,9 +267,9 @@ def _bake(source: trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud | Gltf, n
             continue
         v, f = _arrays(geometry.vertices, getattr(geometry, "faces", ()))
         if not np.array_equal(node.transform, np.eye(4)):
-            v = heights(v, node.transform[:3, :3]) + node.transform[:3, 3]
-            if np.linalg.det(node.transform[:3, :3]) < 0:
-                f = f[:, ::-1]
+            with np.errstate(all="ignore"):  # what is not finite is left out, with a warning
+                v = heights(v, node.transform[:3, :3]) + node.transform[:3, 3]
+                f = f[:, ::-1] if np.linalg.det(node.transform[:3, :3]) < 0 else f
         if len(f) == 0:
             points.append(v)
             continue
