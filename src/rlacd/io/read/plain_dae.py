@@ -36,8 +36,7 @@ def _as_matrix(skew: Any) -> bool:
     """By RenderMan, to which COLLADA refers: turn one axis to the other, along which all points move."""
     try:
         angle, *axes = map(float, (skew.text or "").split())
-        turned, along = np.array(axes).reshape(2, 3)
-        turned, along = turned / np.linalg.norm(turned), along / np.linalg.norm(along)
+        turned, along = (axis / (np.linalg.norm(axis) or np.nan) for axis in np.array(axes).reshape(2, 3))
     except ValueError:
         return False
     between, angle = np.arccos(np.clip(turned @ along, -1, 1)), np.radians(angle)
