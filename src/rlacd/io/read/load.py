@@ -302,7 +302,11 @@ def _instances(source: Any, name: str) -> Iterator[tuple[SourceNode, Any]]:
 
 
 def _require_few(geometries: Iterable[Any], name: str) -> None:
-    count = sum(len(getattr(geometry, "faces", ())) for geometry in geometries)
+    """Points count as well, at three for a triangle: it may be that no face uses them."""
+    counts = (
+        max(len(getattr(geometry, "faces", ())), len(getattr(geometry, "vertices", ())) // 3) for geometry in geometries
+    )
+    count = sum(counts)
     if count > MOST_TRIANGLES:
         raise MeshDataError(f"{name} places {count} triangles, more than {MOST_TRIANGLES}: simplify it first")
 
