@@ -169,7 +169,7 @@ def test_hundreds_of_damaged_streams_end_in_arrays_or_our_error(compressed: Path
             stream = bytearray(seeds[number % 2])
             for _ in range(rng.integers(1, 5)):
                 stream[rng.integers(len(stream))] = rng.integers(256)
-            values = {"path": "a.glb", "attributes": {"a": 0}, "normalized": {"a": False}, "widths": {"a": 3}}
+            values = {"path": "a.glb", "asked": {"a": (0, False, 3)}}
             try:
                 answer = worker.ask(Request(DECODER, values, {"a": bytes(stream[: rng.integers(1, 2 * len(stream))])}))
                 corners = np.frombuffer(answer.blobs["a.corners"], "<u4")

@@ -166,10 +166,10 @@ class _Scene:
             found = [self._placed(index, POINTS) for index in shown]
         unread = (*LINES, *POINTS) if solid else LINES
         said = {
-            "primitives are points or lines, and were left out": sum(mode in unread for mode in modes),
-            "meshes have a skin but no joints, and were placed by their nodes": len(self._unjointed),
+            "primitives that are points or lines were left out": sum(mode in unread for mode in modes),
+            "meshes with a skin but without joints were placed by their nodes": len(self._unjointed),
         }
-        warnings = [f"{count} {what}" for what, count in said.items() if count]
+        warnings = [f"{what}: {count}" for what, count in said.items() if count]
         return Gltf([(node, shape) for node, shape in found if len(shape.vertices)], warnings)
 
     def _shown(self) -> list[int]:
@@ -274,13 +274,16 @@ class _Scene:
     def _repeated(self, shape: Triangles, attributes: Json) -> Triangles:
         """All instances of a shape within its node."""
         kinds = {"TRANSLATION": "VEC3", "ROTATION": "VEC4", "SCALE": "VEC3"}
-        given = {name: self._arrays.more(attributes[name], kinds[name]) for name in kinds if name in attributes}
-        (count,) = {len(rows) for rows in given.values()}
+        (count,) = {self._arrays.accessor(index)["count"] for index in attributes.values()}
         self._instances += count
         if self._instances > MOST_PLACES:
             raise ValueError(f"{self._instances} instances, more than {MOST_PLACES}")
         self._arrays.need(count * (shape.vertices.nbytes + shape.faces.nbytes))
-        moves = _placements(*(given.get(name, np.array([at])) for name, at in zip(kinds, UNMOVED, strict=True)))
+        given = [
+            self._arrays.more(attributes[name], kind) if name in attributes else np.array([at])
+            for (name, kind), at in zip(kinds.items(), UNMOVED, strict=True)
+        ]
+        moves = _placements(*given)
         vertices, faces = [shape.vertices[:0]], [shape.faces[:0]]
         for number, move in enumerate(np.broadcast_to(moves, (count, 4, 4))):
             vertices.append(heights(shape.vertices, move[:3, :3]) + move[:3, 3])

@@ -118,7 +118,7 @@ def _left_out(path: Path, content: bytes, extension: str, scene: trimesh.Scene |
     if extension == "dae":
         unread = {
             rb"skew": "skews of {} were left out",
-            rb"instance_controller": "skinned or morphed meshes of {} have their bind shape, not that of their joints",
+            rb"instance_controller": "skinned or morphed meshes of {} are read as bound, at their nodes",
             rb"ph": "polygons with holes of {} were left out",
         }
         return [
