@@ -55,18 +55,21 @@ def decode_draco(path: Path, primitives: Sequence[Json], required: bool, arrays:
         if not required and "bufferView" in accessors["POSITION"]:
             continue  # the same triangles, not compressed
         names: dict[str, str] = {}
-        for attribute, number in {"POSITION": compressed["attributes"]["POSITION"], **compressed["attributes"]}.items():
+        for attribute, number in compressed["attributes"].items():
             if attribute.startswith(("POSITION", "JOINTS_", "WEIGHTS_")):
                 of = accessors[attribute]
-                name = names[attribute] = f"{compressed['bufferView']}.{number}.{of.get('normalized')}.{of['type']}"
-                streams[name] = bytes(arrays.view(compressed["bufferView"]))
-                asked[name] = int(number), bool(of.get("normalized")), ITEMS[of["type"]]
+                name = f"{compressed['bufferView']}.{number}.{of.get('normalized')}.{of['type']}"
+                names[attribute] = name
+                if name not in streams:
+                    asked[name] = int(number), bool(of.get("normalized")), ITEMS[of["type"]]
+                    view = arrays.view(compressed["bufferView"])
+                    arrays.need(len(view))
+                    streams[name] = bytes(view)
         users.append((primitive, names))
     if not streams:
         return False
     if find_spec("DracoPy") is None:
         raise MissingExtraError(f"{path} is compressed with Draco: run  pip install 'rlacd[draco]'  and try again.")
-    arrays.need(sum(map(len, streams.values())))
     blobs = answer_of(DECODER, path, "glTF", {"path": str(path), "asked": asked}, streams).blobs
     added: dict[str, int] = {}
     for name in streams:
