@@ -256,7 +256,7 @@ def test_nothing_in_a_checkpoint_is_run(tmp_path: Path) -> None:
 
 def test_without_weights_the_error_says_where_to_get_them(tmp_path: Path) -> None:
     meshes = write_meshes(tmp_path / "meshes")
-    for asked in (["--encoder", "i2p-mae"], ["--preset", "paper"]):
+    for asked in (["--encoder", "i2p-mae", "--validation", "2"], ["--preset", "paper", "--validation", "2"]):
         shown = CliRunner().invoke(app, ["train", str(meshes), "--run", str(tmp_path / "run"), *asked])
         assert shown.exit_code == 2
         for word in ("--encoder-weights FILE", "https://", "--encoder sweep"):

@@ -21,7 +21,7 @@ from rlacd.io.read.draco import DECODER
 from rlacd.io.read.load import load_mesh
 from rlacd.pool import Request, WorkerDiedError
 from rlacd.pool.worker import Worker
-from tests.assets import read_glb
+from tests.assets import Rig, read_glb
 from tests.hostile.gltf import gltf_tree
 
 DRACO = "KHR_draco_mesh_compression"
@@ -57,6 +57,32 @@ def test_draco_gives_the_triangles_that_were_compressed(compressed: Path) -> Non
         assert one.is_volume
         assert one.volume == pytest.approx(other.volume, rel=1e-3)
         assert np.allclose(one.bounds, other.bounds, atol=1e-3)  # Draco rounds to 14 bits
+
+
+def test_joints_and_weights_that_draco_compressed_place_a_skin(tmp_path: Path) -> None:
+    draco = pytest.importorskip("DracoPy")
+    rig, box = Rig(), trimesh.creation.box()
+    joints, weights = np.zeros((8, 4), "<u1"), np.tile(np.array([1, 0, 0, 0], "<f4"), (8, 1))
+    joints[:, 0] = np.arange(8) % 2
+    stream = draco.encode(
+        box.vertices, box.faces.astype("<u4"), preserve_order=True, generic_attributes={5: joints, 6: weights}
+    )
+    (position,) = (one["unique_id"] for one in draco.decode(stream).attributes if one["unique_id"] not in (5, 6))
+    given = {"POSITION": position, "JOINTS_0": 5, "WEIGHTS_0": 6}
+    kinds = {"POSITION": (5126, "VEC3"), "JOINTS_0": (5121, "VEC4"), "WEIGHTS_0": (5126, "VEC4")}
+    rig.header["accessors"] = [{"componentType": kind, "count": 8, "type": of} for kind, of in kinds.values()]
+    compressed = {DRACO: {"bufferView": rig.view(stream), "attributes": given}}
+    attributes = {name: index for index, name in enumerate(kinds)}
+    rig.header["meshes"] = [{"primitives": [{"attributes": attributes, "extensions": compressed}]}]
+    rig.header["nodes"] = [{"mesh": 0, "skin": 0}, {}, {"translation": [0, 9, 0]}]
+    rig.header["skins"] = [{"joints": [1, 2]}]
+    rig.header["scenes"] = [{"nodes": [0, 1, 2]}]
+    rig.header["extensionsRequired"] = [DRACO]
+    del rig.header["animations"]
+    mesh = load_mesh(rig.glb(tmp_path / "box.glb"))
+    assert mesh.warnings == ()
+    expected = box.vertices + np.outer(np.arange(8) % 2, (0, 9, 0))
+    assert np.allclose(np.sort(mesh.vertices, axis=0), np.sort(expected, axis=0), atol=1e-3)
 
 
 def test_a_draco_file_is_kept_as_it_is(compressed: Path) -> None:
@@ -143,7 +169,7 @@ def test_hundreds_of_damaged_streams_end_in_arrays_or_our_error(compressed: Path
             stream = bytearray(seeds[number % 2])
             for _ in range(rng.integers(1, 5)):
                 stream[rng.integers(len(stream))] = rng.integers(256)
-            values = {"path": "a.glb", "attributes": {"a": 0}, "normalized": {"a": False}, "widths": {"a": 3}}
+            values = {"path": "a.glb", "asked": {"a": (0, False, 3)}}
             try:
                 answer = worker.ask(Request(DECODER, values, {"a": bytes(stream[: rng.integers(1, 2 * len(stream))])}))
                 corners = np.frombuffer(answer.blobs["a.corners"], "<u4")

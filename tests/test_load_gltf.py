@@ -169,4 +169,4 @@ def test_what_a_gltf_adds_to_its_triangles_is_read_refused_or_named(tmp_path: Pa
     with pytest.raises(MeshFileError, match="requires the extension 'FOO_bar'"):
         load(extensionsRequired=["FOO_bar"])
     nodes = [{**node, "skin": 0} for node in tree["nodes"]]
-    assert load(nodes=nodes).warnings == ("1 meshes have a skin but no joints, and were placed by their nodes",)
+    assert load(nodes=nodes).warnings == ("meshes with a skin but without joints were placed by their nodes: 1",)

@@ -284,3 +284,55 @@ def _shadow(folder: Path) -> Path:
 
 
 REFUSED["a damaged file beside another one.gltf"] = (_shadow, "again")
+
+
+INSTANCES = "EXT_mesh_gpu_instancing"
+
+
+@refused("a hundred thousand instances in each of a thousand nodes.gltf", "instances")
+def _() -> bytes:
+    zeros = {"componentType": 5126, "count": 90_000, "type": "VEC3"}
+    instanced = {"mesh": 0, "extensions": {INSTANCES: {"attributes": {"TRANSLATION": 2}}}}
+    return gltf(
+        accessors=[*gltf_tree()["accessors"], zeros],
+        meshes=[{"primitives": [{"attributes": {}}]}],
+        nodes=many(1000, instanced),
+        scenes=[{"nodes": list(range(1000))}],
+    )
+
+
+@refused("a mesh of a megabyte with five thousand sets of weights.glb", "decodes to more")
+def _() -> bytes:
+    tree = gltf_tree(bufferViews=[{"buffer": 0, "byteLength": 3 * 10**6}], buffers=[{"byteLength": 3 * 10**6}])
+    tree["accessors"] = [
+        {"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3"},
+        {"bufferView": 0, "componentType": 5121, "count": 3 * 10**6, "type": "SCALAR"},
+    ]
+    morphed = {"attributes": {"POSITION": 0}, "indices": 1, "targets": [{"POSITION": 0}]}
+    tree["meshes"] = [{"primitives": [morphed]}]
+    tree["nodes"] = [{"mesh": 0, "weights": [index + 1]} for index in range(5000)]
+    tree["scenes"] = [{"nodes": list(range(5000))}]
+    return glb(tree, b"\0" * 3 * 10**6)
+
+
+@refused("ninety thousand primitives of points in ninety thousand nodes.gltf", "places")
+def _() -> bytes:
+    count = 90_000
+    primitives = many(count, {"attributes": {"POSITION": 0}, "mode": 0})
+    return gltf(
+        meshes=[{"primitives": primitives}], nodes=many(count, {"mesh": 0}), scenes=[{"nodes": list(range(count))}]
+    )
+
+
+@refused("a skin of a hundred thousand joints on each of a thousand nodes.gltf", "decodes to more|damaged")
+def _() -> bytes:
+    tree = gltf_tree()
+    joints = {"componentType": 5121, "count": 8, "type": "VEC4"}
+    tree["accessors"] += [joints, {**joints, "componentType": 5126}]
+    (primitive,) = tree["meshes"][0]["primitives"]
+    primitive["attributes"] |= {"JOINTS_0": 2, "WEIGHTS_0": 3}
+    tree["meshes"] = many(1000, tree["meshes"][0])
+    tree["nodes"] = [{"mesh": index, "skin": 0} for index in range(1000)]
+    tree["scenes"] = [{"nodes": list(range(1000))}]
+    tree["skins"] = [{"joints": [0] * 100_000}]
+    return json.dumps(tree).encode()

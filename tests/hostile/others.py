@@ -5,7 +5,7 @@ from __future__ import annotations
 from tests.hostile.gltf import gltf
 from tests.hostile.registry import refused
 
-for ending in ("xaml", "3dxml", "xdmf", "h5", "vtk", "msh", "binvox", "dxf"):
+for ending in ("xaml", "3dxml", "xdmf", "h5", "vtk", "binvox", "dxf"):
     refused(f"another format.{ending}", "convert it")(lambda: b"anything")
 refused("another format.zip", "unpack it")(lambda: b"anything")
 for ending in ("step", "stp"):

@@ -45,9 +45,7 @@ def decode_draco(path: Path, primitives: Sequence[Json], required: bool, arrays:
         The extra ``draco`` is not installed.
     """
     streams: dict[str, bytes] = {}
-    attributes: dict[str, int] = {}
-    normalized: dict[str, bool] = {}
-    widths: dict[str, int] = {}
+    asked: dict[str, tuple[int, bool, int]] = {}
     users: list[tuple[Json, dict[str, str]]] = []
     for primitive in primitives:
         compressed = primitive.get("extensions", {}).get(DRACO)
@@ -57,21 +55,22 @@ def decode_draco(path: Path, primitives: Sequence[Json], required: bool, arrays:
         if not required and "bufferView" in accessors["POSITION"]:
             continue  # the same triangles, not compressed
         names: dict[str, str] = {}
-        for attribute, number in {"POSITION": compressed["attributes"]["POSITION"], **compressed["attributes"]}.items():
+        for attribute, number in compressed["attributes"].items():
             if attribute.startswith(("POSITION", "JOINTS_", "WEIGHTS_")):
-                as_shares = bool(accessors[attribute].get("normalized"))
-                name = names[attribute] = f"{int(compressed['bufferView'])}.{int(number)}.{as_shares}"
-                streams[name] = bytes(arrays.view(compressed["bufferView"]))
-                attributes[name], normalized[name] = int(number), as_shares
-                widths[name] = ITEMS[accessors[attribute]["type"]]
+                of = accessors[attribute]
+                name = f"{compressed['bufferView']}.{number}.{of.get('normalized')}.{of['type']}"
+                names[attribute] = name
+                if name not in streams:
+                    asked[name] = int(number), bool(of.get("normalized")), ITEMS[of["type"]]
+                    view = arrays.view(compressed["bufferView"])
+                    arrays.need(len(view))
+                    streams[name] = bytes(view)
         users.append((primitive, names))
     if not streams:
         return False
     if find_spec("DracoPy") is None:
         raise MissingExtraError(f"{path} is compressed with Draco: run  pip install 'rlacd[draco]'  and try again.")
-    arrays.need(sum(map(len, streams.values())))
-    values = {"path": str(path), "attributes": attributes, "normalized": normalized, "widths": widths}
-    blobs = answer_of(DECODER, path, "glTF", values, streams).blobs
+    blobs = answer_of(DECODER, path, "glTF", {"path": str(path), "asked": asked}, streams).blobs
     added: dict[str, int] = {}
     for name in streams:
         added[f"{name}.points"] = arrays.add(np.frombuffer(blobs[f"{name}.points"], "<f4"))
@@ -89,24 +88,28 @@ class DracoDecoder:
         pass
 
     def __call__(self, values: Values, blobs: Blobs, shared: Mapping[str, Shared]) -> tuple[Values, dict[str, bytes]]:
-        """Decode each stream: the attribute that `values` names for it as ``NAME.points``, and ``NAME.corners``."""
+        """Decode each stream: an attribute as ``NAME.points``, and ``NAME.corners``.
+
+        What is ``asked`` of a stream are the attribute, whether its integers are normalised, and its width.
+        """
         import DracoPy
 
         arrays: dict[str, bytes] = {}
         for name, stream in blobs.items():
+            attribute, normalized, width = values["asked"][name]
             try:
                 mesh = DracoPy.decode(stream)
-                points = np.asarray(mesh.get_attribute_by_unique_id(values["attributes"][name])["data"])
+                points = np.asarray(mesh.get_attribute_by_unique_id(attribute)["data"])
                 corners = np.asarray(mesh.faces).reshape(-1, 3)
             except Exception as error:
                 raise MeshFileError(
                     f"{values['path']} holds triangles that Draco cannot decode ({error!s:.100}): it is damaged; "
                     "export it again"
                 ) from error
-            if points.shape != (len(points), values["widths"][name]) or (len(corners) and corners.max() >= len(points)):
+            if points.shape != (len(points), width) or (len(corners) and corners.max() >= len(points)):
                 raise MeshFileError(f"{values['path']} holds triangles without points: export it again")
             if len(corners) > MOST_TRIANGLES:
                 raise MeshFileError(f"{values['path']} holds more than {MOST_TRIANGLES} triangles: simplify it first")
-            arrays[f"{name}.points"] = as_floats(points, values["normalized"][name]).astype("<f4").tobytes()
+            arrays[f"{name}.points"] = as_floats(points, normalized).astype("<f4").tobytes()
             arrays[f"{name}.corners"] = corners.astype("<u4").tobytes()
         return {}, arrays

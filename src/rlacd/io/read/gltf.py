@@ -146,15 +146,18 @@ class _Scene:
     def __init__(self, path: Path, header: Json, arrays: Arrays) -> None:
         self._header, self._arrays = header, arrays
         self._nodes: list[Json] = header.get("nodes", [])
+        self._meshes: list[Json] = header.get("meshes", [])
+        self._jointed = [all("JOINTS_0" in part["attributes"] for part in _surfaces(mesh)) for mesh in self._meshes]
         self._worlds = _worlds(path, self._nodes)
         self._shapes: dict[Any, Triangles] = {}
         self._unjointed: set[int] = set()
+        self._instances = 0
 
     def read(self) -> Gltf:
         """Read the triangles; the points if there are none."""
         shown = [index for index in self._shown() if "mesh" in self._nodes[index]]
-        primitives = [one for index in shown for one in self._mesh(index)["primitives"]]
-        modes = [primitive.get("mode", TRIANGLES) for primitive in primitives]
+        meshes = {self._nodes[index]["mesh"] for index in shown}
+        modes = [part.get("mode", TRIANGLES) for mesh in meshes for part in item(self._meshes, mesh)["primitives"]]
         if not set(modes) <= {*POINTS, *LINES, *SURFACES}:
             raise ValueError("a primitive of an unknown mode")
         found = [self._placed(index, SURFACES) for index in shown]
@@ -163,10 +166,10 @@ class _Scene:
             found = [self._placed(index, POINTS) for index in shown]
         unread = (*LINES, *POINTS) if solid else LINES
         said = {
-            "primitives are points or lines, and were left out": sum(mode in unread for mode in modes),
-            "meshes have a skin but no joints, and were placed by their nodes": len(self._unjointed),
+            "primitives that are points or lines were left out": sum(mode in unread for mode in modes),
+            "meshes with a skin but without joints were placed by their nodes": len(self._unjointed),
         }
-        warnings = [f"{count} {what}" for what, count in said.items() if count]
+        warnings = [f"{what}: {count}" for what, count in said.items() if count]
         return Gltf([(node, shape) for node, shape in found if len(shape.vertices)], warnings)
 
     def _shown(self) -> list[int]:
@@ -182,21 +185,17 @@ class _Scene:
             order.extend(below)
         return sorted(found)
 
-    def _mesh(self, node: int) -> Json:
-        return dict(item(self._header["meshes"], self._nodes[node]["mesh"]))
-
     def _placed(self, index: int, modes: Sequence[int]) -> tuple[SourceNode, Triangles]:
         """What a node places: by the joints of its skin, in the coordinates of the scene, or else by itself."""
-        node, mesh = self._nodes[index], self._mesh(index)
-        parts = [one for one in mesh["primitives"] if one.get("mode", TRIANGLES) in modes]
-        skin = node.get("skin")
-        if skin is not None and not all("JOINTS_0" in part["attributes"] for part in parts):
+        node = self._nodes[index]
+        mesh, skin, weights = item(self._meshes, node["mesh"]), node.get("skin"), node.get("weights")
+        if skin is not None and not self._jointed[node["mesh"]]:
             self._unjointed.add(index)
             skin = None
-        weights: list[float] = node.get("weights") or mesh.get("weights") or []
-        key = (node["mesh"], tuple(weights) if any(weights) else (), skin, modes)
+        key = (node["mesh"], None if weights is None else tuple(weights), skin, modes)
         if key not in self._shapes:
-            self._shapes[key] = self._shape(parts, key[1], skin)
+            parts = [part for part in mesh["primitives"] if part.get("mode", TRIANGLES) in modes]
+            self._shapes[key] = self._shape(parts, weights or mesh.get("weights", ()), skin)
         shape = self._shapes[key]
         instances = node.get("extensions", {}).get(INSTANCES)
         if instances is not None:
@@ -209,9 +208,10 @@ class _Scene:
 
     def _shape(self, parts: Sequence[Json], weights: Sequence[float], skin: int | None) -> Triangles:
         """The triangles of primitives with the weights of their morph targets, as the joints of a skin bend them."""
+        weights = weights if any(weights) else ()
+        bones = None if skin is None else self._bones(item(self._header["skins"], skin))
         vertices: list[FloatArray] = [np.empty((0, 3))]
         faces: list[IntArray] = [np.empty((0, 3), dtype=np.int64)]
-        bones = None if skin is None else self._bones(item(self._header["skins"], skin))
         first = 0
         for part in parts:
             if "POSITION" not in part["attributes"]:
@@ -227,6 +227,8 @@ class _Scene:
                 points = self._skinned(points, part["attributes"], bones)
                 if (np.linalg.det(bones[:, :3, :3]) < 0).all():
                     corners = corners[:, ::-1]
+            if weights or bones is not None:  # one of several shapes of a mesh
+                self._arrays.need(points.nbytes + corners.nbytes)
             vertices.append(points)
             faces.append(corners + first)
             first += len(points)
@@ -272,24 +274,30 @@ class _Scene:
     def _repeated(self, shape: Triangles, attributes: Json) -> Triangles:
         """All instances of a shape within its node."""
         kinds = {"TRANSLATION": "VEC3", "ROTATION": "VEC4", "SCALE": "VEC3"}
-        given = {name: self._arrays.more(attributes[name], kinds[name]) for name in kinds if name in attributes}
-        (count,) = {len(rows) for rows in given.values()}
-        if count > MOST_PLACES:
-            raise ValueError(f"{count} instances of a mesh")
+        (count,) = {self._arrays.accessor(index)["count"] for index in attributes.values()}
+        self._instances += count
+        if self._instances > MOST_PLACES:
+            raise ValueError(f"{self._instances} instances, more than {MOST_PLACES}")
         self._arrays.need(count * (shape.vertices.nbytes + shape.faces.nbytes))
-        moves = _placements(*(given.get(name, np.array([at])) for name, at in zip(kinds, UNMOVED, strict=True)))
-        vertices, faces = [], []
+        given = [
+            self._arrays.more(attributes[name], kind) if name in attributes else np.array([at])
+            for (name, kind), at in zip(kinds.items(), UNMOVED, strict=True)
+        ]
+        moves = _placements(*given)
+        vertices, faces = [shape.vertices[:0]], [shape.faces[:0]]
         for number, move in enumerate(np.broadcast_to(moves, (count, 4, 4))):
             vertices.append(heights(shape.vertices, move[:3, :3]) + move[:3, 3])
             turned = shape.faces[:, ::-1] if np.linalg.det(move[:3, :3]) < 0 else shape.faces
             faces.append(turned + number * len(shape.vertices))
-        return Triangles(np.concatenate(vertices), np.concatenate(faces)) if count else Triangles(*_NOTHING)
+        return Triangles(np.concatenate(vertices), np.concatenate(faces))
 
 
 UNMOVED = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), (1.0, 1.0, 1.0))
 """Translation, rotation and scale of a node that gives none."""
 
-_NOTHING = np.empty((0, 3)), np.empty((0, 3), dtype=np.int64)
+
+def _surfaces(mesh: Json) -> list[Json]:
+    return [part for part in mesh["primitives"] if part.get("mode", TRIANGLES) in SURFACES]
 
 
 def _fan(corners: IntArray) -> IntArray:

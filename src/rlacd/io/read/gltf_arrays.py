@@ -190,7 +190,7 @@ class Arrays:
         return self._content[index]
 
 
-def item(items: Any, index: Any) -> Any:
+def item(items: Sequence[Any] | FloatArray, index: Any) -> Any:
     """An item of a list by its index in the file: one below zero would count from the end."""
     if not isinstance(index, int) or index < 0:
         raise IndexError(f"{index!r:.40} is no index")

@@ -101,14 +101,14 @@ def _from_file(path: Path) -> InputMesh:
     mesh = _clean(_bake(scene, path.name), path.name)
     up, metres = stated(extension, content, scene)
     mesh = replace(mesh, up=up, metres=metres, warnings=(*mesh.warnings, *_left_out(path, content, extension, scene)))
+    if isinstance(scene, Gltf):
+        return replace(mesh, asset=Asset(content, path, extension))
     if extension in USD:
         assert not isinstance(scene, Gltf)
         kept = len(mesh.nodes) > 1 or any(one.visual.defined for one in scene.geometry.values())
         return replace(mesh, asset=Asset(scene, extension=extension) if kept else None)
-    if extension not in ("glb", "gltf"):
-        kept = has_looks(path, content, extension, len(mesh.nodes))
-        return replace(mesh, asset=Asset(content, path, extension) if kept else None)
-    return replace(mesh, asset=Asset(content, path, extension))
+    kept = has_looks(path, content, extension, len(mesh.nodes))
+    return replace(mesh, asset=Asset(content, path, extension) if kept else None)
 
 
 def _left_out(path: Path, content: bytes, extension: str, scene: trimesh.Scene | Gltf) -> list[str]:
@@ -121,7 +121,7 @@ def _left_out(path: Path, content: bytes, extension: str, scene: trimesh.Scene |
     if extension == "dae":
         unread = {
             rb"skew": "skews of {} were left out",
-            rb"instance_controller": "skinned or morphed meshes of {} have their bind shape, not that of their joints",
+            rb"instance_controller": "skinned or morphed meshes of {} are read as bound, at their nodes",
             rb"ph": "polygons with holes of {} were left out",
         }
         return [
@@ -270,9 +270,9 @@ def _bake(source: trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud | Gltf, n
             continue
         v, f = _arrays(geometry.vertices, getattr(geometry, "faces", ()))
         if not np.array_equal(node.transform, np.eye(4)):
-            v = heights(v, node.transform[:3, :3]) + node.transform[:3, 3]
-            if np.linalg.det(node.transform[:3, :3]) < 0:
-                f = f[:, ::-1]
+            with np.errstate(all="ignore"):  # what is not finite is left out, with a warning
+                v = heights(v, node.transform[:3, :3]) + node.transform[:3, 3]
+                f = f[:, ::-1] if np.linalg.det(node.transform[:3, :3]) < 0 else f
         if len(f) == 0:
             points.append(v)
             continue
@@ -305,7 +305,11 @@ def _instances(source: Any, name: str) -> Iterator[tuple[SourceNode, Any]]:
 
 
 def _require_few(geometries: Iterable[Any], name: str) -> None:
-    count = sum(len(getattr(geometry, "faces", ())) for geometry in geometries)
+    """Points count as well, at three for a triangle: it may be that no face uses them."""
+    counts = (
+        max(len(getattr(geometry, "faces", ())), len(getattr(geometry, "vertices", ())) // 3) for geometry in geometries
+    )
+    count = sum(counts)
     if count > MOST_TRIANGLES:
         raise MeshDataError(f"{name} places {count} triangles, more than {MOST_TRIANGLES}: simplify it first")
 

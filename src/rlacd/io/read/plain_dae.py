@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +27,8 @@ def in_plain_terms(path: Path, root: Any) -> bool:
     """
     changed = [_as_matrix(skew) for skew in list(root.iter("{*}skew"))]
     changed += [_close_together(path, source) for mesh in root.iter("{*}mesh") for source in mesh.findall("{*}source")]
-    controllers = {one.get("id"): one for one in root.iter("{*}controller")}
-    instances = list(root.iter("{*}instance_controller"))
-    changed += [_as_geometry(instance, controllers) for instance in instances]
+    instances, shapes = list(root.iter("{*}instance_controller")), _bind_shapes(root)
+    changed += [_as_geometry(instance, shapes) for instance in instances]
     return any(changed)
 
 
@@ -38,8 +36,7 @@ def _as_matrix(skew: Any) -> bool:
     """By RenderMan, to which COLLADA refers: turn one axis to the other, along which all points move."""
     try:
         angle, *axes = map(float, (skew.text or "").split())
-        turned, along = np.array(axes).reshape(2, 3)
-        turned, along = turned / np.linalg.norm(turned), along / np.linalg.norm(along)
+        turned, along = (axis / (np.linalg.norm(axis) or np.nan) for axis in np.array(axes).reshape(2, 3))
     except ValueError:
         return False
     between, angle = np.arccos(np.clip(turned @ along, -1, 1)), np.radians(angle)
@@ -81,35 +78,33 @@ def _close_together(path: Path, source: Any) -> bool:
     return True
 
 
-def _as_geometry(instance: Any, controllers: dict[str, Any]) -> bool:
+def _bind_shapes(root: Any) -> dict[str, tuple[str, FloatArray]]:
+    """What each controller bends, a geometry or another controller, and the matrix that it applies before."""
+    found = {}
+    for controller in root.iter("{*}controller"):
+        for shape in controller.iterchildren("{*}skin", "{*}morph"):
+            words = shape.findtext("{*}bind_shape_matrix", _written(np.eye(4))).split()
+            try:
+                matrix = np.array(words, np.float64).reshape(4, 4)
+            except ValueError:
+                continue
+            found[f"#{controller.get('id')}"] = shape.get("source", ""), matrix
+    return found
+
+
+def _as_geometry(instance: Any, shapes: dict[str, tuple[str, FloatArray]]) -> bool:
     """Put the geometry of a controller beside its instance, in its bind shape."""
-    shape, matrix = instance.get("url", ""), np.eye(4)
-    for controller in _chain(shape, controllers):
-        shape = controller.get("source", "")
-        bound = controller.find("{*}bind_shape_matrix")
-        try:
-            matrix = matrix @ np.array((bound.text or "").split() if bound is not None else np.eye(4), float).reshape(
-                4, 4
-            )
-        except ValueError:
-            return False
+    url, matrix = instance.get("url", ""), np.eye(4)
+    for _ in range(DEEPEST):
+        if url in shapes:
+            url, own = shapes[url]
+            matrix = matrix @ own
     node = etree.Element(_beside(instance, "node"))
     etree.SubElement(node, _beside(instance, "matrix")).text = _written(matrix)
-    geometry = etree.SubElement(node, _beside(instance, "instance_geometry"), url=shape)
+    geometry = etree.SubElement(node, _beside(instance, "instance_geometry"), url=url)
     geometry.extend(copy.deepcopy(instance.findall("{*}bind_material")))
     instance.addnext(node)
     return True
-
-
-def _chain(url: str, controllers: dict[str, Any]) -> Iterator[Any]:
-    """The skin or morph of a controller, that of the controller it changes, and so on."""
-    for _ in range(DEEPEST):
-        controller = controllers.get(url.removeprefix("#"))
-        found = None if controller is None else next(controller.iter("{*}skin", "{*}morph"), None)
-        if found is None:
-            return
-        yield found
-        url = found.get("source", "")
 
 
 def _beside(element: Any, name: str) -> str:
