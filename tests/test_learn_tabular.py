@@ -217,7 +217,7 @@ def test_networks_reach_the_optimum_of_their_objective(
     options = TrainOptions(
         **{
             "threshold": LIMIT.threshold,
-            "iterations": 600,
+            "iterations": 1500,
             "warmup": 100,
             "batch": 32,
             "validation": 0,
