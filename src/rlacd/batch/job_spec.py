@@ -15,10 +15,10 @@ from rlacd.errors import OptionError, WeightsError
 from rlacd.io.read.open_file import read_file
 from rlacd.io.write import DENSITY, FORMATS, MODELS, check_model_options, hull_target
 from rlacd.options import Options
-from rlacd.output_options import OutputOptions
+from rlacd.options.output import OutputOptions
+from rlacd.options.presets import find_preset
 from rlacd.policies import make_policy
 from rlacd.pool import Shared
-from rlacd.presets import find_preset
 
 WEIGHTS_ENDING = ".npz"
 DEFAULT_FORMAT = "glb"

@@ -8,9 +8,9 @@ from typing import Any
 
 from rlacd.cli.parameters import Parameters, chosen, option_parameters
 from rlacd.errors import OptionError
-from rlacd.fields import about
 from rlacd.options import CONCAVITY, VOLUME, Options
-from rlacd.space_options import NAVIGABLE, SpaceOptions
+from rlacd.options.fields import about
+from rlacd.options.navigable import NAVIGABLE, SpaceOptions
 
 _SPACE = tuple(field.name for field in dataclasses.fields(SpaceOptions))
 
@@ -76,8 +76,7 @@ def decompose_options(given: dict[str, Any], *, metres: bool = False) -> dict[st
 
 def _typed(name: str, space: dict[str, Any]) -> str:
     """Spell an option as on the command line."""
-    flags = about(SpaceOptions, name).flags or (f"--{name.replace('_', '-')}",)
-    yes, _, no = flags[0].partition("/")
+    yes, _, no = about(SpaceOptions, name).flags[0].partition("/")
     return no if space[name] is False else yes
 
 
