@@ -19,7 +19,8 @@ CONCAVITY: Literal["concavity"] = "concavity"
 VOLUME: Literal["volume"] = "volume"
 """The name of the criterion that V-HACD and NavACD use."""
 
-CRITERIA = (CONCAVITY, VOLUME, NAVIGABLE)
+CRITERIA = {CONCAVITY: ("threshold",), VOLUME: ("volume_tolerance",), NAVIGABLE: ("radius", "tolerance")}
+"""Each criterion by its name, with the numbers that say how tight it is."""
 
 VolumeOf = Literal["part", "whole"]
 OpenName = Literal["auto", "solid", "thin"]

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from rlacd.criteria import NavigableSpace
-from rlacd.options import CONCAVITY, FAST, NAVIGABLE, VOLUME, Options, criterion_named
+from rlacd.options import CONCAVITY, CRITERIA, FAST, NAVIGABLE, Options, criterion_named
 from rlacd.options.names import PrimitiveKind
 from rlacd.solid.input_mesh import InputMesh
 
 _DEFAULTS, _SPACE = Options(), NavigableSpace()
-_OF_GOALS = ("criterion", "threshold", "radius", "tolerance", "volume_tolerance")
+_NUMBERS = {"criterion", *(number for numbers in CRITERIA.values() for number in numbers)}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,14 +41,10 @@ class ViewerControls:
         OptionError
             A value is out of range.
         """
-        goals: dict[str, dict[str, Any]] = {
-            CONCAVITY: {"threshold": self.threshold},
-            VOLUME: {"criterion": VOLUME, "volume_tolerance": self.volume_tolerance},
-        }
         name = criterion_named(self.criterion)
-        if name == NAVIGABLE:
-            goals[name] = {"criterion": NavigableSpace(radius=self.radius, tolerance=self.tolerance)}
-        options = {key: value for key, value in vars(self).items() if key not in _OF_GOALS} | goals[name]
+        goal = {number: getattr(self, number) for number in CRITERIA[name]}
+        criterion = {"criterion": NavigableSpace(**goal)} if name == NAVIGABLE else {"criterion": name, **goal}
+        options = {key: value for key, value in vars(self).items() if key not in _NUMBERS} | criterion
         Options(**options)
         return options
 
