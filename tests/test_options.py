@@ -20,9 +20,11 @@ from rlacd.cli.options import decompose_options
 from rlacd.compat import coacd, vhacd
 from rlacd.errors import MeshFileError, OptionError, RlacdError, WeightsError
 from rlacd.learn.options import TrainOptions
-from rlacd.options import CONCAVITY, OPTION_NAMES, Options, OutputOptions, SpaceOptions
+from rlacd.options import CONCAVITY, OPTION_NAMES, Options
 from rlacd.options.fields import check_callback
 from rlacd.options.names import SCORES as SCORE_NAMES
+from rlacd.options.navigable import SpaceOptions
+from rlacd.options.output import OutputOptions
 from rlacd.policies.greedy import SCORES
 
 

@@ -14,8 +14,9 @@ from rlacd.criteria import NavigableSpace
 from rlacd.errors import OptionError, WeightsError
 from rlacd.io.read.open_file import read_file
 from rlacd.io.write import DENSITY, FORMATS, MODELS, check_model_options, hull_target
-from rlacd.options import Options, OutputOptions
+from rlacd.options import Options
 from rlacd.options.names import WEIGHTS_ENDING
+from rlacd.options.output import OutputOptions
 from rlacd.options.presets import find_preset
 from rlacd.policies import make_policy
 from rlacd.pool import Shared

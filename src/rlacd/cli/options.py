@@ -8,8 +8,9 @@ from typing import Any
 
 from rlacd.cli.parameters import Parameters, chosen, option_parameters
 from rlacd.errors import OptionError
-from rlacd.options import CONCAVITY, NAVIGABLE, VOLUME, Options, SpaceOptions, criterion_named
+from rlacd.options import CONCAVITY, VOLUME, Options, criterion_named
 from rlacd.options.fields import about
+from rlacd.options.navigable import NAVIGABLE, SpaceOptions
 
 _SPACE = tuple(field.name for field in dataclasses.fields(SpaceOptions))
 

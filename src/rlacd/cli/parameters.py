@@ -32,7 +32,7 @@ def command(run: Callable[..., None], text: str, parameters: Parameters) -> Call
 
 
 def option_parameters(
-    options: type[Any], *, only: Collection[str] | None = None, note: str = "default: ", panel: str | None = None
+    options: type[Any], *, only: Collection[str] | None = None, note: str = "default: "
 ) -> Parameters:
     """Make a parameter for each field of a dataclass; the default is None.
 
@@ -44,8 +44,6 @@ def option_parameters(
         The fields to include.
     note : str
         Text before each default in the help.
-    panel : str, optional
-        Heading for all of them, in place of their own.
     """
     parameters: Parameters = {}
     for field in dataclasses.fields(options):
@@ -57,7 +55,7 @@ def option_parameters(
             *known.flags,
             help=_help(known, note),
             metavar=known.metavar,
-            rich_help_panel=panel or known.panel,
+            rich_help_panel=known.panel,
             show_default=False,
         )
         parameters[field.name] = (None, Annotated[kind | None, declared])

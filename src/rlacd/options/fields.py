@@ -121,16 +121,15 @@ def one_of(names: Any, *, rule: str | None = None) -> Kind:
     return custom(rule or f"one of {', '.join(words)}", lambda given: words[words.index(_text(given))], " ".join(words))
 
 
-def text(rule: str = "a string", values: str = "", accepts: Callable[[str], bool] = bool) -> Kind:
-    """A string that `accepts` says yes to; by default any that is not empty."""
+def text(rule: str = "a string", *, least: int = 0) -> Kind:
+    """A string of at least this many characters."""
 
     def read(value: Any) -> str:
-        plain = _text(value)
-        if not accepts(plain):
+        if len(plain := _text(value)) < least:
             raise ValueError
         return plain
 
-    return custom(rule, read, values)
+    return custom(rule, read)
 
 
 def path_like(rule: str = "a path") -> Kind:
@@ -222,7 +221,7 @@ def _kind_of(default: Any, least: float | None = None, most: float | None = None
         return number(-math.inf if least is None else least, math.inf if most is None else most)
     if isinstance(default, int) or least is not None:
         return integer(None if least is None else int(least), None if most is None else int(most))
-    return text(accepts=lambda value: True)
+    return text()
 
 
 _one_of = one_of

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from rlacd.criteria import NavigableSpace
-from rlacd.options import CONCAVITY, CRITERIA, FAST, NAVIGABLE, Options, criterion_named
+from rlacd.options import CONCAVITY, CRITERIA, FAST, Options, criterion_named
 from rlacd.options.names import PrimitiveKind
+from rlacd.options.navigable import NAVIGABLE
 from rlacd.solid.input_mesh import InputMesh
 
 _DEFAULTS, _SPACE = Options(), NavigableSpace()
