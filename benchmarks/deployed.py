@@ -17,6 +17,7 @@ from rlacd.cut_and_merge import cut_and_merge
 from rlacd.errors import OptionError
 from rlacd.finish.limit import limit_part
 from rlacd.io.read.load import load_mesh
+from rlacd.options.names import WEIGHTS_ENDING
 from rlacd.planes.candidates import OFFSETS_PER_AXIS, axis_and_principal
 from rlacd.planes.sweep import SLIVER, Sweep, sweep
 from rlacd.policies.greedy import excess_norm
@@ -25,7 +26,6 @@ from rlacd.policies.observe import paper_planes
 from rlacd.policies.qpolicy import KIND
 from rlacd.policies.shortlist import generator_of, least_hulls
 from rlacd.policies.sweep_features import FEATURES, PLANES, sweep_features
-from rlacd.policy_names import WEIGHTS_ENDING
 from rlacd.repair.repair import repair
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray

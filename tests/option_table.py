@@ -8,11 +8,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rlacd.cli.parameters import usual_value
-from rlacd.fields import About
 from rlacd.options import Options
-from rlacd.output_options import OutputOptions
-from rlacd.space_options import SpaceOptions
+from rlacd.options.fields import About
+from rlacd.options.navigable import SpaceOptions
+from rlacd.options.output import OutputOptions
 
 PAGE = Path(__file__).parents[1] / "docs" / "reference" / "options.md"
 
@@ -32,12 +31,10 @@ def options_table() -> str:
 def _rows(options: type[Any]) -> Iterator[str]:
     for field in dataclasses.fields(options):
         known: About = field.metadata["option"]
-        names = known.flags or (f"--{field.name.replace('_', '-')}",)
-        typed = ", ".join(f"`{name}`" for name in sorted(names, key=len))
-        called = field.name if known.python is None else known.python
-        python = f"<br>`{called}`".replace(", ", "`, `") if called else ""
+        typed = ", ".join(f"`{name}`" for name in sorted(known.flags, key=len))
+        python = f"<br>`{known.python}`".replace(", ", "`, `") if known.python else ""
         meaning = FLAG.sub(r"`\g<0>`", known.help)
-        cells = [typed + python, usual_value(field) or "–", known.kind.values, meaning]
+        cells = [typed + python, known.usual or "–", known.kind.values, meaning]
         yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 

@@ -6,6 +6,7 @@ import dataclasses
 import fractions
 import inspect
 import itertools
+import re
 import typing
 from pathlib import Path
 from typing import Any
@@ -18,11 +19,13 @@ import rlacd
 from rlacd.cli.options import decompose_options
 from rlacd.compat import coacd, vhacd
 from rlacd.errors import MeshFileError, OptionError, RlacdError, WeightsError
-from rlacd.fields import check_callback
+from rlacd.learn.options import TrainOptions
 from rlacd.options import CONCAVITY, OPTION_NAMES, Options
+from rlacd.options.fields import check_callback
+from rlacd.options.names import SCORES as SCORE_NAMES
+from rlacd.options.navigable import SpaceOptions
+from rlacd.options.output import OutputOptions
 from rlacd.policies.greedy import SCORES
-from rlacd.policy_names import SCORES as SCORE_NAMES
-from rlacd.space_options import SpaceOptions
 
 
 class Hostile:
@@ -251,6 +254,14 @@ def test_every_option_of_names_has_a_literal_type() -> None:
                 if typing.get_origin(part) is typing.Literal
             )
             assert " ".join(typing.get_args(literal)) == known.kind.values
+
+
+@pytest.mark.parametrize("options", [Options, SpaceOptions, OutputOptions, TrainOptions])
+def test_every_option_and_no_other_name_is_explained(options: Any) -> None:
+    explained = [line.strip() for line in options.__doc__.splitlines() if re.fullmatch(r" {4}\w+", line)]
+    fields = dataclasses.fields(options)
+    assert explained[: len(fields) + 1] == ["Attributes", *(field.name for field in fields)]
+    assert all(field.metadata["option"].help.endswith(".") for field in fields)
 
 
 def test_the_names_of_scores_are_those_that_are_known() -> None:

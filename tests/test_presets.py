@@ -12,7 +12,7 @@ from scipy.optimize import linprog
 import rlacd
 from rlacd.errors import OptionError
 from rlacd.finish.report import engine_shortcomings
-from rlacd.presets import PRESETS, find_preset
+from rlacd.options.presets import PRESETS, find_preset
 from rlacd.solid.hull import Hull
 
 

@@ -18,7 +18,7 @@ from lxml import etree
 import rlacd
 from rlacd.errors import OptionError
 from rlacd.finish.primitives import fit_primitives, smallest_ball
-from rlacd.primitive_kinds import PRIMITIVE_KINDS, PrimitiveKind
+from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.solid.hull import Hull
 from tests.hulls import assert_convex_hull
 from tests.models import TABLE_VOLUME, fall_in_bullet, fall_in_drake, fall_in_mujoco, table

@@ -21,10 +21,10 @@ if TYPE_CHECKING:
         RlacdError,
     )
     from rlacd.io.robots import Rewritten, rewrite_robot
+    from rlacd.options.presets import PRESETS, Preset
     from rlacd.planes.sweep import Sweep
     from rlacd.planes.sweep_cache import SweepCache
     from rlacd.policies import Policy
-    from rlacd.presets import PRESETS, Preset
     from rlacd.run import Progress
     from rlacd.solid.component import Component, Plane
     from rlacd.solid.primitive import Primitive
@@ -63,8 +63,8 @@ _HOME = {
     "NavigableSpace": "criteria",
     "decompose": "decompose_mesh",
     "Decomposition": "decomposition",
-    "PRESETS": "presets",
-    "Preset": "presets",
+    "PRESETS": "options.presets",
+    "Preset": "options.presets",
     "Progress": "run",
     "Rewritten": "io.robots",
     "rewrite_robot": "io.robots",

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 from rlacd.criteria import NavigableSpace
 from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError
-from rlacd.fields import check_callback
 from rlacd.find_parts import Reached, covered, find_parts
 from rlacd.finish import Finished, finish, misses_some
 from rlacd.finish.report import joint_report
@@ -35,9 +34,10 @@ from rlacd.options import (
     UnitName,
     VolumeOf,
 )
+from rlacd.options.fields import check_callback
+from rlacd.options.names import PrimitiveKind
+from rlacd.options.presets import PresetName
 from rlacd.policies import Policy, make_policy
-from rlacd.presets import PresetName
-from rlacd.primitive_kinds import PrimitiveKind
 from rlacd.run import ProgressCallback, Run
 from rlacd.solid.frame import Frame
 from rlacd.solid.input_mesh import InputMesh

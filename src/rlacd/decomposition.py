@@ -9,7 +9,7 @@ from pathlib import Path
 import trimesh
 
 from rlacd.errors import OptionError
-from rlacd.output_options import Axis
+from rlacd.options.output import Axis
 from rlacd.result import Result
 
 

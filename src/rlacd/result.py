@@ -9,9 +9,9 @@ from typing import Any, overload
 
 import trimesh
 
-from rlacd.fields import checked
-from rlacd.output_options import Axis, OutputOptions
-from rlacd.primitive_kinds import PRIMITIVE_KINDS
+from rlacd.options.fields import checked
+from rlacd.options.names import PRIMITIVE_KINDS
+from rlacd.options.output import Axis, OutputOptions
 from rlacd.solid.balls import Balls
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.primitive import PRIMITIVE, Primitive

@@ -15,12 +15,12 @@ from rlacd.errors import OptionError, WeightsError
 from rlacd.io.read.open_file import read_file
 from rlacd.io.write import DENSITY, FORMATS, MODELS, check_model_options, hull_target
 from rlacd.options import Options
-from rlacd.output_options import OutputOptions
+from rlacd.options.names import WEIGHTS_ENDING
+from rlacd.options.output import OutputOptions
+from rlacd.options.presets import find_preset
 from rlacd.policies import make_policy
 from rlacd.pool import Shared
-from rlacd.presets import find_preset
 
-WEIGHTS_ENDING = ".npz"
 DEFAULT_FORMAT = "glb"
 FOLDER_FORMAT = "obj"
 
@@ -47,7 +47,7 @@ class JobSpec:
     one_mesh
         Whether a model keeps all its hulls in one mesh file.
     weights
-        Hashes of the network in the policy's file and of the shipped one.
+        Hash of the network, if the policy is a file.
     """
 
     options: dict[str, Any] = field(default_factory=dict)
@@ -81,6 +81,7 @@ class JobSpec:
             Keyword arguments of `rlacd.decompose`, without ``progress``. Each mesh gets one thread by default.
         file_format : str, optional
             A value of ``--format``, or any ending of a hull file; by default the preset's format, else glb.
+        folders : bool
             Whether each mesh gets a folder with one file per hull.
         density, up, one_mesh, mass, keep_input
             As for `rlacd.Decomposition.save`.

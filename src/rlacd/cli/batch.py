@@ -16,7 +16,7 @@ from rlacd.cli.exit_codes import ExitCode, exit_codes, give, say
 from rlacd.cli.options import decompose_options, how_parameters
 from rlacd.cli.parameters import REQUIRED, Parameters, command, option_parameters
 from rlacd.errors import OptionError
-from rlacd.output_options import OutputOptions
+from rlacd.options.output import OutputOptions
 from rlacd.run import available_cpus
 
 if TYPE_CHECKING:

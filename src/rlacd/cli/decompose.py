@@ -15,7 +15,7 @@ from rlacd.cli.exit_codes import ExitCode, exit_codes, give, say
 from rlacd.cli.options import decompose_options, how_parameters, unit_given
 from rlacd.cli.parameters import REQUIRED, Parameters, chosen, command, option_parameters, taken
 from rlacd.errors import ImplausibleBodyWarning, MeshFileError, OptionError
-from rlacd.output_options import OutputOptions
+from rlacd.options.output import OutputOptions
 
 STDOUT = "-"
 ROBOTS = (".urdf", ".xml")
@@ -139,7 +139,7 @@ def _rewrite(robot: Path, wanted: OutputOptions, options: dict[str, Any], unit: 
 def _named(mesh: Path, asked: OutputOptions, preset: str | None) -> OutputOptions:
     """Fill in the output path and format that the preset or the input determines."""
     from rlacd.io.write import MODELS
-    from rlacd.presets import find_preset
+    from rlacd.options.presets import find_preset
 
     output, file_format = asked.output, asked.file_format
     if output == STDOUT:

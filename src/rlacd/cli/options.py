@@ -8,9 +8,9 @@ from typing import Any
 
 from rlacd.cli.parameters import Parameters, chosen, option_parameters
 from rlacd.errors import OptionError
-from rlacd.fields import about
-from rlacd.options import CONCAVITY, VOLUME, Options
-from rlacd.space_options import NAVIGABLE, SpaceOptions
+from rlacd.options import CONCAVITY, VOLUME, Options, criterion_named
+from rlacd.options.fields import about
+from rlacd.options.navigable import NAVIGABLE, SpaceOptions
 
 _SPACE = tuple(field.name for field in dataclasses.fields(SpaceOptions))
 
@@ -45,39 +45,36 @@ def decompose_options(given: dict[str, Any], *, metres: bool = False) -> dict[st
     """
     given = _lengths(chosen(given), metres)
     space = {name: given.pop(name) for name in _SPACE if name in given}
-    criterion = given.pop("criterion", CONCAVITY)
-    if criterion not in (CONCAVITY, VOLUME, NAVIGABLE):
-        raise OptionError(f"criterion is {criterion!r}; it has to be {CONCAVITY}, {VOLUME} or {NAVIGABLE}.")
-    if criterion == VOLUME:
-        if "tolerance" in space:
-            given["volume_tolerance"] = space.pop("tolerance")
-        if space:
-            raise OptionError(f"{_typed(next(iter(space)), space)} needs --criterion navigable.")
-        if "threshold" in given or "threshold_abs" in given:
-            raise OptionError("--threshold belongs to --criterion concavity; give --tolerance instead, such as 1%.")
-        return {**given, "criterion": VOLUME}
-    if "volume_of" in given:
+    criterion = criterion_named(given.pop("criterion", CONCAVITY))
+    if criterion == VOLUME and "tolerance" in space:
+        given["volume_tolerance"] = space.pop("tolerance")
+    if criterion != NAVIGABLE and space:
+        needed = f"{VOLUME} or {NAVIGABLE}" if "tolerance" in space else NAVIGABLE
+        raise OptionError(f"{_typed(next(iter(space)), space)} needs --criterion {needed}.")
+    if criterion != CONCAVITY and ("threshold" in given or "threshold_abs" in given):
+        instead = "--tolerance instead, such as 1%" if criterion == VOLUME else "--radius and --tolerance instead"
+        raise OptionError(f"--threshold belongs to --criterion concavity; give {instead}.")
+    if criterion != VOLUME and "volume_of" in given:
         raise OptionError("--volume-of needs --criterion volume.")
-    if criterion == CONCAVITY:
-        if space:
-            needed = f"{VOLUME} or {NAVIGABLE}" if "tolerance" in space else NAVIGABLE
-            raise OptionError(f"{_typed(next(iter(space)), space)} needs --criterion {needed}.")
-        return given
-    if "threshold" in given or "threshold_abs" in given:
-        raise OptionError("--threshold belongs to --criterion concavity; give --radius and --tolerance instead.")
+    if criterion == NAVIGABLE:
+        return {**given, "criterion": _space(space)}
+    return given if criterion == CONCAVITY else {**given, "criterion": criterion}
+
+
+def _space(given: dict[str, Any]) -> SpaceOptions:
     from rlacd.criteria import NavigableSpace
 
-    if "seeds" in space:
-        space["seeds"] = [_numbers("--seed-point", text, 3) for text in space["seeds"]]
-    if "closed_planes" in space:
-        space["closed_planes"] = [_plane(text) for text in space["closed_planes"]]
-    return {**given, "criterion": NavigableSpace(**space)}
+    if "seeds" in given:
+        given["seeds"] = [_numbers("--seed-point", words, 3) for words in given["seeds"]]
+    if "closed_planes" in given:
+        planes = [_numbers("--closed-plane", words, 4) for words in given["closed_planes"]]
+        given["closed_planes"] = [(plane[:3], plane[3]) for plane in planes]
+    return NavigableSpace(**given)
 
 
 def _typed(name: str, space: dict[str, Any]) -> str:
     """Spell an option as on the command line."""
-    flags = about(SpaceOptions, name).flags or (f"--{name.replace('_', '-')}",)
-    yes, _, no = flags[0].partition("/")
+    yes, _, no = about(SpaceOptions, name).flags[0].partition("/")
     return no if space[name] is False else yes
 
 
@@ -89,23 +86,22 @@ def _lengths(given: dict[str, Any], metres: bool) -> dict[str, Any]:
         if not isinstance(word, str):
             continue
         found = _LENGTH.fullmatch(word.strip())
-        value = _number(found[1] if found else word)
+        value, unit = (_number(found[1]), found[2]) if found else (_number(word), None)
         if value is None:
             raise OptionError(
                 f"--{name} is {word!r}; it has to be a number, a share such as 5%, or a length in metres."
             )
-        unit = found[2] if found else None
-        if unit in METRES:
-            if not metres:
-                raise OptionError(
-                    f"--{name} is {word}, but the file does not say its unit; give --{name}-abs in the file's own unit."
-                )
-            if f"{name}_abs" in taken:
-                raise OptionError(f"--{name} and --{name}-abs are both lengths; give one of the two.")
-            del taken[name]
-            taken[f"{name}_abs"] = value * METRES[unit]
-        else:
+        if unit not in METRES:
             taken[name] = value / 100 * of_longest if unit == "%" else value
+            continue
+        if not metres:
+            raise OptionError(
+                f"--{name} is {word}, but the file does not say its unit; give --{name}-abs in the file's own unit."
+            )
+        if f"{name}_abs" in taken:
+            raise OptionError(f"--{name} and --{name}-abs are both lengths; give one of the two.")
+        del taken[name]
+        taken[f"{name}_abs"] = value * METRES[unit]
     return taken
 
 
@@ -123,15 +119,9 @@ def _number(word: str) -> float | None:
 
 
 def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
-    values = [_number(word) for word in text.split(",")]
-    found = tuple(value for value in values if value is not None)
-    if len(found) != count or len(values) != count:
+    values = [value for word in text.split(",") if (value := _number(word)) is not None]
+    if not len(values) == len(text.split(",")) == count:
         raise OptionError(
             f"{option} is {text!r}; it takes {count} numbers separated by commas, such as {'0,0,1,0'[: 2 * count - 1]}."
         )
-    return found
-
-
-def _plane(text: str) -> tuple[tuple[float, ...], float]:
-    *normal, offset = _numbers("--closed-plane", text, 4)
-    return tuple(normal), offset
+    return tuple(values)

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rlacd.fields import About
+from rlacd.options.fields import About
 
 Parameters = dict[str, tuple[Any, Any]]
 """Parameters of a command: name to default and annotation."""
@@ -32,47 +32,34 @@ def command(run: Callable[..., None], text: str, parameters: Parameters) -> Call
 
 
 def option_parameters(
-    options: type[Any], *, only: Collection[str] | None = None, note: str = "default: ", panel: str | None = None
+    options: type[Any], *, only: Collection[str] | None = None, note: str = "default: "
 ) -> Parameters:
     """Make a parameter for each field of a dataclass; the default is None.
 
     Parameters
     ----------
     options : type
-        A dataclass of fields declared with `rlacd.fields.option`.
+        A dataclass of fields declared with `rlacd.options.fields.option`.
     only : collection of str, optional
         The fields to include.
     note : str
         Text before each default in the help.
-    panel : str, optional
-        Heading for all of them, in place of their own.
     """
     parameters: Parameters = {}
     for field in dataclasses.fields(options):
         known: About = field.metadata["option"]
-        if known.flags == () or (only is not None and field.name not in only):
+        if only is not None and field.name not in only:
             continue
-        names = known.flags or ((f"--{field.name.replace('_', '-')}",) if known.kind.typed is not bool else ())
         kind = list[known.kind.typed] if known.repeated else known.kind.typed  # type: ignore[name-defined]
         declared = typer.Option(
-            *names,
-            help=_help(known, usual_value(field), note),
+            *known.flags,
+            help=_help(known, note),
             metavar=known.metavar,
-            rich_help_panel=panel or known.panel,
+            rich_help_panel=known.panel,
             show_default=False,
         )
         parameters[field.name] = (None, Annotated[kind | None, declared])
     return parameters
-
-
-def usual_value(field: dataclasses.Field[Any]) -> str:
-    """Describe the default of an option; empty if omitting the option needs no explanation."""
-    known: About = field.metadata["option"]
-    if known.usual is not None:
-        return known.usual
-    if isinstance(field.default, bool):
-        return str(field.default).lower()
-    return "" if field.default is None else "none" if field.default == "" else str(field.default)
 
 
 def chosen(given: dict[str, Any]) -> dict[str, Any]:
@@ -86,11 +73,10 @@ def taken(given: dict[str, Any], options: type[Any]) -> dict[str, Any]:
     return chosen({name: given.pop(name) for name in sorted(names)})
 
 
-def _help(known: About, usual: str, note: str) -> str:
+def _help(known: About, note: str) -> str:
     """Build the help text; ``[`` is escaped, since it begins markup."""
-    values = known.kind.values if known.metavar is None or known.kind.values not in known.metavar.split("|") else ""
-    facts = [f"{note}{usual}"] if usual not in ("", "–") else []
-    if known.kind.typed is not bool and values and values.replace(" ", "|") != known.metavar:
-        facts.append(values)
+    facts = [f"{note}{known.usual}"] if known.usual not in ("", "–") else []
+    if known.kind.values and known.kind.values.replace(" ", "|") != known.metavar:
+        facts.append(known.kind.values)
     behind = f" [dim]\\[{'; '.join(facts)}][/dim]" if facts else ""
     return known.help.replace("[", "\\[") + behind

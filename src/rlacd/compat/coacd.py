@@ -13,8 +13,8 @@ import numpy.typing as npt
 
 from rlacd.compat.unused import warn_unused
 from rlacd.decompose_mesh import decompose
-from rlacd.fields import flag, integer, number, one_of, read
 from rlacd.options import DEFAULT_THRESHOLD, MAX_OVERLAP, MIN_THRESHOLD
+from rlacd.options.fields import flag, integer, number, one_of, read
 
 __all__ = ["Mesh", "run_coacd", "set_log_level"]
 

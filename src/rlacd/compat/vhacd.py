@@ -14,7 +14,7 @@ import numpy.typing as npt
 from rlacd.compat.unused import warn_unused
 from rlacd.decompose_mesh import decompose
 from rlacd.errors import MeshDataError
-from rlacd.fields import flag, integer, number, read
+from rlacd.options.fields import flag, integer, number, read
 
 __all__ = ["compute_vhacd"]
 

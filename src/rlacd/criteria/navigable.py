@@ -28,13 +28,13 @@ from rlacd import _native
 from rlacd.criteria.criterion import CriterionSummary
 from rlacd.criteria.screen import Part, Screen
 from rlacd.errors import OptionError
+from rlacd.options.navigable import Point, SpaceOptions
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.balls import Balls
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.products import dots, heights
 from rlacd.solid.solid import Solid
-from rlacd.space_options import Point, SpaceOptions
 
 MOST_CELLS = 256
 """Maximum number of grid cells along the longest side: for radii that need more, the balls are spaced more widely."""

@@ -19,7 +19,7 @@ from rlacd.finish.simple import simple_part
 from rlacd.finish.take_in import take_in
 from rlacd.merge import drop_slivers
 from rlacd.options import SIMPLE
-from rlacd.primitive_kinds import PrimitiveKind
+from rlacd.options.names import PrimitiveKind
 from rlacd.run import Run
 from rlacd.solid.balls import Balls
 from rlacd.solid.component import Part

@@ -10,7 +10,7 @@ import numpy as np
 
 from rlacd import _native
 from rlacd.criteria import Criterion
-from rlacd.primitive_kinds import PRIMITIVE_KINDS, PrimitiveKind
+from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import LOST, Component, Part
 from rlacd.solid.hull import Hull

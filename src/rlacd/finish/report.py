@@ -16,8 +16,8 @@ from rlacd.criteria import Criterion
 from rlacd.finish.overlap import Seams
 from rlacd.merge.slivers import is_sliver
 from rlacd.options import Options
-from rlacd.presets import Preset, find_preset
-from rlacd.primitive_kinds import PRIMITIVE_KINDS
+from rlacd.options.names import PRIMITIVE_KINDS
+from rlacd.options.presets import Preset, find_preset
 from rlacd.run import Run
 from rlacd.solid.component import Component, Part, concatenated
 from rlacd.solid.distance import Interval, Place, hull_distances

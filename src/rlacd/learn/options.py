@@ -17,12 +17,83 @@ from types import MappingProxyType
 from typing import Any
 
 from rlacd.errors import OptionError
-from rlacd.fields import check_fields, option, refuse_unknown
+from rlacd.options.fields import check_fields, option, refuse_unknown, stated
 
 
+@stated()
 @dataclass(frozen=True)
 class TrainOptions:
     """All options that affect the outcome of a training run; defaults are the paper's where it states a value.
+
+    Attributes
+    ----------
+    threshold
+        Concavity at which a component is finished (paper, 4.1: 4 %).
+    volume_reward
+        Weight of the reward for hull volume saved, lambda 1 (4.1).
+    volume_of
+        What that volume is relative to: the hull of the whole solid (paper, eq. 2), or the component's own.
+    finish_reward
+        Weight of the reward for finishing, lambda 2 (4.1).
+    finish_counts
+        What has to be finished for that reward: the whole solid (paper, eq. 3), or the component's own two sides.
+    cut_cost
+        Reward every cut costs (the paper: none).
+    max_parts
+        Components after which an episode is broken off.
+    rotate
+        Turn each solid about a random axis by 0, 45, 90 or 180 degrees (4.3).
+    max_faces
+        Leave out meshes with more triangles than this.
+    encoder
+        What describes a component: the volumes on both sides of each plane, or the paper's pre-trained I2P-MAE.
+    encoder_weights
+        The file of i2p-mae's weights: the published checkpoint.
+    points
+        i2p-mae: points on a component's surface and on its hull (4.1).
+    iterations
+        Cuts made, each followed by learning (4.1).
+    warmup
+        First cuts, made at random without learning (4.1).
+    epsilon
+        Share of random cuts after them (4.1).
+    epsilon_decay
+        Factor on it every 1000 cuts (4.1).
+    replay
+        Transitions kept (4.1).
+    batch
+        Transitions a gradient step.
+    learn_every
+        Cuts between gradient steps.
+    learning_rate
+        Of Adam.
+    target_every
+        Gradient steps between copies to the target network.
+    temperature
+        Of the soft value, in rewards; 0: the greatest value (eq. 7).
+    discount
+        What the values of the sides are weighted by: their share of the hull volume (eq. 9), or a constant.
+    static_discount
+        That constant, for each side.
+    returns
+        What the network learns from: a cut's reward and the values of its sides (eq. 8), or the rewards of the rest of
+        the episode.
+    seed
+        The same seed, meshes and options give the same weights on CPU.
+    environments
+        Episodes played side by side; each begins once the one this many before it has been learned from.
+    threads
+        Threads of the training process.
+    device
+        cpu, cuda, or auto: a GPU when there is one.
+    log_every
+        Cuts between points of the curves.
+    validate_every
+        Cuts between validations.
+    validation
+        Meshes held out for validation; 0: validate with those learned from.
+    checkpoint_seconds
+        Seconds between checkpoints.
 
     Raises
     ------
@@ -31,73 +102,45 @@ class TrainOptions:
     """
 
     # The decision process (3.1)
-    threshold: float = option(
-        0.04, "Concavity at which a component is finished (paper, 4.1: 4 %).", least=0.001, most=1
-    )
-    volume_reward: float = option(1000.0, "Weight of the reward for hull volume saved, lambda 1 (4.1).", least=0)
-    volume_of: str = option(
-        "solid",
-        "What that volume is relative to: the hull of the whole solid (paper, eq. 2), or the component's own.",
-        one_of=("solid", "component"),
-    )
-    finish_reward: float = option(1000.0, "Weight of the reward for finishing, lambda 2 (4.1).", least=0)
-    finish_counts: str = option(
-        "solid",
-        "What has to be finished for that reward: the whole solid (paper, eq. 3), or the component's own two sides.",
-        one_of=("solid", "component"),
-    )
-    cut_cost: float = option(0.0, "Reward every cut costs (the paper: none).", least=0)
-    max_parts: int = option(512, "Components after which an episode is broken off.", least=2)
-    rotate: bool = option(True, "Turn each solid about a random axis by 0, 45, 90 or 180 degrees (4.3).")
-    max_faces: int = option(2000, "Leave out meshes with more triangles than this.", least=4)
+    threshold: float = option(0.04, least=0.001, most=1)
+    volume_reward: float = option(1000.0, least=0)
+    volume_of: str = option("solid", one_of=("solid", "component"))
+    finish_reward: float = option(1000.0, least=0)
+    finish_counts: str = option("solid", one_of=("solid", "component"))
+    cut_cost: float = option(0.0, least=0)
+    max_parts: int = option(512, least=2)
+    rotate: bool = option(True)
+    max_faces: int = option(2000, least=4)
 
     # What the network sees (3.3)
-    encoder: str = option(
-        "sweep",
-        "What describes a component: the volumes on both sides of each plane, or the paper's pre-trained I2P-MAE.",
-        one_of=("sweep", "sweep-without-hull", "i2p-mae"),
-    )
-    encoder_weights: str = option("", "The file of i2p-mae's weights: the published checkpoint.")
-    points: int = option(2048, "i2p-mae: points on a component's surface and on its hull (4.1).", least=16, most=65536)
+    encoder: str = option("sweep", one_of=("sweep", "sweep-without-hull", "i2p-mae"))
+    encoder_weights: str = option("")
+    points: int = option(2048, least=16, most=65536)
 
     # Q-learning (3.5, 4.1)
-    iterations: int = option(1_000_000, "Cuts made, each followed by learning (4.1).", least=1)
-    warmup: int = option(10_000, "First cuts, made at random without learning (4.1).", least=0)
-    epsilon: float = option(0.2, "Share of random cuts after them (4.1).", least=0, most=1)
-    epsilon_decay: float = option(0.99, "Factor on it every 1000 cuts (4.1).", least=0, most=1)
-    replay: int = option(100_000, "Transitions kept (4.1).", least=1)
-    batch: int = option(256, "Transitions a gradient step.", least=1)
-    learn_every: int = option(1, "Cuts between gradient steps.", least=1)
-    learning_rate: float = option(1e-4, "Of Adam.", least=0)
-    target_every: int = option(1000, "Gradient steps between copies to the target network.", least=1)
-    temperature: float = option(0.0, "Of the soft value, in rewards; 0: the greatest value (eq. 7).", least=0, most=0.1)
-    discount: str = option(
-        "hull",
-        "What the values of the sides are weighted by: their share of the hull volume (eq. 9), or a constant.",
-        one_of=("hull", "static"),
-    )
-    static_discount: float = option(0.99, "That constant, for each side.", least=0, most=1)
-    returns: str = option(
-        "one-step",
-        "What the network learns from: a cut's reward and the values of its sides (eq. 8), or the rewards of the rest "
-        "of the episode.",
-        one_of=("one-step", "episode"),
-    )
+    iterations: int = option(1_000_000, least=1)
+    warmup: int = option(10_000, least=0)
+    epsilon: float = option(0.2, least=0, most=1)
+    epsilon_decay: float = option(0.99, least=0, most=1)
+    replay: int = option(100_000, least=1)
+    batch: int = option(256, least=1)
+    learn_every: int = option(1, least=1)
+    learning_rate: float = option(1e-4, least=0)
+    target_every: int = option(1000, least=1)
+    temperature: float = option(0.0, least=0, most=0.1)
+    discount: str = option("hull", one_of=("hull", "static"))
+    static_discount: float = option(0.99, least=0, most=1)
+    returns: str = option("one-step", one_of=("one-step", "episode"))
 
     # The run
-    seed: int = option(0, "The same seed, meshes and options give the same weights on CPU.", least=0, most=2**63 - 1)
-    environments: int = option(
-        4,
-        "Episodes played side by side; each begins once the one this many before it has been learned from.",
-        least=1,
-        most=4096,
-    )
-    threads: int = option(1, "Threads of the training process.", least=1, most=1024)
-    device: str = option("auto", "cpu, cuda, or auto: a GPU when there is one.", one_of=("auto", "cpu", "cuda"))
-    log_every: int = option(500, "Cuts between points of the curves.", least=1)
-    validate_every: int = option(10_000, "Cuts between validations.", least=1)
-    validation: int = option(16, "Meshes held out for validation; 0: validate with those learned from.", least=0)
-    checkpoint_seconds: float = option(300.0, "Seconds between checkpoints.", least=0)
+    seed: int = option(0, least=0, most=2**63 - 1)
+    environments: int = option(4, least=1, most=4096)
+    threads: int = option(1, least=1, most=1024)
+    device: str = option("auto", one_of=("auto", "cpu", "cuda"))
+    log_every: int = option(500, least=1)
+    validate_every: int = option(10_000, least=1)
+    validation: int = option(16, least=0)
+    checkpoint_seconds: float = option(300.0, least=0)
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -20,7 +20,6 @@ import torch
 
 from rlacd.criteria import Concavity
 from rlacd.errors import OptionError, TrainingError
-from rlacd.fields import require_same
 from rlacd.learn.checkpoint import (
     adam_state,
     load_checkpoint,
@@ -39,6 +38,7 @@ from rlacd.learn.parts import count_parts, mean_ratio
 from rlacd.learn.q_network import QNetwork, bellman_loss, dual_state_target, policy_of, soft_value
 from rlacd.learn.replay import Replay, Seen, Transition
 from rlacd.learn.rollouts import Acting, Rollouts
+from rlacd.options.fields import require_same
 from rlacd.policies import make_policy
 from rlacd.policies.qpolicy import KIND, SHORTLIST
 from rlacd.policies.shortlist import RandomShortlist

@@ -1,5 +1,6 @@
 """Policies: which plane cuts a component."""
 
+from rlacd.options.names import AS_PUBLISHED, CONTROLS, EDGES, POLICIES, WEIGHTS_ENDING, is_policy
 from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies.greedy import SCORES, Greedy
 from rlacd.policies.learned import Learned
@@ -7,7 +8,6 @@ from rlacd.policies.navacd import CONCAVE_EDGES, NavACD
 from rlacd.policies.policy import CheckedPolicy, Policy
 from rlacd.policies.qpolicy import deployed
 from rlacd.policies.shortlist import RandomShortlist
-from rlacd.policy_names import AS_PUBLISHED, CONTROLS, EDGES, POLICIES, WEIGHTS_ENDING, is_policy
 
 
 def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: float | None = None) -> Policy:

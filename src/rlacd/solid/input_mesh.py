@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rlacd.output_options import Axis
+from rlacd.options.output import Axis
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.topology import IntArray
 

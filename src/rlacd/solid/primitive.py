@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from rlacd.primitive_kinds import PrimitiveKind
+from rlacd.options.names import PrimitiveKind
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import Frame
 

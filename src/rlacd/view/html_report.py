@@ -9,8 +9,8 @@ from typing import Any
 
 from rlacd._version import __version__
 from rlacd.errors import MissingExtraError, OptionError
-from rlacd.fields import path_like, read, shown
 from rlacd.io.write import check_file, write_file
+from rlacd.options.fields import path_like, read, shown
 from rlacd.result import Result
 from rlacd.view.heat import heat_map
 from rlacd.view.page import still_page

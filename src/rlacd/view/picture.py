@@ -13,10 +13,10 @@ import numpy.typing as npt
 
 from rlacd._native import PointTree
 from rlacd.errors import OptionError
-from rlacd.fields import checked, integer, path_like, read, shown
 from rlacd.io.write import check_file, write_file
 from rlacd.io.write.palette import linear_from_srgb
-from rlacd.output_options import OutputOptions
+from rlacd.options.fields import checked, integer, path_like, read, shown
+from rlacd.options.output import OutputOptions
 from rlacd.result import Result
 from rlacd.solid.balls import Balls
 from rlacd.told_apart import told_apart

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rlacd.io.write import file_stem
+from rlacd.options import CONCAVITY, CRITERIA
 
 ENDING = ".glb"
 
@@ -29,18 +30,13 @@ def as_command(mesh: str | os.PathLike[str], given: dict[str, Any], usual: Any) 
     str
         One line, quoted for a POSIX shell.
     """
-    lengths = {"navigable": ("radius", "tolerance"), "volume": ("volume_tolerance",)}
-    of_criterion = lengths.get(str(given.get("criterion")), ("threshold",))
+    own = CRITERIA.get(str(given.get("criterion")), CRITERIA[CONCAVITY])
+    others = {number for numbers in CRITERIA.values() for number in numbers} - {*own}
     words = ["rlacd", "decompose", os.fspath(mesh)]
     for field in dataclasses.fields(usual):
         value = given.get(field.name)
-        if field.name in ("threshold", "radius", "tolerance", "volume_tolerance") and field.name not in of_criterion:
-            continue
-        if value is not None and value != getattr(usual, field.name):
-            words += [
-                f"--{field.name.removeprefix('volume_').replace('_', '-')}",
-                _word(value),
-            ]
+        if field.name not in others and value is not None and value != getattr(usual, field.name):
+            words += [f"--{field.name.removeprefix('volume_').replace('_', '-')}", _word(value)]
     return shlex.join([*words, "-o", f"{file_stem(Path(mesh).stem)}_hulls{ENDING}"])
 
 

@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from rlacd.criteria import NavigableSpace
-from rlacd.errors import OptionError
-from rlacd.options import CONCAVITY, QUALITIES, VOLUME, Options
-from rlacd.primitive_kinds import PrimitiveKind
+from rlacd.options import CONCAVITY, CRITERIA, FAST, Options, criterion_named
+from rlacd.options.names import PrimitiveKind
+from rlacd.options.navigable import NAVIGABLE
 from rlacd.solid.input_mesh import InputMesh
 
-NAVIGABLE = "navigable"
-FAST = QUALITIES[0]
 _DEFAULTS, _SPACE = Options(), NavigableSpace()
+_NUMBERS = {"criterion", *(number for numbers in CRITERIA.values() for number in numbers)}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,7 +26,7 @@ class ViewerControls:
     radius: float = _SPACE.radius or 0.0
     tolerance: float = _SPACE.tolerance or 0.0
     volume_tolerance: float = _DEFAULTS.volume_tolerance
-    quality: str = _DEFAULTS.quality or QUALITIES[0]
+    quality: str = _DEFAULTS.quality or FAST
     primitives: bool | Sequence[PrimitiveKind] = False
     overlap: float = _DEFAULTS.overlap
     open: str = _DEFAULTS.open
@@ -43,23 +42,10 @@ class ViewerControls:
         OptionError
             A value is out of range.
         """
-        if self.criterion not in (CONCAVITY, VOLUME, NAVIGABLE):
-            raise OptionError(f"criterion is {self.criterion!r}; it has to be {CONCAVITY}, {VOLUME} or {NAVIGABLE}.")
-        goal: dict[str, Any] = {"threshold": self.threshold}
-        if self.criterion == VOLUME:
-            goal = {"criterion": VOLUME, "volume_tolerance": self.volume_tolerance}
-        if self.criterion == NAVIGABLE:
-            goal = {"criterion": NavigableSpace(radius=self.radius, tolerance=self.tolerance)}
-        options = {
-            **goal,
-            "quality": self.quality,
-            "primitives": self.primitives,
-            "overlap": self.overlap,
-            "open": self.open,
-            "max_hulls": self.max_hulls,
-            "max_vertices": self.max_vertices,
-            "preset": self.preset,
-        }
+        name = criterion_named(self.criterion)
+        goal = {number: getattr(self, number) for number in CRITERIA[name]}
+        criterion = {"criterion": NavigableSpace(**goal)} if name == NAVIGABLE else {"criterion": name, **goal}
+        options = {key: value for key, value in vars(self).items() if key not in _NUMBERS} | criterion
         Options(**options)
         return options
 

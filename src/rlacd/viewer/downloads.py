@@ -14,7 +14,7 @@ from rlacd.errors import MissingExtraError, OptionError
 from rlacd.io.write import FORMATS, MODELS, file_stem
 from rlacd.io.write.target import WITH_MESHES
 from rlacd.io.write.usd import require_usd
-from rlacd.output_options import Axis
+from rlacd.options.output import Axis
 from rlacd.plain_json import to_json
 from rlacd.view.html_report import report_page
 

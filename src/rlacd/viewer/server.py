@@ -38,8 +38,8 @@ from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError, RlacdError
 from rlacd.io.read.load import FORMATS as READ
 from rlacd.io.write import MODELS
+from rlacd.options.presets import PRESETS
 from rlacd.plain_json import to_json
-from rlacd.presets import PRESETS
 from rlacd.view.heat import heat_map
 from rlacd.view.page import live_page, module
 from rlacd.view.picture import check_up

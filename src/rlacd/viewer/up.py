@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rlacd.output_options import Axis
+from rlacd.options.output import Axis
 from rlacd.solid.input_mesh import InputMesh
 
 SAY_NOTHING = (".obj", ".stl", ".ply", ".off", ".xyz")

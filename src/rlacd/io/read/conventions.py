@@ -7,7 +7,7 @@ from typing import Any
 
 from rlacd.io.read.usd import METRES as STATED_METRES
 from rlacd.io.read.usd import UP, USD
-from rlacd.output_options import Axis
+from rlacd.options.output import Axis
 
 HEAD = 1 << 16
 """Bytes of a COLLADA file in which they are looked for: ``<asset>`` comes first."""

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError, MeshFileError, OptionError, OutputError
-from rlacd.fields import checked, path_like, read, shown
 from rlacd.io.read.load import load_mesh
 from rlacd.io.read.open_file import read_file
 from rlacd.io.robots.collada import collada_unit
@@ -28,7 +27,8 @@ from rlacd.io.write import check_file, check_name, file_stem, write_file
 from rlacd.io.write.encode import encode_plain_obj
 from rlacd.io.write.folder import check_names, write_folder
 from rlacd.options import CONCAVITY, MAX_THRESHOLD
-from rlacd.output_options import OutputOptions
+from rlacd.options.fields import checked, path_like, read, shown
+from rlacd.options.output import OutputOptions
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 

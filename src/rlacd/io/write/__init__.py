@@ -33,8 +33,8 @@ from rlacd.io.write.sdf import encode_sdf
 from rlacd.io.write.target import FORMATS, MODELS, WITH_MESHES, Target, check_file, check_name, hull_target, mesh_folder
 from rlacd.io.write.urdf import encode_urdf
 from rlacd.io.write.usd import encode_usd
-from rlacd.output_options import DENSITY, Axis
-from rlacd.primitive_kinds import PRIMITIVE_KINDS, PrimitiveKind
+from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
+from rlacd.options.output import DENSITY, Axis
 from rlacd.result import Result
 
 __all__ = [

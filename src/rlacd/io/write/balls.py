@@ -9,9 +9,9 @@ import numpy as np
 import trimesh
 
 from rlacd.errors import OptionError
-from rlacd.fields import path_like, read, shown
 from rlacd.io.write.atomic import write_file
 from rlacd.io.write.target import check_file
+from rlacd.options.fields import path_like, read, shown
 from rlacd.solid.balls import Balls
 
 COLOR = (86, 156, 214, 90)  # translucent, so that the hulls show through

@@ -12,12 +12,12 @@ import numpy as np
 import trimesh
 
 from rlacd.errors import OutputError
-from rlacd.fields import about, checked, read
 from rlacd.io.read.conventions import UNITS
 from rlacd.io.write.encode import encode_obj, encode_plain_obj, hull_name
 from rlacd.io.write.single_precision import placed_hull, placed_mesh
-from rlacd.output_options import DENSITY, OutputOptions
-from rlacd.primitive_kinds import PrimitiveKind
+from rlacd.options.fields import about, checked, read
+from rlacd.options.names import PrimitiveKind
+from rlacd.options.output import DENSITY, OutputOptions
 from rlacd.result import Result
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import Frame

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rlacd.errors import OptionError, OutputError
-from rlacd.fields import checked, flag, path_like, read, shown
 from rlacd.io.write.atomic import output_errors
 from rlacd.io.write.usd import require_usd
-from rlacd.output_options import OutputOptions
+from rlacd.options.fields import checked, flag, path_like, read, shown
+from rlacd.options.output import OutputOptions
 
 FORMATS = ("glb", "obj", "ply", "stl")
 """Formats of hulls only; also those of the files in a folder."""

@@ -1,11 +1,19 @@
-"""Names of the policies that choose cuts; `rlacd.policies.make_policy` builds them."""
+"""Names that options take: of the policies that choose cuts, and of the primitives that a part may become."""
 
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import Any, Literal, get_args
+
+from rlacd.options.fields import one_of
+
+PrimitiveKind = Literal["sphere", "capsule", "box", "cylinder"]
+
+PRIMITIVE_KINDS: tuple[PrimitiveKind, ...] = get_args(PrimitiveKind)
+"""Simplest first: in this order engines collide them fastest."""
 
 EDGES = "+edges"
+"""Ends the name of a policy that also cuts at concave edges."""
 
 SCORES = ("hull-sum", "max-excess", "excess-norm")
 """What a greedy policy may order planes by."""
@@ -57,3 +65,21 @@ def _can_be_a_path(name: str) -> bool:
         return b"\0" not in os.fsencode(name)
     except UnicodeError:
         return False
+
+
+def read_primitives(given: Any) -> tuple[PrimitiveKind, ...]:
+    """Read True or ``"all"``, a list of names, or a string of names with commas between them.
+
+    Raises
+    ------
+    TypeError, ValueError
+        It is none of these.
+    """
+    if isinstance(given, str):
+        given = given == "all" or [word.strip() for word in given.split(",")]
+    if isinstance(given, bool):
+        return PRIMITIVE_KINDS if given else ()
+    if not isinstance(given, (list, tuple)):
+        raise TypeError
+    names = {one_of(PRIMITIVE_KINDS).read(word) for word in given}
+    return tuple(kind for kind in PRIMITIVE_KINDS if kind in names)

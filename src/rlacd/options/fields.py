@@ -1,18 +1,18 @@
-"""Options stated once: a dataclass whose fields carry their type, range, help and place on the command line.
+"""Options stated once: a dataclass whose fields carry their type, range and place on the command line.
 
-Checking what was given, the command line, its help and the table of the README are all made from these fields. Nothing
-here imports a library, so that ``--help`` does not wait for one.
+Its docstring says what each means: ``stated`` reads the help from the section ``Attributes``.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import math
 import numbers
 import os
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, get_args
 
 from rlacd.errors import OptionError
 
@@ -21,6 +21,8 @@ LARGEST_INTEGER = 2**63 - 1
 
 LONGEST_SHOWN = 80
 """Characters of a value that a message shows."""
+
+Stated = TypeVar("Stated")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -59,48 +61,43 @@ def number(
     """A finite number from `least` to `most` that is larger than `above`."""
 
     def read(value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, numbers.Real):
-            raise TypeError
-        plain = float(value)
-        if not (math.isfinite(plain) and least <= plain <= most and plain > above):
+        plain: float = _within(value, numbers.Real, float, least, most)
+        if plain <= above:
             raise ValueError
         return plain
 
-    rule = rule or _interval("a number", "a positive number" if above == 0 else None, least, most)
-    return Kind(rule, "> 0" if above == 0 else _interval("", None, least, most), read, typed)
+    said, values = ("a positive number", "> 0") if above == 0 else _interval("a number", least, most)
+    return Kind(rule or said, values, read, typed)
 
 
 def integer(least: int | None = None, most: int | None = None, *, rule: str | None = None) -> Kind:
     """A whole number from `least` to `most`."""
     low, high = -math.inf if least is None else least, LARGEST_INTEGER if most is None else most
-
-    def read(value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, numbers.Integral):
-            raise TypeError
-        plain = int(value)
-        if not low <= plain <= high:
-            raise ValueError
-        return plain
-
-    greatest = math.inf if most is None else most
-    return Kind(rule or _interval("an integer", None, low, greatest), _interval("", None, low, greatest), read, int)
+    said, values = _interval("an integer", low, math.inf if most is None else most)
+    return Kind(rule or said, values, lambda value: _within(value, numbers.Integral, int, low, high), int)
 
 
-def _interval(what: str, positive: str | None, least: float, most: float) -> str:
-    if positive is not None:
-        return positive
+def _within(value: Any, taken: type, plain_type: type, least: float, most: float) -> Any:
+    if isinstance(value, bool) or not isinstance(value, taken):
+        raise TypeError
+    plain = plain_type(value)
+    if not (least <= plain <= most and math.isfinite(plain)):
+        raise ValueError
+    return plain
+
+
+def _interval(what: str, least: float, most: float) -> tuple[str, str]:
+    """Say in a sentence and in a table what is taken."""
     low, high = (_plain(bound) for bound in (least, most))
-    if math.isinf(least) and math.isinf(most):
-        return what
     if math.isinf(most):
-        return f"{what}, at least {low}" if what else f"≥ {low}"
+        return (what, "") if math.isinf(least) else (f"{what}, at least {low}", f"≥ {low}")
     if math.isinf(least):
-        return f"{what}, at most {high}" if what else f"≤ {high}"
-    return f"{what} between {low} and {high}" if what else f"{low} to {high}"
+        return f"{what}, at most {high}", f"≤ {high}"
+    return f"{what} between {low} and {high}", f"{low} to {high}"
 
 
 def _plain(bound: float) -> str:
-    return "2**63 - 1" if bound == 2**63 - 1 else str(bound) if isinstance(bound, int) else f"{bound:g}"
+    return "2**63 - 1" if bound == LARGEST_INTEGER else str(bound) if isinstance(bound, int) else f"{bound:g}"
 
 
 def flag() -> Kind:
@@ -118,34 +115,26 @@ def flag() -> Kind:
 NUMPY_BOOLS = {("numpy", "bool"), ("numpy", "bool_")}
 
 
-def one_of(names: tuple[str, ...], *, rule: str | None = None) -> Kind:
-    """One of some words."""
+def one_of(names: Any, *, rule: str | None = None) -> Kind:
+    """One of some words: a tuple of them, or their ``Literal`` type."""
+    words: tuple[str, ...] = get_args(names) or tuple(names)
+    return custom(rule or f"one of {', '.join(words)}", lambda given: words[words.index(_text(given))], " ".join(words))
+
+
+def text(rule: str = "a string", *, least: int = 0) -> Kind:
+    """A string of at least this many characters."""
 
     def read(value: Any) -> str:
-        return names[names.index(_text(value))]
-
-    return Kind(rule or f"one of {', '.join(names)}", " ".join(names), read, str, textual=True)
-
-
-def text(rule: str = "a string", values: str = "", accepts: Callable[[str], bool] = bool) -> Kind:
-    """A string that `accepts` says yes to; by default any that is not empty."""
-
-    def read(value: Any) -> str:
-        plain = _text(value)
-        if not accepts(plain):
+        if len(plain := _text(value)) < least:
             raise ValueError
         return plain
 
-    return Kind(rule, values, read, str, textual=True)
+    return custom(rule, read)
 
 
 def path_like(rule: str = "a path") -> Kind:
     """Where a file is."""
-
-    def read(value: Any) -> str:
-        return _text(os.fspath(value))
-
-    return Kind(rule, "", read, Path, textual=True)
+    return custom(rule, lambda value: _text(os.fspath(value)), typed=Path)
 
 
 def custom(rule: str, read: Callable[[Any], Any], values: str = "", *, typed: type = str) -> Kind:
@@ -159,24 +148,24 @@ def _text(value: Any) -> str:
     return str.__str__(value)
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass
 class About:
     """What is known of an option beside its name, type and default.
 
     Attributes
     ----------
-    help
-        One or two sentences, for the command line and the table.
     kind
         The values it takes.
     optional
         Whether None, its default, is one of them.
+    flags
+        Its names on the command line.
+    help
+        One or two sentences, for the command line and the table.
     usual
-        The default in words, where None or the plain value does not tell.
+        The default in words.
     panel
         The heading it stands under in the command's help.
-    flags
-        Its names on the command line, where they are not ``--`` and its own; none for an option of Python alone.
     metavar
         The word for its value in the help.
     python
@@ -185,52 +174,94 @@ class About:
         Whether the command line takes it several times.
     """
 
-    help: str
     kind: Kind
-    optional: bool = False
-    usual: str | None = None
+    optional: bool
+    flags: tuple[str, ...] = ()
+    help: str = ""
+    usual: str = ""
     panel: str | None = None
-    flags: tuple[str, ...] | None = None
     metavar: str | None = None
     python: str | None = None
     repeated: bool = False
 
 
-def option(default: Any, help: str, kind: Kind | None = None, *, keyword: bool = False, **about: Any) -> Any:
+def option(
+    default: Any, panel: str | None = None, kind: Kind | None = None, *, keyword: bool = False, **about: Any
+) -> Any:
     """Declare a field with what is known of it.
 
     Parameters
     ----------
     default
         With None, the option may be left out.
-    help : str
+    panel : str, optional
+        The heading it stands under in the command's help.
     kind : Kind, optional
         Told by the default where it is left out, within the bounds ``least`` and ``most`` or the words ``one_of``.
     keyword : bool
         Whether it is given by its name only.
     **about
-        Fields of `About`.
+        Fields of `About`, where they are not what its name and default tell.
     """
     bounds = {name: about.pop(name) for name in ("least", "most", "one_of") if name in about}
-    if kind is None:
-        kind = _kind_of(default, **bounds)
-    known = About(help, kind, optional=default is None, **about)
+    if "one_of" in bounds:
+        about.setdefault("metavar", "|".join(get_args(bounds["one_of"]) or bounds["one_of"]))
+    words = str(default).lower() if isinstance(default, bool) else str(default) or "none"
+    about.setdefault("usual", "" if default is None else words)
+    known = About(kind or _kind_of(default, **bounds), default is None, panel=panel, **about)
     return dataclasses.field(default=default, kw_only=keyword, metadata={"option": known})
 
 
 def _kind_of(default: Any, least: float | None = None, most: float | None = None, one_of: Any = ()) -> Kind:
     if one_of:
-        return _one_of(tuple(one_of))
+        return _one_of(one_of)
     if isinstance(default, bool):
         return flag()
-    if isinstance(default, int):
-        return integer(None if least is None else int(least), None if most is None else int(most))
     if isinstance(default, float):
         return number(-math.inf if least is None else least, math.inf if most is None else most)
-    return text(accepts=lambda value: True)
+    if isinstance(default, int) or least is not None:
+        return integer(None if least is None else int(least), None if most is None else int(most))
+    return text()
 
 
 _one_of = one_of
+
+
+def stated(panel: str | None = None, python: str = "{}") -> Callable[[type[Stated]], type[Stated]]:
+    """Complete the fields of a dataclass by their names and by the section ``Attributes`` of its docstring.
+
+    Parameters
+    ----------
+    panel : str, optional
+        Heading of the options that state none.
+    python : str
+        How Python gives an option, with ``{}`` for its name.
+    """
+
+    def completed(options: type[Stated]) -> type[Stated]:
+        meanings = _meanings(options.__doc__)
+        for field in dataclasses.fields(options):  # type: ignore[arg-type]
+            known: About = field.metadata["option"]
+            word = field.name.replace("_", "-")
+            known.help = meanings.get(field.name, "")
+            known.flags = known.flags or (f"--{word}/--no-{word}" if field.default is True else f"--{word}",)
+            known.panel = known.panel or panel
+            known.python = python.format(field.name) if known.python is None else known.python
+        return options
+
+    return completed
+
+
+def _meanings(docstring: str | None) -> dict[str, str]:
+    """Read the section ``Attributes``; nothing where Python leaves docstrings out (``-OO``)."""
+    section = inspect.cleandoc(docstring or "").partition("Attributes\n----------\n")[2].partition("\n\n")[0]
+    lines: dict[str, list[str]] = {}
+    for line in section.splitlines():
+        if not line.startswith(" "):
+            lines[name := line] = []
+        else:
+            lines[name].append(line.strip())
+    return {name: " ".join(words) for name, words in lines.items()}
 
 
 def about(options: Any, name: str) -> About:

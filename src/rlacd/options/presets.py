@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from rlacd.fields import one_of, read
+from rlacd.options.fields import one_of, read
 
 PresetName = Literal["mujoco", "physx", "physx-gpu", "unity", "unreal", "newton", "bullet", "godot"]
 

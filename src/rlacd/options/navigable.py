@@ -8,14 +8,12 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from rlacd.errors import OptionError
-from rlacd.fields import check_fields, custom, number, option
+from rlacd.options.fields import check_fields, custom, number, option, stated
 
 Point: TypeAlias = tuple[float, float, float]
 
 NAVIGABLE = "navigable"
 """The criterion's name on the command line."""
-
-PANEL = "Navigable space (--criterion navigable)"
 
 LENGTHS = (1e-4, 10.0)
 """Shares of the longest side that radius and tolerance may be: less takes no end of balls, more fills everything."""
@@ -24,12 +22,7 @@ LARGEST = 1e100
 """Coordinates of seeds and planes: of larger ones, products would be infinite."""
 
 
-def _coordinate(value: Any) -> float:
-    """Take a number, of numpy's too; raise where it is none."""
-    return float(_COORDINATE.read(value))
-
-
-_COORDINATE = number(-LARGEST, LARGEST)
+_coordinate = number(-LARGEST, LARGEST).read
 
 
 def _rows(given: Any) -> Sequence[Any]:
@@ -63,13 +56,36 @@ def _planes(given: Any) -> tuple[tuple[Point, float], ...]:
     return tuple(planes)
 
 
-_LENGTH = "a positive length in the input's unit"
-_SHARE = "a share of the longest side between {:g} and {:g}".format(*LENGTHS)
+LENGTH = number(above=0, rule="a positive length in the input's unit")
+
+_SHARE = number(*LENGTHS, rule="a share of the longest side between {:g} and {:g}".format(*LENGTHS), typed=str)
+_SEEDS = custom("a list of at least one finite point [x, y, z]", _seeds)
+_PLANES = custom("a list of (normal, offset) pairs, every normal a finite vector [x, y, z] that is not zero", _planes)
 
 
+@stated(panel="Navigable space (--criterion navigable)", python="NavigableSpace({}=)")
 @dataclass(frozen=True)
 class SpaceOptions:
     """The options of `rlacd.NavigableSpace`, checked.
+
+    Attributes
+    ----------
+    radius
+        Radius of the ball, as a share of the longest side of the mesh.
+    tolerance
+        Space nearer to the surface than this may be filled; also a share of the longest side. With --criterion volume:
+        the share of volume that a hull may add, such as 1%.
+    reachable_only
+        Count only what a ball can reach from outside, or every room.
+    seeds
+        A point from which balls start, instead of from outside, in the mesh's own unit; may be repeated.
+    closed_planes
+        A plane that balls do not cross, such as the ground 0,0,1,0: they stay on the side to which the normal X,Y,Z
+        points; D is the plane's distance from the origin; may be repeated.
+    radius_abs
+        The same as --radius, as a length in the mesh's own unit.
+    tolerance_abs
+        The same as --tolerance, as a length in the mesh's own unit.
 
     Raises
     ------
@@ -77,73 +93,17 @@ class SpaceOptions:
         A value is of the wrong type or out of its range.
     """
 
-    radius: float | None = option(
-        0.025,
-        "Radius of the ball, as a share of the longest side of the mesh.",
-        number(*LENGTHS, rule=_SHARE, typed=str),
-        panel=PANEL,
-        metavar="NUMBER",
-        python="NavigableSpace(radius=)",
-    )
-    tolerance: float | None = option(
-        0.05,
-        "Space nearer to the surface than this may be filled; also a share of the longest side. With --criterion "
-        "volume: the share of volume that a hull may add, such as 1%.",
-        number(*LENGTHS, rule=_SHARE, typed=str),
-        panel=PANEL,
-        metavar="NUMBER",
-        python="NavigableSpace(tolerance=)",
-    )
-    reachable_only: bool = option(
-        True,
-        "Count only what a ball can reach from outside, or every room.",
-        keyword=True,
-        panel=PANEL,
-        flags=("--reachable-only/--everywhere",),
-        usual="reachable-only",
-        python="NavigableSpace(reachable_only=)",
-    )
+    radius: float | None = option(0.025, kind=_SHARE, metavar="NUMBER")
+    tolerance: float | None = option(0.05, kind=_SHARE, metavar="NUMBER")
+    reachable_only: bool = option(True, keyword=True, flags=("--reachable-only/--everywhere",), usual="reachable-only")
     seeds: tuple[Point, ...] | None = option(
-        None,
-        "A point from which balls start, instead of from outside, in the mesh's own unit; may be repeated.",
-        custom("a list of at least one finite point [x, y, z]", _seeds),
-        keyword=True,
-        panel=PANEL,
-        flags=("--seed-point",),
-        metavar="X,Y,Z",
-        repeated=True,
-        usual="outside",
-        python="NavigableSpace(seeds=)",
+        None, kind=_SEEDS, keyword=True, flags=("--seed-point",), metavar="X,Y,Z", repeated=True, usual="outside"
     )
     closed_planes: tuple[tuple[Point, float], ...] = option(
-        (),
-        "A plane that balls do not cross, such as the ground 0,0,1,0: they stay on the side to which the normal X,Y,Z "
-        "points; D is the plane's distance from the origin; may be repeated.",
-        custom("a list of (normal, offset) pairs, every normal a finite vector [x, y, z] that is not zero", _planes),
-        keyword=True,
-        panel=PANEL,
-        flags=("--closed-plane",),
-        metavar="X,Y,Z,D",
-        repeated=True,
-        usual="–",
-        python="NavigableSpace(closed_planes=)",
+        (), kind=_PLANES, keyword=True, flags=("--closed-plane",), metavar="X,Y,Z,D", repeated=True, usual="–"
     )
-    radius_abs: float | None = option(
-        None,
-        "The same as --radius, as a length in the mesh's own unit.",
-        number(above=0, rule=_LENGTH),
-        keyword=True,
-        panel=PANEL,
-        python="NavigableSpace(radius_abs=)",
-    )
-    tolerance_abs: float | None = option(
-        None,
-        "The same as --tolerance, as a length in the mesh's own unit.",
-        number(above=0, rule=_LENGTH),
-        keyword=True,
-        panel=PANEL,
-        python="NavigableSpace(tolerance_abs=)",
-    )
+    radius_abs: float | None = option(None, kind=LENGTH, keyword=True)
+    tolerance_abs: float | None = option(None, kind=LENGTH, keyword=True)
 
     def __post_init__(self) -> None:
         absolute = [name for name in ("radius", "tolerance") if getattr(self, f"{name}_abs") is not None]

@@ -1,0 +1,104 @@
+"""What the command line writes, and how: each option stated once. `rlacd.io.write` checks by them too."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from rlacd.options.fields import check_fields, custom, flag, number, one_of, option, path_like, stated, text
+
+Axis = Literal["x", "y", "z"]
+
+DENSITY = 1000.0
+"""Water's, where the unit is a metre."""
+
+
+def _folders(given: Any) -> list[str]:
+    if not isinstance(given, (list, tuple)) or not all(isinstance(word, str) for word in given):
+        raise TypeError
+    return list(given)
+
+
+_DENSITY = number(above=0, rule="a positive mass per cubic unit, such as 1000 for water")
+_MASS = number(above=0, rule="a positive mass")
+_FORMAT = text("the name of a format, such as obj", least=1)
+_PACKAGES = custom("a list of strings, NAME=FOLDER or FOLDER", _folders)
+_AXIS = one_of(Axis, rule="x, y or z")
+
+
+@stated(panel="Output", python=".save({}=)")
+@dataclass(frozen=True)
+class OutputOptions:
+    """Where the hulls go and what is written beside them.
+
+    Attributes
+    ----------
+    output
+        Where the hulls go: .glb, .obj, .ply or .stl for one file with a node, group or solid per hull; .xml (MJCF),
+        .urdf, .sdf, .usd, .usda or .usdc for a body with mass, visual mesh and hulls; an existing folder, or a name
+        ending in /, for one file per hull. An existing file is replaced.
+    file_format
+        The format of the files in a folder: obj, glb, ply or stl; or unreal or godot, for a .glb with the mesh and
+        hulls named for that engine.
+    density
+        Mass per cubic unit, for formats that hold masses.
+    mass
+        Mass of the whole body, instead of --density.
+    keep_input
+        In a .glb, the input's own scene with the hulls added under the nodes they belong to; always so with --format
+        unreal and godot.
+    scene
+        In .xml (MJCF), add a floor and a light and place the body just above the floor, ready for MuJoCo's viewer.
+    one_mesh
+        In a .urdf, one collision with all hulls as objects of its mesh, for Bullet.
+    package_dirs
+        Where a robot's package://NAME/ is; a FOLDER alone may be read and holds packages. May be repeated.
+    report
+        Write all measurements as JSON, or as an HTML page if the name ends in .html; - writes JSON to stdout, and
+        nothing else there.
+    picture
+        Draw the input beside its hulls, together and pulled apart. Needs the extra rlacd[view].
+    balls
+        Write the balls that no hull touches: .csv (x, y, z, radius) or .glb. Needs --criterion navigable.
+    up
+        The axis of the mesh that points up, for the picture and for MJCF, SDF and USD.
+    quiet
+        Print only warnings and errors.
+
+    Raises
+    ------
+    OptionError
+        A value is of the wrong type or out of its range.
+    """
+
+    output: str | None = option(
+        None,
+        flags=("--output", "-o"),
+        metavar="OUT",
+        usual="IN_hulls beside IN, .glb or what --preset says",
+        python=".save(path)",
+    )
+    file_format: str | None = option(None, kind=_FORMAT, flags=("--format",), metavar="EXT", usual="obj")
+    density: float | None = option(None, kind=_DENSITY, usual=f"{DENSITY:g}")
+    mass: float | None = option(None, kind=_MASS)
+    keep_input: bool | None = option(None, kind=flag())
+    scene: bool | None = option(None, kind=flag())
+    one_mesh: bool | None = option(None, kind=flag())
+    package_dirs: list[str] | None = option(
+        None,
+        kind=_PACKAGES,
+        flags=("--package-dir",),
+        metavar="NAME=FOLDER",
+        repeated=True,
+        python="rewrite_robot(package_dirs=)",
+    )
+    report: str | None = option(None, kind=path_like(), metavar="FILE", python=".report, .save_report(path)")
+    picture: str | None = option(None, kind=path_like(), metavar="FILE.png", python=".picture(path)")
+    balls: str | None = option(None, kind=path_like(), metavar="FILE", python=".save_balls(path)")
+    up: Axis | None = option(
+        None, kind=_AXIS, metavar="AXIS", usual="what the format or file says (y for glb and gltf), else z", python="up"
+    )
+    quiet: bool | None = option(None, kind=flag(), flags=("--quiet", "-q"), python="")
+
+    def __post_init__(self) -> None:
+        check_fields(self)
