@@ -15,7 +15,7 @@ from rlacd.errors import OptionError
 from rlacd.options.fields import check_fields, custom, integer, number, one_of, option, read, stated
 from rlacd.options.names import POLICIES, PRIMITIVE_KINDS, PrimitiveKind, policy_name, read_policy, read_primitives
 from rlacd.options.navigable import LENGTH, NAVIGABLE, SpaceOptions
-from rlacd.options.presets import PresetName, find_preset
+from rlacd.options.presets import PRESETS, PresetName, find_preset
 
 CONCAVITY: Literal["concavity"] = "concavity"
 """The default criterion's name."""
@@ -211,7 +211,7 @@ class Options:
     quality: QualityName | None = option(None, METHOD, one_of=QualityName, usual="balanced; fast with --no-merge")
     budget: float | None = option(None, METHOD, _SECONDS, usual="5 with --quality best", metavar="SECONDS")
     search_steps: int | None = option(None, METHOD, least=0)
-    preset: PresetName | None = option(None, LIMITS, one_of=PresetName, metavar="ENGINE")
+    preset: PresetName | None = option(None, LIMITS, one_of=tuple(PRESETS), metavar="ENGINE")
     per_node: bool = option(False, METHOD)
     relative_to: RelativeTo = option("scene", METHOD, one_of=RelativeTo)
     unit: UnitName | None = option(None, METHOD, one_of=UnitName, usual="coordinates stay as they are")
