@@ -246,11 +246,14 @@ def test_hulls_of_a_scene_in_memory_and_of_other_files_give_way(tmp_path: Path) 
         assert len(read.graph.nodes_geometry) == 2
 
 
-def test_hulls_in_an_obj_file_count_as_shapes(tmp_path: Path) -> None:
+def test_hulls_for_an_engine_in_an_obj_file_give_way(tmp_path: Path) -> None:
     scene = trimesh.Scene({"post": trimesh.creation.box((1, 1, 3)), "UCX_post_00": trimesh.creation.box((5, 5, 5))})
     (tmp_path / "post.obj").write_text(scene.export(file_type="obj"))
     result = rlacd.decompose(tmp_path / "post.obj", threads=1, quality="fast")
-    assert max(hull.extents.max() for hull in result) == pytest.approx(5.0)
+    assert max(hull.extents.max() for hull in result) == pytest.approx(3.0)
+    assert "1 of 2 nodes, hulls of an engine (UCX_post_00) were left out" in result.report["warnings"]
+    kept = trimesh.load_scene(result.save(tmp_path / "out.glb", keep_input=True), process=False)
+    assert kept.extents.max() == pytest.approx(3.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("how", [{"unit": "cm"}, {"scale": 0.01}])

@@ -502,3 +502,29 @@ def test_msh_of_mujoco_is_read_and_damage_in_it_refused(tmp_path):
         (tmp_path / "box.msh").write_bytes(content)
         with pytest.raises(MeshFileError, match=r"again|Gmsh"):
             load_mesh(tmp_path / "box.msh")
+
+
+@pytest.mark.parametrize("word", ["o", "g"])
+def test_objects_of_an_obj_are_nodes_or_else_its_groups(tmp_path, word):
+    """Quads, a concave face, indices from the end, and a name that comes again."""
+    text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+    text += f"{word} door\nf 1 2 3 4\n{word} frame left\nv 0 0 1\nv 2 0 1\nv 1 0.1 1\nv 1 2 1\nf -4 -3 -1 -2\n"
+    text += f"{word} door\nf 1 2 3\n"
+    path = tmp_path / "scene.obj"
+    path.write_text(text, encoding="utf-8")
+    mesh = load_mesh(path)
+    assert [node.name for node in mesh.nodes] == ["door", "frame left"]
+    corners = [mesh.vertices[mesh.faces[mesh.node_of == i]] for i in range(2)]
+    areas = [np.linalg.norm(np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]), axis=1).sum() / 2 for c in corners]
+    assert areas == pytest.approx([1.5, 1.05])
+    path.write_text(text.replace("frame left", "door"), encoding="utf-8")
+    assert len(load_mesh(path).nodes) == 1
+
+
+def test_the_model_of_a_3mf_file_may_have_any_name(box, tmp_path):
+    trimesh.Scene(box).export(tmp_path / "usual.3mf")
+    with zipfile.ZipFile(tmp_path / "usual.3mf") as usual, zipfile.ZipFile(tmp_path / "other.3mf", "w") as other:
+        for name in usual.namelist():
+            content = usual.read(name).replace(b"3D/3dmodel.model", b"parts/box.model")
+            other.writestr(name.replace("3D/3dmodel.model", "parts/box.model"), content)
+    np.testing.assert_allclose(triangles(load_mesh(tmp_path / "other.3mf")), triangles(box), atol=1e-5)

@@ -192,9 +192,7 @@ def decompose(
         with run.stage("load"):
             source = in_metres(load_mesh(mesh), options)
         apart = options.per_node and len(source.nodes) > 1
-        if options.per_node and not apart:
-            said = f"per_node had no effect: {source.name} was read as one node"
-            source = replace(source, warnings=(*source.warnings, said))
+        source = replace(source, warnings=(*source.warnings, *_without_effect(options, source, apart)))
         done = _each_node(source, options, run) if apart else _as_one(source, options, run)
     report = {
         "name": Path(source.name).stem if isinstance(mesh, (str, os.PathLike)) else "mesh",
@@ -206,6 +204,16 @@ def decompose(
     }
     surface = trimesh.Trimesh(source.vertices, source.faces, process=False)
     return Decomposition(done.hulls, report, surface, done.balls, source)
+
+
+def _without_effect(options: Options, source: InputMesh, apart: bool) -> list[str]:
+    """A sentence for each option that changes nothing for this input."""
+    said = []
+    if options.per_node and not apart:
+        said.append(f"per_node had no effect: {source.name} was read as one node")
+    if options.relative_to == "node" and not apart:
+        said.append("relative_to had no effect: nodes were not decomposed separately")
+    return said
 
 
 def _as_one(source: InputMesh, options: Options, run: Run) -> Finished:

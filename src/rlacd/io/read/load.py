@@ -27,11 +27,12 @@ from rlacd.io.read.gltf import Gltf, Triangles, read_gltf
 from rlacd.io.read.limits import MOST_TRIANGLES
 from rlacd.io.read.looks import has_looks
 from rlacd.io.read.msh import msh_as_ply
+from rlacd.io.read.obj import objects_of
 from rlacd.io.read.off import is_off, plain_off
 from rlacd.io.read.open_file import read_file
 from rlacd.io.read.text import check_text, declared_triangles, is_text, plain_obj, plain_ply, plain_stl, plain_text
 from rlacd.io.read.usd import USD, usd_scene
-from rlacd.io.read.xml import check_3mf, collada_of
+from rlacd.io.read.xml import collada_of, plain_3mf
 from rlacd.memory import BYTES_READ, require_memory
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.input_mesh import Asset, InputMesh, SourceNode
@@ -188,6 +189,8 @@ def _parsed(path: Path, content: bytes, extension: str, beside: FolderFiles) -> 
         return read_gltf(path, content, beside.get)
     if extension in USD:
         return usd_scene(path)
+    if extension == "obj" and (objects := objects_of(content)) is not None:
+        return objects
     return trimesh.load_scene(
         io.BytesIO(content),
         file_type=extension,
@@ -202,7 +205,7 @@ def _checked(path: Path, content: bytes, extension: str) -> tuple[bytes, str]:
     """Return the content to parse, in a form that is safe for the parser; raises MeshFileError."""
     match extension:
         case "3mf":
-            check_3mf(path, content)
+            return plain_3mf(path, content), extension
         case "dae" | "zae":
             return collada_of(path, content, extension), "dae"
         case "stl":

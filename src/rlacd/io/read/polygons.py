@@ -139,9 +139,11 @@ def obj_without_folds(content: bytes) -> bytes:
         return content
     text = content.replace(b"\r\n", b"\n").replace(b"\\\n", b" ")
     try:
-        points, lines, counts, corners = _obj_polygons(text)
+        points, lines, counts, corners = obj_faces(text)
     except (ValueError, OverflowError):
         return content
+    polygons = counts > 3
+    lines, corners, counts = lines[polygons], corners[np.repeat(polygons, counts)], counts[polygons]
     if not len(corners) or corners.min() < 0 or corners.max() >= len(points):
         return content
     kept, done = [], 0
@@ -154,8 +156,8 @@ def obj_without_folds(content: bytes) -> bytes:
     return b"".join([*kept, text[done:]]) if kept else content
 
 
-def _obj_polygons(text: bytes) -> tuple[FloatArray, IntArray, IntArray, IntArray]:
-    """All points; of the faces with more than three corners where their lines begin and end, the counts, the corners.
+def obj_faces(text: bytes) -> tuple[FloatArray, IntArray, IntArray, IntArray]:
+    """All points of an OBJ file; of each face where its line begins and ends, the number of corners, and the corners.
 
     Faces and points begin with their letter and a space. Raises ValueError where numbers are none, or the points have
     different numbers of them. Works on arrays of characters, without a loop over lines: most programs write quads, so
@@ -179,9 +181,7 @@ def _obj_polygons(text: bytes) -> tuple[FloatArray, IntArray, IntArray, IntArray
     if len(named) != counts.sum():
         raise ValueError("corners that are not numbers")
     corners = np.where(named > 0, named - 1, np.repeat(np.cumsum(vertex)[face], counts) + named)
-    polygons = counts > 3
-    lines = np.stack([begins[face], ends[face]], axis=1)
-    return points, lines[polygons], counts[polygons], corners[np.repeat(polygons, counts)]
+    return points, np.stack([begins[face], ends[face]], axis=1), counts, corners
 
 
 def _lines_of(letters: npt.NDArray[np.uint8], begins: IntArray, ends: IntArray, kept: npt.NDArray[np.bool_]) -> bytes:

@@ -78,6 +78,29 @@ def check_prologue(path: Path, data: bytes) -> None:
         raise MeshFileError(f"{path} is not valid XML ({error}): it is damaged or cut off; export it again") from error
 
 
+MODEL_3MF = "3D/3dmodel.model"
+"""What the parser calls the model; its name is up to the file, whose relationships tell it."""
+
+
+def plain_3mf(path: Path, content: bytes) -> bytes:
+    """Return a 3MF file whose model has the usual name, checked as by `check_3mf`."""
+    archive = open_archive(path, content)
+    names = archive.namelist()
+    if not any(MODEL_3MF.lower() in name.lower() for name in names) and "_rels/.rels" in names:
+        data = unpack(path, archive, "_rels/.rels")
+        check_prologue(path, data)
+        rows = etree.fromstring(data, etree.XMLParser(**PARSER)).iter("{*}Relationship")
+        told = [row.get("Target", "").lstrip("/") for row in rows if row.get("Type", "").endswith("/3dmodel")]
+        if told and told[0] in names:
+            file = io.BytesIO()
+            with ZipFile(file, "w") as renamed:
+                for name in names:
+                    renamed.writestr(MODEL_3MF if name == told[0] else name, unpack(path, archive, name))
+            content = file.getvalue()
+    check_3mf(path, content)
+    return content
+
+
 def check_3mf(path: Path, content: bytes) -> None:
     """Refuse a 3MF file that would unpack, expand or multiply to more than is reasonable.
 

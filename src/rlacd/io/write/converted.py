@@ -63,7 +63,9 @@ def _scene(mesh: InputMesh, name: str) -> trimesh.Scene:
     asset = mesh.asset
     assert asset is not None
     content: Any = asset.content
-    if asset.path is not None:
+    if asset.extension == "obj" and mesh.left_out:  # whose triangles the parser of looks cannot tell apart
+        content = None
+    elif asset.path is not None:
         content = looks_of(asset.path, content, asset.extension)
     if content is None or (isinstance(content, trimesh.Scene) and not content.geometry):
         return trimesh.Scene({name: trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)})

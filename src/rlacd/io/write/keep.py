@@ -125,7 +125,7 @@ class _Scene:
         self._added: list[bytes] = []
         self._take_in(FolderFiles(asset.path.parent, DATA | IMAGES) if asset.is_gltf and asset.path else None)
         self._nodes = {node.get("name"): index for index, node in enumerate(header.get("nodes", []))}
-        self._take_off([self.index_of(node.key) for node in mesh.left_out])
+        self._take_off([at for node in mesh.left_out if (at := self.index_of(node.key)) is not None])
 
     def index_of(self, key: int | str) -> int | None:
         """The index of a source node."""
