@@ -181,7 +181,7 @@ def _read(path: Path) -> tuple[bytes, str, trimesh.Scene | Gltf]:
         ) from error
     if holds and holds not in (extension, named) and not scene.geometry:
         raise MeshFileError(f"{path} is not {extension} but {holds}: rename it to .{holds}")
-    return plain if extension == "dae" else content, extension, scene
+    return plain if extension in ("dae", "3mf") else content, extension, scene
 
 
 def _parsed(path: Path, content: bytes, extension: str, beside: FolderFiles) -> trimesh.Scene | Gltf:
