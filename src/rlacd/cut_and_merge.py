@@ -18,8 +18,8 @@ MOST_CUTTING, MOST_PER_FACE = 5e6, 300
 and more of one core. Of 181 real meshes none took more than a third of it."""
 
 MOST_MERGING = 14e6
-"""Units of work after which merging stops: about fourteen seconds of one core. At 3e6, a real mesh of thin shells in each
-other is left in 276 hulls instead of 30."""
+"""Units of work after which merging stops: about fourteen seconds of one core. At 3e6, a real mesh of thin shells in
+each other is left in 276 hulls instead of 30."""
 
 
 @dataclass(frozen=True)
