@@ -187,7 +187,7 @@ def _check_folder(folder: Path) -> None:
             raise OutputError(
                 f"cannot write into {folder}: you may not; choose another place or change its permissions."
             )
-    elif folder.exists():
+    elif folder.exists() and not folder.is_dir():  # another run's may have appeared between the two questions
         raise OutputError(f"cannot write into {folder}: it is a file, not a folder; choose another name.")
     else:
         _check_parent(folder)
