@@ -142,6 +142,13 @@ def test_a_node_below_two_others_is_refused(rig: Rig, tmp_path: Path) -> None:
         read(rig, tmp_path)
 
 
+def test_true_is_no_index(rig: Rig, tmp_path: Path) -> None:
+    rig.header["nodes"] = [{"children": [True]}, {"mesh": 0}]
+    rig.header["scenes"] = [{"nodes": [0]}]
+    with pytest.raises(MeshFileError, match="True is no index"):
+        read(rig, tmp_path)
+
+
 def test_what_a_gltf_adds_to_its_triangles_is_read_refused_or_named(tmp_path: Path) -> None:
     files = trimesh.Scene(BOX).export(file_type="gltf")
     tree = json.loads(files.pop("model.gltf"))

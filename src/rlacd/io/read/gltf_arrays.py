@@ -192,7 +192,7 @@ class Arrays:
 
 def item(items: Sequence[Any] | FloatArray, index: Any) -> Any:
     """An item of a list by its index in the file: one below zero would count from the end."""
-    if not isinstance(index, int) or index < 0:
+    if type(index) is not int or index < 0:  # JSON's true is an int of Python
         raise IndexError(f"{index!r:.40} is no index")
     return items[index]
 
