@@ -381,10 +381,14 @@ def test_of_several_runs_at_once_each_writes_a_whole_result(tmp_path: Path) -> N
         subprocess.Popen([sys.executable, "-c", AT_ONCE, tmp_path, str(count), go], stdout=subprocess.PIPE)
         for count in counts
     ]
-    for turn in range(20):
-        assert all(run.stdout is not None and run.stdout.readline() for run in runs)
-        (go / str(turn)).touch()
-    assert [run.communicate()[0].count(b"\n") for run in runs] == [1] * len(runs)
+    try:
+        for turn in range(20):
+            assert all(run.stdout is not None and run.stdout.readline() for run in runs)
+            (go / str(turn)).touch()
+        assert [run.communicate()[0].count(b"\n") for run in runs] == [1] * len(runs)
+    finally:
+        for run in runs:
+            run.kill()
     for turn in range(20):
         names = json.loads((tmp_path / str(turn) / "chair_hulls.json").read_bytes())["files"]
         assert files_of(tmp_path / str(turn)) == [*names, "chair_hulls.json"]
