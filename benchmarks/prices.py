@@ -41,7 +41,6 @@ KERNELS: dict[str, tuple[Any, str, Callable[..., Sizes], Callable[..., float]]] 
         ),
         lambda pairs, vertices: pairs * work.screening(0) + work.screening(vertices) - work.screening(0),
     ),
-    "probing": (ConcavityScreen, "forbids", lambda screen, solid, hull: (len(hull.vertices),), work.probing),
     "gluing": (Part, "glued", lambda a, b, hull=None: (a.size + b.size,), work.gluing),
     "filling": (
         ClippedPart,

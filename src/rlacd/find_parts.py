@@ -170,14 +170,16 @@ class _Decomposer:
         options, run, found = self.options, self.run, None
         policy = options.policy if isinstance(options.policy, str) else ""
         context = SearchContext(self.model.component, goal, options.seed, self.sweeps)
-        bounds = (options.quality, options.budget, options.search_steps) if is_first else ("balanced",)
+        given = options.quality, options.budget, options.search_steps
+        quality, seconds, steps = given if is_first else ("balanced", None, None)
+        assert quality is not None, "filled in by the options"
         try:
             if options.merge and goal.obstacles is not None and policy not in AS_PUBLISHED and run.stopped_by is None:
                 with run.stage("search"):
                     parts = eliminate_parts(context, parts, run)
             if options.quality != "fast" and run.stopped_by is None:
                 with run.stage("search"):
-                    parts, found = search(context, parts, run, *bounds)
+                    parts, found = search(context, parts, run, quality, seconds, steps, policy)
         except Stopped:
             run.note_stop()
         return parts, found

@@ -300,16 +300,6 @@ class Uniter:
     solid: Component
     account: Work
 
-    def unite(self, first: Part, second: Part) -> Part | None:
-        """Unite two parts; None if no union meets the criterion."""
-        hull = Hull.around(first.hull, second.hull)
-        if not self.account.pay(work.testing(len(hull.vertices))):
-            return None
-        screen = self.criterion.screen
-        if screen.looks_inside and screen.feasibility(self.solid.filling, hull) is not Feasibility.MAYBE:
-            return None
-        return self.unite_feasible(first, second, hull)
-
     def feasible(self, part: Part, others: Sequence[Part]) -> list[tuple[int, float]]:
         """Find which of other parts may be united with a part, and the volumes of the joint hulls.
 
@@ -329,9 +319,9 @@ class Uniter:
         volumes, verdicts = screen.feasibilities(self.solid.filling, hulls, pairs, 1)
         return [(i, float(volumes[i])) for i in np.flatnonzero(verdicts == Feasibility.MAYBE).tolist()]
 
-    def unite_feasible(self, first: Part, second: Part, hull: Hull | None = None) -> Part | None:
+    def unite_feasible(self, first: Part, second: Part) -> Part | None:
         """Unite two parts that may be united; None if no union meets the criterion after all."""
-        hull = hull or Hull.around(first.hull, second.hull)
+        hull = Hull.around(first.hull, second.hull)
         screen = self.criterion.screen
         if is_alone(first) and is_alone(second):  # otherwise they may overlap
             if not self.account.pay(price_of_gluing(first, second)):
@@ -342,13 +332,6 @@ class Uniter:
         if not screen.looks_inside or not self.account.pay(price_of_clipping(first, second)):
             return None
         return _clipped(first, second, hull, self.criterion, self.solid)
-
-    def forbids(self, hull: Hull) -> bool:
-        """Whether no part with this hull, or with any hull that contains it, can meet the criterion; False if unknown.
-
-        Cheaper than `unite`; the caller pays.
-        """
-        return self.criterion.screen.forbids(self.solid.filling, hull)
 
 
 def price_of_gluing(first: Part, second: Part) -> float:

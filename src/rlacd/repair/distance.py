@@ -16,7 +16,7 @@ from rlacd.solid.topology import BoolArray, IntArray, first_of_doubled
 # Points of a triangle at which it is looked whether it lies inside a body: near its corners, its edges, its middle.
 _PROBES = np.array([(18, 1, 1), (1, 18, 1), (1, 1, 18), (9, 9, 2), (9, 2, 9), (2, 9, 9), (7, 7, 6)]) / 20
 
-MOST_POINTS = 100_000
+MOST_POINTS = 160_000
 """Points spread over a surface in the usual spacing are fewer, unless it is a stack of hundreds of sheets."""
 
 

@@ -84,11 +84,6 @@ def testing(vertices: int) -> float:
     return 160 + 7 * vertices
 
 
-def probing(vertices: int) -> float:
-    """Test only whether the solid comes too deep inside a hull."""
-    return 5 + 0.9 * vertices
-
-
 def gluing(faces: int) -> float:
     """Glue two parts that have `faces` faces in total."""
     return 16 + 0.2 * faces

@@ -93,6 +93,7 @@ def search(
     quality: str,
     seconds: float | None = None,
     steps: int | None = None,
+    first: str = "greedy",
 ) -> tuple[list[Part], SearchSummary]:
     """Search for fewer parts, or for equally many with a smaller total hull volume.
 
@@ -111,6 +112,8 @@ def search(
         Wall time of the search, in place of that bound.
     steps : int, optional
         Recuts of clusters, in place of that bound.
+    first : str
+        The policy of the first pass, which is not repeated.
 
     Returns
     -------
@@ -130,10 +133,11 @@ def search(
         allowed = min(max(TIMES_FIRST_PASS * first_pass, LEAST_WORK), MOST_WORK)
     elif steps is not None and seconds is None:
         allowed = TIMES_FIRST_PASS * first_pass + MOST_WORK + WORK_OF_A_STEP * steps
-    state = _Search(context, run, first_pass, a_pass, HOPELESS * len(parts))
+    others = context.rankings[1:] if first == "greedy" else context.rankings  # greedy is the first of them
+    state = _Search(context, others, run, first_pass, a_pass, HOPELESS * len(parts))
     if bounded:
         with run.limited(allowed):
-            starts = state.passes(parts, context.rankings[1:2] if len(parts) <= FEW else [])
+            starts = state.passes(parts, others[:1] if len(parts) <= FEW else [])
             done = Neighbourhood(context, starts[0], run, BOUNDED_PATIENCE).improve()
         if quality == "best":
             with run.limited(seconds=BEST_SECONDS - (time.perf_counter() - begin)):
@@ -171,6 +175,7 @@ class _Search:
     """Passes over the whole solid, and searches from each."""
 
     context: SearchContext
+    others: Sequence[Ranking]
     run: Run
     first_pass: int
     seconds_of_a_pass: float
@@ -197,7 +202,7 @@ class _Search:
 
     def from_all(self, parts: list[Part], steps: float = math.inf) -> SearchOutcome:
         """Search from the best pass, then from the next whenever a search is exhausted, for `ROUNDS` rounds."""
-        starts = self.passes(parts, self.context.rankings[1:])
+        starts = self.passes(parts, self.others)
         done = SearchOutcome(starts[0], 0, 0, False)
         for number in range(ROUNDS * len(starts)):
             context = replace(self.context, seed=self.context.seed + 1 + number)
