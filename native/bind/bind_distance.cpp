@@ -1,6 +1,7 @@
 // Python bindings of the surface queries: closest points, winding numbers, samples, one-sided Hausdorff distance.
 #include "base/arrays.hpp"
 #include "base/parallel.hpp"
+#include "distance/apart.hpp"
 #include "distance/crossings.hpp"
 #include "distance/hausdorff.hpp"
 #include "distance/sample.hpp"
@@ -160,6 +161,23 @@ void bind_distance(nb::module_& m) {
       nb::arg("vertices"), nb::arg("faces"), nb::arg("body"), nb::arg("most"),
       "How many pairs of faces of different bodies [F] touch, and a bound on the corners of their arrangement.\n"
       "Stops to count once there are more than `most` pairs.");
+
+  m.def(
+      "apart_points",
+      [](const Surface& surface, const PointsIn& array, double reach, std::size_t enough) {
+        const std::vector<Vec3> points = to_points(array);
+        require_finite(points);
+        if (!(reach > 0)) throw std::invalid_argument("the reach must be positive");
+        std::vector<std::int32_t> found;
+        {
+          nb::gil_scoped_release release;
+          found = apart_points(surface, points, reach, enough);
+        }
+        return to_array<std::int32_t>(std::move(found));
+      },
+      nb::arg("surface"), nb::arg("points"), nb::arg("reach"), nb::arg("enough"),
+      "Indices [K] of points [N, 3] of a closed solid of which no two can lie in one convex set whose surface stays\n"
+      "within `reach` of the solid; the search ends when `enough` are found.");
 }
 
 }  // namespace rlacd

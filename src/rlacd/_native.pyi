@@ -129,6 +129,7 @@ class Surface:
     def closest(self, points: FloatArray, threads: int = 0) -> tuple[FloatArray, IntArray]: ...  # [N, 3], [N]
     def winding(self, points: FloatArray, accuracy: float = 2.0, threads: int = 0) -> FloatArray: ...  # [N]
 
+def apart_points(surface: Surface, points: FloatArray, reach: float, enough: int) -> IntArray: ...  # [K]
 def sample_surface(vertices: FloatArray, faces: IntArray, count: int, seed: int) -> tuple[FloatArray, IntArray]: ...
 def crossings(vertices: FloatArray, faces: IntArray, body: NDArray[np.int64], most: int) -> tuple[int, int]: ...
 def directed_hausdorff(

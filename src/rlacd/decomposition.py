@@ -67,6 +67,9 @@ class Decomposition(Result):
         ``search`` : dict or None
             What the search of a quality level has done: ``level``, ``steps``, ``accepted``, ``seconds``, whether it was
             ``exhausted``, and the parts of the ``first_pass``, of the best of the ``portfolio``, and at its end.
+        ``at_least`` : int or None
+            No decomposition has fewer hulls if each stays within the threshold of the solid and they cover it to 0.001
+            (longest side 2). None with the quality ``fast``; 1 where the criterion bounds no distance.
         ``seconds`` : dict
             Wall time of each stage, and their ``total``.
         ``repair`` : list of dict

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
@@ -24,7 +24,7 @@ from rlacd.proxy import Model
 from rlacd.repair.repair import repair
 from rlacd.repair.tangles import TangledError, refuse_tangles
 from rlacd.run import Run
-from rlacd.search import SearchContext, SearchSummary, eliminate_parts, search
+from rlacd.search import SearchContext, SearchSummary, at_least, eliminate_parts, search
 from rlacd.solid.component import Component, Part
 from rlacd.solid.cover import cover
 from rlacd.solid.hull import Hull
@@ -137,7 +137,7 @@ class _Decomposer:
         """
         with self.run.limited():
             done = cut_and_merge(self.tree, self.model.tighter(goal, factor), self.run, merge=self.options.merge)
-            parts, found = self._searched(done.parts, done.criterion, is_first=factor == 1.0)
+            parts, found = self._searched(done.parts, done.criterion, goal if factor == 1.0 else None)
             if self.model.proxy is None:
                 return parts, done.criterion, found
             policy = make_policy(self.options.policy, SweepCache(), _scale(goal))
@@ -165,13 +165,15 @@ class _Decomposer:
         assert most is not None
         return best_within(free, most, self.model.solid, coarser, unite, LimitedCriterion(goal, *limits), self.run)
 
-    def _searched(self, parts: list[Part], goal: Criterion, is_first: bool) -> tuple[list[Part], SearchSummary | None]:
-        """The parts after the search of the quality level, and its summary."""
+    def _searched(
+        self, parts: list[Part], goal: Criterion, asked: Criterion | None
+    ) -> tuple[list[Part], SearchSummary | None]:
+        """The parts after the search of the quality level and its summary; `asked` is the solid's unscaled goal."""
         options, run, found = self.options, self.run, None
         policy = options.policy if isinstance(options.policy, str) else ""
         context = SearchContext(self.model.component, goal, options.seed, self.sweeps)
         given = options.quality, options.budget, options.search_steps
-        quality, seconds, steps = given if is_first else ("balanced", None, None)
+        quality, seconds, steps = given if asked is not None else ("balanced", None, None)
         assert quality is not None, "filled in by the options"
         try:
             if options.merge and goal.obstacles is not None and policy not in AS_PUBLISHED and run.stopped_by is None:
@@ -179,6 +181,8 @@ class _Decomposer:
                     parts = eliminate_parts(context, parts, run)
             if options.quality != "fast" and run.stopped_by is None:
                 with run.stage("search"):
+                    if asked is not None:
+                        context = replace(context, enough=at_least(self.model.solid, parts, asked.overhang, run))
                     parts, found = search(context, parts, run, quality, seconds, steps, policy)
         except Stopped:
             run.note_stop()

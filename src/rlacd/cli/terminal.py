@@ -99,9 +99,20 @@ def summary(result: Decomposition, written: str, unit: str | None = None) -> str
     triangles = sum(len(hull.faces) for hull in result)
     lines = [f"{written}: {_count(len(result))}, {triangles} triangles{_time(report)}"]
     lines += [f"  {fit}" for fit in [_fit(report, unit)] if fit]
+    lines += [f"  {bound}" for bound in [_at_least(report)] if bound]
     lines += [f"  of them {kinds}" for kinds in [_primitives(result)] if kinds]
     lines += [f"  warning: {warning}" for warning in report.get("warnings", [])]
     return "\n".join(lines)
+
+
+def _at_least(report: dict[str, Any]) -> str:
+    """What is proved about the number of hulls, where that is more than one."""
+    least, parts = report.get("at_least") or 1, report["parts"]
+    if not 1 < least <= parts:
+        return ""
+    if least == parts:
+        return "no decomposition to this tolerance has fewer hulls"
+    return f"no decomposition to this tolerance has fewer than {least} hulls"
 
 
 def rewrite_summary(done: Rewritten, unit: str | None = None) -> str:

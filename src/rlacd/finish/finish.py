@@ -87,7 +87,9 @@ def _finished(reached: Reached, run: Run) -> tuple[Finished, list[Part]]:
         bodies = run.if_in_time(lambda: _bodies(solid, hulls), lambda: unknown)
     for hull, body in zip(hulls, bodies, strict=True):
         hull.metadata["body"] = body
-    report["search"] = None if reached.found is None else reached.found.as_plain()
+    found = reached.found
+    report["search"] = None if found is None else found.as_plain()
+    report["at_least"] = None if found is None else min(found.at_least, len(hulls))
     balls = goal.obstacles.in_input(solid.frame) if goal.obstacles is not None else None
     return Finished(hulls, report, balls), parts
 

@@ -205,8 +205,14 @@ def joint_report(reports: Sequence[tuple[str, dict[str, Any]]], scale: float) ->
         ],
         "nodes": nodes,
         "search": None,
+        "at_least": _sum_known([report["at_least"] for _, report, _ in each]),
         "warnings": [f"{name}: {warning}" for name, report, _ in each for warning in report["warnings"]],
     }
+
+
+def _sum_known(counts: Sequence[int | None]) -> int | None:
+    known = [count for count in counts if count is not None]
+    return sum(known) if len(known) == len(counts) else None
 
 
 def _times(length: float | None, factor: float) -> float | None:

@@ -112,15 +112,15 @@ class Neighbourhood:
         self._near = min(context.criterion.screen.reach, 2 * context.criterion.overhang)
 
     def improve(self, most: float = math.inf) -> SearchOutcome:
-        """Search until nothing is left to try, the run is over, `most` recuts are made or one part is left."""
-        exhausted = len(self._graph.parts) == 1
+        """Search until nothing is left to try, the run is over, `most` recuts are made or no fewer parts can do."""
+        exhausted = self._is_least
         try:
             if most > 0:
                 self.redistribute_all(SMALL)
                 self._recut_some(min(most, OPENING))
                 self.redistribute_all()
-            exhausted = len(self._graph.parts) == 1
-            while not exhausted and self._steps < most and len(self._graph.parts) > 1 and not self._run.is_over:
+            exhausted = self._is_least
+            while not exhausted and self._steps < most and not self._is_least and not self._run.is_over:
                 target = self._steps + RECUTS_PER_PART * len(self._graph.parts)
                 exhausted = self._recut_some(min(most, target)) or self._gave_up
                 self.redistribute_all()
@@ -133,14 +133,13 @@ class Neighbourhood:
         graph = self._graph
         waiting = sorted(graph.parts, key=lambda i: (graph.parts[i].hull.volume, i))
         waiting = waiting[: math.ceil(share * len(waiting))]
-        while waiting and len(graph.parts) > 1 and not self._gave_up and self._may_continue():
+        while waiting and not self._is_least and not self._gave_up and self._may_continue():
             batch, waiting = waiting[:BATCH], waiting[BATCH:]
             self._make("redistribute", [trial for i in batch if (trial := self._redistributing(i)) is not None])
 
     def _recut_some(self, most: float) -> bool:
         """Recut clusters until `most` steps are made in total; whether nothing new was left to recut."""
-        graph = self._graph
-        while self._steps < most and len(graph.parts) > 1 and not self._gave_up and self._may_continue():
+        while self._steps < most and not self._is_least and not self._gave_up and self._may_continue():
             taken: set[int] = set()
             trials = [trial for _ in range(BATCH) if (trial := self._recutting(taken)) is not None]
             if not trials:
@@ -148,7 +147,11 @@ class Neighbourhood:
             # Drawn in full and then shortened, so a search with more steps starts with the same trials.
             trials = trials[: int(min(BATCH, most - self._steps))]
             self._steps += self._make("recut", trials)
-        return len(graph.parts) == 1
+        return self._is_least
+
+    @property
+    def _is_least(self) -> bool:
+        return len(self._graph.parts) <= self._context.enough
 
     @property
     def _gave_up(self) -> bool:

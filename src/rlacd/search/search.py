@@ -68,6 +68,8 @@ class SearchSummary:
         Units of work done (see `rlacd.run.work`).
     allowed : int or None
         Limit on the work, if the level has one.
+    at_least : int
+        No decomposition to this tolerance has fewer parts.
     """
 
     level: str
@@ -80,6 +82,7 @@ class SearchSummary:
     exhausted: bool
     work: int
     allowed: int | None
+    at_least: int
 
     def as_plain(self) -> dict[str, Any]:
         """All fields as plain values."""
@@ -156,6 +159,7 @@ def search(
         exhausted=done.exhausted,
         work=run.work.done - first_pass,
         allowed=None if math.isinf(allowed) else math.floor(allowed),
+        at_least=context.enough,
     )
     return done.parts, summary
 
@@ -187,7 +191,7 @@ class _Search:
         run, context, cache = self.run, self.context, CutCache()
         found = [parts]
         for ranking in rankings:
-            if run.is_over or len(parts) == 1 or self.seconds_of_a_pass > SHARE * run.seconds_left:
+            if run.is_over or len(parts) <= context.enough or self.seconds_of_a_pass > SHARE * run.seconds_left:
                 break
             tree = CutTree(context.root, ranking(context.sweeps), run, cache)
             with run.quietly(), run.limited(ANOTHER_PASS * self.first_pass):
