@@ -29,8 +29,9 @@ constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
 
-ConvexCollapse::ConvexCollapse(const Mesh& hull, std::function<Vec3(Vec3)> placed, double tolerance)
-    : placed_(std::move(placed)), tolerance_(tolerance) {
+ConvexCollapse::ConvexCollapse(const Mesh& hull, std::vector<Above> bounds, std::function<Vec3(Vec3)> placed,
+                               double tolerance)
+    : bounds_(std::move(bounds)), placed_(std::move(placed)), tolerance_(tolerance) {
   for (const Vec3 point : hull.vertices) add_corner(point);
   std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> sides;
   for (const Triangle& face : hull.faces) {
@@ -190,7 +191,7 @@ std::optional<ConvexCollapse::Collapse> ConvexCollapse::plan(std::int32_t from, 
   if (!gather(from, to)) return std::nullopt;
   // The volume between the facets and a point that sees them is sum area (n . x - h) / 3, linear in x.
   Vec3 objective;
-  above_.clear();
+  above_ = bounds_;
   for (const std::int32_t f : region_) {
     objective = objective + facets_[f].area * facets_[f].normal;
     above_.push_back({facets_[f].normal, facets_[f].offset});

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "base/geometry.hpp"
@@ -18,10 +19,11 @@ namespace rlacd {
 
 class ConvexCollapse {
  public:
-  explicit ConvexCollapse(const Mesh& hull) : ConvexCollapse(hull, {}, 0) {}
+  // New corners stay above the bounds.
+  ConvexCollapse(const Mesh& hull, std::vector<Above> bounds) : ConvexCollapse(hull, std::move(bounds), {}, 0) {}
   // The same if no corner is acceptable that is farther than the tolerance from the hull, measured where `placed` puts
   // corners: most edges are too long then, which is seen before their new corner is known.
-  ConvexCollapse(const Mesh& hull, std::function<Vec3(Vec3)> placed, double tolerance);
+  ConvexCollapse(const Mesh& hull, std::vector<Above> bounds, std::function<Vec3(Vec3)> placed, double tolerance);
 
   // Collapses edges while there are more than `most` corners, and beyond that while the new corner is acceptable. False
   // if no edge can be collapsed although there are still too many corners.
@@ -63,6 +65,7 @@ class ConvexCollapse {
   void schedule(std::int32_t from, std::int32_t to);
   void apply(const Collapse& collapse);
 
+  const std::vector<Above> bounds_;
   const std::function<Vec3(Vec3)> placed_;
   const double tolerance_;
   std::vector<Vec3> points_, places_;

@@ -49,7 +49,7 @@ Above touching_plane(Vec3 a, Vec3 b, Vec3 w, const Mesh& inner) {
 
 }  // namespace
 
-Mesh relax_around(Mesh outer, const Mesh& inner, int sweeps) {
+Mesh relax_around(Mesh outer, const Mesh& inner, const std::vector<Above>& bounds, int sweeps) {
   double volume = mesh_volume(outer.vertices, outer.faces);
   std::vector<Above> constraints;
   for (int sweep = 0; sweep < sweeps; ++sweep) {
@@ -57,7 +57,7 @@ Mesh relax_around(Mesh outer, const Mesh& inner, int sweeps) {
     std::vector<Vec3>& v = outer.vertices;
     for (std::size_t w = 0; w < v.size(); ++w) {
       poll_stop();
-      constraints.clear();
+      constraints = bounds;
       Vec3 objective;
       bool sound = true;
       for (const RingEdge& edge : around[w]) {

@@ -1,7 +1,7 @@
 // A convex polytope around another one, tightened without adding corners.
 //
 // In:  an outer convex hull that holds an inner one; both around the origin, about as wide in all directions.
-// Out: an outer hull with no more corners and no more volume.
+// Out: an outer hull with no more corners and no more volume; what was above the bounds stays there.
 // How: one corner w at a time moves to where the volume is least while its neighbours stay. The facets around w turn
 //      about the edges of its ring, so the inner hull stays inside as long as w lies beyond the plane through each ring
 //      edge that touches the inner hull; the outer hull stays convex as long as w lies below the facets across the
@@ -9,10 +9,13 @@
 //      over all corners the hull is taken anew, which lets edges flip.
 #pragma once
 
+#include <vector>
+
 #include "base/geometry.hpp"
+#include "hull/linear_program.hpp"
 
 namespace rlacd {
 
-Mesh relax_around(Mesh outer, const Mesh& inner, int sweeps);
+Mesh relax_around(Mesh outer, const Mesh& inner, const std::vector<Above>& bounds, int sweeps);
 
 }  // namespace rlacd

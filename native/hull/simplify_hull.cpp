@@ -52,6 +52,12 @@ class Whitening {
     const Vec3 d = p - centre_;
     return {dot(axes_[0], d) / scale_[0], dot(axes_[1], d) / scale_[1], dot(axes_[2], d) / scale_[2]};
   }
+  Above to(const Above& plane) const {
+    Vec3 normal;
+    for (int i = 0; i < 3; ++i) normal[i] = scale_[i] * dot(axes_[i], plane.normal);
+    const double length = norm(normal);
+    return {1 / length * normal, (plane.offset - dot(plane.normal, centre_)) / length};
+  }
   Vec3 from(Vec3 p) const {
     return centre_ + scale_[0] * p.x * axes_[0] + scale_[1] * p.y * axes_[1] + scale_[2] * p.z * axes_[2];
   }
@@ -179,17 +185,22 @@ std::vector<std::size_t> stages(std::size_t corners, std::size_t most) {
 
 }  // namespace
 
-Mesh simplify_hull(const Mesh& hull, std::size_t max_vertices, std::size_t max_faces, double tolerance) {
+Mesh simplify_hull(const Mesh& hull, std::size_t max_vertices, std::size_t max_faces, double tolerance,
+                   const std::vector<Above>& bounds) {
   if (max_vertices < 4 || max_faces < 4) throw std::invalid_argument("a hull has at least 4 vertices and 4 faces");
   // A triangulated convex polytope has twice as many triangles as corners, minus four.
   const std::size_t most = std::min(max_vertices, (max_faces + 4) / 2);
   const Whitening whitening(hull.vertices);
   if (const std::vector<Vec3> thick = whitening.thickened(hull.vertices, kThinnest); !thick.empty())
-    return hull.vertices.size() <= most ? hull : simplify_hull(hull_mesh(thick), max_vertices, max_faces, tolerance);
+    return hull.vertices.size() <= most ? hull
+                                        : simplify_hull(hull_mesh(thick), max_vertices, max_faces, tolerance, {});
   std::vector<Vec3> whitened;
   for (const Vec3 p : hull.vertices) whitened.push_back(whitening.to(p));
   const Mesh inner = hull_mesh(whitened);
   if (inner.faces.empty()) throw std::invalid_argument("the hull is flat");
+
+  std::vector<Above> within;
+  for (const Above& plane : bounds) within.push_back(whitening.to(plane));
 
   const Bvh surface(hull);
   const ConvexPlanes planes(hull);
@@ -198,7 +209,7 @@ Mesh simplify_hull(const Mesh& hull, std::size_t max_vertices, std::size_t max_f
     return planes.nearest(p).depth >= -tolerance && surface.closest(p).distance2 <= tolerance * tolerance;
   };
   if (inner.vertices.size() <= most) {
-    ConvexCollapse collapse(inner, [&](Vec3 p) { return whitening.from(p); }, tolerance);
+    ConvexCollapse collapse(inner, within, [&](Vec3 p) { return whitening.from(p); }, tolerance);
     collapse.reduce(most, redundant);
     const std::vector<Vec3> left = collapse.corners();
     return left.size() == hull.vertices.size() ? hull : brought_back(hull_mesh(left), inner, whitening);
@@ -206,14 +217,15 @@ Mesh simplify_hull(const Mesh& hull, std::size_t max_vertices, std::size_t max_f
   Mesh best = inner;
   bool fits = true;
   for (const std::size_t stage : stages(best.vertices.size(), most)) {
-    ConvexCollapse collapse(best);
+    ConvexCollapse collapse(best, within);
     fits = collapse.reduce(stage, redundant);
-    best = relax_around(hull_mesh(collapse.corners()), inner, stage > most ? kSweepsOnTheWay : kSweepsAtTheEnd);
+    best = relax_around(hull_mesh(collapse.corners()), inner, within, stage > most ? kSweepsOnTheWay : kSweepsAtTheEnd);
     if (!fits) break;
   }
-  if (!fits || most <= kFewCorners)
+  if (!fits && !within.empty()) return simplify_hull(hull, max_vertices, max_faces, tolerance, {});
+  if (!fits || (most <= kFewCorners && within.empty()))
     for (Mesh& cover : plain_covers(inner, most)) {
-      cover = relax_around(std::move(cover), inner, kSweepsAtTheEnd);
+      cover = relax_around(std::move(cover), inner, {}, kSweepsAtTheEnd);
       if (!fits || volume_of(cover) < volume_of(best)) best = std::move(cover), fits = true;
     }
   return brought_back(best, inner, whitening);

@@ -1,8 +1,9 @@
 // A convex polytope with fewer corners around a convex polytope.
 //
-// In:  a convex hull, limits on corners and triangles, a tolerance.
+// In:  a convex hull, limits on corners and triangles, a tolerance, half-spaces that hold the hull.
 // Out: a convex hull that contains the given one, within the limits, with little added volume. Corners that can be
-//      removed without the hull growing by more than the tolerance anywhere are removed in any case.
+//      removed without the hull growing by more than the tolerance anywhere are removed in any case. The result stays
+//      in the half-spaces, unless the limits leave no such hull.
 // How: everything is measured after an affine map that makes the hull about as wide in all directions: ratios of
 // volumes
 //      do not change, and needles and plates become well-conditioned.
@@ -19,9 +20,11 @@
 
 #include "base/geometry.hpp"
 #include "hull/hull.hpp"
+#include "hull/linear_program.hpp"
 
 namespace rlacd {
 
-Mesh simplify_hull(const Mesh& hull, std::size_t max_vertices, std::size_t max_faces, double tolerance);
+Mesh simplify_hull(const Mesh& hull, std::size_t max_vertices, std::size_t max_faces, double tolerance,
+                   const std::vector<Above>& bounds);
 
 }  // namespace rlacd

@@ -194,7 +194,7 @@ class HullUnion:
     def distance(self, points: FloatArray, threads: int = 0) -> FloatArray: ...  # [N]
 
 def simplify_hull(
-    vertices: FloatArray, faces: IntArray, max_vertices: int, max_faces: int, tolerance: float = 1e-6
+    vertices: FloatArray, faces: IntArray, max_vertices: int, max_faces: int, tolerance: float, bounds: FloatArray
 ) -> tuple[FloatArray, IntArray]: ...
 def navigable_balls(
     surface: Surface,

@@ -10,12 +10,13 @@ import trimesh
 
 from rlacd import _native
 from rlacd.find_parts import Reached
+from rlacd.finish.flat import kept_within, resting_sides, within_reach
 from rlacd.finish.in_input import as_carried, in_input
 from rlacd.finish.limit import limit_part, limit_roughly
 from rlacd.finish.overlap import Seams, overlap_parts
 from rlacd.finish.primitives import SLACK, primitive_part
 from rlacd.finish.report import COVERAGE_TOLERANCE, NEARLY, make_report
-from rlacd.finish.simple import simple_part
+from rlacd.finish.simple import MOST, simple_part
 from rlacd.finish.take_in import take_in
 from rlacd.merge import drop_slivers
 from rlacd.options import SIMPLE
@@ -24,6 +25,7 @@ from rlacd.run import Run
 from rlacd.solid.balls import Balls
 from rlacd.solid.component import Part
 from rlacd.solid.distance import hull_union
+from rlacd.solid.limit_hull import NO_SIDES
 from rlacd.solid.provenance import owners
 from rlacd.solid.solid import Solid
 
@@ -117,6 +119,7 @@ def _cleaned(
 ) -> tuple[list[Part], Seams | None]:
     """The parts without slivers, overlapping if asked for, as primitives or with simple hulls inside the limits."""
     kinds, goal = cast("tuple[PrimitiveKind, ...]", reached.options.primitives), reached.goal
+    sides = NO_SIDES if reached.root is None else resting_sides(reached.root)
     slack = SLACK + 8 * reached.solid.frame.resolution
 
     def cleaned(part: Part) -> Part:
@@ -125,9 +128,11 @@ def _cleaned(
             shaped = primitive_part(part, goal, kinds, max_vertices, max_faces, slack, reached.root)
             if shaped is not part:
                 return shaped
+        near = within_reach(sides, part.hull, MOST)
+        part = kept_within(part, near, goal)
         if reached.options.detail == SIMPLE:
-            part = simple_part(part, goal, max_vertices, max_faces)
-        return limit_part(part, max_vertices, max_faces, goal)
+            part = simple_part(part, goal, max_vertices, max_faces, near)
+        return limit_part(part, max_vertices, max_faces, goal, near)
 
     parts, seams = drop_slivers(reached.parts, run), None
     if reached.options.overlap > 0 and reached.root is not None:

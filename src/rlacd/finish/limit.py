@@ -6,8 +6,9 @@ import math
 
 from rlacd.criteria import Criterion
 from rlacd.finish.in_input import plain_hull
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
-from rlacd.solid.limit_hull import limit_hull
+from rlacd.solid.limit_hull import NO_SIDES, limit_hull
 
 
 def limit_roughly(part: Part, max_vertices: int | None, max_faces: int | None) -> Part:
@@ -18,12 +19,19 @@ def limit_roughly(part: Part, max_vertices: int | None, max_faces: int | None) -
     return part.with_hull(plain_hull(part.hull.vertices, max_vertices, max_faces))
 
 
-def limit_part(part: Part, max_vertices: int | None, max_faces: int | None, criterion: Criterion | None = None) -> Part:
+def limit_part(
+    part: Part,
+    max_vertices: int | None,
+    max_faces: int | None,
+    criterion: Criterion | None = None,
+    sides: FloatArray = NO_SIDES,
+) -> Part:
     """Get the part with a hull inside the limits and without nearly redundant corners; the same part if unchanged.
 
     Without such corners a hull is up to 1e-6 larger. They stay if the part would then no longer meet a given criterion.
+    For `sides` see `limit_hull`.
     """
-    hull = limit_hull(part.hull, max_vertices, max_faces)
+    hull = limit_hull(part.hull, max_vertices, max_faces, sides=sides)
     if hull is part.hull:
         return part
     limited = part.with_hull(hull)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from rlacd.criteria import Criterion
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
 from rlacd.solid.limit_hull import limit_hull
 
@@ -18,7 +19,9 @@ TRIES = 3
 """If the criterion is no longer met, half the growth is tried, and so on."""
 
 
-def simple_part(part: Part, criterion: Criterion, max_vertices: int | None, max_faces: int | None) -> Part:
+def simple_part(
+    part: Part, criterion: Criterion, max_vertices: int | None, max_faces: int | None, sides: FloatArray
+) -> Part:
     """Get the part with a hull of few corners that still meets the criterion; the same part if there is none.
 
     Parameters
@@ -28,12 +31,14 @@ def simple_part(part: Part, criterion: Criterion, max_vertices: int | None, max_
         One that does not bound how far a hull may reach beyond its part leaves hulls as they are.
     max_vertices, max_faces : int, optional
         Limits on the hull's vertices and triangles. If the hull exceeds them, it is left for `limit_part`.
+    sides : FloatArray
+        Half-spaces that the hull stays in, as for `limit_hull`.
     """
     if not math.isfinite(criterion.overhang):
         return part
     growth = min(ROOM * criterion.overhang, MOST)
     for _ in range(TRIES):
-        hull = limit_hull(part.hull, max_vertices, max_faces, tolerance=growth)
+        hull = limit_hull(part.hull, max_vertices, max_faces, tolerance=growth, sides=sides)
         if hull is part.hull:
             return part
         simple = part.with_hull(hull)

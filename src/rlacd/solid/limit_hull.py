@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from rlacd import _native
 from rlacd.errors import OptionError
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.hull import Hull
 
 TOLERANCE = 1e-6
@@ -11,9 +14,15 @@ TOLERANCE = 1e-6
 
 _NO_LIMIT = 2**31 - 1
 
+NO_SIDES = np.empty((0, 4))
+
 
 def limit_hull(
-    hull: Hull, max_vertices: int | None = None, max_faces: int | None = None, tolerance: float = TOLERANCE
+    hull: Hull,
+    max_vertices: int | None = None,
+    max_faces: int | None = None,
+    tolerance: float = TOLERANCE,
+    sides: FloatArray = NO_SIDES,
 ) -> Hull:
     """Enclose a hull in one with at most the given numbers of corners and triangles, adding little volume.
 
@@ -28,6 +37,10 @@ def limit_hull(
     tolerance : float
         Removing nearly redundant corners and facets, which is always done, moves no point of the result farther than
         this from the hull.
+
+    sides : FloatArray
+        Half-spaces n.x <= d that hold the hull, rows of unit n and d [P, 4]. The result stays in them, unless the
+        limits leave no such hull.
 
     Returns
     -------
@@ -56,6 +69,7 @@ def limit_hull(
         min(max_vertices or _NO_LIMIT, _NO_LIMIT),
         min(max_faces or _NO_LIMIT, _NO_LIMIT),
         tolerance,
+        sides,
     )
     if len(vertices) == len(hull.vertices) and (vertices == hull.vertices).all():
         return hull
