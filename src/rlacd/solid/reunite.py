@@ -15,6 +15,7 @@ from rlacd import _native
 from rlacd.solid.arrays import BoolArray, FloatArray
 from rlacd.solid.boolean_time import require_time_for
 from rlacd.solid.component import LOST, ClippedPart, Component, Part, concatenated
+from rlacd.solid.manifold import to_manifold
 
 TOUCHING = 1e-8
 """Distance at which faces count as touching (see native/distance/glue.hpp)."""
@@ -128,7 +129,7 @@ def _overlapping(components: Sequence[Component]) -> list[Manifold]:
             moved = np.clip(component.vertices + OVERLAP * outward, lower, upper)
             overlapping.append(Manifold(Mesh64(moved, component.faces.astype(np.uint64))))
         else:
-            overlapping.append(component.manifold)
+            overlapping.append(to_manifold(component.vertices, component.faces))
     return overlapping
 
 
