@@ -143,7 +143,7 @@ def part_queries(mesh: Soup, other: Soup, hull: Hull, random: np.random.Generato
     reached = distance_to_triangles(sampled(hull.vertices, hull.faces.astype(np.int64), 30, random), mesh[0][mesh[1]])
     assert reached.max() <= upper + ROUNDING, f"concavity: {reached.max()} > {upper}"
     _native.glue(*mesh, *other)
-    _native.outward_where_touching(*mesh, *other)
+    _native.do_touch(*mesh, *other)
 
 
 def ball_queries(hull: Hull, surface: _native.Surface, random: np.random.Generator) -> None:

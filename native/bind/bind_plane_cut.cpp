@@ -1,6 +1,9 @@
 // Python bindings of plane cuts and of the pieces they leave.
+#include <nanobind/stl/vector.h>
+
 #include "base/arrays.hpp"
 #include "cut/pieces.hpp"
+#include "cut/reunite.hpp"
 
 namespace rlacd {
 
@@ -48,6 +51,22 @@ void bind_plane_cut(nb::module_& m) {
       "The pieces of a closed mesh that edges connect, with their cavities, as `cut` returns its sides, without those "
       "of no more\n"
       "than the least volume; None if all is one piece.");
+  m.def(
+      "reunite",
+      [](const std::vector<PointsIn>& vertices, const std::vector<FacesIn>& faces, double least) {
+        if (vertices.size() != faces.size()) throw std::invalid_argument("one array of faces a solid");
+        std::optional<Piece> whole;
+        {
+          nb::gil_scoped_release release;
+          std::vector<Mesh> solids;
+          for (std::size_t i = 0; i < vertices.size(); ++i) solids.push_back(to_finite_mesh(vertices[i], faces[i]));
+          if (std::optional<Mesh> united = reunited(solids)) whole = piece_of(std::move(*united), least);
+        }
+        return as_object(std::move(whole));
+      },
+      nb::arg("vertices"), nb::arg("faces"), nb::arg("least"),
+      "Solids with disjoint interiors that touch face to face as one, as `cut` returns its sides; None if rounding\n"
+      "leaves it open.");
 }
 
 }  // namespace rlacd

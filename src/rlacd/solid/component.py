@@ -229,7 +229,7 @@ class Component(Part):
         self._threads = threads
 
     @classmethod
-    def _from(cls, piece: _native.Piece, within: Component) -> Component:
+    def of(cls, piece: _native.Piece, within: Component | None = None) -> Component:
         """Take over what a kernel made."""
         vertices, faces, volume, *hull = piece
         component = cls.__new__(cls)
@@ -260,7 +260,7 @@ class Component(Part):
     def cut(self, plane: Plane, least: float = NEGLIGIBLE_VOLUME) -> tuple[Component | None, Component | None]:
         """Cut by a plane: returns the sides below and above, None for a side of no more than the least volume."""
         below, above = _native.cut(self.vertices, self.faces, *plane.normal, plane.offset, least)
-        return below and Component._from(below, self), above and Component._from(above, self)
+        return below and Component.of(below, self), above and Component.of(above, self)
 
     def inside(self, hull: Hull) -> Part:
         """Return all that the solid fills of a hull, closed by caps on the hull's facets; without faces if nothing."""
@@ -272,7 +272,7 @@ class Component(Part):
     def pieces(self) -> list[Component]:
         """Connected pieces, cavities kept inside the piece that encloses them; ``[self]`` if it is connected."""
         pieces = _native.connected_pieces(self.vertices, self.faces, NEGLIGIBLE_VOLUME)
-        return [self] if pieces is None else [Component._from(piece, self) for piece in pieces]
+        return [self] if pieces is None else [Component.of(piece, self) for piece in pieces]
 
 
 def concatenated(surfaces: list[tuple[FloatArray, IntArray]]) -> tuple[FloatArray, IntArray]:
