@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <unordered_map>
 
@@ -16,9 +17,9 @@ namespace rlacd {
 
 namespace {
 
-constexpr double kSame = 1e-9;  // distance at which vertices are one, or on an edge: above rounding, below kCoincident
-constexpr double kFilm = 1e-9;  // thickness of the film over the solids by which the union's volume may differ
-constexpr int kDeepest = 8;     // times that an edge between stops may have stops: two, but for rounding
+constexpr double kSame = kCoincident;  // distance at which vertices are one, or on an edge
+constexpr double kFilm = 1e-9;         // thickness of the film over the solids by which the union's volume may differ
+constexpr int kDeepest = 8;            // times that an edge between stops may have stops: two, but for rounding
 
 using Edge = std::array<std::int32_t, 2>;
 
@@ -174,28 +175,27 @@ class Reunion {
       note({static_cast<std::int32_t>(key >> 32), static_cast<std::int32_t>(key & 0xffffffffu)}, std::move(stops));
   }
 
-  // Closes what the rims in a plane bound; returns whether each point is bounded at most once.
+  // Closes what the rims in a plane bound; returns whether they do bound something.
   bool close(std::size_t plane) {
     const std::vector<Edge> rim = net(expanded(rims_[plane]));
     if (rim.empty()) return true;
     const Vec3 normal = planes_[plane].normal;
     const std::vector<PlanePoint> at = on_plane(points_of(rim), normal);
-    std::array<std::vector<Edge>, 2> sides;  // of what faces along the normal, and against it
+    std::map<int, std::vector<Edge>> sides;  // of what is bounded so often, without the rest
     for (std::size_t i = 0; i < rim.size(); ++i) {
       poll_stop();
       const int left = winding_left_of(at, i);
-      if (left != 1 && left != 0) return false;
-      if (left == 1)
-        sides[0].push_back(rim[i]);
+      if (left > 0)
+        sides[left].push_back(rim[i]);
       else
-        sides[1].push_back({rim[i][1], rim[i][0]});
+        sides[left - 1].push_back({rim[i][1], rim[i][0]});
     }
-    for (const int side : {0, 1}) {
+    for (const auto& [times, edges] : sides) {
       std::vector<std::int32_t> vertices;
       std::vector<std::vector<PlanePoint>> outlines;
-      if (!walk(sides[side], vertices, outlines, normal)) return false;
+      if (!walk(edges, vertices, outlines, normal)) return false;
       for (const Triangle& t : triangulate(outlines, vertices))
-        caps_.push_back(side == 0 ? Triangle{vertices[t[0]], vertices[t[1]], vertices[t[2]]}
+        caps_.push_back(times > 0 ? Triangle{vertices[t[0]], vertices[t[1]], vertices[t[2]]}
                                   : Triangle{vertices[t[0]], vertices[t[2]], vertices[t[1]]});
     }
     return true;
@@ -210,6 +210,7 @@ class Reunion {
     int winding = sign * (b[v] - a[v]) > 0 ? 1 : 0;
     for (std::size_t i = 0; 2 * i < at.size(); ++i) {
       const PlanePoint p = at[2 * i], q = at[2 * i + 1];
+      if (i < own && p == a && q == b) ++winding;  // the same edge again: one after the other, from the right
       if (i == own || (p[v] > y) == (q[v] > y)) continue;
       if (p[u] + (y - p[v]) / (q[v] - p[v]) * (q[u] - p[u]) > x) winding += sign * (q[v] > p[v] ? 1 : -1);
     }
