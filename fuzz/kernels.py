@@ -133,7 +133,7 @@ def part_queries(mesh: Soup, other: Soup, hull: Hull, random: np.random.Generato
         )
     )
     same(lambda threads: _native.concave_edges(*mesh, hull.vertices, hull.faces, 4))
-    _native.concave_edge_planes(*mesh, hull.vertices, hull.faces, 4)
+    _native.candidate_planes(*mesh, hull.vertices, hull.faces, 12, 4)
     volume = _native.mesh_volume(*mesh)
     threshold = float(random.choice([0.01, 0.05, 0.3]))
     met = _native.meets_concavity(*mesh, hull.vertices, hull.faces, volume, hull.volume, threshold)

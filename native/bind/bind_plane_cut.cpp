@@ -1,7 +1,11 @@
-// Python bindings of plane cuts and of the pieces they leave.
+// Python bindings of plane cuts, of the pieces they leave, and of reuniting them.
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include "base/arrays.hpp"
+#include "base/mesh_measures.hpp"
 #include "cut/pieces.hpp"
 #include "cut/reunite.hpp"
 
@@ -9,12 +13,21 @@ namespace rlacd {
 
 namespace {
 
-nb::object as_object(std::optional<Piece>&& piece) {
-  if (!piece) return nb::none();
-  return nb::make_tuple(to_array<double>(std::move(piece->mesh.vertices)),
-                        to_array<std::int32_t>(std::move(piece->mesh.faces)), piece->volume,
-                        to_array<double>(std::move(piece->hull.vertices)),
-                        to_array<std::int32_t>(std::move(piece->hull.faces)), piece->hull_volume);
+using PieceOut = std::tuple<Rows<double, Vec3>, Rows<std::int32_t, Triangle>, double, Rows<double, Vec3>,
+                            Rows<std::int32_t, Triangle>, double>;
+
+PieceOut out(Piece&& piece) {
+  return {
+      rows<double>(std::move(piece.mesh.vertices)), rows<std::int32_t>(std::move(piece.mesh.faces)), piece.volume,
+      rows<double>(std::move(piece.hull.vertices)), rows<std::int32_t>(std::move(piece.hull.faces)), piece.hull_volume};
+}
+
+std::optional<PieceOut> out(std::optional<Piece>&& piece) {
+  return piece ? std::optional(out(std::move(*piece))) : std::nullopt;
+}
+
+std::array<std::optional<PieceOut>, 2> out(std::array<std::optional<Piece>, 2>&& sides) {
+  return {out(std::move(sides[0])), out(std::move(sides[1]))};
 }
 
 }  // namespace
@@ -23,48 +36,45 @@ void bind_plane_cut(nb::module_& m) {
   m.def(
       "cut",
       [](const PointsIn& vertices, const FacesIn& faces, double x, double y, double z, double offset, double least) {
-        std::array<std::optional<Piece>, 2> sides;
-        {
-          nb::gil_scoped_release release;
-          sides = cut(to_finite_mesh(vertices, faces), {x, y, z}, offset, least);
-        }
-        return nb::make_tuple(as_object(std::move(sides[0])), as_object(std::move(sides[1])));
+        return out(cut(to_finite_mesh(vertices, faces), {x, y, z}, offset, least));
       },
-      nb::arg("vertices"), nb::arg("faces"), nb::arg("x"), nb::arg("y"), nb::arg("z"), nb::arg("offset"),
+      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("x"), nb::arg("y"), nb::arg("z"), nb::arg("offset"),
       nb::arg("least"),
       "The closed sides below and above a plane of a closed mesh: for each its vertices [V, 3], faces [F, 3] and\n"
       "volume, and those of its hull; None for a side of no more than the least volume, or without a hull.");
   m.def(
+      "halve",
+      [](const PointsIn& vertices, const FacesIn& faces, const PointsIn& hull, bool along_principal, double share,
+         double least) {
+        const Mesh mesh = to_finite_mesh(vertices, faces);
+        std::array<Vec3, 3> axes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+        if (along_principal) axes = principal_axes(mesh.vertices, mesh.faces);
+        return out(halve(mesh, to_points(hull), axes, share, least));
+      },
+      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("hull"), nb::arg("along_principal"), nb::arg("share"),
+      nb::arg("least"),
+      "The sides, as `cut` returns them, of the plane across the longest coordinate axis or principal axis of a mesh\n"
+      "that leaves this share of its length below.");
+  m.def(
       "connected_pieces",
-      [](const PointsIn& vertices, const FacesIn& faces, double least) -> nb::object {
-        std::optional<std::vector<Piece>> pieces;
-        {
-          nb::gil_scoped_release release;
-          pieces = connected_pieces(to_finite_mesh(vertices, faces), least);
+      [](const PointsIn& vertices, const FacesIn& faces, double least) {
+        std::optional<std::vector<PieceOut>> all;
+        if (std::optional<std::vector<Piece>> found = connected_pieces(to_finite_mesh(vertices, faces), least)) {
+          all.emplace();
+          for (Piece& piece : *found) all->push_back(out(std::move(piece)));
         }
-        if (!pieces) return nb::none();
-        nb::list all;
-        for (Piece& piece : *pieces) all.append(as_object(std::move(piece)));
         return all;
       },
-      nb::arg("vertices"), nb::arg("faces"), nb::arg("least"),
-      "The pieces of a closed mesh that edges connect, with their cavities, as `cut` returns its sides, without those "
-      "of no more\n"
-      "than the least volume; None if all is one piece.");
+      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("least"),
+      "The pieces of a closed mesh that edges connect, with their cavities, as `cut` returns its sides, without those\n"
+      "of no more than the least volume; None if all is one piece.");
   m.def(
       "reunite",
       [](const std::vector<PointsIn>& vertices, const std::vector<FacesIn>& faces, double least) {
-        if (vertices.size() != faces.size()) throw std::invalid_argument("one array of faces a solid");
-        std::optional<Piece> whole;
-        {
-          nb::gil_scoped_release release;
-          std::vector<Mesh> solids;
-          for (std::size_t i = 0; i < vertices.size(); ++i) solids.push_back(to_finite_mesh(vertices[i], faces[i]));
-          if (std::optional<Mesh> united = reunited(solids)) whole = piece_of(std::move(*united), least);
-        }
-        return as_object(std::move(whole));
+        std::optional<Mesh> united = reunited(to_finite_meshes(vertices, faces));
+        return united ? out(piece_of(std::move(*united), least)) : std::nullopt;
       },
-      nb::arg("vertices"), nb::arg("faces"), nb::arg("least"),
+      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("least"),
       "Solids with disjoint interiors that touch face to face as one, as `cut` returns its sides; None if rounding\n"
       "leaves it open.");
 }

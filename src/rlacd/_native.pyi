@@ -56,9 +56,19 @@ def reflex_edges(
 def concave_edges(
     vertices: FloatArray, faces: IntArray, hull_vertices: FloatArray, hull_faces: IntArray, count: int
 ) -> tuple[IntArray, IntArray, FloatArray, FloatArray]: ...
-def concave_edge_planes(
-    vertices: FloatArray, faces: IntArray, hull_vertices: FloatArray, hull_faces: IntArray, count: int
+def candidate_planes(
+    vertices: FloatArray,
+    faces: IntArray,
+    hull_vertices: FloatArray,
+    hull_faces: IntArray,
+    per_axis: int,
+    edges: int,
 ) -> tuple[FloatArray, FloatArray]: ...  # [K, 3], [K]
+def near_pairs(boxes: FloatArray, is_new: BoolArray, reach: float, across: bool) -> IntArray: ...  # [P, 2]
+def joint_hull(groups: list[FloatArray]) -> tuple[FloatArray, IntArray, float] | None: ...
+def halve(
+    vertices: FloatArray, faces: IntArray, hull: FloatArray, along_principal: bool, share: float, least: float
+) -> tuple[Piece | None, Piece | None]: ...
 def glue(
     vertices_a: FloatArray, faces_a: IntArray, vertices_b: FloatArray, faces_b: IntArray
 ) -> tuple[FloatArray, IntArray]: ...

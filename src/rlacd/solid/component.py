@@ -262,6 +262,13 @@ class Component(Part):
         below, above = _native.cut(self.vertices, self.faces, *plane.normal, plane.offset, least)
         return below and Component.of(below, self), above and Component.of(above, self)
 
+    def halve(self, along_principal: bool, share: float) -> list[Component]:
+        """Cut across the longest coordinate axis or principal axis, a share of its length below; empty if it fails."""
+        below, above = _native.halve(
+            self.vertices, self.faces, self.hull.vertices, along_principal, share, NEGLIGIBLE_VOLUME
+        )
+        return [] if below is None or above is None else [Component.of(below, self), Component.of(above, self)]
+
     def inside(self, hull: Hull) -> Part:
         """Return all that the solid fills of a hull, closed by caps on the hull's facets; without faces if nothing."""
         vertices, faces, volume, tree = self.filling.clipped(hull.vertices, hull.faces)
