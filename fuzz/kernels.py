@@ -133,7 +133,7 @@ def part_queries(mesh: Soup, other: Soup, hull: Hull, random: np.random.Generato
         )
     )
     same(lambda threads: _native.concave_edges(*mesh, hull.vertices, hull.faces, 4))
-    _native.concave_edge_planes(*mesh, hull.vertices, hull.faces, 4)
+    _native.candidate_planes(*mesh, hull.vertices, hull.faces, 12, 4)
     volume = _native.mesh_volume(*mesh)
     threshold = float(random.choice([0.01, 0.05, 0.3]))
     met = _native.meets_concavity(*mesh, hull.vertices, hull.faces, volume, hull.volume, threshold)
@@ -143,7 +143,7 @@ def part_queries(mesh: Soup, other: Soup, hull: Hull, random: np.random.Generato
     reached = distance_to_triangles(sampled(hull.vertices, hull.faces.astype(np.int64), 30, random), mesh[0][mesh[1]])
     assert reached.max() <= upper + ROUNDING, f"concavity: {reached.max()} > {upper}"
     _native.glue(*mesh, *other)
-    _native.outward_where_touching(*mesh, *other)
+    _native.do_touch(*mesh, *other)
 
 
 def ball_queries(hull: Hull, surface: _native.Surface, random: np.random.Generator) -> None:

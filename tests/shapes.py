@@ -115,7 +115,7 @@ def stacks(draw: st.DrawFn) -> list[Component]:
 
 def strangers(components: Sequence[Component]) -> list[Component]:
     """The same components, without what they were cut from."""
-    return [Component(component.manifold) for component in components]
+    return [Component((component.vertices, component.faces)) for component in components]
 
 
 def together(parts: Sequence[Part]) -> Component:

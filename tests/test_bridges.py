@@ -21,6 +21,7 @@ from rlacd.run import Run, Work
 from rlacd.solid.balls import Balls
 from rlacd.solid.component import ClippedPart, Component, Part, Plane
 from rlacd.solid.hull import Hull
+from rlacd.solid.manifold import to_manifold
 from rlacd.solid.reunite import reunite
 from tests.shapes import strangers
 
@@ -129,7 +130,7 @@ def heap_of_blocks(random: np.random.Generator) -> tuple[Component, list[Manifol
 
 def share_fits(solid: Component, hull: Hull, threshold: float) -> bool | None:
     """Whether what the solid fills of a hull meets the strict test; None where it is empty."""
-    share = solid.manifold ^ Manifold(Mesh64(hull.vertices + 0, hull.faces.astype(np.uint64)))
+    share = to_manifold(solid.vertices, solid.faces) ^ Manifold(Mesh64(hull.vertices + 0, hull.faces.astype(np.uint64)))
     mesh = share.to_mesh64()
     vertices = np.ascontiguousarray(mesh.vert_properties[:, :3])
     if len(vertices) == 0:

@@ -8,12 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rlacd import _native
-from rlacd.solid.caps import Surface, capped
+from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.hull import Hull
+
+Surface = tuple[FloatArray, IntArray]
+NOTHING = np.empty((0, 3)), np.empty((0, 3), np.int32)
 
 
 def cut(surface: Surface, normal: tuple[float, float, float], offset: float) -> list[Surface]:
-    return [capped(*side)[0] for side in _native.cut_by_plane(*surface, *normal, offset)]
+    return [NOTHING if side is None else side[:2] for side in _native.cut(*surface, *normal, offset, -np.inf)]
 
 
 def together(*solids: Surface) -> Surface:
@@ -98,20 +101,3 @@ def test_films_that_coincide_are_closed(offset) -> None:
                 assert_closed(side)
         assert volume(sides[0]) == pytest.approx(2 * offset, abs=1e-9)
         assert volume(sides[1]) == pytest.approx(2 - 2 * offset, abs=1e-9)
-
-
-@given(st.integers(0, 10**6))
-def test_the_share_of_triangles_upside_down(seed: int) -> None:
-    random = np.random.default_rng(seed)
-    points = random.normal(size=(random.integers(3, 20), 2))
-    triangles = random.integers(0, len(points), (random.integers(0, 30), 3)).astype(np.int32)
-    a, b, c = (points[corner] for corner in triangles.T)
-    areas = np.linalg.det(np.stack([b - a, c - a], axis=1)) if len(triangles) else np.zeros(0)
-    total = np.abs(areas).sum()
-    expected = -areas[areas < 0].sum() / total if total > 0 else 0.0
-    assert _native.upside_down_share(points, triangles) == pytest.approx(expected, abs=1e-9)
-
-
-def test_the_share_upside_down_needs_triangles_of_its_points() -> None:
-    with pytest.raises(ValueError, match="out of range"):
-        _native.upside_down_share(np.zeros((3, 2)), np.array([[0, 1, 3]], dtype=np.int32))

@@ -11,6 +11,7 @@ from rlacd.planes.candidates import OFFSETS_PER_AXIS, axis_and_principal
 from rlacd.policies import SCORES, Greedy
 from rlacd.run import Run
 from rlacd.solid.component import Component, Plane
+from rlacd.solid.manifold import to_manifold
 
 
 def box(x: float, y: float, z: float, at: tuple[float, float, float] = (0, 0, 0)) -> Component:
@@ -146,4 +147,4 @@ def test_arrays_that_cannot_be_written_make_a_solid() -> None:
     whole = box(1, 2, 3)
     vertices, faces = whole.vertices.copy(), whole.faces.copy()
     vertices.flags.writeable = faces.flags.writeable = False
-    assert Component((vertices, faces)).manifold.volume() == pytest.approx(6)
+    assert to_manifold(vertices, faces).volume() == pytest.approx(6)

@@ -8,7 +8,7 @@ from manifold3d import Manifold
 
 from rlacd.criteria import Concavity
 from rlacd.criteria.navigable import Navigable, NavigableSpace
-from rlacd.merge import boxes, merge_parts
+from rlacd.merge import merge_parts
 from rlacd.merge.boxes import Boxes
 from rlacd.run import Run
 from rlacd.solid.balls import Balls
@@ -123,10 +123,8 @@ def test_what_a_ball_keeps_apart_is_not_asked_again() -> None:
     assert asked[Counting] < 0.9 * asked[Forgetful]
 
 
-@pytest.mark.parametrize("at_once", [1, 7, boxes.AT_ONCE])
 @pytest.mark.parametrize("across", [False, True])
-def test_pairs_of_nearby_boxes(at_once: int, across: bool, monkeypatch) -> None:
-    monkeypatch.setattr(boxes, "AT_ONCE", at_once)
+def test_pairs_of_nearby_boxes(across: bool) -> None:
     random = np.random.default_rng(0)
     for count in (1, 2, 30):
         places = random.uniform(0, 4, (count, 3))

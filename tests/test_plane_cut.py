@@ -15,6 +15,7 @@ from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Plane
+from rlacd.solid.manifold import to_manifold
 
 LAST_BITS = 1e-12
 
@@ -73,7 +74,7 @@ def test_both_sides_are_closed_and_nothing_is_lost(seed: int) -> None:
         component = pieces.pop(random.integers(len(pieces)))
         plane = plane_through(random, component)
         sides = sides_of(component, plane)
-        above, below = component.manifold.split_by_plane(plane.normal, plane.offset)
+        above, below = to_manifold(component.vertices, component.faces).split_by_plane(plane.normal, plane.offset)
         for side, expected in zip(sides, (below, above), strict=True):
             assert (0.0 if side is None else side.volume) == pytest.approx(expected.volume(), rel=1e-6, abs=1e-9)
         pieces += [side for side in sides if side is not None]
@@ -195,7 +196,11 @@ def test_caps_stay_inside_a_real_solid_that_overlaps_itself_by_a_hair(corpus: Pa
 
 def bodies(*solids: Manifold) -> list[tuple[FloatArray, IntArray]]:
     component = Component(Manifold.compose(list(solids)))
-    return _native.bodies(component.vertices, component.faces)
+    return pieces_of(component.vertices, component.faces)
+
+
+def pieces_of(vertices: FloatArray, faces: IntArray) -> list[tuple[FloatArray, IntArray]]:
+    return [piece[:2] for piece in _native.connected_pieces(vertices, faces, 0.0) or ()]
 
 
 def test_bodies_are_connected_by_edges() -> None:
@@ -205,14 +210,14 @@ def test_bodies_are_connected_by_edges() -> None:
     vertices = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, 0, 0), (0, -1, 0), (0, 0, -1)], dtype=float)
     faces = np.array([(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)], dtype=np.int32)
     mirrored = np.where(faces > 0, faces + 3, 0)[:, [0, 2, 1]].astype(np.int32)
-    touching = _native.bodies(vertices, np.concatenate([faces, mirrored]))  # two tetrahedra that share a corner
+    touching = pieces_of(vertices, np.concatenate([faces, mirrored]))  # two tetrahedra that share a corner
     assert [_native.mesh_volume(*body) for body in touching] == pytest.approx([1 / 6, 1 / 6])
-    assert _native.bodies(vertices, faces[:0]) == []
+    assert pieces_of(vertices, faces[:0]) == []
 
 
 def test_bad_meshes_are_refused() -> None:
     corner = np.eye(3)
     with pytest.raises(ValueError, match="out of range"):
-        _native.cut_by_plane(corner, np.array([(0, 1, 3)], dtype=np.int32), 1.0, 0.0, 0.0, 0.5)
+        _native.cut(corner, np.array([(0, 1, 3)], dtype=np.int32), 1.0, 0.0, 0.0, 0.5, 0.0)
     with pytest.raises(ValueError, match="not finite"):
-        _native.cut_by_plane(corner * np.nan, np.array([(0, 1, 2)], dtype=np.int32), 1.0, 0.0, 0.0, 0.5)
+        _native.cut(corner * np.nan, np.array([(0, 1, 2)], dtype=np.int32), 1.0, 0.0, 0.0, 0.5, 0.0)

@@ -28,7 +28,7 @@ from rlacd.policies import make_policy
 from rlacd.repair.repair import repair
 from rlacd.run import Run
 from rlacd.search.context import SearchContext, by_score
-from rlacd.search.neighbourhood import BATCH, LEAST_TRIALS, Neighbourhood, cost
+from rlacd.search.neighbourhood import LAG, LEAST_TRIALS, Neighbourhood, cost
 from rlacd.search.part_graph import PartGraph
 from rlacd.search.recut import Exchange, recut
 from rlacd.search.search import BOUNDED_PATIENCE, search
@@ -151,14 +151,14 @@ def test_the_state_of_a_search_is_always_feasible() -> None:
 def test_a_bounded_search_gives_up_after_a_few_trials_per_part(monkeypatch: pytest.MonkeyPatch) -> None:
     tried: list[Any] = []
     for operator in ("recut", "redistribute"):
-        monkeypatch.setattr(f"rlacd.search.neighbourhood.{operator}", lambda *given: tried.append(given))
+        monkeypatch.setattr(f"rlacd.search.neighbourhood.{operator}", lambda *given, **_: tried.append(given))
     root = Component(frame())
     with Run(1) as run:
         parts = first_pass(root, run)
         found, account = search(SearchContext(root, CRITERION), parts, run, "balanced")
         assert (account.exhausted, account.parts) == (True, len(found))
         patience = max(BOUNDED_PATIENCE * len(found), LEAST_TRIALS)
-        assert len(tried) < patience + BATCH
+        assert len(tried) < patience + LAG
         few = len(tried)
         tried.clear()
         search(SearchContext(root, CRITERION), parts, run, "balanced", steps=10_000)
@@ -171,19 +171,18 @@ def cubes(*places: tuple[float, float, float]) -> list[Part]:
 
 def test_neighbours_share_a_face() -> None:
     parts = cubes(*((float(x), float(y), 0.0) for x in range(3) for y in range(2)))
-    with Run(1) as run:
-        here = PartGraph(parts, CRITERION, run)
-        assert here.around((0,)) == (1, 2)  # not 3, which has an edge in common
-        assert here.around((0, 1)) == (2, 3)
-        for seed in range(20):
-            cluster = here.draw(3, np.random.default_rng(seed))
-            assert cluster is not None
-            assert len(cluster) == 3
-            assert all(set(here.around((i,))) & set(cluster) for i in cluster)
-        assert here.draw(7, np.random.default_rng(0)) is None
-        assert here.apply(Exchange((parts[0], parts[1]), ()))
-        assert not here.apply(Exchange((parts[1], parts[2]), ()))  # gone already
-        assert here.around((2,)) == (3, 4)
+    here = PartGraph(parts, CRITERION)
+    assert here.around((0,)) == (1, 2)  # not 3, which has an edge in common
+    assert here.around((0, 1)) == (2, 3)
+    for seed in range(20):
+        cluster = here.draw(3, np.random.default_rng(seed))
+        assert cluster is not None
+        assert len(cluster) == 3
+        assert all(set(here.around((i,))) & set(cluster) for i in cluster)
+    assert here.draw(7, np.random.default_rng(0)) is None
+    assert here.apply(Exchange((parts[0], parts[1]), ()))
+    assert not here.apply(Exchange((parts[1], parts[2]), ()))  # gone already
+    assert here.around((2,)) == (3, 4)
 
 
 def test_touching_is_face_to_face() -> None:

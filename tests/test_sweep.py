@@ -13,6 +13,7 @@ from rlacd.planes.candidates import Candidates, axis_and_principal
 from rlacd.planes.sweep import sweep
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Plane
+from rlacd.solid.manifold import to_manifold
 
 
 def from_trimesh(mesh: trimesh.Trimesh) -> Manifold:
@@ -47,10 +48,10 @@ def hull_volume(points: FloatArray) -> float:
 def test_sweep_equals_real_cuts(name: str) -> None:
     component = Component(SOLIDS[name]())
     scored = sweep(component, axis_and_principal(component))
-    total = component.volume
+    total, whole = component.volume, to_manifold(component.vertices, component.faces)
     for index in range(0, len(scored.candidates), 3):
         plane = scored.candidates.plane(index)
-        above, below = component.manifold.split_by_plane(plane.normal, plane.offset)
+        above, below = whole.split_by_plane(plane.normal, plane.offset)
         for side, solid, hull in (
             (below, scored.solid_below, scored.hull_below),
             (above, scored.solid_above, scored.hull_above),
@@ -58,7 +59,7 @@ def test_sweep_equals_real_cuts(name: str) -> None:
             assert solid[index] == pytest.approx(side.volume(), abs=1e-9 * total)
             points = np.asarray(side.to_mesh64().vert_properties[:, :3])
             assert hull[index] == pytest.approx(hull_volume(points), rel=1e-9, abs=1e-12)
-        section = component.manifold.rotate(_upright(plane.normal)).slice(plane.offset)
+        section = whole.rotate(_upright(plane.normal)).slice(plane.offset)
         assert scored.section_area[index] == pytest.approx(section.area(), abs=1e-6)
 
 

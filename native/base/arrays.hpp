@@ -65,6 +65,14 @@ inline Mesh to_finite_mesh(const PointsIn& vertices, const FacesIn& faces) {
   return mesh;
 }
 
+// One mesh for each pair of arrays.
+inline std::vector<Mesh> to_finite_meshes(const std::vector<PointsIn>& vertices, const std::vector<FacesIn>& faces) {
+  if (vertices.size() != faces.size()) throw std::invalid_argument("one array of faces for each array of vertices");
+  std::vector<Mesh> meshes;
+  for (std::size_t i = 0; i < vertices.size(); ++i) meshes.push_back(to_finite_mesh(vertices[i], faces[i]));
+  return meshes;
+}
+
 // Hands a vector of rows to numpy without copying; the array then owns the data.
 template <class Scalar, class Row>
 nb::ndarray<nb::numpy, Scalar> to_array(std::vector<Row>&& rows) {
@@ -78,4 +86,30 @@ nb::ndarray<nb::numpy, Scalar> to_array(std::vector<Row>&& rows) {
     return nb::ndarray<nb::numpy, Scalar>(reinterpret_cast<Scalar*>(owned->data()), {owned->size(), columns}, owner);
 }
 
+// What a kernel that runs without the GIL returns: rows that become an array once it is held again.
+template <class Scalar, class Row>
+struct Rows {
+  std::vector<Row> rows;
+};
+template <class Scalar, class Row>
+Rows<Scalar, Row> rows(std::vector<Row> own) {
+  return {std::move(own)};
+}
+
+// The GIL is held while arguments and results are converted, and not in between.
+using Released = nb::call_guard<nb::gil_scoped_release>;
+
 }  // namespace rlacd
+
+namespace nanobind::detail {
+
+template <class Scalar, class Row>
+struct type_caster<rlacd::Rows<Scalar, Row>> {
+  using Array = make_caster<ndarray<numpy, Scalar>>;
+  static constexpr auto Name = Array::Name;
+  static handle from_cpp(rlacd::Rows<Scalar, Row>&& own, rv_policy policy, cleanup_list* cleanup) {
+    return Array::from_cpp(rlacd::to_array<Scalar>(std::move(own.rows)), policy, cleanup);
+  }
+};
+
+}  // namespace nanobind::detail

@@ -72,19 +72,6 @@ double mesh_area(const std::vector<Vec3>& vertices, const std::vector<Triangle>&
 }
 
 // Jacobi's method takes sums, products, quotients and square roots alone, which IEEE 754 rounds the same everywhere.
-double upside_down_share(const std::vector<PlanePoint>& points, const std::vector<Triangle>& triangles) {
-  double total = 0, upside_down = 0;
-  for (const Triangle& t : triangles) {
-    const auto [ax, ay] = points[t[0]];
-    const auto [bx, by] = points[t[1]];
-    const auto [cx, cy] = points[t[2]];
-    const double area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax);
-    total += std::fabs(area);
-    if (area < 0) upside_down -= area;
-  }
-  return total > 0 ? upside_down / total : 0.0;
-}
-
 std::array<Vec3, 3> principal_axes(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
   std::array<Vec3, 3> moments = mesh_moments(vertices, faces);
   std::array<Vec3, 3> axes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};

@@ -1,8 +1,7 @@
-// Volume, area, folds, axes and mass of triangle meshes, summed face by face: the same bits on every machine.
+// Volume, area, axes and mass of triangle meshes, summed face by face: the same bits on every machine.
 //
 // Input:  vertices and faces; for the volume, of a closed oriented mesh.
-// Output: the enclosed volume, the surface area, what of it is upside down in the plane, the principal axes of the
-//         surface, and the mass of the solid.
+// Output: the enclosed volume, the surface area, the principal axes of the surface, and the mass of the solid.
 #pragma once
 
 #include <array>
@@ -14,9 +13,6 @@ namespace rlacd {
 
 double mesh_volume(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces);
 double mesh_area(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces);
-
-// Share of the area of triangles in the plane that is upside down: whose corners run clockwise.
-double upside_down_share(const std::vector<PlanePoint>& points, const std::vector<Triangle>& triangles);
 
 // Unit vectors along the principal axes of the surface, longest first, the largest entry of each positive.
 std::array<Vec3, 3> principal_axes(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces);

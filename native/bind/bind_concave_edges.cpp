@@ -1,4 +1,6 @@
 // Python bindings of concave edges and their planes.
+#include <nanobind/stl/tuple.h>
+
 #include "base/arrays.hpp"
 #include "cut/concave_edges.hpp"
 
@@ -51,23 +53,27 @@ void bind_concave_edges(nb::module_& m) {
       nb::arg("vertices"), nb::arg("faces"), nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("count"),
       "Up to `count` of the reflex edges, deep, sharp ones of long creases first, and spread out; as `reflex_edges`.");
   m.def(
-      "concave_edge_planes",
+      "candidate_planes",
       [](const PointsIn& vertices, const FacesIn& faces, const PointsIn& hull_vertices, const FacesIn& hull_faces,
-         std::size_t count) {
+         int per_axis, std::size_t edges) {
         const Mesh mesh = to_mesh(vertices, faces), hull = to_mesh(hull_vertices, hull_faces);
+        std::vector<CandidatePlane> planes;
+        if (per_axis > 0) planes = equidistant_planes(mesh, hull, per_axis);
+        if (edges > 0)
+          for (const CandidatePlane& plane : planes_of_edges(mesh, hull, choose_concave_edges(mesh, hull, edges)))
+            planes.push_back(plane);
         std::vector<Vec3> normals;
         std::vector<double> offsets;
-        {
-          nb::gil_scoped_release release;
-          for (const CandidatePlane& plane : planes_of_edges(mesh, hull, choose_concave_edges(mesh, hull, count))) {
-            normals.push_back(plane.normal);
-            offsets.push_back(plane.offset);
-          }
+        for (const CandidatePlane& plane : planes) {
+          normals.push_back(plane.normal);
+          offsets.push_back(plane.offset);
         }
-        return nb::make_tuple(to_array<double>(std::move(normals)), to_array<double>(std::move(offsets)));
+        return std::tuple(rows<double>(std::move(normals)), rows<double>(std::move(offsets)));
       },
-      nb::arg("vertices"), nb::arg("faces"), nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("count"),
-      "The planes of those edges: unit normals [K, 3] and offsets [K], at most three an edge.");
+      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("hull_vertices"), nb::arg("hull_faces"),
+      nb::arg("per_axis"), nb::arg("edges"),
+      "Unit normals [K, 3] and offsets [K] of planes: `per_axis` along each coordinate axis and principal axis,\n"
+      "which divide the hull's extent into equal slabs, and at most three for each of the concave edges chosen.");
 }
 
 }  // namespace rlacd

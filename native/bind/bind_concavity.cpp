@@ -5,7 +5,6 @@
 #include "base/parallel.hpp"
 #include "distance/concavity.hpp"
 #include "distance/filling.hpp"
-#include "distance/section_plan.hpp"
 
 namespace rlacd {
 
@@ -118,29 +117,19 @@ void bind_concavity(nb::module_& m) {
           "Whether the solid's surface comes deeper than the threshold inside a hull: `feasibility` is 2.")
       .def(
           "clipped",
-          [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces) -> nb::object {
-            const Mesh hull = to_finite_mesh(hull_vertices, hull_faces);
-            std::optional<ConvexClip> clip;
+          [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces) {
+            ClippedSolid clip;
             {
               nb::gil_scoped_release release;
-              clip = self.clipped(hull);
+              clip = self.clipped(to_finite_mesh(hull_vertices, hull_faces));
             }
-            if (!clip) return nb::none();
-            SectionPlan plan = side_by_side(*clip);
-            return nb::make_tuple(to_array<double>(std::move(clip->mesh.vertices)),
-                                  to_array<std::int32_t>(std::move(clip->mesh.faces)),
-                                  nb::make_tuple(to_array<std::int32_t>(std::move(plan.corners)),
-                                                 to_array<double>(std::move(plan.outline)),
-                                                 to_array<std::int32_t>(std::move(plan.rim_ends)),
-                                                 to_array<std::int32_t>(std::move(plan.section_ends))),
-                                  new TreeCache(std::move(clip->shape)));
+            return nb::make_tuple(to_array<double>(std::move(clip.mesh.vertices)),
+                                  to_array<std::int32_t>(std::move(clip.mesh.faces)), clip.volume,
+                                  new TreeCache(std::move(clip.shape)));
           },
           nb::arg("hull_vertices"), nb::arg("hull_faces"),
-          "The solid clipped to a convex hull, without the caps on the hull's facets: vertices [V, 3], faces [F, 3];\n"
-          "for the sections by the facets, side by side in one plane and counter-clockwise from outside, the vertices\n"
-          "of all rims [R], the same as points [R, 2], where each rim ends there, and at which rim each section ends;\n"
-          "and what makes the tree of the surface with caps added to its faces. None where rounding makes the result\n"
-          "uncertain.")
+          "The solid clipped to a convex hull and closed by caps on the hull's facets: vertices [V, 3], faces [F, 3],\n"
+          "volume, and what makes the tree of that surface.")
       .def(
           "uncovered",
           [](const Filling& self, const std::vector<PointsIn>& vertices, const std::vector<FacesIn>& faces,

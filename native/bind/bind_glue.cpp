@@ -21,19 +21,13 @@ void bind_glue(nb::module_& m) {
       "surfaces\n"
       "without the regions where they touch face to face (within 1e-8). Not a closed mesh: for measuring only.");
   m.def(
-      "outward_where_touching",
+      "do_touch",
       [](const PointsIn& va, const FacesIn& fa, const PointsIn& vb, const FacesIn& fb) {
-        const Mesh a = to_mesh(va, fa), b = to_mesh(vb, fb);
-        std::vector<Vec3> outward;
-        {
-          nb::gil_scoped_release release;
-          outward = outward_where_touching(a, b);
-        }
-        return to_array<double>(std::move(outward));
+        nb::gil_scoped_release release;
+        return do_touch(to_mesh(va, fa), to_mesh(vb, fb));
       },
       nb::arg("vertices_a"), nb::arg("faces_a"), nb::arg("vertices_b"), nb::arg("faces_b"),
-      "For every vertex of the first solid, the direction [V, 3] out of all its faces that touch the second: 1 along\n"
-      "the normal of each such plane, 0 where there is none.");
+      "Whether two solids touch face to face, not just in an edge or a point.");
 }
 
 }  // namespace rlacd

@@ -1,4 +1,6 @@
 // Python bindings of the convex hull and of mesh volume and area.
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <cmath>
@@ -41,6 +43,27 @@ void bind_hull(nb::module_& m) {
       "Convex hull of points [N, 3]: (indices [H] into points, faces [F, 3] into those H points, rank).\n\n"
       "Every index is an extreme point, the facets are exactly convex (no rounding in the decisions) and outward\n"
       "oriented. rank < 3 (all points coplanar): no indices, no faces.");
+  m.def(
+      "joint_hull",
+      [](const std::vector<PointsIn>& groups) {
+        std::vector<Vec3> points;
+        for (const PointsIn& group : groups) {
+          const std::vector<Vec3> own = to_points(group);
+          points.insert(points.end(), own.begin(), own.end());
+        }
+        require_finite(points);
+        Hull hull = convex_hull(points);
+        using Out = std::tuple<Rows<double, Vec3>, Rows<std::int32_t, Triangle>, double>;
+        if (hull.rank < 3) return std::optional<Out>();
+        std::vector<Vec3> corners;
+        for (const std::int32_t i : hull.indices) corners.push_back(points[i]);
+        const double volume = mesh_volume(corners, hull.faces);
+        return std::optional<Out>(
+            {rows<double>(std::move(corners)), rows<std::int32_t>(std::move(hull.faces)), volume});
+      },
+      Released(), nb::arg("groups"),
+      "Corners [H, 3], faces [F, 3] and volume of the convex hull of several arrays of points [N, 3]; None if all lie\n"
+      "in a plane.");
   m.def(
       "holds_ball",
       [](const PointsIn& vertices, const FacesIn& faces, double radius) {

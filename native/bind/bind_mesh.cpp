@@ -9,6 +9,7 @@
 #include "mesh/curve.hpp"
 #include "mesh/edges.hpp"
 #include "mesh/least_bent.hpp"
+#include "mesh/near_boxes.hpp"
 #include "mesh/point_bodies.hpp"
 #include "mesh/point_tree.hpp"
 #include "mesh/spread_points.hpp"
@@ -302,6 +303,19 @@ void bind_mesh(nb::module_& m) {
       "The same mesh with vertices [V, 3] and faces [F, 3] along a space-filling curve: neighbours in space are near "
       "in\n"
       "memory.");
+  m.def(
+      "near_pairs",
+      [](const nb::ndarray<const double, nb::shape<-1, 6>, nb::c_contig, nb::device::cpu>& array, const MarksIn& fresh,
+         double reach, bool across) {
+        if (fresh.size() != array.shape(0)) throw std::invalid_argument("not as many marks as boxes");
+        std::vector<Box> boxes;
+        for (const double* row = array.data(); boxes.size() < array.shape(0); row += 6)
+          boxes.push_back({{row[0], row[1], row[2]}, {row[3], row[4], row[5]}});
+        return rows<std::int32_t>(near_pairs(boxes, {fresh.data(), fresh.data() + fresh.size()}, reach, across));
+      },
+      Released(), nb::arg("boxes"), nb::arg("is_new"), nb::arg("reach"), nb::arg("across"),
+      "Pairs [P, 2], ascending, of a new box and any other, of boxes [N, 6] given by their lower and upper corners:\n"
+      "those within reach of each other, or with `across` of a common third one.");
   m.def(
       "point_bodies",
       [](const PointsIn& vertices, const FacesIn& faces) {

@@ -1,134 +1,82 @@
-// Python bindings of plane cuts and of the pieces they leave.
+// Python bindings of plane cuts, of the pieces they leave, and of reuniting them.
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include "base/arrays.hpp"
 #include "base/mesh_measures.hpp"
-#include "cut/bodies.hpp"
-#include "cut/plane_cut.hpp"
-#include "cut/uncross.hpp"
+#include "cut/pieces.hpp"
+#include "cut/reunite.hpp"
 
 namespace rlacd {
 
 namespace {
 
-nb::tuple as_tuple(Mesh&& mesh) {
-  return nb::make_tuple(to_array<double>(std::move(mesh.vertices)), to_array<std::int32_t>(std::move(mesh.faces)));
+using PieceOut = std::tuple<Rows<double, Vec3>, Rows<std::int32_t, Triangle>, double, Rows<double, Vec3>,
+                            Rows<std::int32_t, Triangle>, double>;
+
+PieceOut out(Piece&& piece) {
+  return {
+      rows<double>(std::move(piece.mesh.vertices)), rows<std::int32_t>(std::move(piece.mesh.faces)), piece.volume,
+      rows<double>(std::move(piece.hull.vertices)), rows<std::int32_t>(std::move(piece.hull.faces)), piece.hull_volume};
 }
 
-nb::tuple as_tuple(OpenSide&& side, Vec3 outward) {
-  nb::list rims, outlines;
-  for (std::vector<std::int32_t>& rim : side.rims) {
-    std::vector<Vec3> points;
-    for (const std::int32_t i : rim) points.push_back(side.mesh.vertices[i]);
-    outlines.append(to_array<double>(on_plane(points, outward)));
-    rims.append(to_array<std::int32_t>(std::move(rim)));
-  }
-  return nb::make_tuple(to_array<double>(std::move(side.mesh.vertices)),
-                        to_array<std::int32_t>(std::move(side.mesh.faces)), rims, outlines);
+std::optional<PieceOut> out(std::optional<Piece>&& piece) {
+  return piece ? std::optional(out(std::move(*piece))) : std::nullopt;
 }
 
-using RimsIn = std::vector<nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>>;
-using OutlineIn = nb::ndarray<const double, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
-using OutlinesIn = std::vector<OutlineIn>;
-
-std::vector<std::vector<std::int32_t>> to_rims(const RimsIn& arrays, std::size_t vertices) {
-  std::vector<std::vector<std::int32_t>> rims;
-  for (const auto& array : arrays) {
-    rims.emplace_back(array.data(), array.data() + array.shape(0));
-    for (const std::int32_t i : rims.back())
-      if (i < 0 || static_cast<std::size_t>(i) >= vertices) throw std::invalid_argument("rim index out of range");
-  }
-  return rims;
-}
-
-std::vector<PlanePoint> to_plane_points(const OutlineIn& array) {
-  std::vector<PlanePoint> points(array.shape(0));
-  for (std::size_t i = 0; i < points.size(); ++i) points[i] = {array(i, 0), array(i, 1)};
-  return points;
-}
-
-std::vector<std::vector<PlanePoint>> to_outlines(const OutlinesIn& arrays,
-                                                 const std::vector<std::vector<std::int32_t>>& rims) {
-  std::vector<std::vector<PlanePoint>> outlines;
-  for (const auto& array : arrays) outlines.push_back(to_plane_points(array));
-  if (outlines.size() != rims.size()) throw std::invalid_argument("as many outlines as rims are needed");
-  for (std::size_t r = 0; r < rims.size(); ++r)
-    if (outlines[r].size() != rims[r].size()) throw std::invalid_argument("an outline has as many points as its rim");
-  return outlines;
-}
-
-nb::tuple as_tuple(UncrossedSide&& side) {
-  nb::list regions;
-  for (RimRegion& region : side.regions) {
-    nb::list rims, outlines;
-    for (auto& rim : region.rims) rims.append(to_array<std::int32_t>(std::move(rim)));
-    for (auto& outline : region.outlines) outlines.append(to_array<double>(std::move(outline)));
-    regions.append(nb::make_tuple(region.winding, rims, outlines));
-  }
-  return nb::make_tuple(to_array<double>(std::move(side.mesh.vertices)),
-                        to_array<std::int32_t>(std::move(side.mesh.faces)), regions);
+std::array<std::optional<PieceOut>, 2> out(std::array<std::optional<Piece>, 2>&& sides) {
+  return {out(std::move(sides[0])), out(std::move(sides[1]))};
 }
 
 }  // namespace
 
 void bind_plane_cut(nb::module_& m) {
   m.def(
-      "cut_by_plane",
-      [](const PointsIn& vertices, const FacesIn& faces, double x, double y, double z, double offset) {
+      "cut",
+      [](const PointsIn& vertices, const FacesIn& faces, double x, double y, double z, double offset, double least) {
+        return out(cut(to_finite_mesh(vertices, faces), {x, y, z}, offset, least));
+      },
+      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("x"), nb::arg("y"), nb::arg("z"), nb::arg("offset"),
+      nb::arg("least"),
+      "The closed sides below and above a plane of a closed mesh: for each its vertices [V, 3], faces [F, 3] and\n"
+      "volume, and those of its hull; None for a side of no more than the least volume, or without a hull.");
+  m.def(
+      "halve",
+      [](const PointsIn& vertices, const FacesIn& faces, const PointsIn& hull, bool along_principal, double share,
+         double least) {
         const Mesh mesh = to_finite_mesh(vertices, faces);
-        const Vec3 normal = {x, y, z};
-        std::array<OpenSide, 2> sides;
-        {
-          nb::gil_scoped_release release;
-          sides = cut_by_plane(mesh, normal, offset);
-        }
-        return nb::make_tuple(as_tuple(std::move(sides[0]), normal), as_tuple(std::move(sides[1]), -normal));
+        std::array<Vec3, 3> axes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+        if (along_principal) axes = principal_axes(mesh.vertices, mesh.faces);
+        return out(halve(mesh, to_points(hull), axes, share, least));
       },
-      nb::arg("vertices"), nb::arg("faces"), nb::arg("x"), nb::arg("y"), nb::arg("z"), nb::arg("offset"),
-      "What lies below and above a plane of a closed mesh, without the cap in the plane: for each side vertices [V, "
-      "3],\n"
-      "faces [F, 3], the cap's rims as loops of vertices, a list of [R], and as points [R, 2] of the plane, counter-\n"
-      "clockwise from outside.");
+      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("hull"), nb::arg("along_principal"), nb::arg("share"),
+      nb::arg("least"),
+      "The sides, as `cut` returns them, of the plane across the longest coordinate axis or principal axis of a mesh\n"
+      "that leaves this share of its length below.");
   m.def(
-      "upside_down_share",
-      [](const OutlineIn& outline, const FacesIn& triangles) {
-        const std::vector<PlanePoint> points = to_plane_points(outline);
-        return upside_down_share(points, to_faces(triangles, points.size()));
-      },
-      nb::arg("points"), nb::arg("triangles"),
-      "Share of the area of triangles [T, 3] of points [N, 2] in the plane that is upside down.");
-  m.def(
-      "uncross",
-      [](const PointsIn& vertices, const FacesIn& faces, const RimsIn& rims, const OutlinesIn& outlines) {
-        OpenSide side{to_finite_mesh(vertices, faces), {}};
-        side.rims = to_rims(rims, side.mesh.vertices.size());
-        const std::vector<std::vector<PlanePoint>> points = to_outlines(outlines, side.rims);
-        std::optional<UncrossedSide> uncrossed;
-        {
-          nb::gil_scoped_release release;
-          uncrossed = uncross(std::move(side), points);
+      "connected_pieces",
+      [](const PointsIn& vertices, const FacesIn& faces, double least) {
+        std::optional<std::vector<PieceOut>> all;
+        if (std::optional<std::vector<Piece>> found = connected_pieces(to_finite_mesh(vertices, faces), least)) {
+          all.emplace();
+          for (Piece& piece : *found) all->push_back(out(std::move(piece)));
         }
-        return uncrossed ? nb::object(as_tuple(std::move(*uncrossed))) : nb::none();
-      },
-      nb::arg("vertices"), nb::arg("faces"), nb::arg("rims"), nb::arg("outlines"),
-      "One side of a cut whose rims cross, with a vertex at every crossing: vertices [V, 3], faces [F, 3] and a list\n"
-      "of regions (winding number, rims, outlines) bounded by loops that do not cross, each to the left of its loops;\n"
-      "None if there are too many crossings.");
-  m.def(
-      "bodies",
-      [](const PointsIn& vertices, const FacesIn& faces) {
-        const Mesh mesh = to_finite_mesh(vertices, faces);
-        std::vector<Mesh> found;
-        {
-          nb::gil_scoped_release release;
-          found = bodies(mesh);
-        }
-        nb::list all;
-        for (Mesh& one : found) all.append(as_tuple(std::move(one)));
         return all;
       },
-      nb::arg("vertices"), nb::arg("faces"),
-      "The edge-connected pieces of a mesh, each with its own vertices: a list of (vertices, faces).");
+      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("least"),
+      "The pieces of a closed mesh that edges connect, with their cavities, as `cut` returns its sides, without those\n"
+      "of no more than the least volume; None if all is one piece.");
+  m.def(
+      "reunite",
+      [](const std::vector<PointsIn>& vertices, const std::vector<FacesIn>& faces, double least) {
+        std::optional<Mesh> united = reunited(to_finite_meshes(vertices, faces));
+        return united ? out(piece_of(std::move(*united), least)) : std::nullopt;
+      },
+      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("least"),
+      "Solids with disjoint interiors that touch face to face as one, as `cut` returns its sides; None if rounding\n"
+      "leaves it open.");
 }
 
 }  // namespace rlacd

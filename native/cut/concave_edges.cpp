@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <numeric>
 
+#include "base/mesh_measures.hpp"
 #include "base/stop.hpp"
 
 namespace rlacd {
@@ -246,6 +248,26 @@ std::vector<CandidatePlane> planes_of_edges(const Mesh& mesh, const Mesh& hull, 
                       [&](const CandidatePlane& other) { return space.difference(candidate, other) > kSamePlane; }))
         planes.push_back(candidate);
     }
+  }
+  return planes;
+}
+
+std::vector<CandidatePlane> equidistant_planes(const Mesh& mesh, const Mesh& hull, int per_axis) {
+  constexpr double kSameAxis = 1e-3;  // sine of an angle
+  std::vector<Vec3> directions = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (const Vec3 axis : principal_axes(mesh.vertices, mesh.faces)) {
+    const Vec3 size = {std::fabs(axis.x), std::fabs(axis.y), std::fabs(axis.z)};
+    const int nearest = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    Vec3 rest = axis;
+    rest[nearest] = 0;
+    directions.push_back(norm(rest) < kSameAxis ? directions[static_cast<std::size_t>(nearest)] : axis);
+  }
+  std::vector<CandidatePlane> planes;
+  for (const Vec3 direction : directions) {
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (const Vec3 p : hull.vertices) low = std::min(low, dot(p, direction)), high = std::max(high, dot(p, direction));
+    for (int i = 1; i <= per_axis; ++i)
+      planes.push_back({direction, low + (high - low) * (static_cast<double>(i) / (per_axis + 1))});
   }
   return planes;
 }

@@ -32,4 +32,8 @@ std::vector<ReflexEdge> choose_concave_edges(const Mesh& mesh, const Mesh& hull,
 // would carry the face along as a film.
 std::vector<CandidatePlane> planes_of_edges(const Mesh& mesh, const Mesh& hull, const std::vector<ReflexEdge>& edges);
 
+// The paper's candidates: along x, y, z and the principal axes of a mesh, planes that divide its hull's extent into
+// equal slabs. Principal axes that hardly differ from a coordinate axis are replaced by it.
+std::vector<CandidatePlane> equidistant_planes(const Mesh& mesh, const Mesh& hull, int per_axis);
+
 }  // namespace rlacd

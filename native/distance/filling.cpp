@@ -5,6 +5,8 @@
 
 #include "base/mesh_measures.hpp"
 #include "base/stop.hpp"
+#include "cut/caps.hpp"
+#include "cut/pieces.hpp"
 #include "hull/hull.hpp"
 
 namespace rlacd {
@@ -234,6 +236,25 @@ bool Filling::is_missed(const Mesh& hull, const std::vector<Triangle>& facets, d
     if (look_at(Cell(p, between, tip, cell.hint)) || look_at(Cell(between, q, tip, cell.hint))) return true;
   }
   return false;
+}
+
+ClippedSolid Filling::clipped(const Mesh& hull) const {
+  ClippedSolid out;
+  std::optional<ConvexClip> clip = clip_to_convex(solid_, surface_, hull);
+  if (clip) {
+    CapArea area;
+    for (const ConvexClip::Section& section : clip->sections)
+      add_caps(clip->mesh.faces, clip->mesh.vertices, section.rims, section.normal, area);
+    if (area.folded <= kFolded * area.all) {
+      out.mesh = std::move(clip->mesh);
+      out.shape = std::move(clip->shape);
+    } else {
+      clip.reset();
+    }
+  }
+  if (!clip) out.mesh = inside_all(solid_, hull);
+  out.volume = std::fmax(0, mesh_volume(out.mesh.vertices, out.mesh.faces));
+  return out;
 }
 
 }  // namespace rlacd

@@ -30,6 +30,12 @@ struct HullCorners {
   std::vector<Vec3> all, some;
 };
 
+struct ClippedSolid {
+  Mesh mesh;
+  TreeShape shape;  // of a tree over its first faces
+  double volume = 0;
+};
+
 class Filling {
  public:
   explicit Filling(const Mesh& solid, int threads = 1) : solid_(solid), surface_(solid, threads) {}
@@ -46,7 +52,8 @@ class Filling {
   // Whether the verdict is kNever: much faster than the full verdict.
   bool comes_deeper(const Mesh& hull, double threshold) const;
 
-  std::optional<ConvexClip> clipped(const Mesh& hull) const { return clip_to_convex(solid_, surface_, hull); }
+  // All that the solid fills of a convex hull, closed by caps on its facets.
+  ClippedSolid clipped(const Mesh& hull) const;
   std::vector<std::vector<Vec3>> uncovered(const std::vector<Mesh>& hulls, double reach, double grain,
                                            int threads) const {
     return rlacd::uncovered(solid_, surface_.bvh(), hulls, reach, grain, threads);

@@ -9,8 +9,6 @@ namespace rlacd {
 
 namespace {
 
-constexpr double kSameNormal = 1e-6;  // 1 - cosine between normals of faces in one plane
-
 struct Point2 {
   double u, v;
 };
@@ -218,23 +216,31 @@ bool share_area(const Facet& facet, const Facet& other) {
 
 }  // namespace
 
-std::vector<Vec3> outward_where_touching(const Mesh& a, const Mesh& b) {
-  const Box box_a = box_of(a), box_b = box_of(b);
-  const std::vector<Facet> others = facets_within(b, box_a);
-  std::vector<Vec3> outward(a.vertices.size());
-  for (const Triangle& face : a.faces) {
+bool do_touch(const Mesh& a, const Mesh& b) {
+  const std::vector<Facet> others = facets_within(b, box_of(a));
+  for (const Facet& facet : facets_within(a, box_of(b))) {
     poll_stop();
-    const Facet facet(a, face);
-    if (facet.height <= kCoincident || !overlap(facet.box, box_b)) continue;
-    if (std::none_of(others.begin(), others.end(), [&](const Facet& other) { return share_area(facet, other); }))
-      continue;
-    for (const std::int32_t corner : face) {
-      Vec3& sum = outward[static_cast<std::size_t>(corner)];
-      const double lacking = 1 - dot(sum, facet.normal);
-      if (lacking > kSameNormal) sum = sum + lacking * facet.normal;  // faces of one plane count once
-    }
+    if (std::any_of(others.begin(), others.end(), [&](const Facet& other) { return share_area(facet, other); }))
+      return true;
   }
-  return outward;
+  return false;
+}
+
+void add_touching_planes(std::vector<TouchingPlane>& planes, const Mesh& a, const Mesh& b) {
+  const std::vector<Facet> others = facets_within(b, box_of(a));
+  std::vector<Facet> own = facets_within(a, box_of(b));
+  // Large faces first: their planes are the most exact.
+  std::stable_sort(own.begin(), own.end(), [](const Facet& f, const Facet& g) { return f.height > g.height; });
+  for (const Facet& facet : own) {
+    poll_stop();
+    const bool is_known = std::any_of(planes.begin(), planes.end(), [&](const TouchingPlane& plane) {
+      return std::all_of(std::begin(facet.corner), std::end(facet.corner),
+                         [&](Vec3 p) { return std::fabs(dot(plane.normal, p) - plane.offset) <= kCoincident; });
+    });
+    if (is_known) continue;
+    if (std::any_of(others.begin(), others.end(), [&](const Facet& other) { return share_area(facet, other); }))
+      planes.push_back({facet.normal, facet.offset});
+  }
 }
 
 }  // namespace rlacd

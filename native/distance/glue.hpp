@@ -19,9 +19,14 @@ constexpr double kCoincident = 1e-8;  // distance at which faces count as touchi
 
 Mesh glue(const Mesh& a, const Mesh& b);
 
-// For every vertex of a, a direction that leads out of all its faces that touch b: 1 along the normal of each such
-// plane (as far as several normals allow), zero if it has none. Once the vertices are moved along it by a little, the
-// solids overlap where they touched, and a mesh boolean unites them without a crack.
-std::vector<Vec3> outward_where_touching(const Mesh& a, const Mesh& b);
+// Whether two solids touch face to face, not just in an edge or a point.
+bool do_touch(const Mesh& a, const Mesh& b);
+
+// Adds the planes n.x = d in which two solids touch.
+struct TouchingPlane {
+  Vec3 normal;
+  double offset;
+};
+void add_touching_planes(std::vector<TouchingPlane>& planes, const Mesh& a, const Mesh& b);
 
 }  // namespace rlacd

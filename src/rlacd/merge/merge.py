@@ -212,7 +212,7 @@ class _Adjoining:
             return [], []
         found = [
             _Pair(hull_volume - (screen.filled(alive[first]) + screen.filled(alive[second])), first, second)
-            for first, second, volume, hull_volume in joint_volumes(alive, pairs, self.run)
+            for first, second, volume, hull_volume in joint_volumes(alive, pairs, self.run.threads)
             if not screen.excludes(volume, hull_volume)
         ]
         return found, []
@@ -309,7 +309,8 @@ class Uniter:
             Index and volume. Empty if too little work is left.
         """
         hulls = [part.hull, *(other.hull for other in others)]
-        pairs = np.array([(0, i) for i in range(1, len(hulls))], dtype=np.int32).reshape(-1, 2)
+        pairs = np.zeros((len(others), 2), dtype=np.int32)
+        pairs[:, 1] = range(1, len(hulls))
         corners = [len(hull.vertices) for hull in hulls]
         if not self.account.pay(sum(work.screening(corners[0] + corner) for corner in corners[1:])):
             return []
@@ -358,17 +359,17 @@ def _clipped(first: Part, second: Part, hull: Hull, criterion: Criterion, solid:
 
 
 def neighbours(
-    alive: Mapping[int, Part], new: Sequence[int], reach: float, run: Run
+    alive: Mapping[int, Part], new: Sequence[int], reach: float, threads: int
 ) -> list[tuple[int, int, float, float]]:
     """Pairs of a new part and any other with boxes within reach: (first, second, volume, joint hull's volume)."""
-    return joint_volumes(alive, Boxes(alive).pairs(new, reach), run)
+    return joint_volumes(alive, Boxes(alive).pairs(new, reach), threads)
 
 
-def joint_volumes(alive: Mapping[int, Part], pairs: IntArray, run: Run) -> list[tuple[int, int, float, float]]:
+def joint_volumes(alive: Mapping[int, Part], pairs: IntArray, threads: int) -> list[tuple[int, int, float, float]]:
     """Volumes of pairs of parts [P, 2]: (first, second, volume of both, joint hull's volume)."""
     used, places = _places(pairs)
     corners = [alive[i].hull.vertices for i in used]
-    hulls = _native.joint_hull_volumes(corners, places, run.threads)
+    hulls = _native.joint_hull_volumes(corners, places, threads)
     return [
         (i, j, alive[i].volume + alive[j].volume, hull)
         for (i, j), hull in zip(pairs.tolist(), hulls.tolist(), strict=True)
@@ -377,8 +378,8 @@ def joint_volumes(alive: Mapping[int, Part], pairs: IntArray, run: Run) -> list[
 
 def _places(pairs: IntArray) -> tuple[list[int], IntArray]:
     """The distinct ids in pairs [P, 2], and the pairs as indices into them."""
-    used, places = np.unique(pairs, return_inverse=True)
-    return used.tolist(), np.ascontiguousarray(places.reshape(-1, 2), dtype=np.int32)
+    used = np.unique(pairs)
+    return used.tolist(), np.searchsorted(used, pairs).astype(np.int32)
 
 
 def _sum_over(alive: Mapping[int, Part], pairs: IntArray, price: Callable[[int], float]) -> float:
@@ -448,7 +449,7 @@ def _bounded_pairs(
     screen = criterion.screen
     queue = [
         _BoundedPair(screen.least_error(volume, hull_volume), first, second, False)
-        for first, second, volume, hull_volume in neighbours(alive, new, reach, run)
+        for first, second, volume, hull_volume in neighbours(alive, new, reach, run.threads)
     ]
     heapq.heapify(queue)
     return queue

@@ -6,16 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rlacd import _native
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
-from rlacd.solid.products import heights
 
 OFFSETS_PER_AXIS = 25
 """25 planes along each of 6 axes make the paper's 150."""
-
-
-SAME_AXIS = 1e-3
-"""Principal axes within this angle (radians) of a coordinate axis are replaced by it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,16 +50,10 @@ def axis_and_principal(component: Component, per_axis: int = OFFSETS_PER_AXIS) -
     """Candidates of one component: `per_axis` planes along x, y, z and its three principal axes.
 
     The planes divide the component's extent along each direction into `per_axis` + 1 equal slabs (the paper, 3.2).
+    Principal axes within 0.001 radians of a coordinate axis are replaced by it.
     """
-    directions = np.concatenate([np.eye(3), _snapped(component.principal_axes)])
-    along = heights(component.hull.vertices, directions)
-    lower, upper = along.min(axis=0), along.max(axis=0)
-    steps = np.arange(1, per_axis + 1) / (per_axis + 1)
-    offsets = lower[:, None] + (upper - lower)[:, None] * steps
-    return Candidates(np.ascontiguousarray(directions), np.ascontiguousarray(offsets))
-
-
-def _snapped(axes: FloatArray) -> FloatArray:
-    nearest = np.eye(3)[np.abs(axes).argmax(axis=1)]
-    aligned = np.linalg.norm(np.where(nearest == 1, 0.0, axes), axis=1) < SAME_AXIS
-    return np.where(aligned[:, None], nearest, axes)
+    hull = component.hull
+    directions, offsets = _native.candidate_planes(
+        component.vertices, component.faces, hull.vertices, hull.faces, per_axis, 0
+    )
+    return Candidates(np.ascontiguousarray(directions[::per_axis]), offsets.reshape(-1, per_axis))

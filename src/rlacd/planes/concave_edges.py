@@ -80,7 +80,7 @@ def concave_edge_planes(component: Component, count: int = 4) -> Candidates:
         K <= 3 * `count` directions with one plane each, in the order of choice; K = 0 for a convex component.
     """
     hull = component.hull
-    normals, offsets = _native.concave_edge_planes(
-        component.vertices, component.faces, hull.vertices, hull.faces, count
+    normals, offsets = _native.candidate_planes(
+        component.vertices, component.faces, hull.vertices, hull.faces, 0, count
     )
     return Candidates(normals, offsets[:, None])

@@ -5,8 +5,8 @@ from __future__ import annotations
 import threading
 from weakref import WeakKeyDictionary
 
+from rlacd import _native
 from rlacd.planes.candidates import OFFSETS_PER_AXIS, Candidates, axis_and_principal
-from rlacd.planes.concave_edges import concave_edge_planes
 from rlacd.planes.sweep import Sweep, sweep
 from rlacd.solid.component import Component
 
@@ -34,12 +34,19 @@ class SweepCache:
         with self._lock:
             known = self._candidates.get(component)
         if known is None:
-            known = axis_and_principal(component, self._per_axis)
-            if self._concave_edges > 0:
-                known = Candidates.joined(known, concave_edge_planes(component, self._concave_edges))
+            known = self._found(component)
             with self._lock:  # another thread may have done the same, with the same result
                 self._candidates[component] = known
         return known
+
+    def _found(self, component: Component) -> Candidates:
+        if self._concave_edges == 0:
+            return axis_and_principal(component, self._per_axis)
+        hull = component.hull
+        normals, offsets = _native.candidate_planes(
+            component.vertices, component.faces, hull.vertices, hull.faces, self._per_axis, self._concave_edges
+        )
+        return Candidates(normals, offsets[:, None])
 
     def of(self, component: Component, threads: int = 1) -> Sweep:
         """Get the sweep of a component."""

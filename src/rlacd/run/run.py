@@ -6,7 +6,7 @@ import contextlib
 import math
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from functools import cache
@@ -249,6 +249,26 @@ class Run:
             wait(futures)
             raise
 
+    def start(self, function: Callable[[], _R]) -> Future[_R]:
+        """Begin some work on another thread, or do it at once where there is only this one."""
+        if self._pool is not None and self.threads > 1:
+            return self._pool.submit(function)
+        done: Future[_R] = Future()
+        done.set_result(function())
+        return done
+
+    def result(self, begun: Future[_R]) -> _R:
+        """Wait for what was begun."""
+        self._watch([begun])
+        return begun.result()
+
+    @staticmethod
+    def drop(begun: Sequence[Future[_R]]) -> None:
+        """Leave undone what has not been begun in earnest, and wait for the rest."""
+        for future in begun:
+            future.cancel()
+        wait(begun)
+
     def share(self, count: int) -> int:
         """Threads for each of `count` items that are worked on at the same time."""
         return max(1, self.threads // max(1, count))
@@ -262,9 +282,9 @@ class Run:
         return results
 
     @staticmethod
-    def _watch(futures: list[Future[list[_R]]]) -> None:
+    def _watch(futures: Sequence[Future[_R]]) -> None:
         """Wait until all are done or one has failed; only this thread can look whether they have to stop."""
-        waiting: set[Future[list[_R]]] = set(futures)
+        waiting: set[Future[_R]] = set(futures)
         while waiting:
             done, waiting = wait(waiting, BETWEEN_POLLS, "FIRST_EXCEPTION")
             if any(future.exception() is not None for future in done):

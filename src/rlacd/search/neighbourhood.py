@@ -12,8 +12,11 @@ Source: P. Shaw, "Using Constraint Programming and Local Search Methods to Solve
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -25,8 +28,9 @@ from rlacd.search.recut import Exchange, recut
 from rlacd.search.redistribute import redistribute
 from rlacd.solid.component import Part
 
-BATCH = 8
-"""Trials made from the same state. It does not depend on the number of threads, so neither does the result."""
+LAG = 8
+"""A trial starts from the state that all trials but the `LAG` - 1 before it have left, so that many can be under way
+at a time. It does not depend on the number of threads, so neither does the result."""
 
 CLUSTER = 3
 """Parts that are recut together: two rarely become one, and of more, hardly any trial saves a part
@@ -84,6 +88,15 @@ class SearchOutcome:
 _Trial = Callable[[Run], Exchange | None]
 
 
+@dataclass(frozen=True)
+class _Begun:
+    """A trial under way: its own run, what it will find, and the cluster that it recuts."""
+
+    run: Run
+    found: Future[Exchange | None]
+    cluster: Cluster
+
+
 class Neighbourhood:
     """A decomposition that is being improved.
 
@@ -103,51 +116,58 @@ class Neighbourhood:
         self._patience = patience
         self._policies = [ranking(context.near_sweeps) for ranking in context.rankings]
         self._random = np.random.default_rng(context.seed)
-        self._graph = PartGraph(parts, context.criterion, run)
+        self._graph = PartGraph(parts, context.criterion)
         self._best = list(parts)
         self._steps = self._accepted = self._without_gain = 0
+        self._begun: deque[_Begun] = deque()
         self._recut: set[tuple[Cluster, int]] = set()
         self._offered: dict[tuple[int, Cluster], int] = {}
-        self._price = {"recut": 0.0, "redistribute": 0.0}  # units, of the last batch
+        self._price = 0.0  # units that the last trials took
+        self._exhausted = False
         self._near = min(context.criterion.screen.reach, 2 * context.criterion.overhang)
 
     def improve(self, most: float = math.inf) -> SearchOutcome:
         """Search until nothing is left to try, the run is over, `most` recuts are made or no fewer parts can do."""
-        exhausted = self._is_least
-        try:
-            if most > 0:
-                self.redistribute_all(SMALL)
-                self._recut_some(min(most, OPENING))
-                self.redistribute_all()
-            exhausted = self._is_least
-            while not exhausted and self._steps < most and not self._is_least and not self._run.is_over:
-                target = self._steps + RECUTS_PER_PART * len(self._graph.parts)
-                exhausted = self._recut_some(min(most, target)) or self._gave_up
-                self.redistribute_all()
-        except Stopped:  # raised between two exchanges: the best state so far is kept
-            self._run.note_stop()
+        self._exhausted = False
+        if most > 0:
+            self._make(self._trials(most))
+        exhausted = self._exhausted or self._gave_up or self._is_least
         return SearchOutcome(self._best, self._steps, self._accepted, exhausted)
 
-    def redistribute_all(self, share: float = 1.0) -> None:
+    def redistribute_all(self) -> None:
+        """Offer each part to those around."""
+        self._make(self._redistributions())
+
+    def _trials(self, most: float) -> Iterator[tuple[_Trial, Cluster]]:
+        yield from self._redistributions(SMALL)
+        yield from self._recuts(min(most, OPENING))
+        yield from self._redistributions()
+        while not self._exhausted and self._steps < most and self._may_continue():
+            yield from self._recuts(min(most, self._steps + RECUTS_PER_PART * len(self._graph.parts)))
+            yield from self._redistributions()
+
+    def _redistributions(self, share: float = 1.0) -> Iterator[tuple[_Trial, Cluster]]:
         """Offer each part, or the smallest share of them, to those around."""
         graph = self._graph
         waiting = sorted(graph.parts, key=lambda i: (graph.parts[i].hull.volume, i))
-        waiting = waiting[: math.ceil(share * len(waiting))]
-        while waiting and not self._is_least and not self._gave_up and self._may_continue():
-            batch, waiting = waiting[:BATCH], waiting[BATCH:]
-            self._make("redistribute", [trial for i in batch if (trial := self._redistributing(i)) is not None])
+        for which in waiting[: math.ceil(share * len(waiting))]:
+            if not self._may_continue():
+                return
+            if (trial := self._redistributing(which)) is not None:
+                yield trial, ()
 
-    def _recut_some(self, most: float) -> bool:
-        """Recut clusters until `most` steps are made in total; whether nothing new was left to recut."""
-        while self._steps < most and not self._is_least and not self._gave_up and self._may_continue():
-            taken: set[int] = set()
-            trials = [trial for _ in range(BATCH) if (trial := self._recutting(taken)) is not None]
-            if not trials:
-                return True
-            # Drawn in full and then shortened, so a search with more steps starts with the same trials.
-            trials = trials[: int(min(BATCH, most - self._steps))]
-            self._steps += self._make("recut", trials)
-        return self._is_least
+    def _recuts(self, most: float) -> Iterator[tuple[_Trial, Cluster]]:
+        """Recut clusters until `most` steps are made in total."""
+        while self._steps < most and self._may_continue():
+            drawn = self._recutting()
+            if drawn is not None:
+                self._steps += 1
+                yield drawn
+            elif self._begun:  # parts that are being recut may be drawn again, or others in their place
+                self._settle()
+            else:
+                self._exhausted = True
+                return
 
     @property
     def _is_least(self) -> bool:
@@ -158,21 +178,23 @@ class Neighbourhood:
         return self._without_gain >= max(self._patience * len(self._graph.parts), LEAST_TRIALS)
 
     def _may_continue(self) -> bool:
+        if self._is_least or self._gave_up:
+            return False
         return self._run.step(self._steps, None, len(self._best))
 
-    def _recutting(self, taken: set[int]) -> _Trial | None:
-        """Draw a cluster disjoint from those taken that has not been recut by the drawn policy."""
+    def _recutting(self) -> tuple[_Trial, Cluster] | None:
+        """Draw a cluster without parts that are being recut; it has not been recut by the drawn policy."""
+        taken = {i for begun in self._begun for i in begun.cluster}
         for _ in range(DRAWS):
             cluster = self._graph.draw(CLUSTER, self._random)
             if cluster is None:
                 return None
             policy = int(self._random.integers(len(self._policies)))
             if taken.isdisjoint(cluster) and (cluster, policy) not in self._recut:
-                taken.update(cluster)
                 self._recut.add((cluster, policy))
                 parts, around = self._graph.of(cluster), self._graph.of(self._graph.around(cluster))
                 context, chosen = self._context, self._policies[policy]
-                return lambda run: recut(parts, around, chosen, context.criterion, run, context.root)
+                return partial(recut, parts, around, chosen, context.criterion, whole=context.root), cluster
         return None
 
     def _redistributing(self, which: int) -> _Trial | None:
@@ -186,28 +208,49 @@ class Neighbourhood:
         part, takers, context = self._graph.parts[which], self._graph.of(around), self._context
         return lambda run: redistribute(part, takers, context.criterion, np.random.default_rng(seed), context.root, run)
 
-    def _make(self, kind: str, trials: list[_Trial]) -> int:
-        """Make trials of the same state at a time, as many as the work left pays for; apply what they find in order."""
-        run, account = self._run, self._run.work
-        if not trials:
-            return 0
-        if self._price[kind] > 0 and math.isfinite(account.left):
-            trials = trials[: max(1, int(account.left / self._price[kind]))]
-        alone = [run.alone(account.share(len(trials))) for _ in trials]
-        found = run.map(lambda pair: pair[0](pair[1]), zip(trials, alone, strict=True))
-        for exchange, trial in zip(found, alone, strict=True):
-            account.pay(trial.work.done)
-            taken = exchange is not None and self._graph.apply(exchange)
-            gain = exchange.gain if exchange is not None and taken else 0
-            self._accepted += taken
-            self._without_gain = 0 if gain > 0 else self._without_gain + 1
-            if taken:
-                self._best = min(self._best, self.parts, key=cost)
-        self._price[kind] = max(trial.work.done for trial in alone)
+    def _make(self, trials: Iterator[tuple[_Trial, Cluster]]) -> None:
+        """Make trials, `LAG` at a time, and apply what they find in the order in which they began."""
+        try:
+            while True:
+                while self._begun and (len(self._begun) == LAG or self._allowance < self._price):
+                    self._settle()
+                if (drawn := next(trials, None)) is None:
+                    break
+                trial, cluster = drawn
+                alone = self._run.alone(self._allowance)
+                self._begun.append(_Begun(alone, self._run.start(partial(trial, alone)), cluster))
+            while self._begun:
+                self._settle()
+        except Stopped:  # raised between two exchanges: the best state so far is kept
+            self._run.note_stop()
+        finally:
+            self._run.drop([begun.found for begun in self._begun])
+            self._begun.clear()
+
+    @property
+    def _allowance(self) -> float:
+        """Units for another trial: an equal share of what is left, without what those under way may use."""
+        left = self._run.work.left
+        if math.isinf(left):
+            return left
+        return (left - sum(begun.run.work.most for begun in self._begun)) // (LAG - len(self._begun))
+
+    def _settle(self) -> None:
+        """Apply what the first of the trials under way has found, unless parts that it changes have gone."""
+        begun, account = self._begun[0], self._run.work
+        exchange = self._run.result(begun.found)
+        self._begun.popleft()
+        account.pay(begun.run.work.done)
+        taken = exchange is not None and self._graph.apply(exchange)
+        gain = exchange.gain if exchange is not None and taken else 0
+        self._accepted += taken
+        self._without_gain = 0 if gain > 0 else self._without_gain + 1
+        if taken:
+            self._best = min(self._best, self.parts, key=cost)
         account.pay(self._graph.collect())
-        if all(trial.work.is_spent for trial in alone):
+        self._price = max(begun.run.work.done, self._price / 2)
+        if begun.run.work.is_spent and not self._begun:
             account.close()
-        return len(trials)
 
     @property
     def parts(self) -> list[Part]:

@@ -8,8 +8,9 @@ import numpy as np
 
 from rlacd.criteria.criterion import Criterion
 from rlacd.merge.merge import neighbours
-from rlacd.run import Run, work
+from rlacd.run import work
 from rlacd.search.recut import Exchange
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
 from rlacd.solid.reunite import TOUCHING, touch
 
@@ -32,14 +33,11 @@ class PartGraph:
         They get the ids 0, 1, ...
     criterion : Criterion
         Decides what may be filled for free.
-    run : Run
-        Tests pairs in parallel.
     """
 
-    def __init__(self, parts: Sequence[Part], criterion: Criterion, run: Run) -> None:
+    def __init__(self, parts: Sequence[Part], criterion: Criterion) -> None:
         self.parts: dict[int, Part] = {}
         self._screen = criterion.screen
-        self._run = run
         self._gaps: dict[int, dict[int, float]] = {}
         self._next = 0
         self._work = 0.0
@@ -54,6 +52,8 @@ class PartGraph:
         self._add(new)
         self._ids = np.array(list(self.parts), dtype=np.int64)
         self._boxes = np.array([part.box for part in self.parts.values()]).reshape(-1, 2, 3)
+        self._pairs = [(i, j) for i, gaps in self._gaps.items() for j in gaps if i < j]
+        self._pair_gaps = np.array([self._gaps[i][j] for i, j in self._pairs])
 
     def _add(self, new: Sequence[Part]) -> None:
         if not new:
@@ -63,15 +63,14 @@ class PartGraph:
         self.parts.update(zip(ids, new, strict=True))
         self._gaps.update((i, {}) for i in ids)
         filled = {i: self._screen.filled(part) for i, part in self.parts.items()}
-        near = neighbours(self.parts, ids, TOUCHING, self._run)
+        near = neighbours(self.parts, ids, TOUCHING, 1)
         self._work += sum(
             work.joining(len(self.parts[i].hull.vertices) + len(self.parts[j].hull.vertices))
             + work.gluing(self.parts[i].size + self.parts[j].size)
             for i, j, _, _ in near
         )
-        touching = self._run.map(lambda pair: touch(self.parts[pair[0]], self.parts[pair[1]]), near)
-        for (i, j, _, hull_volume), does in zip(near, touching, strict=True):
-            if does:
+        for i, j, _, hull_volume in near:
+            if touch(self.parts[i], self.parts[j]):
                 self._gaps[i][j] = self._gaps[j][i] = max(hull_volume - filled[i] - filled[j], 0.0) ** (1 / 3)
 
     def collect(self) -> float:
@@ -107,10 +106,9 @@ class PartGraph:
         Each gap is multiplied by a random factor between 1 - `SPREAD` and 1 + `SPREAD` before comparing. None if the
         connected parts around the pair are too few.
         """
-        pairs = [(gap, i, j) for i, gaps in self._gaps.items() for j, gap in gaps.items() if i < j]
-        if not pairs:
+        if not self._pairs:
             return None
-        _, *cluster = pairs[_least([gap for gap, _, _ in pairs], random)]
+        cluster = list(self._pairs[_least(self._pair_gaps, random)])
         while len(cluster) < size:
             near: dict[int, float] = {}
             for i in cluster:
@@ -119,9 +117,9 @@ class PartGraph:
                         near[j] = min(gap, near.get(j, np.inf))
             if not near:
                 return None
-            cluster.append(list(near)[_least(list(near.values()), random)])
+            cluster.append(list(near)[_least(np.array(list(near.values())), random)])
         return tuple(sorted(cluster))
 
 
-def _least(gaps: Sequence[float], random: np.random.Generator) -> int:
-    return int(np.argmin(np.array(gaps) * random.uniform(1 - SPREAD, 1 + SPREAD, len(gaps))))
+def _least(gaps: FloatArray, random: np.random.Generator) -> int:
+    return int(np.argmin(gaps * random.uniform(1 - SPREAD, 1 + SPREAD, len(gaps))))

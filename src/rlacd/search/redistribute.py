@@ -17,8 +17,8 @@ from rlacd.merge.merge import Uniter
 from rlacd.run import Run, work
 from rlacd.search.recut import Exchange
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.component import Component, Part, Plane
-from rlacd.solid.products import dots, heights
+from rlacd.solid.component import Component, Part
+from rlacd.solid.products import dots
 from rlacd.solid.reunite import reunite
 
 TAKERS = 6
@@ -135,13 +135,6 @@ def _gaps(boxes: FloatArray, box: FloatArray) -> FloatArray:
 
 def _halved(piece: Component, random: np.random.Generator) -> list[Component]:
     """Cut across the longest coordinate axis or principal axis, chosen at random; the smaller half first."""
-    axes = np.eye(3) if random.random() < 0.5 else piece.principal_axes
-    along = heights(piece.hull.vertices, axes)
-    lower, upper = along.min(axis=0), along.max(axis=0)
-    longest = int(np.argmax(upper - lower))
-    share = random.uniform(0.5 - MIDDLE, 0.5 + MIDDLE)
-    x, y, z = (float(c) for c in axes[longest])
-    below, above = piece.cut(Plane((x, y, z), float(lower[longest] + share * (upper - lower)[longest])))
-    if below is None or above is None:
-        return []
-    return sorted([below, above], key=lambda half: half.volume)
+    along_principal = random.random() >= 0.5
+    halves = piece.halve(along_principal, random.uniform(0.5 - MIDDLE, 0.5 + MIDDLE))
+    return sorted(halves, key=lambda half: half.volume)

@@ -10,31 +10,17 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from manifold3d import Manifold, Mesh64
 
 from rlacd import _native
 from rlacd.solid.arrays import FloatArray, IntArray
-from rlacd.solid.boolean_time import require_time_for
-from rlacd.solid.caps import FOLDED, NEGLIGIBLE_FOLD, Surface, capped, section_caps
 from rlacd.solid.hull import Hull
-from rlacd.solid.manifold import to_manifold
-from rlacd.solid.solid import mesh_of, surface_of
+from rlacd.solid.solid import Shape, mesh_of
 
 NEGLIGIBLE_VOLUME = 1e-12
 """Solids below this volume (the frame's box has 8) are rounding left over by a cut."""
 
 LOST = 1e-6
 """Share of a solid's volume that may be lost in a boolean, or as shavings (see `rlacd.cut`)."""
-
-
-MARGIN = 1e-3
-"""Margin around a box when the solid is cropped to it, so that no cap touches what lies inside the box."""
-
-FEW_FACES = 400
-"""A boolean of this few faces takes no longer than cropping them first."""
-
-MANY_FACES = 2000
-"""Solids with more faces are halved before they are cropped to a box."""
 
 
 @dataclass(frozen=True)
@@ -223,7 +209,7 @@ class Component(Part):
 
     Parameters
     ----------
-    solid : manifold3d.Manifold or (vertices, faces)
+    solid : Shape
         The solid, in the normalised frame; not flat. A surface [V, 3], [F, 3] has to be closed and oriented.
     threads : int
         Number of threads that may prepare the tests of how well hulls are filled.
@@ -234,25 +220,28 @@ class Component(Part):
         The solid is flat.
     """
 
-    def __init__(self, solid: Manifold | tuple[FloatArray, IntArray], threads: int = 1) -> None:
+    def __init__(self, solid: Shape, threads: int = 1) -> None:
         vertices, faces = mesh_of(solid)
         hull = Hull.of(vertices)
         if hull is None:
             raise ValueError("a component has to have a volume")
         super().__init__(vertices, faces, _native.mesh_volume(vertices, faces), hull)
         self._threads = threads
-        if isinstance(solid, Manifold):
-            self.manifold = solid
+
+    @classmethod
+    def of(cls, piece: _native.Piece, within: Component | None = None) -> Component:
+        """Take over what a kernel made."""
+        vertices, faces, volume, *hull = piece
+        component = cls.__new__(cls)
+        Part.__init__(component, vertices, faces, volume, Hull(*hull))
+        component._threads = 1
+        component.within = within
+        return component
 
     @property
     def members(self) -> tuple[Component, ...]:
         """Itself."""
         return (self,)
-
-    @cached_property
-    def manifold(self) -> Manifold:
-        """The solid, ready for booleans."""
-        return to_manifold(self.vertices, self.faces)
 
     @cached_property
     def filling(self) -> _native.Filling:
@@ -270,129 +259,27 @@ class Component(Part):
 
     def cut(self, plane: Plane, least: float = NEGLIGIBLE_VOLUME) -> tuple[Component | None, Component | None]:
         """Cut by a plane: returns the sides below and above, None for a side of no more than the least volume."""
-        sides = _native.cut_by_plane(self.vertices, self.faces, *plane.normal, plane.offset)
-        (below, _), (above, _) = (capped(*side) for side in sides)
-        return _component(below, self, least), _component(above, self, least)
+        below, above = _native.cut(self.vertices, self.faces, *plane.normal, plane.offset, least)
+        return below and Component.of(below, self), above and Component.of(above, self)
+
+    def halve(self, along_principal: bool, share: float) -> list[Component]:
+        """Cut across the longest coordinate axis or principal axis, a share of its length below; empty if it fails."""
+        below, above = _native.halve(
+            self.vertices, self.faces, self.hull.vertices, along_principal, share, NEGLIGIBLE_VOLUME
+        )
+        return [] if below is None or above is None else [Component.of(below, self), Component.of(above, self)]
 
     def inside(self, hull: Hull) -> Part:
         """Return all that the solid fills of a hull, closed by caps on the hull's facets; without faces if nothing."""
-        (vertices, faces), tree = self._clipped(hull)
-        volume = max(0.0, _native.mesh_volume(vertices, faces)) if len(faces) else 0.0
+        vertices, faces, volume, tree = self.filling.clipped(hull.vertices, hull.faces)
         part = Part(vertices, faces, volume, hull)
         part.tree = tree
         return part
 
-    def _clipped(self, hull: Hull) -> tuple[Surface, _native.TreeCache]:
-        found = self.filling.clipped(hull.vertices, hull.faces)
-        if found is not None:
-            vertices, faces, sections, tree = found
-            caps, folded = section_caps(*sections)
-            if folded <= FOLDED:
-                return (vertices, np.ascontiguousarray(np.concatenate([faces, caps]), dtype=np.int32)), tree
-        require_time_for(len(self.faces))
-        clipped = self.around(hull.box) ^ Manifold(Mesh64(hull.vertices, hull.faces.astype(np.uint64)))
-        return surface_of(clipped), _native.TreeCache()
-
-    def around(self, box: FloatArray) -> Manifold:
-        """Return the solid cropped to a box [2, 3] and a margin around it, for booleans with what lies in the box.
-
-        Returns the whole solid if it is small, or if it cannot be cut cleanly.
-        """
-        surface = self._cell(box)
-        room = np.stack([box[0] - self.box[0], self.box[1] - box[1]])  # beyond each side of the box
-        for side, axis in sorted(np.argwhere(room > MARGIN).tolist(), key=lambda at: -room[at[0], at[1]]):
-            if len(surface[1]) <= FEW_FACES:
-                break
-            kept = _halves(surface, axis, float(box[side, axis] + (MARGIN if side else -MARGIN)))[1 - side]
-            if kept is None:
-                return self.manifold
-            surface = kept
-        if surface[1] is self.faces:
-            return self.manifold
-        clipped = Manifold(Mesh64(surface[0], surface[1].astype(np.uint64)))
-        volume = _native.mesh_volume(*surface) if len(surface[1]) else 0.0
-        return clipped if abs(clipped.volume() - volume) <= NEGLIGIBLE_VOLUME + LOST * volume else self.manifold
-
-    def _cell(self, box: FloatArray) -> tuple[FloatArray, IntArray]:
-        """Return the smallest cell of the solid that holds a box, by repeatedly halving it across its longest side.
-
-        Cells are cached: otherwise every crop would go through all faces.
-        """
-        cell, place = self.box, ""
-        surface = self.vertices, self.faces
-        while len(surface[1]) > MANY_FACES:
-            axis = int(np.argmax(cell[1] - cell[0]))
-            middle = float(cell[:, axis].mean())
-            if box[1, axis] + MARGIN <= middle:
-                side = 0
-            elif box[0, axis] - MARGIN >= middle:
-                side = 1
-            else:
-                break
-            if place not in self._cells:
-                self._cells[place] = _halves(surface, axis, middle)
-            half = self._cells[place][side]
-            if half is None:
-                break
-            surface = half
-            cell = cell.copy()
-            cell[1 - side, axis] = middle
-            place += str(side)
-        return surface
-
-    @cached_property
-    def _cells(self) -> dict[str, tuple[Surface | None, ...]]:
-        return {}
-
     def pieces(self) -> list[Component]:
         """Connected pieces, cavities kept inside the piece that encloses them; ``[self]`` if it is connected."""
-        bodies = _native.bodies(self.vertices, self.faces)
-        if len(bodies) == 1:
-            return [self]
-        volumes = [_native.mesh_volume(*body) for body in bodies]
-        shells = [(volume, body) for volume, body in zip(volumes, bodies, strict=True) if volume > 0]
-        cavities = [body for volume, body in zip(volumes, bodies, strict=True) if volume < 0]
-        surfaces = _enclose(shells, cavities) if cavities else [body for _, body in shells]
-        return [piece for surface in surfaces if (piece := _component(surface, self)) is not None]
-
-
-def _halves(surface: Surface, axis: int, offset: float) -> tuple[Surface | None, ...]:
-    """Cut a closed surface across a coordinate axis: the sides below and above, None if it cannot be cut cleanly."""
-    x, y, z = np.eye(3)[axis].tolist()
-    sides = (capped(*side) for side in _native.cut_by_plane(*surface, x, y, z, offset))
-    return tuple(side if folded <= NEGLIGIBLE_FOLD else None for side, folded in sides)
-
-
-def _component(
-    solid: Manifold | tuple[FloatArray, IntArray], within: Component, least: float = NEGLIGIBLE_VOLUME
-) -> Component | None:
-    if isinstance(solid, Manifold):
-        is_empty = solid.is_empty() or solid.volume() <= least
-    else:
-        is_empty = not len(solid[1]) or _native.mesh_volume(*solid) <= least
-    if is_empty:
-        return None
-    try:
-        component = Component(solid)
-    except ValueError:
-        return None
-    component.within = within
-    return component
-
-
-def _enclose(
-    shells: list[tuple[float, tuple[FloatArray, IntArray]]], cavities: list[tuple[FloatArray, IntArray]]
-) -> list[tuple[FloatArray, IntArray]]:
-    """Assign every cavity (a shell of negative volume) to the smallest of the shells (volume, surface) around it."""
-    by_shell = [[surface] for _, surface in shells]
-    by_volume = sorted(range(len(shells)), key=lambda i: (shells[i][0], i))
-    for cavity in cavities:
-        point = cavity[0][:1]
-        for i in by_volume:
-            if _native.Surface(*shells[i][1]).winding(point)[0] > 0.5:
-                by_shell[i].append(cavity)
-                break
-    return [group[0] if len(group) == 1 else concatenated(group) for group in by_shell]
+        pieces = _native.connected_pieces(self.vertices, self.faces, NEGLIGIBLE_VOLUME)
+        return [self] if pieces is None else [Component.of(piece, self) for piece in pieces]
 
 
 def concatenated(surfaces: list[tuple[FloatArray, IntArray]]) -> tuple[FloatArray, IntArray]:

@@ -44,18 +44,14 @@ class Hull:
         return _native.HullCorners(self.vertices)
 
     @classmethod
-    def of(cls, points: FloatArray) -> Hull | None:
-        """Return the hull of points [N, 3]; None when they all lie in one plane."""
-        points = np.ascontiguousarray(points, dtype=np.float64)
-        indices, faces, rank = _native.convex_hull(points)
-        if rank < 3:
-            return None
-        vertices = points[indices]
-        return cls(vertices, faces, _native.mesh_volume(vertices, faces))
+    def of(cls, *points: FloatArray) -> Hull | None:
+        """Return the hull of arrays of points [N, 3]; None when they all lie in one plane."""
+        found = _native.joint_hull([np.ascontiguousarray(some, dtype=np.float64) for some in points])
+        return found and cls(*found)
 
     @classmethod
     def around(cls, *hulls: Hull) -> Hull:
         """Return the joint hull of several hulls."""
-        joint = cls.of(np.concatenate([hull.vertices for hull in hulls]))
+        joint = cls.of(*(hull.vertices for hull in hulls))
         assert joint is not None, "the hull of solid hulls is solid"
         return joint

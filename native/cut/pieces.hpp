@@ -1,0 +1,36 @@
+// Pieces of a solid: what a cut or a search for connected bodies leaves, each with its volume and its hull.
+//
+// Input:  a closed oriented triangle mesh.
+// Output: its sides below and above a plane, its connected pieces, or what it fills of a convex polytope; closed.
+// Algorithm: cut by the plane and capped; bodies (bodies.hpp), with each cavity in the smallest shell around it.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "base/geometry.hpp"
+
+namespace rlacd {
+
+struct Piece {
+  Mesh mesh, hull;
+  double volume, hull_volume;
+};
+
+// Nothing if the volume is not above the least, or the mesh is flat.
+std::optional<Piece> piece_of(Mesh mesh, double least);
+
+std::array<std::optional<Piece>, 2> cut(const Mesh& mesh, Vec3 normal, double offset, double least);
+
+// Across the longest of three axes, with a share of its length below.
+std::array<std::optional<Piece>, 2> halve(const Mesh& mesh, const std::vector<Vec3>& hull,
+                                          const std::array<Vec3, 3>& axes, double share, double least);
+
+// Nothing if all is one piece.
+std::optional<std::vector<Piece>> connected_pieces(const Mesh& mesh, double least);
+
+// What is below all facet planes of a hull, cut by one after the other: slower than convex_clip.hpp, but always closed.
+Mesh inside_all(Mesh mesh, const Mesh& hull);
+
+}  // namespace rlacd
