@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import trimesh
 from trimesh import creation
-from typer.testing import CliRunner, Result
+from click.testing import CliRunner, Result
 
 import rlacd
 from rlacd.cli.main import app

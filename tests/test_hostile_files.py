@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from trimesh import creation
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from rlacd.batch.assets import Asset
 from rlacd.batch.ledger import Ledger

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from rlacd.cli.main import app
 from rlacd.errors import OptionError, WeightsError

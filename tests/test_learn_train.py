@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import psutil
 import pytest
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from rlacd.cli.main import app
 from rlacd.errors import OptionError, TrainingError

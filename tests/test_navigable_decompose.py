@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import trimesh
 from manifold3d import Manifold, OpType
-from typer.testing import CliRunner, Result
+from click.testing import CliRunner, Result
 
 import rlacd
 from rlacd.cli.main import app

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 import rlacd
 from rlacd.cli.main import app

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 from lxml import etree
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 import rlacd
 from rlacd.cli.main import app

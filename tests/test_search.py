@@ -14,7 +14,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from manifold3d import Manifold
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 import rlacd
 from rlacd import _native

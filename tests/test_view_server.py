@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from rlacd.cli.main import app
 from rlacd.criteria import NavigableSpace
