@@ -11,9 +11,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
 
+import click
 import numpy as np
 import pytest
-import click
 from click.testing import CliRunner
 
 import rlacd

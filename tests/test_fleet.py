@@ -20,7 +20,7 @@ from rlacd.batch import JobSpec, find_assets
 from rlacd.batch.assets import _places, content_hash
 from rlacd.batch.ledger import Ledger
 from rlacd.batch.store import FolderStore, ResultStore, open_store
-from rlacd.cli.main import app
+from rlacd.cli.batch import COMMAND
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError, OptionError, OutputError, WeightsError
 from rlacd.io.write import save_hulls
@@ -181,9 +181,7 @@ def test_all_that_decides_the_bytes_is_in_the_key_and_nothing_else(tmp_path: Pat
 
 
 def test_a_batch_takes_every_option_of_a_decomposition() -> None:
-    command = next(command for command in app.registered_commands if command.name == "batch").callback
-    assert command is not None
-    taken = set(inspect.signature(command).parameters)
+    taken = {parameter.name for parameter in COMMAND.params}
     assert taken >= {option.name for option in dataclasses.fields(Options)} - {"criterion"}
     assert taken >= {name for name in inspect.signature(Decomposition.save).parameters if name not in NOT_OPTIONS}
 

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from trimesh import creation
 from click.testing import CliRunner
+from trimesh import creation
 
 from rlacd.batch.assets import Asset
 from rlacd.batch.ledger import Ledger

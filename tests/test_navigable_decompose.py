@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from manifold3d import Manifold, OpType
 from click.testing import CliRunner, Result
+from manifold3d import Manifold, OpType
 
 import rlacd
 from rlacd.cli.main import app

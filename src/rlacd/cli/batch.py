@@ -95,6 +95,8 @@ def _batch(assets: Path, quiet: bool | None, **given: Any) -> None:
     from rlacd.batch import Batch, JobSpec
 
     own, where = BatchOptions(**taken(given, BatchOptions)), PoolOptions(**taken(given, PoolOptions))
+    if where.jobs == 0:
+        raise OptionError("--jobs is 0; a batch needs at least 1 process.")
     written = {"file_format": own.file_format, **{name: given.pop(name) for name in WRITTEN}}
     spec = JobSpec.of(decompose_options({**given, "threads": own.threads}), folders=own.folders, **written)
     work = Batch(assets, own.output, spec, where.limits(), own.fallback, own.glob, own.redo)
