@@ -18,7 +18,7 @@ import rlacd
 from rlacd import NavigableSpace
 from rlacd.batch import JobSpec, find_assets
 from rlacd.batch.assets import _places, content_hash
-from rlacd.batch.ledger import Ledger
+from rlacd.batch.manifest import Ledger
 from rlacd.batch.store import FolderStore, ResultStore, open_store
 from rlacd.cli.batch import COMMAND
 from rlacd.decomposition import Decomposition
@@ -239,19 +239,17 @@ def test_files_go_in_and_come_out(store: ResultStore) -> None:
 
 @pytest.mark.promise("batch-resumes")
 def test_rows_outlive_a_run_that_never_ended(store: ResultStore) -> None:
-    first = Ledger(store, "m.jsonl")
-    first.add({"mesh": "b", "n": 1})
-    first.add({"mesh": "a", "n": 1})
-    first.add({"mesh": "b", "n": 2})
-    first.close()
-    second = Ledger(store, "m.jsonl")
-    assert second.rows() == [{"mesh": "a", "n": 1}, {"mesh": "b", "n": 2}]
-    second.add({"mesh": "c\udcff", "n": 3})
-    second.finish()
-    again = Ledger(store, "m.jsonl")
-    assert [row["mesh"] for row in again.rows()] == ["a", "b", "c\udcff"]
+    with pytest.raises(KeyboardInterrupt), Ledger(store, "m.jsonl") as first:
+        first.add({"mesh": "b", "n": 1})
+        first.add({"mesh": "a", "n": 1})
+        first.add({"mesh": "b", "n": 2})
+        raise KeyboardInterrupt
+    with Ledger(store, "m.jsonl") as second:
+        assert second.rows() == [{"mesh": "a", "n": 1}, {"mesh": "b", "n": 2}]
+        second.add({"mesh": "c\udcff", "n": 3})
     before = store.read("m.jsonl")
-    again.finish()
+    with Ledger(store, "m.jsonl") as again:
+        assert [row["mesh"] for row in again.rows()] == ["a", "b", "c\udcff"]
     assert store.read("m.jsonl") == before
 
 
@@ -279,10 +277,9 @@ def test_half_a_line_is_cut_off_and_a_damaged_one_is_reported(tmp_path: Path) ->
     journal = tmp_path / ".rlacd" / "m.jsonl"
     journal.parent.mkdir()
     journal.write_bytes(b'{"mesh": "a"}\n{"mesh": "b')
-    ledger = Ledger(store, "m.jsonl")
-    assert [row["mesh"] for row in ledger.rows()] == ["a"]
-    ledger.add({"mesh": "c"})
-    ledger.close()
+    with Ledger(store, "m.jsonl") as ledger:
+        assert [row["mesh"] for row in ledger.rows()] == ["a"]
+        ledger.add({"mesh": "c"})
     assert [row["mesh"] for row in Ledger(store, "m.jsonl").rows()] == ["a", "c"]
     journal.write_bytes(b'{"mesh": "a"}\n{"mesh": 1}\n')
     with pytest.raises(OutputError, match="line 2"):

@@ -13,7 +13,7 @@ from rlacd.plain_json import printable
 
 if TYPE_CHECKING:
     from rlacd.batch import Asset, Summary
-    from rlacd.batch.ledger import Row
+    from rlacd.batch.manifest import Row
 
 REPORT_EVERY = 30.0
 """Seconds between progress lines if stderr is not a terminal."""
