@@ -15,8 +15,7 @@ import trimesh
 
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MissingExtraError, OptionError, OutputError
-from rlacd.view import check_picture, draw_picture
-from rlacd.view.picture import caption
+from rlacd.view.picture import caption, check_picture, draw_picture
 from tests.hulls import hull_of, moved
 
 Image = pytest.importorskip("PIL.Image", reason="the extra view is not installed")

@@ -16,7 +16,7 @@ import typer
 
 import rlacd
 from rlacd.cli.main import app
-from rlacd.viewer import viewer
+from rlacd.view import viewer
 
 ROOT = Path(__file__).resolve().parent.parent
 SNIPPET = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)

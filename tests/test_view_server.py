@@ -29,9 +29,10 @@ from rlacd.cli.main import app
 from rlacd.criteria import NavigableSpace
 from rlacd.errors import MeshFileError, OptionError
 from rlacd.options import Options
-from rlacd.viewer.controls import ViewerControls
-from rlacd.viewer.downloads import offered
-from rlacd.viewer.viewer import Viewer, open_viewer, read_controls
+from rlacd.view.controls import ViewerControls, read_controls
+from rlacd.view.downloads import offered
+from rlacd.view.viewer import Viewer
+from tests.viewing import open_viewer
 
 PATIENCE = 60.0
 NAME = "an elbow 'n ümläut"

@@ -34,10 +34,11 @@ CONTROLS = ("threshold", "criterion", "quality", "max_hulls", "open")
 def _view(mesh: Path, browser: bool, **given: Any) -> None:
     if mesh.suffix.lower() in ROBOTS:
         raise OptionError(f"{mesh} is a robot; view shows a single mesh: give one of the meshes that it refers to.")
-    from rlacd.viewer.viewer import open_viewer
+    from rlacd.decompose_mesh import decompose
+    from rlacd.view.viewer import open_viewer
 
     controls = lengths(chosen({name: given.pop(name) for name in CONTROLS}), metres=False)
-    with open_viewer(mesh, controls, **given) as server, contextlib.suppress(KeyboardInterrupt):
+    with open_viewer(mesh, decompose, controls, **given) as server, contextlib.suppress(KeyboardInterrupt):
         say(f"{mesh.name} is shown at {server.address} (Ctrl-C ends)")
         if browser:
             webbrowser.open(server.address)

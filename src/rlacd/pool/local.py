@@ -49,7 +49,7 @@ class _Child:
         self.reader.start()
 
     def _read(self) -> None:
-        """Pass on what the process says, then None; a thread, since not every system can wait for a pipe for a while."""
+        """Pass on what the process says, then None; a thread, since not every system can poll a pipe."""
         assert self.process.stdout is not None
         try:
             with self.process.stdout as pipe, contextlib.suppress(EOFError, OSError, ValueError):
