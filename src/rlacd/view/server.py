@@ -55,7 +55,7 @@ LONGEST_REQUEST = 10_000  # bytes of JSON
 LARGEST_MESH = 2**28  # bytes of an uploaded file
 QUICKEST = 0.05  # seconds between two reports of progress
 HEARTBEAT = 3.0  # seconds of silence before a stream sends a sign of life, which shows whether the client still reads
-HEAVY = 2  # concurrent answers that take much memory and time
+HEAVY = 2  # concurrent scenes, and downloads: answers that take much memory and time
 UPLOADS = 4  # concurrent uploads, each in memory; slow ones keep nothing else waiting
 
 HARDENING = {
@@ -97,7 +97,8 @@ class ViewServer(BoundedServer):
         options: ViewerControls,
     ) -> None:
         self.session, self.subject = session, subject
-        self.heavy, self.uploads = threading.BoundedSemaphore(HEAVY), threading.BoundedSemaphore(UPLOADS)
+        self.heavy, self.downloads = threading.BoundedSemaphore(HEAVY), threading.BoundedSemaphore(HEAVY)
+        self.uploads = threading.BoundedSemaphore(UPLOADS)
         self._made: dict[str, tuple[int, bytes]] = {}
         self._making = threading.Lock()
         self._opening = threading.Lock()
@@ -335,7 +336,7 @@ class _Handler(BoundedHandler):
 
     def _send_file(self, wanted: str, up: str) -> None:
         check_up(up)
-        with self.server.heavy:
+        with self.server.downloads:
             file = download(self._result()[1], wanted, up=up, unit=self.server.subject.unit)
         plain = file.name.encode("ascii", "replace").decode().replace('"', "_").replace("\\", "_")
         exact = urllib.parse.quote(file.name.encode(errors="replace"))
