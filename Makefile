@@ -25,21 +25,24 @@ SECONDS_TO_FUZZ = $(shell expr 60 \* $(MINUTES))
 install: $(VENV)/installed
 
 $(VENV)/tools: constraints-dev.txt
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --upgrade pip
-	$(BIN)/pip install --quiet --constraint constraints-dev.txt scikit-build-core nanobind cmake ninja
-	touch $@
+	@echo "making an environment in $(VENV) and fetching the build tools (half a minute) ..."
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@$(BIN)/pip install --quiet --upgrade pip
+	@$(BIN)/pip install --quiet --constraint constraints-dev.txt scikit-build-core nanobind cmake ninja
+	@touch $@
 
 $(VENV)/installed: $(VENV)/tools $(NATIVE_SOURCES)
-	$(RLACD_INSTALL) --editable '.[view]'
-	touch $@
+	@echo "fetching libraries and compiling the kernels (some minutes the first time) ..."
+	@begun=$$(date +%s); $(RLACD_INSTALL) --editable '.[view]' && \
+	  echo "compiled and installed in $$(($$(date +%s) - begun)) s"
+	@touch $@
 
 $(VENV)/test-extras: $(VENV)/installed
 	$(RLACD_INSTALL) --editable '.[view,train,usd,draco,sim,fleet]' --group test --group bench
 	touch $@
 
 demo: install
-	$(BIN)/python examples/demo.py
+	@$(BIN)/python examples/demo.py
 
 # The site, in build/site; a broken link or reference is an error.
 docs: $(VENV)/docs

@@ -14,8 +14,13 @@ from benchmarks.runner import Bench, Limits, find_meshes
 from benchmarks.store import Store
 from benchmarks.tables import Page
 from rlacd.cli.exit_codes import exit_codes
-from rlacd.cli.parameters import REQUIRED, Parameters, command
 from rlacd.errors import OptionError
+
+Parameters: TypeAlias = dict[str, tuple[Any, Any]]
+"""Parameters of a command: name to default and annotation."""
+
+REQUIRED = inspect.Parameter.empty
+"""The default of a parameter that is required."""
 
 Meshes: TypeAlias = Annotated[Path, typer.Argument(help="A folder of meshes, of any depth.", show_default=False)]
 Out: TypeAlias = Annotated[Path, typer.Option("--out", "-o", help="Folder of results, which a next run goes on with.")]
@@ -67,10 +72,23 @@ def experiment(
                     store.close()
 
         parameters: Parameters = {"meshes": (REQUIRED, Meshes), "out": (REQUIRED, Out), **own, **RUNS}
-        app.command(name)(command(run, inspect.getdoc(make_page) or "", parameters))
+        app.command(name)(_command(run, inspect.getdoc(make_page) or "", parameters))
         return make_page
 
     return register
+
+
+def _command(run: Callable[..., None], text: str, parameters: Parameters) -> Callable[..., None]:
+    """Give a function of keyword arguments the signature and help that typer inspects."""
+    run.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        [
+            inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+            for name, (default, annotation) in parameters.items()
+        ]
+    )
+    run.__annotations__ = {name: annotation for name, (_, annotation) in parameters.items()}
+    run.__doc__ = text
+    return run
 
 
 def write(page: Page, folder: Path, name: str) -> None:

@@ -38,19 +38,20 @@ def on_post_build(config: Any) -> None:
 
 
 def _commands() -> str:
-    import typer
+    import click
 
-    from rlacd.cli.main import app
+    from rlacd.cli.main import COMMANDS, app
 
-    group: Any = typer.main.get_command(app)
     parts = []
-    for path, command in _leaves(group, ("rlacd",)):
+    for name in COMMANDS:
+        path, command = ("rlacd", name), app.get_command(click.Context(app), name)
+        assert command is not None
         lines = [f"## {' '.join(path)}", "", _plain(command.help or "").partition("Examples")[0].strip(), ""]
         arguments = [p for p in command.params if p.param_type_name == "argument"]
         usage = " ".join([*path, *(f"{p.metavar or p.name.upper()}" for p in arguments), "[OPTIONS]"])
         lines += ["```sh", usage, "```", "", "| option | meaning |", "|---|---|"]
         for parameter in command.params:
-            if parameter.param_type_name == "argument" or parameter.hidden or "--help" in parameter.opts:
+            if parameter.param_type_name == "argument" or {"--help", "--help-all"} & {*parameter.opts}:
                 continue
             names = ", ".join(f"`{name}`" for name in [*parameter.opts, *parameter.secondary_opts])
             meaning = re.sub(r"--[a-z][a-z-]*", r"`\g<0>`", _plain(parameter.help or ""))
@@ -59,14 +60,6 @@ def _commands() -> str:
     return "\n".join(parts)
 
 
-def _leaves(command: Any, path: tuple[str, ...]) -> list[tuple[tuple[str, ...], Any]]:
-    inner = getattr(command, "commands", None)
-    if inner is None:
-        return [(path, command)]
-    return [leaf for name, below in inner.items() for leaf in _leaves(below, (*path, name))]
-
-
 def _plain(text: str) -> str:
-    """Help without rich's marks, on one line a paragraph."""
-    text = re.sub(r"\[/?(bold|italic|dim)\]", "", text).replace("\b", "")
-    return re.sub(r"\s+", " ", text).replace("<", "&lt;").strip()
+    """Help on one line a paragraph."""
+    return re.sub(r"\s+", " ", text.replace("\b", "")).replace("<", "&lt;").strip()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from sample import sample
@@ -17,14 +20,27 @@ def main() -> None:
     folder.mkdir(exist_ok=True)
     mesh, hulls, picture, report = (folder / f"chair{end}" for end in (".glb", "_hulls.glb", ".png", "_report.json"))
 
-    sample().export(mesh)
-    result = rlacd.decompose(mesh)
-    result.save(hulls)
-    report.write_text(to_json(result.report), encoding="utf-8")
-    result.picture(picture, up="y")
+    with step("making a chair"):
+        sample().export(mesh)
+    with step("decomposing it into convex hulls"):
+        result = rlacd.decompose(mesh)
+        result.save(hulls)
+        report.write_text(to_json(result.report), encoding="utf-8")
+    with step("drawing it"):
+        result.picture(picture, up="y")
 
-    print(summary(result, "chair.glb"))
+    print(f"\n{summary(result, 'chair.glb')}")
     print(f"\n  input    {mesh}\n  hulls    {hulls}\n  picture  {picture}\n  report   {report}")
+    print(f"\nnext: .venv/bin/rlacd view {mesh}")
+
+
+@contextmanager
+def step(what: str) -> Iterator[None]:
+    """Print a line for what is done, and how long it took."""
+    print(f"{what} ...", end="", flush=True)
+    begun = time.monotonic()
+    yield
+    print(f" {time.monotonic() - begun:.1f} s", flush=True)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ import psutil
 from rlacd.batch import JobSpec
 from rlacd.batch.server import SERVER, MeshServer
 from rlacd.pool import ProcessLimits, Request, WorkerDiedError
-from rlacd.pool.worker import Worker
+from rlacd.pool.local import Worker
 
 Answered = tuple[dict[str, Any], dict[str, bytes]]
 """The answer of `rlacd.batch.server.MeshServer`."""

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from click.testing import CliRunner, Result
 from trimesh import creation
-from typer.testing import CliRunner, Result
 
 import rlacd
 from rlacd.cli.main import app

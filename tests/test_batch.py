@@ -15,7 +15,7 @@ from typing import Any
 import psutil
 import pytest
 import trimesh
-from typer.testing import CliRunner, Result
+from click.testing import CliRunner, Result
 
 from rlacd.cli.main import app
 from tests.trouble import make_trouble, tree, write_ell

@@ -12,7 +12,8 @@ import pytest
 
 from rlacd.batch import Asset, Batch, JobSpec
 from rlacd.errors import OptionError
-from rlacd.pool import LocalPool, ProcessLimits
+from rlacd.pool import ProcessLimits
+from rlacd.pool.local import LocalPool
 from tests.test_batch import TIMES, rows
 from tests.trouble import make_trouble, tree, write_ell
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 import trimesh
-from typer.testing import CliRunner, Result
+from click.testing import CliRunner, Result
 
 from rlacd.cli.main import app
 from rlacd.cli.terminal import summary

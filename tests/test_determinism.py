@@ -13,7 +13,7 @@ import pytest
 
 from rlacd import decompose
 from rlacd.batch import Batch, JobSpec
-from rlacd.pool import InProcessPool
+from rlacd.pool.local import InProcessPool
 from tests.test_batch import TIMES
 from tests.trouble import tree
 

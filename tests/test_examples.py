@@ -11,10 +11,10 @@ from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
 
+import click
 import numpy as np
 import pytest
-import typer
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 import rlacd
 from rlacd.cli.main import app
@@ -129,8 +129,14 @@ def test_the_readme_works_outside_the_repository() -> None:
 @pytest.mark.promise("all-options")
 def test_the_table_names_every_option() -> None:
     table = "".join(line.split("|")[1] for line in options_table().splitlines())
-    command = typer.main.get_command(app).commands["decompose"]  # type: ignore[attr-defined]
-    options = {name for p in command.params if not p.hidden for name in p.opts if name.startswith("--")} - {"--help"}
+    command = app.get_command(click.Context(app), "decompose")
+    assert command is not None
+    options = {
+        name for p in command.params if not getattr(p, "hidden", False) for name in p.opts if name.startswith("--")
+    } - {
+        "--help",
+        "--help-all",
+    }
     assert {name for name in options if f"`{name}`" not in table and f"{name}/" not in table} == set()
     arguments = set(inspect.signature(rlacd.decompose).parameters) - {"mesh"}
     assert {name for name in arguments if f"`{name}`" not in table} == set()
@@ -147,6 +153,7 @@ def test_the_function_has_the_options_as_they_are_stated_once() -> None:
 
 @pytest.mark.promise("all-options")
 def test_the_command_offers_every_argument_of_the_function() -> None:
-    command = typer.main.get_command(app).commands["decompose"]  # type: ignore[attr-defined]
+    command = app.get_command(click.Context(app), "decompose")
+    assert command is not None
     offered = {parameter.name for parameter in command.params}
     assert set(inspect.signature(rlacd.decompose).parameters) - {"progress"} <= offered

@@ -18,9 +18,9 @@ import rlacd
 from rlacd import NavigableSpace
 from rlacd.batch import JobSpec, find_assets
 from rlacd.batch.assets import _places, content_hash
-from rlacd.batch.ledger import Ledger
+from rlacd.batch.manifest import Ledger
 from rlacd.batch.store import FolderStore, ResultStore, open_store
-from rlacd.cli.main import app
+from rlacd.cli.batch import COMMAND
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError, OptionError, OutputError, WeightsError
 from rlacd.io.write import save_hulls
@@ -181,9 +181,7 @@ def test_all_that_decides_the_bytes_is_in_the_key_and_nothing_else(tmp_path: Pat
 
 
 def test_a_batch_takes_every_option_of_a_decomposition() -> None:
-    command = next(command for command in app.registered_commands if command.name == "batch").callback
-    assert command is not None
-    taken = set(inspect.signature(command).parameters)
+    taken = {parameter.name for parameter in COMMAND.params}
     assert taken >= {option.name for option in dataclasses.fields(Options)} - {"criterion"}
     assert taken >= {name for name in inspect.signature(Decomposition.save).parameters if name not in NOT_OPTIONS}
 
@@ -245,15 +243,13 @@ def test_rows_outlive_a_run_that_never_ended(store: ResultStore) -> None:
     first.add({"mesh": "b", "n": 1})
     first.add({"mesh": "a", "n": 1})
     first.add({"mesh": "b", "n": 2})
-    first.close()
-    second = Ledger(store, "m.jsonl")
-    assert second.rows() == [{"mesh": "a", "n": 1}, {"mesh": "b", "n": 2}]
-    second.add({"mesh": "c\udcff", "n": 3})
-    second.finish()
-    again = Ledger(store, "m.jsonl")
-    assert [row["mesh"] for row in again.rows()] == ["a", "b", "c\udcff"]
+    first.__exit__(KeyboardInterrupt, KeyboardInterrupt(), None)
+    with Ledger(store, "m.jsonl") as second:
+        assert second.rows() == [{"mesh": "a", "n": 1}, {"mesh": "b", "n": 2}]
+        second.add({"mesh": "c\udcff", "n": 3})
     before = store.read("m.jsonl")
-    again.finish()
+    with Ledger(store, "m.jsonl") as again:
+        assert [row["mesh"] for row in again.rows()] == ["a", "b", "c\udcff"]
     assert store.read("m.jsonl") == before
 
 
@@ -281,10 +277,9 @@ def test_half_a_line_is_cut_off_and_a_damaged_one_is_reported(tmp_path: Path) ->
     journal = tmp_path / ".rlacd" / "m.jsonl"
     journal.parent.mkdir()
     journal.write_bytes(b'{"mesh": "a"}\n{"mesh": "b')
-    ledger = Ledger(store, "m.jsonl")
-    assert [row["mesh"] for row in ledger.rows()] == ["a"]
-    ledger.add({"mesh": "c"})
-    ledger.close()
+    with Ledger(store, "m.jsonl") as ledger:
+        assert [row["mesh"] for row in ledger.rows()] == ["a"]
+        ledger.add({"mesh": "c"})
     assert [row["mesh"] for row in Ledger(store, "m.jsonl").rows()] == ["a", "c"]
     journal.write_bytes(b'{"mesh": "a"}\n{"mesh": 1}\n')
     with pytest.raises(OutputError, match="line 2"):

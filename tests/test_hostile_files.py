@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from trimesh import creation
-from typer.testing import CliRunner
 
 from rlacd.batch.assets import Asset
-from rlacd.batch.ledger import Ledger
+from rlacd.batch.manifest import Ledger
 from rlacd.batch.store import FolderStore
 from rlacd.cli.main import app
 from rlacd.errors import MeshFileError, OutputError, RlacdError, TrainingError, WeightsError

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
-from typer.testing import CliRunner
 
 from rlacd.cli.main import app
 from rlacd.errors import OptionError, WeightsError

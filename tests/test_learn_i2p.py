@@ -10,7 +10,8 @@ import pytest
 
 from rlacd.errors import OptionError, WeightsError
 from rlacd.learn.options import TrainOptions
-from rlacd.pool import LocalPool, Pool
+from rlacd.pool import Pool
+from rlacd.pool.local import LocalPool
 from rlacd.solid.component import Component
 from tests.learning import small_solids, write_meshes
 

@@ -18,12 +18,13 @@ from typing import Any
 import numpy as np
 import psutil
 import pytest
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from rlacd.cli.main import app
 from rlacd.errors import OptionError, TrainingError
 from rlacd.learn.options import PRESETS, TrainOptions
-from rlacd.pool import Answer, InProcessPool, LocalPool, Pool, Request, WorkerDiedError
+from rlacd.pool import Answer, Pool, Request, WorkerDiedError
+from rlacd.pool.local import InProcessPool, LocalPool
 from tests.learning import write_meshes
 from tests.pools import pool_processes
 

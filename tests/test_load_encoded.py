@@ -20,7 +20,7 @@ from rlacd.io.read.apart import answer_of
 from rlacd.io.read.draco import DECODER
 from rlacd.io.read.load import load_mesh
 from rlacd.pool import Request, WorkerDiedError
-from rlacd.pool.worker import Worker
+from rlacd.pool.local import Worker
 from tests.assets import Rig, read_glb
 from tests.hostile.gltf import gltf_tree
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from click.testing import CliRunner, Result
 from manifold3d import Manifold, OpType
-from typer.testing import CliRunner, Result
 
 import rlacd
 from rlacd.cli.main import app

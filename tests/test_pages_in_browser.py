@@ -13,8 +13,9 @@ import pytest
 import trimesh
 
 import rlacd
-from rlacd.viewer.viewer import Viewer, open_viewer
+from rlacd.view.viewer import Viewer
 from tests.browser import Watched, change, open_browser, open_driver, open_page, pixels
+from tests.viewing import open_viewer
 
 pytest.importorskip("PIL", reason="the extra view is not installed")
 

@@ -15,8 +15,8 @@ import trimesh
 
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MissingExtraError, OptionError, OutputError
-from rlacd.view import check_picture, draw_picture
-from rlacd.view.picture import caption
+from rlacd.view.apart import renderer
+from rlacd.view.picture import caption, check_picture, draw_picture, picture_bytes
 from tests.hulls import hull_of, moved
 
 Image = pytest.importorskip("PIL.Image", reason="the extra view is not installed")
@@ -144,3 +144,12 @@ def test_the_callers_own_choice_of_renderer_comes_back(tmp_path: Path) -> None:
     mitsuba.set_variant("scalar_spectral")
     draw_picture(towers(), tmp_path / "out.png", width=WIDTH, samples=1)
     assert mitsuba.variant() == "scalar_spectral"
+
+
+@pytest.mark.slow
+def test_a_process_of_its_own_draws_the_same() -> None:
+    """So that the viewer's report holds up no decomposition."""
+    drawn = towers()
+    with renderer() as apart:
+        there = picture_bytes(drawn, width=WIDTH, samples=1, clear=True, render=apart)
+    assert there == picture_bytes(drawn, width=WIDTH, samples=1, clear=True)

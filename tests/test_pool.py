@@ -14,20 +14,8 @@ import psutil
 import pytest
 
 from rlacd.errors import OptionError
-from rlacd.pool import (
-    InProcessPool,
-    LocalPool,
-    Pool,
-    ProcessLimits,
-    Request,
-    Shared,
-    TimeLimitError,
-    WorkerDiedError,
-    answers,
-    open_pool,
-    submit_with_retry,
-    worker,
-)
+from rlacd.pool import Pool, ProcessLimits, Request, Shared, TimeLimitError, WorkerDiedError, local, open_pool
+from rlacd.pool.local import InProcessPool, LocalPool
 from tests.pool_server import SERVER
 from tests.pools import pool_processes
 
@@ -53,7 +41,7 @@ def one() -> Iterator[LocalPool]:
 
 def ask(what: str = "echo", **more: Any) -> Request:
     seconds = more.pop("seconds", 600)
-    kept = {name: more.pop(name) for name in ("blobs", "shared", "fresh") if name in more}
+    kept = {name: more.pop(name) for name in ("blobs", "shared", "fresh", "tries") if name in more}
     return Request(SERVER, {"what": what, **more}, **kept, limits=ProcessLimits(seconds=seconds))
 
 
@@ -80,7 +68,7 @@ def test_refusals_are_raised_as_what_they_are(pool: Pool) -> None:
 
 def test_what_is_shared_reaches_a_process_once_and_again_when_it_changes(one: LocalPool) -> None:
     first, second = Shared({"weights": b"1"}), Shared({"weights": b"22"})
-    with mock.patch.object(worker, "send", wraps=worker.send) as send:
+    with mock.patch.object(local, "send", wraps=local.send) as send:
         seen = [
             one.submit(ask(shared={"network": shared})).result().values["shared"]["network"]["weights"]
             for shared in (first, first, second, second, first)
@@ -124,37 +112,19 @@ def test_a_process_stays_unless_a_new_one_is_wanted(one: LocalPool) -> None:
 def test_a_second_chance_is_one(one: LocalPool, tmp_path: Path) -> None:
     begun = time.monotonic()
     with pytest.raises(TimeLimitError) as late:
-        submit_with_retry(one, ask("hang", seconds=2)).result()
+        one.submit(ask("hang", seconds=2, tries=2)).result()
     assert 2 <= late.value.seconds <= time.monotonic() - begun < 4, "what takes too long would do so again"
     before = pid(one)
-    assert submit_with_retry(one, ask("die once", mark=str(tmp_path / "mark"))).result().values["pid"] != before
+    assert one.submit(ask("die once", mark=str(tmp_path / "mark"), tries=2)).result().values["pid"] != before
     with pytest.raises(WorkerDiedError, match="SIGKILL"):
-        submit_with_retry(one, ask("die")).result()
+        one.submit(ask("die", tries=2)).result()
     with pytest.raises(OptionError, match="too much"):
-        submit_with_retry(one, ask("refuse")).result()
+        one.submit(ask("refuse", tries=2)).result()
 
 
 def test_a_process_that_is_killed_from_outside_costs_nothing_but_time(one: LocalPool) -> None:
     os.kill(pid(one), signal.SIGKILL)
-    assert submit_with_retry(one, ask(number=7)).result().values["echo"]["number"] == 7
-
-
-def test_many_requests_are_taken_as_there_is_room(pool: Pool) -> None:
-    taken = []
-
-    def requests() -> Iterator[tuple[int, Request]]:
-        for number in range(20):
-            taken.append(number)
-            yield number, ask(number=number)
-
-    stream = answers(pool, requests())
-    first, _ = next(stream)
-    assert len(taken) < 10
-    assert sorted([first, *(key for key, _ in stream)]) == list(range(20))
-    if isinstance(pool, LocalPool):
-        lost = dict(answers(pool, [("a", ask("die")), ("b", ask())]))
-        assert isinstance(lost["a"], WorkerDiedError)
-        assert not isinstance(lost["b"], WorkerDiedError)
+    assert one.submit(ask(number=7, tries=2)).result().values["echo"]["number"] == 7
 
 
 def test_closing_ends_what_is_running_at_once() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from rlacd.errors import OptionError
-from rlacd.pool import Shared, WorkerDiedError, answers
+from rlacd.pool import Shared, WorkerDiedError
 from tests.test_learn_train import assert_same_run, curves, meshes, run
 from tests.test_pool import ask
 
@@ -39,14 +39,13 @@ def test_requests_over_ray_are_as_those_here(cluster: Cluster) -> None:
     shared = {"network": Shared({"weights": b"1234"})}
     with RayPool("auto") as pool:
         assert pool.room == 2
-        found = dict(answers(pool, ((n, ask(number=n, blobs={"a": b"x" * n}, shared=shared)) for n in range(6))))
-        for number, answer in found.items():
-            assert not isinstance(answer, WorkerDiedError)
+        asked = [pool.submit(ask(number=n, blobs={"a": b"x" * n}, shared=shared)) for n in range(6)]
+        for number, answer in enumerate(future.result() for future in asked):
             assert (answer.values["echo"]["number"], answer.blobs["a"]) == (number, b"x" * number)
             assert answer.values["shared"] == {"network": {"weights": 4}}
-        died = dict(answers(pool, [("dies", ask("die"))]))["dies"]
-        assert isinstance(died, WorkerDiedError)
-        assert (died.reason, died.last_words) == ("its process died of SIGKILL", "last words")
+        with pytest.raises(WorkerDiedError) as died:
+            pool.submit(ask("die", tries=2)).result()
+        assert (died.value.reason, died.value.last_words) == ("its process died of SIGKILL", "last words")
         with pytest.raises(OptionError, match="that is too much; ask for less"):
             pool.submit(ask("refuse")).result()
     assert ray.is_initialized(), "a cluster that somebody else started goes on"

@@ -114,7 +114,7 @@ def test_a_batch_runs_in_processes_and_passes_over_what_is_done(ring: Path) -> N
 def test_a_worker_is_ended_with_its_children() -> None:
     program = """
 import subprocess, sys
-from rlacd.pool.process import end, peak_memory, start
+from rlacd.pool.process import kill_group, peak_memory, start
 child = "import subprocess, sys, time; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)']);" \
         "print('up', flush=True); time.sleep(600)"
 process = start([sys.executable, "-c", child], subprocess.DEVNULL, subprocess.PIPE, subprocess.DEVNULL, {})
@@ -122,7 +122,8 @@ assert process.stdout.readline().strip() == b"up"
 import psutil
 grandchildren = psutil.Process(process.pid).children()
 assert len(grandchildren) == 1
-end(process)
+kill_group(process)
+process.wait()
 assert not psutil.wait_procs(grandchildren, timeout=30)[1]
 assert 2**23 < peak_memory() < 2**33
 """

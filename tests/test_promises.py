@@ -195,11 +195,10 @@ def test_a_command_without_its_extra_names_it(hidden: str, extra: str, words: st
 def test_bash_completes_commands_and_options(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Bash runs the script that `--show-completion` prints."""
     monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
-    monkeypatch.setenv("_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION", "1")
     start = "import sys; sys.argv[0] = 'rlacd'; from rlacd.cli.main import main; main()"
     (tmp_path / "rlacd").write_text(f'#!/bin/sh\nexec \'{sys.executable}\' -c "{start}" "$@"\n', encoding="utf-8")
     (tmp_path / "rlacd").chmod(0o755)
-    ask = 'COMP_WORDS=({}); COMP_CWORD={}; _rlacd_completion rlacd; echo "${{COMPREPLY[*]}}"\n'
+    ask = 'COMPREPLY=(); COMP_WORDS=({}); COMP_CWORD={}; _rlacd_completion rlacd; echo "${{COMPREPLY[*]}}"\n'
     script = 'eval "$(rlacd --show-completion bash)"\n' + ask.format("rlacd dec", 1)
     script += ask.format("rlacd decompose --thre", 2)
     done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, timeout=120)

@@ -48,7 +48,7 @@ def test_the_module_runs_as_the_command() -> None:
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_shells_complete(shell: str) -> None:
-    program = f"import os; os.environ['_RLACD_COMPLETE'] = 'source_{shell}'; from rlacd.cli.main import main; main()"
+    program = f"import os; os.environ['_RLACD_COMPLETE'] = '{shell}_source'; from rlacd.cli.main import main; main()"
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120)
     assert "rlacd" in run.stdout
     assert "_RLACD_COMPLETE" in run.stdout

@@ -14,15 +14,14 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 import rlacd
 from rlacd.cli.main import app
 from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError
-from rlacd.view import check_report_page, save_report_page
-from rlacd.view.html_report import report_page
 from rlacd.view.page import MODULES
+from rlacd.view.report import check_report_page, report_page, save_report_page
 from rlacd.view.scene import scene
 from tests.hulls import hull_of
 

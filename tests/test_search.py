@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from manifold3d import Manifold
-from typer.testing import CliRunner
 
 import rlacd
 from rlacd import _native

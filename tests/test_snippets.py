@@ -16,7 +16,7 @@ import typer
 
 import rlacd
 from rlacd.cli.main import app
-from rlacd.viewer import viewer
+from rlacd.view import viewer
 
 ROOT = Path(__file__).resolve().parent.parent
 SNIPPET = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -80,10 +80,10 @@ def test_commands_have_the_options_that_pages_use(line: str) -> None:
     words = list(
         takewhile(lambda word: word not in {"|", ">", "&&", ";"}, shlex.split(line.replace("SEED", "1"), comments=True))
     )
-    at: Any = typer.main.get_command(app)
+    at: Any = app
     if words[0] == "benchmarks":
         _, name, *words = words
         at = typer.main.get_command(import_module(f"benchmarks.{name.replace('-', '_')}").app)
-    while isinstance(at, typer.core.TyperGroup):
-        _, at, words = at.resolve_command(typer.Context(at), words)
+    while hasattr(at, "resolve_command"):
+        _, at, words = at.resolve_command(at.context_class(at), words)
     at.make_context("rlacd", words)

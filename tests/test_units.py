@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from click.testing import CliRunner
 from lxml import etree
-from typer.testing import CliRunner
 
 import rlacd
 from rlacd.cli.main import app

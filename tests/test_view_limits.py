@@ -18,10 +18,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from rlacd.viewer import connections
-from rlacd.viewer.connections import LONGEST_HEAD, MOST_CONNECTIONS, MOST_STREAMS
-from rlacd.viewer.server import UPLOADS
-from rlacd.viewer.viewer import Viewer, open_viewer
+from rlacd.view import connections
+from rlacd.view.connections import LONGEST_HEAD, MOST_CONNECTIONS, MOST_STREAMS
+from rlacd.view.server import UPLOADS
+from rlacd.view.viewer import Viewer
+from tests.viewing import open_viewer
 
 PATIENCE = 60.0
 
@@ -114,7 +115,7 @@ def wait_until(true: Callable[[], bool]) -> None:
 )
 def test_a_request_that_trickles_in_is_ended(viewer: Viewer, trickle: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(connections, "REQUEST_SECONDS", 0.5)
-    monkeypatch.setattr("rlacd.viewer.server.REQUEST_SECONDS", 0.5)
+    monkeypatch.setattr("rlacd.view.server.REQUEST_SECONDS", 0.5)
     trickle = trickle.replace(b"Content-Length", b"Content-Type: application/json\r\nContent-Length")
     with connected(viewer) as slow:
         slow.sendall(trickle)
@@ -222,9 +223,9 @@ ENDINGS = {
     "done": "rlacd.decompose(mesh, quality='fast')",
     "kept": "import sys; sys.kept = rlacd.decompose(mesh, quality='fast', criterion=rlacd.NavigableSpace())",
     "raised": "rlacd.decompose(mesh, progress=lambda seen: 1 / 0)",
-    "viewed": "from rlacd.viewer.viewer import open_viewer\nwith open_viewer(mesh, port=0): pass",
+    "viewed": "from tests.viewing import open_viewer\nwith open_viewer(mesh, port=0): pass",
     "viewed for a while": (
-        "import time\nfrom rlacd.viewer.viewer import open_viewer\nwith open_viewer(mesh, port=0): time.sleep(2)"
+        "import time\nfrom tests.viewing import open_viewer\nwith open_viewer(mesh, port=0): time.sleep(2)"
     ),
 }
 

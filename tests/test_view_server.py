@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 import hashlib
 import http.client
 import io
@@ -23,15 +24,16 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from rlacd.cli.main import app
 from rlacd.criteria import NavigableSpace
-from rlacd.errors import MeshFileError, OptionError
+from rlacd.errors import MeshFileError, OptionError, OutputError
 from rlacd.options import Options
-from rlacd.viewer.controls import ViewerControls
-from rlacd.viewer.downloads import offered
-from rlacd.viewer.viewer import Viewer, open_viewer, read_controls
+from rlacd.view.controls import ViewerControls, read_controls
+from rlacd.view.downloads import offered
+from rlacd.view.viewer import Viewer
+from tests.viewing import open_viewer
 
 PATIENCE = 60.0
 NAME = "an elbow 'n ümläut"
@@ -209,6 +211,37 @@ def test_everything_offered_can_be_downloaded_and_read(viewer: Viewer) -> None:
             assert answer.json["parts"] == 2
         elif name == "report.html":
             assert b"connect-src 'none'" in answer.body
+
+
+def test_a_report_under_way_holds_up_no_decomposition(viewer: Viewer, monkeypatch: pytest.MonkeyPatch) -> None:
+    settled(viewer, run=1)
+    begun, done = threading.Event(), threading.Event()
+
+    @contextlib.contextmanager
+    def slow() -> Iterator[Any]:
+        begun.set()
+        assert done.wait(PATIENCE)
+        raise OutputError("the picture could not be drawn: its process died of SIGKILL.")
+        yield
+
+    monkeypatch.setattr("rlacd.view.downloads.renderer", slow)
+    answers: list[Answer] = []
+    reports = [
+        threading.Thread(target=lambda: answers.append(ask(viewer, "GET", "/download?format=report.html")))
+        for _ in range(3)
+    ]
+    for report in reports:
+        report.start()
+    assert begun.wait(PATIENCE)
+    ask(viewer, "POST", "/decompose", {"threshold": 0.3, "quality": "fast"})
+    settled(viewer, run=2)
+    assert ask(viewer, "GET", "/scene").status == 200
+    assert answers == []
+    done.set()
+    for report in reports:
+        report.join(PATIENCE)
+    assert [answer.status for answer in answers] == [400] * 3
+    assert "could not be drawn" in answers[0].json["error"]
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import trimesh
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError
 from rlacd.run import Progress, ProgressCallback
-from rlacd.viewer.session import Session, SessionState
+from rlacd.view.session import Session, SessionState
 from tests.hulls import hull_of
 
 PATIENCE = 20.0  # seconds until a test gives up

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from rlacd.viewer.viewer import read_subject
+from rlacd.view.controls import read_subject
 
 
 @pytest.mark.parametrize(

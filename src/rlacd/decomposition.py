@@ -213,7 +213,7 @@ class Decomposition(Result):
         OptionError
             `path`, `width` or `up` is none of those above.
         """
-        from rlacd.view import draw_picture
+        from rlacd.view.picture import draw_picture
 
         return draw_picture(self, path, width=width, up=up)
 
@@ -239,7 +239,7 @@ class Decomposition(Result):
         OptionError
             `path` or `up` is none of those above.
         """
-        from rlacd.view import save_report_page
+        from rlacd.view.report import save_report_page
 
         return save_report_page(self, path, up=up)
 
@@ -285,7 +285,7 @@ class Decomposition(Result):
         """Show the 3-D view in a notebook."""
         from html import escape
 
-        from rlacd.view.html_report import report_page
+        from rlacd.view.report import report_page
 
         page = escape(report_page(self, picture=False))
         return f'<iframe srcdoc="{page}" style="width:100%;height:600px;border:0"></iframe>'

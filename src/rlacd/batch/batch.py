@@ -4,27 +4,36 @@ from __future__ import annotations
 
 import threading
 import time
-from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from collections import Counter, deque
+from collections.abc import Generator, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import ExitStack, closing
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, Protocol
 
 from rlacd.batch.assets import EVERYTHING, Asset, content_hash, find_assets, other_files
-from rlacd.batch.context import BatchContext
-from rlacd.batch.engine import Engine
 from rlacd.batch.job_spec import JobSpec
-from rlacd.batch.ledger import Ledger, Row
-from rlacd.batch.pipeline import MeshOutcome, MeshTask
+from rlacd.batch.manifest import Ledger, Row
+from rlacd.batch.mesh import Outcome, Task, Work, process
 from rlacd.batch.store import FolderStore, ResultStore, open_store
 from rlacd.errors import MeshFileError, OptionError
-from rlacd.pool import Pool, ProcessLimits
+from rlacd.pool import Pool, ProcessLimits, WorkerDiedError
 
 MANIFEST, TIMINGS = "manifest.jsonl", "timings.jsonl"
 
 Redo = Literal["none", "failed", "all"]
 REDO: tuple[Redo, ...] = ("none", "failed", "all")
 
+
+WRITERS = 4
+"""Results written concurrently; each waits for the disk, not for a processor."""
+
+ROOM_SECONDS = 1.0
+"""Seconds between checks of how many requests the pool has room for: a cluster grows and shrinks."""
+
+MOST_THREADS = 1024
+"""Threads that wait for answers; they start as they are needed."""
 
 LARGE = 5_000_000
 """Bytes of 100,000 triangles in a binary STL file; larger meshes may take much longer than the rest."""
@@ -54,6 +63,8 @@ class Summary:
     ----------
     meshes
         Number of meshes found.
+    seen
+        Names of the meshes that have a result now.
     passed_over
         Number of meshes whose result already existed, whatever its status; `status` counts them too.
     status
@@ -71,6 +82,7 @@ class Summary:
     """
 
     meshes: int
+    seen: list[str] = field(default_factory=list)
     passed_over: int = 0
     status: Counter[str] = field(default_factory=Counter)
     stopped: bool = False
@@ -78,6 +90,42 @@ class Summary:
     failures: list[Row] = field(default_factory=list)
     slowest: list[tuple[str, float]] = field(default_factory=list)
     others: Counter[str] = field(default_factory=Counter)
+
+
+def _outcomes(work: Work, tasks: Iterator[Task]) -> Generator[tuple[Task, Outcome], None, None]:
+    """Process tasks in any order, taking them as the pool has room; what is yielded is written.
+
+    A mesh whose process died is tried again alone, after all others: on this machine they may have taken its memory.
+    """
+    running: dict[Future[Outcome], tuple[Task, bool]] = {}  # whether it is being written
+    again: deque[tuple[Task, WorkerDiedError]] = deque()
+    with ThreadPoolExecutor(MOST_THREADS) as threads:
+        try:
+            while True:
+                room = max(1, work.pool.room // work.spec.threads)
+                while len(running) < room + WRITERS and sum(not writing for _, writing in running.values()) < room:
+                    if (task := next(tasks, None)) is None:
+                        break
+                    running[threads.submit(process, task, work)] = task, False
+                if not running and (not again or work.stop.is_set()):
+                    return
+                if not running or (again and work.pool.many_machines):
+                    task, death = again.popleft()
+                    running[threads.submit(process, task, work, death)] = task, False
+                for done in wait(running, ROOM_SECONDS, FIRST_COMPLETED).done:
+                    task, written = running.pop(done)
+                    try:
+                        outcome = done.result()
+                    except WorkerDiedError as died:
+                        again.append((task, died))
+                        continue
+                    if written:
+                        yield task, outcome
+                    else:
+                        running[threads.submit(outcome.put, work)] = task, True
+        except BaseException:
+            work.pool.close()  # threads wait for it
+            raise
 
 
 @dataclass(frozen=True)
@@ -158,60 +206,49 @@ class Batch:
             The results cannot be written, or another run is writing there.
         """
         assets, store = self._find(), open_store(self.out)
+        summary, start = Summary(len(assets)), time.monotonic()
+        stop = stop or threading.Event()
         store.open()
         try:
-            shared = self.spec.shared()
-            work = BatchContext(
-                self.spec, self.limits, self.fallback, self.out, store, stop=stop or threading.Event(), shared=shared
-            )
-            summary = self._run(assets, work, pool, watcher)
-            summary.others = other_files(self.assets, self.glob, Path(self.out))
-            return summary
+            with Ledger(store, MANIFEST) as manifest, Ledger(store, TIMINGS) as timings, ExitStack() as threads:
+                shared = self.spec.shared()
+                work = Work(self.spec, self.limits, self.fallback, self.out, store, pool, manifest.owns, stop, shared)
+                watcher.begin(len(assets))
+                pending = self._pending(assets, work, manifest, watcher, summary)
+                for task, outcome in threads.enter_context(closing(_outcomes(work, pending))):
+                    row = self._row(task, outcome)
+                    timing = {"mesh": task.asset.name, **outcome.timing}
+                    timings.add(timing)
+                    manifest.add(row)
+                    watcher.finished(row, timing)
+                    summary.slowest.append((task.asset.name, float(timing.get("seconds", 0.0))))
+                    summary.slowest = sorted(summary.slowest, key=lambda entry: -entry[1])[:3]
+                    summary.seen.append(task.asset.name)
         finally:
             store.close()
-
-    def _run(self, assets: list[Asset], work: BatchContext, pool: Pool, watcher: Watcher) -> Summary:
-        summary, start = Summary(len(assets)), time.monotonic()
-        manifest, timings = Ledger(work.store, MANIFEST), Ledger(work.store, TIMINGS)
-        work = replace(work, owns=manifest.owns)
-        seen: list[str] = []
-
-        def waiting() -> Iterator[MeshTask]:
-            for asset in assets:
-                if work.stop.is_set():
-                    return
-                task, finished = self._task(asset, manifest, work.store)
-                if finished:
-                    summary.passed_over += 1
-                    seen.append(asset.name)
-                    watcher.passed_over(asset)
-                else:
-                    watcher.started(asset)
-                    yield task
-
-        watcher.begin(len(assets))
-        try:
-            for task, outcome in Engine(pool, work).run(waiting()):
-                row = self._row(task, outcome)
-                timing = {"mesh": task.asset.name, **outcome.timing}
-                timings.add(timing)
-                manifest.add(row)
-                seen.append(task.asset.name)
-                watcher.finished(row, timing)
-                spent = (task.asset.name, float(timing.get("seconds", 0.0)))
-                summary.slowest = sorted([*summary.slowest, spent], key=lambda entry: -entry[1])[:3]
-        except BaseException:
-            manifest.close()
-            timings.close()
-            raise
-        manifest.finish()
-        timings.finish()
-        rows = [found for name in sorted(seen) if (found := manifest.get(name)) is not None]
+        rows = [found for name in sorted(summary.seen) if (found := manifest.get(name)) is not None]
         summary.status = Counter(row["status"] for row in rows)
         summary.failures = [row for row in rows if row["status"] != "done"]
-        summary.stopped = len(seen) < len(assets)
+        summary.stopped = len(summary.seen) < len(assets)
+        summary.others = other_files(self.assets, self.glob, Path(self.out))
         summary.seconds = time.monotonic() - start
         return summary
+
+    def _pending(
+        self, assets: list[Asset], work: Work, manifest: Ledger, watcher: Watcher, summary: Summary
+    ) -> Iterator[Task]:
+        """The meshes without a result, one after the other until the stop."""
+        for asset in assets:
+            if work.stop.is_set():
+                return
+            task, finished = self._task(asset, manifest, work.store)
+            if finished:
+                summary.seen.append(asset.name)
+                summary.passed_over += 1
+                watcher.passed_over(asset)
+            else:
+                watcher.started(asset)
+                yield task
 
     def _find(self) -> list[Asset]:
         store = open_store(self.out)
@@ -236,16 +273,16 @@ class Batch:
                 if path.parent.resolve() / path.stem in places:
                     raise OptionError(f"a result would overwrite the input {asset.path}; choose another folder.")
 
-    def _task(self, asset: Asset, manifest: Ledger, store: ResultStore) -> tuple[MeshTask, bool]:
+    def _task(self, asset: Asset, manifest: Ledger, store: ResultStore) -> tuple[Task, bool]:
         """Return the mesh with the key of its result, and whether that result exists."""
         try:
             content = content_hash(asset.files())
         except MeshFileError as error:  # loading the mesh reports what is wrong with the file
             content = str(error)
-        task = MeshTask(asset, self.spec.key(content, asset.name))
+        task = Task(asset, self.spec.key(content, asset.name))
         return task, self.redo != "all" and self._is_finished(task, manifest.get(asset.name), store)
 
-    def _is_finished(self, task: MeshTask, row: Row | None, store: ResultStore) -> bool:
+    def _is_finished(self, task: Task, row: Row | None, store: ResultStore) -> bool:
         if row is None or row.get("key") != task.key or row.get("place") != task.asset.place:
             return False  # the place of a result depends on the neighbouring meshes
         status = row.get("status")
@@ -253,7 +290,7 @@ class Batch:
             return False
         return status is not None and all(store.size(name) == size for name, size in row.get("outputs", {}).items())
 
-    def _row(self, task: MeshTask, outcome: MeshOutcome) -> Row:
+    def _row(self, task: Task, outcome: Outcome) -> Row:
         """Collect everything that is the same in every run."""
         row: Row = {"mesh": task.asset.name, "status": outcome.status, "place": task.asset.place, "key": task.key}
         if outcome.error is not None:

@@ -13,10 +13,10 @@ from rlacd._version import __version__
 from rlacd.criteria import NavigableSpace
 from rlacd.errors import OptionError, WeightsError
 from rlacd.io.read.open_file import read_file
-from rlacd.io.write import DENSITY, FORMATS, MODELS, check_model_options, hull_target
+from rlacd.io.write import FORMATS, MODELS, hull_target
 from rlacd.options import Options
 from rlacd.options.names import WEIGHTS_ENDING
-from rlacd.options.output import OutputOptions
+from rlacd.options.output import DENSITY, OutputOptions
 from rlacd.options.presets import find_preset
 from rlacd.policies import make_policy
 from rlacd.pool import Shared
@@ -38,53 +38,30 @@ class JobSpec:
         Arguments of `rlacd.decompose` as plain values: a `NavigableSpace` is the dict of its fields.
     ending
         Ending of the output file, with its dot; empty for a folder with one file per hull.
-    file_format
-        The format, if the ending does not determine it.
-    density
-        Mass per cubic unit, for formats that hold masses.
-    up
-        The axis that points up; None for y in files from glTF, else z.
-    one_mesh
-        Whether a model keeps all its hulls in one mesh file.
+    written
+        Arguments of `rlacd.Decomposition.save` beside the path.
     weights
         Hash of the network, if the policy is a file.
     """
 
     options: dict[str, Any] = field(default_factory=dict)
     ending: str = f".{DEFAULT_FORMAT}"
-    file_format: str | None = None
-    density: float = DENSITY
-    up: str | None = None
-    one_mesh: bool = False
-    mass: float | None = None
-    keep_input: bool = False
+    written: dict[str, Any] = field(default_factory=dict)
     weights: str = ""
 
     @classmethod
-    def of(
-        cls,
-        options: dict[str, Any],
-        *,
-        file_format: str | None = None,
-        folders: bool = False,
-        density: float | None = None,
-        up: str | None = None,
-        one_mesh: bool = False,
-        mass: float | None = None,
-        keep_input: bool = False,
-    ) -> JobSpec:
+    def of(cls, options: dict[str, Any], *, folders: bool = False, **written: Any) -> JobSpec:
         """Check everything that can be checked before a mesh is read.
 
         Parameters
         ----------
         options : dict
             Keyword arguments of `rlacd.decompose`, without ``progress``. Each mesh gets one thread by default.
-        file_format : str, optional
-            A value of ``--format``, or any ending of a hull file; by default the preset's format, else glb.
         folders : bool
             Whether each mesh gets a folder with one file per hull.
-        density, up, one_mesh, mass, keep_input
-            As for `rlacd.Decomposition.save`.
+        **written
+            ``file_format``: a value of ``--format``, or any ending of a hull file; by default the preset's format,
+            else glb. ``density``, ``mass``, ``up``, ``one_mesh`` and ``keep_input`` as for `rlacd.Decomposition.save`.
 
         Raises
         ------
@@ -101,18 +78,19 @@ class JobSpec:
                 "in a batch, policy has to be a name or a file: an object cannot be sent to other processes."
             )
         make_policy(checked.policy)
-        ending, wanted = _file_kind(file_format, folders, checked.preset)
-        check_model_options(DENSITY if density is None else density, up)
-        OutputOptions(mass=mass)
+        asked = OutputOptions(**written)
+        ending, file_format = _file_kind(asked.file_format, folders, checked.preset)
+        flags = {name: bool(getattr(asked, name)) for name in ("one_mesh", "keep_input")}
         with TemporaryDirectory() as folder:
-            hull_target(f"{folder}/mesh{ending or '/'}", wanted, keep_input=keep_input)
-        if one_mesh and ending != ".urdf":
+            hull_target(f"{folder}/mesh{ending or '/'}", file_format, keep_input=flags["keep_input"])
+        if flags["one_mesh"] and ending != ".urdf":
             raise OptionError("one_mesh (--one-mesh) works for .urdf files only: leave it out.")
         plain = {"threads": 1, **options}
         if isinstance(checked.criterion, NavigableSpace):
             plain["criterion"] = asdict(checked.criterion)
-        weight = DENSITY if density is None else density
-        return cls(plain, ending, wanted, weight, up, one_mesh, mass, keep_input, _weights(checked.policy))
+        density = DENSITY if asked.density is None else asked.density
+        saved = {"file_format": file_format, "density": density, "mass": asked.mass, "up": asked.up, **flags}
+        return cls(plain, ending, saved, _weights(checked.policy))
 
     @property
     def threads(self) -> int:
@@ -128,14 +106,8 @@ class JobSpec:
         del options["threads"]
         if options["policy"].endswith(WEIGHTS_ENDING):
             options["policy"] = WEIGHTS_ENDING
-        decides = [
-            __version__,
-            content,
-            PurePosixPath(name).stem,  # models carry this name
-            self.weights,
-            options,
-            [self.ending, self.file_format, self.density, self.up, self.one_mesh, self.mass, self.keep_input],
-        ]
+        stem = PurePosixPath(name).stem  # models carry this name
+        decides = [__version__, content, stem, self.weights, options, self.ending, self.written]
         return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
 
     def arguments(self) -> dict[str, Any]:

@@ -63,10 +63,9 @@ def make(
             return facts, _files_in(Path(folder))
         result = _hull(spec, mesh) if hull_only else decompose(mesh, **spec.arguments())
         place = f"{folder}/{stem}{spec.ending or '/'}"
-        names = ("file_format", "density", "mass", "up", "one_mesh", "keep_input")
         with warnings.catch_warnings(record=True) as doubts:
             warnings.simplefilter("always", ImplausibleBodyWarning)
-            result.save(place, **{name: getattr(spec, name) for name in names})
+            result.save(place, **spec.written)
         files = _files_in(Path(folder))
     facts = _summary(result.report)
     return facts | {"warnings": [*facts["warnings"], *(str(doubt.message) for doubt in doubts)]}, files

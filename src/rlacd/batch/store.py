@@ -9,7 +9,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 from filelock import FileLock
 
@@ -23,55 +23,6 @@ PRIVATE = ".rlacd"
 
 SEGMENT_SECONDS = 10.0
 """Seconds between journal objects: an object store cannot append, so each object holds the lines since the last."""
-
-
-class Journal(Protocol):
-    """Lines that survive a kill of the process that writes them."""
-
-    def lines(self) -> Iterator[bytes]:
-        """All complete lines, oldest first."""
-
-    def add(self, line: bytes) -> None:
-        """Append a line, which must end in a newline."""
-
-    def remove(self) -> None:
-        """Delete all lines, on disk too."""
-
-    def close(self) -> None:
-        """Write any lines still pending."""
-
-
-class ResultStore(Protocol):
-    """A place for files; names are relative to it, with forward slashes.
-
-    Attributes
-    ----------
-    shared : bool
-        Whether every machine can reach it under the same address.
-    """
-
-    shared: bool
-
-    def write(self, name: str, data: bytes) -> None:
-        """Write a file atomically."""
-
-    def read(self, name: str) -> bytes | None:
-        """Return the content of a file; None if it does not exist."""
-
-    def size(self, name: str) -> int | None:
-        """Return the length of a file; None if it does not exist."""
-
-    def remove(self, name: str) -> None:
-        """Remove a file, and any folders left empty."""
-
-    def journal(self, name: str) -> Journal:
-        """Open a journal."""
-
-    def open(self) -> None:
-        """Prepare for writing and lock out other runs."""
-
-    def close(self) -> None:
-        """Release the store to other runs."""
 
 
 def open_store(place: str) -> ResultStore:
@@ -117,7 +68,13 @@ def put_files(store: ResultStore, files: Mapping[str, bytes], owns: Callable[[st
 
 
 class FolderStore:
-    """A folder on this machine."""
+    """A folder on this machine; names are relative to it, with forward slashes.
+
+    Attributes
+    ----------
+    shared : bool
+        Whether every machine can reach the store under the same address.
+    """
 
     shared = False
 
@@ -126,7 +83,7 @@ class FolderStore:
         self._lock: FileLock | None = None
 
     def write(self, name: str, data: bytes) -> None:
-        """See `ResultStore`."""
+        """Write a file atomically."""
         path = self.folder / name
         with output_errors(path):
             if path.is_symlink():
@@ -135,7 +92,7 @@ class FolderStore:
         write_file(path, data)
 
     def read(self, name: str) -> bytes | None:
-        """See `ResultStore`."""
+        """Return the content of a file; None if it does not exist."""
         path = self.folder / name
         try:
             return read_file(path, sys.maxsize)
@@ -145,14 +102,14 @@ class FolderStore:
             raise OutputNameError(f"cannot read {path} ({error.strerror}); move it away.") from error
 
     def size(self, name: str) -> int | None:
-        """See `ResultStore`."""
+        """Return the length of a file; None if it does not exist."""
         try:
             return (self.folder / name).stat().st_size
         except OSError:
             return None
 
     def remove(self, name: str) -> None:
-        """See `ResultStore`."""
+        """Remove a file, and any folders left empty."""
         path = self.folder / name
         if path.is_dir() and not path.is_symlink():
             return  # somebody has put a folder there since
@@ -165,7 +122,7 @@ class FolderStore:
                 parent.rmdir()
 
     def journal(self, name: str) -> Journal:
-        """See `ResultStore`."""
+        """Open a journal: lines that survive a kill of the process that writes them."""
         return _FileJournal(self.folder / PRIVATE / name)
 
     def open(self) -> None:
@@ -186,7 +143,7 @@ class FolderStore:
                     Path(at, file).unlink(missing_ok=True)
 
     def close(self) -> None:
-        """See `ResultStore`."""
+        """Release the store to other runs."""
         if self._lock is not None:
             self._lock.release()
 
@@ -246,14 +203,14 @@ class AddressStore:
         self.shared = not address.startswith("memory://")
 
     def write(self, name: str, data: bytes) -> None:
-        """See `ResultStore`; atomic where the system writes objects atomically, as all object stores do."""
+        """See `FolderStore`; atomic where the system writes objects atomically, as all object stores do."""
         path = self._path(name)
         with self._errors(path):
             self._system.makedirs(path.rpartition("/")[0], exist_ok=True)
             self._system.pipe_file(path, data)
 
     def read(self, name: str) -> bytes | None:
-        """See `ResultStore`."""
+        """See `FolderStore`."""
         with self._errors(self._path(name)):
             try:
                 return bytes(self._system.cat_file(self._path(name)))
@@ -261,7 +218,7 @@ class AddressStore:
                 return None
 
     def size(self, name: str) -> int | None:
-        """See `ResultStore`."""
+        """See `FolderStore`."""
         with self._errors(self._path(name)):
             try:
                 return int(self._system.size(self._path(name)))
@@ -269,7 +226,7 @@ class AddressStore:
                 return None
 
     def remove(self, name: str) -> None:
-        """See `ResultStore`."""
+        """See `FolderStore`."""
         with self._errors(self._path(name)), contextlib.suppress(FileNotFoundError):
             self._system.rm_file(self._path(name))
 
@@ -284,7 +241,7 @@ class AddressStore:
         return sorted(f"{folder}/{str(path).rstrip('/').rpartition('/')[2]}" for path in found)
 
     def journal(self, name: str) -> Journal:
-        """See `ResultStore`."""
+        """See `FolderStore`."""
         return _SegmentJournal(self, f"{PRIVATE}/{name}.parts")
 
     def open(self) -> None:
@@ -340,3 +297,7 @@ class _SegmentJournal:
             self._waiting.clear()
             self._number += 1
         self._written = time.monotonic()
+
+
+ResultStore: TypeAlias = FolderStore | AddressStore
+Journal: TypeAlias = _FileJournal | _SegmentJournal

@@ -5,19 +5,15 @@ from __future__ import annotations
 import time
 from collections import Counter
 from types import TracebackType
-from typing import TYPE_CHECKING
-
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
-from rich.progress import Progress as Bars
+from typing import TYPE_CHECKING, Any
 
 from rlacd.cli.exit_codes import say
-from rlacd.cli.terminal import counted
+from rlacd.cli.terminal import counted, open_bar
 from rlacd.plain_json import printable
 
 if TYPE_CHECKING:
     from rlacd.batch import Asset, Summary
-    from rlacd.batch.ledger import Row
+    from rlacd.batch.manifest import Row
 
 REPORT_EVERY = 30.0
 """Seconds between progress lines if stderr is not a terminal."""
@@ -38,59 +34,52 @@ class Screen:
     """
 
     def __init__(self, *, quiet: bool) -> None:
-        console = Console(stderr=True)
         self._quiet = quiet
-        self._draws = console.is_terminal and not quiet
-        self._bars = Bars(
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("{task.fields[state]}", markup=False),
-            TimeElapsedColumn(),
-            TextColumn("{task.fields[running]}", style="dim", markup=False),
-            console=console,
-            transient=True,
-            disable=not self._draws,
-        )
-        self._bar = self._bars.add_task("meshes", total=None, state="", running="")
+        columns = (None, "{task.completed:.0f}/{task.total}", "{task.fields[state]}", "{task.fields[running]}")
+        self._bar = None if quiet else open_bar(*columns, state="", running="")
         self._start = self._reported = time.monotonic()
         self._total = self._passed_over = self._made = 0
         self._status: Counter[str] = Counter()
         self._running: dict[str, None] = {}  # in the order of their turns
 
     def __enter__(self) -> Screen:
-        self._bars.start()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self._bars.stop()
+        if self._bar is not None:
+            self._bar.stop()
 
     def begin(self, meshes: int) -> None:
         """See `rlacd.batch.Watcher`."""
         self._total = meshes
-        self._bars.update(self._bar, total=meshes)
+        self._update(total=meshes)
 
     def passed_over(self, asset: Asset) -> None:
         """See `rlacd.batch.Watcher`."""
         self._passed_over += 1
-        self._bars.update(self._bar, advance=1)
+        self._update(advance=1)
 
     def started(self, asset: Asset) -> None:
         """See `rlacd.batch.Watcher`."""
         self._running[asset.name] = None
-        self._bars.update(self._bar, running=self._names())
+        self._update(running=self._names())
 
     def finished(self, row: Row, timing: Row) -> None:
         """See `rlacd.batch.Watcher`."""
         self._made += 1
         self._status[row["status"]] += 1
         self._running.pop(row["mesh"], None)
-        self._bars.update(self._bar, advance=1, state=self._state(), running=self._names())
+        self._update(advance=1, state=self._state(), running=self._names())
         if row["status"] != "done":
             line = printable(failure_line(row))
-            self._bars.console.print(line, markup=False, highlight=False) if self._draws else say(line)
-        elif not self._draws and not self._quiet and time.monotonic() - self._reported > REPORT_EVERY:
+            say(line) if self._bar is None else self._bar.console.print(line, markup=False, highlight=False)
+        elif self._bar is None and not self._quiet and time.monotonic() - self._reported > REPORT_EVERY:
             self._reported = time.monotonic()
             say(f"{self._made + self._passed_over}/{self._total}  {self._state()}")
+
+    def _update(self, **news: Any) -> None:
+        if self._bar is not None:
+            self._bar.update(self._bar.task_ids[0], **news)
 
     def _names(self) -> str:
         """The meshes at work, the latest first: large ones that had to wait come last."""

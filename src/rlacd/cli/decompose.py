@@ -5,15 +5,15 @@ from __future__ import annotations
 import dataclasses
 import os
 import warnings
-from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import typer
+import click
 
-from rlacd.cli.exit_codes import ExitCode, exit_codes, give, say
-from rlacd.cli.options import decompose_options, how_parameters, unit_given
-from rlacd.cli.parameters import REQUIRED, Parameters, chosen, command, option_parameters, taken
+from rlacd.cli.commands import Argument, Command, chosen, options_of, taken
+from rlacd.cli.exit_codes import ExitCode, give, say
+from rlacd.cli.lean import import_trimesh
+from rlacd.cli.options import decompose_options, how, unit_given
 from rlacd.errors import ImplausibleBodyWarning, MeshFileError, OptionError
 from rlacd.options.output import OutputOptions
 
@@ -31,7 +31,7 @@ IN_METRES = (*ROBOTS, ".glb", ".gltf", ".vrm")
 HELP = """Turn a mesh into convex hulls for collision.
 
 \b
-[bold]Examples[/bold]
+Examples:
   rlacd decompose chair.glb
   rlacd decompose chair.glb -o chair_hulls.obj --threshold 0.02
   rlacd decompose chair.glb -o hulls/ --format stl --max-vertices 64
@@ -43,26 +43,22 @@ HELP = """Turn a mesh into convex hulls for collision.
 Ctrl-C once stops and writes the result so far; twice quits at once.
 """
 
-MESH = typer.Argument(
-    metavar="IN",
-    help="The mesh: obj, stl, ply, off, glb, gltf, vrm, dae, 3mf, usd. It need not be closed or clean. "
-    "Or a robot, .urdf or .xml (MJCF), whose collision meshes are to be replaced.",
+MESH = (
+    "The mesh: obj, stl, ply, off, glb, gltf, vrm, dae, 3mf, usd. It need not be closed or clean. "
+    "Or a robot, .urdf or .xml (MJCF), whose collision meshes are to be replaced."
 )
 
-
-def decompose_command() -> Callable[..., None]:
-    """Build `rlacd decompose`."""
-
-    def decompose(mesh: Path, **given: Any) -> None:
-        with exit_codes():
-            _decompose(mesh, OutputOptions(**taken(given, OutputOptions)), given)
-
-    mine: Parameters = {"mesh": (REQUIRED, Annotated[Path, MESH])}
-    return command(decompose, HELP, mine | option_parameters(OutputOptions) | how_parameters())
+FIRST = (
+    *("output", "threshold", "quality", "max_hulls", "max_vertices"),
+    *("preset", "criterion", "picture", "report", "timeout"),
+)
+"""What people use first, and ``--help`` shows."""
 
 
-def _decompose(mesh: Path, asked: OutputOptions, how: dict[str, Any]) -> None:
+def _decompose(mesh: Path, **how: Any) -> None:
+    asked = OutputOptions(**taken(how, OutputOptions))
     _check_input(mesh)
+    import_trimesh(mesh)
     if asked.report == STDOUT:
         give("")  # before any work
     wanted = _named(mesh, asked, how.get("preset"))
@@ -74,16 +70,14 @@ def _decompose(mesh: Path, asked: OutputOptions, how: dict[str, Any]) -> None:
     options = decompose_options(how, metres=mesh.suffix.lower() in IN_METRES)
     run = _rewrite if robot else _write
     if not run(mesh, wanted, options, unit_given(how)):
-        raise typer.Exit(ExitCode.STOPPED_EARLY)
+        raise SystemExit(ExitCode.STOPPED_EARLY)
 
 
 def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any], unit: str | None) -> bool:
     """Decompose a mesh and write all requested files; returns whether it is complete."""
     from rlacd.cli.terminal import Watch, summary, writing
     from rlacd.decompose_mesh import decompose
-    from rlacd.io.write import write_file
     from rlacd.plain_json import to_json
-    from rlacd.view import draw_picture, is_html, save_report_page
 
     up, quiet = wanted.up, bool(wanted.quiet)
     with Watch(quiet=quiet) as watch:
@@ -98,28 +92,41 @@ def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any], unit: str
         say(summary(result, place, unit))
     for doubt in doubts:
         say(f"  warning: {doubt.message}")
-    if wanted.report == STDOUT:
-        give(to_json(result.report))
-    elif wanted.report is not None:
+    if wanted.report is not None and is_html(wanted.report):
         with writing("report", wanted.report, quiet=quiet):
-            if is_html(wanted.report):
-                save_report_page(result, wanted.report, up=up)
-            else:
-                write_file(Path(wanted.report), to_json(result.report).encode())
+            result.save_report(wanted.report, up=up)
+    else:
+        _write_report(wanted, to_json(result.report))
     if wanted.balls is not None:
         with writing("balls", wanted.balls, quiet=quiet):
             result.save_balls(wanted.balls)
     if wanted.picture is not None:
         with writing("picture", wanted.picture, quiet=quiet):
-            draw_picture(result, wanted.picture, up=up)
+            result.picture(wanted.picture, up=up)
     return bool(result.report.get("complete", True))
+
+
+def _write_report(wanted: OutputOptions, text: str) -> None:
+    """Write measurements where they were asked for, if they were."""
+    from rlacd.cli.terminal import writing
+    from rlacd.io.write import write_file
+
+    if wanted.report == STDOUT:
+        give(text)
+    elif wanted.report is not None:
+        with writing("report", wanted.report, quiet=bool(wanted.quiet)):
+            write_file(Path(wanted.report), text.encode())
+
+
+def is_html(path: str) -> bool:
+    """Tell from its name whether a report should be a page; here, since `rlacd.view` takes time to load."""
+    return Path(path).suffix.lower() in (".html", ".htm")
 
 
 def _rewrite(robot: Path, wanted: OutputOptions, options: dict[str, Any], unit: str | None) -> bool:
     """Replace the collision meshes of a robot; returns whether all are complete."""
-    from rlacd.cli.terminal import Watch, rewrite_summary, writing
+    from rlacd.cli.terminal import Watch, rewrite_summary
     from rlacd.io.robots import rewrite_robot
-    from rlacd.io.write import write_file
     from rlacd.plain_json import to_json
 
     with Watch(quiet=bool(wanted.quiet)) as watch:
@@ -127,12 +134,7 @@ def _rewrite(robot: Path, wanted: OutputOptions, options: dict[str, Any], unit: 
         done = rewrite_robot(robot, str(wanted.output), package_dirs=packages, **options, progress=watch)
     if not wanted.quiet:
         say(rewrite_summary(done, unit))
-    measured = to_json({str(mesh.path): mesh.result.report for mesh in done.meshes})
-    if wanted.report == STDOUT:
-        give(measured)
-    elif wanted.report is not None:
-        with writing("report", wanted.report, quiet=bool(wanted.quiet)):
-            write_file(Path(wanted.report), measured.encode())
+    _write_report(wanted, to_json({str(mesh.path): mesh.result.report for mesh in done.meshes}))
     return done.complete
 
 
@@ -162,7 +164,6 @@ def _check_mesh(mesh: Path, wanted: OutputOptions) -> None:
     """Check before any work that all outputs can be written."""
     from rlacd.io.write import check_balls, check_file, file_stem, hull_target
     from rlacd.io.write.folder import check_names
-    from rlacd.view import check_picture
 
     flags = {"one_mesh": bool(wanted.one_mesh), "keep_input": bool(wanted.keep_input), "scene": bool(wanted.scene)}
     target = hull_target(str(wanted.output), wanted.file_format, **flags)
@@ -174,6 +175,8 @@ def _check_mesh(mesh: Path, wanted: OutputOptions) -> None:
     if wanted.report not in (None, STDOUT):
         check_file(Path(wanted.report))
     if wanted.picture is not None:
+        from rlacd.view.picture import check_picture
+
         check_picture(wanted.picture, up=wanted.up)
     if wanted.balls is not None:
         check_balls(Path(wanted.balls))
@@ -182,7 +185,6 @@ def _check_mesh(mesh: Path, wanted: OutputOptions) -> None:
 def _check_robot(asked: OutputOptions, wanted: OutputOptions) -> None:
     """Reject options for single meshes, and check that the report can be written."""
     from rlacd.io.write import check_file
-    from rlacd.view import is_html
 
     if wanted.report is not None and is_html(wanted.report):
         raise OptionError("--report as a page is for a single mesh; for a robot give a .json file.")
@@ -196,6 +198,12 @@ def _check_robot(asked: OutputOptions, wanted: OutputOptions) -> None:
 
 def _check_input(mesh: Path) -> None:
     """Report a missing input before any problem with the output; loading reports everything else."""
+    if more := click.get_current_context().args:
+        ending = f"'*{mesh.suffix}'" if mesh.suffix else "'*.obj'"
+        raise OptionError(
+            f"decompose takes one mesh, not {1 + len(more)}; for many, put them in a folder: "
+            f"rlacd batch {mesh.parent} -o hulls/ --glob {ending}."
+        )
     try:
         mesh.stat()
     except FileNotFoundError as error:
@@ -204,6 +212,8 @@ def _check_input(mesh: Path) -> None:
         raise MeshFileError(f"{mesh} does not exist: check the spelling and the folder") from error
     except (OSError, ValueError):
         return
+    if mesh.is_dir():
+        raise MeshFileError(f"{mesh} is a folder; for all meshes in it run  rlacd batch {mesh} -o hulls/")
     if mesh.suffix.lower() in NOT_REWRITTEN:
         raise MeshFileError(f"{mesh} {NOT_REWRITTEN[mesh.suffix.lower()]}")
 
@@ -222,3 +232,13 @@ def _check_output(mesh: Path, wanted: OutputOptions) -> None:
 
 def _same(path: str | Path) -> str:
     return os.path.normcase(os.path.realpath(path))  # unlike Path.resolve, accepts circular links
+
+
+COMMAND = Command(
+    "decompose",
+    _decompose,
+    HELP,
+    [Argument("mesh", "IN", MESH), *options_of(OutputOptions), *how()],
+    first=FIRST,
+    context_settings={"allow_extra_args": True},
+)

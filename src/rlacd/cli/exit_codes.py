@@ -14,8 +14,6 @@ from collections.abc import Iterator
 from enum import IntEnum
 from typing import NoReturn
 
-import typer
-
 from rlacd.errors import OutputError, RlacdError
 
 
@@ -33,7 +31,7 @@ class ExitCode(IntEnum):
 
 # \b preserves line breaks in the help.
 EPILOG = """\b
-[bold]Exit codes[/bold]
+Exit codes:
   0    done
   1    a bug in rlacd (RLACD_DEBUG=1 shows the traceback)
   2    bad input or bad option
@@ -49,13 +47,11 @@ def exit_codes() -> Iterator[None]:
     """Turn every error into one sentence on stderr and an exit code; RLACD_DEBUG=1 lets the traceback through."""
     try:
         yield
-    except (typer.Exit, typer.Abort, SystemExit):
-        raise
     except KeyboardInterrupt:
         _fail("interrupted; no file is left half-written.", ExitCode.INTERRUPTED)
     except BrokenPipeError:
         _silence_stdout()  # its reader (head, jq) has closed it
-        raise typer.Exit(ExitCode.CANNOT_WRITE) from None
+        raise SystemExit(ExitCode.CANNOT_WRITE) from None
     except OutputError as error:
         _fail(error, ExitCode.CANNOT_WRITE)
     except RlacdError as error:
@@ -89,8 +85,8 @@ def give(text: str) -> None:
 
 def say(text: str) -> None:
     """Print a line to stderr; stdout is reserved for requested output. A stderr that nobody can read loses it."""
-    with contextlib.suppress(OSError):
-        typer.echo(text, err=True)
+    with contextlib.suppress(OSError, AttributeError):
+        sys.stderr.write(f"{text}\n")
 
 
 def _silence_stdout() -> None:
@@ -110,7 +106,7 @@ def _fail(message: object, code: ExitCode) -> None:
     if os.environ.get("RLACD_DEBUG") == "1":
         raise
     say(f"rlacd: {message}")
-    raise typer.Exit(code)
+    raise SystemExit(code)
 
 
 def _first_line(error: Exception) -> str:

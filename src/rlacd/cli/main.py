@@ -1,51 +1,82 @@
-"""The command line: one module per command; this one only assembles them."""
+"""The command line: one module per command, imported when the command is used."""
 
 from __future__ import annotations
 
-import contextlib
+import atexit
 import gc
+import importlib
 import io
 import os
 import shlex
 import sys
+import threading
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import typer
-from typer.core import TyperGroup
+import click
+from click.shell_completion import get_completion_class
 
 from rlacd._version import __version__
-from rlacd.cli.batch import BATCH_EPILOG, batch_command
-from rlacd.cli.decompose import decompose_command
-from rlacd.cli.exit_codes import EPILOG, ExitCode, exit_codes, give
-from rlacd.cli.train import train_command
-from rlacd.cli.view import view
+from rlacd.cli.exit_codes import EPILOG, ExitCode, exit_codes, give, leave, say
 from rlacd.plain_json import printable
 
+COMMANDS = ("decompose", "info", "view", "batch", "train")
+COMPLETE = "_RLACD_COMPLETE"
+"""The variable by which a shell asks for completions."""
 
-class Commands(TyperGroup):
-    """Suggests the right command if a file is given in its place."""
+
+class Commands(click.Group):
+    """Finds a command in the module of its name, and suggests the right one if a file is given in its place."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """All commands, in the order of the help."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import a command."""
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = importlib.import_module(f"rlacd.cli.{cmd_name}").COMMAND
+        return command
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Find the command that the arguments start with."""
         word = args[0]
-        if self.get_command(ctx, word) is None and (Path(word).suffix or os.path.exists(word)):
+        if word not in COMMANDS and (Path(word).suffix or os.path.exists(word)):
             verb = "batch" if os.path.isdir(word) else "decompose"
             typed = shlex.join(["rlacd", verb, *args])
-            typer.echo(f"rlacd: {printable(word)} is not a command; did you mean  {printable(typed)}", err=True)
-            raise typer.Exit(ExitCode.BAD_INPUT)
+            say(f"rlacd: {printable(word)} is not a command; did you mean  {printable(typed)}")
+            raise SystemExit(ExitCode.BAD_INPUT)
         return super().resolve_command(ctx, args)
 
 
-app = typer.Typer(
+def _print_and_exit(ctx: click.Context, param: click.Parameter, value: Any) -> None:
+    if not value:
+        return
+    with exit_codes():
+        complete = param.name == "show_completion" and get_completion_class(value)
+        give(complete(app, {}, "rlacd", COMPLETE).source() + "\n" if complete else f"rlacd {__version__}\n")
+    ctx.exit()
+
+
+_EAGER: dict[str, Any] = {"is_eager": True, "expose_value": False, "callback": _print_and_exit}
+
+app = Commands(
     name="rlacd",
-    cls=Commands,
     help="Approximate convex decomposition: any mesh in, few tight convex hulls out.",
     epilog=EPILOG,
     no_args_is_help=True,
-    rich_markup_mode="rich",
-    pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
+    params=[
+        click.Option(["--version"], is_flag=True, help="Show the version and exit.", **_EAGER),
+        click.Option(
+            ["--show-completion"],
+            metavar="bash|zsh|fish",
+            type=click.Choice(["bash", "zsh", "fish"]),
+            help="Print what completes commands and options in a shell, and exit.",
+            **_EAGER,
+        ),
+    ],
 )
 
 
@@ -56,54 +87,13 @@ def main() -> None:
     # Little of what a command allocates can be freed before it ends, so look for that rarely.
     gc.set_threshold(100_000, 50, 50)
     try:
-        app(prog_name="rlacd")
+        app(prog_name="rlacd", complete_var=COMPLETE)
     except SystemExit as ended:
-        if ended.code == ExitCode.STOPPED_EARLY:  # late already: freeing thousands of hulls one by one takes long
-            with contextlib.suppress(BrokenPipeError):
-                sys.stdout.flush()
-            os._exit(ExitCode.STOPPED_EARLY)
+        # Taking the interpreter down object by object takes long: a tenth of a small mesh's time, and after a stop more
+        # than is left.
+        late = ended.code == ExitCode.STOPPED_EARLY
+        if late or threading.active_count() == 1:
+            if not late:
+                atexit._run_exitfuncs()
+            leave(ended.code if isinstance(ended.code, int) else int(ended.code is not None))
         raise
-
-
-def _print_version(wanted: bool) -> None:
-    if wanted:
-        with exit_codes():
-            give(f"rlacd {__version__}\n")
-        raise typer.Exit
-
-
-@app.callback()
-def common(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit.")
-    ] = False,
-) -> None:
-    """Approximate convex decomposition: any mesh in, few tight convex hulls out."""
-
-
-app.command("decompose", epilog=EPILOG)(decompose_command())
-
-
-@app.command(epilog=EPILOG)
-def info(
-    mesh: Annotated[Path, typer.Argument(metavar="FILE", help="The mesh to look at.")],
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
-) -> None:
-    """Show what a file contains and how it would be repaired, without decomposing it.
-
-    \b
-    [bold]Examples[/bold]
-      rlacd info chair.glb
-      rlacd info chair.glb --json | jq .repair
-    """
-    with exit_codes():
-        from rlacd.cli.describe import describe, describe_text
-        from rlacd.plain_json import printable, to_json
-
-        facts = describe(mesh)
-        give(to_json(facts) if as_json else printable(describe_text(facts)))
-
-
-app.command("view", epilog=EPILOG)(view)
-app.command("batch", epilog=BATCH_EPILOG)(batch_command())
-app.command("train", epilog=EPILOG)(train_command())

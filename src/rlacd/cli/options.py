@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
-from rlacd.cli.parameters import Parameters, chosen, option_parameters
+from rlacd.cli.commands import Option, chosen, options_of
 from rlacd.errors import OptionError
 from rlacd.options import CONCAVITY, VOLUME, Options, criterion_named
-from rlacd.options.fields import about
+from rlacd.options.fields import about, check_fields, number, option, stated
 from rlacd.options.navigable import NAVIGABLE, SpaceOptions
+
+if TYPE_CHECKING:
+    from rlacd.pool import Pool, ProcessLimits
 
 _SPACE = tuple(field.name for field in dataclasses.fields(SpaceOptions))
 
@@ -18,9 +22,47 @@ _LENGTH = re.compile(r"([-+.\deE]+)\s*(%|m|cm|mm)")
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
-def how_parameters() -> Parameters:
-    """Make the parameters that control the decomposition."""
-    return option_parameters(Options) | option_parameters(SpaceOptions)
+@stated(panel="Processes")
+@dataclass(frozen=True)
+class PoolOptions:
+    """Where `rlacd batch` and `rlacd train` work, and what each process may take.
+
+    Attributes
+    ----------
+    jobs
+        Processes at a time.
+    ray
+        Use a Ray cluster: its address, auto, or local.
+    limit
+        Time limit for a mesh, or for an episode of a training; after it the process is killed.
+    memory
+        Memory limit of a process; 0 means no limit.
+    """
+
+    jobs: int | None = option(None, least=0, usual="all cores; train: 1")
+    ray: str | None = option(None, metavar="ADDRESS")
+    limit: float = option(600.0, kind=number(0.1), metavar="SECONDS", usual="600")
+    memory: float = option(4.0, kind=number(0.0), metavar="GB", usual="4")
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    def limits(self) -> ProcessLimits:
+        """Limits of each request."""
+        from rlacd.pool import ProcessLimits
+
+        return ProcessLimits(self.limit, int(self.memory * 2**30))
+
+    def open(self, jobs: int) -> Pool:
+        """Open the pool; on this machine with this many processes unless told otherwise."""
+        from rlacd.pool import open_pool
+
+        return open_pool(jobs if self.jobs is None and self.ray is None else self.jobs, self.ray)
+
+
+def how() -> list[Option]:
+    """Make the options that control the decomposition."""
+    return options_of(Options) + options_of(SpaceOptions)
 
 
 def decompose_options(given: dict[str, Any], *, metres: bool = False) -> dict[str, Any]:
@@ -43,7 +85,7 @@ def decompose_options(given: dict[str, Any], *, metres: bool = False) -> dict[st
     OptionError
         Options contradict each other or are malformed.
     """
-    given = _lengths(chosen(given), metres)
+    given = lengths(chosen(given), metres)
     space = {name: given.pop(name) for name in _SPACE if name in given}
     criterion = criterion_named(given.pop("criterion", CONCAVITY))
     if criterion == VOLUME and "tolerance" in space:
@@ -78,7 +120,7 @@ def _typed(name: str, space: dict[str, Any]) -> str:
     return no if space[name] is False else yes
 
 
-def _lengths(given: dict[str, Any], metres: bool) -> dict[str, Any]:
+def lengths(given: dict[str, Any], metres: bool) -> dict[str, Any]:
     """Parse lengths: a number, a share of the longest side (5%), or metres (0.05m)."""
     taken = dict(given)
     for name, of_longest in (("threshold", 2.0), ("overlap", 2.0), ("radius", 1.0), ("tolerance", 1.0)):

@@ -28,7 +28,7 @@ from rlacd.learn.options import TrainOptions
 from rlacd.learn.process import CutProcess, Memory
 from rlacd.learn.q_network import QNetwork
 from rlacd.policies.network import Network, parse_network
-from rlacd.pool import Answer, Blobs, Pool, ProcessLimits, Request, Shared, WorkerDiedError, submit_with_retry
+from rlacd.pool import Answer, Blobs, Pool, ProcessLimits, Request, Shared, WorkerDiedError
 from rlacd.solid.component import Component
 
 LOST = 10
@@ -146,8 +146,8 @@ class Rollouts:
             "seed": [options.seed, ACT, number],
         }
         shared = {"setting": self._setting} | ({} if acting.network is None else {"network": acting.network})
-        request = Request(SERVER, values, self._solids.files(name), shared, self._limits)
-        return number, name, submit_with_retry(self._pool, request)
+        request = Request(SERVER, values, self._solids.files(name), shared, self._limits, tries=2)
+        return number, name, self._pool.submit(request)
 
     def _played(self, episode: tuple[int, str, Future[Answer]] | Episode) -> Episode:
         if isinstance(episode, Episode):

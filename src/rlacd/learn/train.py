@@ -42,7 +42,8 @@ from rlacd.options.fields import require_same
 from rlacd.policies import make_policy
 from rlacd.policies.qpolicy import KIND, SHORTLIST
 from rlacd.policies.shortlist import RandomShortlist
-from rlacd.pool import InProcessPool, Pool, ProcessLimits
+from rlacd.pool import Pool, ProcessLimits
+from rlacd.pool.local import InProcessPool
 
 VALIDATED = 16
 """At most this many solids are validated with."""

@@ -2,24 +2,74 @@
 
 Requests come through stdin and answers leave through what stdout was at the start: pipes that every system has. A
 request that crashes, hangs, exhausts memory or makes a library print does so here. The process exits when its parent
-does.
+does. A message is a JSON header that names its blobs, then the blobs.
 """
 
 from __future__ import annotations
 
+import importlib
+import json
 import os
 import queue
 import signal
+import struct
 import sys
 import threading
 from pathlib import Path
+from typing import IO
 
 from rlacd.errors import RlacdError
-from rlacd.pool.message import find_server, receive, send
-from rlacd.pool.request import Shared, Values
+from rlacd.pool import Blobs, MakeServer, Shared, Values
 
 READY = {"ready": True}
 """Header of the first message, sent when requests may come."""
+
+_LENGTH = struct.Struct("<Q")
+
+
+def send(pipe: IO[bytes], header: Values, blobs: Blobs) -> None:
+    """Send one message.
+
+    Raises
+    ------
+    OSError, ValueError
+        The other end, or this one, is closed.
+    """
+    for content in (json.dumps({**header, "blobs": list(blobs)}).encode(), *blobs.values()):
+        pipe.write(_LENGTH.pack(len(content)))
+        pipe.write(content)
+    pipe.flush()
+
+
+def receive(pipe: IO[bytes]) -> tuple[Values, dict[str, bytes]]:
+    """Wait for one message.
+
+    Raises
+    ------
+    EOFError, OSError, ValueError
+        The other end, or this one, is closed.
+    """
+    header: Values = json.loads(_next(pipe))
+    return header, {name: _next(pipe) for name in header.pop("blobs")}
+
+
+def _next(pipe: IO[bytes]) -> bytes:
+    (length,) = _LENGTH.unpack(_exactly(pipe, _LENGTH.size))
+    return _exactly(pipe, length)
+
+
+def _exactly(pipe: IO[bytes], length: int) -> bytes:
+    content = pipe.read(length)
+    if len(content) < length:
+        raise EOFError
+    return content
+
+
+def find_server(name: str) -> MakeServer:
+    """Import the object that ``module:name`` refers to."""
+    module, _, attribute = name.partition(":")
+    make: MakeServer = getattr(importlib.import_module(module), attribute)
+    return make
 
 
 def main() -> None:

@@ -6,38 +6,30 @@ requests share is put in the object store once; a machine fetches it for its fir
 
 from __future__ import annotations
 
-import contextlib
 import os
 import socket
 import time
 import weakref
 from collections.abc import Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
-from types import TracebackType
+from concurrent.futures import Future
 from typing import Any
 
 from rlacd._version import __version__
 from rlacd.errors import MissingExtraError, OptionError
-from rlacd.pool.request import Answer, MachineLostError, ProcessLimits, Request, Shared
-from rlacd.pool.worker import Worker
+from rlacd.pool import Answer, MachineLostError, Pool, ProcessLimits, Request, Shared
+from rlacd.pool.local import Worker
 
 LOCAL = "local"
 """The address of a cluster on this machine alone."""
 
-LOST = 5
+MACHINES = 5
 """Times a request is resent after its machine was lost."""
 
-QUEUE = 2
-"""Requests submitted per processor: one running, and one queued so that the processor never waits."""
-
-RECOUNT = 10.0
-"""Seconds between checks of the number of processors."""
-
-ANSWER = 10.0
-"""Seconds allowed for a cluster to answer."""
+PATIENCE = 10.0
+"""Seconds allowed for a cluster to answer, and between two counts of its processors."""
 
 
-class RayPool:
+class RayPool(Pool):
     """Tasks on a cluster.
 
     Parameters
@@ -81,19 +73,18 @@ class RayPool:
                 raise OptionError(
                     f"there is no Ray cluster at {address} ({reason}); start one or use local."
                 ) from error
-        self._remote = ray.remote(max_retries=LOST, retry_exceptions=False)(_do)
+        self._remote = ray.remote(max_retries=MACHINES, retry_exceptions=False)(_do)
         self._running: set[Any] = set()
-        self._finishing = ThreadPoolExecutor(1)  # Ray's callbacks must not call Ray; ours may
         self._stored: weakref.WeakKeyDictionary[Shared, Any] = weakref.WeakKeyDictionary()
-        self._processors, self._counted = 0.0, -RECOUNT
+        self._processors, self._counted = 0.0, -PATIENCE
 
     @property
     def room(self) -> int:
         """Single-threaded requests worth submitting at once; clusters grow and shrink."""
-        if time.monotonic() - self._counted > RECOUNT:
+        if time.monotonic() - self._counted > PATIENCE:
             self._processors = self._ray.cluster_resources().get("CPU", 0)
             self._counted = time.monotonic()
-        return max(1, int(QUEUE * self._processors))
+        return max(1, int(2 * self._processors))  # one running, and one queued so that the processor never waits
 
     def submit(self, request: Request) -> Future[Answer]:
         """See `Pool`; unshared data travels with every request, so share what is large.
@@ -105,13 +96,13 @@ class RayPool:
         """
         self._require_processors(request.threads)
         shared = {name: (given.key, [self._store(given)]) for name, given in request.shared.items()}
-        plain = {name: getattr(request, name) for name in ("server", "values", "blobs", "fresh")}
+        plain = {name: getattr(request, name) for name in ("server", "values", "blobs", "fresh", "tries")}
         limits = (request.limits.seconds, request.limits.memory)
         task = self._remote.options(num_cpus=request.threads).remote(__version__, plain, shared, limits)
         self._running.add(task)
         future: Future[Answer] = Future()
         future.set_running_or_notify_cancel()
-        task.future().add_done_callback(lambda done: self._hand_over(task, done, future))
+        task.future().add_done_callback(lambda done: self._finish(task, done, future))
         return future
 
     def close(self) -> None:
@@ -122,16 +113,6 @@ class RayPool:
         if self._ours:
             self._ray.shutdown()
 
-    def __enter__(self) -> RayPool:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self.close()
-
-    def _hand_over(self, task: Any, done: Future[Any], future: Future[Answer]) -> None:
-        with contextlib.suppress(RuntimeError):  # the interpreter is exiting
-            self._finishing.submit(self._finish, task, done, future)
-
     def _finish(self, task: Any, done: Future[Any], future: Future[Answer]) -> None:
         self._running.discard(task)
         exceptions = self._ray.exceptions
@@ -140,7 +121,7 @@ class RayPool:
         except exceptions.RayTaskError as error:
             future.set_exception(getattr(error, "cause", None) or error)
         except exceptions.RayError:
-            future.set_exception(MachineLostError(f"it was lost with its machine {LOST + 1} times"))
+            future.set_exception(MachineLostError(f"it was lost with its machine {MACHINES + 1} times"))
         except BaseException as error:
             future.set_exception(error)
 
@@ -163,7 +144,7 @@ def _require_answer(address: str) -> None:
     if not (host and port.isdecimal()):
         return
     try:
-        socket.create_connection((host.strip("[]"), int(port)), timeout=ANSWER).close()
+        socket.create_connection((host.strip("[]"), int(port)), timeout=PATIENCE).close()
     except (OSError, OverflowError) as error:
         raise OptionError(f"there is no Ray cluster at {address} ({error}); start one or use local.") from error
 

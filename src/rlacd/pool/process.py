@@ -43,12 +43,6 @@ def why_it_ended(code: int | None) -> str:
     return f"ended with code {code}" if code < 2**16 else f"ended with code {code:#x}"  # a crash on Windows
 
 
-def end(process: subprocess.Popen[bytes]) -> None:
-    """End a process and its children, and wait until it is gone."""
-    kill_group(process)
-    process.wait()
-
-
 def kill_group(process: subprocess.Popen[bytes]) -> None:
     """Kill a process made by `start` and its children."""
     if hasattr(os, "killpg"):

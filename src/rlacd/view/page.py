@@ -43,7 +43,7 @@ def live_page(title: str, config: dict[str, Any]) -> Page:
     ----------
     title : str
     config : dict
-        Plain values for the page's controls; see `rlacd.viewer.server`.
+        Plain values for the page's controls; see `rlacd.view.server`.
     """
     imports = {f"page/{name}": f"./page/{name}.js" for name in MODULES}
     return _page(title, {"live": True, **config}, None, imports, modules="'self'", connect="'self'")

@@ -21,7 +21,7 @@ from rlacd.result import Result
 from rlacd.solid.balls import Balls
 from rlacd.told_apart import told_apart
 from rlacd.view.coloring import color_hulls
-from rlacd.view.render import Body, Spheres, render, require_extra
+from rlacd.view.render import Body, Render, Spheres, render, require_extra
 
 INPUT_COLOR = np.array([0.46, 0.47, 0.50])  # linear reflectance
 BALL_COLOR = np.array([0.10, 0.30, 0.75])
@@ -104,7 +104,13 @@ def draw_picture(
 
 
 def picture_bytes(
-    decomposition: Result, *, width: int = 1600, samples: int = 16, up: str | None = None, clear: bool = False
+    decomposition: Result,
+    *,
+    width: int = 1600,
+    samples: int = 16,
+    up: str | None = None,
+    clear: bool = False,
+    render: Render = render,
 ) -> bytes:
     """Draw the picture as the bytes of a PNG file; see `draw_picture`.
 

@@ -10,9 +10,9 @@ import contextlib
 import importlib
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -41,6 +41,10 @@ class Spheres:
     centres: npt.NDArray[np.float64]
     radii: npt.NDArray[np.float64]
     color: npt.NDArray[np.float64]
+
+
+Render: TypeAlias = Callable[..., npt.NDArray[np.uint8]]
+"""`render`, here or in another process."""
 
 
 def require_extra(module: str) -> Any:

@@ -6,9 +6,8 @@ from pathlib import Path
 
 from rlacd.errors import MeshFileError
 from rlacd.memory import memory_left
-from rlacd.pool import Answer, Blobs, ProcessLimits, Request, WorkerDiedError
-from rlacd.pool.request import Values
-from rlacd.pool.worker import Worker
+from rlacd.pool import Answer, Blobs, ProcessLimits, Request, Values, WorkerDiedError
+from rlacd.pool.local import Worker
 
 SECONDS, MEMORY = 600.0, 8 * 2**30
 """Limits of one file."""
@@ -20,7 +19,7 @@ def answer_of(server: str, path: Path, kind: str, values: Values, blobs: Blobs) 
     Parameters
     ----------
     server : str
-        ``module:name`` of a factory, as of `rlacd.pool.request.MakeServer`.
+        ``module:name`` of a factory, as of `rlacd.pool.MakeServer`.
     path : Path
         Of the file, for messages.
     kind : str

@@ -15,8 +15,7 @@ from rlacd.errors import MeshFileError, MissingExtraError
 from rlacd.io.read.apart import answer_of
 from rlacd.io.read.gltf_arrays import ITEMS, Arrays, Json, as_floats
 from rlacd.io.read.limits import MOST_TRIANGLES
-from rlacd.pool import Blobs, Shared
-from rlacd.pool.request import Values
+from rlacd.pool import Blobs, Shared, Values
 
 DRACO = "KHR_draco_mesh_compression"
 
@@ -82,7 +81,7 @@ def decode_draco(path: Path, primitives: Sequence[Json], required: bool, arrays:
 
 
 class DracoDecoder:
-    """The server of a process that decodes Draco's streams (see `rlacd.pool.request.Server`)."""
+    """The server of a process that decodes Draco's streams (see `rlacd.pool.Server`)."""
 
     def __init__(self, folder: Path) -> None:
         pass

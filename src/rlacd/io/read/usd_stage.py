@@ -16,8 +16,7 @@ from rlacd.errors import MeshFileError, MissingExtraError
 from rlacd.io.read.limits import MOST_PLACES, MOST_TRIANGLES
 from rlacd.io.read.open_file import read_file
 from rlacd.io.read.polygons import triangles_of
-from rlacd.pool import Blobs, Shared
-from rlacd.pool.request import Values
+from rlacd.pool import Blobs, Shared, Values
 from rlacd.solid.arrays import FloatArray
 
 SERVER = "rlacd.io.read.usd_stage:StageReader"
@@ -36,7 +35,7 @@ _LOOK = {"diffuseColor": 3, "emissiveColor": 3, "opacity": 1, "metallic": 1, "ro
 
 
 class StageReader:
-    """The server of a process that reads stages (see `rlacd.pool.request.Server`)."""
+    """The server of a process that reads stages (see `rlacd.pool.Server`)."""
 
     def __init__(self, folder: Path) -> None:
         os.environ["TMPDIR"] = str(folder)  # OpenUSD writes a report of a crash there

@@ -272,10 +272,13 @@ const link = config.live
 if (config.live) choosePreset(config.options.preset ?? "");
 at("cancel").addEventListener("click", stop);
 
-/** Download a file; some take seconds to make, which the button tells. */
+/** Download a file; the button tells how long it is being made: a report takes a minute. */
 async function keep(format, button) {
   say(null);
   button.setAttribute("aria-busy", true);
+  const [spent, began] = [make("small", {}), Date.now()];
+  button.append(spent);
+  const clock = setInterval(() => (spent.textContent = `${Math.round((Date.now() - began) / 1000)} s`), 1000);
   try {
     const { name, content } = await link.file(format, look.up.querySelector("input:checked").value);
     const address = URL.createObjectURL(content);
@@ -284,6 +287,8 @@ async function keep(format, button) {
   } catch (error) {
     say(error.message);
   }
+  clearInterval(clock);
+  spent.remove();
   button.removeAttribute("aria-busy");
 }
 

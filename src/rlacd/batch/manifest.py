@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from pathlib import PurePosixPath
+from types import TracebackType
 from typing import Any, TypeAlias
 
 from rlacd.batch.store import ResultStore
@@ -60,16 +61,18 @@ class Ledger:
         self._journal.add(_line(row))
         self._put(row)
 
-    def finish(self) -> None:
-        """Write the sorted file and remove the journal."""
+    def __enter__(self) -> Ledger:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        """Write the sorted file and remove the journal; after an error, leave the journal for the next run."""
+        if error is not None:
+            self._journal.close()
+            return
         content = b"".join(_line(row) for row in self.rows())
         if content != (self._store.read(self._name) or b""):
             self._store.write(self._name, content)
         self._journal.remove()
-
-    def close(self) -> None:
-        """Close the journal and leave it for the next run."""
-        self._journal.close()
 
     def _put(self, row: Row) -> None:
         """Store a row, and drop the row of any other mesh (deleted since) that claims the same outputs."""

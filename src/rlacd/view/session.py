@@ -14,11 +14,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from rlacd.decomposition import Decomposition
 from rlacd.errors import RlacdError
+from rlacd.result import Result
 from rlacd.run import Progress
 
-Run = Callable[..., Decomposition]
+Run = Callable[..., Result]
 """Takes ``progress`` and the options, returns a decomposition: `rlacd.decompose` with the mesh bound."""
 
 
@@ -73,7 +73,7 @@ class Session:
         self._count = 0  # number of state changes so far
         self._wanted: list[dict[str, Any]] | None = None  # options of the draft, if any, and of the result
         self._stopped = False
-        self._result: Decomposition | None = None
+        self._result: Result | None = None
         self._thread = threading.Thread(target=self._work, name="rlacd-view", daemon=True)
         self._thread.start()
         _SESSIONS.add(self)
@@ -91,7 +91,7 @@ class Session:
             return self._state
 
     @property
-    def result(self) -> tuple[int, Decomposition] | None:
+    def result(self) -> tuple[int, Result] | None:
         """The current hulls and their version; None before the first result and after the input changed."""
         with self._changed:
             return None if self._result is None else (self._state.version, self._result)
@@ -182,7 +182,7 @@ class Session:
                 if is_last:
                     return
 
-    def _attempt(self, options: dict[str, Any]) -> tuple[Decomposition | None, str | None]:
+    def _attempt(self, options: dict[str, Any]) -> tuple[Result | None, str | None]:
         try:
             return self._run(progress=self._follow, **options), None
         except RlacdError as error:
@@ -206,7 +206,7 @@ class Session:
         self._changed.notify_all()
 
 
-def _is_cut_short(result: Decomposition) -> bool:
+def _is_cut_short(result: Result) -> bool:
     """Tell whether the work was stopped during its first pass."""
     return result.report.get("complete") is False and result.report.get("search") is None
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import atexit
 import contextlib
 import dataclasses
-import functools
 import os
 import threading
 import time
@@ -13,15 +12,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rlacd.decompose_mesh import decompose
-from rlacd.errors import OptionError
-from rlacd.io.read.load import load_mesh
 from rlacd.options import Options
+from rlacd.view.controls import read_controls, read_subject
 from rlacd.view.picture import check_up
-from rlacd.viewer.controls import Subject, ViewerControls
-from rlacd.viewer.server import ViewServer
-from rlacd.viewer.session import AT_EXIT, Session
-from rlacd.viewer.up import SAY_NOTHING, guessed_up
+from rlacd.view.server import ViewServer
+from rlacd.view.session import AT_EXIT, Run, Session
 
 LEAVING = 0.8  # seconds for current work to end when the viewer is closed
 
@@ -29,6 +24,7 @@ LEAVING = 0.8  # seconds for current work to end when the viewer is closed
 @contextlib.contextmanager
 def open_viewer(
     mesh: str | os.PathLike[str],
+    decompose: Run,
     options: dict[str, Any] | None = None,
     *,
     up: str | None = None,
@@ -43,6 +39,8 @@ def open_viewer(
     ----------
     mesh : path-like
         Any file `rlacd.decompose` takes; it is read again for every decomposition, so that changes to it take effect.
+    decompose : callable
+        `rlacd.decompose`.
     options : dict, optional
         Initial values of the page's controls: fields of `ViewerControls`.
     up : {"x", "y", "z"}, optional
@@ -68,9 +66,9 @@ def open_viewer(
     controls.options()
     Options(threads=threads)
     subject = read_subject(mesh, up)
-    session = Session(functools.partial(decompose, threads=threads))
+    session = Session(lambda **given: decompose(**given, threads=threads))
     try:
-        server = ViewServer(session, subject, port=port, options=controls, accept=read_controls, read=read_subject)
+        server = ViewServer(session, subject, port=port, options=controls)
     except BaseException:
         session.close()
         raise
@@ -126,32 +124,3 @@ class Viewer:
         with contextlib.suppress(KeyboardInterrupt):
             while self._thread.is_alive():  # a wait without timeout would not notice Ctrl-C on Windows
                 self._thread.join(0.5)
-
-
-def read_subject(mesh: str | os.PathLike[str], up: str | None = None) -> Subject:
-    """Read the mesh to be viewed.
-
-    Raises
-    ------
-    MeshError
-        The file cannot be read or holds nothing usable.
-    """
-    read = load_mesh(mesh)
-    guess = up is None and Path(mesh).suffix.lower() in SAY_NOTHING
-    axis = up or (guessed_up(read) if guess else read.up)
-    return Subject(Path(mesh), Path(read.name).stem, axis, read.unit, read, up_is_guess=guess)
-
-
-def read_controls(given: dict[str, Any]) -> ViewerControls:
-    """Check the options given by a page or a command line.
-
-    Raises
-    ------
-    OptionError
-        An option is unknown or of the wrong type.
-    """
-    known = {field.name for field in dataclasses.fields(ViewerControls)}
-    for name in given:
-        if name not in known:
-            raise OptionError(f"{name!r} is not an option of the viewer; choose from {', '.join(sorted(known))}.")
-    return ViewerControls(**given)

@@ -1,16 +1,41 @@
-"""The contents of a mesh file, and how it would be repaired."""
+"""The command `rlacd info`: the contents of a mesh file, and how it would be repaired."""
 
 from __future__ import annotations
 
 import os
 from collections import Counter
+from pathlib import Path
 from typing import Any
 
-import numpy as np
+from rlacd.cli.commands import Argument, Command, Option
+from rlacd.cli.exit_codes import give
+from rlacd.cli.lean import import_trimesh
+from rlacd.plain_json import printable, to_json
 
-from rlacd._native import mesh_volume
-from rlacd.io.read.load import load_mesh
-from rlacd.repair.repair import repair
+HELP = """Show what a file contains and how it would be repaired, without decomposing it.
+
+\b
+Examples:
+  rlacd info chair.glb
+  rlacd info chair.glb --json | jq .repair
+"""
+
+
+def _info(mesh: Path, as_json: bool) -> None:
+    import_trimesh(mesh)
+    facts = describe(mesh)
+    give(to_json(facts) if as_json else printable(describe_text(facts)))
+
+
+COMMAND = Command(
+    "info",
+    _info,
+    HELP,
+    [
+        Argument("mesh", "FILE", "The mesh to look at."),
+        Option("as_json", "--json", is_flag=True, default=False, help="Print JSON instead of text."),
+    ],
+)
 
 
 def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -33,6 +58,12 @@ def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
     MeshError
         The file cannot be read or holds nothing usable.
     """
+    import numpy as np
+
+    from rlacd._native import mesh_volume
+    from rlacd.io.read.load import load_mesh
+    from rlacd.repair.repair import repair
+
     mesh = load_mesh(path)
     solid = repair(mesh)
     used = mesh.vertices[np.unique(mesh.faces)] if len(mesh.faces) else mesh.vertices
@@ -63,7 +94,7 @@ def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 def describe_text(facts: dict[str, Any]) -> str:
     """Format the result of `describe` as a few lines of text."""
-    size = np.subtract(facts["bounds"][1], facts["bounds"][0])
+    size = [high - low for low, high in zip(*facts["bounds"], strict=True)]
     bodies = facts["repair"]
     lines = [
         facts["file"],

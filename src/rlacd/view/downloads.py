@@ -9,14 +9,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
-from rlacd.decomposition import Decomposition
 from rlacd.errors import MissingExtraError, OptionError
-from rlacd.io.write import FORMATS, MODELS, file_stem
+from rlacd.io.write import FORMATS, MODELS, file_stem, save, save_balls
 from rlacd.io.write.target import WITH_MESHES
 from rlacd.io.write.usd import require_usd
 from rlacd.options.output import Axis
 from rlacd.plain_json import to_json
-from rlacd.view.html_report import report_page
+from rlacd.result import Result
+from rlacd.view.apart import renderer
+from rlacd.view.report import report_page
 
 FOLDERS = ("obj", "stl")
 """Formats also offered with one file per hull."""
@@ -100,12 +101,12 @@ def _missing(model: str) -> str | None:
     return None
 
 
-def download(decomposition: Decomposition, wanted: str, *, up: str = "z", unit: str = "") -> Download:
+def download(decomposition: Result, wanted: str, *, up: str = "z", unit: str = "") -> Download:
     """Make one of the files `offered`; several files are zipped.
 
     Parameters
     ----------
-    decomposition : Decomposition
+    decomposition : Result
     wanted : str
         The name of the offer.
     up : {"x", "y", "z"}
@@ -127,20 +128,24 @@ def download(decomposition: Decomposition, wanted: str, *, up: str = "z", unit: 
         raise OptionError(f"{wanted!r} cannot be downloaded; choose one of {', '.join(names)}.")
     stem = file_stem(decomposition.name)
     if wanted == "report.html":
-        return Download(f"{stem}_hulls.html", report_page(decomposition, up=up, unit=unit).encode())
+        with renderer() as render:
+            page = report_page(decomposition, up=up, unit=unit, render=render)
+        return Download(f"{stem}_hulls.html", page.encode())
     if wanted == "report.json":
         return Download(f"{stem}_hulls.json", to_json(decomposition.report).encode())
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         if wanted == "balls.csv":
-            decomposition.save_balls(folder / f"{stem}_balls.csv")
+            if decomposition.balls is None:
+                raise OptionError("there are no balls to write; decompose with a NavigableSpace.")
+            save_balls(decomposition.balls, folder / f"{stem}_balls.csv")
         elif wanted in MODELS:
             place = folder / f"{stem if wanted in WITH_MESHES else f'{stem}_{wanted}'}.{MODELS[wanted][0]}"
-            decomposition.save(place, file_format=wanted, up=cast(Axis, up))
+            save(decomposition, place, file_format=wanted, up=cast(Axis, up))
         elif wanted.endswith(".zip"):
-            decomposition.save(folder, file_format=wanted.removesuffix(".zip"))
+            save(decomposition, folder, file_format=wanted.removesuffix(".zip"))
         else:
-            decomposition.save(folder / f"{stem}_hulls.{wanted}")
+            save(decomposition, folder / f"{stem}_hulls.{wanted}")
         files = sorted(path for path in folder.rglob("*") if path.is_file())
         if len(files) == 1 and not wanted.endswith(".zip"):
             return Download(files[0].name, files[0].read_bytes())

@@ -15,6 +15,7 @@ from rlacd.result import Result
 from rlacd.view.heat import heat_map
 from rlacd.view.page import still_page
 from rlacd.view.picture import check_up, picture_bytes
+from rlacd.view.render import Render, render
 from rlacd.view.scene import heat_scene, scene
 
 HEAT_TRIANGLES = 16_000
@@ -80,7 +81,14 @@ def save_report_page(
     return place
 
 
-def report_page(decomposition: Result, *, up: str | None = None, picture: bool = True, unit: str | None = None) -> str:
+def report_page(
+    decomposition: Result,
+    *,
+    up: str | None = None,
+    picture: bool = True,
+    unit: str | None = None,
+    render: Render = render,
+) -> str:
     """Build the text of the report; see `save_report_page`. The unit is the input's, unless it is given."""
     up = decomposition.up_axis(up)
     if unit is None:
@@ -88,15 +96,15 @@ def report_page(decomposition: Result, *, up: str | None = None, picture: bool =
     data: dict[str, Any] = {
         **scene(decomposition, up, unit=unit),
         "heat": heat_scene(heat_map(decomposition, triangles=HEAT_TRIANGLES)),
-        **(_picture(decomposition, up) if picture else {}),
+        **(_picture(decomposition, up, render) if picture else {}),
     }
     return still_page(f"{decomposition.name}: convex hulls", {"version": __version__}, data)
 
 
-def _picture(decomposition: Result, up: str) -> dict[str, str]:
+def _picture(decomposition: Result, up: str, render: Render) -> dict[str, str]:
     """The picture as a data URL, or a note that explains its absence."""
     try:
-        png = picture_bytes(decomposition, width=PICTURE_WIDTH, up=up, clear=True)
+        png = picture_bytes(decomposition, width=PICTURE_WIDTH, up=up, clear=True, render=render)
     except MissingExtraError as error:
         return {"note": f"The picture is left out: {error}"}
     return {"picture": "data:image/png;base64," + base64.b64encode(png).decode("ascii")}

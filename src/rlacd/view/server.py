@@ -13,7 +13,7 @@
 
 It listens on the loopback address alone. Pages of other sites are kept out: a request's Host header must name this
 server, which defeats DNS rebinding, and the request must not come from a page of another origin. Resources are bounded:
-connections and their time in `rlacd.viewer.connections`, `UPLOADS` of at most `LARGEST_MESH` bytes at a time, one
+connections and their time in `rlacd.view.connections`, `UPLOADS` of at most `LARGEST_MESH` bytes at a time, one
 decomposition with its scene and heat map, and `HEAVY` costly answers at a time.
 """
 
@@ -34,21 +34,20 @@ from pathlib import Path
 from typing import Any
 
 from rlacd._version import __version__
-from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError, RlacdError
 from rlacd.io.read.load import FORMATS as READ
 from rlacd.io.write import MODELS
 from rlacd.options.presets import PRESETS
 from rlacd.plain_json import to_json
+from rlacd.result import Result
+from rlacd.view.connections import ANSWER_SECONDS, FOREVER, FULL, REQUEST_SECONDS, BoundedHandler, BoundedServer
+from rlacd.view.controls import Subject, ViewerControls, as_command, read_controls, read_subject
+from rlacd.view.downloads import download, offered
 from rlacd.view.heat import heat_map
 from rlacd.view.page import live_page, module
 from rlacd.view.picture import check_up
 from rlacd.view.scene import heat_scene, input_scene, scene
-from rlacd.viewer.command import as_command
-from rlacd.viewer.connections import ANSWER_SECONDS, FOREVER, FULL, REQUEST_SECONDS, BoundedHandler, BoundedServer
-from rlacd.viewer.controls import Subject, ViewerControls
-from rlacd.viewer.downloads import download, offered
-from rlacd.viewer.session import Session, SessionState
+from rlacd.view.session import Session, SessionState
 
 ADDRESS = "127.0.0.1"
 USUAL_PORT = 8765
@@ -56,7 +55,7 @@ LONGEST_REQUEST = 10_000  # bytes of JSON
 LARGEST_MESH = 2**28  # bytes of an uploaded file
 QUICKEST = 0.05  # seconds between two reports of progress
 HEARTBEAT = 3.0  # seconds of silence before a stream sends a sign of life, which shows whether the client still reads
-HEAVY = 2  # concurrent answers that take much memory and time
+HEAVY = 2  # concurrent scenes, and downloads: answers that take much memory and time
 UPLOADS = 4  # concurrent uploads, each in memory; slow ones keep nothing else waiting
 
 HARDENING = {
@@ -82,10 +81,6 @@ class ViewServer(BoundedServer):
         Port to listen on; by default the usual port, or any free one.
     options : ViewerControls
         Initial values of the page's controls.
-    accept : callable
-        From the page's options to `ViewerControls`; raises `OptionError`.
-    read : callable
-        From a path to a `Subject`; raises `MeshError`.
 
     Raises
     ------
@@ -100,11 +95,10 @@ class ViewServer(BoundedServer):
         *,
         port: int | None,
         options: ViewerControls,
-        accept: Callable[[dict[str, Any]], ViewerControls],
-        read: Callable[[Path], Subject],
     ) -> None:
-        self.session, self.subject, self.accept, self._read = session, subject, accept, read
-        self.heavy, self.uploads = threading.BoundedSemaphore(HEAVY), threading.BoundedSemaphore(UPLOADS)
+        self.session, self.subject = session, subject
+        self.heavy, self.downloads = threading.BoundedSemaphore(HEAVY), threading.BoundedSemaphore(HEAVY)
+        self.uploads = threading.BoundedSemaphore(UPLOADS)
         self._made: dict[str, tuple[int, bytes]] = {}
         self._making = threading.Lock()
         self._opening = threading.Lock()
@@ -153,7 +147,7 @@ class ViewServer(BoundedServer):
             try:
                 path = Path(folder.name) / file_name(name)
                 path.write_bytes(content)
-                self.subject = self._read(path)
+                self.subject = read_subject(path)
             except BaseException:
                 folder.cleanup()
                 raise
@@ -178,7 +172,7 @@ class ViewServer(BoundedServer):
             return to_json(bare | guess, indent=None).encode()
         return self._once("scene", result[0], lambda: scene(result[1], subject.up, unit=subject.unit) | guess)
 
-    def heat(self, version: int, decomposition: Decomposition) -> bytes:
+    def heat(self, version: int, decomposition: Result) -> bytes:
         """Return the error heat map as JSON; computed once per decomposition."""
         return self._once("heat", version, lambda: heat_scene(heat_map(decomposition)))
 
@@ -243,7 +237,7 @@ class _Handler(BoundedHandler):
             if place.path == "/open":
                 self._open(urllib.parse.parse_qs(place.query))
             elif place.path == "/decompose":
-                self.server.decompose(self.server.accept(self._body()))
+                self.server.decompose(read_controls(self._body()))
             elif place.path == "/command":
                 answer["command"] = self._command(self._body())
             elif place.path == "/cancel":
@@ -256,7 +250,7 @@ class _Handler(BoundedHandler):
     def _open(self, query: dict[str, list[str]]) -> None:
         if self.headers.get_content_type() != "application/octet-stream":
             raise _Refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "send the mesh as application/octet-stream.")
-        controls = self.server.accept(_object(query.get("options", ["{}"])[0]))
+        controls = read_controls(_object(query.get("options", ["{}"])[0]))
         controls.options()
         if not self.server.uploads.acquire(blocking=False):
             raise _Refused(HTTPStatus.SERVICE_UNAVAILABLE, FULL)
@@ -268,7 +262,7 @@ class _Handler(BoundedHandler):
             self.server.open_mesh(query.get("name", [""])[0], content, controls)
 
     def _command(self, given: dict[str, Any]) -> str:
-        controls = self.server.accept(given)
+        controls = read_controls(given)
         controls.options()
         # An uploaded mesh has no place but the copy kept here, which goes with the viewer.
         path = self.server.subject.path
@@ -321,7 +315,7 @@ class _Handler(BoundedHandler):
             raise ConnectionError("the request ended early")
         return content
 
-    def _result(self) -> tuple[int, Decomposition]:
+    def _result(self) -> tuple[int, Result]:
         result = self.server.session.result
         if result is None:
             raise OptionError("there are no hulls yet; wait for the first decomposition.")
@@ -342,7 +336,7 @@ class _Handler(BoundedHandler):
 
     def _send_file(self, wanted: str, up: str) -> None:
         check_up(up)
-        with self.server.heavy:
+        with self.server.downloads:
             file = download(self._result()[1], wanted, up=up, unit=self.server.subject.unit)
         plain = file.name.encode("ascii", "replace").decode().replace('"', "_").replace("\\", "_")
         exact = urllib.parse.quote(file.name.encode(errors="replace"))

@@ -1,0 +1,192 @@
+"""One mesh from its file to its results: in a shared process, again in a new one, and as its convex hull."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path, PurePosixPath
+from typing import Any, Literal
+
+from rlacd.batch.assets import Asset
+from rlacd.batch.job_spec import JobSpec
+from rlacd.batch.server import SERVER
+from rlacd.batch.store import ResultStore, put_files, under
+from rlacd.errors import MeshFileError, OutputNameError
+from rlacd.pool import Answer, MachineLostError, Pool, ProcessLimits, Request, Shared, TimeLimitError, WorkerDiedError
+
+Status = Literal["done", "fallback", "failed"]
+
+HULL_SECONDS = 60.0
+"""A hull takes milliseconds; a time limit meant for decompositions must not prevent it."""
+
+
+@dataclass(frozen=True)
+class Work:
+    """What all meshes of a batch share.
+
+    Attributes
+    ----------
+    spec
+        What is done to a mesh.
+    limits
+        Limits for each mesh.
+    fallback
+        Whether a mesh that fails gets its convex hull instead.
+    out
+        Folder or address of the results.
+    store
+        The store opened for `out`.
+    pool
+        Where meshes are processed.
+    owns
+        Tells of a file among the results whether an earlier run wrote it.
+    stop
+        Once set, no further mesh is started.
+    shared
+        What all processes need: the network, if the policy is a file.
+    """
+
+    spec: JobSpec
+    limits: ProcessLimits
+    fallback: bool
+    out: str
+    store: ResultStore
+    pool: Pool
+    owns: Callable[[str], bool]
+    stop: threading.Event
+    shared: dict[str, Shared]
+
+
+@dataclass(frozen=True)
+class Task:
+    """A mesh to process, and the key of its result."""
+
+    asset: Asset
+    key: str
+
+    @property
+    def parent(self) -> str:
+        """Folder of its result."""
+        return str(PurePosixPath(self.asset.place).parent)
+
+
+@dataclass
+class Outcome:
+    """Outcome of a mesh.
+
+    Attributes
+    ----------
+    status
+        ``fallback``: its convex hull replaces the decomposition.
+    report
+        Facts about the hulls.
+    error
+        Why the decomposition failed.
+    unusable
+        Whether the mesh itself is at fault; then there is no fallback either.
+    name_taken
+        Whether its result could not be written for its name; it is tried again by every run.
+    files
+        Files still to be written, by name relative to the results.
+    outputs
+        Length of each file written.
+    timing
+        What differs between runs: ``seconds`` and ``cpu`` of the mesh, ``peak_mb`` and the name of its ``worker``;
+        if its process died, also the number of ``attempts``, why it ``died``, and its ``last_words``.
+    """
+
+    status: Status
+    report: dict[str, Any] = field(default_factory=dict)
+    error: str | None = None
+    unusable: bool = False
+    name_taken: bool = False
+    files: dict[str, bytes] = field(default_factory=dict)
+    outputs: dict[str, int] = field(default_factory=dict)
+    timing: dict[str, Any] = field(default_factory=dict)
+
+    def put(self, work: Work) -> Outcome:
+        """Write the files; a name that cannot be used fails this mesh only."""
+        try:
+            self.outputs |= put_files(work.store, self.files, work.owns)
+        except OutputNameError as error:
+            said = str(error).replace(f"{Path(work.out)}{os.sep}", "")  # the same wherever the results are
+            return Outcome("failed", error=said, name_taken=True, timing=self.timing)
+        self.files = {}
+        return self
+
+
+def process(task: Task, work: Work, died: WorkerDiedError | None = None) -> Outcome:
+    """Take a mesh to its outcome; waits for the pool.
+
+    Parameters
+    ----------
+    task : Task
+    work : Work
+    died : WorkerDiedError, optional
+        How an earlier attempt ended: the last one is made in a new process.
+
+    Raises
+    ------
+    WorkerDiedError
+        Its process died, and another attempt may succeed.
+    """
+    if work.pool.many_machines and task.asset.is_robot:
+        return Outcome("failed", error="robots are not sent to other machines; leave out --ray", unusable=True)
+    try:
+        request = _request(task, work)
+    except MeshFileError as error:
+        return Outcome("failed", error=str(error), unusable=True)
+    outcome, last = _attempt(replace(request, fresh=died is not None), task, work)
+    if last is not None and died is None and not isinstance(last, MachineLostError | TimeLimitError):
+        raise last
+    if outcome.status == "failed" and not outcome.unusable and work.fallback:
+        outcome = _as_hull(outcome, replace(request, fresh=True), task, work, isinstance(last, TimeLimitError))
+    deaths = [death for death in (died, last) if death is not None]
+    if deaths:
+        spent = outcome.timing.get("seconds", 0.0) + sum(death.seconds for death in deaths)
+        outcome.timing |= {"seconds": round(spent, 4), "attempts": 1 if died is None else 2}
+        outcome.timing |= {"died": deaths[-1].reason, "last_words": deaths[-1].last_words}
+    return outcome
+
+
+def _request(task: Task, work: Work) -> Request:
+    """Other machines get the mesh's files, and write results for a place that they can reach."""
+    brought = work.pool.many_machines
+    values = {
+        "spec": work.spec.as_plain(),
+        "path": None if brought else str(task.asset.path),
+        "name": task.asset.name,
+        "stem": PurePosixPath(task.asset.place).name,
+        "parent": task.parent,
+        "hull_only": False,
+        "out": work.out if brought and work.store.shared else None,
+    }
+    files = task.asset.files() if brought else {}
+    return Request(SERVER, values, files, work.shared, work.limits, work.spec.threads)
+
+
+def _attempt(request: Request, task: Task, work: Work) -> tuple[Outcome, WorkerDiedError | None]:
+    """The outcome of one request, and how its process died."""
+    try:
+        answer: Answer = work.pool.submit(request).result()
+    except WorkerDiedError as died:
+        return Outcome("failed", error=died.reason), died
+    values = answer.values
+    timing = {**{what: values[what] for what in ("seconds", "cpu", "peak_mb")}, "worker": answer.worker}
+    if "error" in values:
+        unusable = values.get("unusable", False)
+        return Outcome("failed", error=values["error"], unusable=unusable, timing=timing), None
+    files, outputs = under(task.parent, answer.blobs), values.get("outputs", {})
+    return Outcome("done", values["report"], files=files, outputs=outputs, timing=timing), None
+
+
+def _as_hull(failed: Outcome, request: Request, task: Task, work: Work, lost_time: bool) -> Outcome:
+    """The mesh as its convex hull; as it failed if that fails too."""
+    seconds = HULL_SECONDS if lost_time else max(work.limits.seconds, HULL_SECONDS)
+    limits, values = replace(work.limits, seconds=seconds), {**request.values, "hull_only": True}
+    hull, _ = _attempt(replace(request, values=values, limits=limits), task, work)
+    if hull.status != "done":
+        return failed
+    return replace(hull, status="fallback", error=failed.error, timing={**hull.timing, **failed.timing})

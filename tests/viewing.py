@@ -1,0 +1,15 @@
+"""The viewer as `rlacd view` opens it."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from typing import Any
+
+import rlacd
+from rlacd.view import viewer
+from rlacd.view.viewer import Viewer
+
+
+def open_viewer(mesh: Any, options: dict[str, Any] | None = None, **given: Any) -> AbstractContextManager[Viewer]:
+    """Open it with what decomposes here."""
+    return viewer.open_viewer(mesh, rlacd.decompose, options, **given)
