@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import json
 import struct
 from pathlib import Path
@@ -12,7 +11,7 @@ import numpy as np
 import trimesh
 
 from rlacd.io.read.gltf import MAGIC, split
-from rlacd.io.read.looks import looks_of
+from rlacd.io.read.looks import BETWEEN, looks_of
 from rlacd.io.write.encode import VISUAL_COLOR
 from rlacd.io.write.glb import JSON_CHUNK, ROUGHNESS, chunk
 from rlacd.io.write.palette import linear_from_srgb
@@ -37,8 +36,8 @@ def converted(mesh: InputMesh, name: str) -> bytes:
     header, rest = split(Path(f"{name}.glb"), bytes(scene.export(file_type="glb")))
     if asset.extension:
         _tell_materials(header)
-    if asset.path is not None and len(mesh.nodes) + len(mesh.left_out) < 2:
-        _join(header, name)
+    if asset.path is not None:
+        _join(header, name if len(mesh.nodes) + len(mesh.left_out) < 2 else None)
     text = json.dumps(header, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
     chunks = chunk(JSON_CHUNK, text + b" " * (-len(text) % 4)) + (rest or b"")
     return struct.pack("<4sII", MAGIC, 2, 12 + len(chunks)) + chunks
@@ -63,9 +62,7 @@ def _scene(mesh: InputMesh, name: str) -> trimesh.Scene:
     asset = mesh.asset
     assert asset is not None
     content: Any = asset.content
-    if asset.extension == "obj" and mesh.left_out:  # whose triangles the parser of looks cannot tell apart
-        content = None
-    elif asset.path is not None:
+    if asset.path is not None:
         content = looks_of(asset.path, content, asset.extension)
     if content is None or (isinstance(content, trimesh.Scene) and not content.geometry):
         return trimesh.Scene({name: trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)})
@@ -107,20 +104,18 @@ def _tell_materials(header: dict[str, Any]) -> None:
         del header["materials"]
 
 
-def _join(header: dict[str, Any], name: str) -> None:
-    """Make one node of the materials of a mesh, which trimesh writes as nodes of their own."""
-    nodes = header["nodes"]
-    placing = [index for index, node in enumerate(nodes) if "mesh" in node]
-    if not placing:
-        return
-    first = nodes[placing[0]]
-    mesh = copy.deepcopy(header["meshes"][first["mesh"]])
-    mesh["primitives"] = [
-        primitive for index in placing for primitive in header["meshes"][nodes[index]["mesh"]]["primitives"]
+def _join(header: dict[str, Any], name: str | None) -> None:
+    """Make one node of the materials of each node of the file, which are nodes of their own in a scene of looks.
+
+    It gets the name of the file's node, or `name` if there is only one.
+    """
+    groups: dict[str, list[dict[str, Any]]] = {}
+    for node in header["nodes"]:
+        if "mesh" in node:
+            groups.setdefault(name or node["name"].partition(BETWEEN)[0], []).append(node)
+    parts = [
+        [part for node in group for part in header["meshes"][node["mesh"]]["primitives"]] for group in groups.values()
     ]
-    for index in placing[1:]:
-        del nodes[index]["mesh"]
-    mesh["name"] = first["name"] = name
-    header["meshes"], first["mesh"] = [mesh], 0
-    if header["scenes"][0]["nodes"] == placing:  # nothing else is there: the emptied nodes go
-        header["nodes"], header["scenes"][0]["nodes"] = [first], [0]
+    header["nodes"] = [{**group[0], "name": called, "mesh": i} for i, (called, group) in enumerate(groups.items())]
+    header["meshes"] = [{"name": called, "primitives": some} for called, some in zip(groups, parts, strict=True)]
+    header["scenes"][0]["nodes"] = list(range(len(groups)))
