@@ -194,8 +194,9 @@ class Fuzzer:
                 mesh.unlink()
         told = str(said.get("error", ""))
         if not told:
-            hulls = read_hulls(files["mesh.obj"], "obj")
-            wrong = "; ".join(f"hull {i}: {why}" for i, hull in enumerate(hulls) if (why := why_not_convex(*hull)))
+            # Of a robot there is a file for each hull.
+            read = [hull for name, data in files.items() if name.endswith(".obj") for hull in read_hulls(data, "obj")]
+            wrong = "; ".join(f"hull {i}: {why}" for i, hull in enumerate(read) if (why := why_not_convex(*hull)))
             return {"end": "invalid" if wrong else "loaded", "said": wrong, "cpu": said["cpu"]}
         untyped = told.startswith(("a bug in rlacd", "there is not enough memory"))
         return {"end": "untyped" if untyped else "refused", "said": told, "cpu": said["cpu"]}

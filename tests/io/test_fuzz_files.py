@@ -22,6 +22,7 @@ INPUTS = 60
 APART = {"draco": "glb", "usda": "usda", "usdc": "usdc", "usdz": "usdz"}
 """What is read in a process of its own, and how its files end."""
 
+
 def shape() -> trimesh.Trimesh:
     return trimesh.util.concatenate([creation.box((2, 0.4, 0.4)), creation.cylinder(0.3, 1, sections=5)])
 

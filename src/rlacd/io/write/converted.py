@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import json
+import re
 import struct
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import trimesh
@@ -14,8 +16,12 @@ from rlacd.io.read.gltf import MAGIC, split
 from rlacd.io.read.looks import BETWEEN, looks_of
 from rlacd.io.write.encode import VISUAL_COLOR
 from rlacd.io.write.glb import JSON_CHUNK, ROUGHNESS, chunk
+from rlacd.io.write.model import Look, Painted
 from rlacd.io.write.palette import linear_from_srgb
+from rlacd.io.write.single_precision import Triangles
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import InputMesh, SourceNode
+from rlacd.solid.topology import IntArray
 
 
 def converted(mesh: InputMesh, name: str) -> bytes:
@@ -68,6 +74,50 @@ def _scene(mesh: InputMesh, name: str) -> trimesh.Scene:
         return trimesh.Scene({name: trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)})
     scene = content if isinstance(content, trimesh.Scene) else trimesh.Scene({name: content})
     return scene if mesh.factor == 1.0 else _scaled(scene, mesh.factor)
+
+
+_Shape: TypeAlias = tuple[FloatArray, IntArray, FloatArray | None]
+"""Vertices, faces, and where the vertices are in a picture."""
+
+
+def painted_parts(mesh: InputMesh) -> list[Painted]:
+    """The input by materials, in the unit of the hulls; nothing if it has none, or is a glTF file."""
+    asset = mesh.asset
+    if asset is None or asset.is_gltf:
+        return []
+    scene, gone = _scene(mesh, "mesh"), {node.key for node in mesh.left_out}
+    groups: dict[Any, list[_Shape]] = {}
+    materials: dict[Any, Any] = {}
+    for node in scene.graph.nodes_geometry:
+        transform, name = scene.graph[node]
+        shape = scene.geometry[name]
+        material = getattr(shape.visual, "material", None)
+        if str(node).partition(BETWEEN)[0] in gone or not hasattr(shape, "faces"):
+            continue
+        picture = getattr(material, "image", None) or getattr(material, "baseColorTexture", None)
+        uv = None if picture is None else shape.visual.uv
+        key = getattr(material, "name", None), id(picture), None if material is None else tuple(material.main_color)
+        turned = shape.faces[:, ::-1] if np.linalg.det(transform[:3, :3]) < 0 else shape.faces
+        groups.setdefault(key, []).append((shape.vertices @ transform[:3, :3].T + transform[:3, 3], turned, uv))
+        materials[key] = material, picture
+    if not any(material is not None for material, _ in materials.values()):
+        return []
+    return [_part(index, parts, *materials[key]) for index, (key, parts) in enumerate(groups.items())]
+
+
+def _part(
+    index: int, parts: list[tuple[FloatArray, IntArray, FloatArray | None]], material: Any, picture: Any
+) -> Painted:
+    points, faces, textures = zip(*parts, strict=True)
+    first = np.cumsum([0, *map(len, points)])
+    mesh = Triangles(np.concatenate(points), np.concatenate([f + at for f, at in zip(faces, first, strict=False)]))
+    texture = None if any(uv is None for uv in textures) else np.concatenate(textures)
+    png = io.BytesIO()
+    if texture is not None:
+        picture.convert("RGBA" if "A" in picture.getbands() else "RGB").save(png, "PNG")
+    color = np.array([*VISUAL_COLOR, 255] if material is None else material.main_color) / 255
+    name = re.sub(r"\W+", "_", getattr(material, "name", None) or "")[:50]
+    return Painted(f"{index}_{name}".strip("_"), mesh, texture, Look(color.round(3).tolist(), png.getvalue() or None))
 
 
 def _scaled(scene: trimesh.Scene, factor: float) -> trimesh.Scene:
