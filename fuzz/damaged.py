@@ -36,7 +36,7 @@ import trimesh
 
 from fuzz.files import read_hulls
 from fuzz.geometry import why_not_convex
-from fuzz.mutations import Seed, mutated, repacked
+from fuzz.mutations import Seed, damaged, repacked
 from fuzz.networks import q_network
 from fuzz.worker import Watched
 from rlacd.batch import JobSpec
@@ -54,6 +54,22 @@ LARGEST_SEED = 60_000
 SMALL_MESHES = 12
 
 BOX = trimesh.creation.box()
+
+URDF = (
+    '<?xml version="1.0"?>\n<robot name="r">\n<link name="a">\n<collision name="c">\n<origin xyz="0 0 1"/>\n'
+    '<geometry><mesh filename="box.stl" scale="1 2 -1"/></geometry>\n</collision>\n</link>\n<link name="b"/>\n'
+    '<joint name="j" type="fixed">\n<parent link="a"/>\n<child link="b"/>\n</joint>\n</robot>\n'
+)
+MJCF = (
+    '<mujoco model="m">\n<compiler meshdir="."/>\n<include file="parts.xml"/>\n<worldbody>\n'
+    '<body name="x" childclass="c">\n<geom name="g" mesh="b" mass="2"/>\n<geom type="box" size="1 1 1"/>\n</body>\n'
+    "</worldbody>\n</mujoco>\n"
+)
+MJCF_PARTS = (
+    '<mujoco>\n<default>\n<default class="c">\n<geom type="mesh" group="3"/>\n</default>\n</default>\n<asset>\n'
+    '<mesh name="b" file="box.msh" scale="1 1 2"/>\n</asset>\n<worldbody>\n<geom mesh="b" type="mesh"/>\n'
+    "</worldbody>\n</mujoco>\n"
+)
 
 OFF_LETTERS = {"4": " 1", "N": " 0 0 1", "C": " 255 128 0 255", "ST": " 0.5 0.25"}
 """Numbers that each letter before ``OFF`` adds to a vertex's line, in this order."""
@@ -100,6 +116,11 @@ def written(mesh: trimesh.Trimesh) -> Iterator[tuple[str, Seed]]:
     yield "xyz", Seed("\n".join(" ".join(map(str, row)) for row in mesh.vertices.tolist()).encode())
     files = scene.export(file_type="gltf")
     yield "gltf", Seed(files.pop("model.gltf"), files)
+    counts = np.array([len(mesh.vertices), 0, 0, len(mesh.faces)], "<i4").tobytes()
+    msh = counts + mesh.vertices.astype("<f4").tobytes() + mesh.faces.astype("<i4").tobytes()
+    yield "msh", Seed(msh)
+    yield "urdf", Seed(URDF.encode(), {"box.stl": mesh.export(file_type="stl")})
+    yield "xml", Seed(MJCF.encode(), {"parts.xml": MJCF_PARTS.encode(), "box.msh": msh})
 
 
 def written_by_extras(mesh: trimesh.Trimesh) -> Iterator[tuple[str, Seed]]:
@@ -150,7 +171,8 @@ class Fuzzer:
         seeds = self.seeds[kind]
         seed = seeds[rng.integers(len(seeds))]
         path = self.folder / f"{number}.{kind}"
-        path.write_bytes(mutated(kind, seed, seeds, rng))
+        seed = damaged(kind, seed, seeds, rng)
+        path.write_bytes(seed.content)
         for name, content in seed.beside.items():
             (self.folder / name).write_bytes(content)
         return kind, path
@@ -172,8 +194,9 @@ class Fuzzer:
                 mesh.unlink()
         told = str(said.get("error", ""))
         if not told:
-            hulls = read_hulls(files["mesh.obj"], "obj")
-            wrong = "; ".join(f"hull {i}: {why}" for i, hull in enumerate(hulls) if (why := why_not_convex(*hull)))
+            # Of a robot there is a file for each hull.
+            read = [hull for name, data in files.items() if name.endswith(".obj") for hull in read_hulls(data, "obj")]
+            wrong = "; ".join(f"hull {i}: {why}" for i, hull in enumerate(read) if (why := why_not_convex(*hull)))
             return {"end": "invalid" if wrong else "loaded", "said": wrong, "cpu": said["cpu"]}
         untyped = told.startswith(("a bug in rlacd", "there is not enough memory"))
         return {"end": "untyped" if untyped else "refused", "said": told, "cpu": said["cpu"]}

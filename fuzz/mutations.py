@@ -18,7 +18,7 @@ Rng = np.random.Generator
 
 Mutation = Callable[[bytes, bytes, Rng], bytes]
 
-TEXT = {"obj", "off", "xyz", "dae", "gltf"}
+TEXT = {"obj", "off", "xyz", "dae", "gltf", "urdf", "xml"}
 
 NUMBER = re.compile(rb"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
 
@@ -71,6 +71,15 @@ def mutated(kind: str, seed: Seed, others: list[Seed], rng: Rng) -> bytes:
         ways = _ways(kind, data)
         data = ways[rng.integers(len(ways))](data, others[rng.integers(len(others))].content, rng)
     return data
+
+
+def damaged(kind: str, seed: Seed, others: list[Seed], rng: Rng) -> Seed:
+    """Mutate a file, or one of those beside it."""
+    if seed.beside and rng.random() < 0.4:
+        name = sorted(seed.beside)[rng.integers(len(seed.beside))]
+        inner = Seed(seed.beside[name])
+        return Seed(seed.content, {**seed.beside, name: mutated(name.rpartition(".")[2], inner, [inner], rng)})
+    return Seed(mutated(kind, seed, others, rng), seed.beside)
 
 
 def nudged(kind: str, seed: Seed, others: list[Seed], rng: Rng) -> bytes:

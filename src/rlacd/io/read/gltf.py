@@ -5,19 +5,21 @@ from __future__ import annotations
 import json
 import re
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from rlacd.errors import MeshFileError
+from rlacd.io.read.beside import FolderFiles
+from rlacd.io.read.contents import Contents, Triangles
 from rlacd.io.read.draco import DRACO, decode_draco
 from rlacd.io.read.gltf_arrays import Arrays, Json, item
 from rlacd.io.read.limits import MOST_PLACES
-from rlacd.io.read.polygons import strip_triangles
+from rlacd.io.read.polygons import fan_triangles, strip_triangles
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.input_mesh import SourceNode
+from rlacd.solid.input_mesh import Asset, SourceNode
 from rlacd.solid.products import dots, heights
 from rlacd.solid.topology import IntArray
 
@@ -42,21 +44,7 @@ SURFACES = (TRIANGLES, STRIP, FAN)
 UNREADABLE = "cannot be read as glTF: it is damaged or cut off"
 
 
-class Triangles(NamedTuple):
-    """Triangles as a node places them; points if there are no faces."""
-
-    vertices: FloatArray
-    faces: IntArray
-
-
-class Gltf(NamedTuple):
-    """What a file shows: nodes with what they place, and a sentence for each kind of content that is not read."""
-
-    geometry: list[tuple[SourceNode, Triangles]]
-    warnings: list[str]
-
-
-def read_gltf(path: Path, content: bytes, beside: Callable[[str], bytes]) -> Gltf:
+def read_gltf(path: Path, content: bytes) -> Contents:
     """Read a glTF file.
 
     Parameters
@@ -65,8 +53,6 @@ def read_gltf(path: Path, content: bytes, beside: Callable[[str], bytes]) -> Glt
         Of the file, for messages.
     content : bytes
         Its content, JSON or binary (GLB).
-    beside : callable
-        Returns the content of a file that a buffer names.
 
     Raises
     ------
@@ -75,21 +61,22 @@ def read_gltf(path: Path, content: bytes, beside: Callable[[str], bytes]) -> Glt
     MissingExtraError
         It is compressed with Draco, and the extra ``draco`` is not installed.
     FileNotFoundError
-        Raised by `beside`.
+        A file that a buffer names is not in the folder.
     """
     header, rest = split(path, content)
     try:
         primitives = _checked(path, header)
-        arrays = Arrays(path, header, rest, len(content), beside)
+        arrays = Arrays(path, header, rest, len(content), FolderFiles(path.parent).get)
         required = DRACO in header.get("extensionsRequired", [])
         if not decode_draco(path, primitives, required, arrays) and required:
             raise _hidden(path, DRACO)
         with np.errstate(all="ignore"):  # what is not finite is left out, with a warning
-            return _Scene(path, header, arrays).read()
+            geometry, warnings = _Scene(path, header, arrays).read()
     except MeshFileError:
         raise
     except (TypeError, KeyError, IndexError, AttributeError, OverflowError, ValueError) as error:
         raise MeshFileError(f"{path} {UNREADABLE} ({type(error).__name__}: {error!s:.100}); export it again") from error
+    return Contents(geometry, warnings, "y", 1.0, Asset(content, path, "gltf"))
 
 
 def split(path: Path, content: bytes) -> tuple[Json, bytes | None]:
@@ -153,7 +140,7 @@ class _Scene:
         self._unjointed: set[int] = set()
         self._instances = 0
 
-    def read(self) -> Gltf:
+    def read(self) -> tuple[list[tuple[SourceNode, Triangles]], list[str]]:
         """Read the triangles; the points if there are none."""
         shown = [index for index in self._shown() if "mesh" in self._nodes[index]]
         meshes = {self._nodes[index]["mesh"] for index in shown}
@@ -170,7 +157,7 @@ class _Scene:
             "meshes with a skin but without joints were placed by their nodes": len(self._unjointed),
         }
         warnings = [f"{what}: {count}" for what, count in said.items() if count]
-        return Gltf([(node, shape) for node, shape in found if len(shape.vertices)], warnings)
+        return [(node, shape) for node, shape in found if len(shape.vertices)], warnings
 
     def _shown(self) -> list[int]:
         """The nodes of the scene, by index."""
@@ -242,7 +229,7 @@ class _Scene:
         if mode == TRIANGLES:
             return corners.reshape(-1, 3)
         self._arrays.need(3 * corners.nbytes)
-        return strip_triangles(corners) if mode == STRIP else _fan(corners)
+        return strip_triangles(corners) if mode == STRIP else fan_triangles(corners)
 
     def _bones(self, skin: Json) -> FloatArray:
         """How each joint of a skin moves points ``[J, 4, 4]``."""
@@ -298,11 +285,6 @@ UNMOVED = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), (1.0, 1.0, 1.0))
 
 def _surfaces(mesh: Json) -> list[Json]:
     return [part for part in mesh["primitives"] if part.get("mode", TRIANGLES) in SURFACES]
-
-
-def _fan(corners: IntArray) -> IntArray:
-    middle = np.full(max(len(corners) - 2, 0), corners[0] if len(corners) else 0)
-    return np.stack([middle, corners[1:-1], corners[2:]], axis=1)
 
 
 def _worlds(path: Path, nodes: Sequence[Json]) -> FloatArray:

@@ -8,22 +8,11 @@ MOST_TRIANGLES = 20_000_000
 MOST_PLACES = 100_000
 """Nodes of a scene, and instances of its geometries; parsers take about a kilobyte for each."""
 
-MOST_ITEMS = 10_000
-"""Instances in a 3MF file, whose parser finds a free number for each by linear search."""
-
 LONGEST_NAME = 1000
 """Instances of one part. Each gets a unique name by a counting suffix."""
 
 DEEPEST = 20
 """Depth of nested instances: the cost of an instance grows with the cube of its depth."""
-
-MOST_MEMBERS = 10_000
-"""Files in an archive."""
-
-
-def most_unpacked(packed: int) -> int:
-    """Bytes that an archive of this size may unpack to: XML meshes compress to a tenth, rarely to a thirtieth."""
-    return min(2**24 + 50 * packed, 2**30)
 
 
 def most_in_memory(given: int) -> int:

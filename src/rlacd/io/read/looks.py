@@ -1,57 +1,41 @@
 """What files other than glTF say of the looks of their triangles: normals, texture coordinates, colours, materials.
 
-They are read only for a file that keeps them, a second time and after the checks that reading the triangles makes.
+They are read only for a file that keeps them, a second time and after the triangles have been read without.
 Pictures are decoded here, by Pillow where it is installed; those that are missing or damaged are left out.
 """
 
 from __future__ import annotations
 
 import io
-import re
-from collections.abc import Iterator
+from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import trimesh
 
-from rlacd.errors import MeshFileError
-from rlacd.io.read.beside import PICTURES, FolderFiles
-from rlacd.io.read.colors_3mf import Color, colors_3mf, has_colors
-from rlacd.io.read.polygons import obj_without_folds
-from rlacd.io.read.polygons_ply import STRIPS
-from rlacd.io.read.text import check_text, spaced_obj
-from rlacd.io.read.xml import collada_of
+from rlacd.io.read.beside import FolderFiles
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.topology import IntArray
 
-_COLORED = re.compile(rb"^v(?:[ \t]+[^\s#]+){6,}", re.MULTILINE)
-_DESCRIBED = re.compile(rb"^property\s+\S+\s+(?:red|nx|s|u|texture_u)\s|TextureFile", re.MULTILINE)
-
-MOST_IN_TABLES = 200_000_000
-"""Vertices times materials of an OBJ file: the parser makes a table of all vertices for every material."""
+_READERS = {
+    "obj": "obj:scene_of_obj",
+    "ply": "ply:scene_of_ply",
+    "dae": "collada:scene_of_collada",
+    "3mf": "threemf:scene_of_3mf",
+}
+"""By extension, the module and function that reads a file with its looks."""
 
 MOST_PIXELS = 2**26
 """Of one picture: 8,192 by 8,192."""
 
-
-def has_looks(path: Path, content: bytes, extension: str, nodes: int) -> bool:
-    """Whether a file says more than where its triangles are: looks, or several nodes."""
-    match extension:
-        case "obj":
-            return (
-                any(word in content for word in (b"\nusemtl ", b"\nvt ", b"\nvn "))
-                or _COLORED.search(content) is not None
-            )
-        case "ply":
-            header = content[: max(content.find(b"end_header"), 0)]
-            return _DESCRIBED.search(header) is not None and STRIPS.encode() not in header
-        case "dae":
-            return True
-        case _:
-            return extension == "3mf" and (nodes > 1 or has_colors(path, content))
+BETWEEN = "\n"
+"""In the name of a node in a scene of looks: between that of the node in the file, and that of its material."""
 
 
 def looks_of(path: Path, content: bytes, extension: str) -> trimesh.Scene | None:
-    """Parse a file again, with everything that its parser reads; None where that fails or would take too much.
+    """Parse a file again, with everything that its parser reads; None where that fails.
 
     Parameters
     ----------
@@ -62,54 +46,48 @@ def looks_of(path: Path, content: bytes, extension: str) -> trimesh.Scene | None
     extension : str
         ``obj``, ``ply``, ``dae`` or ``3mf``.
     """
+    module, function = _READERS[extension].split(":")
     try:
-        plain = _checked(path, content, extension)
-        scene = trimesh.load_scene(
-            io.BytesIO(plain),
-            file_type=extension,
-            resolver=FolderFiles(path.parent, PICTURES),
-            allow_remote=False,
-            process=False,
-        )
-        if extension == "3mf":
-            _paint(scene, colors_3mf(path, content))
-        for material in _materials(scene):
-            _drop_bad_pictures(material)
+        scene: trimesh.Scene = getattr(import_module(f"rlacd.io.read.{module}"), function)(path, content)
+        for geometry in scene.geometry.values():
+            _drop_bad_pictures(getattr(geometry.visual, "material", None))
     except Exception:  # parsers may raise anything on damaged files; the triangles have been read without looks
         return None
     return scene
 
 
-def _checked(path: Path, content: bytes, extension: str) -> bytes:
-    if extension == "dae":
-        return collada_of(path, content, extension)
-    if extension == "obj":
-        check_text(path, content)
-        names = {line.split(None, 1)[-1] for line in content.splitlines() if line.startswith(b"usemtl")}
-        if len(names) * content.count(b"\nv ") > MOST_IN_TABLES:
-            raise MeshFileError(f"{path} has too many materials")
-        return obj_without_folds(spaced_obj(content))
-    return content
+def painted(arrays: Mapping[str, tuple[FloatArray, IntArray]], material: Any) -> trimesh.Trimesh:
+    """A mesh with looks.
+
+    Parameters
+    ----------
+    arrays : mapping
+        ``POSITION``, and ``TEXCOORD``, ``NORMAL`` and ``COLOR`` if there are any: rows, and which of them each corner
+        of the triangles uses ``[F, 3]``. One that lacks rows is left out.
+    material
+        Of trimesh, or None.
+    """
+    kept = {name: both for name, both in arrays.items() if both[1].min() >= 0 and both[1].max() < len(both[0])}
+    rows = np.stack([corners.ravel() for _, corners in kept.values()], axis=1)
+    used, faces = np.unique(rows, axis=0, return_inverse=True)
+    of = {name: array[used[:, at]] for at, (name, (array, _)) in enumerate(kept.items())}
+    mesh = trimesh.Trimesh(of["POSITION"][:, :3], faces.reshape(-1, 3), vertex_normals=of.get("NORMAL"), process=False)
+    uv = of["TEXCOORD"][:, :2] if "TEXCOORD" in of else None
+    if material is not None or (uv is not None and "COLOR" not in of):
+        mesh.visual = trimesh.visual.TextureVisuals(uv=uv, material=material)
+    elif "COLOR" in of:
+        mesh.visual.vertex_colors = of["COLOR"]
+    return mesh
 
 
-def _paint(scene: trimesh.Scene, colors: dict[str, Color]) -> None:
-    """Give each geometry the colour of its name, which is that of its object."""
-    for name, color in colors.items():
-        if name in scene.geometry:
-            material = trimesh.visual.material.PBRMaterial(
-                baseColorFactor=np.array(color),
-                metallicFactor=0.0,
-                roughnessFactor=0.5,
-                alphaMode="OPAQUE" if color[3] == 1.0 else "BLEND",
-            )
-            scene.geometry[name].visual = trimesh.visual.TextureVisuals(material=material)
+def opened_picture(beside: FolderFiles, name: str) -> Any:
+    """A picture in the folder of a mesh; None if it is missing, no picture, or Pillow is not installed."""
+    try:
+        from PIL import Image
 
-
-def _materials(scene: trimesh.Scene) -> Iterator[Any]:
-    for geometry in scene.geometry.values():
-        material = getattr(getattr(geometry, "visual", None), "material", None)
-        if material is not None:
-            yield material
+        return Image.open(io.BytesIO(beside.get(name)))
+    except Exception:  # decoders may raise anything
+        return None
 
 
 def _drop_bad_pictures(material: Any) -> None:

@@ -1,65 +1,208 @@
-"""The objects of an OBJ file, each a node of a scene: what exporters make of a door, a wheel or a drawer."""
+"""Wavefront OBJ: the triangles of its objects, each a node, and what it says of their looks.
+
+All lines of a kind are read at once, as an array of characters: files of a million lines are common.
+"""
 
 from __future__ import annotations
 
-import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 import trimesh
+from trimesh.exchange.obj import parse_mtl
 
+from rlacd.io.read.beside import PICTURES, FolderFiles
+from rlacd.io.read.contents import Contents, Triangles, one_shape
 from rlacd.io.read.limits import MOST_PLACES
-from rlacd.io.read.polygons import IntArray, obj_faces, triangles_of
+from rlacd.io.read.looks import BETWEEN, painted
+from rlacd.io.read.polygons import places_of
+from rlacd.io.read.text import check_text, numbers_in, plain_text, rows_of
+from rlacd.memory import BYTES_READ, require_memory
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.input_mesh import Asset, SourceNode
+from rlacd.solid.topology import BoolArray, IntArray
 
-_OBJECT, _GROUP = (re.compile(rb"^" + word + rb"(?:[ \t]+([^\n#]*))?$", re.MULTILINE) for word in (b"o", b"g"))
+_UNREAD = {
+    **dict.fromkeys((b"curv", b"curv2", b"surf", b"bzp", b"bsp", b"cdc", b"cdp"), "free-form curves and surfaces"),
+    **dict.fromkeys((b"p", b"l"), "points and lines"),
+}
 
 
-def objects_of(text: bytes) -> trimesh.Scene | None:
-    """Read each object of an OBJ file as a node; its groups, if it has no objects.
+MOST_PARTS = 2_000
+"""Materials of all objects; with more, looks are left out: writing takes a millisecond for each."""
 
-    Parameters
-    ----------
-    text : bytes
-        The file, whose points and faces begin with their letter and a space.
 
-    Returns
-    -------
-    trimesh.Scene or None
-        None for fewer than two objects with faces, for more than a scene may have, and for a file that cannot be read.
+class _Faces(NamedTuple):
+    """Triangles, by the numbers of their points, texture coordinates and normals, ``[F, 3]`` each; -1 for none."""
+
+    points: IntArray
+    texture: IntArray
+    normals: IntArray
+
+
+class _File:
+    """The lines of a file. Raises ValueError where they are damaged."""
+
+    def __init__(self, path: Path, content: bytes) -> None:
+        check_text(path, content)
+        require_memory(content.count(b"\nf "), BYTES_READ, path.name)
+        text = plain_text(content).replace(b"\\\n", b" ").replace(b"\t", b" ")
+        self._text = b"\n".join(line.lstrip(b" ") for line in text.split(b"\n")) if b"\n " in b"\n" + text else text
+        self._letters = np.frombuffer(self._text + b"\n\n\n", np.uint8)
+        self._ends = np.flatnonzero(self._letters == ord("\n"))[:-2]
+        self._begins = np.concatenate([[0], self._ends[:-1] + 1])
+        points = self.vectors(b"v")
+        if len(points) and points.shape[1] < 3:
+            raise ValueError(f"a vertex of {points.shape[1]} coordinates")
+        self.points = np.ascontiguousarray(points[:, :3]).reshape(-1, 3)
+        self.colors = points[:, 3:6] if points.shape[1] >= 6 else None
+        self._named: dict[bytes, list[tuple[int, str]]] = {b"o": [], b"g": [], b"usemtl": [], b"mtllib": []}
+        self.unread: list[str] = []
+        for line, word, rest in self._statements():
+            if word in self._named:
+                self._named[word].append((line, rest.split(b"#")[0].strip().decode(errors="replace")))
+            elif word in _UNREAD and _UNREAD[word] not in self.unread:
+                self.unread.append(_UNREAD[word])
+        self.libraries = [name for _, name in self._named[b"mtllib"]]
+        self._read_faces()
+
+    def _are(self, word: bytes) -> BoolArray:
+        """Which lines begin with a word of one letter or two."""
+        letters = (self._letters[self._begins + at] == letter for at, letter in enumerate(word + b" "))
+        return np.asarray(np.logical_and.reduce(list(letters)))
+
+    def _of(self, lines: BoolArray, word: bytes) -> bytes:
+        """What stands behind a word on some lines, without comments."""
+        kept = np.repeat(lines, self._ends - self._begins + 1)
+        text = self._letters[: len(kept)][kept].tobytes()
+        if b"#" in text:
+            text = b"\n".join(line.split(b"#", 1)[0] for line in text.split(b"\n"))
+        return text.replace(word, b" " * len(word))
+
+    def vectors(self, word: bytes) -> FloatArray:
+        """The numbers on all lines of a word, as many as the shortest has."""
+        numbers, counts = rows_of(self._of(self._are(word), word))
+        first = (np.cumsum(counts) - counts)[:, None]
+        return np.ascontiguousarray(numbers[first + np.arange(counts.min(initial=len(numbers)))])
+
+    def _statements(self) -> Iterator[tuple[int, bytes, bytes]]:
+        """All lines but those of vertices, faces and smoothing groups, and comments: number, word, and the rest."""
+        letter, second = self._letters[self._begins], self._letters[self._begins + 1]
+        common = np.isin(letter, np.frombuffer(b"vf#\n", np.uint8)) | ((letter == ord("s")) & (second <= ord(" ")))
+        for line in np.flatnonzero(~common).tolist():
+            word, _, rest = self._text[self._begins[line] : self._ends[line]].partition(b" ")
+            yield line, word, rest
+
+    def _read_faces(self) -> None:
+        lines = self._are(b"f")
+        self._lines = np.flatnonzero(lines)
+        self._counts, words = _fields(self._of(lines, b"f"))
+        index = [self._index(numbers, word) for numbers, word in zip(words, (b"v", b"vt", b"vn"), strict=True)]
+        points = index[0]
+        if (points < 0).any():
+            raise ValueError("a face uses vertex 0, but OBJ counts from 1, or one before the first")
+        if len(points) and points.max() >= len(self.points):
+            raise ValueError(f"a face uses vertex {points.max() + 1}, but there are {len(self.points)}")
+        places = places_of(self.points, self._counts, points)
+        self.faces = _Faces(*(one[places] for one in index))
+
+    def _index(self, numbers: IntArray, word: bytes) -> IntArray:
+        """Indices from 0; those of the file count from 1, or from the end of what stands before their line."""
+        if not (numbers < 0).any():
+            return numbers - 1
+        before = np.repeat(np.cumsum(self._are(word))[self._lines], self._counts)
+        return np.where(numbers < 0, before + numbers, numbers - 1)
+
+    def named(self, word: bytes) -> tuple[list[str], IntArray]:
+        """The names behind a word, the first empty, and the number of that which each triangle stands behind."""
+        names: dict[str, int] = {"": 0}
+        number = np.array([0, *(names.setdefault(name, len(names)) for _, name in self._named[word])])
+        of_line = number[np.searchsorted([line for line, _ in self._named[word]], self._lines)]
+        return list(names), np.repeat(of_line, np.maximum(self._counts - 2, 0))
+
+    def objects(self) -> tuple[list[str], IntArray]:
+        """The objects, or groups if there are no objects, and the number of that of each triangle."""
+        names, owner = self.named(b"o" if self._named[b"o"] else b"g")
+        one = len(np.unique(owner)) < 2 or len(names) > MOST_PLACES
+        return (names, np.zeros_like(owner)) if one else (names, owner)
+
+
+def _fields(text: bytes) -> tuple[IntArray, list[IntArray]]:
+    """The number of words on each line, and the three numbers of each word, ``point/texture/normal``; 0 for none."""
+    letters = np.frombuffer(text, np.uint8)
+    blank = letters <= ord(" ")
+    words = np.flatnonzero(~blank[1:] & blank[:-1])
+    counts = np.diff(np.searchsorted(words, np.flatnonzero(letters == ord("\n"))), prepend=0)
+    slash = letters == ord("/")
+    slashes = np.cumsum(slash, dtype=np.int32)
+    slashes -= np.maximum.accumulate(np.where(blank, slashes, 0))
+    found = []
+    for field in range(3 if slash.any() else 1):
+        kept = ~blank & ~slash & (slashes == field)
+        begins = np.flatnonzero(kept[1:] & ~kept[:-1])
+        numbers = numbers_in(np.where(kept, letters, np.uint8(ord(" "))).tobytes(), np.int64)
+        if len(numbers) != len(begins) or (field == 0 and len(numbers) != len(words)):
+            raise ValueError("a corner of a face is no number")
+        found.append(np.zeros(len(words), dtype=np.int64))
+        found[field][np.searchsorted(words, begins, side="right") - 1] = numbers
+    return counts, found + [np.zeros(len(words), dtype=np.int64)] * (3 - len(found))
+
+
+def read_obj(path: Path, content: bytes) -> Contents:
+    """Read each object as a node; its groups, if it has no objects.
+
+    Raises
+    ------
+    MeshFileError, ValueError
+        The file is damaged.
     """
-    for word in (_OBJECT, _GROUP):
-        found = [(match.start(), (match[1] or b"").strip()) for match in word.finditer(text)]
-        if len({name for _, name in found}) > 1:
-            return _scene(text, found)
-        if found:
-            return None
-    return None
+    file = _File(path, content)
+    warnings = [f"{what} of {path.name} were left out" for what in file.unread]
+    if not len(file.faces.points):
+        return Contents(one_shape(path.stem, file.points), warnings)
+    names, owner = file.objects()
+    geometry = []
+    for one, faces in _split(file.faces.points, owner):
+        some, local = np.unique(faces, return_inverse=True)
+        node = SourceNode(names[one] or path.stem, names[one] or path.stem, np.eye(4))
+        geometry.append((node, Triangles(file.points[some], local.reshape(-1, 3))))
+    described = file.colors is not None or any(word in content for word in (b"usemtl", b"\nvt", b"\nvn"))
+    return Contents(geometry, warnings, asset=Asset(content, path, "obj") if described else None)
 
 
-def _scene(text: bytes, found: list[tuple[int, bytes]]) -> trimesh.Scene | None:
-    try:
-        points, lines, counts, corners = obj_faces(text)
-    except (ValueError, OverflowError):
-        return None
-    if not len(corners) or corners.min() < 0 or corners.max() >= len(points):
-        return None
-    names: dict[bytes, int] = {b"": 0}
-    number = np.array([0, *(names.setdefault(name, len(names)) for _, name in found)])
-    owner = number[np.searchsorted([start for start, _ in found], lines[:, 0], side="right")]
-    faces = triangles_of(points, counts, corners)
-    of_face = np.repeat(owner, np.maximum(counts - 2, 0))
-    used = np.unique(of_face)
-    if not 1 < len(used) <= MOST_PLACES:
-        return None
-    called = [name.decode(errors="replace") for name in names]
-    scene = trimesh.Scene()
-    for one, own in zip(used.tolist(), _by_owner(faces, of_face), strict=True):
-        some, local = np.unique(own, return_inverse=True)
-        mesh = trimesh.Trimesh(points[some], local.reshape(-1, 3), process=False)
-        scene.add_geometry(mesh, node_name=called[one] or "mesh", geom_name=called[one] or "mesh")
+def scene_of_obj(path: Path, content: bytes) -> trimesh.Scene:
+    """The same with all looks: a node for each material of an object, which begins with the object's name."""
+    file = _File(path, content)
+    names, owner = file.objects()
+    called, paint = file.named(b"usemtl")
+    beside, paints = FolderFiles(path.parent, PICTURES), {}
+    for library in file.libraries:
+        try:
+            paints |= parse_mtl(beside.get(library), resolver=beside)
+        except FileNotFoundError:
+            continue
+    textures, directions = file.vectors(b"vt"), file.vectors(b"vn")
+    scene, parts = trimesh.Scene(), list(_split(np.arange(len(owner)), owner * len(called) + paint))
+    if len(parts) > MOST_PARTS:
+        raise ValueError(f"{len(parts)} materials of objects")
+    for pair, rows in parts:
+        points, texture, normals = (index[rows] for index in file.faces)
+        looks = {"POSITION": (file.points, points), "TEXCOORD": (textures, texture)}
+        looks["NORMAL"] = directions, normals
+        if file.colors is not None:
+            looks["COLOR"] = file.colors, points
+        material = paints.get(called[pair % len(called)])
+        mesh = painted(looks, material and trimesh.visual.material.SimpleMaterial(**material))
+        name = f"{names[pair // len(called)] or path.stem}{BETWEEN}{called[pair % len(called)]}"
+        scene.add_geometry(mesh, node_name=name, geom_name=name)
     return scene
 
 
-def _by_owner(faces: IntArray, owner: IntArray) -> list[IntArray]:
-    """The faces of each owner, ascending, in their order."""
+def _split(rows: IntArray, owner: IntArray) -> Iterator[tuple[int, npt.NDArray[np.int64]]]:
+    """The rows of each owner, ascending, in their order."""
     order = np.argsort(owner, kind="stable")
-    return np.split(faces[order], np.flatnonzero(np.diff(owner[order])) + 1)
+    found = np.flatnonzero(np.diff(owner[order], prepend=-1))
+    yield from zip(owner[order][found].tolist(), np.split(rows[order], found[1:]), strict=True)

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import re
-import warnings
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -19,9 +16,6 @@ FOLDED = 1e-9
 
 MOST_CORNERS = 10_000
 """Of a polygon that is taken apart without a fan, which may take time quadratic in its corners."""
-
-_OBJ_COMMENT = re.compile(rb"#[^\n]*")
-_OBJ_POLYGON = re.compile(rb"^[ \t]*f(?:[ \t]+[^\s#]+){4}|\\\r?$", re.MULTILINE)
 
 
 def triangles_of(points: FloatArray, counts: IntArray, corners: IntArray) -> IntArray:
@@ -42,33 +36,28 @@ def triangles_of(points: FloatArray, counts: IntArray, corners: IntArray) -> Int
         ``[F, 3]``: of each polygon a fan around its first corner, or, where that folds over, as many triangles that do
         not overlap.
     """
-    fans, owner = _fans(counts, corners)
+    return np.asarray(corners[places_of(points, counts, corners)])
+
+
+def places_of(points: FloatArray, counts: IntArray, corners: IntArray) -> IntArray:
+    """The triangles of `triangles_of` as places in ``corners``."""
+    places, owner = fans_of(counts)
     begins = np.searchsorted(owner, np.arange(len(counts) + 1))
     first = np.cumsum(counts) - counts
-    for polygon, apart in where_folded(points, counts, corners):
-        fans[begins[polygon] : begins[polygon + 1]] = corners[first[polygon] + apart]
-    return fans
+    for polygon in _folded(points, corners[places], owner, len(counts)).tolist():
+        ring = slice(first[polygon], first[polygon] + counts[polygon])
+        if (apart := triangles_within(points[corners[ring]])) is not None:
+            places[begins[polygon] : begins[polygon + 1]] = first[polygon] + apart
+    return places
 
 
-def where_folded(points: FloatArray, counts: IntArray, corners: IntArray) -> Iterator[tuple[int, IntArray]]:
-    """Each polygon whose fan folds over, in order, and its triangles ``[N - 2, 3]`` as places in its ring of corners.
-
-    Those that cannot be taken apart are left out. Arguments as for `triangles_of`.
-    """
-    first = np.cumsum(counts) - counts
-    for polygon in _folded(points, *_fans(counts, corners), len(counts)).tolist():
-        apart = triangles_within(points[corners[first[polygon] : first[polygon] + counts[polygon]]])
-        if apart is not None:
-            yield polygon, apart
-
-
-def _fans(counts: IntArray, corners: IntArray) -> tuple[IntArray, IntArray]:
-    """A fan for each polygon, ``[F, 3]``, and the polygon of each triangle."""
+def fans_of(counts: IntArray) -> tuple[IntArray, IntArray]:
+    """A fan for each polygon, as places in all corners ``[F, 3]``, and the polygon of each triangle."""
     pieces = np.maximum(counts - 2, 0)
     owner = np.repeat(np.arange(len(counts)), pieces)
     first = (np.cumsum(counts) - counts)[owner]
     step = np.arange(len(first)) - (np.cumsum(pieces) - pieces)[owner]
-    return np.asarray(corners[np.stack([first, first + step + 1, first + step + 2], axis=1)]), owner
+    return np.stack([first, first + step + 1, first + step + 2], axis=1), owner
 
 
 def _folded(points: FloatArray, fans: IntArray, owner: IntArray, polygons: int) -> IntArray:
@@ -125,78 +114,7 @@ def strip_triangles(corners: IntArray) -> IntArray:
     return np.asarray(corners[np.stack([first, first + 1 + odd, first + 2 - odd], axis=1)])
 
 
-def folds(points: FloatArray, counts: IntArray, corners: IntArray) -> bool:
-    """Whether the fan of any polygon folds over (arguments as for `triangles_of`)."""
-    return len(_folded(points, *_fans(counts, corners), len(counts))) > 0
-
-
-def obj_without_folds(content: bytes) -> bytes:
-    """Replace the faces of an OBJ file that fans would fold over by their triangles; all other lines stay.
-
-    What cannot be read stays too, for the parser to say so.
-    """
-    if _OBJ_POLYGON.search(content) is None:
-        return content
-    text = content.replace(b"\r\n", b"\n").replace(b"\\\n", b" ")
-    try:
-        points, lines, counts, corners = obj_faces(text)
-    except (ValueError, OverflowError):
-        return content
-    polygons = counts > 3
-    lines, corners, counts = lines[polygons], corners[np.repeat(polygons, counts)], counts[polygons]
-    if not len(corners) or corners.min() < 0 or corners.max() >= len(points):
-        return content
-    kept, done = [], 0
-    for polygon, apart in where_folded(points, counts, corners):
-        begin, end = lines[polygon].tolist()
-        words = text[begin:end].split()[1:]
-        faces = b"\n".join(b"f " + b" ".join(words[corner] for corner in face) for face in apart)
-        kept += [text[done:begin], faces]
-        done = end
-    return b"".join([*kept, text[done:]]) if kept else content
-
-
-def obj_faces(text: bytes) -> tuple[FloatArray, IntArray, IntArray, IntArray]:
-    """All points of an OBJ file; of each face where its line begins and ends, the number of corners, and the corners.
-
-    Faces and points begin with their letter and a space. Raises ValueError where numbers are none, or the points have
-    different numbers of them. Works on arrays of characters, without a loop over lines: most programs write quads, so
-    most files come here.
-    """
-    letters = np.frombuffer(text + b"\n\n", np.uint8)
-    ends = np.flatnonzero(letters == ord("\n"))[:-1]
-    begins = np.concatenate([[0], ends[:-1] + 1])
-    vertex, face = ((letters[begins] == ord(kind)) & (letters[begins + 1] == ord(" ")) for kind in "vf")
-    points = _rows(_lines_of(letters, begins, ends, vertex).replace(b"v", b" "))
-
-    own = _lines_of(letters, begins, ends, face).replace(b"f", b" ")
-    letters = np.frombuffer(_OBJ_COMMENT.sub(b"", own) if b"#" in own else own, np.uint8)
-    blank = letters <= ord(" ")
-    words = np.flatnonzero(~blank[1:] & blank[:-1])
-    counts = np.diff(np.searchsorted(words, np.flatnonzero(letters == ord("\n"))), prepend=0)
-    place = np.arange(len(letters), dtype=np.int32)
-    slash = np.maximum.accumulate(np.where(letters == ord("/"), place, -1))
-    gap = np.maximum.accumulate(np.where(blank, place, 0))
-    named = _numbers(np.where(slash > gap, np.uint8(ord(" ")), letters).tobytes(), np.int64)  # of 1/2/3, the point 1
-    if len(named) != counts.sum():
-        raise ValueError("corners that are not numbers")
-    corners = np.where(named > 0, named - 1, np.repeat(np.cumsum(vertex)[face], counts) + named)
-    return points, np.stack([begins[face], ends[face]], axis=1), counts, corners
-
-
-def _lines_of(letters: npt.NDArray[np.uint8], begins: IntArray, ends: IntArray, kept: npt.NDArray[np.bool_]) -> bytes:
-    return letters[: ends[-1] + 1][np.repeat(kept, ends - begins + 1)].tobytes()
-
-
-def _rows(text: bytes) -> FloatArray:
-    """The first three numbers of each line; all lines have equally many."""
-    width = len(text[: text.find(b"\n")].split())
-    numbers = _numbers(text, np.float64)
-    return np.ascontiguousarray(numbers.reshape(text.count(b"\n"), width)[:, :3])
-
-
-def _numbers(text: bytes, kind: type) -> npt.NDArray[Any]:
-    """The numbers in a text, up to the first word that is none."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # of text that ends in something else than numbers
-        return np.fromstring(text.decode("latin-1"), kind, sep=" ")
+def fan_triangles(corners: IntArray) -> IntArray:
+    """The triangles of a fan of corners."""
+    middle = np.full(max(len(corners) - 2, 0), corners[0] if len(corners) else 0)
+    return np.stack([middle, corners[1:-1], corners[2:]], axis=1)

@@ -11,19 +11,17 @@ import trimesh
 
 from rlacd.errors import MissingExtraError
 from rlacd.io.read.apart import answer_of
+from rlacd.io.read.contents import Contents
+from rlacd.io.read.trimesh_scene import geometry_of
 from rlacd.io.read.usd_stage import SERVER
-
-USD = ("usd", "usda", "usdc", "usdz")
-
-UP, METRES = "up", "metres"
-"""Keys of the scene's metadata."""
+from rlacd.solid.input_mesh import Asset
 
 _TO_AXIS = {"X": (0, 1, 0, np.pi / 2), "Y": (1, 0, 0, -np.pi / 2), "Z": (1, 0, 0, 0.0)}
 """How to turn z to an axis: about x, y, z by an angle."""
 
 
-def usd_scene(path: Path) -> trimesh.Scene:
-    """Read a stage as a scene with a node for each mesh, whose metadata holds `UP` and `METRES`.
+def read_usd(path: Path, _: bytes) -> Contents:
+    """Read a stage: a node for each mesh.
 
     Invisible prims and those for other purposes than to be rendered (guides, proxies) are left out. Subdivision
     surfaces are read as their cages. A mesh has the colours and the surface of its material, without pictures.
@@ -50,8 +48,9 @@ def usd_scene(path: Path) -> trimesh.Scene:
             mesh.visual = trimesh.visual.TextureVisuals(material=_material(node["look"]))
         transform = np.reshape(node["transform"], (4, 4))
         scene.add_geometry(mesh, node_name=node["name"], geom_name=node["name"], transform=transform)
-    scene.metadata[UP], scene.metadata[METRES] = answer.values["up"], answer.values["metres"]
-    return scene
+    kept = len(scene.geometry) > 1 or any(one.visual.defined for one in scene.geometry.values())
+    asset = Asset(scene, extension="usd") if kept else None
+    return Contents(geometry_of(scene, path.name), (), answer.values["up"], answer.values["metres"], asset)
 
 
 def _material(look: dict[str, list[float]]) -> Any:

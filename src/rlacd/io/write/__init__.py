@@ -14,24 +14,25 @@ import trimesh
 from rlacd.errors import ImplausibleBodyWarning, OutputError
 from rlacd.io.write.atomic import write_file
 from rlacd.io.write.balls import check_balls, save_balls
+from rlacd.io.write.converted import painted_parts
 from rlacd.io.write.encode import ENCODERS, encode_glb, hull_name
 from rlacd.io.write.engines import ENGINE_NAMES, encode_engine
 from rlacd.io.write.folder import write_folder
 from rlacd.io.write.keep import encode_kept, is_kept
-from rlacd.io.write.mjcf import encode_mjcf
 from rlacd.io.write.model import (
     MeshFile,
     Model,
+    Painted,
     check_model_options,
     hollow,
     implausible,
     model_of,
     node_name,
     shapes_of,
+    visuals_of,
 )
-from rlacd.io.write.sdf import encode_sdf
+from rlacd.io.write.simulators import encode_mjcf, encode_sdf, encode_urdf
 from rlacd.io.write.target import FORMATS, MODELS, WITH_MESHES, Target, check_file, check_name, hull_target, mesh_folder
-from rlacd.io.write.urdf import encode_urdf
 from rlacd.io.write.usd import encode_usd
 from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.options.output import DENSITY, Axis
@@ -104,7 +105,8 @@ def save(
             if doubt is not None:
                 warnings.warn(doubt, ImplausibleBodyWarning, stacklevel=3)
     if target.file_format in WITH_MESHES:
-        _save_with_meshes(model, target, one_mesh)
+        painted = painted_parts(result.input) if target.file_format == "mjcf" and result.input is not None else []
+        _save_with_meshes(model, target, one_mesh, painted)
     elif target.file_format == "usd":
         write_file(target.path, encode_usd(model, ending))
     else:
@@ -120,13 +122,15 @@ def _with_input(result: Result) -> bytes:
     return encode_glb(result.hulls, visual=visual)
 
 
-def _save_with_meshes(model: Model, target: Target, one_mesh: bool) -> None:
+def _save_with_meshes(model: Model, target: Target, one_mesh: bool, painted: Sequence[Painted]) -> None:
     folder = mesh_folder(target.path, target.file_format)
     stem = file_stem(model.name)
-    shapes, visual = shapes_of(model, stem, _PRIMITIVES[target.file_format], one_mesh=one_mesh)
-    meshes = [shape for shape in (visual, *shapes) if isinstance(shape, MeshFile)]
+    shapes = shapes_of(model, stem, _PRIMITIVES[target.file_format], one_mesh=one_mesh)
+    visuals = visuals_of(model, stem, painted)
+    meshes = [shape for shape in (*visuals, *shapes) if isinstance(shape, MeshFile)]
     files = {file.name: file.data for file in meshes}
-    described = _WITH_MESHES[target.file_format](model, shapes, visual, folder.name)
+    files |= {file.picture_name: file.look.picture for file in meshes if file.look and file.look.picture}
+    described = _WITH_MESHES[target.file_format](model, shapes, visuals, folder.name)
     write_folder(folder, stem, files, then=lambda: write_file(target.path, described))
 
 

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-import copy
+import io
 import json
+import re
 import struct
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import trimesh
 
 from rlacd.io.read.gltf import MAGIC, split
-from rlacd.io.read.looks import looks_of
+from rlacd.io.read.looks import BETWEEN, looks_of
 from rlacd.io.write.encode import VISUAL_COLOR
 from rlacd.io.write.glb import JSON_CHUNK, ROUGHNESS, chunk
+from rlacd.io.write.model import Look, Painted
 from rlacd.io.write.palette import linear_from_srgb
+from rlacd.io.write.single_precision import Triangles
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import InputMesh, SourceNode
+from rlacd.solid.topology import IntArray
 
 
 def converted(mesh: InputMesh, name: str) -> bytes:
@@ -37,8 +42,8 @@ def converted(mesh: InputMesh, name: str) -> bytes:
     header, rest = split(Path(f"{name}.glb"), bytes(scene.export(file_type="glb")))
     if asset.extension:
         _tell_materials(header)
-    if asset.path is not None and len(mesh.nodes) + len(mesh.left_out) < 2:
-        _join(header, name)
+    if asset.path is not None:
+        _join(header, name if len(mesh.nodes) + len(mesh.left_out) < 2 else None)
     text = json.dumps(header, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
     chunks = chunk(JSON_CHUNK, text + b" " * (-len(text) % 4)) + (rest or b"")
     return struct.pack("<4sII", MAGIC, 2, 12 + len(chunks)) + chunks
@@ -63,14 +68,56 @@ def _scene(mesh: InputMesh, name: str) -> trimesh.Scene:
     asset = mesh.asset
     assert asset is not None
     content: Any = asset.content
-    if asset.extension == "obj" and mesh.left_out:  # whose triangles the parser of looks cannot tell apart
-        content = None
-    elif asset.path is not None:
+    if asset.path is not None:
         content = looks_of(asset.path, content, asset.extension)
     if content is None or (isinstance(content, trimesh.Scene) and not content.geometry):
         return trimesh.Scene({name: trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)})
     scene = content if isinstance(content, trimesh.Scene) else trimesh.Scene({name: content})
     return scene if mesh.factor == 1.0 else _scaled(scene, mesh.factor)
+
+
+_Shape: TypeAlias = tuple[FloatArray, IntArray, FloatArray | None]
+"""Vertices, faces, and where the vertices are in a picture."""
+
+
+def painted_parts(mesh: InputMesh) -> list[Painted]:
+    """The input by materials, in the unit of the hulls; nothing if it has none, or is a glTF file."""
+    asset = mesh.asset
+    if asset is None or asset.is_gltf:
+        return []
+    scene, gone = _scene(mesh, "mesh"), {node.key for node in mesh.left_out}
+    groups: dict[Any, list[_Shape]] = {}
+    materials: dict[Any, Any] = {}
+    for node in scene.graph.nodes_geometry:
+        transform, name = scene.graph[node]
+        shape = scene.geometry[name]
+        material = getattr(shape.visual, "material", None)
+        if str(node).partition(BETWEEN)[0] in gone or not hasattr(shape, "faces"):
+            continue
+        picture = getattr(material, "image", None) or getattr(material, "baseColorTexture", None)
+        uv = None if picture is None else shape.visual.uv
+        key = getattr(material, "name", None), id(picture), None if material is None else tuple(material.main_color)
+        turned = shape.faces[:, ::-1] if np.linalg.det(transform[:3, :3]) < 0 else shape.faces
+        groups.setdefault(key, []).append((shape.vertices @ transform[:3, :3].T + transform[:3, 3], turned, uv))
+        materials[key] = material, picture
+    if not any(material is not None for material, _ in materials.values()):
+        return []
+    return [_part(index, parts, *materials[key]) for index, (key, parts) in enumerate(groups.items())]
+
+
+def _part(
+    index: int, parts: list[tuple[FloatArray, IntArray, FloatArray | None]], material: Any, picture: Any
+) -> Painted:
+    points, faces, textures = zip(*parts, strict=True)
+    first = np.cumsum([0, *map(len, points)])
+    mesh = Triangles(np.concatenate(points), np.concatenate([f + at for f, at in zip(faces, first, strict=False)]))
+    texture = None if any(uv is None for uv in textures) else np.concatenate(textures)
+    png = io.BytesIO()
+    if texture is not None:
+        picture.convert("RGBA" if "A" in picture.getbands() else "RGB").save(png, "PNG")
+    color = np.array([*VISUAL_COLOR, 255] if material is None else material.main_color) / 255
+    name = re.sub(r"\W+", "_", getattr(material, "name", None) or "")[:50]
+    return Painted(f"{index}_{name}".strip("_"), mesh, texture, Look(color.round(3).tolist(), png.getvalue() or None))
 
 
 def _scaled(scene: trimesh.Scene, factor: float) -> trimesh.Scene:
@@ -107,20 +154,18 @@ def _tell_materials(header: dict[str, Any]) -> None:
         del header["materials"]
 
 
-def _join(header: dict[str, Any], name: str) -> None:
-    """Make one node of the materials of a mesh, which trimesh writes as nodes of their own."""
-    nodes = header["nodes"]
-    placing = [index for index, node in enumerate(nodes) if "mesh" in node]
-    if not placing:
-        return
-    first = nodes[placing[0]]
-    mesh = copy.deepcopy(header["meshes"][first["mesh"]])
-    mesh["primitives"] = [
-        primitive for index in placing for primitive in header["meshes"][nodes[index]["mesh"]]["primitives"]
+def _join(header: dict[str, Any], name: str | None) -> None:
+    """Make one node of the materials of each node of the file, which are nodes of their own in a scene of looks.
+
+    It gets the name of the file's node, or `name` if there is only one.
+    """
+    groups: dict[str, list[dict[str, Any]]] = {}
+    for node in header["nodes"]:
+        if "mesh" in node:
+            groups.setdefault(name or node["name"].partition(BETWEEN)[0], []).append(node)
+    parts = [
+        [part for node in group for part in header["meshes"][node["mesh"]]["primitives"]] for group in groups.values()
     ]
-    for index in placing[1:]:
-        del nodes[index]["mesh"]
-    mesh["name"] = first["name"] = name
-    header["meshes"], first["mesh"] = [mesh], 0
-    if header["scenes"][0]["nodes"] == placing:  # nothing else is there: the emptied nodes go
-        header["nodes"], header["scenes"][0]["nodes"] = [first], [0]
+    header["nodes"] = [{**group[0], "name": called, "mesh": i} for i, (called, group) in enumerate(groups.items())]
+    header["meshes"] = [{"name": called, "primitives": some} for called, some in zip(groups, parts, strict=True)]
+    header["scenes"][0]["nodes"] = list(range(len(groups)))

@@ -13,10 +13,9 @@ from typing import TypeAlias
 import numpy as np
 import trimesh
 
-from rlacd.errors import OutputError
 from rlacd.io.write.glb import Placed, glb
 from rlacd.io.write.palette import hull_colors, linear_from_srgb
-from rlacd.io.write.single_precision import Triangulated, placed_hull, placed_mesh, rounded_hull
+from rlacd.io.write.single_precision import Triangulated, placed_mesh, required_hull, rounded_hull
 
 GENERATOR = "rlacd"
 
@@ -50,13 +49,7 @@ def encode_glb(
     solids = [] if visual is None else [Placed(visual[0], *placed_mesh(visual[1]), linear_from_srgb(VISUAL_COLOR))]
     names = names or [hull_name(index) for index in range(len(hulls))]
     for name, hull, color in zip(names, hulls, linear_from_srgb(hull_colors(len(hulls))), strict=True):
-        placed = placed_hull(hull)
-        if placed is None:
-            raise OutputError(
-                f"cannot write {name} as GLB: it is too thin for single precision; "
-                "write .obj, .ply or .stl, which keep double precision."
-            )
-        solids.append(Placed(name, *placed, color))
+        solids.append(Placed(name, *required_hull(hull, name, "as GLB"), color))
     return glb(solids, GENERATOR)
 
 
@@ -85,11 +78,16 @@ def encode_obj(
     return ("\n".join(lines) + "\n").encode()
 
 
-def encode_plain_obj(mesh: Triangulated) -> bytes:
-    """One mesh as Wavefront OBJ that every reader accepts: no object, no colours, every digit."""
-    lines = [f"# {GENERATOR}"]
-    lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist()]
-    lines += [f"f {a} {b} {c}" for a, b, c in (mesh.faces + 1).tolist()]
+def encode_plain_obj(mesh: Triangulated, texture: FloatArray | None = None) -> bytes:
+    """One mesh as Wavefront OBJ that every reader accepts: no object, no colours, every digit.
+
+    `texture` has coordinates in a picture for each vertex.
+    """
+    lines = [f"# {GENERATOR}", *(f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist())]
+    if texture is not None:
+        lines += [f"vt {u!r} {v!r}" for u, v in texture.tolist()]
+    corner = "f {0} {1} {2}" if texture is None else "f {0}/{0} {1}/{1} {2}/{2}"
+    lines += [corner.format(*face) for face in (mesh.faces + 1).tolist()]
     return ("\n".join(lines) + "\n").encode("ascii")
 
 

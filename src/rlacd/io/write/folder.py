@@ -64,7 +64,7 @@ def check_names(folder: Path, stem: str, names: Sequence[str]) -> None:
 
 def listed_hulls(listing: Path, stem: str) -> set[str]:
     """Hull files an earlier run wrote; entries of any other form are ignored, whatever the list says by now."""
-    ours = re.compile(re.escape(stem) + r"(_[^/\\]+)?_(\d{3,}|visual|collision)\.(glb|obj|ply|stl)")
+    ours = re.compile(re.escape(stem) + r"(_[^/\\]+)?_(\d{3,}|visual|collision)\.(glb|obj|ply|stl|png)")
     names = _listed(listing)
     # No list, or one from another program: then no file here is known to be ours.
     return {name for name in names if isinstance(name, str) and ours.fullmatch(name)} if names else set()

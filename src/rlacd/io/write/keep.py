@@ -19,13 +19,12 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from rlacd.errors import OutputError
 from rlacd.io.read.beside import DATA, IMAGES, FolderFiles
 from rlacd.io.read.gltf import MAGIC, split
 from rlacd.io.write.converted import converted, nodes_of
 from rlacd.io.write.glb import ATTRIBUTES, BINARY_CHUNK, INDICES, JSON_CHUNK, Placed, chunk, material, packed
 from rlacd.io.write.palette import hull_colors, linear_from_srgb
-from rlacd.io.write.single_precision import Triangles, placed_hull
+from rlacd.io.write.single_precision import Triangles, required_hull
 from rlacd.result import Result
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import InputMesh
@@ -89,13 +88,7 @@ def _local(hull: trimesh.Trimesh, factor: float, inverse: FloatArray | None, nam
         points = points @ inverse[:3, :3].T + inverse[:3, 3]
         if np.linalg.det(inverse[:3, :3]) < 0:
             faces = faces[:, ::-1]
-    placed = placed_hull(Triangles(points, faces))
-    if placed is None:
-        raise OutputError(
-            f"cannot write {name} as GLB: it is too thin for single precision; "
-            "write .obj, .ply or .stl, which keep double precision."
-        )
-    return Placed(name, *placed, np.zeros(3))
+    return Placed(name, *required_hull(Triangles(points, faces), name, "as GLB"), np.zeros(3))
 
 
 def _inverse(transform: FloatArray) -> FloatArray | None:

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import trimesh
@@ -14,7 +14,7 @@ import trimesh
 from rlacd.errors import OutputError
 from rlacd.io.read.conventions import UNITS
 from rlacd.io.write.encode import encode_obj, encode_plain_obj, hull_name
-from rlacd.io.write.single_precision import placed_hull, placed_mesh
+from rlacd.io.write.single_precision import Triangles, placed_mesh, required_hull
 from rlacd.options.fields import about, checked, read
 from rlacd.options.names import PrimitiveKind
 from rlacd.options.output import DENSITY, OutputOptions
@@ -63,7 +63,23 @@ class Model:
     is_scene: bool = False
 
 
-@dataclass(frozen=True)
+class Look(NamedTuple):
+    """The looks of a visible mesh: red, green, blue and opacity, and a picture as PNG."""
+
+    rgba: Sequence[float]
+    picture: bytes | None
+
+
+class Painted(NamedTuple):
+    """The triangles of one material, and for each of their vertices its place in the picture."""
+
+    name: str
+    mesh: Triangles
+    texture: FloatArray | None
+    look: Look
+
+
+@dataclass(frozen=True, eq=False)
 class MeshFile:
     """A mesh file beside the model: its name, content, and position in the body's frame.
 
@@ -71,15 +87,23 @@ class MeshFile:
     ----------
     name
         File name.
-    Its content.
+    data
         Its bytes.
     shift
         ``[3]``; zero unless the body lies too far from its origin for float32.
+    look
+        What it looks like, if that is known.
     """
 
     name: str
     data: bytes
     shift: FloatArray
+    look: Look | None = None
+
+    @property
+    def picture_name(self) -> str:
+        """The name of the file of its picture."""
+        return f"{self.name.rpartition('.')[0]}.png"
 
 
 Shape: TypeAlias = "MeshFile | Primitive"
@@ -173,10 +197,8 @@ def node_name(name: str) -> str:
     return re.sub(r"\s+", "_", printable_name(name))
 
 
-def shapes_of(
-    model: Model, stem: str, kinds: Collection[PrimitiveKind], *, one_mesh: bool = False
-) -> tuple[list[Shape], MeshFile | None]:
-    """The shapes that collide and the visible mesh: OBJ files ``<stem>_000.obj``, ... and ``<stem>_visual.obj``.
+def shapes_of(model: Model, stem: str, kinds: Collection[PrimitiveKind], *, one_mesh: bool = False) -> list[Shape]:
+    """The shapes that collide: OBJ files ``<stem>_000.obj``, ...
 
     A hull that stands for a primitive of one of the `kinds` is that primitive. With `one_mesh`, the hulls are objects
     of a single file, ``<stem>_collision.obj``.
@@ -191,41 +213,35 @@ def shapes_of(
         if primitive is not None and primitive.kind in kinds and not one_mesh:
             shapes.append(primitive)
             continue
-        placed = placed_hull(hull)
-        if placed is None:
-            raise OutputError(
-                f"cannot write {hull_name(index)} for a simulator: it is too thin for single precision; "
-                "scale the mesh, or write .obj, .ply or .stl."
-            )
-        rounded, shift = placed
+        rounded, shift = required_hull(hull, hull_name(index), "for a simulator")
         exact = rounded if shift.any() else hull  # readers in double precision get the exact hull if possible
         shapes.append(MeshFile(f"{stem}_{index:03d}.obj", encode_plain_obj(exact), shift))
-    if one_mesh:
-        far = any(isinstance(shape, MeshFile) and shape.shift.any() for shape in shapes)
-        shapes = [_one_file(model, f"{stem}_collision.obj", far)]
+    if not one_mesh:
+        return shapes
+    far = any(isinstance(shape, MeshFile) and shape.shift.any() for shape in shapes)
+    bounds = np.array([hull.bounds for hull in model.hulls])
+    shift = (bounds[:, 0].min(axis=0) + bounds[:, 1].max(axis=0)) / 2 if far else np.zeros(3)
+    moved = [trimesh.Trimesh(hull.vertices - shift, hull.faces, process=False) for hull in model.hulls]
+    return [MeshFile(f"{stem}_collision.obj", encode_obj(moved), shift)]
+
+
+def visuals_of(model: Model, stem: str, painted: Sequence[Painted] = ()) -> list[MeshFile]:
+    """The visible meshes, as OBJ files: one, or one for each material where the looks are known."""
     if model.visual is None:
-        return shapes, None
-    visual, shift = placed_mesh(model.visual)
-    return shapes, MeshFile(f"{stem}_visual.obj", encode_plain_obj(visual), shift)
-
-
-def primitive_sizes(shape: Primitive) -> dict[str, str]:
-    """The sizes of a primitive by the names that URDF and SDF share."""
-    if shape.kind == "box":
-        return {"size": numbers(shape.size)}
-    return dict(zip(("radius", "length"), map(numbers, ([size] for size in shape.size)), strict=False))
+        return []
+    if not painted:
+        mesh, shift = placed_mesh(model.visual)
+        return [MeshFile(f"{stem}_visual.obj", encode_plain_obj(mesh), shift)]
+    files = []
+    for name, whole, texture, look in painted:
+        mesh, shift = placed_mesh(whole)
+        files.append(MeshFile(f"{stem}_{name}_visual.obj", encode_plain_obj(mesh, texture), shift, look))
+    return files
 
 
 def numbers(values: Sequence[float] | FloatArray) -> str:
     """Write numbers with every digit, separated by spaces."""
     return " ".join(repr(float(value) + 0.0) for value in values)  # + 0.0: no negative zero
-
-
-def _one_file(model: Model, name: str, far: bool) -> MeshFile:
-    bounds = np.array([hull.bounds for hull in model.hulls])
-    shift = (bounds[:, 0].min(axis=0) + bounds[:, 1].max(axis=0)) / 2 if far else np.zeros(3)
-    moved = [trimesh.Trimesh(hull.vertices - shift, hull.faces, process=False) for hull in model.hulls]
-    return MeshFile(name, encode_obj(moved), shift)
 
 
 def _mass(result: Result) -> Mass:

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 # Found by a greedy search in Oklab (Ottosson 2020, https://bottosson.github.io/posts/oklab/): each colour is the
 # farthest from all before it, as seen by the eye that tells it apart least: normal, protanopic, deuteranopic
-# or tritanopic (Machado et al. 2009, https://doi.org/10.1109/TVCG.2009.113); tests/test_palette.py.
+# or tritanopic (Machado et al. 2009, https://doi.org/10.1109/TVCG.2009.113); tests/io/test_palette.py.
 DISTINCT = bytes.fromhex("5899e0f8d05cb05315ec8781abd2fe8a5e97ad8b1c65f2c353c1c54b7f5fbdba42d26ea4")
 
 SHADES = 0.08  # how far the lightness of repeated colours is spread

@@ -9,6 +9,7 @@ import numpy.typing as npt
 import trimesh
 
 from rlacd._native import convex_hull, mesh_volume
+from rlacd.errors import OutputError
 
 # A hull keeps its shape if its volume changes by less than this share: a flat or tiny hull far from the origin loses
 # much more, or all of it, when float32 has no digits left for its thickness.
@@ -60,21 +61,30 @@ def rounded_hull(hull: Triangulated, shift: npt.ArrayLike = (0.0, 0.0, 0.0)) -> 
     return Triangles(vertices, faces)
 
 
-def placed_hull(hull: Triangulated) -> tuple[Triangles, npt.NDArray[np.float64]] | None:
+def required_hull(hull: Triangulated, name: str, where: str) -> tuple[Triangles, npt.NDArray[np.float64]]:
     """Round a hull to float32 in place or, if that would ruin it, about its own centre.
 
     Returns
     -------
-    (Triangles, shift [3]) or None
-        The hull is the mesh moved by the shift, which is zero wherever that suffices. None if it is too thin for its
-        size even about its own centre.
+    Triangles, shift [3]
+        The hull is the mesh moved by the shift, which is zero wherever that suffices.
+
+    Raises
+    ------
+    OutputError
+        It is too thin for its size even about its own centre; the message says its name and where it was to go.
     """
     shift = np.zeros(3)
     rounded = rounded_hull(hull)
     if rounded is None:
         shift = (hull.vertices.min(axis=0) + hull.vertices.max(axis=0)) / 2
         rounded = rounded_hull(hull, shift)
-    return None if rounded is None else (rounded, shift)
+    if rounded is None:
+        raise OutputError(
+            f"cannot write {name} {where}: it is too thin for single precision; scale the mesh, or write .obj, .ply "
+            "or .stl, which keep double precision."
+        )
+    return rounded, shift
 
 
 def placed_mesh(mesh: Triangulated) -> tuple[Triangles, npt.NDArray[np.float64]]:

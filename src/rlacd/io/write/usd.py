@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from rlacd.errors import MissingExtraError, OutputError
+from rlacd.errors import MissingExtraError
 from rlacd.io.write.encode import hull_name
 from rlacd.io.write.model import Model
 from rlacd.io.write.palette import hull_colors, linear_from_srgb
-from rlacd.io.write.single_precision import Triangulated, placed_hull, placed_mesh
+from rlacd.io.write.single_precision import Triangulated, placed_mesh, required_hull
 from rlacd.solid.primitive import Primitive
 
 
@@ -72,13 +72,7 @@ def encode_usd(model: Model, ending: str) -> bytes:
         if shape is not None:
             _collider(_primitive(stage, path, shape), color)
             continue
-        placed = placed_hull(hull)
-        if placed is None:
-            raise OutputError(
-                f"cannot write {hull_name(index)} as USD: it is too thin for single precision; "
-                "write .obj, .ply or .stl, which keep double precision."
-            )
-        mesh = _mesh(stage, path, *placed)
+        mesh = _mesh(stage, path, *required_hull(hull, hull_name(index), "as USD"))
         _collider(mesh, color)
         UsdPhysics.MeshCollisionAPI.Apply(mesh.GetPrim()).CreateApproximationAttr(UsdPhysics.Tokens.convexHull)
     return _bytes(layer, ending)

@@ -28,9 +28,9 @@ from rlacd.io.read.open_file import LARGEST
 from rlacd.io.robots import rewrite_robot
 from rlacd.policies.network import load_network
 from tests.bounded import bounded
-from tests.hostile import HARMLESS, REFUSED
-from tests.hostile.gltf import gltf, named_often, reference
-from tests.hostile.xml import EXTERNAL, LAUGHS, OUTSIDE, PARAMETER, QUADRATIC
+from tests.io.hostile import HARMLESS, REFUSED
+from tests.io.hostile.gltf import gltf, named_often, reference
+from tests.io.hostile.xml import EXTERNAL, LAUGHS, OUTSIDE, PARAMETER, QUADRATIC
 
 
 def load(path: Path) -> tuple[int, float]:

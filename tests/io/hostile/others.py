@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from tests.hostile.gltf import gltf
-from tests.hostile.registry import refused
+from tests.io.hostile.gltf import gltf
+from tests.io.hostile.registry import refused
 
 for ending in ("xaml", "3dxml", "xdmf", "h5", "vtk", "binvox", "dxf"):
     refused(f"another format.{ending}", "convert it")(lambda: b"anything")

@@ -22,7 +22,7 @@ from rlacd.io.read.load import load_mesh
 from rlacd.pool import Request, WorkerDiedError
 from rlacd.pool.local import Worker
 from tests.assets import Rig, read_glb
-from tests.hostile.gltf import gltf_tree
+from tests.io.hostile.gltf import gltf_tree
 
 DRACO = "KHR_draco_mesh_compression"
 

@@ -12,7 +12,7 @@ import pytest
 import trimesh
 
 import rlacd
-from rlacd.io.read import looks
+from rlacd.io.read import looks, obj
 from rlacd.io.read.companions import mesh_files
 from tests.assets import Json, painted_obj, png, read_glb, view_of
 from tests.hulls import assert_convex_hull
@@ -90,7 +90,7 @@ def test_materials_and_pictures_are_sent_along_with_an_obj(tmp_path: Path) -> No
 
 
 def test_too_many_materials_are_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(looks, "MOST_IN_TABLES", 10)
+    monkeypatch.setattr(obj, "MOST_PARTS", 1)
     header, _, _ = kept(painted_obj(tmp_path), tmp_path / "out.glb")
     assert len(header["meshes"][0]["primitives"]) == 1
 

@@ -22,18 +22,6 @@ INPUTS = 60
 APART = {"draco": "glb", "usda": "usda", "usdc": "usdc", "usdz": "usdz"}
 """What is read in a process of its own, and how its files end."""
 
-URDF = (
-    '<?xml version="1.0"?>\n<robot name="r">\n<link name="a">\n<collision name="c">\n<origin xyz="0 0 1"/>\n'
-    '<geometry><mesh filename="box.stl" scale="1 2 -1"/></geometry>\n</collision>\n</link>\n<link name="b"/>\n'
-    '<joint name="j" type="fixed">\n<parent link="a"/>\n<child link="b"/>\n</joint>\n</robot>\n'
-)
-MJCF = (
-    '<mujoco model="m">\n<compiler meshdir="."/>\n<default>\n<default class="c">\n<geom type="mesh" group="3"/>\n'
-    '</default>\n</default>\n<asset>\n<mesh name="b" file="box.stl" scale="1 1 2"/>\n</asset>\n<worldbody>\n'
-    '<body name="x" childclass="c">\n<geom name="g" mesh="b" mass="2"/>\n<geom type="box" size="1 1 1"/>\n</body>\n'
-    "</worldbody>\n</mujoco>\n"
-)
-
 
 def shape() -> trimesh.Trimesh:
     return trimesh.util.concatenate([creation.box((2, 0.4, 0.4)), creation.cylinder(0.3, 1, sections=5)])
@@ -43,11 +31,11 @@ def damaged(kind: str, number: int, folder: Path) -> Path:
     """The file of a number."""
     write = written_by_extras if kind in APART else written
     seeds: list[Any] = [seed for of, seed in write(shape()) if of == APART.get(kind, kind)]
-    seeds += [mutations.Seed({"urdf": URDF, "xml": MJCF}[kind].encode())] if kind in ("urdf", "xml") else []
     rng = np.random.default_rng([7, number])
     seed = seeds[rng.integers(len(seeds))]
     path = folder / f"mesh.{APART.get(kind, kind)}"
-    path.write_bytes(mutations.mutated(APART.get(kind, kind), seed, seeds, rng))
+    seed = mutations.damaged(APART.get(kind, kind), seed, seeds, rng)
+    path.write_bytes(seed.content)
     for name, content in seed.beside.items():
         (folder / name).write_bytes(content)
     return path
@@ -71,10 +59,9 @@ def untyped(kind: str, folder: Path) -> dict[int, str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["obj", "stl", "ply", "off", "glb", "gltf", "dae", "3mf", "xyz", "urdf", "xml"])
+@pytest.mark.parametrize("kind", ["obj", "stl", "ply", "off", "glb", "gltf", "dae", "3mf", "xyz", "msh", "urdf", "xml"])
 @pytest.mark.promise("hostile-files")
 def test_a_damaged_file_is_read_or_refused(kind: str, tmp_path: Path) -> None:
-    creation.box().export(tmp_path / "box.stl")
     assert bounded(untyped, kind, tmp_path, seconds=300) == {}
 
 

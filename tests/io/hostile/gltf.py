@@ -9,7 +9,7 @@ import struct
 from pathlib import Path
 from typing import Any
 
-from tests.hostile.registry import BOX, REFUSED, harmless, refused
+from tests.io.hostile.registry import BOX, REFUSED, harmless, refused
 
 
 def gltf_tree(**changes: Any) -> dict[str, Any]:

@@ -1,0 +1,361 @@
+"""COLLADA: the triangles of a scene's geometries where its nodes place them, and their materials."""
+
+from __future__ import annotations
+
+import io
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+from zipfile import is_zipfile
+
+import numpy as np
+import trimesh
+from lxml import etree
+
+from rlacd.errors import MeshFileError
+from rlacd.io.read.beside import PICTURES, FolderFiles
+from rlacd.io.read.contents import Contents, Triangles
+from rlacd.io.read.conventions import HEAD, collada
+from rlacd.io.read.limits import DEEPEST, LONGEST_NAME, MOST_PLACES
+from rlacd.io.read.looks import opened_picture, painted
+from rlacd.io.read.polygons import fan_triangles, places_of, strip_triangles, triangles_within
+from rlacd.io.read.text import rows_of, whole
+from rlacd.io.read.xml import open_archive, parse_xml, unpack
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.input_mesh import Asset, SourceNode
+from rlacd.solid.topology import IntArray
+
+_UNREAD = {
+    "lines": "lines of {} were left out",
+    "linestrips": "lines of {} were left out",
+    "convex_mesh": "convex meshes of {} were left out",
+    "spline": "splines of {} were left out",
+    "brep": "boundary representations of {} were left out",
+    "instance_controller": "skinned or morphed meshes of {} are read as bound, at their nodes",
+}
+
+
+class _Primitive(NamedTuple):
+    """Triangles of one material: the rows of their corners ``[F, 3]`` in each of the arrays, by semantic."""
+
+    material: str
+    arrays: dict[str, tuple[FloatArray, IntArray]]
+
+
+class _Placed(NamedTuple):
+    """An instance of a geometry: the node, its primitives, and what each symbol of a material means here."""
+
+    node: SourceNode
+    primitives: list[_Primitive]
+    materials: dict[str, str]
+
+
+class _Document:
+    """A file's geometries where they are placed, and a sentence for each kind of content that is not read."""
+
+    def __init__(self, path: Path, content: bytes) -> None:
+        self._path = path
+        self.root = parse_xml(path, content)
+        self.named: dict[Any, Any] = {
+            element.get("id"): element for element in self.root.iter("{*}*") if element.get("id")
+        }
+        tags = {etree.QName(element).localname for element in self.root.iter("{*}*")}
+        self.warnings = list(dict.fromkeys(said.format(path.name) for tag, said in _UNREAD.items() if tag in tags))
+        self.placed: dict[str, _Placed] = {}
+        self._keys: Counter[str | None] = Counter()
+        self._geometries: dict[str, list[_Primitive]] = {}
+        self._sources: dict[str, FloatArray] = {}
+        self._count = 0
+        self.damage: list[str] = []
+        scene = self.at(self.root.find("{*}scene/{*}instance_visual_scene"))
+        scene = self.root.find("{*}library_visual_scenes/{*}visual_scene") if scene is None else scene
+        if scene is None:
+            raise ValueError("it has no scene")
+        for node in scene.iterchildren("{*}node"):
+            self._place(node, np.eye(4), 0)
+
+    def at(self, element: Any, attribute: str = "url") -> Any:
+        """What an element refers to; None if that is not there."""
+        return None if element is None else self.named.get(element.get(attribute, "").removeprefix("#"))
+
+    def _place(self, node: Any, transform: FloatArray, depth: int) -> None:
+        if depth > DEEPEST:
+            raise MeshFileError(
+                f"{self._path} places parts inside parts, or inside itself, more than {DEEPEST} deep: export it again"
+            )
+        here = transform @ _transform(node)
+        for child in node.iterchildren("{*}*"):
+            self._count += 1
+            if self._count > MOST_PLACES:
+                raise MeshFileError(f"{self._path} has more than {MOST_PLACES} places for its parts: simplify it first")
+            target = self.at(child)
+            match etree.QName(child).localname:
+                case "node":
+                    self._place(child, here, depth + 1)
+                case "instance_node" if target is not None:
+                    self._place(target, here, depth + 1)
+                case "instance_geometry":
+                    self._add(node, child, target, here)
+                case "instance_controller":
+                    shape, bound = self._bound(target)
+                    self._add(node, child, shape, here @ bound)
+
+    def _bound(self, controller: Any) -> tuple[Any, FloatArray]:
+        """The geometry that a controller bends, and the matrix that it applies before."""
+        matrix = np.eye(4)
+        for _ in range(DEEPEST):
+            shape = None if controller is None else next(controller.iterchildren("{*}skin", "{*}morph"), None)
+            if shape is None:
+                break
+            if (given := shape.findtext("{*}bind_shape_matrix")) is not None:
+                matrix = matrix @ _numbers(given).reshape(4, 4)
+            controller = self.at(shape, "source")
+        return controller, matrix
+
+    def _add(self, node: Any, instance: Any, geometry: Any, transform: FloatArray) -> None:
+        if geometry is None:
+            self.damage.append(f"{instance.get('url')!r:.80}, which a node of {self._path.name} places, is missing")
+            return
+        own = geometry.get("id", "")
+        if own not in self._geometries:
+            self._geometries[own] = self._read(geometry)
+        name = (node.get("name") or node.get("id") or own or "node")[:LONGEST_NAME]
+        key = trimesh.util.unique_name(name, self.placed, self._keys)
+        meant = {one.get("symbol"): one.get("target", "")[1:] for one in instance.iter("{*}instance_material")}
+        self.placed[key] = _Placed(SourceNode(name, key, transform), self._geometries[own], meant)
+
+    def _read(self, geometry: Any) -> list[_Primitive]:
+        found = []
+        for mesh in geometry.iterchildren("{*}mesh"):
+            for primitive in mesh.iterchildren(*(f"{{*}}{tag}" for tag in _RINGS)):
+                try:
+                    found.append(self._primitive(primitive))
+                except (ValueError, LookupError, TypeError, OverflowError) as error:
+                    name = geometry.get("name") or geometry.get("id")
+                    self.damage.append(
+                        f"faces of the geometry {name!r:.80} of {self._path.name} were left out, as they are damaged "
+                        f"({error!s:.100})"
+                    )
+        return found
+
+    def _primitive(self, primitive: Any) -> _Primitive:
+        arrays: dict[str, tuple[FloatArray, int]] = {}
+        offsets = [0]
+        for one in primitive.iterchildren("{*}input"):
+            offsets.append(offset := int(one.get("offset", 0)))
+            source = self.at(one, "source")
+            inputs = source.findall("{*}input") if one.get("semantic") == "VERTEX" else [one]
+            for inner in inputs:
+                arrays.setdefault(inner.get("semantic"), (self._rows(self.at(inner, "source")), offset))
+        points, offset = arrays["POSITION"]
+        if min(offsets) < 0:
+            raise ValueError("an offset below zero")
+        corners = _corners(primitive, points, offset, max(offsets) + 1)
+        return _Primitive(
+            primitive.get("material", ""), {name: (rows, corners[..., at]) for name, (rows, at) in arrays.items()}
+        )
+
+    def _rows(self, source: Any) -> FloatArray:
+        """The numbers of an array that its accessor uses, a row for each of its steps."""
+        name = source.get("id")
+        if name not in self._sources:
+            accessor = source.find("{*}technique_common/{*}accessor")
+            values = _numbers(source.findtext("{*}float_array"))
+            params = accessor.findall("{*}param")
+            used = [at for at, param in enumerate(params) if param.get("name")] or list(range(len(params)))
+            offset, stride = int(accessor.get("offset", 0)), int(accessor.get("stride", len(params)))
+            count = int(accessor.get("count", (len(values) - offset) // max(stride, 1)))
+            if (
+                min(offset, count) < 0
+                or stride < len(params)
+                or offset + (count - 1) * stride + len(params) > len(values)
+            ):
+                raise ValueError(f"an accessor of {count} rows leads out of its array")
+            self._sources[name] = values[offset + stride * np.arange(count)[:, None] + np.array(used)]
+        return self._sources[name]
+
+    def paint(self, material: str, beside: FolderFiles) -> Any:
+        """A material by its identifier, as glTF describes it; None if it says nothing."""
+        named = self.named.get(material)
+        effect = None if named is None else self.at(named.find("{*}instance_effect"))
+        if effect is None:
+            return None
+        color = _first(effect, "diffuse", np.ones(4)).copy()
+        color[3] = _first(effect, "transparent", color)[3]
+        texture = effect.find(".//{*}diffuse/{*}texture")
+        shininess = max(_first(effect, "shininess", np.zeros(1), "float")[0], 0.0)
+        return trimesh.visual.material.PBRMaterial(
+            baseColorFactor=color,
+            baseColorTexture=None if texture is None else self._picture(effect, texture.get("texture"), beside),
+            emissiveFactor=_first(effect, "emission", np.zeros(4))[:3],
+            metallicFactor=0.0,
+            roughnessFactor=float(np.sqrt(2.0 / (2.0 + shininess))),
+        )
+
+    def _picture(self, effect: Any, name: str | None, beside: FolderFiles) -> Any:
+        """The picture of a texture: its sampler names a surface, and that an image."""
+        params = {param.get("sid"): param for param in effect.iter("{*}newparam")}
+        while (param := params.pop(name, None)) is not None:
+            inner = next(param.iter("{*}source", "{*}init_from", "{*}instance_image"), param)
+            name = (inner.get("url") or inner.text or "").strip().removeprefix("#")
+        image = self.named.get(name)
+        said = [] if image is None else [(one.text or "").strip() for one in image.iter("{*}init_from", "{*}ref")]
+        return opened_picture(beside, next(filter(None, said), ""))
+
+
+def _first(effect: Any, tag: str, otherwise: FloatArray, kind: str = "color") -> FloatArray:
+    """The numbers of a property of an effect."""
+    text = effect.findtext(f".//{{*}}{tag}/{{*}}{kind}")
+    found = otherwise if text is None else _numbers(text)
+    return found if len(found) == len(otherwise) else otherwise
+
+
+_RINGS = ("triangles", "polylist", "polygons", "tristrips", "trifans")
+
+
+def _corners(primitive: Any, points: FloatArray, offset: int, width: int) -> IntArray:
+    """The rows that a primitive's triangles use of its inputs ``[F, 3, inputs]``."""
+    tag = etree.QName(primitive).localname
+    rings = [_integers(p.text, width) for p in primitive.iterchildren("{*}p")]
+    rows = np.concatenate([np.empty((0, width), dtype=np.int64), *rings])
+    counts = np.array([len(ring) for ring in rings], dtype=np.int64)
+    more = []
+    for holed in primitive.iterchildren("{*}ph"):
+        outline, *holes = (_integers(ring.text, width) for ring in holed.iterchildren("{*}p", "{*}h"))
+        own = np.concatenate([outline, *holes])
+        _check(own[:, offset], points)
+        places = triangles_within(points[outline[:, offset]], [points[hole[:, offset]] for hole in holes])
+        if places is None:
+            raise ValueError("a polygon with holes that cross it")
+        more.append(own[places])
+    _check(rows[:, offset], points)
+    match tag:
+        case "triangles":
+            places = np.arange(len(rows)).reshape(-1, 3)
+        case "tristrips" | "trifans":
+            turn = strip_triangles if tag == "tristrips" else fan_triangles
+            places = np.concatenate([turn(part) for part in np.split(np.arange(len(rows)), np.cumsum(counts)[:-1])])
+        case _:
+            counts = _integers(primitive.findtext("{*}vcount"), 1)[:, 0] if tag == "polylist" else counts
+            if (counts < 0).any() or counts.sum() != len(rows):
+                raise ValueError(f"polygons of {counts.sum()} corners, but {len(rows)} are there")
+            places = places_of(points, counts, rows[:, offset])
+    return np.concatenate([rows[places], *more])
+
+
+def _check(corners: IntArray, points: FloatArray) -> None:
+    if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
+        raise ValueError(f"a face uses vertex {corners.max()} of {len(points)}, or one below 0")
+
+
+def _numbers(text: str | None) -> FloatArray:
+    return rows_of((text or "").encode() + b"\n")[0]
+
+
+def _integers(text: str | None, width: int) -> IntArray:
+    return whole(_numbers(text)).reshape(-1, width)
+
+
+def _transform(node: Any) -> FloatArray:
+    """The product of all transforms of a node, in their order."""
+    matrix = np.eye(4)
+    for one in node.iterchildren("{*}matrix", "{*}translate", "{*}rotate", "{*}scale", "{*}skew", "{*}lookat"):
+        matrix = matrix @ _MOVES[etree.QName(one).localname](_numbers(one.text))
+    return matrix
+
+
+def _rotation(values: FloatArray) -> FloatArray:
+    *axis, angle = values.tolist()
+    if not any(axis):
+        return np.eye(4)
+    return np.asarray(trimesh.transformations.rotation_matrix(np.radians(angle), axis))
+
+
+def _skew(values: FloatArray) -> FloatArray:
+    """By RenderMan, to which COLLADA refers: turn one axis to the other, along which all points move."""
+    angle, (turned, along) = np.radians(values[0]), values[1:].reshape(2, 3)
+    turned, along = turned / np.linalg.norm(turned), along / np.linalg.norm(along)
+    between = np.arccos(np.clip(turned @ along, -1, 1))
+    if not between - np.pi < angle < between:
+        raise ValueError("a skew that is none")
+    across = (turned - turned @ along * along) / np.sin(between)
+    matrix = np.eye(4)
+    matrix[:3, :3] += (1 / np.tan(between - angle) - 1 / np.tan(between)) * np.outer(along, across)
+    return matrix
+
+
+def _lookat(values: FloatArray) -> FloatArray:
+    """A view from one point to another."""
+    eye, aim, up = values.reshape(3, 3)
+    back = (eye - aim) / np.linalg.norm(eye - aim)
+    right = np.cross(up, back) / np.linalg.norm(np.cross(up, back))
+    matrix = np.eye(4)
+    matrix[:3] = np.stack([right, np.cross(back, right), back, eye], axis=1)
+    return matrix
+
+
+_MOVES: dict[str, Callable[[FloatArray], FloatArray]] = {
+    "matrix": lambda values: values.reshape(4, 4),
+    "translate": lambda values: np.asarray(trimesh.transformations.translation_matrix(values)),
+    "rotate": _rotation,
+    "scale": lambda values: np.diag([*values.reshape(3), 1.0]),
+    "skew": _skew,
+    "lookat": _lookat,
+}
+
+
+def read_collada(path: Path, content: bytes) -> Contents:
+    """Read the geometries that the scene places.
+
+    Raises
+    ------
+    MeshFileError, ValueError, LookupError
+        The file is damaged, or would multiply to more than is reasonable.
+    """
+    content = _unpacked(path, content)
+    up, metres = collada(content[:HEAD])
+    document = _Document(path, content)
+    geometry = []
+    for one in document.placed.values():
+        vertices, faces, count = [], [], 0
+        for points, corners in (primitive.arrays["POSITION"] for primitive in one.primitives):
+            used, local = np.unique(corners, return_inverse=True)
+            vertices.append(points[used][:, :3])
+            faces.append(local.reshape(-1, 3) + count)
+            count += len(used)
+        if count:
+            geometry.append((one.node, Triangles(np.concatenate(vertices), np.concatenate(faces))))
+    if not geometry and document.damage:
+        raise ValueError(document.damage[0])
+    warnings = [*document.warnings, *document.damage]
+    return Contents(geometry, warnings, up, metres, Asset(content, path, "dae"))
+
+
+def _unpacked(path: Path, content: bytes) -> bytes:
+    """The XML of a COLLADA file, unpacked if it is a ``zae``."""
+    if path.suffix.lower() == ".zae":
+        archive = open_archive(path, content)
+        names = [name for name in archive.namelist() if name.lower().endswith(".dae") and "MACOSX" not in name]
+        if not names:
+            raise MeshFileError(f"{path} holds no .dae file: export it again")
+        content = unpack(path, archive, names[0])
+    if is_zipfile(io.BytesIO(content)):
+        raise MeshFileError(f"{path} is an archive, not XML: rename it to .zae, or export it again")
+    return content
+
+
+def scene_of_collada(path: Path, content: bytes) -> trimesh.Scene:
+    """The same with all looks: a node for each primitive of an instance, which begins with the node's name."""
+    document = _Document(path, content)
+    beside, paints = FolderFiles(path.parent, PICTURES), {}
+    scene = trimesh.Scene()
+    for key, one in document.placed.items():
+        for index, primitive in enumerate(one.primitives):
+            material = one.materials.get(primitive.material, primitive.material)
+            if material not in paints:
+                paints[material] = document.paint(material, beside)
+            mesh = painted(primitive.arrays, paints[material])
+            name = f"{key}\n{index}"
+            scene.add_geometry(mesh, node_name=name, geom_name=name, transform=one.node.transform)
+    return scene

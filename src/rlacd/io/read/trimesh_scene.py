@@ -1,0 +1,111 @@
+"""Scenes and meshes of trimesh, from memory or parsed by it, as contents."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from rlacd.errors import MeshDataError
+from rlacd.io.read.beside import DATA, FolderFiles
+from rlacd.io.read.contents import Triangles, require_few
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.input_mesh import SourceNode
+from rlacd.solid.topology import IntArray
+
+
+def parsed(path: Path, content: bytes, extension: str, endings: frozenset[str] = DATA, **options: Any) -> trimesh.Scene:
+    """Parse a file by trimesh; only files beside it with these endings are opened, and nothing is fetched."""
+    return trimesh.load_scene(
+        io.BytesIO(content),
+        file_type=extension,
+        resolver=FolderFiles(path.parent, endings),
+        allow_remote=False,
+        process=False,
+        **options,
+    )
+
+
+def is_trimesh(source: object) -> bool:
+    """Whether an object is one of trimesh that is taken."""
+    return isinstance(source, trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud)
+
+
+def geometry_of(source: Any, name: str) -> list[tuple[SourceNode, Triangles]]:
+    """All that a scene, mesh or point cloud places; paths are passed over.
+
+    Raises
+    ------
+    MeshDataError
+        Its arrays are none of a mesh, a node has no place, or it places too many triangles.
+    """
+    shapes = (trimesh.Trimesh, trimesh.PointCloud)
+    placed = [(node, shape) for node, shape in _instances(source, name) if isinstance(shape, shapes)]
+    require_few(((getattr(shape, "faces", ()), shape.vertices) for _, shape in placed), name)
+    return [(node, Triangles(*arrays_of(shape.vertices, getattr(shape, "faces", ())))) for node, shape in placed]
+
+
+def _instances(source: Any, name: str) -> Iterator[tuple[SourceNode, Any]]:
+    """Yield each node and its geometry, once per instance."""
+    if not isinstance(source, trimesh.Scene):
+        yield SourceNode("mesh", "mesh", np.eye(4)), source
+        return
+    data, placed = source.graph.transforms.node_data, {source.graph.base_frame: np.eye(4)}
+    for node in source.graph.nodes_geometry:
+        shape = source.geometry[data[node]["geometry"]]
+        yield SourceNode(str(node), node, _placed(source.graph, node, placed, name)), shape
+
+
+def _placed(graph: Any, node: Any, placed: dict[Any, FloatArray], name: str) -> FloatArray:
+    """Return a node's transform [4, 4]; the transforms of its ancestors are multiplied only once."""
+    chain: list[tuple[Any, Any]] = []
+    at = node
+    while at not in placed:
+        parent = graph.transforms.parents.get(at)
+        if parent is None:
+            return _placed_otherwise(graph, node, name)
+        chain.append((parent, at))
+        if len(chain) > len(graph.transforms.parents):
+            raise MeshDataError(f"the node {node!r:.80} of {name} is placed inside itself: export the scene again")
+        at = parent
+    for parent, child in reversed(chain):
+        edge = graph.transforms.edge_data[parent, child]
+        placed[child] = placed[parent] @ np.asarray(edge.get("matrix", np.eye(4)), dtype=np.float64)
+    return placed[node]
+
+
+def _placed_otherwise(graph: Any, node: Any, name: str) -> FloatArray:
+    """Return the transform of a node that is not below the base: a scene in memory may have reversed edges."""
+    try:
+        return np.asarray(graph[node][0], dtype=np.float64)
+    except ValueError as error:
+        raise MeshDataError(
+            f"the node {node!r:.80} of {name} has no place in its scene: export the scene again"
+        ) from error
+
+
+def arrays_of(vertices: Any, faces: Any) -> tuple[FloatArray, IntArray]:
+    """Check the shapes and dtypes of arrays; quads become two triangles each."""
+    try:
+        if np.iscomplexobj(vertices) or np.ma.is_masked(vertices) or np.ma.is_masked(faces):
+            raise MeshDataError("vertices are complex, or vertices or faces are masked: give plain real arrays")
+        v = np.asarray(vertices, dtype=np.float64)
+        f = np.asarray(faces)
+    except MeshDataError:
+        raise
+    except (TypeError, ValueError) as error:
+        raise MeshDataError("vertices and faces must be rectangular arrays of numbers: [V, 3] and [F, 3]") from error
+    v = v.reshape(-1, 3) if v.size == 0 else v
+    f = f.reshape(-1, 3).astype(np.int64) if f.size == 0 else f
+    if v.ndim != 2 or v.shape[1] != 3:
+        raise MeshDataError(f"vertices have shape {list(v.shape)}, not [V, 3]: give one row of x, y, z per vertex")
+    if f.ndim != 2 or f.shape[1] not in (3, 4):
+        raise MeshDataError(f"faces have shape {list(f.shape)}, not [F, 3]: triangulate the polygons first")
+    if not np.issubdtype(f.dtype, np.integer):
+        raise MeshDataError(f"faces are {f.dtype}, not integers: give indices into the vertices, counted from 0")
+    f = f.astype(np.int64)
+    return v, (np.concatenate([f[:, [0, 1, 2]], f[:, [0, 2, 3]]]) if f.shape[1] == 4 else f)

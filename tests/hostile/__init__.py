@@ -1,6 +1,0 @@
-"""Mesh files made to harm the program that opens them, and words of the sentence that refuses each."""
-
-from tests.hostile import archives, counts, gltf, others, xml  # noqa: F401  # they fill the list
-from tests.hostile.registry import HARMLESS, REFUSED
-
-__all__ = ["HARMLESS", "REFUSED"]
