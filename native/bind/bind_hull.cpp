@@ -21,6 +21,13 @@ using PlanePointsIn = nb::ndarray<const double, nb::shape<-1, 2>, nb::c_contig, 
 
 constexpr std::size_t kPairsAThread = 8;  // starting a thread takes as long as a few joint hulls of small parts
 
+// The predicates are undefined for infinity and NaN.
+void require_numbers(const std::vector<Vec3>& points) {
+  for (const Vec3& p : points)
+    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
+      throw std::invalid_argument("points must be finite");
+}
+
 }  // namespace
 
 void bind_hull(nb::module_& m) {
@@ -28,9 +35,7 @@ void bind_hull(nb::module_& m) {
       "convex_hull",
       [](const PointsIn& array) {
         const std::vector<Vec3> points = to_points(array);
-        for (const Vec3& p : points)  // the predicates are undefined for infinity and NaN
-          if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
-            throw std::invalid_argument("points must be finite");
+        require_numbers(points);
         Hull hull;
         {
           nb::gil_scoped_release release;
@@ -51,7 +56,7 @@ void bind_hull(nb::module_& m) {
           const std::vector<Vec3> own = to_points(group);
           points.insert(points.end(), own.begin(), own.end());
         }
-        require_finite(points);
+        require_numbers(points);
         Hull hull = convex_hull(points);
         using Out = std::tuple<Rows<double, Vec3>, Rows<std::int32_t, Triangle>, double>;
         if (hull.rank < 3) return std::optional<Out>();
