@@ -26,9 +26,9 @@ import trimesh
 from typer.testing import CliRunner
 
 from rlacd.cli.main import app
-from rlacd.criteria import NavigableSpace
 from rlacd.errors import MeshFileError, OptionError
 from rlacd.options import Options
+from rlacd.options.navigable import NavigableSpace
 from rlacd.viewer.controls import ViewerControls
 from rlacd.viewer.downloads import offered
 from rlacd.viewer.viewer import Viewer, open_viewer, read_controls

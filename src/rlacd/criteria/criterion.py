@@ -7,7 +7,10 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from rlacd.criteria.screen import Part, Screen
+from rlacd.options import Options
+from rlacd.run import Run
 from rlacd.solid.balls import Balls
+from rlacd.solid.solid import Solid
 
 
 @dataclass(frozen=True)
@@ -28,6 +31,14 @@ class CriterionSummary:
 
 class Criterion(Protocol):
     """When a component is close enough to its hull to be a part."""
+
+    @classmethod
+    def prepare(cls, options: Options, solid: Solid, run: Run | None) -> Criterion:
+        """Make the criterion that options ask for, for a solid; without a run there is no time to look at that."""
+
+    @property
+    def eliminates(self) -> bool:
+        """Whether a pass also tries to divide each part among those around it."""
 
     @property
     def is_hereditary(self) -> bool:

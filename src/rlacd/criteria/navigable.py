@@ -28,7 +28,9 @@ from rlacd import _native
 from rlacd.criteria.criterion import CriterionSummary
 from rlacd.criteria.screen import Part, Screen
 from rlacd.errors import OptionError
-from rlacd.options.navigable import Point, SpaceOptions
+from rlacd.options import Options
+from rlacd.options.navigable import NavigableSpace, Point
+from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.balls import Balls
 from rlacd.solid.frame import Frame
@@ -46,114 +48,6 @@ LEAST_RADIUS = 0.1
 """A ball that has to shrink below this share of the radius is dropped."""
 
 _OPEN = ("capped", "slab", "wrapped", "hull")
-
-
-@dataclass(frozen=True)
-class NavigableSpace(SpaceOptions):
-    """The criterion "no hull intrudes into the space that a ball can reach".
-
-    Parameters
-    ----------
-    radius : float
-        Radius of the ball, as a fraction of the longest side of the input's bounding box.
-    tolerance : float
-        Distance from the surface within which space may be filled, as a fraction of the same length.
-    reachable_only : bool
-        Count only space that the ball can reach; otherwise all space outside the solid with room for the ball counts,
-        including sealed cavities.
-    seeds : array_like [S, 3], optional
-        Points, in the input's frame and unit, from which balls start; by default they start outside.
-    closed_planes : sequence of (normal [3], offset)
-        Half-spaces n.x < offset, in the input's frame and unit, that balls cannot enter: ``((0, 0, 1), 0)`` is ground
-        at z = 0. The normal need not have length 1; the offset refers to the normal as given.
-    radius_abs, tolerance_abs : float, optional
-        The same lengths in the input's unit; they replace `radius` and `tolerance`.
-
-    Raises
-    ------
-    OptionError
-        A length is out of range, or seeds or planes have the wrong shape.
-    """
-
-    def prepare(self, solid: Solid, threads: int = 0) -> Navigable:
-        """Find the space around a solid and place its balls.
-
-        Parameters
-        ----------
-        solid : Solid
-            The repaired input; its cavities count only if it was repaired with ``keep_cavities``.
-        threads : int
-            0 uses every core. The result does not depend on it.
-
-        Raises
-        ------
-        OptionError
-            A seed lies inside the solid, closer than the radius to it or to a closed plane, or in a closed half-space;
-            or a length in the input's unit is too small or too large for the object.
-
-        Notes
-        -----
-        Distances are exact. Passages are found on a grid with cells half a radius wide; if the grid leaves the answer
-        open, the passage itself is followed. No passage narrower than 99 % of the ball counts, and one as wide as the
-        ball is found unless it is too contorted to be followed in steps of half a radius.
-
-        Measured well inside the hull of the solid, 99 % of the space's boundary is within 0.6 ball radii of a centre,
-        and all of it within 0.75: between balls, a hull can reach a fifth of their radius past the boundary undetected,
-        and very rarely a third.
-        """
-        scale = solid.frame.scale
-        radius, tolerance = self.in_frame(scale)
-        warnings = list(_warnings(solid))
-        vertices, faces = solid.vertices, solid.faces
-        surface = _native.Surface(vertices, faces)
-        planes = _planes_in_frame(self.closed_planes, solid.frame)
-        seeds = None
-        if self.seeds is not None:
-            seeds = solid.frame.to_frame(self.seeds)
-            _check_seeds(seeds, self.seeds, surface, planes, radius, scale)
-        hull = Hull.of(vertices)
-        balls = Balls(np.empty((0, 3)), np.empty(0))
-        if radius >= 2:
-            warnings.append("the radius is larger than the object, so no ball can get in: one hull is enough")
-        elif hull is not None:
-            pitch = max(radius / 2, (2 + 2 * radius) / MOST_CELLS)
-            if pitch > radius / 2:
-                warnings.append(
-                    f"the radius, {50 * radius:.3g} % of the longest side, is small: balls are placed "
-                    f"{pitch / radius:.2g} radii apart, and free space between them may be missed"
-                )
-            balls = Balls(
-                *_native.navigable_balls(
-                    surface,
-                    hull.vertices,
-                    hull.faces,
-                    radius,
-                    tolerance,
-                    self.reachable_only,
-                    seeds,
-                    planes,
-                    pitch,
-                    threads,
-                )
-            )
-        return Navigable(self, radius, tolerance, balls, tuple(warnings), hull=hull)
-
-    def unprepared(self, scale: float) -> Navigable:
-        """Make the criterion for a solid whose space there was no time to find: it has no balls.
-
-        Parameters
-        ----------
-        scale : float
-            Frame units per unit of the input.
-        """
-        radius, tolerance = self.in_frame(scale)
-        warning = "There was no time to find the navigable space, so there are no balls."
-        return Navigable(self, radius, tolerance, Balls(np.empty((0, 3)), np.empty(0)), (warning,))
-
-    @property
-    def sees_cavities(self) -> bool:
-        """Whether sealed cavities may count, so repair has to keep them."""
-        return not self.reachable_only or self.seeds is not None
 
 
 @dataclass(frozen=True)
@@ -180,8 +74,6 @@ class Navigable:
 
     Attributes
     ----------
-    space : NavigableSpace
-        The requested space.
     radius, tolerance : float
     balls : Balls
     allowance : float
@@ -196,7 +88,6 @@ class Navigable:
 
     def __init__(
         self,
-        space: NavigableSpace,
         radius: float,
         tolerance: float,
         balls: Balls,
@@ -204,7 +95,6 @@ class Navigable:
         conflicts: Conflicts | None = None,
         hull: Hull | None = None,
     ) -> None:
-        self.space = space
         self.radius = radius
         self.tolerance = tolerance
         self.balls = balls
@@ -216,6 +106,78 @@ class Navigable:
 
     def __repr__(self) -> str:
         return f"Navigable(radius {self.radius:.4g}, tolerance {self.tolerance:.4g}, {len(self.balls)} balls)"
+
+    @classmethod
+    def prepare(cls, options: Options, solid: Solid, run: Run | None) -> Navigable:
+        """The space of a solid; without balls where there is no time to find it."""
+        space = options.criterion
+        assert isinstance(space, NavigableSpace)
+        if run is None:
+            warning = "There was no time to find the navigable space, so there are no balls."
+            return cls(*space.in_frame(solid.frame.scale), Balls(np.empty((0, 3)), np.empty(0)), (warning,))
+        with run.stage("space"):
+            return cls.of(space, solid, run.threads)
+
+    @classmethod
+    def of(cls, space: NavigableSpace, solid: Solid, threads: int = 0) -> Navigable:
+        """Find the space around a solid and place its balls.
+
+        Parameters
+        ----------
+        space : NavigableSpace
+        solid : Solid
+            The repaired input; its cavities count only if it was repaired with ``keep_cavities``.
+        threads : int
+            0 uses every core. The result does not depend on it.
+
+        Raises
+        ------
+        OptionError
+            A seed lies inside the solid, closer than the radius to it or to a closed plane, or in a closed half-space;
+            or a length in the input's unit is too small or too large for the object.
+
+        Notes
+        -----
+        Distances are exact. Passages are found on a grid with cells half a radius wide; if the grid leaves the answer
+        open, the passage itself is followed. No passage narrower than 99 % of the ball counts, and one as wide as the
+        ball is found unless it is too contorted to be followed in steps of half a radius.
+
+        Measured well inside the hull of the solid, 99 % of the space's boundary is within 0.6 ball radii of a centre,
+        and all of it within 0.75: between balls, a hull can reach a fifth of their radius past the boundary undetected,
+        and very rarely a third.
+        """
+        scale = solid.frame.scale
+        radius, tolerance = space.in_frame(scale)
+        warnings = _warnings(solid)
+        surface = _native.Surface(solid.vertices, solid.faces)
+        planes = _planes_in_frame(space.closed_planes, solid.frame)
+        seeds = None
+        if space.seeds is not None:
+            seeds = solid.frame.to_frame(space.seeds)
+            _check_seeds(seeds, space.seeds, surface, planes, radius, scale)
+        hull = Hull.of(solid.vertices)
+        balls = Balls(np.empty((0, 3)), np.empty(0))
+        if radius >= 2:
+            warnings.append("the radius is larger than the object, so no ball can get in: one hull is enough")
+        elif hull is not None:
+            pitch = max(radius / 2, (2 + 2 * radius) / MOST_CELLS)
+            if pitch > radius / 2:
+                warnings.append(
+                    f"the radius, {50 * radius:.3g} % of the longest side, is small: balls are placed "
+                    f"{pitch / radius:.2g} radii apart, and free space between them may be missed"
+                )
+            lengths, reachable = (radius, tolerance), space.reachable_only
+            balls = Balls(
+                *_native.navigable_balls(
+                    surface, hull.vertices, hull.faces, *lengths, reachable, seeds, planes, pitch, threads
+                )
+            )
+        return cls(radius, tolerance, balls, tuple(warnings), hull=hull)
+
+    @property
+    def eliminates(self) -> bool:
+        """Yes: hulls are tested quickly against balls."""
+        return True
 
     @property
     def screen(self) -> Screen:
@@ -309,7 +271,6 @@ class Navigable:
         if conflicts == Conflicts():
             return self
         settled = Navigable(
-            self.space,
             self.radius,
             self.tolerance,
             Balls(self.balls.centres[kept], radii[kept]),

@@ -11,11 +11,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from rlacd._native import mesh_volume
 from rlacd.criteria.criterion import CriterionSummary
 from rlacd.criteria.screen import Part, Screen
+from rlacd.fit import told_apart
+from rlacd.options import Options
+from rlacd.run import Run
 from rlacd.solid.hull import Hull
 from rlacd.solid.solid import Solid
-from rlacd.told_apart import told_apart
 
 LEAST = 1e-3
 """Of the volume of the whole's convex hull: parts smaller than this count as this large."""
@@ -67,13 +70,18 @@ class AddedVolume:
     least: float
 
     @classmethod
-    def of(cls, tolerance: float, relative_to: str, solid: Solid) -> AddedVolume:
-        """Make the criterion for a solid; `relative_to` is ``part`` or ``whole``."""
-        from rlacd._native import mesh_volume
-
+    def prepare(cls, options: Options, solid: Solid, run: Run | None) -> AddedVolume:
+        """Shares are of the part, or of the whole solid as the options say."""
+        if run is None:
+            return cls(options.volume_tolerance, None, 0.0)
         hull = Hull.of(solid.vertices) if len(solid.vertices) else None
-        whole = float(mesh_volume(*solid.mesh)) if relative_to == "whole" else None
-        return cls(tolerance, whole, LEAST * hull.volume if hull is not None else 0.0)
+        whole = float(mesh_volume(*solid.mesh)) if options.volume_of == "whole" else None
+        return cls(options.volume_tolerance, whole, LEAST * hull.volume if hull is not None else 0.0)
+
+    @property
+    def eliminates(self) -> bool:
+        """No."""
+        return False
 
     def share(self, volume: float, hull_volume: float) -> float:
         """The error of a part with these volumes."""

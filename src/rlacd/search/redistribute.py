@@ -18,6 +18,7 @@ from rlacd.run import Run, work
 from rlacd.search.recut import Exchange
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part, Plane
+from rlacd.solid.hull import Hull
 from rlacd.solid.products import dots, heights
 from rlacd.solid.reunite import reunite
 
@@ -70,7 +71,8 @@ def redistribute(
     def halves(piece: _Piece) -> list[_Piece]:
         if piece.halves is None:
             may_cut = run.step(0, None, len(now)) and run.work.pay(work.cutting(piece.component.size))
-            piece.halves = [_Piece(half) for half in _halved(piece.component, random)] if may_cut else []
+            halved = _halved(piece.component, _between(now, piece.component), random) if may_cut else []
+            piece.halves = [_Piece(half) for half in halved]
         return piece.halves
 
     def may_go(piece: _Piece, halvings: int) -> bool:
@@ -133,9 +135,22 @@ def _gaps(boxes: FloatArray, box: FloatArray) -> FloatArray:
     return np.sqrt(dots(apart, apart))
 
 
-def _halved(piece: Component, random: np.random.Generator) -> list[Component]:
-    """Cut across the longest coordinate axis or principal axis, chosen at random; the smaller half first."""
-    axes = np.eye(3) if random.random() < 0.5 else piece.principal_axes
+def _between(parts: Sequence[Part], piece: Part) -> FloatArray | None:
+    """The direction from one to the other of the two parts whose hulls would grow the least by a piece [1, 3].
+
+    Around a round hole it follows the hole, which no axis does. None if there are no two parts.
+    """
+    growth = [Hull.around(part.hull, piece.hull).volume - part.hull.volume for part in parts]
+    if len(parts) < 2:
+        return None
+    first, second = (parts[i].hull.vertices.mean(axis=0) for i in np.argsort(growth, kind="stable")[:2])
+    length = float(np.sqrt(dots(second - first, second - first)))
+    return ((second - first) / length)[None] if length > 0 else None
+
+
+def _halved(piece: Component, direction: FloatArray | None, random: np.random.Generator) -> list[Component]:
+    """Cut across a direction, by default the longest coordinate axis or principal axis; the smaller half first."""
+    axes = direction if direction is not None else np.eye(3) if random.random() < 0.5 else piece.principal_axes
     along = heights(piece.hull.vertices, axes)
     lower, upper = along.min(axis=0), along.max(axis=0)
     longest = int(np.argmax(upper - lower))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rlacd.io.write import file_stem
-from rlacd.options import CONCAVITY, CRITERIA
+from rlacd.options import CRITERIA, Options
 
 ENDING = ".glb"
 
@@ -30,7 +30,7 @@ def as_command(mesh: str | os.PathLike[str], given: dict[str, Any], usual: Any) 
     str
         One line, quoted for a POSIX shell.
     """
-    own = CRITERIA.get(str(given.get("criterion")), CRITERIA[CONCAVITY])
+    own = CRITERIA.get(str(given.get("criterion")), Options().numbers)
     others = {number for numbers in CRITERIA.values() for number in numbers} - {*own}
     words = ["rlacd", "decompose", os.fspath(mesh)]
     for field in dataclasses.fields(usual):

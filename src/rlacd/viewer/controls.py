@@ -7,21 +7,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rlacd.criteria import NavigableSpace
-from rlacd.options import CONCAVITY, CRITERIA, FAST, Options, criterion_named
+from rlacd.options import CRITERIA, FAST, Options, with_criterion
 from rlacd.options.names import PrimitiveKind
-from rlacd.options.navigable import NAVIGABLE
+from rlacd.options.navigable import NavigableSpace
 from rlacd.solid.input_mesh import InputMesh
 
 _DEFAULTS, _SPACE = Options(), NavigableSpace()
-_NUMBERS = {"criterion", *(number for numbers in CRITERIA.values() for number in numbers)}
+_NUMBERS = {number for numbers in CRITERIA.values() for number in numbers}
 
 
 @dataclasses.dataclass(frozen=True)
 class ViewerControls:
     """Values of the page's controls; see `rlacd.decompose` for their meaning."""
 
-    criterion: str = CONCAVITY
+    criterion: str = str(_DEFAULTS.criterion)
     threshold: float = _DEFAULTS.threshold
     radius: float = _SPACE.radius or 0.0
     tolerance: float = _SPACE.tolerance or 0.0
@@ -42,10 +41,8 @@ class ViewerControls:
         OptionError
             A value is out of range.
         """
-        name = criterion_named(self.criterion)
-        goal = {number: getattr(self, number) for number in CRITERIA[name]}
-        criterion = {"criterion": NavigableSpace(**goal)} if name == NAVIGABLE else {"criterion": name, **goal}
-        options = {key: value for key, value in vars(self).items() if key not in _NUMBERS} | criterion
+        others = _NUMBERS - {*CRITERIA.get(self.criterion, ())}
+        options = with_criterion({key: value for key, value in vars(self).items() if key not in others})
         Options(**options)
         return options
 
