@@ -216,7 +216,7 @@ def test_everything_offered_can_be_downloaded_and_read(viewer: Viewer) -> None:
     [
         ({"threshold": -1}, "threshold is -1"),
         ({"threshold": "tight"}, "threshold is 'tight'"),
-        ({"criterion": "beauty"}, "concavity, volume or navigable"),
+        ({"criterion": "beauty"}, "distance, volume or navigable"),
         ({"criterion": "navigable", "radius": 0}, "radius"),
         ({"quality": "perfect"}, "quality"),
         ({"max_hulls": 1.5}, "max_hulls"),
@@ -514,7 +514,7 @@ def test_mistakes_are_found_before_anything_is_served(mesh: Path, tmp_path: Path
         (["{mesh}", "--port", "99999"], "not a port"),
         (["{mesh}", "--up", "w"], "x, y or z"),
         (["{mesh}", "--threshold", "-1"], "threshold is -1"),
-        (["{mesh}", "--criterion", "beauty"], "concavity, volume or navigable"),
+        (["{mesh}", "--criterion", "beauty"], "distance, volume or navigable"),
         (["{mesh}", "--open", "wide"], "auto, solid, thin"),
     ],
 )

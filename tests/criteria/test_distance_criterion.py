@@ -96,3 +96,6 @@ def test_a_length_is_a_distance_unless_the_criterion_is_named(tmp_path: Path) ->
     assert "max distance" in said("--threshold", "0.1", "--criterion", "distance")
     assert "max concavity" in said("--threshold", "100mm", "--criterion", "concavity")
     assert "max concavity" in said("--threshold", "5%")
+    comb().export(path := tmp_path / "comb.stl")
+    assert "its unit" in said("--threshold", "0.1mm")
+    assert "(threshold 0.1); hulls" in said("--threshold", "0.1mm", "--unit", "mm")

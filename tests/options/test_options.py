@@ -232,7 +232,7 @@ def test_a_length_may_be_a_share_or_in_metres() -> None:
     assert decompose_options({"threshold": "5 mm"}, metres=True) == {"threshold_abs": 0.005}
     space = decompose_options({"criterion": "navigable", "radius": "4%", "tolerance": "2cm"}, metres=True)["criterion"]
     assert (space.radius, space.tolerance_abs) == (0.04, 0.02)
-    with pytest.raises(OptionError, match="does not say its unit; give --threshold-abs"):
+    with pytest.raises(OptionError, match="does not say its unit; give --unit, or --threshold-abs"):
         decompose_options({"threshold": "0.05m"})
     for word in ("tight", "5 %%", "", "1e", "m", "0.1 miles"):
         with pytest.raises(OptionError, match="--threshold is"):

@@ -20,7 +20,8 @@ METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 def how_parameters() -> Parameters:
     """Make the parameters that control the decomposition."""
-    return option_parameters(Options) | option_parameters(NavigableSpace)
+    own = [name for name in OPTION_NAMES if name != "volume_tolerance"]  # --tolerance of navigable space stands for it
+    return option_parameters(Options, only=own) | option_parameters(NavigableSpace)
 
 
 def decompose_options(given: dict[str, Any], *, metres: bool = False) -> dict[str, Any]:
@@ -70,7 +71,7 @@ def _lengths(given: dict[str, Any], metres: bool) -> dict[str, Any]:
             continue
         if not metres:
             raise OptionError(
-                f"--{name} is {word}, but the file does not say its unit; give --{name}-abs in the file's own unit."
+                f"--{name} is {word}, but the file does not say its unit; give --unit, or --{name}-abs in its own."
             )
         if f"{name}_abs" not in _ABSOLUTE:
             raise OptionError(f"--{name} is {word}; it has to be a number or a share such as 2%.")

@@ -20,7 +20,8 @@ def view(
         float | None, typer.Option("--threshold", "-t", help="As for decompose; the page changes it.")
     ] = None,
     criterion: Annotated[
-        str | None, typer.Option(help="concavity, volume or navigable, as for decompose; the page changes it.")
+        str | None,
+        typer.Option(help="concavity, distance, volume or navigable, as for decompose; the page changes it."),
     ] = None,
     quality: Annotated[
         str | None, typer.Option(help="fast, balanced or best, as for decompose; the page changes it.")

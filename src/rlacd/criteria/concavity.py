@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from rlacd import _native
-from rlacd.criteria.criterion import CriterionSummary
+from rlacd.criteria.criterion import Criterion, CriterionSummary
 from rlacd.criteria.screen import Feasibility, Part, Screen
 from rlacd.errors import OptionError
 from rlacd.fit import told_apart
@@ -104,7 +104,7 @@ class ConcavityScreen(DistanceScreen):
 
 
 @dataclass(frozen=True)
-class Distance:
+class Distance(Criterion):
     """The criterion "the surfaces of a part and its hull lie at most ``threshold`` apart".
 
     Parameters
@@ -145,11 +145,6 @@ class Distance:
         return cls(options.threshold, 1.0 if options.threshold_abs is None else solid.frame.scale)
 
     @property
-    def is_hereditary(self) -> bool:
-        """No: another part may fill what is missing from a part's hull."""
-        return False
-
-    @property
     def eliminates(self) -> bool:
         """Yes: a quarter more time saves a ninth of the parts, and the parts around a hole need not be 8, 16 or 32."""
         return True
@@ -159,10 +154,6 @@ class Distance:
         """Tests of the solid's corners."""
         return DistanceScreen(2 * self.threshold, self.threshold)
 
-    def settled(self, parts: Sequence[Part]) -> Distance:
-        """Unchanged: parts that exceed the threshold are reported."""
-        return self
-
     def scaled(self, factor: float) -> Distance:
         """The same criterion with ``factor`` times the threshold."""
         return replace(self, threshold=self.threshold * factor)
@@ -171,10 +162,6 @@ class Distance:
     def overhang(self) -> float:
         """The threshold."""
         return self.threshold
-
-    @property
-    def obstacles(self) -> None:
-        """None: distances are not about space."""
 
     def summary(self, errors: Sequence[float] | None) -> CriterionSummary:
         """The error of each part, and how many exceed the threshold."""

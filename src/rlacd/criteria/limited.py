@@ -32,7 +32,7 @@ for 32)."""
 
 
 @dataclass(frozen=True)
-class LimitedCriterion:
+class LimitedCriterion(Criterion):
     """A criterion that must hold for the limited hull too.
 
     Attributes
@@ -55,11 +55,6 @@ class LimitedCriterion:
     def eliminates(self) -> bool:
         """As the underlying criterion."""
         return self.criterion.eliminates
-
-    @property
-    def is_hereditary(self) -> bool:
-        """No: limited hulls need not be nested even if the exact ones are."""
-        return False
 
     @property
     def screen(self) -> Screen:

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rlacd import _native
-from rlacd.criteria.criterion import CriterionSummary
+from rlacd.criteria.criterion import Criterion, CriterionSummary
 from rlacd.criteria.screen import Part, Screen
 from rlacd.errors import OptionError
 from rlacd.options import Options
@@ -67,7 +67,7 @@ class Conflicts:
     most: float = 0.0
 
 
-class Navigable:
+class Navigable(Criterion):
     """The navigable space of one solid, as a criterion.
 
     Every length is in the normalised frame.
@@ -188,11 +188,6 @@ class Navigable:
     def is_hereditary(self) -> bool:
         """Yes: a larger hull touches every ball that a smaller one inside it touches."""
         return True
-
-    @property
-    def overhang(self) -> float:
-        """Infinite: space that no ball can reach may be filled, however far from the surface."""
-        return math.inf
 
     @property
     def obstacles(self) -> Balls:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from rlacd._native import mesh_volume
-from rlacd.criteria.criterion import CriterionSummary
+from rlacd.criteria.criterion import Criterion, CriterionSummary
 from rlacd.criteria.screen import Part, Screen
 from rlacd.fit import told_apart
 from rlacd.options import Options
@@ -52,7 +52,7 @@ class VolumeScreen(Screen):
 
 
 @dataclass(frozen=True)
-class AddedVolume:
+class AddedVolume(Criterion):
     """The criterion "the hull adds at most this share of volume".
 
     Attributes
@@ -78,19 +78,9 @@ class AddedVolume:
         whole = float(mesh_volume(*solid.mesh)) if options.volume_of == "whole" else None
         return cls(options.volume_tolerance, whole, LEAST * hull.volume if hull is not None else 0.0)
 
-    @property
-    def eliminates(self) -> bool:
-        """No."""
-        return False
-
     def share(self, volume: float, hull_volume: float) -> float:
         """The error of a part with these volumes."""
         return share_of(hull_volume - volume, max(volume if self.whole is None else self.whole, self.least))
-
-    @property
-    def is_hereditary(self) -> bool:
-        """No: another part may fill what is missing from a part's hull."""
-        return False
 
     @property
     def screen(self) -> VolumeScreen:
@@ -105,22 +95,9 @@ class AddedVolume:
         """The share that the hull adds."""
         return self.share(part.volume, part.hull.volume)
 
-    def settled(self, parts: Sequence[Part]) -> AddedVolume:
-        """Unchanged: parts that exceed the tolerance are reported."""
-        return self
-
     def scaled(self, factor: float) -> AddedVolume:
         """The same criterion with `factor` times the tolerance."""
         return replace(self, tolerance=self.tolerance * factor)
-
-    @property
-    def overhang(self) -> float:
-        """Infinite: a thin spike may reach far and add little."""
-        return math.inf
-
-    @property
-    def obstacles(self) -> None:
-        """None: volumes are not about space."""
 
     def summary(self, errors: Sequence[float] | None) -> CriterionSummary:
         """The share of each part, and how many exceed the tolerance."""

@@ -125,7 +125,7 @@ class Options:
     threshold_abs
         The same as a length in the mesh's own unit, such as 2 for 2 mm in a file in millimetres: a distance.
     volume_tolerance
-        With --criterion volume: the share of volume that a hull may add; the same as --tolerance 1%.
+        With --criterion volume: the share of volume that a hull may add, such as 1%.
     volume_of
         With --criterion volume: whether --tolerance is a share of each part's own volume or of the whole's.
     max_hulls
@@ -196,7 +196,7 @@ class Options:
         metavar="NUMBER",
     )
     threshold_abs: float | None = option(None, TIGHT, LENGTH)
-    volume_tolerance: float = option(0.01, TIGHT, least=1e-4, most=10.0)
+    volume_tolerance: float = option(0.01, TIGHT, least=1e-4, most=10.0, flags=("--tolerance",))
     volume_of: VolumeOf = option("part", TIGHT, one_of=VolumeOf)
     max_hulls: int | None = option(None, LIMITS, least=1)
     max_vertices: int | None = option(None, LIMITS, _CORNERS)
