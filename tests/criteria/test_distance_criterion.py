@@ -99,3 +99,12 @@ def test_a_length_is_a_distance_unless_the_criterion_is_named(tmp_path: Path) ->
     comb().export(path := tmp_path / "comb.stl")
     assert "its unit" in said("--threshold", "0.1mm")
     assert "(threshold 0.1); hulls" in said("--threshold", "0.1mm", "--unit", "mm")
+
+
+@pytest.mark.parametrize("criterion", ["concavity", "distance", "volume"])
+def test_the_parts_of_all_nodes_are_measured_in_the_frame_of_the_scene(criterion: str) -> None:
+    scene = trimesh.Scene({"large": comb(), "small": comb().apply_scale(0.2).apply_translation((3, 0, 0))})
+    result = rlacd.decompose(scene, criterion=criterion, per_node=True, quality="fast", threads=1)  # type: ignore[arg-type]
+    measured = result.report[criterion]
+    assert len(measured["per_part"]) == len(result) > 2
+    assert measured["max"] == max(measured["per_part"]) <= (0.01 if criterion == "volume" else 0.05)

@@ -303,16 +303,6 @@ def test_the_number_of_threads_changes_nothing(reachable_only: bool) -> None:
         np.testing.assert_array_equal(first.balls.radii, other.balls.radii)
 
 
-def test_lengths_in_the_unit_of_the_input() -> None:
-    here, there = (table().scale((s,) * 3).translate((1, 2, 3)) for s in (1, 0.01))
-    # The longest side is 2 and 0.02.
-    a = prepare(here, 0.05, 0.02)
-    b = Navigable.of(NavigableSpace(radius_abs=0.001, tolerance_abs=0.0004), solid_of(there))
-    assert (b.radius, b.tolerance) == pytest.approx((a.radius, a.tolerance))
-    assert len(b.balls) == pytest.approx(len(a.balls), rel=0.01)  # rounding decides between equals
-    assert cKDTree(a.balls.centres).query(b.balls.centres)[0].max() < a.radius / 2
-
-
 @pytest.mark.parametrize(
     ("given", "says"),
     [

@@ -15,12 +15,13 @@ from typing import ClassVar
 
 from rlacd import _native
 from rlacd.criteria.criterion import Criterion, CriterionSummary
-from rlacd.criteria.screen import Feasibility, Part, Screen
+from rlacd.criteria.screen import Feasibility, Screen
 from rlacd.errors import OptionError
 from rlacd.fit import told_apart
 from rlacd.options import Options
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.component import Part
 from rlacd.solid.hull import Hull
 from rlacd.solid.solid import Solid
 

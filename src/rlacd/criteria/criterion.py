@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from rlacd.criteria.screen import Part, Screen
+from rlacd.criteria.screen import Screen
 from rlacd.options import Options
 from rlacd.run import Run
 from rlacd.solid.balls import Balls
+from rlacd.solid.component import Part
 from rlacd.solid.solid import Solid
 
 

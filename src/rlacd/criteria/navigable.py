@@ -26,13 +26,14 @@ from numpy.typing import ArrayLike
 
 from rlacd import _native
 from rlacd.criteria.criterion import Criterion, CriterionSummary
-from rlacd.criteria.screen import Part, Screen
+from rlacd.criteria.screen import Screen
 from rlacd.errors import OptionError
 from rlacd.options import Options
 from rlacd.options.navigable import NavigableSpace, Point
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.balls import Balls
+from rlacd.solid.component import Part
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.products import dots, heights

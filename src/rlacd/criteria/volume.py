@@ -13,10 +13,11 @@ from dataclasses import dataclass, replace
 
 from rlacd._native import mesh_volume
 from rlacd.criteria.criterion import Criterion, CriterionSummary
-from rlacd.criteria.screen import Part, Screen
+from rlacd.criteria.screen import Screen
 from rlacd.fit import told_apart
 from rlacd.options import Options
 from rlacd.run import Run
+from rlacd.solid.component import Part
 from rlacd.solid.hull import Hull
 from rlacd.solid.solid import Solid
 

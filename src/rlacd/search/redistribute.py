@@ -71,7 +71,7 @@ def redistribute(
     def halves(piece: _Piece) -> list[_Piece]:
         if piece.halves is None:
             may_cut = run.step(0, None, len(now)) and run.work.pay(work.cutting(piece.component.size))
-            halved = _halved(piece.component, _between(now, piece.component), random) if may_cut else []
+            halved = _halved(piece.component, now, random) if may_cut else []
             piece.halves = [_Piece(half) for half in halved]
         return piece.halves
 
@@ -135,28 +135,22 @@ def _gaps(boxes: FloatArray, box: FloatArray) -> FloatArray:
     return np.sqrt(dots(apart, apart))
 
 
-def _between(parts: Sequence[Part], piece: Part) -> FloatArray | None:
-    """The direction from one to the other of the two parts whose hulls would grow the least by a piece [1, 3].
+def _halved(piece: Component, parts: Sequence[Part], random: np.random.Generator) -> list[Component]:
+    """Cut across the direction from one to the other of the two parts whose hulls would grow the least by a piece.
 
-    Around a round hole it follows the hole, which no axis does. None if there are no two parts.
+    Around a round hole it follows the hole, which no axis does. The smaller half comes first.
     """
     growth = [Hull.around(part.hull, piece.hull).volume - part.hull.volume for part in parts]
     if len(parts) < 2:
-        return None
+        return []  # what one part cannot take, it cannot take in halves
     first, second = (parts[i].hull.vertices.mean(axis=0) for i in np.argsort(growth, kind="stable")[:2])
     length = float(np.sqrt(dots(second - first, second - first)))
-    return ((second - first) / length)[None] if length > 0 else None
-
-
-def _halved(piece: Component, direction: FloatArray | None, random: np.random.Generator) -> list[Component]:
-    """Cut across a direction, by default the longest coordinate axis or principal axis; the smaller half first."""
-    axes = direction if direction is not None else np.eye(3) if random.random() < 0.5 else piece.principal_axes
-    along = heights(piece.hull.vertices, axes)
-    lower, upper = along.min(axis=0), along.max(axis=0)
-    longest = int(np.argmax(upper - lower))
+    if length == 0:
+        return []
+    x, y, z = direction = (second - first) / length
+    along = heights(piece.hull.vertices, direction[None])
     share = random.uniform(0.5 - MIDDLE, 0.5 + MIDDLE)
-    x, y, z = (float(c) for c in axes[longest])
-    below, above = piece.cut(Plane((x, y, z), float(lower[longest] + share * (upper - lower)[longest])))
+    below, above = piece.cut(Plane((float(x), float(y), float(z)), float(along.min() + share * np.ptp(along))))
     if below is None or above is None:
         return []
     return sorted([below, above], key=lambda half: half.volume)
