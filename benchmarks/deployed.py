@@ -31,6 +31,7 @@ from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Plane
 from rlacd.solid.hull import Hull
+from rlacd.solid.limit_hull import NO_LIMITS
 
 RANKINGS = ("excess", "random")
 
@@ -142,5 +143,5 @@ def decompose_as_deployed(
     with Run(threads) as run:
         tree = CutTree(Component(solid.shape), Deployed(deployment, threshold), run)
         parts = cut_and_merge(tree, Concavity(threshold), run).parts
-    there = [Hull.of(solid.frame.to_input(limit_part(part, None, None).hull.vertices)) for part in parts]
+    there = [Hull.of(solid.frame.to_input(limit_part(part, NO_LIMITS).hull.vertices)) for part in parts]
     return [(hull.vertices, hull.faces) for hull in there if hull is not None]

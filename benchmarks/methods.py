@@ -28,7 +28,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from rlacd.errors import MissingExtraError, OptionError
-from rlacd.options import DEFAULT_THRESHOLD
+from rlacd.options import Options
 from rlacd.solid.arrays import FloatArray, IntArray
 
 RawHull: TypeAlias = tuple[FloatArray, IntArray]
@@ -86,7 +86,7 @@ def make_method(name: str) -> Method:
     if name == "disjoint":
         from benchmarks.disjoint import decompose_disjoint
 
-        return Method(name, version_of("rlacd"), "threshold", DEFAULT_THRESHOLD, decompose_disjoint)
+        return Method(name, version_of("rlacd"), "threshold", Options.threshold, decompose_disjoint)
     if base == "planes":
         from benchmarks.deployed import Deployment, decompose_as_deployed
 
@@ -95,8 +95,8 @@ def make_method(name: str) -> Method:
         def run(v: FloatArray, f: IntArray, threshold: float, threads: int) -> list[RawHull]:
             return decompose_as_deployed(deployment, v, f, threshold, threads)
 
-        return Method(name, version_of("rlacd"), "threshold", DEFAULT_THRESHOLD, run)
-    setting, default = ("tolerance", 0.1) if _space(name) else ("threshold", DEFAULT_THRESHOLD)
+        return Method(name, version_of("rlacd"), "threshold", Options.threshold, run)
+    setting, default = ("tolerance", 0.1) if _space(name) else ("threshold", Options.threshold)
     return Method(name, version_of("rlacd"), setting, default, _rlacd(name))
 
 
@@ -151,7 +151,7 @@ def _rlacd(name: str) -> Run:
     def run(vertices: FloatArray, faces: IntArray, number: float, threads: int) -> list[RawHull]:
         import rlacd
 
-        goal: dict[str, Any] = {} if number == DEFAULT_THRESHOLD else {"threshold": number}
+        goal: dict[str, Any] = {} if number == Options.threshold else {"threshold": number}
         if space:
             radius = float(space[0].partition("=")[2] or number / 2)
             goal = {"criterion": rlacd.NavigableSpace(radius / 2, number / 2)}  # shares of the longest side

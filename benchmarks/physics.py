@@ -47,7 +47,7 @@ ONE_HULL = "fast:max_hulls=1"
 
 METHODS = (
     f"coacd,vhacd,{ONE_HULL},default,fast,fast:detail=full,fast:max_vertices=64,fast:max_vertices=32,"
-    "fast:max_vertices=16,fast:primitives=true,fast:overlap=0.02"
+    "fast:max_vertices=16,fast:primitives=true,fast:overlap=0.01"
 )
 
 

@@ -81,7 +81,7 @@ def hills(side: int = 9, seed: int = 5) -> Shape:
 
 CASES: dict[str, tuple[Callable[[], Shape], dict[str, Any]]] = {
     "chair": (chair, {}),
-    "chair, overlapping": (chair, {"quality": "fast", "overlap": 0.02}),
+    "chair, overlapping": (chair, {"quality": "fast", "overlap": 0.01}),
     "ring": (ring, {}),
     "ring, passages": (ring, {"quality": "fast", "criterion": rlacd.NavigableSpace(radius=0.1)}),
     "hills": (hills, {"quality": "fast"}),

@@ -10,7 +10,7 @@ from typing import Any
 
 from rlacd.options import Options
 from rlacd.options.fields import About
-from rlacd.options.navigable import SpaceOptions
+from rlacd.options.navigable import NavigableSpace
 from rlacd.options.output import OutputOptions
 
 PAGE = Path(__file__).parents[1] / "docs" / "reference" / "options.md"
@@ -24,7 +24,7 @@ PROGRESS = "| `progress` | – | | a function called between steps; returning `F
 
 def options_table() -> str:
     """All options in Markdown, one per row."""
-    rows = [*_rows(Options), PROGRESS, *_rows(SpaceOptions), *_rows(OutputOptions)]
+    rows = [*_rows(Options), PROGRESS, *_rows(NavigableSpace), *_rows(OutputOptions)]
     return "\n".join([*HEAD, *rows, ""])
 
 

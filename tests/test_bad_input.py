@@ -213,7 +213,7 @@ WRONG_OPTIONS = {
     "overlap_abs": [0, -1, NAN, INFINITE, "a", 1e9],
     "merge": [None, "no", 0, 2],
     "policy": ["", None, 3, "GREEDY", "greedy-", ["greedy"]],
-    "gap": [0, 0.009, 0.31, NAN, "3", None, True],
+    "gap": [0, 0.004, 0.16, NAN, "3", None, True],
     "resolution": [0, -1, 19, 401, 2.5, "3", None, 10**6],
     "seed": [-1, 1.5, "a", None, 2**70],
     "threads": [0, -1, 1.5, "2", True, 10**6],

@@ -13,7 +13,7 @@ from manifold3d import CrossSection, Manifold, Mesh64, OpType
 import rlacd
 from rlacd import _native
 from rlacd.criteria import Concavity
-from rlacd.criteria.navigable import Navigable, NavigableSpace
+from rlacd.criteria.navigable import Navigable
 from rlacd.criteria.screen import Feasibility
 from rlacd.merge import merge_parts
 from rlacd.merge.merge import united_in_turn
@@ -116,7 +116,7 @@ def test_what_is_united_with_a_share_is_a_share(run: Run) -> None:
 
 def test_balls_do_not_ask_what_is_inside_a_hull() -> None:
     component = Component(CROSS)
-    space = Navigable(NavigableSpace(0.1, 0.05), 0.1, 0.05, Balls(np.zeros((0, 3)), np.zeros(0)))
+    space = Navigable(0.1, 0.05, Balls(np.zeros((0, 3)), np.zeros(0)))
     assert space.screen.feasibility(component.filling, component.hull) is Feasibility.NEVER
     assert not space.screen.forbids(component.filling, component.hull)
 

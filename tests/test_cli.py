@@ -21,8 +21,8 @@ from rlacd.cli.terminal import summary
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError, OptionError, OutputError
+from rlacd.fit import told_apart
 from rlacd.run import Progress, ProgressCallback
-from rlacd.told_apart import told_apart
 from tests.hulls import hull_of
 
 ELL = [(2.0, 0.4, 0.4), (0.4, 0.4, 2.0)]

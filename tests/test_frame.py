@@ -8,6 +8,7 @@ from hypothesis.extra import numpy as hnp
 import rlacd
 from fuzz.geometry import Polytope
 from rlacd.finish.in_input import in_input
+from rlacd.options.presets import HullLimits
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 
@@ -51,14 +52,14 @@ def test_a_hull_thinner_than_the_coordinates_resolve_keeps_its_outline(turn):
     assert 0 < trimesh.Trimesh(outline, there.faces).volume < 1e-6
     assert outline.min() >= -1e-6
     assert outline.sum(axis=1).max() <= 1 + 1e-6
-    few = in_input(hull, frame, max_vertices=4)
+    few = in_input(hull, frame, HullLimits(max_vertices=4))
     assert len(few.vertices) == 4
 
 
 @pytest.mark.parametrize("limits", [{"max_vertices": 4}, {"max_faces": 4}, {"max_vertices": 5}, {"max_faces": 8}])
 def test_a_flat_hull_within_limits_stays_near_its_outline(limits):
     corners = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0.2, 0.9, 0), (0, 0, 1e-9)], dtype=float)
-    there = in_input(Hull.of(corners), Frame(center=np.full(3, 1e9), scale=1.0), **limits)
+    there = in_input(Hull.of(corners), Frame(center=np.full(3, 1e9), scale=1.0), HullLimits(**limits))
     assert len(there.vertices) <= limits.get("max_vertices", 9)
     assert len(there.faces) <= limits.get("max_faces", 99)
     assert np.ptp(there.vertices, axis=0).max() <= 4 + 1e-5

@@ -7,7 +7,7 @@ import pytest
 from manifold3d import Manifold
 
 from rlacd.criteria import Concavity
-from rlacd.criteria.navigable import Navigable, NavigableSpace
+from rlacd.criteria.navigable import Navigable
 from rlacd.merge import merge_parts
 from rlacd.merge.boxes import Boxes
 from rlacd.run import Run
@@ -114,7 +114,7 @@ def test_what_a_ball_keeps_apart_is_not_asked_again() -> None:
         balls = Balls(random.uniform(-1.2, 1.2, (24, 3)), random.uniform(0.02, 0.2, 24))
         results = []
         for kind in asked:
-            criterion = kind(NavigableSpace(), 0.02, 0.01, balls)
+            criterion = kind(0.02, 0.01, balls)
             with Run(1) as pool:
                 results.append(merge_parts(parts, criterion, pool))
             asked[kind] += criterion.asked

@@ -11,11 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rlacd import _native
-from rlacd.criteria import Concavity, NavigableSpace
+from rlacd.criteria import Concavity, Navigable
 from rlacd.criteria.criterion import Criterion
 from rlacd.cut import CutTree
 from rlacd.io.read.load import load_mesh
 from rlacd.merge import merge_parts
+from rlacd.options.navigable import NavigableSpace
 from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import make_policy
 from rlacd.repair.repair import repair
@@ -102,7 +103,7 @@ def test_nothing_is_lost(stack: list[Component], seed: int) -> None:
 def test_parts_of_a_real_shape(name: str, space: NavigableSpace | None, corpus: Path) -> None:
     solid = repair(load_mesh(corpus / name))
     root = Component(solid.manifold)
-    goal: Criterion = CRITERION if space is None else space.prepare(solid, 1)
+    goal: Criterion = CRITERION if space is None else Navigable.of(space, solid, 1)
     with Run(1) as run:
         done, left = CutTree(root, make_policy("greedy", SweepCache(), None), run).cut_until(goal)
         goal = goal.settled([*done, *left])

@@ -27,9 +27,9 @@ import trimesh
 from click.testing import CliRunner
 
 from rlacd.cli.main import app
-from rlacd.criteria import NavigableSpace
 from rlacd.errors import MeshFileError, OptionError, OutputError
 from rlacd.options import Options
+from rlacd.options.navigable import NavigableSpace
 from rlacd.view.controls import ViewerControls, read_controls
 from rlacd.view.downloads import offered
 from rlacd.view.viewer import Viewer
@@ -249,7 +249,7 @@ def test_a_report_under_way_holds_up_no_decomposition(viewer: Viewer, monkeypatc
     [
         ({"threshold": -1}, "threshold is -1"),
         ({"threshold": "tight"}, "threshold is 'tight'"),
-        ({"criterion": "beauty"}, "concavity, volume or navigable"),
+        ({"criterion": "beauty"}, "distance, volume or navigable"),
         ({"criterion": "navigable", "radius": 0}, "radius"),
         ({"quality": "perfect"}, "quality"),
         ({"max_hulls": 1.5}, "max_hulls"),
@@ -547,7 +547,7 @@ def test_mistakes_are_found_before_anything_is_served(mesh: Path, tmp_path: Path
         (["{mesh}", "--port", "99999"], "not a port"),
         (["{mesh}", "--up", "w"], "x, y or z"),
         (["{mesh}", "--threshold", "-1"], "threshold is -1"),
-        (["{mesh}", "--criterion", "beauty"], "concavity, volume or navigable"),
+        (["{mesh}", "--criterion", "beauty"], "distance, volume or navigable"),
         (["{mesh}", "--open", "wide"], "auto, solid, thin"),
     ],
 )

@@ -15,11 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from rlacd.criteria import Concavity, Criterion, NavigableSpace
+from rlacd.criteria import Concavity, Criterion, Navigable
 from rlacd.cut import CutTree
 from rlacd.errors import RlacdError
 from rlacd.io.read.load import load_mesh
 from rlacd.merge import drop_slivers, merge_parts
+from rlacd.options.navigable import NavigableSpace
 from rlacd.policies import make_policy
 from rlacd.repair.repair import repair
 from rlacd.run import Run
@@ -35,7 +36,7 @@ SAMPLES = 4000
 def criterion_of(name: str, solid: Solid) -> tuple[Criterion, float | None]:
     """Get a criterion and its length: ``navigable`` (5 %, 1 %), or a concavity threshold."""
     if name == "navigable":
-        return NavigableSpace(radius=0.05, tolerance=0.01).prepare(solid, 1), None
+        return Navigable.of(NavigableSpace(radius=0.05, tolerance=0.01), solid, 1), None
     return Concavity(float(name)), float(name)
 
 

@@ -21,10 +21,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rlacd.criteria import Concavity, Criterion, NavigableSpace
+from rlacd.criteria import Concavity, Criterion, Navigable
 from rlacd.cut import CutTree
 from rlacd.errors import RlacdError
 from rlacd.io.read.load import load_mesh
+from rlacd.options.navigable import NavigableSpace
 from rlacd.planes.least_excess import SLIVERS
 from rlacd.planes.sweep import Sweep
 from rlacd.planes.sweep_cache import SweepCache
@@ -108,7 +109,7 @@ def labels_of(path: Path, rng: np.random.Generator) -> list[dict[str, Any]]:
     solid = repair(load_mesh(path), threads=1)
     root = Component(solid.shape)
     space = NavigableSpace(radius=0.05, tolerance=0.01)
-    criterion: Criterion = Concavity(threshold) if kind == "concavity" else space.prepare(solid, 1)
+    criterion: Criterion = Concavity(threshold) if kind == "concavity" else Navigable.of(space, solid, 1)
     if criterion.is_met(root):
         return []
     tree = CutTree(root, Explore(rng, float(rng.choice([0, 0.3]))), RUN)

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 from rlacd._version import __version__
 
 if TYPE_CHECKING:
-    from rlacd.criteria import NavigableSpace
     from rlacd.decompose_mesh import decompose
     from rlacd.decomposition import Decomposition
     from rlacd.errors import (
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
         RlacdError,
     )
     from rlacd.io.robots import Rewritten, rewrite_robot
+    from rlacd.options.navigable import NavigableSpace
     from rlacd.options.presets import PRESETS, Preset
     from rlacd.planes.sweep import Sweep
     from rlacd.planes.sweep_cache import SweepCache
@@ -60,7 +60,7 @@ __all__ = [
 # and programs that only might decompose do not wait for trimesh and numpy. No module may be called like a public name:
 # importing it would hide that.
 _HOME = {
-    "NavigableSpace": "criteria",
+    "NavigableSpace": "options.navigable",
     "decompose": "decompose_mesh",
     "Decomposition": "decomposition",
     "PRESETS": "options.presets",

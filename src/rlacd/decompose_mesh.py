@@ -12,7 +12,6 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
-from rlacd.criteria import NavigableSpace
 from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError
 from rlacd.find_parts import Reached, covered, find_parts
@@ -21,9 +20,6 @@ from rlacd.finish.report import joint_report
 from rlacd.io.read.conventions import UNITS
 from rlacd.io.read.load import load_mesh
 from rlacd.options import (
-    CONCAVITY,
-    DEFAULT_RESOLUTION,
-    DEFAULT_THRESHOLD,
     OPTION_NAMES,
     SIMPLE,
     DetailName,
@@ -36,6 +32,7 @@ from rlacd.options import (
 )
 from rlacd.options.fields import check_callback
 from rlacd.options.names import PrimitiveKind
+from rlacd.options.navigable import NavigableSpace
 from rlacd.options.presets import PresetName
 from rlacd.policies import Policy, make_policy
 from rlacd.run import ProgressCallback, Run
@@ -49,8 +46,8 @@ MeshLike: TypeAlias = "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene 
 def decompose(
     mesh: MeshLike,
     *,
-    criterion: Literal["concavity", "volume"] | NavigableSpace = CONCAVITY,
-    threshold: float = DEFAULT_THRESHOLD,
+    criterion: Literal["concavity", "distance", "volume"] | NavigableSpace | None = None,
+    threshold: float = 0.05,
     threshold_abs: float | None = None,
     volume_tolerance: float = 0.01,
     volume_of: VolumeOf = "part",
@@ -63,9 +60,9 @@ def decompose(
     overlap_abs: float | None = None,
     merge: bool = True,
     policy: str | Policy = "greedy",
-    resolution: int = DEFAULT_RESOLUTION,
+    resolution: int = 100,
     open: OpenName = "auto",
-    gap: float = 0.03,
+    gap: float = 0.015,
     seed: int = 0,
     threads: int | None = None,
     timeout: float | None = None,
@@ -85,12 +82,14 @@ def decompose(
     ----------
     mesh : path, trimesh.Trimesh, trimesh.Scene or (vertices, faces)
         Any triangle mesh or file of one; it need not be closed, oriented or clean.
-    criterion : "concavity", "volume" or NavigableSpace
-        Decides when a part is tight enough: its concavity is at most `threshold`; its hull adds at most
-        `volume_tolerance` of volume; or its hull stays out of the space that a ball of a given size can reach.
+    criterion : "concavity", "distance", "volume" or NavigableSpace, optional
+        Decides when a part is tight enough. ``distance``: its surface and its hull's lie at most `threshold` apart.
+        ``concavity``: so do they, and the hull adds little volume (CoACD's measure). ``volume``: its hull adds at most
+        `volume_tolerance` of volume. `NavigableSpace`: its hull stays out of the space that a ball of a given size can
+        reach. By default concavity, and distance with `threshold_abs`.
     threshold : float
-        Largest concavity of a part, in the frame where the input's longest side is 2 (CoACD's measure and frame):
-        how far the surfaces of a part and its hull may lie apart. Between 0.001 and 2.
+        Largest concavity or distance of a part, in CoACD's frame, where the input's longest side is 2: 0.05 is 2.5 % of
+        it. Between 0.001 and 2. All other lengths are shares of the longest side, or in the input's unit.
     threshold_abs : float, optional
         The same in the input's unit; replaces `threshold`.
     volume_tolerance : float
@@ -115,10 +114,10 @@ def decompose(
         True allows all. Its hull is then a convex polyhedron around the primitive, and ``Decomposition.primitives``
         describes it. Models (MJCF, URDF, SDF, USD) hold primitives in place of such hulls.
     overlap : float
-        Hulls that touch overlap by this much, in the same frame as `threshold`, so that nothing thin slips between
-        them: one takes in a layer of the other. The threshold still holds; where it leaves no room, hulls overlap by
-        less, and ``report["warnings"]`` says at how many seams. At most 0.5. With `per_node`, hulls of different nodes
-        do not overlap.
+        Hulls that touch overlap by this share of the longest side, so that nothing thin slips between them: one takes
+        in a layer of the other. The threshold still holds; where it leaves no room, hulls overlap by less, and
+        ``report["warnings"]`` says at how many seams. At most 0.25. With `per_node`, hulls of different nodes do not
+        overlap.
     overlap_abs : float, optional
         The same in the input's unit; replaces `overlap`.
     merge : bool
@@ -133,7 +132,7 @@ def decompose(
         if the openings look like missing faces; otherwise a shell as thin as its faces. ``solid``: hollows are filled.
         ``thin``: nothing is filled.
     gap : float
-        Radius of a ball, where the longest side is 2: what it cannot get into through the openings counts as closed.
+        Radius of a ball, as a share of the longest side: what it cannot get into through the openings counts as closed.
     seed : int
         Seed of all random choices; the same input, options and seed give the same bytes.
     threads : int, optional
@@ -142,10 +141,10 @@ def decompose(
         Seconds after which the decomposition reached so far is returned, at most 1 s and 10 % late for inputs of up to
         a million triangles. It always covers the input, at worst with one hull for each body.
     quality : str, optional
-        ``fast``: one pass of cuts; on navigable space, parts that can be divided among others are then eliminated,
-        unless the policy stands for a published method (``navacd``, ``greedy-SCORE``). ``balanced``, the default if
-        parts are merged: also a search for fewer parts, whose work is limited to a multiple of that of the pass.
-        ``best``: the same, followed by a long search.
+        ``fast``: one pass of cuts; by distance and on navigable space, parts that can be divided among others are then
+        eliminated, unless the policy stands for a published method (``navacd``, ``greedy-SCORE``). ``balanced``, the
+        default if parts are merged: also a search for fewer parts, whose work is limited to a multiple of that of the
+        pass. ``best``: the same, followed by a long search.
         No level is worse than the one before it: it finds fewer hulls, or equally many with no more volume before
         `detail` simplifies them.
     budget : float, optional

@@ -46,9 +46,10 @@ class Decomposition(Result):
         ``overlap`` : dict
             With the option `overlap`: ``seams``, how many pairs of hulls touched, and ``short``, how many of them
             overlap by less than asked for. Both are None where there was no time.
-        ``concavity`` : dict
-            ``per_part`` lists the concavity of each hull's part in the order of ``hulls``; ``max`` is the worst. Both
-            are None where there was no time to measure them; so are the distances below. ``warnings`` says so.
+        ``concavity``, ``distance`` : dict
+            With the criterion of that name: ``per_part`` lists that of each hull's part in the order of ``hulls``;
+            ``max`` is the worst. Both are None where there was no time to measure them; so are the distances below.
+            ``warnings`` says so.
         ``volume`` : dict
             Instead of ``concavity`` with the criterion ``volume``: ``tolerance``, ``relative_to``, and ``per_part`` and
             ``max``, the shares of volume that the hulls add.

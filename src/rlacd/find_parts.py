@@ -13,11 +13,11 @@ from functools import partial
 from typing import NamedTuple
 
 from rlacd._native import Stopped
-from rlacd.criteria import AddedVolume, Concavity, Criterion, LimitedCriterion, NavigableSpace, with_limits
+from rlacd.criteria import Criterion, LimitedCriterion
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.merge import best_within, drop_slivers
-from rlacd.options import VOLUME, Options
+from rlacd.options import Options
 from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
 from rlacd.proxy import Model
@@ -73,7 +73,7 @@ def _find_parts(source: InputMesh, options: Options, run: Run, tangled: IntArray
         with run.stage("repair"):
             solid = _repaired(source, options, run, tangled)
         options = options.at_scale(solid.frame.scale)
-        goal = with_limits(_goal(options, solid, run), options.max_vertices, options.max_faces)
+        goal = LimitedCriterion.prepare(options, solid, run)
         root = Component(solid.shape, run.threads)
     except Stopped:
         run.note_stop()
@@ -81,7 +81,7 @@ def _find_parts(source: InputMesh, options: Options, run: Run, tangled: IntArray
     if options.max_hulls == 1:
         pieces = drop_slivers(root.pieces(), run)
         return Reached(solid, options, goal, pieces if len(pieces) == 1 else [root], None, root)
-    model = Model.of(root, solid.pieces, goal, options.threshold, run)
+    model = Model.of(root, solid.pieces, goal, run)
     solid.pieces.clear()
     doubt = None if tangled is not None else partial(refuse_tangles, solid, run.threads)
     decomposer = _Decomposer.of(model, goal, options, run, doubt)
@@ -95,7 +95,7 @@ def covered(source: InputMesh, options: Options, run: Run) -> Reached:
     """Cover a mesh that there was no time to decompose, with one hull for each of its bodies."""
     solid, parts = cover(source, run)
     options = options.at_scale(solid.frame.scale)
-    return Reached(solid, options, _goal_without_time(options, solid), parts)
+    return Reached(solid, options, LimitedCriterion.prepare(options, solid, None), parts)
 
 
 @dataclass(frozen=True)
@@ -158,12 +158,12 @@ class _Decomposer:
                 return Part.glued(first, second)
             return self.model.solid.inside(Hull.around(first.hull, second.hull))
 
-        def coarser(factor: float) -> list[Part]:
-            return self.decompose(goal, factor)[0]
+        def decompose(factor: float) -> list[Part]:
+            return free if factor == 1.0 else self.decompose(goal, factor)[0]
 
-        most, limits = self.options.max_hulls, (self.options.max_vertices, self.options.max_faces)
+        most, limited = self.options.max_hulls, LimitedCriterion(goal, self.options.hull_limits)
         assert most is not None
-        return best_within(free, most, self.model.solid, coarser, unite, LimitedCriterion(goal, *limits), self.run)
+        return best_within(most, self.model.solid, decompose, unite, limited, self.run)
 
     def _searched(
         self, parts: list[Part], goal: Criterion, asked: Criterion | None
@@ -176,7 +176,7 @@ class _Decomposer:
         quality, seconds, steps = given if asked is not None else ("balanced", None, None)
         assert quality is not None, "filled in by the options"
         try:
-            if options.merge and goal.obstacles is not None and policy not in AS_PUBLISHED and run.stopped_by is None:
+            if options.merge and goal.eliminates and policy not in AS_PUBLISHED and run.stopped_by is None:
                 with run.stage("search"):
                     parts = eliminate_parts(context, parts, run)
             if options.quality != "fast" and run.stopped_by is None:
@@ -194,9 +194,9 @@ def _repaired(source: InputMesh, options: Options, run: Run, tangled: IntArray |
         source,
         resolution=options.resolution,
         open_bodies=options.open,
-        gap=options.gap,
+        gap=2 * options.gap,
         threads=run.threads,
-        keep_cavities=isinstance(options.criterion, NavigableSpace) and options.criterion.sees_cavities,
+        keep_cavities=options.sees_cavities,
         tangled=tangled,
     )
 
@@ -204,27 +204,3 @@ def _repaired(source: InputMesh, options: Options, run: Run, tangled: IntArray |
 def _scale(criterion: Criterion) -> float | None:
     """How far a hull may reach beyond its part, if the criterion bounds that: an input of networks."""
     return criterion.overhang if math.isfinite(criterion.overhang) else None
-
-
-def _goal(options: Options, solid: Solid, run: Run) -> Criterion:
-    """The criterion that the options name, for this solid."""
-    if isinstance(options.criterion, NavigableSpace):
-        with run.stage("space"):
-            return options.criterion.prepare(solid, run.threads)
-    if options.criterion == VOLUME:
-        return AddedVolume.of(options.volume_tolerance, options.volume_of, solid)
-    return Concavity(options.threshold, _unit(options, solid))
-
-
-def _goal_without_time(options: Options, solid: Solid) -> Criterion:
-    """The same where there is no time to look at the solid."""
-    if isinstance(options.criterion, NavigableSpace):
-        return options.criterion.unprepared(solid.frame.scale)
-    if options.criterion == VOLUME:
-        return AddedVolume(options.volume_tolerance, None, 0.0)
-    return Concavity(options.threshold, _unit(options, solid))
-
-
-def _unit(options: Options, solid: Solid) -> float:
-    """Length of the unit in which the threshold was given."""
-    return 1.0 if options.threshold_abs is None else solid.frame.scale

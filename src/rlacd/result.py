@@ -9,6 +9,7 @@ from typing import Any, overload
 
 import trimesh
 
+from rlacd.fit import Fit
 from rlacd.options.fields import checked
 from rlacd.options.names import PRIMITIVE_KINDS
 from rlacd.options.output import Axis, OutputOptions
@@ -61,14 +62,9 @@ class Result:
         words = [f"{len(self)} hull{'s' * (len(self) != 1)} of {self.name}", f"{faces} faces"]
         shapes = Counter(each.kind for each in self.primitives if each is not None)
         words[1:1] = [f"{shapes[kind]} as {kind}" for kind in PRIMITIVE_KINDS if shapes[kind]]
-        worst = self.report.get("concavity", {}).get("max")
-        if worst is not None:
-            words.append(f"max concavity {worst:.4f}")
-        added = self.report.get("volume", {}).get("max")
-        if added is not None:
-            words.append(f"at most {100 * added:.2f} % of volume added")
-        if self.balls is not None:
-            words.append(f"{len(self.balls)} balls left free")
+        fit = Fit.of(self.report)
+        if fit is not None and (said := fit.words()):
+            words.append(said)
         if not self.report.get("complete", True):
             words.append(f"stopped by {self.report.get('stopped_by')}")
         return f"<{type(self).__name__}: {', '.join(words)}>"

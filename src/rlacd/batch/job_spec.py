@@ -10,7 +10,6 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from rlacd._version import __version__
-from rlacd.criteria import NavigableSpace
 from rlacd.errors import OptionError, WeightsError
 from rlacd.io.read.open_file import read_file
 from rlacd.io.write import FORMATS, MODELS, hull_target
@@ -86,8 +85,7 @@ class JobSpec:
         if flags["one_mesh"] and ending != ".urdf":
             raise OptionError("one_mesh (--one-mesh) works for .urdf files only: leave it out.")
         plain = {"threads": 1, **options}
-        if isinstance(checked.criterion, NavigableSpace):
-            plain["criterion"] = asdict(checked.criterion)
+        plain["criterion"] = checked.as_plain()["criterion"]
         density = DENSITY if asked.density is None else asked.density
         saved = {"file_format": file_format, "density": density, "mass": asked.mass, "up": asked.up, **flags}
         return cls(plain, ending, saved, _weights(checked.policy))
@@ -112,10 +110,7 @@ class JobSpec:
 
     def arguments(self) -> dict[str, Any]:
         """Get the keyword arguments of `rlacd.decompose`."""
-        space = self.options.get("criterion")
-        if not isinstance(space, dict):
-            return dict(self.options)
-        return {**self.options, "criterion": NavigableSpace(**space)}
+        return dict(self.options)
 
     def with_policy(self, path: Path) -> JobSpec:
         """Return the same job with the network at another path."""

@@ -18,6 +18,7 @@ from rlacd.batch.store import open_store, put_files, under
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import ImplausibleBodyWarning, MeshError, OutputNameError, RlacdError
+from rlacd.fit import LENGTHS, Fit
 from rlacd.io.read.companions import lay_out
 from rlacd.io.read.load import load_mesh
 from rlacd.io.robots import is_robot, rewrite_robot
@@ -90,9 +91,9 @@ def _robot(spec: JobSpec, robot: Path, place: Path, hull_only: bool) -> dict[str
         warnings.append(warning)
     reports = [mesh.result.report for mesh in done.meshes]
     facts = {what: sum(report[what] for report in reports) for what in ("parts", "faces", "vertices")}
-    worst = [report["concavity"]["max"] for report in reports if "concavity" in report]
-    if worst and None not in worst:
-        facts["concavity"] = max(worst)
+    fits = [fit for report in reports if (fit := Fit.of(report)) is not None and fit.name in LENGTHS]
+    if fits and all(fit.worst is not None for fit in fits):
+        facts[fits[0].name] = max(fit.worst for fit in fits if fit.worst is not None)
     return {**facts, "complete": done.complete and not hull_only, "warnings": warnings}
 
 
@@ -115,12 +116,8 @@ def _summary(report: dict[str, Any]) -> dict[str, Any]:
     """Collect the facts that do not depend on when and where the mesh is decomposed."""
     same = ("parts", "faces", "vertices", "complete", "hausdorff")
     kept: dict[str, Any] = {what: report[what] for what in same if what in report}
-    if "concavity" in report:
-        kept["concavity"] = report["concavity"]["max"]
-    if "volume" in report:
-        kept["added_volume"] = report["volume"]["max"]
-    if "navigable" in report:
-        kept["intrusion"] = report["navigable"]["intrusion"]["max"]
+    if (fit := Fit.of(report)) is not None:
+        kept[fit.name] = fit.worst
     return {**kept, "warnings": report["warnings"]}
 
 

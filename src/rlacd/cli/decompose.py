@@ -67,7 +67,7 @@ def _decompose(mesh: Path, **how: Any) -> None:
     _check_robot(asked, wanted) if robot else _check_mesh(mesh, wanted)
     if wanted.balls is not None and how.get("criterion") != "navigable":
         raise OptionError("--balls needs --criterion navigable.")
-    options = decompose_options(how, metres=mesh.suffix.lower() in IN_METRES)
+    options = decompose_options(how, metres=mesh.suffix.lower() in IN_METRES or how.get("unit") is not None)
     run = _rewrite if robot else _write
     if not run(mesh, wanted, options, unit_given(how)):
         raise SystemExit(ExitCode.STOPPED_EARLY)

@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 from rlacd.cli.commands import Option, chosen, options_of
 from rlacd.errors import OptionError
-from rlacd.options import CONCAVITY, VOLUME, Options, criterion_named
-from rlacd.options.fields import about, check_fields, number, option, stated
-from rlacd.options.navigable import NAVIGABLE, SpaceOptions
+from rlacd.options import OPTION_NAMES, Options, with_criterion
+from rlacd.options.fields import check_fields, number, option, stated
+from rlacd.options.lengths import LONGEST_SIDE
+from rlacd.options.navigable import NavigableSpace
 
 if TYPE_CHECKING:
     from rlacd.pool import Pool, ProcessLimits
 
-_SPACE = tuple(field.name for field in dataclasses.fields(SpaceOptions))
+_ABSOLUTE = {*OPTION_NAMES, *(field.name for field in dataclasses.fields(NavigableSpace))}
 
 _LENGTH = re.compile(r"([-+.\deE]+)\s*(%|m|cm|mm)")
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
@@ -62,7 +63,8 @@ class PoolOptions:
 
 def how() -> list[Option]:
     """Make the options that control the decomposition."""
-    return options_of(Options) + options_of(SpaceOptions)
+    own = [name for name in OPTION_NAMES if name != "volume_tolerance"]  # --tolerance of navigable space stands for it
+    return options_of(Options, only=own) + options_of(NavigableSpace)
 
 
 def decompose_options(given: dict[str, Any], *, metres: bool = False) -> dict[str, Any]:
@@ -86,44 +88,18 @@ def decompose_options(given: dict[str, Any], *, metres: bool = False) -> dict[st
         Options contradict each other or are malformed.
     """
     given = lengths(chosen(given), metres)
-    space = {name: given.pop(name) for name in _SPACE if name in given}
-    criterion = criterion_named(given.pop("criterion", CONCAVITY))
-    if criterion == VOLUME and "tolerance" in space:
-        given["volume_tolerance"] = space.pop("tolerance")
-    if criterion != NAVIGABLE and space:
-        needed = f"{VOLUME} or {NAVIGABLE}" if "tolerance" in space else NAVIGABLE
-        raise OptionError(f"{_typed(next(iter(space)), space)} needs --criterion {needed}.")
-    if criterion != CONCAVITY and ("threshold" in given or "threshold_abs" in given):
-        instead = "--tolerance instead, such as 1%" if criterion == VOLUME else "--radius and --tolerance instead"
-        raise OptionError(f"--threshold belongs to --criterion concavity; give {instead}.")
-    if criterion != VOLUME and "volume_of" in given:
-        raise OptionError("--volume-of needs --criterion volume.")
-    if criterion == NAVIGABLE:
-        return {**given, "criterion": _space(space)}
-    return given if criterion == CONCAVITY else {**given, "criterion": criterion}
-
-
-def _space(given: dict[str, Any]) -> SpaceOptions:
-    from rlacd.criteria import NavigableSpace
-
     if "seeds" in given:
         given["seeds"] = [_numbers("--seed-point", words, 3) for words in given["seeds"]]
     if "closed_planes" in given:
         planes = [_numbers("--closed-plane", words, 4) for words in given["closed_planes"]]
         given["closed_planes"] = [(plane[:3], plane[3]) for plane in planes]
-    return NavigableSpace(**given)
-
-
-def _typed(name: str, space: dict[str, Any]) -> str:
-    """Spell an option as on the command line."""
-    yes, _, no = about(SpaceOptions, name).flags[0].partition("/")
-    return no if space[name] is False else yes
+    return with_criterion(given)
 
 
 def lengths(given: dict[str, Any], metres: bool) -> dict[str, Any]:
     """Parse lengths: a number, a share of the longest side (5%), or metres (0.05m)."""
     taken = dict(given)
-    for name, of_longest in (("threshold", 2.0), ("overlap", 2.0), ("radius", 1.0), ("tolerance", 1.0)):
+    for name, longest in LONGEST_SIDE.items():
         word = taken.get(name)
         if not isinstance(word, str):
             continue
@@ -134,12 +110,14 @@ def lengths(given: dict[str, Any], metres: bool) -> dict[str, Any]:
                 f"--{name} is {word!r}; it has to be a number, a share such as 5%, or a length in metres."
             )
         if unit not in METRES:
-            taken[name] = value / 100 * of_longest if unit == "%" else value
+            taken[name] = value / 100 * longest if unit == "%" else value
             continue
         if not metres:
             raise OptionError(
-                f"--{name} is {word}, but the file does not say its unit; give --{name}-abs in the file's own unit."
+                f"--{name} is {word}, but the file does not say its unit; give --unit, or --{name}-abs in its own."
             )
+        if f"{name}_abs" not in _ABSOLUTE:
+            raise OptionError(f"--{name} is {word}; it has to be a number or a share such as 2%.")
         if f"{name}_abs" in taken:
             raise OptionError(f"--{name} and --{name}-abs are both lengths; give one of the two.")
         del taken[name]

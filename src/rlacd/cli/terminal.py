@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 from rlacd._native import count_interrupts, forget_interrupts
 from rlacd.cli.exit_codes import ExitCode, say
 from rlacd.cli.options import METRES
+from rlacd.fit import Fit
 from rlacd.run import Progress
-from rlacd.told_apart import told_apart
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars
@@ -164,25 +164,9 @@ def _fit(report: dict[str, Any], unit: str | None = None) -> str:
     """How well the hulls fit; lengths in `unit`, in the input's if the threshold was given in that, or in the frame."""
     words = []
     scale, in_words = _unit(report, unit)
-    worst = report.get("concavity", {}).get("max")
-    if worst is not None:
-        threshold = report.get("options", {}).get("threshold", worst)
-        measured, limit = told_apart(worst / scale, threshold / scale)
-        words.append(f"max concavity {measured} (threshold {limit}{', exceeded' * (worst > threshold)})")
-    added = report.get("volume")
-    if added is not None and added["max"] is not None:
-        most, tolerance = told_apart(100 * added["max"], 100 * added["tolerance"])
-        words.append(f"hulls add up to {most} % of volume (tolerance {tolerance} %)")
-    space = report.get("navigable")
-    if space is not None:
-        intruding = space["intrusion"]["max"]
-        words.append(
-            f"there are {space['balls']} balls"
-            if intruding is None
-            else f"no hull touches any of the {space['balls']} balls"
-            if intruding <= 0
-            else f"hulls reach {intruding / scale:.4g} into the {space['balls']} balls"
-        )
+    fit = Fit.of(report)
+    if fit is not None and (said := fit.words(scale)):
+        words.append(said)
     reach = report.get("hausdorff", {})
     if reach.get("over") is not None:
         missed = reach["under"] / scale

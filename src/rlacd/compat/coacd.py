@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from rlacd.compat.unused import warn_unused
 from rlacd.decompose_mesh import decompose
-from rlacd.options import DEFAULT_THRESHOLD, MAX_OVERLAP, MIN_THRESHOLD
+from rlacd.options import LENGTHS, Options
 from rlacd.options.fields import flag, integer, number, one_of, read
 
 __all__ = ["Mesh", "run_coacd", "set_log_level"]
@@ -104,11 +104,12 @@ def run_coacd(
     extrude, margin = read(flag(), "extrude", extrude), read(number(0.0), "extrude_margin", extrude_margin)
     result = decompose(
         (mesh.vertices, mesh.indices),
-        threshold=DEFAULT_THRESHOLD if real_metric else max(threshold, MIN_THRESHOLD),
+        criterion="concavity",
+        threshold=Options.threshold if real_metric else max(threshold, LENGTHS["threshold"][0]),
         threshold_abs=threshold if real_metric else None,
         max_hulls=None if most_hulls < 1 else most_hulls,
         max_vertices=max_ch_vertex if decimate else None,
-        overlap=min(2 * margin, MAX_OVERLAP) if extrude else 0.0,
+        overlap=min(margin, LENGTHS["overlap"][1]) if extrude else 0.0,
         merge=merge,
         seed=seed,
     )

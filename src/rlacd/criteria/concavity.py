@@ -1,9 +1,9 @@
-"""CoACD concavity, decided strictly.
+"""How far a part and its hull may be apart, decided strictly: by distance, or by CoACD's concavity.
 
-The concavity of a part with convex hull CH is ``max(H_b, 0.3 R_v)``, where ``H_b`` is the two-sided Hausdorff distance
-between the *surfaces* of the part and of its hull, and ``R_v = cbrt(3 (|CH| - |part|) / 4 pi)`` is the radius of a ball
-with the volume between them (Wei et al., "Approximate Convex Decomposition for 3D Meshes with Collision-Aware Concavity
-and Tree Search", SIGGRAPH 2022). CoACD samples ``H_b``; here it is bounded.
+The distance of a part with convex hull CH is ``H_b``, the two-sided Hausdorff distance between the *surfaces* of the
+part and of its hull. Its concavity is ``max(H_b, 0.3 R_v)``, where ``R_v = cbrt(3 (|CH| - |part|) / 4 pi)`` is the
+radius of a ball with the volume between them (Wei et al., "Approximate Convex Decomposition for 3D Meshes with
+Collision-Aware Concavity and Tree Search", SIGGRAPH 2022). CoACD samples ``H_b``; here it is bounded.
 """
 
 from __future__ import annotations
@@ -11,14 +11,19 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 from rlacd import _native
-from rlacd.criteria.criterion import CriterionSummary
-from rlacd.criteria.screen import Feasibility, Part, Screen
+from rlacd.criteria.criterion import Criterion, CriterionSummary
+from rlacd.criteria.screen import Feasibility, Screen
 from rlacd.errors import OptionError
+from rlacd.fit import told_apart
+from rlacd.options import Options
+from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.component import Part
 from rlacd.solid.hull import Hull
-from rlacd.told_apart import told_apart
+from rlacd.solid.solid import Solid
 
 VOLUME_WEIGHT = 0.3
 """The weight of ``R_v``, as in the original definition."""
@@ -31,18 +36,18 @@ def volume_radius(volume: float, hull_volume: float) -> float:
 
 @dataclass(frozen=True)
 class ConcavityValue:
-    """A measured concavity; every distance is a certified interval ``(lower, upper)``.
+    """A measured concavity or distance; every length is a certified interval ``(lower, upper)``.
 
     Attributes
     ----------
     value
-        The concavity; the interval is at most as wide as the tolerance.
+        The concavity or distance; the interval is at most as wide as the tolerance.
     part_to_hull
         Greatest distance from the part's surface to the hull's surface.
     hull_to_part
         Greatest distance from the hull's surface to the part's surface.
     volume_radius
-        ``R_v``.
+        ``R_v``; 0 for a distance.
 
     The interval of a one-sided distance may be wider than the tolerance if another term decides the value.
     """
@@ -54,8 +59,8 @@ class ConcavityValue:
 
 
 @dataclass(frozen=True)
-class ConcavityScreen(Screen):
-    """Necessary conditions for a concavity of at most `threshold`.
+class DistanceScreen(Screen):
+    """Necessary conditions for a distance of at most `threshold`.
 
     The reach is twice the threshold: if parts are farther apart, the middle of the joint hull is too far from both.
     """
@@ -68,16 +73,8 @@ class ConcavityScreen(Screen):
         return True
 
     def filled(self, part: Part) -> float:
-        """The part's volume: the rest of the hull is the volume in ``R_v``."""
+        """The part's volume: the rest of the hull is the volume between the two surfaces."""
         return part.volume
-
-    def least_error(self, volume: float, hull_volume: float) -> float:
-        """``0.3 R_v``, a lower bound of the concavity."""
-        return VOLUME_WEIGHT * volume_radius(volume, hull_volume)
-
-    def excludes(self, volume: float, hull_volume: float) -> bool:
-        """Whether ``0.3 R_v`` alone exceeds the threshold."""
-        return self.least_error(volume, hull_volume) > self.threshold
 
     def feasibility(self, filling: _native.Filling, hull: Hull) -> Feasibility:
         """Test the solid's corners and points of the hull."""
@@ -95,8 +92,21 @@ class ConcavityScreen(Screen):
 
 
 @dataclass(frozen=True)
-class Concavity:
-    """The criterion "CoACD concavity at most ``threshold``".
+class ConcavityScreen(DistanceScreen):
+    """The same for a concavity, which the volumes bound from below."""
+
+    def least_error(self, volume: float, hull_volume: float) -> float:
+        """``0.3 R_v``, a lower bound of the concavity."""
+        return VOLUME_WEIGHT * volume_radius(volume, hull_volume)
+
+    def excludes(self, volume: float, hull_volume: float) -> bool:
+        """Whether ``0.3 R_v`` alone exceeds the threshold."""
+        return self.least_error(volume, hull_volume) > self.threshold
+
+
+@dataclass(frozen=True)
+class Distance(Criterion):
+    """The criterion "the surfaces of a part and its hull lie at most ``threshold`` apart".
 
     Parameters
     ----------
@@ -124,25 +134,28 @@ class Concavity:
     threshold: float = 0.05
     unit: float = 1.0
 
+    name: ClassVar[str] = "distance"
+
     def __post_init__(self) -> None:
         if not self.threshold > 0:
-            raise OptionError(f"The concavity threshold must be positive, not {self.threshold}; 0.05 is usual.")
+            raise OptionError(f"The {self.name} threshold must be positive, not {self.threshold}; 0.05 is usual.")
+
+    @classmethod
+    def prepare(cls, options: Options, solid: Solid, run: Run | None) -> Distance:
+        """Warnings give lengths as the threshold was given: in the frame, or in the input's unit."""
+        return cls(options.threshold, 1.0 if options.threshold_abs is None else solid.frame.scale)
 
     @property
-    def is_hereditary(self) -> bool:
-        """No: another part may fill what is missing from a part's hull."""
-        return False
+    def eliminates(self) -> bool:
+        """Yes: a quarter more time saves a ninth of the parts, and the parts around a hole need not be 8, 16 or 32."""
+        return True
 
     @property
-    def screen(self) -> ConcavityScreen:
-        """Tests of volumes and of the solid's corners."""
-        return ConcavityScreen(2 * self.threshold, self.threshold)
+    def screen(self) -> DistanceScreen:
+        """Tests of the solid's corners."""
+        return DistanceScreen(2 * self.threshold, self.threshold)
 
-    def settled(self, parts: Sequence[Part]) -> Concavity:
-        """Unchanged: parts that exceed the threshold are reported."""
-        return self
-
-    def scaled(self, factor: float) -> Concavity:
+    def scaled(self, factor: float) -> Distance:
         """The same criterion with ``factor`` times the threshold."""
         return replace(self, threshold=self.threshold * factor)
 
@@ -151,57 +164,68 @@ class Concavity:
         """The threshold."""
         return self.threshold
 
-    @property
-    def obstacles(self) -> None:
-        """None: concavity is not about space."""
-
     def summary(self, errors: Sequence[float] | None) -> CriterionSummary:
-        """The concavity of each part, and how many exceed the threshold."""
+        """The error of each part, and how many exceed the threshold."""
         if errors is None:
-            sentence = "There was no time to measure the concavity of the parts."
-            return CriterionSummary({"concavity": {"per_part": None, "max": None}}, (sentence,))
+            sentence = f"There was no time to measure the {self.name} of the parts."
+            return CriterionSummary({self.name: {"per_part": None, "max": None}}, (sentence,))
         exceeding = [error for error in errors if error > self.threshold]
         worst, threshold = told_apart(max(errors) / self.unit, self.threshold / self.unit)
-        warning = f"{len(exceeding)} of {len(errors)} parts exceed the concavity {threshold}; the worst has {worst}."
-        entries = {"concavity": {"per_part": list(errors), "max": max(errors)}}
+        warning = f"{len(exceeding)} of {len(errors)} parts exceed the {self.name} {threshold}; the worst has {worst}."
+        entries = {self.name: {"per_part": list(errors), "max": max(errors)}}
         return CriterionSummary(entries, (warning,) if exceeding else ())
 
     def error(self, part: Part) -> float:
-        """Upper end of the measured concavity; at most the threshold if the part certainly meets it."""
+        """Upper end of what `measure` finds; at most the threshold if the part certainly meets it."""
         measured = self.measure(part, tolerance=self.threshold / 50).value[1]
         if not self.threshold < measured <= 1.02 * self.threshold:
             return measured
         return self.threshold if self.is_met(part) else self.measure(part, tolerance=self.threshold / 5000).value[1]
 
     def is_met(self, part: Part) -> bool:
-        """Whether the part's concavity is certainly at most the threshold.
+        """Whether the part's error is certainly at most the threshold.
 
         False if it is larger, or if it is within 0.1 % of the threshold and branch and bound cannot decide.
         """
         hull = part.hull
         return _native.meets_concavity(
-            part.vertices, part.faces, hull.vertices, hull.faces, part.volume, hull.volume, self.threshold, part.tree
+            part.vertices, part.faces, hull.vertices, hull.faces, *self._volumes(part), self.threshold, part.tree
         )
 
     def measure(self, part: Part, tolerance: float = 1e-3, floor: float = 0.0) -> ConcavityValue:
-        """Measure the concavity to within ``tolerance`` (same frame as the threshold).
+        """Measure the distance or concavity to within ``tolerance`` (same frame as the threshold).
 
         Values up to ``floor`` need not be resolved: for them the interval may be as wide as ``(0, floor)``. That is
         much faster for nearly convex parts with many faces, which otherwise need cells as small as the tolerance.
         """
         if not tolerance > 0:
             raise OptionError(f"The tolerance must be positive, not {tolerance}; 0.001 is usual.")
-        hull = part.hull
-        return ConcavityValue(
-            *_native.concavity(
-                part.vertices,
-                part.faces,
-                hull.vertices,
-                hull.faces,
-                part.volume,
-                hull.volume,
-                tolerance,
-                floor,
-                part.tree,
-            )
+        hull, (volume, hull_volume) = part.hull, self._volumes(part)
+        found = _native.concavity(
+            part.vertices, part.faces, hull.vertices, hull.faces, volume, hull_volume, tolerance, floor, part.tree
         )
+        return ConcavityValue(*found)
+
+    def _volumes(self, part: Part) -> tuple[float, float]:
+        """Volumes of the part and its hull, as far as they matter: equal ones make ``R_v`` 0."""
+        return part.hull.volume, part.hull.volume
+
+
+@dataclass(frozen=True)
+class Concavity(Distance):
+    """The criterion "CoACD concavity at most ``threshold``"."""
+
+    name: ClassVar[str] = "concavity"
+
+    @property
+    def eliminates(self) -> bool:
+        """No: a pass is cuts and merging, as in CoACD."""
+        return False
+
+    @property
+    def screen(self) -> ConcavityScreen:
+        """Tests of volumes and of the solid's corners."""
+        return ConcavityScreen(2 * self.threshold, self.threshold)
+
+    def _volumes(self, part: Part) -> tuple[float, float]:
+        return part.volume, part.hull.volume

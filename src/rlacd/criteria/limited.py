@@ -5,35 +5,57 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from rlacd.criteria.concavity import Concavity, Distance
 from rlacd.criteria.criterion import Criterion, CriterionSummary
-from rlacd.criteria.screen import Part, Screen
+from rlacd.criteria.navigable import Navigable
+from rlacd.criteria.screen import Screen
+from rlacd.criteria.volume import AddedVolume
+from rlacd.options import Options
+from rlacd.options.presets import HullLimits
+from rlacd.run import Run
 from rlacd.solid.balls import Balls
-from rlacd.solid.limit_hull import limit_hull
+from rlacd.solid.component import Part
+from rlacd.solid.limit_hull import keeps, limit_hull
+from rlacd.solid.solid import Solid
 
-FEWEST_VERTICES, FEWEST_FACES = 24, 44
-"""Lower limits are applied only at the end, with a warning if a hull then exceeds the threshold: to meet them, round
-parts would have to be cut very small (a ball into 75 pieces for 16 vertices at threshold 0.05, into 12 for 32)."""
+CRITERIA: dict[str, type[Criterion]] = {
+    "concavity": Concavity,
+    "distance": Distance,
+    "volume": AddedVolume,
+    "navigable": Navigable,
+}
+"""By the name that options give them."""
+
+FEWEST = (24, 44)
+"""Vertices and triangles. Lower limits apply only at the end, with a warning if a hull then exceeds the threshold: to
+meet them, round parts would have to be cut very small (a ball into 75 pieces for 16 vertices at threshold 0.05, into 12
+for 32)."""
 
 
 @dataclass(frozen=True)
-class LimitedCriterion:
+class LimitedCriterion(Criterion):
     """A criterion that must hold for the limited hull too.
 
     Attributes
     ----------
     criterion : Criterion
-    max_vertices, max_faces : int or None
-        Limits on the hull's vertices and triangles.
+    limits : HullLimits
     """
 
     criterion: Criterion
-    max_vertices: int | None
-    max_faces: int | None
+    limits: HullLimits
+
+    @classmethod
+    def prepare(cls, options: Options, solid: Solid, run: Run | None) -> Criterion:
+        """The criterion that the options name, within their limits if none is too low for cutting to meet."""
+        criterion = CRITERIA[options.criterion_name].prepare(options, solid, run)
+        limits = options.hull_limits
+        return cls(criterion, limits) if any(limits) and limits.allow(*FEWEST) else criterion
 
     @property
-    def is_hereditary(self) -> bool:
-        """No: limited hulls need not be nested even if the exact ones are."""
-        return False
+    def eliminates(self) -> bool:
+        """As the underlying criterion."""
+        return self.criterion.eliminates
 
     @property
     def screen(self) -> Screen:
@@ -42,7 +64,9 @@ class LimitedCriterion:
 
     def is_met(self, part: Part) -> bool:
         """Decide for the exact hull first, then for the limited one."""
-        return self.criterion.is_met(part) and (self._fits(part) or self.criterion.is_met(self._limited(part)))
+        return self.criterion.is_met(part) and (
+            keeps(part.hull, self.limits) or self.criterion.is_met(self._limited(part))
+        )
 
     def error(self, part: Part) -> float:
         """Measure the part against its limited hull."""
@@ -50,9 +74,7 @@ class LimitedCriterion:
 
     def settled(self, parts: Sequence[Part]) -> LimitedCriterion:
         """Settle the underlying criterion with the limited hulls."""
-        return LimitedCriterion(
-            self.criterion.settled([self._limited(part) for part in parts]), self.max_vertices, self.max_faces
-        )
+        return LimitedCriterion(self.criterion.settled([self._limited(part) for part in parts]), self.limits)
 
     @property
     def overhang(self) -> float:
@@ -70,24 +92,7 @@ class LimitedCriterion:
 
     def scaled(self, factor: float) -> LimitedCriterion:
         """Get the same limits with a larger threshold."""
-        return LimitedCriterion(self.criterion.scaled(factor), self.max_vertices, self.max_faces)
-
-    def _fits(self, part: Part) -> bool:
-        return (self.max_vertices is None or len(part.hull.vertices) <= self.max_vertices) and (
-            self.max_faces is None or len(part.hull.faces) <= self.max_faces
-        )
+        return LimitedCriterion(self.criterion.scaled(factor), self.limits)
 
     def _limited(self, part: Part) -> Part:
-        if self._fits(part):
-            return part
-        hull = limit_hull(part.hull, self.max_vertices, self.max_faces)
-        return part.with_hull(hull)
-
-
-def with_limits(criterion: Criterion, max_vertices: int | None, max_faces: int | None) -> Criterion:
-    """Add limits to a criterion, if there are any and none is too low for cutting to meet."""
-    if max_vertices is None and max_faces is None:
-        return criterion
-    if (max_vertices or FEWEST_VERTICES) < FEWEST_VERTICES or (max_faces or FEWEST_FACES) < FEWEST_FACES:
-        return criterion
-    return LimitedCriterion(criterion, max_vertices, max_faces)
+        return part if keeps(part.hull, self.limits) else part.with_hull(limit_hull(part.hull, self.limits))

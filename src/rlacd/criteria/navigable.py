@@ -25,12 +25,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rlacd import _native
-from rlacd.criteria.criterion import CriterionSummary
-from rlacd.criteria.screen import Part, Screen
+from rlacd.criteria.criterion import Criterion, CriterionSummary
+from rlacd.criteria.screen import Screen
 from rlacd.errors import OptionError
-from rlacd.options.navigable import Point, SpaceOptions
+from rlacd.options import Options
+from rlacd.options.navigable import NavigableSpace, Point
+from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.balls import Balls
+from rlacd.solid.component import Part
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.products import dots, heights
@@ -49,37 +52,80 @@ _OPEN = ("capped", "slab", "wrapped", "hull")
 
 
 @dataclass(frozen=True)
-class NavigableSpace(SpaceOptions):
-    """The criterion "no hull intrudes into the space that a ball can reach".
+class Conflicts:
+    """How many balls had to give way to parts.
 
-    Parameters
+    Attributes
     ----------
-    radius : float
-        Radius of the ball, as a fraction of the longest side of the input's bounding box.
-    tolerance : float
-        Distance from the surface within which space may be filled, as a fraction of the same length.
-    reachable_only : bool
-        Count only space that the ball can reach; otherwise all space outside the solid with room for the ball counts,
-        including sealed cavities.
-    seeds : array_like [S, 3], optional
-        Points, in the input's frame and unit, from which balls start; by default they start outside.
-    closed_planes : sequence of (normal [3], offset)
-        Half-spaces n.x < offset, in the input's frame and unit, that balls cannot enter: ``((0, 0, 1), 0)`` is ground
-        at z = 0. The normal need not have length 1; the offset refers to the normal as given.
-    radius_abs, tolerance_abs : float, optional
-        The same lengths in the input's unit; they replace `radius` and `tolerance`.
-
-    Raises
-    ------
-    OptionError
-        A length is out of range, or seeds or planes have the wrong shape.
+    shrunk, dropped : int
+        Number of balls that shrank, and that were dropped.
+    most : float
+        Largest reduction of a radius, in the normalised frame; the whole radius for a dropped ball.
     """
 
-    def prepare(self, solid: Solid, threads: int = 0) -> Navigable:
+    shrunk: int = 0
+    dropped: int = 0
+    most: float = 0.0
+
+
+class Navigable(Criterion):
+    """The navigable space of one solid, as a criterion.
+
+    Every length is in the normalised frame.
+
+    Attributes
+    ----------
+    radius, tolerance : float
+    balls : Balls
+    allowance : float
+        How deep a hull may reach into a ball: 0 except for `scaled` criteria.
+    warnings : tuple of str
+        Sentences for the user.
+    conflicts : Conflicts
+        Changes that `settled` made to the balls.
+    hull : Hull or None
+        Of the solid. Primitives may reach beyond it by the tolerance; without it there are none.
+    """
+
+    def __init__(
+        self,
+        radius: float,
+        tolerance: float,
+        balls: Balls,
+        warnings: tuple[str, ...] = (),
+        conflicts: Conflicts | None = None,
+        hull: Hull | None = None,
+    ) -> None:
+        self.radius = radius
+        self.tolerance = tolerance
+        self.balls = balls
+        self.allowance = 0.0
+        self.warnings = warnings
+        self.conflicts = conflicts or Conflicts()
+        self.hull = hull
+        self._intrusions = _Intrusions(balls)
+
+    def __repr__(self) -> str:
+        return f"Navigable(radius {self.radius:.4g}, tolerance {self.tolerance:.4g}, {len(self.balls)} balls)"
+
+    @classmethod
+    def prepare(cls, options: Options, solid: Solid, run: Run | None) -> Navigable:
+        """The space of a solid; without balls where there is no time to find it."""
+        space = options.criterion
+        assert isinstance(space, NavigableSpace)
+        if run is None:
+            warning = "There was no time to find the navigable space, so there are no balls."
+            return cls(*space.in_frame(solid.frame.scale), Balls(np.empty((0, 3)), np.empty(0)), (warning,))
+        with run.stage("space"):
+            return cls.of(space, solid, run.threads)
+
+    @classmethod
+    def of(cls, space: NavigableSpace, solid: Solid, threads: int = 0) -> Navigable:
         """Find the space around a solid and place its balls.
 
         Parameters
         ----------
+        space : NavigableSpace
         solid : Solid
             The repaired input; its cavities count only if it was repaired with ``keep_cavities``.
         threads : int
@@ -102,16 +148,15 @@ class NavigableSpace(SpaceOptions):
         and very rarely a third.
         """
         scale = solid.frame.scale
-        radius, tolerance = self.in_frame(scale)
-        warnings = list(_warnings(solid))
-        vertices, faces = solid.vertices, solid.faces
-        surface = _native.Surface(vertices, faces)
-        planes = _planes_in_frame(self.closed_planes, solid.frame)
+        radius, tolerance = space.in_frame(scale)
+        warnings = _warnings(solid)
+        surface = _native.Surface(solid.vertices, solid.faces)
+        planes = _planes_in_frame(space.closed_planes, solid.frame)
         seeds = None
-        if self.seeds is not None:
-            seeds = solid.frame.to_frame(self.seeds)
-            _check_seeds(seeds, self.seeds, surface, planes, radius, scale)
-        hull = Hull.of(vertices)
+        if space.seeds is not None:
+            seeds = solid.frame.to_frame(space.seeds)
+            _check_seeds(seeds, space.seeds, surface, planes, radius, scale)
+        hull = Hull.of(solid.vertices)
         balls = Balls(np.empty((0, 3)), np.empty(0))
         if radius >= 2:
             warnings.append("the radius is larger than the object, so no ball can get in: one hull is enough")
@@ -122,100 +167,18 @@ class NavigableSpace(SpaceOptions):
                     f"the radius, {50 * radius:.3g} % of the longest side, is small: balls are placed "
                     f"{pitch / radius:.2g} radii apart, and free space between them may be missed"
                 )
+            lengths, reachable = (radius, tolerance), space.reachable_only
             balls = Balls(
                 *_native.navigable_balls(
-                    surface,
-                    hull.vertices,
-                    hull.faces,
-                    radius,
-                    tolerance,
-                    self.reachable_only,
-                    seeds,
-                    planes,
-                    pitch,
-                    threads,
+                    surface, hull.vertices, hull.faces, *lengths, reachable, seeds, planes, pitch, threads
                 )
             )
-        return Navigable(self, radius, tolerance, balls, tuple(warnings), hull=hull)
-
-    def unprepared(self, scale: float) -> Navigable:
-        """Make the criterion for a solid whose space there was no time to find: it has no balls.
-
-        Parameters
-        ----------
-        scale : float
-            Frame units per unit of the input.
-        """
-        radius, tolerance = self.in_frame(scale)
-        warning = "There was no time to find the navigable space, so there are no balls."
-        return Navigable(self, radius, tolerance, Balls(np.empty((0, 3)), np.empty(0)), (warning,))
+        return cls(radius, tolerance, balls, tuple(warnings), hull=hull)
 
     @property
-    def sees_cavities(self) -> bool:
-        """Whether sealed cavities may count, so repair has to keep them."""
-        return not self.reachable_only or self.seeds is not None
-
-
-@dataclass(frozen=True)
-class Conflicts:
-    """How many balls had to give way to parts.
-
-    Attributes
-    ----------
-    shrunk, dropped : int
-        Number of balls that shrank, and that were dropped.
-    most : float
-        Largest reduction of a radius, in the normalised frame; the whole radius for a dropped ball.
-    """
-
-    shrunk: int = 0
-    dropped: int = 0
-    most: float = 0.0
-
-
-class Navigable:
-    """The navigable space of one solid, as a criterion.
-
-    Every length is in the normalised frame.
-
-    Attributes
-    ----------
-    space : NavigableSpace
-        The requested space.
-    radius, tolerance : float
-    balls : Balls
-    allowance : float
-        How deep a hull may reach into a ball: 0 except for `scaled` criteria.
-    warnings : tuple of str
-        Sentences for the user.
-    conflicts : Conflicts
-        Changes that `settled` made to the balls.
-    hull : Hull or None
-        Of the solid. Primitives may reach beyond it by the tolerance; without it there are none.
-    """
-
-    def __init__(
-        self,
-        space: NavigableSpace,
-        radius: float,
-        tolerance: float,
-        balls: Balls,
-        warnings: tuple[str, ...] = (),
-        conflicts: Conflicts | None = None,
-        hull: Hull | None = None,
-    ) -> None:
-        self.space = space
-        self.radius = radius
-        self.tolerance = tolerance
-        self.balls = balls
-        self.allowance = 0.0
-        self.warnings = warnings
-        self.conflicts = conflicts or Conflicts()
-        self.hull = hull
-        self._intrusions = _Intrusions(balls)
-
-    def __repr__(self) -> str:
-        return f"Navigable(radius {self.radius:.4g}, tolerance {self.tolerance:.4g}, {len(self.balls)} balls)"
+    def eliminates(self) -> bool:
+        """Yes: hulls are tested quickly against balls."""
+        return True
 
     @property
     def screen(self) -> Screen:
@@ -226,11 +189,6 @@ class Navigable:
     def is_hereditary(self) -> bool:
         """Yes: a larger hull touches every ball that a smaller one inside it touches."""
         return True
-
-    @property
-    def overhang(self) -> float:
-        """Infinite: space that no ball can reach may be filled, however far from the surface."""
-        return math.inf
 
     @property
     def obstacles(self) -> Balls:
@@ -309,7 +267,6 @@ class Navigable:
         if conflicts == Conflicts():
             return self
         settled = Navigable(
-            self.space,
             self.radius,
             self.tolerance,
             Balls(self.balls.centres[kept], radii[kept]),

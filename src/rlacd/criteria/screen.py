@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Protocol
 
 import numpy as np
 
 from rlacd import _native
 from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.component import Part
 from rlacd.solid.hull import Hull
 
 
@@ -21,41 +21,6 @@ class Feasibility(IntEnum):
     NO = 1
     NEVER = 2
     """The solid clipped to any hull that contains this one does not meet it either."""
-
-
-class Part(Protocol):
-    """A solid with its hull; everything in the normalised frame."""
-
-    @property
-    def vertices(self) -> FloatArray:
-        """Points of a surface that bounds the solid [V, 3]."""
-
-    @property
-    def faces(self) -> IntArray:
-        """Triangles of that surface [F, 3]."""
-
-    @property
-    def volume(self) -> float:
-        """Volume of the solid."""
-
-    @property
-    def hull(self) -> Hull:
-        """A convex hull that contains it."""
-
-    @property
-    def piece_hulls(self) -> float:
-        """Total volume of the hulls of the pieces it was glued from."""
-
-    @property
-    def within(self) -> Part | None:
-        """The part it was cut from, whose hull contains this one's."""
-
-    @property
-    def tree(self) -> _native.TreeCache | None:
-        """Keeps the tree over the surface from one test to the next."""
-
-    def with_hull(self, hull: Hull) -> Part:
-        """Get the same solid with another hull."""
 
 
 @dataclass(frozen=True)

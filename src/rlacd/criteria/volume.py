@@ -11,11 +11,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from rlacd.criteria.criterion import CriterionSummary
-from rlacd.criteria.screen import Part, Screen
+from rlacd._native import mesh_volume
+from rlacd.criteria.criterion import Criterion, CriterionSummary
+from rlacd.criteria.screen import Screen
+from rlacd.fit import told_apart
+from rlacd.options import Options
+from rlacd.run import Run
+from rlacd.solid.component import Part
 from rlacd.solid.hull import Hull
 from rlacd.solid.solid import Solid
-from rlacd.told_apart import told_apart
 
 LEAST = 1e-3
 """Of the volume of the whole's convex hull: parts smaller than this count as this large."""
@@ -49,7 +53,7 @@ class VolumeScreen(Screen):
 
 
 @dataclass(frozen=True)
-class AddedVolume:
+class AddedVolume(Criterion):
     """The criterion "the hull adds at most this share of volume".
 
     Attributes
@@ -67,22 +71,17 @@ class AddedVolume:
     least: float
 
     @classmethod
-    def of(cls, tolerance: float, relative_to: str, solid: Solid) -> AddedVolume:
-        """Make the criterion for a solid; `relative_to` is ``part`` or ``whole``."""
-        from rlacd._native import mesh_volume
-
+    def prepare(cls, options: Options, solid: Solid, run: Run | None) -> AddedVolume:
+        """Shares are of the part, or of the whole solid as the options say."""
+        if run is None:
+            return cls(options.volume_tolerance, None, 0.0)
         hull = Hull.of(solid.vertices) if len(solid.vertices) else None
-        whole = float(mesh_volume(*solid.mesh)) if relative_to == "whole" else None
-        return cls(tolerance, whole, LEAST * hull.volume if hull is not None else 0.0)
+        whole = float(mesh_volume(*solid.mesh)) if options.volume_of == "whole" else None
+        return cls(options.volume_tolerance, whole, LEAST * hull.volume if hull is not None else 0.0)
 
     def share(self, volume: float, hull_volume: float) -> float:
         """The error of a part with these volumes."""
         return share_of(hull_volume - volume, max(volume if self.whole is None else self.whole, self.least))
-
-    @property
-    def is_hereditary(self) -> bool:
-        """No: another part may fill what is missing from a part's hull."""
-        return False
 
     @property
     def screen(self) -> VolumeScreen:
@@ -97,22 +96,9 @@ class AddedVolume:
         """The share that the hull adds."""
         return self.share(part.volume, part.hull.volume)
 
-    def settled(self, parts: Sequence[Part]) -> AddedVolume:
-        """Unchanged: parts that exceed the tolerance are reported."""
-        return self
-
     def scaled(self, factor: float) -> AddedVolume:
         """The same criterion with `factor` times the tolerance."""
         return replace(self, tolerance=self.tolerance * factor)
-
-    @property
-    def overhang(self) -> float:
-        """Infinite: a thin spike may reach far and add little."""
-        return math.inf
-
-    @property
-    def obstacles(self) -> None:
-        """None: volumes are not about space."""
 
     def summary(self, errors: Sequence[float] | None) -> CriterionSummary:
         """The share of each part, and how many exceed the tolerance."""

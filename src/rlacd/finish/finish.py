@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 import trimesh
@@ -12,15 +12,13 @@ from rlacd import _native
 from rlacd.find_parts import Reached
 from rlacd.finish.flat import kept_within, resting_sides, within_reach
 from rlacd.finish.in_input import as_carried, in_input
-from rlacd.finish.limit import limit_part, limit_roughly
+from rlacd.finish.limit import MOST, limit_part, limit_roughly, simple_part
 from rlacd.finish.overlap import Seams, overlap_parts
 from rlacd.finish.primitives import SLACK, primitive_part
 from rlacd.finish.report import COVERAGE_TOLERANCE, NEARLY, make_report
-from rlacd.finish.simple import MOST, simple_part
 from rlacd.finish.take_in import take_in
 from rlacd.merge import drop_slivers
 from rlacd.options import SIMPLE
-from rlacd.options.names import PrimitiveKind
 from rlacd.run import Run
 from rlacd.solid.balls import Balls
 from rlacd.solid.component import Part
@@ -75,23 +73,19 @@ def _finished(reached: Reached, run: Run) -> tuple[Finished, list[Part]]:
     """The result, and the cleaned parts."""
     solid, goal = reached.solid, reached.goal
     with run.stage("finish"):
-        limits = reached.options.max_vertices, reached.options.max_faces
+        limits = reached.options.hull_limits
         parts, seams = run.if_in_time(
-            lambda: _cleaned(reached, *limits, run),
-            lambda: ([limit_roughly(part, *limits) for part in reached.parts], None),
+            lambda: _cleaned(reached, run), lambda: ([limit_roughly(part, limits) for part in reached.parts], None)
         )
         with run.shielded():
-            hulls = run.map(lambda part: in_input(part.hull, solid.frame, *limits), parts)
+            hulls = run.map(lambda part: in_input(part.hull, solid.frame, limits), parts)
             parts = [as_carried(part, hull, solid.frame) for part, hull in zip(parts, hulls, strict=True)]
     with run.stage("measure"):
-        report = make_report(solid, parts, hulls, reached.options, goal, seams, run, reached.root)
+        report = make_report(reached, parts, hulls, seams, run)
         unknown: list[int] | list[None] = [None] * len(hulls)
         bodies = run.if_in_time(lambda: _bodies(solid, hulls), lambda: unknown)
     for hull, body in zip(hulls, bodies, strict=True):
         hull.metadata["body"] = body
-    found = reached.found
-    report["search"] = None if found is None else found.as_plain()
-    report["at_least"] = None if found is None else min(found.at_least, len(hulls))
     balls = goal.obstacles.in_input(solid.frame) if goal.obstacles is not None else None
     return Finished(hulls, report, balls), parts
 
@@ -114,29 +108,26 @@ def _taking_in(reached: Reached, finished: Sequence[Part], run: Run) -> list[Par
     return None if all(new is old for new, old in zip(grown, reached.parts, strict=True)) else grown
 
 
-def _cleaned(
-    reached: Reached, max_vertices: int | None, max_faces: int | None, run: Run
-) -> tuple[list[Part], Seams | None]:
+def _cleaned(reached: Reached, run: Run) -> tuple[list[Part], Seams | None]:
     """The parts without slivers, overlapping if asked for, as primitives or with simple hulls inside the limits."""
-    kinds, goal = cast("tuple[PrimitiveKind, ...]", reached.options.primitives), reached.goal
+    options, goal, limits = reached.options, reached.goal, reached.options.hull_limits
     sides = NO_SIDES if reached.root is None else resting_sides(reached.root)
     slack = SLACK + 8 * reached.solid.frame.resolution
 
     def cleaned(part: Part) -> Part:
         part.tree = part.tree or _native.TreeCache()
-        if kinds:
-            shaped = primitive_part(part, goal, kinds, max_vertices, max_faces, slack, reached.root)
-            if shaped is not part:
-                return shaped
+        shaped = primitive_part(part, goal, options.primitive_kinds, limits, slack, reached.root)
+        if shaped is not part:
+            return shaped
         near = within_reach(sides, part.hull, MOST)
         part = kept_within(part, near, goal)
-        if reached.options.detail == SIMPLE:
-            part = simple_part(part, goal, max_vertices, max_faces, near)
-        return limit_part(part, max_vertices, max_faces, goal, near)
+        return limit_part(
+            simple_part(part, goal, limits, near) if options.detail == SIMPLE else part, limits, goal, near
+        )
 
     parts, seams = drop_slivers(reached.parts, run), None
-    if reached.options.overlap > 0 and reached.root is not None:
-        parts, seams = overlap_parts(parts, reached.root, goal, reached.options.overlap)
+    if options.overlap > 0 and reached.root is not None:
+        parts, seams = overlap_parts(parts, reached.root, goal, 2 * options.overlap)
     return run.map(cleaned, parts), seams
 
 

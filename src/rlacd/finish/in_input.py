@@ -3,33 +3,24 @@
 from __future__ import annotations
 
 import itertools
-import math
 
 import numpy as np
 import trimesh
 
+from rlacd.options.navigable import LARGEST
+from rlacd.options.presets import HullLimits
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
 from rlacd.solid.distance import hull_union
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
-from rlacd.solid.limit_hull import limit_hull
+from rlacd.solid.limit_hull import NO_LIMITS, TOLERANCE, keeps, limit_hull
 from rlacd.solid.primitive import PRIMITIVE
 
 _LARGEST = float(np.finfo(np.float64).max)
 
-_BOX_VERTICES, _BOX_FACES = 8, 12
 
-UNSEEN = 1e-6
-"""How far, in the frame, a hull may move on its way to the input's unit before it has to be measured again."""
-
-_BEYOND = 1e100
-"""Coordinates of the frame with which no distance is computed: those of a speck far from the origin."""
-
-
-def in_input(
-    hull: Hull, frame: Frame, max_vertices: int | None = None, max_faces: int | None = None
-) -> trimesh.Trimesh:
+def in_input(hull: Hull, frame: Frame, limits: HullLimits = NO_LIMITS) -> trimesh.Trimesh:
     """Carry a hull from the frame to the input's unit: vertices are rounded first, so the result is exactly convex.
 
     Parameters
@@ -37,8 +28,8 @@ def in_input(
     hull : Hull
         In the frame, inside the limits.
     frame : Frame
-    max_vertices, max_faces : int, optional
-        Limits for the replacement of a hull that is thinner than the coordinates can resolve.
+    limits : HullLimits, optional
+        For the replacement of a hull that is thinner than the coordinates can resolve.
 
     Returns
     -------
@@ -49,7 +40,7 @@ def in_input(
         points = np.clip(frame.to_input(hull.vertices), -_LARGEST, _LARGEST)
     there = Hull.of(points)
     if there is None:
-        there = _thickened(points, max_vertices, max_faces)
+        there = _thickened(points, limits)
     metadata = {} if hull.primitive is None else {PRIMITIVE: hull.primitive.in_input(frame).as_plain()}
     return trimesh.Trimesh(there.vertices, there.faces, process=False, metadata=metadata)
 
@@ -57,41 +48,41 @@ def in_input(
 def as_carried(part: Part, there: trimesh.Trimesh, frame: Frame) -> Part:
     """Get the part with the hull that `in_input` made of its own, in the frame: what has to be measured.
 
-    The same part if no vertex moved by more than `UNSEEN`, as always unless the coordinates resolve little.
+    The same part if no vertex moved by more than `TOLERANCE`, as always unless the coordinates resolve little.
     """
     points = frame.to_frame(there.vertices)
-    if part.hull.primitive is not None or np.abs(points).max() > _BEYOND:
+    if part.hull.primitive is not None or np.abs(points).max() > LARGEST:
         return part
-    if points.shape == part.hull.vertices.shape and np.abs(points - part.hull.vertices).max() <= UNSEEN:
+    if points.shape == part.hull.vertices.shape and np.abs(points - part.hull.vertices).max() <= TOLERANCE:
         return part
-    if all(np.abs(part.hull.vertices - point).max(axis=1).min() <= UNSEEN for point in points):
+    if all(np.abs(part.hull.vertices - point).max(axis=1).min() <= TOLERANCE for point in points):
         return part
     hull = Hull.of(points)
     return part if hull is None else part.with_hull(hull)
 
 
-def _thickened(points: FloatArray, max_vertices: int | None, max_faces: int | None) -> Hull:
+def _thickened(points: FloatArray, limits: HullLimits) -> Hull:
     """A hull of flat points [N, 3] that has a volume and is within the limits."""
     step = _step(points)
     lower, upper = np.maximum(points, step - _LARGEST) - step, np.minimum(points, _LARGEST - step) + step
     corners = itertools.product(*zip(lower.T, upper.T, strict=True))
     hull = Hull.of(np.concatenate([np.stack(corner, axis=1) for corner in corners]))
-    if hull is not None and _fits(hull, max_vertices, max_faces):
+    if hull is not None and keeps(hull, limits):
         return hull
-    plain = plain_hull(points, max_vertices, max_faces)
-    limited = None if hull is None else _limited(hull, max_vertices, max_faces, 2 * step)
+    plain = plain_hull(points, limits)
+    limited = None if hull is None else _limited(hull, limits, 2 * step)
     return plain if limited is None else min(limited, plain, key=lambda hull: float(np.ptp(hull.box, axis=0).max()))
 
 
-def _limited(hull: Hull, max_vertices: int | None, max_faces: int | None, slack: float) -> Hull | None:
+def _limited(hull: Hull, limits: HullLimits, slack: float) -> Hull | None:
     """A hull within the limits around one in the input's unit; None if rounding leaves more than `slack` outside."""
     near = Frame.of(hull.vertices)
     full = Hull.of(near.to_frame(hull.vertices))
     if full is None:
         return None
-    points = near.to_input(limit_hull(full, max_vertices, max_faces).vertices)
+    points = near.to_input(limit_hull(full, limits).vertices)
     limited = Hull.of(points) if np.isfinite(points).all() else None
-    if limited is None or not _fits(limited, max_vertices, max_faces):
+    if limited is None or not keeps(limited, limits):
         return None
     in_frame = Hull.of(near.to_frame(limited.vertices))
     if in_frame is None or np.max(hull_union([in_frame]).distance(full.vertices)) > slack * near.scale:
@@ -99,14 +90,9 @@ def _limited(hull: Hull, max_vertices: int | None, max_faces: int | None, slack:
     return limited
 
 
-def _fits(hull: Hull, max_vertices: int | None, max_faces: int | None) -> bool:
-    return len(hull.vertices) <= (max_vertices or math.inf) and len(hull.faces) <= (max_faces or math.inf)
-
-
-def plain_hull(points: FloatArray, max_vertices: int | None, max_faces: int | None) -> Hull:
+def plain_hull(points: FloatArray, limits: HullLimits) -> Hull:
     """Get a box around points [N, 3], or a tetrahedron if a box has too many vertices or triangles."""
-    fits = (max_vertices or _BOX_VERTICES) >= _BOX_VERTICES and (max_faces or _BOX_FACES) >= _BOX_FACES
-    hull = Hull.of(_box_around(points) if fits else _tetrahedron_around(points))
+    hull = Hull.of(_box_around(points) if limits.allow(vertices=8, faces=12) else _tetrahedron_around(points))
     assert hull is not None
     return hull
 

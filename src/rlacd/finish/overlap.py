@@ -20,9 +20,7 @@ from rlacd.merge.boxes import Boxes
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import LOST, Component, Part
 from rlacd.solid.hull import Hull
-
-TOUCH = 1e-6
-"""Hulls touch that are no farther apart than this (frame)."""
+from rlacd.solid.limit_hull import TOLERANCE
 
 HELD = 0.7
 """A seam overlaps enough if each of its points lies deep in some hull: as deep as in the solid or by half the overlap,
@@ -101,7 +99,7 @@ def overlap_parts(
     bodies = [_Body(part) for part in parts]
     tolerated = max((criterion.error(part) for part in parts if not criterion.is_met(part)), default=None)
     boxes = Boxes(dict(enumerate(parts)))
-    pairs = boxes.pairs(range(len(parts)), TOUCH).tolist()
+    pairs = boxes.pairs(range(len(parts)), TOLERANCE).tolist()
     near: list[set[int]] = [set() for _ in parts]
     for first, second in pairs:
         near[first].add(second)
@@ -159,7 +157,7 @@ def _changes(
     def grown(one: int, other: int, depth: float, touched: set[int]) -> tuple[float, tuple[int, Hull]] | None:
         body = bodies[one]
         sides = np.unique(np.concatenate([body.contact(bodies[place], overlap)[0] for place in sorted(touched)]))
-        layer = Hull.of(body.sides.layer(bodies[other].sides, sides, depth, TOUCH))
+        layer = Hull.of(body.sides.layer(bodies[other].sides, sides, depth, TOLERANCE))
         if layer is None:
             return None
         hull = Hull.around(body.part.hull, layer)
@@ -196,5 +194,5 @@ class _Body:
     def contact(self, other: _Body, overlap: float) -> tuple[IntArray, FloatArray]:
         """Sides [S] under which a side of another body lies less deep than the overlap, and places on that [N, 3]."""
         if other not in self._contacts:
-            self._contacts[other] = self.sides.contact(other.sides, overlap, TOUCH)
+            self._contacts[other] = self.sides.contact(other.sides, overlap, TOLERANCE)
         return self._contacts[other]

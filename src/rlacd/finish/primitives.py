@@ -11,9 +11,11 @@ import numpy as np
 from rlacd import _native
 from rlacd.criteria import Criterion
 from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
+from rlacd.options.presets import HullLimits
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import LOST, Component, Part
 from rlacd.solid.hull import Hull
+from rlacd.solid.limit_hull import NO_LIMITS, keeps
 from rlacd.solid.primitive import Primitive
 
 SLACK = 1e-9
@@ -22,9 +24,9 @@ SLACK = 1e-9
 SIMPLER = 1.25
 """A simpler primitive is preferred unless its volume exceeds that of the tightest by this factor."""
 
-FACETS, EDGES = 12, 6
-"""Directions of facets and edges of the hull that are tried as axes, largest first, besides principal axes and the
-frame's."""
+DIRECTIONS = 12
+"""Of facets of the hull that are tried as axes, and half as many of edges, largest first, besides principal axes and
+the frame's."""
 
 SAME_DIRECTION = 0.9998
 """Cosine of the angle (1 degree) below which two directions are tried once."""
@@ -40,8 +42,7 @@ def primitive_part(
     part: Part,
     criterion: Criterion,
     kinds: Collection[PrimitiveKind],
-    max_vertices: int | None = None,
-    max_faces: int | None = None,
+    limits: HullLimits = NO_LIMITS,
     slack: float = SLACK,
     solid: Component | None = None,
 ) -> Part:
@@ -58,8 +59,8 @@ def primitive_part(
     criterion : Criterion
     kinds : collection of str
         Those to choose from.
-    max_vertices, max_faces : int, optional
-        Limits on the polyhedron's vertices and triangles.
+    limits : HullLimits, optional
+        Of the polyhedron.
     slack : float
         How much larger a primitive is made than needed, for later rounding.
     solid : Component, optional
@@ -72,7 +73,7 @@ def primitive_part(
     def judged(primitive: Primitive) -> Part | None:
         for corners in primitive.polyhedra():
             hull = Hull.of(np.ascontiguousarray(corners))
-            if hull is None or len(hull.vertices) > (max_vertices or np.inf) or len(hull.faces) > (max_faces or np.inf):
+            if hull is None or not keeps(hull, limits):
                 return None
             around = replace(hull, volume=primitive.volume, primitive=primitive)
             for candidate in _candidates(part, around, solid, criterion):
@@ -241,8 +242,8 @@ def _candidate_axes(hull: Hull) -> FloatArray:
     centred = hull.vertices - hull.vertices.mean(axis=0)
     principal = np.linalg.eigh(centred.T @ centred)[1].T
     groups = (
-        _distinct(crosses, FACETS, together=True),
-        _distinct(edges, EDGES),
+        _distinct(crosses, DIRECTIONS, together=True),
+        _distinct(edges, DIRECTIONS // 2),
         [*principal, *np.eye(3)],
     )
     return np.array(list(_new_directions(itertools.chain(*groups))))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from itertools import accumulate
 from typing import Any, NamedTuple
@@ -12,14 +11,15 @@ import trimesh
 
 from rlacd import _native
 from rlacd._version import __version__
-from rlacd.criteria import Criterion
+from rlacd.find_parts import Reached
 from rlacd.finish.overlap import Seams
+from rlacd.fit import Fit
 from rlacd.merge.slivers import is_sliver
 from rlacd.options import Options
 from rlacd.options.names import PRIMITIVE_KINDS
 from rlacd.options.presets import Preset, find_preset
 from rlacd.run import Run
-from rlacd.solid.component import Component, Part, concatenated
+from rlacd.solid.component import Part, concatenated
 from rlacd.solid.distance import Interval, Place, hull_distances
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
@@ -33,7 +33,7 @@ measurement."""
 NEARLY = 1e-3
 """No point of the input should lie farther outside the hulls than this, which is half the thickness of a sheet."""
 
-FINE = 1e-4
+FINE = NEARLY / 10
 """Width of the intervals where the usual one would decide a warning, or whether hulls have to grow to the input."""
 
 MOST_HOLES = 1000
@@ -50,29 +50,41 @@ class _Distances(NamedTuple):
 
 
 def make_report(
-    solid: Solid,
-    parts: Sequence[Part],
-    hulls: Sequence[trimesh.Trimesh],
-    options: Options,
-    criterion: Criterion,
-    seams: Seams | None,
-    run: Run,
-    root: Component | None,
+    reached: Reached, parts: Sequence[Part], hulls: Sequence[trimesh.Trimesh], seams: Seams | None, run: Run
 ) -> dict[str, Any]:
-    """Measure a finished decomposition; the keys are those of `rlacd.Decomposition` without name, search and seconds.
+    """Measure a finished decomposition; the keys are those of `rlacd.Decomposition` without name and seconds.
 
-    Values that there was no time to measure are None. The component that was cut is None if there was no time for one.
+    Values that there was no time to measure are None.
+
+    Parameters
+    ----------
+    reached : Reached
+    parts : sequence of Part
+        Those that were reached, cleaned.
+    hulls : sequence of trimesh.Trimesh
+        Theirs, in the input's unit.
+    seams : Seams or None
+        What became of the seams, if hulls were to overlap.
     """
+    solid, options, criterion = reached.solid, reached.options, reached.goal
     is_cover = len(solid.faces) == 0  # hulls of an input that was not repaired: the parts in them are unknown
     errors = None if is_cover else run.if_in_time(lambda: run.map(criterion.error, parts), lambda: None)
     summary = criterion.summary(errors)
     has_surface = len(solid.surface[1]) > 0  # a cloud of points has none
     apart: _Distances | None = None
     if has_surface:
-        apart = run.if_in_time(lambda: _distances(solid, parts, run, root, criterion.overhang), lambda: None)
+        apart = run.if_in_time(lambda: _distances(reached, parts, run), lambda: None)
     with run.shielded():  # nothing below takes long
         stands_for_mass = [(part.hull.vertices, part.hull.faces) for part in parts] if is_cover else [solid.mesh]
-        mass = mass_of(*concatenated(stands_for_mass), solid.frame)
+        warnings = [*solid.warnings, *_coarse(solid), *_early_end(run)]
+        if has_surface and apart is None:
+            warnings += _unmeasured(solid)
+        if options.overlap > 0:
+            warnings += _shallow(seams, 2 * options.overlap / solid.frame.scale)
+        exceeds = len(summary.warnings) > 0
+        warnings += [*summary.warnings, *_shortcomings([part.hull for part in parts], apart, reached, exceeds)]
+        if criterion.obstacles is not None and not is_cover:
+            warnings += _out_of_the_box([part.hull for part in parts], solid)
         return {
             "version": __version__,
             "options": options.as_plain(),
@@ -86,30 +98,12 @@ def make_report(
             **summary.entries,
             "hausdorff": {"over": apart and apart.over, "under": apart and apart.under},
             "scale": solid.frame.scale,
-            "mass": _mass(mass),
+            "mass": _mass(mass_of(*concatenated(stands_for_mass), solid.frame)),
             "repair": [{**vars(body)} for body in solid.bodies],
             "holes": _holes(solid),
-            "warnings": [
-                *solid.warnings,
-                *_coarse(solid),
-                *_early_end(run),
-                *_cut_short(run),
-                *(_unmeasured(solid) if has_surface and apart is None else []),
-                *(_shallow(seams, options.overlap / solid.frame.scale) if options.overlap > 0 else []),
-                *summary.warnings,
-                *_shortcomings(
-                    [part.hull for part in parts],
-                    apart,
-                    solid,
-                    options,
-                    criterion.overhang if not summary.warnings else math.inf,
-                ),
-                *(
-                    _out_of_the_box([part.hull for part in parts], solid)
-                    if criterion.obstacles is not None and not is_cover
-                    else []
-                ),
-            ],
+            "search": reached.found and reached.found.as_plain(),
+            "at_least": reached.found and min(reached.found.at_least, len(hulls)),
+            "warnings": warnings,
         }
 
 
@@ -168,45 +162,35 @@ def joint_report(reports: Sequence[tuple[str, dict[str, Any]]], scale: float) ->
         Frame units of the scene per unit of the input: its lengths are in that frame.
     """
     each = [(name, report, scale / report["scale"]) for name, report in reports]
-    first = reports[0][1]
-    nodes = []
-    criterion = "volume" if "volume" in first else "concavity"
-    per_part: list[float] | None = []
-    for name, report, factor in each:
-        errors = report[criterion]["per_part"]
-        unit = factor if criterion == "concavity" else 1.0
-        per_part = None if errors is None or per_part is None else [*per_part, *(error * unit for error in errors)]
-        nodes.append({"node": name, "parts": report["parts"], "scale": report["scale"]})
-    sides = ("over", "under")
-    far = {side: [_times(report["hausdorff"][side], factor) for _, report, factor in each] for side in sides}
-    repairs = [(name, body, factor) for name, report, factor in each for body in report["repair"]]
-    firsts = accumulate((len(report["repair"]) for _, report, _ in each), initial=0)
-    stopped = next((report for _, report, _ in each if not report["complete"]), first)
+    first, counted = reports[0][1], ("parts", "faces", "vertices")
+    bodies = accumulate((len(report["repair"]) for _, report in reports), initial=0)
+    begins = list(zip(each, bodies, strict=False))
+    stopped = next((report for _, report in reports if not report["complete"]), first)
     return {
         "version": first["version"],
         "options": dict(first["options"]),
-        "complete": stopped["complete"],
-        "stopped_by": stopped["stopped_by"],
-        **({"primitives": _added([r["primitives"] for _, r, _ in each])} if "primitives" in first else {}),
-        **({"overlap": _joint_seams([r for _, r, _ in each])} if "overlap" in first else {}),
-        **{what: sum(report[what] for _, report, _ in each) for what in ("parts", "faces", "vertices")},
-        criterion: first[criterion] | {"per_part": per_part, "max": None if per_part is None else max(per_part)},
-        "hausdorff": {side: None if None in far[side] else max(far[side]) for side in sides},  # type: ignore[type-var]
+        **{what: stopped[what] for what in ("complete", "stopped_by")},
+        **({"primitives": _added([r["primitives"] for _, r in reports])} if "primitives" in first else {}),
+        **({"overlap": _joint_seams([r for _, r in reports])} if "overlap" in first else {}),
+        **{what: sum(report[what] for _, report in reports) for what in counted},
+        **_joint_fit(each),
+        "hausdorff": {side: _farthest([(r["hausdorff"][side], f) for _, r, f in each]) for side in ("over", "under")},
         "scale": scale,
-        "mass": _mass(joint_mass([_read_mass(report["mass"]) for _, report, _ in each])),
+        "mass": _mass(joint_mass([_read_mass(report["mass"]) for _, report in reports])),
         "repair": [
-            {**body, "body": index, "deviation": body["deviation"] * factor, "node": name}
-            for index, (name, body, factor) in enumerate(repairs)
+            {**body, "body": begin + i, "deviation": body["deviation"] * factor, "node": name}
+            for (name, report, factor), begin in begins
+            for i, body in enumerate(report["repair"])
         ],
         "holes": [
-            {**hole, "body": first + hole["body"], "node": name}
-            for (name, report, _), first in zip(each, firsts, strict=False)
+            {**hole, "body": begin + hole["body"], "node": name}
+            for (name, report, _), begin in begins
             for hole in report["holes"]
         ],
-        "nodes": nodes,
+        "nodes": [{"node": name, "parts": report["parts"], "scale": report["scale"]} for name, report in reports],
         "search": None,
-        "at_least": _sum_known([report["at_least"] for _, report, _ in each]),
-        "warnings": [f"{name}: {warning}" for name, report, _ in each for warning in report["warnings"]],
+        "at_least": _sum_known([report["at_least"] for _, report in reports]),
+        "warnings": [f"{name}: {warning}" for name, report in reports for warning in report["warnings"]],
     }
 
 
@@ -215,8 +199,22 @@ def _sum_known(counts: Sequence[int | None]) -> int | None:
     return sum(known) if len(known) == len(counts) else None
 
 
-def _times(length: float | None, factor: float) -> float | None:
-    return None if length is None else length * factor
+def _joint_fit(each: Sequence[tuple[str, dict[str, Any], float]]) -> dict[str, Any]:
+    """The criterion's entry for the parts of all nodes; lengths grow by each node's factor."""
+    fits = [(Fit.of(report), factor) for _, report, factor in each]
+    errors: list[float] | None = []
+    for fit, factor in fits:
+        assert fit is not None
+        known = None if errors is None or fit.per_part is None else fit.per_part
+        errors = None if known is None or errors is None else [*errors, *(e * fit.unit(factor) for e in known)]
+    key = fits[0][0].key if fits[0][0] is not None else ""
+    return {key: each[0][1][key] | {"per_part": errors, "max": None if errors is None else max(errors)}}
+
+
+def _farthest(lengths: Sequence[tuple[float | None, float]]) -> float | None:
+    """The greatest of lengths, each times its factor; None if one is unknown."""
+    known = [length * factor for length, factor in lengths if length is not None]
+    return max(known) if len(known) == len(lengths) else None
 
 
 def _joint_seams(reports: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -224,7 +222,7 @@ def _joint_seams(reports: Sequence[dict[str, Any]]) -> dict[str, Any]:
     seams = [report["overlap"] for report in reports]
     if any(one["seams"] is None for one in seams):
         return dict.fromkeys(seams[0])
-    firsts = [0, *accumulate(report["parts"] for report in reports)]
+    firsts = accumulate((report["parts"] for report in reports), initial=0)
     places = [
         {**place, "parts": [first + part for part in place["parts"]]}
         for first, one in zip(firsts, seams, strict=False)
@@ -247,14 +245,14 @@ def _mass(mass: Mass) -> dict[str, Any]:
     return {"volume_abs": mass.volume_abs, "centre_abs": centre, "inertia_abs": inertia}
 
 
-def _distances(solid: Solid, parts: Sequence[Part], run: Run, root: Component | None, overhang: float) -> _Distances:
-    known = root is not None and solid.is_as_given
-    surface = root.filling.surface if root is not None and known else solid.index
+def _distances(reached: Reached, parts: Sequence[Part], run: Run) -> _Distances:
+    solid, root = reached.solid, reached.root
+    surface = root.filling.surface if root is not None and solid.is_as_given else solid.index
     surface = surface or _native.Surface(*solid.surface, run.threads)
     hulls = [part.hull for part in parts]
     found = hull_distances(hulls, *solid.surface, threads=run.threads, surface=surface)
     outside = any(_is_undecided(found.under, limit) for limit in (NEARLY, COVERAGE_TOLERANCE))
-    if outside or _is_undecided(found.over, overhang + COVERAGE_TOLERANCE):
+    if outside or _is_undecided(found.over, reached.goal.overhang + COVERAGE_TOLERANCE):
         found = hull_distances(hulls, *solid.surface, FINE, threads=run.threads, surface=surface)
 
     def place(point: Place) -> str:
@@ -301,27 +299,28 @@ def _out_of_the_box(hulls: Sequence[Hull], solid: Solid) -> list[str]:
 
 
 def _early_end(run: Run) -> list[str]:
-    if run.stopped_by is None:
-        return []
-    reason = {"timeout": "the timeout ended", "cancel": "the caller ended"}[run.stopped_by]
-    if run.stopped_in == "search":
-        return [f"{reason.capitalize()} the search for fewer hulls early; those found so far are valid."]
-    return [f"Incomplete: {reason} the work early; the hulls cover the solid but are coarser than asked for."]
-
-
-def _cut_short(run: Run) -> list[str]:
+    """Why the work ended early, and what stopped at its bound of work."""
     said = {
         "cut": "There were so many components that cutting stopped at its bound of work: the hulls cover the solid "
         "but are coarser than asked for.",
         "merge": "There were so many parts that merging stopped at its bound of work: all hulls are valid, but fewer "
         "may suffice. A larger threshold leaves less to merge.",
     }
-    return [sentence for stage, sentence in said.items() if stage in run.cut_short]
+    sentences = [sentence for stage, sentence in said.items() if stage in run.cut_short]
+    if run.stopped_by is None:
+        return sentences
+    reason = {"timeout": "the timeout ended", "cancel": "the caller ended"}[run.stopped_by]
+    if run.stopped_in == "search":
+        return [f"{reason.capitalize()} the search for fewer hulls early; those found so far are valid.", *sentences]
+    return [
+        f"Incomplete: {reason} the work early; the hulls cover the solid but are coarser than asked for.",
+        *sentences,
+    ]
 
 
-def _shortcomings(
-    hulls: Sequence[Hull], apart: _Distances | None, solid: Solid, options: Options, overhang: float
-) -> list[str]:
+def _shortcomings(hulls: Sequence[Hull], apart: _Distances | None, reached: Reached, exceeds: bool) -> list[str]:
+    """What hulls fall short of; how far they reach out is known where the criterion has said so (`exceeds`)."""
+    options = reached.options
     sentences = [] if options.preset is None else engine_shortcomings(find_preset(options.preset), hulls)
     if options.max_hulls is not None and len(hulls) > options.max_hulls:
         sentences.append(f"{len(hulls)} hulls are left, more than the {options.max_hulls} asked for.")
@@ -330,10 +329,10 @@ def _shortcomings(
             f"Some of the input's surface lies up to {apart.under:.4g} outside the hulls, farthest near "
             f"{apart.under_at}: repair dropped what it could not make solid (see `deviation` in `repair`)."
         )
-    if apart is not None and apart.over > overhang + COVERAGE_TOLERANCE:
+    if apart is not None and not exceeds and apart.over > reached.goal.overhang + COVERAGE_TOLERANCE:
         sentences.append(
             f"The hulls extend up to {apart.over:.4g} beyond the input's surface, more than the threshold, farthest "
-            f"near {apart.over_at}: {_why_beyond(solid, options)}."
+            f"near {apart.over_at}: {_why_beyond(reached.solid, options)}."
         )
     return sentences
 

@@ -25,10 +25,9 @@ MEASURING = 5e6
 
 
 def best_within(
-    free: Sequence[Part],
     most: int,
     whole: Part,
-    coarser: Callable[[float], Sequence[Part]],
+    decompose: Callable[[float], Sequence[Part]],
     unite: Callable[[Part, Part], Part],
     criterion: Criterion,
     run: Run,
@@ -37,31 +36,30 @@ def best_within(
 
     Parameters
     ----------
-    free : sequence of Part
-        The decomposition without a limit.
     most : int
-        Fewer than `free` has.
+        Fewer than the decomposition without a limit has.
     whole : Part
         The solid as one part: what remains where there is no time.
-    coarser : callable
-        Decomposes the solid under a criterion whose threshold is larger by a factor.
+    decompose : callable
+        Decomposes the solid under a criterion whose threshold is larger by a factor; 1 gives what it has without a
+        limit.
     unite : callable
         Returns the union of two parts.
     criterion : Criterion
         Measures the errors.
     """
     best, least = [whole], math.inf
-    parts, factor, account, begin = free, 1.0, Work(MEASURING), run.work.done
+    factor, account, begin = 1.0, Work(MEASURING), run.work.done
     try:
         least = criterion.error(whole)
         while True:
+            parts = decompose(factor)
             for state, error in united_in_turn(parts, unite, criterion, account, run):
                 if len(state) <= most and error < least:
                     best, least = state, error
             if len(parts) <= 1 or run.stopped_by is not None:
                 return best
             factor *= COARSER if run.work.done - begin < LONG else COARSER**4
-            parts = coarser(factor)
     except Stopped:
         run.note_stop()
     return best

@@ -7,23 +7,23 @@ made from them. Nothing here imports a library, so that ``--help`` does not wait
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, cast
 
 from rlacd.errors import OptionError
-from rlacd.options.fields import check_fields, custom, integer, number, one_of, option, read, stated
+from rlacd.options.fields import about, check_fields, custom, integer, number, one_of, option, read, stated
+from rlacd.options.lengths import LENGTH, relative
 from rlacd.options.names import POLICIES, PRIMITIVE_KINDS, PrimitiveKind, policy_name, read_policy, read_primitives
-from rlacd.options.navigable import LENGTH, NAVIGABLE, SpaceOptions
-from rlacd.options.presets import PRESETS, PresetName, find_preset
+from rlacd.options.navigable import NavigableSpace
+from rlacd.options.presets import PRESETS, HullLimits, PresetName, find_preset
 
-CONCAVITY: Literal["concavity"] = "concavity"
-"""The default criterion's name."""
-
-VOLUME: Literal["volume"] = "volume"
-"""The name of the criterion that V-HACD and NavACD use."""
-
-CRITERIA = {CONCAVITY: ("threshold",), VOLUME: ("volume_tolerance",), NAVIGABLE: ("radius", "tolerance")}
+CRITERIA = {
+    "concavity": ("threshold",),
+    "distance": ("threshold",),
+    "volume": ("volume_tolerance",),
+    "navigable": ("radius", "tolerance"),
+}
 """Each criterion by its name, with the numbers that say how tight it is."""
 
 VolumeOf = Literal["part", "whole"]
@@ -39,41 +39,35 @@ Policy: TypeAlias = Any
 SIMPLE: Literal["simple"] = "simple"
 FAST: Literal["fast"] = "fast"
 
-DEFAULT_RESOLUTION = 100
-"""Cells along the longest side of the grid on which repair looks for rooms that nothing can enter."""
-
 RESOLUTIONS = (20, 400)
 """The grid that repair looks for rooms on has this number cubed of cells: with fewer than 20 along a side, a wrap drawn
 onto the surface folds over itself; more than 400 would take over 4 GB."""
 
-GAPS = (0.01, 0.3)
-"""Smaller balls would need more than `RESOLUTIONS` cells, larger ones close what a body is made of."""
+GAPS = (0.005, 0.15)
+"""Shares of the longest side: smaller balls would need more than `RESOLUTIONS` cells, larger ones close what a body is
+made of."""
 
-DEFAULT_THRESHOLD = 0.05
-"""CoACD's default."""
-
-MIN_THRESHOLD = 0.001
-"""Least concavity that can be asked for; the longest side of the input is 2."""
-
-MAX_THRESHOLD = 2.0
-"""A hull that lies farther from its part than that does not fit into the frame."""
-
-MAX_OVERLAP = 0.5
-"""Hulls that overlap by more than a quarter of the longest side are hardly parts of it."""
-
-LENGTHS = {"threshold": (MIN_THRESHOLD, MAX_THRESHOLD), "overlap": (0.0, MAX_OVERLAP)}
-"""Options that may also be given in the input's unit, under their name and ``_abs``."""
+LENGTHS = {"threshold": (0.001, 2.0), "overlap": (0.0, 0.25)}
+"""Bounds of options that may also be given in the input's unit, under their name and ``_abs``. A hull farther from its
+part than the largest threshold does not fit into the frame; hulls that overlap by more are hardly parts."""
 
 TIGHT, LIMITS, METHOD, RUN = "How tight", "Limits", "Method", "Running"
 """Headings of the command's help."""
 
 
 def _criterion(given: Any) -> Any:
-    return given if isinstance(given, SpaceOptions) and hasattr(given, "prepare") else _NAMED.read(given)
+    if isinstance(given, Mapping):
+        return NavigableSpace(**given)
+    return given if isinstance(given, NavigableSpace) else one_of(NAMED).read(given)
 
 
-_NAMED = one_of((CONCAVITY, VOLUME))
-_CRITERION = custom(f'"{CONCAVITY}", "{VOLUME}" or an `rlacd.NavigableSpace`', _criterion, " ".join(CRITERIA))
+_OWN = {"threshold": ("threshold", "threshold_abs"), "volume_tolerance": ("volume_tolerance", "volume_of")}
+"""Options that only criteria with a certain number take."""
+
+NAMED = tuple(name for name in CRITERIA if name != "navigable")
+"""Criteria whose numbers are options of a decomposition themselves."""
+
+_CRITERION = custom(f"{', '.join(NAMED)} or an `rlacd.NavigableSpace`", _criterion, " ".join(CRITERIA))
 _PRIMITIVES = custom(
     f"all (True), or some of {', '.join(PRIMITIVE_KINDS)}", read_primitives, f"all {' '.join(PRIMITIVE_KINDS)}"
 )
@@ -82,22 +76,34 @@ _POLICY = custom(
     read_policy,
     "greedy navacd learned FILE.npz …",
 )
-_CONCAVITY = number(*LENGTHS["threshold"], typed=str)
 _CORNERS = integer(4, rule="an integer, at least 4 (a tetrahedron)")
 _SECONDS = number(above=0, rule="a positive number of seconds")
 _FACTOR = number(above=0, rule="a positive factor")
 
 
-def criterion_named(given: Any) -> str:
-    """Check the name of a criterion, where it is given by name and its options beside it.
+def with_criterion(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Get arguments of `rlacd.decompose` from flat ones: the criterion by its name, the options of a space beside it.
 
     Raises
     ------
     OptionError
-        There is none of this name.
+        There is no criterion of this name, or an option belongs to another.
     """
-    name: str = read(one_of(CRITERIA, rule=f"{CONCAVITY}, {VOLUME} or {NAVIGABLE}"), "criterion", given)
-    return name
+    own = {field.name for field in dataclasses.fields(NavigableSpace)}
+    space = {name: value for name, value in given.items() if name in own}
+    given = {name: value for name, value in given.items() if name not in own}
+    name = given.get("criterion")
+    if name is not None:
+        read(one_of(CRITERIA, rule="concavity, distance, volume or navigable"), "criterion", name)
+    if name == "navigable":
+        return given | {"criterion": NavigableSpace(**space)}
+    if name == "volume" and "tolerance" in space:
+        given["volume_tolerance"] = space.pop("tolerance")
+    for word, value in space.items():
+        yes, _, no = about(NavigableSpace, word).flags[0].partition("/")
+        needed = "volume or navigable" if word == "tolerance" else "navigable"
+        raise OptionError(f"{no if value is False else yes} needs --criterion {needed}.")
+    return given
 
 
 @stated()
@@ -108,17 +114,18 @@ class Options:
     Attributes
     ----------
     criterion
-        When a hull is tight enough: concavity (see --threshold); volume: it adds at most --tolerance of volume, such as
-        1%; or navigable: it stays out of the space that a ball of --radius can reach, and what no ball can reach may be
+        When a hull is tight enough: distance: its surface and the mesh's lie at most --threshold apart; concavity: also
+        the volume it adds is small (CoACD's measure); volume: it adds at most --tolerance of volume, such as 1%; or
+        navigable: it stays out of the space that a ball of --radius can reach, and what no ball can reach may be
         filled.
     threshold
         The concavity a hull may have, where the longest side of the mesh is 2. Smaller is tighter, with more hulls:
-        0.02 is fine, 0.2 coarse. Also as a share of the longest side (2.5%) or, where the file is in metres, as a
-        length (0.05m).
+        0.02 is fine, 0.2 coarse. Also as a share of the longest side (2.5%) or, where the file says its unit, as a
+        length (0.05m), which is a distance.
     threshold_abs
-        The same as a length in the mesh's own unit, such as 2 for 2 mm in a file in millimetres.
+        The same as a length in the mesh's own unit, such as 2 for 2 mm in a file in millimetres: a distance.
     volume_tolerance
-        With --criterion volume: the share of volume that a hull may add; the same as --tolerance 1%.
+        With --criterion volume: the share of volume that a hull may add, such as 1%.
     volume_of
         With --criterion volume: whether --tolerance is a share of each part's own volume or of the whole's.
     max_hulls
@@ -133,8 +140,8 @@ class Options:
         Parts become a box, sphere, capsule or cylinder where one meets the criterion; written as such to MJCF, URDF,
         SDF, USD and Unreal, else as meshes.
     overlap
-        Hulls that touch overlap by this much, so that nothing thin slips between them; as --threshold, also a share of
-        the longest side (0.5%) or a length (2mm).
+        Hulls that touch overlap by this share of the longest side (0.5%), so that nothing thin slips between them; also
+        a length (2mm).
     overlap_abs
         The same as a length in the mesh's own unit.
     merge
@@ -147,7 +154,7 @@ class Options:
         Bodies with openings: auto fills those that nothing can get into, or that have lost some faces, and makes the
         others thin shells; solid fills all that enclose a space; thin fills none.
     gap
-        Openings that a ball of this radius cannot pass count as closed (the longest side of the mesh is 2).
+        Openings that a ball of this radius, a share of the longest side, cannot pass count as closed.
     seed
         The same seed, input and options give the same bytes.
     threads
@@ -178,18 +185,18 @@ class Options:
         A value is of the wrong type or out of its range.
     """
 
-    criterion: Literal["concavity", "volume"] | SpaceOptions = option(
-        CONCAVITY, TIGHT, _CRITERION, metavar="|".join(CRITERIA)
+    criterion: Literal["concavity", "distance", "volume"] | NavigableSpace | None = option(
+        None, TIGHT, _CRITERION, metavar="|".join(CRITERIA), usual="concavity; distance with a length as the threshold"
     )
     threshold: float = option(
-        DEFAULT_THRESHOLD,
+        0.05,
         TIGHT,
         number(*LENGTHS["threshold"], typed=str),
         flags=("--threshold", "-t"),
         metavar="NUMBER",
     )
     threshold_abs: float | None = option(None, TIGHT, LENGTH)
-    volume_tolerance: float = option(0.01, TIGHT, least=1e-4, most=10.0)
+    volume_tolerance: float = option(0.01, TIGHT, least=1e-4, most=10.0, flags=("--tolerance",))
     volume_of: VolumeOf = option("part", TIGHT, one_of=VolumeOf)
     max_hulls: int | None = option(None, LIMITS, least=1)
     max_vertices: int | None = option(None, LIMITS, _CORNERS)
@@ -202,9 +209,9 @@ class Options:
     overlap_abs: float | None = option(None, LIMITS, LENGTH)
     merge: bool = option(True, METHOD, usual="merge")
     policy: str | Policy = option("greedy", METHOD, _POLICY, metavar="NAME")
-    resolution: int = option(DEFAULT_RESOLUTION, METHOD, least=RESOLUTIONS[0], most=RESOLUTIONS[1])
+    resolution: int = option(100, METHOD, least=RESOLUTIONS[0], most=RESOLUTIONS[1])
     open: OpenName = option("auto", METHOD, one_of=OpenName)
-    gap: float = option(0.03, METHOD, least=GAPS[0], most=GAPS[1])
+    gap: float = option(0.015, METHOD, number(*GAPS, typed=str), metavar="NUMBER")
     seed: int = option(0, RUN, least=0, most=2**63 - 1)
     threads: int | None = option(None, RUN, least=1, most=1024, usual="all cores")
     timeout: float | None = option(None, RUN, _SECONDS, metavar="SECONDS")
@@ -224,6 +231,8 @@ class Options:
             for name in ("max_vertices", "max_faces"):
                 if getattr(self, name) is None:
                     object.__setattr__(self, name, getattr(engine, name))
+        if self.criterion is None:  # whoever gives a length means a distance
+            object.__setattr__(self, "criterion", "concavity" if self.threshold_abs is None else "distance")
         if self.quality is None:  # searching means merging
             object.__setattr__(self, "quality", "balanced" if self.merge else FAST)
         for name, rule in self._conflicts():
@@ -231,20 +240,43 @@ class Options:
 
     def _conflicts(self) -> Iterator[tuple[str, str]]:
         """Options that others exclude, and what they have to be instead."""
-        length = "threshold" if self.threshold_abs is None else "threshold_abs"
-        has_threshold = self.threshold_abs is not None or self.threshold != DEFAULT_THRESHOLD
-        if self.criterion == VOLUME and has_threshold:
-            yield length, "left out: with the criterion volume, volume_tolerance takes its place"
-        if isinstance(self.criterion, SpaceOptions):
-            if has_threshold:
-                yield length, "left out: navigable space has a radius and a tolerance instead"
-            if self.per_node:
-                yield "per_node", "left out: navigable space is that of the whole scene"
+        for needed, names in _OWN.items():
+            for name in names:
+                if needed not in self.numbers and getattr(self, name) != getattr(type(self), name):
+                    instead = " and ".join(word.removeprefix("volume_") for word in self.numbers)
+                    yield name, f"left out: the criterion {self.criterion_name} has {instead} instead"
+        if self.per_node and self.criterion_name == "navigable":
+            yield "per_node", "left out: navigable space is that of the whole scene"
         for name in ("budget", "search_steps"):
             if self.quality == FAST and getattr(self, name) is not None:
                 yield name, "left out with quality='fast', which does not search"
         if not self.merge and self.quality != FAST:
             yield "quality", "'fast', or left out, without merge: searching includes merging"
+
+    @property
+    def criterion_name(self) -> str:
+        """A key of `CRITERIA`."""
+        return self.criterion if isinstance(self.criterion, str) else "navigable"
+
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        """The options that say how tight the criterion is."""
+        return CRITERIA[self.criterion_name]
+
+    @property
+    def primitive_kinds(self) -> tuple[PrimitiveKind, ...]:
+        """Primitives that parts may become."""
+        return cast("tuple[PrimitiveKind, ...]", self.primitives)
+
+    @property
+    def hull_limits(self) -> HullLimits:
+        """Limits on each hull."""
+        return HullLimits(self.max_vertices, self.max_faces)
+
+    @property
+    def sees_cavities(self) -> bool:
+        """Whether sealed cavities may count."""
+        return isinstance(self.criterion, NavigableSpace) and self.criterion.sees_cavities
 
     def as_plain(self) -> dict[str, Any]:
         """Everything as plain values, the criterion by its name or its own options, a policy by its name."""
@@ -252,28 +284,21 @@ class Options:
         return plain | {"policy": policy_name(self.policy), "primitives": [*plain["primitives"]]}
 
     def at_scale(self, scale: float) -> Options:
-        """Get the same options with lengths in the frame, of which one of the input's units takes `scale`.
+        """Get the same options with lengths as bare numbers, where a unit of the input is `scale` units of the frame.
 
         Raises
         ------
         OptionError
             `threshold_abs` or `overlap_abs` is too small or too large for the object.
         """
-        lengths = {}
-        for name, (least, most) in LENGTHS.items():
-            given = getattr(self, f"{name}_abs")
-            if given is None:
-                continue
-            lengths[name] = given * scale
-            if not least <= lengths[name] <= most:
-                raise OptionError(
-                    f"{name}_abs is {given!r}; for this object it has to be between {least / scale:.4g} and "
-                    f"{most / scale:.4g} ({50 * least:g} % and {50 * most:g} % of its longest side)."
-                )
+        given = {name: getattr(self, f"{name}_abs") for name in LENGTHS}
+        lengths: dict[str, Any] = {
+            n: relative(n, length, scale, LENGTHS[n]) for n, length in given.items() if length is not None
+        }
         return dataclasses.replace(self, **lengths) if lengths else self
 
     def for_node(self, scene: float, node: float) -> Options:
-        """Get the same options with lengths in the frame of a node.
+        """Get the same options with lengths relative to a node.
 
         Parameters
         ----------
@@ -287,6 +312,8 @@ class Options:
         """
         of_scene, lengths = self.at_scale(scene), {}
         for name, (least, most) in LENGTHS.items():
+            if name in _OWN and name not in self.numbers:
+                continue
             if self.relative_to == "scene" or getattr(self, f"{name}_abs") is not None:
                 lengths[name] = min(max(getattr(of_scene, name) * node / scene, least), most)
         return dataclasses.replace(self, threshold_abs=None, overlap_abs=None, **lengths)

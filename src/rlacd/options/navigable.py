@@ -7,19 +7,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from rlacd.errors import OptionError
 from rlacd.options.fields import check_fields, custom, number, option, stated
+from rlacd.options.lengths import LENGTH, relative
 
 Point: TypeAlias = tuple[float, float, float]
 
 NAVIGABLE = "navigable"
 """The criterion's name on the command line."""
 
-LENGTHS = (1e-4, 10.0)
+SHARES = (1e-4, 10.0)
 """Shares of the longest side that radius and tolerance may be: less takes no end of balls, more fills everything."""
 
 LARGEST = 1e100
-"""Coordinates of seeds and planes: of larger ones, products would be infinite."""
+"""Coordinates: of larger ones, products would be infinite."""
 
 
 _coordinate = number(-LARGEST, LARGEST).read
@@ -56,17 +56,15 @@ def _planes(given: Any) -> tuple[tuple[Point, float], ...]:
     return tuple(planes)
 
 
-LENGTH = number(above=0, rule="a positive length in the input's unit")
-
-_SHARE = number(*LENGTHS, rule="a share of the longest side between {:g} and {:g}".format(*LENGTHS), typed=str)
+_SHARE = number(*SHARES, rule="a share of the longest side between {:g} and {:g}".format(*SHARES), typed=str)
 _SEEDS = custom("a list of at least one finite point [x, y, z]", _seeds)
 _PLANES = custom("a list of (normal, offset) pairs, every normal a finite vector [x, y, z] that is not zero", _planes)
 
 
 @stated(panel="Navigable space (--criterion navigable)", python="NavigableSpace({}=)")
 @dataclass(frozen=True)
-class SpaceOptions:
-    """The options of `rlacd.NavigableSpace`, checked.
+class NavigableSpace:
+    """The criterion "no hull intrudes into the space that a ball can reach".
 
     Attributes
     ----------
@@ -108,7 +106,7 @@ class SpaceOptions:
     def __post_init__(self) -> None:
         absolute = [name for name in ("radius", "tolerance") if getattr(self, f"{name}_abs") is not None]
         for name in absolute:
-            object.__setattr__(self, name, LENGTHS[1])  # anything in range, for the check
+            object.__setattr__(self, name, SHARES[1])  # anything in range, for the check
         check_fields(self)
         for name in absolute:
             object.__setattr__(self, name, None)
@@ -123,14 +121,11 @@ class SpaceOptions:
         """
         return self._in_frame("radius", scale), self._in_frame("tolerance", scale)
 
+    @property
+    def sees_cavities(self) -> bool:
+        """Whether sealed cavities may count, so repair has to keep them."""
+        return not self.reachable_only or self.seeds is not None
+
     def _in_frame(self, name: str, scale: float) -> float:
         share, length = getattr(self, name), getattr(self, f"{name}_abs")
-        if length is None:
-            return 2.0 * float(share)
-        if not 2 * LENGTHS[0] <= length * scale <= 2 * LENGTHS[1]:
-            low, high = (2 * bound / scale for bound in LENGTHS)
-            raise OptionError(
-                f"{name}_abs is {length!r}; for this object it has to be between {low:.4g} and {high:.4g} "
-                f"({LENGTHS[0]:.2%} and {LENGTHS[1]:.0%} of its longest side)."
-            )
-        return float(length * scale)
+        return 2.0 * float(share) if length is None else 2.0 * relative(name, length, scale, SHARES)

@@ -17,11 +17,25 @@ more.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from rlacd.options.fields import one_of, read
 
 PresetName = Literal["mujoco", "physx", "physx-gpu", "unity", "unreal", "newton", "bullet", "godot"]
+
+
+class HullLimits(NamedTuple):
+    """Limits on the vertices and triangles of a hull, at least 4 each; None means no limit.
+
+    A triangulated hull of V corners has 2 V - 4 triangles.
+    """
+
+    max_vertices: int | None = None
+    max_faces: int | None = None
+
+    def allow(self, vertices: int, faces: int) -> bool:
+        """Whether a hull may have so many vertices and triangles."""
+        return vertices <= (self.max_vertices or vertices) and faces <= (self.max_faces or faces)
 
 
 @dataclass(frozen=True)

@@ -37,16 +37,16 @@ class Model:
     threshold: float
 
     @classmethod
-    def of(cls, solid: Component, pieces: Sequence[Shape], goal: Criterion, threshold: float, run: Run) -> Model:
+    def of(cls, solid: Component, pieces: Sequence[Shape], goal: Criterion, run: Run) -> Model:
         """Make the model of a solid; `pieces` are closed solids whose union it is (see `simplify`)."""
         proxy = None
         if math.isfinite(goal.overhang) and len(solid.faces) >= FEW:
             try:
                 with run.stage("simplify"):
-                    proxy = simplify(solid, threshold, run.threads, pieces)
+                    proxy = simplify(solid, goal.overhang, run.threads, pieces)
             except Stopped:
                 run.note_stop()
-        return cls(solid, proxy, threshold)
+        return cls(solid, proxy, goal.overhang)
 
     @property
     def component(self) -> Component:

@@ -17,8 +17,9 @@ from rlacd.merge.merge import Uniter
 from rlacd.run import Run, work
 from rlacd.search.recut import Exchange
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.component import Component, Part
-from rlacd.solid.products import dots
+from rlacd.solid.component import Component, Part, Plane
+from rlacd.solid.hull import Hull
+from rlacd.solid.products import dots, heights
 from rlacd.solid.reunite import reunite
 
 TAKERS = 6
@@ -70,7 +71,8 @@ def redistribute(
     def halves(piece: _Piece) -> list[_Piece]:
         if piece.halves is None:
             may_cut = run.step(0, None, len(now)) and run.work.pay(work.cutting(piece.component.size))
-            piece.halves = [_Piece(half) for half in _halved(piece.component, random)] if may_cut else []
+            halved = _halved(piece.component, now, random) if may_cut else []
+            piece.halves = [_Piece(half) for half in halved]
         return piece.halves
 
     def may_go(piece: _Piece, halvings: int) -> bool:
@@ -133,8 +135,22 @@ def _gaps(boxes: FloatArray, box: FloatArray) -> FloatArray:
     return np.sqrt(dots(apart, apart))
 
 
-def _halved(piece: Component, random: np.random.Generator) -> list[Component]:
-    """Cut across the longest coordinate axis or principal axis, chosen at random; the smaller half first."""
-    along_principal = random.random() >= 0.5
-    halves = piece.halve(along_principal, random.uniform(0.5 - MIDDLE, 0.5 + MIDDLE))
-    return sorted(halves, key=lambda half: half.volume)
+def _halved(piece: Component, parts: Sequence[Part], random: np.random.Generator) -> list[Component]:
+    """Cut across the direction from one to the other of the two parts whose hulls would grow the least by a piece.
+
+    Around a round hole it follows the hole, which no axis does. The smaller half comes first.
+    """
+    growth = [Hull.around(part.hull, piece.hull).volume - part.hull.volume for part in parts]
+    if len(parts) < 2:
+        return []  # what one part cannot take, it cannot take in halves
+    first, second = (parts[i].hull.vertices.mean(axis=0) for i in np.argsort(growth, kind="stable")[:2])
+    length = float(np.sqrt(dots(second - first, second - first)))
+    if length == 0:
+        return []
+    x, y, z = direction = (second - first) / length
+    along = heights(piece.hull.vertices, direction[None])
+    share = random.uniform(0.5 - MIDDLE, 0.5 + MIDDLE)
+    below, above = piece.cut(Plane((float(x), float(y), float(z)), float(along.min() + share * np.ptp(along))))
+    if below is None or above is None:
+        return []
+    return sorted([below, above], key=lambda half: half.volume)

@@ -6,23 +6,29 @@ import numpy as np
 
 from rlacd import _native
 from rlacd.errors import OptionError
+from rlacd.options.presets import HullLimits
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.hull import Hull
 
 TOLERANCE = 1e-6
-"""Corners that change the hull by no more than this (in the frame) are always removed."""
+"""Lengths in the frame that do not count: corners that change the hull by no more are always removed, hulls that are no
+farther apart touch, and one that moves no farther on its way to the input's unit is not measured again."""
 
 _NO_LIMIT = 2**31 - 1
 
 NO_SIDES = np.empty((0, 4))
 
 
+NO_LIMITS = HullLimits()
+
+
+def keeps(hull: Hull, limits: HullLimits) -> bool:
+    """Tell whether a hull has no more vertices and triangles than the limits allow."""
+    return limits.allow(len(hull.vertices), len(hull.faces))
+
+
 def limit_hull(
-    hull: Hull,
-    max_vertices: int | None = None,
-    max_faces: int | None = None,
-    tolerance: float = TOLERANCE,
-    sides: FloatArray = NO_SIDES,
+    hull: Hull, limits: HullLimits = NO_LIMITS, tolerance: float = TOLERANCE, sides: FloatArray = NO_SIDES
 ) -> Hull:
     """Enclose a hull in one with at most the given numbers of corners and triangles, adding little volume.
 
@@ -30,10 +36,7 @@ def limit_hull(
     ----------
     hull : Hull
         Convex, closed, oriented outwards.
-    max_vertices : int, optional
-        At least 4; None means no limit.
-    max_faces : int, optional
-        Limit on triangles, at least 4; None means no limit. A triangulated hull of V corners has 2 V - 4 triangles.
+    limits : HullLimits, optional
     tolerance : float
         Removing nearly redundant corners and facets, which is always done, moves no point of the result farther than
         this from the hull.
@@ -58,19 +61,13 @@ def limit_hull(
     "Silhouette Clipping", SIGGRAPH 2000). Then the remaining corners are moved one at a time to minimise the volume
     while the hull stays convex and contains the given one.
     """
-    for name, limit in (("max_vertices", max_vertices), ("max_faces", max_faces)):
+    for name, limit in limits._asdict().items():
         if limit is not None and limit < 4:
             raise OptionError(f"{name} must be at least 4, the corners and faces of a tetrahedron, not {limit}.")
     if not tolerance >= 0:
         raise OptionError(f"The tolerance must not be negative, as {tolerance} is; 1e-6 is usual.")
-    vertices, faces = _native.simplify_hull(
-        hull.vertices,
-        hull.faces,
-        min(max_vertices or _NO_LIMIT, _NO_LIMIT),
-        min(max_faces or _NO_LIMIT, _NO_LIMIT),
-        tolerance,
-        sides,
-    )
+    most, most_faces = (min(limit or _NO_LIMIT, _NO_LIMIT) for limit in limits)
+    vertices, faces = _native.simplify_hull(hull.vertices, hull.faces, most, most_faces, tolerance, sides)
     if len(vertices) == len(hull.vertices) and (vertices == hull.vertices).all():
         return hull
     return Hull(vertices, faces, _native.mesh_volume(vertices, faces))

@@ -11,25 +11,24 @@ from typing import Any
 
 import numpy as np
 
-from rlacd.criteria import NavigableSpace
 from rlacd.errors import OptionError
 from rlacd.io.read.load import load_mesh
 from rlacd.io.write import file_stem
-from rlacd.options import CONCAVITY, CRITERIA, FAST, Options, criterion_named
+from rlacd.options import CRITERIA, FAST, Options, with_criterion
 from rlacd.options.names import PrimitiveKind
-from rlacd.options.navigable import NAVIGABLE
+from rlacd.options.navigable import NavigableSpace
 from rlacd.options.output import Axis
 from rlacd.solid.input_mesh import InputMesh
 
 _DEFAULTS, _SPACE = Options(), NavigableSpace()
-_NUMBERS = {"criterion", *(number for numbers in CRITERIA.values() for number in numbers)}
+_NUMBERS = {number for numbers in CRITERIA.values() for number in numbers}
 
 
 @dataclasses.dataclass(frozen=True)
 class ViewerControls:
     """Values of the page's controls; see `rlacd.decompose` for their meaning."""
 
-    criterion: str = CONCAVITY
+    criterion: str = str(_DEFAULTS.criterion)
     threshold: float = _DEFAULTS.threshold
     radius: float = _SPACE.radius or 0.0
     tolerance: float = _SPACE.tolerance or 0.0
@@ -50,10 +49,8 @@ class ViewerControls:
         OptionError
             A value is out of range.
         """
-        name = criterion_named(self.criterion)
-        goal = {number: getattr(self, number) for number in CRITERIA[name]}
-        criterion = {"criterion": NavigableSpace(**goal)} if name == NAVIGABLE else {"criterion": name, **goal}
-        options = {key: value for key, value in vars(self).items() if key not in _NUMBERS} | criterion
+        others = _NUMBERS - {*CRITERIA.get(self.criterion, ())}
+        options = with_criterion({key: value for key, value in vars(self).items() if key not in others})
         Options(**options)
         return options
 
@@ -150,7 +147,7 @@ def as_command(mesh: str | os.PathLike[str], given: dict[str, Any], usual: Any) 
     str
         One line, quoted for a POSIX shell.
     """
-    own = CRITERIA.get(str(given.get("criterion")), CRITERIA[CONCAVITY])
+    own = CRITERIA.get(str(given.get("criterion")), Options().numbers)
     others = {number for numbers in CRITERIA.values() for number in numbers} - {*own}
     words = ["rlacd", "decompose", os.fspath(mesh)]
     for field in dataclasses.fields(usual):

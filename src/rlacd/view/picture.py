@@ -13,13 +13,13 @@ import numpy.typing as npt
 
 from rlacd._native import PointTree
 from rlacd.errors import OptionError
+from rlacd.fit import Fit
 from rlacd.io.write import check_file, write_file
 from rlacd.io.write.palette import linear_from_srgb
 from rlacd.options.fields import checked, integer, path_like, read, shown
 from rlacd.options.output import OutputOptions
 from rlacd.result import Result
 from rlacd.solid.balls import Balls
-from rlacd.told_apart import told_apart
 from rlacd.view.coloring import color_hulls
 from rlacd.view.render import Body, Render, Spheres, render, require_extra
 
@@ -163,12 +163,9 @@ def caption(decomposition: Result) -> str:
     report = decomposition.report
     count = len(decomposition)
     words = [f"{count} hull{'s' * (count != 1)}", f"{sum(len(hull.faces) for hull in decomposition)} triangles"]
-    worst = report.get("concavity", {}).get("max")
-    if worst is not None:
-        measured, limit = told_apart(worst, report.get("options", {}).get("threshold", worst))
-        words.append(f"concavity {measured} (threshold {limit})")
-    if "navigable" in report:
-        words.append(f"{report['navigable']['balls']} balls left free")
+    fit = Fit.of(report)
+    if fit is not None and (said := fit.words()):
+        words.append(said)
     total = report.get("seconds", {}).get("total")
     if total is not None:
         words.append(f"{total:.2f} s")

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rlacd.fit import Fit
 from rlacd.result import Result
 from rlacd.solid.frame import Frame
 from rlacd.solid.primitive import PRIMITIVE
@@ -118,7 +119,7 @@ def _mesh(vertices: ArrayLike, faces: ArrayLike) -> dict[str, str]:
 
 
 def _errors(report: dict[str, Any], count: int) -> list[float | None]:
-    """The criterion's measurement of each part, for either criterion."""
-    measured = report.get("concavity") or report.get("volume") or report.get("navigable", {}).get("intrusion") or {}
-    per_part = measured.get("per_part") or []
+    """The criterion's measurement of each part."""
+    fit = Fit.of(report)
+    per_part = (fit and fit.per_part) or []
     return list(per_part) if len(per_part) == count else [None] * count

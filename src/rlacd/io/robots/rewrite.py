@@ -26,7 +26,7 @@ from rlacd.io.robots.urdf import plan_urdf
 from rlacd.io.write import check_file, check_name, file_stem, write_file
 from rlacd.io.write.encode import encode_plain_obj
 from rlacd.io.write.folder import check_names, write_folder
-from rlacd.options import CONCAVITY, MAX_THRESHOLD
+from rlacd.options import LENGTHS, OPTION_NAMES, Options
 from rlacd.options.fields import checked, path_like, read, shown
 from rlacd.options.output import OutputOptions
 from rlacd.solid.frame import Frame
@@ -204,18 +204,16 @@ def _reference(old: str, hull: str, references: References, folder: Path) -> str
 def _fewer(meshes: Mapping[MeshUse, RewrittenMesh], options: Mapping[str, Any]) -> list[str]:
     """Say what one threshold for the whole robot would give, if each mesh's own made many hulls of small ones."""
     hulls = sum(len(mesh.files) for mesh in meshes.values())
-    of_meshes = "criterion" not in options or options["criterion"] == CONCAVITY
+    asked = Options(**{name: options[name] for name in OPTION_NAMES if name in options})
     stated = any(options.get(name) is not None for name in ("threshold_abs", "max_hulls", "timeout"))
-    if not of_meshes or stated or len(meshes) < 2 or hulls < MANY * len(meshes):
+    if "threshold" not in asked.numbers or stated or len(meshes) < 2 or hulls < MANY * len(meshes):
         return []
     largest = min(mesh.result.report["scale"] for mesh in meshes.values())
     quick = {name: value for name, value in options.items() if name not in ("threshold", "budget", "search_steps")}
+    quick |= {"quality": "fast", "criterion": asked.criterion}  # by distance, as a length is taken, there are no more
     for times in LARGER:
         length = float(f"{times * _threshold(meshes) / largest:.1g}")
-        fewer = sum(
-            len(_coarse(mesh.result.source, {**quick, "quality": "fast", "threshold_abs": length}))
-            for mesh in meshes.values()
-        )
+        fewer = sum(len(_coarse(mesh.result.source, {**quick, "threshold_abs": length})) for mesh in meshes.values())
         if fewer <= FEWER * hulls:
             return [
                 f"{len(meshes)} meshes became {hulls} hulls, because the threshold is relative to each; "
@@ -241,7 +239,7 @@ def _coarse(mesh: trimesh.Trimesh, options: Mapping[str, Any]) -> Decomposition:
     given = dict(options)
     if isinstance(given.get("threshold_abs"), (int, float)):
         scale = Frame.of(mesh.vertices[np.unique(mesh.faces)] if len(mesh.faces) else mesh.vertices).scale
-        given["threshold_abs"] = min(given["threshold_abs"], MAX_THRESHOLD / scale)
+        given["threshold_abs"] = min(given["threshold_abs"], LENGTHS["threshold"][1] / scale)
     return decompose((mesh.vertices, mesh.faces), **given)
 
 

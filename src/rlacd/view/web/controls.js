@@ -92,7 +92,8 @@ export class Controls {
       "Criterion",
       "criterion",
       [
-        ["concavity", "Concavity", "Every hull stays within the threshold of the surface, everywhere."],
+        ["concavity", "Concavity", "Every hull stays within the threshold of the surface, everywhere, and adds little volume: CoACD's measure."],
+        ["distance", "Distance", "Every hull stays within the threshold of the surface, everywhere."],
         ["volume", "Volume", "Every hull adds at most a share of volume, as V-HACD and NavACD measure it."],
         ["navigable", "Navigable space", "Hulls stay out of where a ball can go. Dents too narrow for the ball are filled, which saves hulls."],
       ],
@@ -136,8 +137,8 @@ export class Controls {
     this.overlap = new Length(
       "overlap",
       "Overlap",
-      "How deep hulls that touch reach into each other, so that nothing thin slips between them. 0.05 is 2.5 % of the longest side, which counts as 2.",
-      [0.002, 0.2],
+      "How deep hulls that touch reach into each other, so that nothing thin slips between them. 0.05 is 5 % of the longest side.",
+      [0.001, 0.1],
       given.overlap,
       this.changed,
       { orNone: true },
@@ -206,14 +207,14 @@ export class Controls {
     this.threshold.tell(scene, 1);
     this.radius.tell(scene, 2);
     this.tolerance.tell(scene, 2);
-    this.overlap.tell(scene, 1);
+    this.overlap.tell(scene, 2);
     this.open.hidden = this.options.open === "auto" && !hasOpenBodies(scene);
   }
 
   #arrange() {
     const { criterion } = this.options;
     const navigable = criterion === "navigable";
-    this.threshold.element.hidden = criterion !== "concavity";
+    this.threshold.element.hidden = criterion === "navigable" || criterion === "volume";
     this.volume.element.hidden = criterion !== "volume";
     this.radius.element.hidden = this.tolerance.element.hidden = !navigable;
   }

@@ -49,12 +49,13 @@ export const HINTS = {
 export function summary(scene, { draft = false } = {}) {
   const { report, parts } = scene;
   if (!report) return [];
-  const { concavity, volume, navigable, seconds } = report;
+  const { concavity, distance, volume, navigable, seconds } = report;
   const words = [
     term(plural(parts.length, "hull"), HINTS.hull),
     report.primitives && term(plural(parts.filter((part) => part.primitive).length, "primitive"), HINTS.primitives),
     term(plural(report.faces ?? parts.length, "triangle"), HINTS.triangles),
     concavity && term(`concavity\u00a0${measure(concavity.max, scene)}`, HINTS.concavity),
+    distance && term(`distance\u00a0${measure(distance.max, scene)}`, HINTS.concavity),
     volume?.max != null && term(`${percent(volume.max)} of volume added`, HINTS.added),
     navigable && term(`${plural(navigable.balls, "ball")} left free`, HINTS.balls),
     !draft && seconds?.total != null && term(`${seconds.total.toFixed(2)}\u00a0s`, HINTS.seconds),
@@ -92,6 +93,7 @@ export function fitTable(report, scene) {
     if (value != null) rows.push([term(name, hint), measure(value, scene), `${digits(50 * value, 2)}\u00a0%`]);
   };
   add("Largest concavity", report.concavity?.max, HINTS.concavity);
+  add("Largest distance", report.distance?.max, HINTS.concavity);
   if (report.volume?.max != null) rows.push([term("Largest added volume", HINTS.added), percent(report.volume.max), ""]);
   add("Deepest intrusion", report.navigable?.intrusion?.max, HINTS.intrusion);
   add("Hulls beyond the input", report.hausdorff?.over, HINTS.over);

@@ -43,7 +43,7 @@ export class PartList {
       ["index", "Part", "In the order of the file."],
       ["faces", "Faces", scene.report?.primitives ? "Triangles of the hull, or the primitive that the part is." : "Triangles of the hull."],
       ["share", "Volume", "Share of all hulls' volume."],
-      volume ? ["error", "Added", `${HINTS.added} The bar is full at the tolerance.`] : navigable ? ["error", `Intrusion${unit}`, HINTS.intrusion] : ["error", `Concavity${unit}`, `${HINTS.concavity} The bar is full at the threshold.`],
+      volume ? ["error", "Added", `${HINTS.added} The bar is full at the tolerance.`] : navigable ? ["error", `Intrusion${unit}`, HINTS.intrusion] : ["error", `${scene.report?.distance ? "Distance" : "Concavity"}${unit}`, `${HINTS.concavity} The bar is full at the threshold.`],
     ];
     this.head.replaceChildren(
       ...this.columns.map(([key, text, hint]) =>

@@ -37,7 +37,7 @@ def solid_of(manifold: Any) -> Solid:
 
 
 def prepare(manifold: Any, radius: float = RADIUS, tolerance: float = TOLERANCE, **options: Any) -> Navigable:
-    return NavigableSpace(radius, tolerance, **options).prepare(solid_of(manifold), threads=1)
+    return Navigable.of(NavigableSpace(radius, tolerance, **options), solid_of(manifold), threads=1)
 
 
 def turned(manifold: Any, turn: int) -> Any:
@@ -101,7 +101,7 @@ SHAPES = {
 @pytest.mark.parametrize("name", SHAPES)
 def test_balls_are_where_the_definition_says(name: str) -> None:
     solid = solid_of(SHAPES[name])
-    nav = NavigableSpace(RADIUS, TOLERANCE).prepare(solid)
+    nav = Navigable.of(NavigableSpace(RADIUS, TOLERANCE), solid)
     check_balls(nav, solid)
 
 
@@ -129,7 +129,7 @@ def check_balls(nav: Navigable, solid: Solid) -> None:
 def test_the_boundary_is_covered(name: str, radius: float, tolerance: float) -> None:
     """Points at the distance of radius and tolerance, found without a grid; all of these shapes are open."""
     solid = solid_of(SHAPES[name])
-    nav = NavigableSpace(radius, tolerance).prepare(solid)
+    nav = Navigable.of(NavigableSpace(radius, tolerance), solid)
     mesh = from_manifold(solid.manifold)
     surface, hull = _native.Surface(mesh.vertices, mesh.faces), Hull.of(mesh.vertices)
     assert hull is not None
@@ -152,7 +152,7 @@ def test_creases_and_corners_get_a_ball(turn: int) -> None:
     """Where three walls meet a ball touches all of them, and where two meet there is one every spacing."""
     corner = turned(box((-1, -1, -1), (1, 1, 1)) - box((-0.5, -0.5, -0.5), (2, 2, 2)), turn)
     solid = solid_of(corner)
-    nav = NavigableSpace(RADIUS, TOLERANCE).prepare(solid)
+    nav = Navigable.of(NavigableSpace(RADIUS, TOLERANCE), solid)
     off_walls = (upright(solid.frame.to_input(nav.balls.centres), turn) + 0.5) * solid.frame.scale
     touched = (np.abs(off_walls - (R + T)) < 1e-6).sum(axis=1)
     assert (touched == 3).sum() == 1
@@ -176,7 +176,7 @@ def test_a_convex_solid_has_no_balls() -> None:
 def test_the_hole_of_a_torus_is_open_when_the_ball_fits(turn: int, hole: float, share: float, is_open: bool) -> None:
     """A ball too large for it sinks into the hole from both sides, but not to its middle."""
     solid = solid_of(turned(torus(hole), turn))
-    nav = NavigableSpace(radius_abs=0.7 * share * hole, tolerance_abs=0.3 * share * hole).prepare(solid)
+    nav = Navigable.of(NavigableSpace(radius_abs=0.7 * share * hole, tolerance_abs=0.3 * share * hole), solid)
     centres = solid.frame.to_input(nav.balls.centres)
     assert len(centres) > 0
     assert (np.linalg.norm(centres, axis=1) < 0.43 * hole).any() == is_open
@@ -187,7 +187,7 @@ def test_the_hole_of_a_torus_is_open_when_the_ball_fits(turn: int, hole: float, 
 def test_a_tube_is_open_exactly_when_the_ball_fits(turn: int, share: float, is_open: bool) -> None:
     hole = manifold3d.Manifold.cylinder(4, 0.2, circular_segments=256, center=True)
     solid = solid_of(turned(manifold3d.Manifold.cylinder(2, 0.5, circular_segments=64, center=True) - hole, turn))
-    nav = NavigableSpace(radius_abs=0.15 * share, tolerance_abs=0.05 * share).prepare(solid)
+    nav = Navigable.of(NavigableSpace(radius_abs=0.15 * share, tolerance_abs=0.05 * share), solid)
     centres = solid.frame.to_input(nav.balls.centres)
     assert (np.linalg.norm(centres, axis=1) < 0.15).any() == is_open
 
@@ -199,7 +199,7 @@ def test_a_tube_is_open_exactly_when_the_ball_fits(turn: int, share: float, is_o
 def test_a_door_lets_in_what_is_narrower(turn: int, wall: float, share: float) -> None:
     diameter = 0.2
     home = turned(house(share * diameter, wall), turn)
-    nav = NavigableSpace(radius_abs=diameter / 2, tolerance_abs=0.02).prepare(solid_of(home))
+    nav = Navigable.of(NavigableSpace(radius_abs=diameter / 2, tolerance_abs=0.02), solid_of(home))
     assert inside_house(nav, home, turn).any() == (share > 1)
 
 
@@ -211,7 +211,7 @@ def test_a_round_hole_lets_in_what_is_narrower(turn: int, share: float, wall: fl
     radius = 0.1
     hole = manifold3d.Manifold.cylinder(2, share * radius, circular_segments=256).rotate((0, 90, 0))
     home = turned(house(None, wall) - hole.translate((0.5, 0.2, 0.23)), turn)
-    nav = NavigableSpace(radius_abs=radius, tolerance_abs=0.01).prepare(solid_of(home))
+    nav = Navigable.of(NavigableSpace(radius_abs=radius, tolerance_abs=0.01), solid_of(home))
     assert inside_house(nav, home, turn).any() == (share > 1)
 
 
@@ -226,13 +226,13 @@ def test_a_winding_passage_is_followed(turn: int, share: float) -> None:
         box((0.9 - half, 0.4 - half, -half), (2, 0.4 + half, half)),
     ]
     home = turned(house(None, 0.6) - manifold3d.Manifold.batch_boolean(legs, manifold3d.OpType.Add), turn)
-    nav = NavigableSpace(radius_abs=0.1, tolerance_abs=0.01).prepare(solid_of(home))
+    nav = Navigable.of(NavigableSpace(radius_abs=0.1, tolerance_abs=0.01), solid_of(home))
     assert inside_house(nav, home, turn).any() == (share > 1)
 
 
 def test_of_two_doors_the_wider_one_counts() -> None:
     home = house(0.98 * 0.2) - box((-2, -0.2, -0.1), (0, -0.2 + 1.02 * 0.2, 0.4))
-    nav = NavigableSpace(radius_abs=0.1, tolerance_abs=0.01).prepare(solid_of(home))
+    nav = Navigable.of(NavigableSpace(radius_abs=0.1, tolerance_abs=0.01), solid_of(home))
     assert inside_house(nav, home, 0).any()
 
 
@@ -269,7 +269,7 @@ def test_the_ground_keeps_balls_above_it() -> None:
     """A table on the ground: balls go under it from the sides. A crate upside down: nothing comes in."""
     ground = ((0, 0, 2), -1.6)  # z = -0.8; the normal's length does not matter
     solid = solid_of(table())
-    nav = NavigableSpace(RADIUS, TOLERANCE, closed_planes=[ground]).prepare(solid)
+    nav = Navigable.of(NavigableSpace(RADIUS, TOLERANCE, closed_planes=[ground]), solid)
     floor = float(solid.frame.to_frame([[0, 0, -0.8]])[0, 2])
     lowest = nav.balls.centres[:, 2] - nav.balls.radii
     assert lowest.min() == pytest.approx(floor, abs=1e-9)
@@ -284,7 +284,7 @@ def test_the_ground_keeps_balls_above_it() -> None:
 def test_a_table_leg_seen_from_the_ground_up() -> None:
     """Between the legs, just above the ground, a hull is met by balls that stand on the ground."""
     solid = solid_of(table())
-    nav = NavigableSpace(RADIUS, TOLERANCE, closed_planes=[((0, 0, 1), -0.8)]).prepare(solid)
+    nav = Navigable.of(NavigableSpace(RADIUS, TOLERANCE, closed_planes=[((0, 0, 1), -0.8)]), solid)
     lowest = solid.manifold.bounding_box()[2]
     feet = from_manifold(solid.manifold.trim_by_plane((0, 0, -1), -lowest - 0.02)).vertices
     hull = Hull.of(feet)
@@ -296,22 +296,11 @@ def test_a_table_leg_seen_from_the_ground_up() -> None:
 def test_the_number_of_threads_changes_nothing(reachable_only: bool) -> None:
     solid = solid_of(turned(house(0.21), 1))
     space = NavigableSpace(0.05, 0.01, reachable_only=reachable_only)
-    first = space.prepare(solid, threads=1)
+    first = Navigable.of(space, solid, threads=1)
     for threads in (2, 5):
-        other = space.prepare(solid, threads=threads)
+        other = Navigable.of(space, solid, threads=threads)
         np.testing.assert_array_equal(first.balls.centres, other.balls.centres)
         np.testing.assert_array_equal(first.balls.radii, other.balls.radii)
-
-
-def test_lengths_in_the_unit_of_the_input() -> None:
-    here, there = (table().scale((s,) * 3).translate((1, 2, 3)) for s in (1, 0.01))
-    # The longest side is 2 and 0.02.
-    a = prepare(here, 0.05, 0.02)
-    b = NavigableSpace(radius_abs=0.001, tolerance_abs=0.0004).prepare(solid_of(there))
-    assert (b.radius, b.tolerance) == pytest.approx((a.radius, a.tolerance))
-    assert len(b.balls) == pytest.approx(len(a.balls), rel=0.01)  # rounding decides between equals
-    assert cKDTree(a.balls.centres).query(b.balls.centres)[0].max() < a.radius / 2
-    assert b.space.radius is None
 
 
 @pytest.mark.parametrize(
@@ -370,7 +359,7 @@ def test_a_radius_too_small_for_the_grid_is_reported() -> None:
 
 def test_what_was_open_is_reported() -> None:
     vertices, faces = _cup()
-    nav = NavigableSpace().prepare(repair(load_mesh((vertices, faces))))
+    nav = Navigable.of(NavigableSpace(), repair(load_mesh((vertices, faces))))
     assert any("open bod" in warning for warning in nav.warnings)
     assert len(nav.balls) > 0
 
@@ -393,7 +382,7 @@ def part_of(hull: Hull, within: Part | None = None) -> Part:
 def some_balls(count: int = 400, seed: int = 3) -> Navigable:
     rng = np.random.default_rng(seed)
     balls = Balls(rng.uniform(-1, 1, (count, 3)), rng.uniform(0.05, 0.2, count))
-    return Navigable(NavigableSpace(0.025, 0.01), 0.05, 0.02, balls)
+    return Navigable(0.05, 0.02, balls)
 
 
 def some_hull(seed: int, size: float = 0.4) -> Hull:
@@ -425,11 +414,11 @@ def test_scaling_twice_is_scaling_by_the_product() -> None:
 
 def test_children_are_judged_as_if_they_had_no_parents() -> None:
     solid = solid_of(turned(table(), 1))
-    nav = NavigableSpace(RADIUS, TOLERANCE).prepare(solid)
+    nav = Navigable.of(NavigableSpace(RADIUS, TOLERANCE), solid)
     generation = [Component(solid.manifold)]
     for axis in (0, 1, 2, 0, 1):
         for component in generation:
-            alone = NavigableSpace(RADIUS, TOLERANCE).prepare(solid)
+            alone = Navigable.of(NavigableSpace(RADIUS, TOLERANCE), solid)
             assert nav.is_met(component) == alone.is_met(part_of(component.hull))
             assert nav.error(component) == alone.error(part_of(component.hull))
         normal = tuple(float(axis == i) for i in range(3))
@@ -439,7 +428,7 @@ def test_children_are_judged_as_if_they_had_no_parents() -> None:
 
 
 def test_a_part_smaller_than_half_the_tolerance_is_done() -> None:
-    nav = Navigable(NavigableSpace(0.1, 0.1), 0.2, 0.2, Balls(np.zeros((1, 3)), np.array([0.2])))
+    nav = Navigable(0.2, 0.2, Balls(np.zeros((1, 3)), np.array([0.2])))
     for side, done in ((0.09, True), (0.11, False)):
         hull = Hull.of(side * np.array(list(itertools.product((0, 1), repeat=3)), dtype=float))
         assert hull is not None
@@ -470,7 +459,7 @@ def test_on_real_meshes(corpus: Path) -> None:
     for name in (corpus / "quick.txt").read_text().split()[::4]:
         solid = repair(load_mesh(corpus / name))
         for radius, tolerance in ((0.025, 0.05), (0.05, 0.01)):
-            nav = NavigableSpace(radius, tolerance).prepare(solid)
+            nav = Navigable.of(NavigableSpace(radius, tolerance), solid)
             mesh = from_manifold(solid.manifold)
             surface = _native.Surface(mesh.vertices, mesh.faces)
             distance = surface.distance(nav.balls.centres)

@@ -20,10 +20,10 @@ from rlacd.cli.options import decompose_options
 from rlacd.compat import coacd, vhacd
 from rlacd.errors import MeshFileError, OptionError, RlacdError, WeightsError
 from rlacd.learn.options import TrainOptions
-from rlacd.options import CONCAVITY, OPTION_NAMES, Options
+from rlacd.options import OPTION_NAMES, Options
 from rlacd.options.fields import check_callback
 from rlacd.options.names import SCORES as SCORE_NAMES
-from rlacd.options.navigable import SpaceOptions
+from rlacd.options.navigable import NavigableSpace
 from rlacd.options.output import OutputOptions
 from rlacd.policies.greedy import SCORES
 
@@ -92,7 +92,6 @@ ODD: dict[str, Any] = {
     "class": int,
     "class of options": rlacd.NavigableSpace,
     "space": rlacd.NavigableSpace(),
-    "bare space": SpaceOptions(),
     "function": lambda: None,
     "hostile": Hostile(),
     "hostile in a list": [Hostile()],
@@ -185,7 +184,7 @@ def test_options_of_the_other_functions_are_checked(odd: Any, tmp_path: Path) ->
         ({"quality": np.eye(2)}, r"quality is array\(\[\[1\., 0\.\], \[0\., 1\.\]\]\); it has to be one of fast, "),
         (
             {"criterion": np.zeros(2)},
-            r'criterion is array\(.*\); it has to be "concavity", "volume" or an `rlacd\.NavigableSpace`',
+            r"criterion is array\(.*\); it has to be concavity, distance, volume or an `rlacd\.NavigableSpace`",
         ),
         ({"seed": 10**5000}, "seed is an object of type int; it has to be an integer between 0 and"),
         (
@@ -233,7 +232,7 @@ def test_a_length_may_be_a_share_or_in_metres() -> None:
     assert decompose_options({"threshold": "5 mm"}, metres=True) == {"threshold_abs": 0.005}
     space = decompose_options({"criterion": "navigable", "radius": "4%", "tolerance": "2cm"}, metres=True)["criterion"]
     assert (space.radius, space.tolerance_abs) == (0.04, 0.02)
-    with pytest.raises(OptionError, match="does not say its unit; give --threshold-abs"):
+    with pytest.raises(OptionError, match="does not say its unit; give --unit, or --threshold-abs"):
         decompose_options({"threshold": "0.05m"})
     for word in ("tight", "5 %%", "", "1e", "m", "0.1 miles"):
         with pytest.raises(OptionError, match="--threshold is"):
@@ -256,7 +255,7 @@ def test_every_option_of_names_has_a_literal_type() -> None:
             assert " ".join(typing.get_args(literal)) == known.kind.values
 
 
-@pytest.mark.parametrize("options", [Options, SpaceOptions, OutputOptions, TrainOptions])
+@pytest.mark.parametrize("options", [Options, NavigableSpace, OutputOptions, TrainOptions])
 def test_every_option_and_no_other_name_is_explained(options: Any) -> None:
     explained = [line.strip() for line in options.__doc__.splitlines() if re.fullmatch(r" {4}\w+", line)]
     fields = dataclasses.fields(options)
@@ -272,4 +271,4 @@ def test_plain_values_are_kept() -> None:
     options = Options(threshold=np.float32(0.5), seed=np.uint8(3), merge=np.False_, policy=np.str_("navacd"))
     kinds = [type(value) for value in (options.threshold, options.seed, options.merge, options.policy)]
     assert kinds == [float, int, bool, str]
-    assert options.criterion == CONCAVITY
+    assert options.criterion == "concavity"

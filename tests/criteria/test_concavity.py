@@ -233,12 +233,6 @@ def test_parts_out_of_reach_and_excluded_volumes_never_meet() -> None:
     assert criterion.screen.excludes(1.0, 1.0 + 4 / 3 * np.pi * 0.167**3)
 
 
-def test_same_answer_every_time() -> None:
-    bowl = manifold3d.Manifold.sphere(1.0, 40) - manifold3d.Manifold.sphere(0.6, 32).translate((0, 0, 0.7))
-    part = from_manifold(bowl)
-    assert Concavity().measure(part) == Concavity().measure(part)
-
-
 @pytest.mark.parametrize("threshold", [0, -1, float("nan")])
 def test_bad_options_are_refused(threshold: float) -> None:
     with pytest.raises(OptionError, match="must be positive"):

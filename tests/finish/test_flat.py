@@ -11,6 +11,7 @@ from manifold3d import Manifold
 import rlacd
 from rlacd.finish.flat import FLUSH, resting_sides
 from rlacd.io.read.load import load_mesh
+from rlacd.options.presets import HullLimits
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component
 from rlacd.solid.limit_hull import limit_hull
@@ -41,7 +42,7 @@ def test_it_does_not_rest_where_its_centre_of_mass_is_not_above() -> None:
 def test_a_simpler_hull_stays_above_the_ground(corners: int) -> None:
     solid = Component(cup())
     ground = np.array([[0.0, 0.0, -1.0, FLUSH]])
-    simple = limit_hull(solid.hull, corners, tolerance=0.02, sides=ground)
+    simple = limit_hull(solid.hull, HullLimits(corners, None), 0.02, ground)
     assert len(simple.vertices) <= corners
     assert simple.vertices[:, 2].min() >= -2 * FLUSH
 

@@ -17,9 +17,10 @@ from rlacd import _native
 from rlacd.criteria import Concavity
 from rlacd.errors import OptionError
 from rlacd.finish.limit import limit_part
+from rlacd.options.presets import HullLimits
 from rlacd.solid.component import Part
 from rlacd.solid.hull import Hull
-from rlacd.solid.limit_hull import NO_SIDES, limit_hull
+from rlacd.solid.limit_hull import NO_LIMITS, NO_SIDES, limit_hull
 
 
 def hull_of(points: np.ndarray) -> Hull:
@@ -55,7 +56,7 @@ def exactly_convex(hull: Hull) -> bool:
 
 
 def check(hull: Hull, max_vertices: int | None = None, max_faces: int | None = None) -> Hull:
-    limited = limit_hull(hull, max_vertices, max_faces)
+    limited = limit_hull(hull, HullLimits(max_vertices, max_faces))
     assert len(limited.vertices) <= (max_vertices or len(hull.vertices))
     assert len(limited.faces) <= (max_faces or len(hull.faces))
     assert len(limited.faces) == 2 * len(limited.vertices) - 4
@@ -106,7 +107,7 @@ def test_what_is_hardly_there_is_held(seed: int, plate: bool, thickness: float) 
     """It gets a billionth of its length as thickness: without, rounding left out 2e-4 of a needle's length."""
     random = np.random.default_rng(seed)
     hull = hull_of(random.uniform(-1, 1, (40, 3)) * [1, 0.8 if plate else thickness, thickness])
-    limited = limit_hull(hull, max_vertices=int(random.integers(4, 13)))
+    limited = limit_hull(hull, HullLimits(int(random.integers(4, 13))))
     assert len(limited.vertices) <= 12
     assert exactly_convex(limited)
     middle = hull.vertices.mean(axis=0)
@@ -158,7 +159,7 @@ def test_prism_keeps_its_flat_ends() -> None:
 
 def test_box_of_eight_is_left_alone() -> None:
     hull = hull_of(np.array(np.meshgrid([0, 1], [0, 2], [0, 3])).reshape(3, -1).T.astype(float))
-    assert limit_hull(hull, max_vertices=8) is hull
+    assert limit_hull(hull, HullLimits(8)) is hull
     assert limit_hull(hull) is hull
     assert check(hull, max_vertices=4).volume < 4.6 * hull.volume
 
@@ -188,7 +189,7 @@ def test_clean_up_stays_within_the_tolerance() -> None:
 
 
 def test_same_bits_every_time() -> None:
-    one, two = (limit_hull(ball(300), max_vertices=24) for _ in range(2))
+    one, two = (limit_hull(ball(300), HullLimits(24)) for _ in range(2))
     assert one.vertices.tobytes() == two.vertices.tobytes()
     assert one.faces.tobytes() == two.faces.tobytes()
 
@@ -214,7 +215,7 @@ def test_real_hulls(corpus: Path) -> None:
 @pytest.mark.parametrize("limits", [{"max_vertices": 3}, {"max_faces": 3}, {"max_vertices": -1}])
 def test_impossible_limits_are_refused(limits: dict[str, int]) -> None:
     with pytest.raises(OptionError, match="at least 4"):
-        limit_hull(ball(20), **limits)
+        limit_hull(ball(20), HullLimits(**limits))
     with pytest.raises(OptionError, match="tolerance"):
         limit_hull(ball(20), tolerance=-1.0)
 
@@ -235,11 +236,11 @@ def test_redundant_corners_stay_if_the_threshold_needs_them() -> None:
     chamfer = np.ones(3) - 4e-7 * np.eye(3)
     hull = hull_of(np.concatenate([cube[:-1], chamfer]))
     part = Part(hull.vertices, hull.faces, hull.volume, hull)
-    simple = limit_part(part, None, None)
+    simple = limit_part(part, NO_LIMITS)
     assert len(simple.hull.vertices) == 8 < len(hull.vertices)
     tight = Concavity(1e-7)  # the corner lies 4e-7 / sqrt(3) outside
     assert tight.is_met(part)
     assert not tight.is_met(simple)
-    assert limit_part(part, None, None, tight) is part
-    assert limit_part(part, 8, None, tight).hull.volume == simple.hull.volume
-    assert limit_part(part, None, None, Concavity(0.05)).hull.volume == simple.hull.volume
+    assert limit_part(part, NO_LIMITS, tight) is part
+    assert limit_part(part, HullLimits(8), tight).hull.volume == simple.hull.volume
+    assert limit_part(part, NO_LIMITS, Concavity(0.05)).hull.volume == simple.hull.volume

@@ -251,7 +251,7 @@ def test_the_command_takes_seeds_and_planes(mesh: Path, tmp_path: Path) -> None:
         (["--radius", "0.05"], "--radius needs --criterion navigable"),
         (["--everywhere"], "--everywhere needs --criterion navigable"),
         (["--balls", "b.csv"], "--balls needs --criterion navigable"),
-        (["--criterion", "navigable", "-t", "0.1"], "belongs to --criterion concavity"),
+        (["--criterion", "navigable", "-t", "0.1"], "has radius and tolerance instead"),
         (["--criterion", "navigable", "--radius", "0"], "radius"),
         (["--criterion", "navigable", "--tolerance", "-1"], "tolerance"),
         (["--criterion", "navigable", "--seed-point", "1,2"], "--seed-point is '1,2'; it takes 3 numbers"),

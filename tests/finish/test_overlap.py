@@ -86,7 +86,7 @@ OPTIONS: list[dict[str, Any]] = [
 def test_no_needle_slips_between_hulls_that_overlap(options: dict[str, Any]) -> None:
     mesh = stool()
     flush = rlacd.decompose(mesh, quality="fast", threads=1, **options)
-    result = rlacd.decompose(mesh, quality="fast", threads=1, overlap=OVERLAP, **options)
+    result = rlacd.decompose(mesh, quality="fast", threads=1, overlap=OVERLAP / 2, **options)
     overlap = OVERLAP / result.report["scale"]
     places, deep = needles(mesh, flush.hulls, overlap / 10)
     assert len(places) > 100
@@ -102,7 +102,7 @@ def test_no_needle_slips_between_hulls_that_overlap(options: dict[str, Any]) -> 
 
 @pytest.mark.promise("overlap")
 def test_the_threshold_holds_and_each_hull_contains_its_own() -> None:
-    flush, result = (rlacd.decompose(stool(), quality="fast", threads=1, overlap=depth) for depth in (0.0, OVERLAP))
+    flush, result = (rlacd.decompose(stool(), quality="fast", threads=1, overlap=depth / 2) for depth in (0.0, OVERLAP))
     assert len(flush) == len(result)
     assert result.report["concavity"]["max"] <= 0.05
     assert result.report["hausdorff"]["over"] <= 0.05
@@ -194,7 +194,7 @@ def test_parts_that_do_not_touch_or_share_only_an_edge_stay_as_they_are() -> Non
 def test_a_seam_without_room_is_told() -> None:
     """Two blocks of a stair: what either takes in of the other spans the step between them."""
     mesh = solid(Manifold.cube((1.0, 1.0, 1.0)) + Manifold.cube((1.0, 1.0, 1.0)).translate((1.0, 0.5, 0.5)))
-    result = rlacd.decompose(mesh, threshold=0.003, overlap=0.2, quality="fast", threads=1)
+    result = rlacd.decompose(mesh, threshold=0.003, overlap=0.1, quality="fast", threads=1)
     overlap = result.report["overlap"]
     assert overlap["short"] > 0
     (told,) = (warning for warning in result.report["warnings"] if "seams" in warning)
@@ -217,7 +217,7 @@ def test_where_a_layer_at_all_seams_is_too_much_one_at_this_seam_is_taken() -> N
         low, size = random.integers(0, 8, 3) / 4, random.integers(1, 7, 3) / 4
         turned = float(random.uniform(-40, 40)), 0.0, float(random.uniform(-40, 40))
         blocks += Manifold.cube(size.tolist()).rotate(turned).translate(low.tolist())
-    overlap = rlacd.decompose(solid(blocks), overlap=0.1, quality="fast", threads=1).report["overlap"]
+    overlap = rlacd.decompose(solid(blocks), overlap=0.05, quality="fast", threads=1).report["overlap"]
     assert overlap["seams"] >= 4
     assert overlap["short"] <= 1
 
@@ -242,7 +242,7 @@ def test_few_needles_slip_between_hulls_of_real_objects(corpus: Path, name: str,
     """Those that do slip at seams that are told to be short."""
     mesh = corpus / "test" / "vhacd" / name
     flush = rlacd.decompose(mesh, quality="fast", threads=1, detail="full")
-    result = rlacd.decompose(mesh, quality="fast", threads=1, overlap=0.02)
+    result = rlacd.decompose(mesh, quality="fast", threads=1, overlap=0.01)
     overlap = 0.02 / result.report["scale"]
     places, deep = needles(flush.source, flush.hulls, overlap / 10)
     assert slips(flush.hulls, places, deep, overlap) > 0.9
@@ -305,11 +305,11 @@ def test_coacd_extrudes_the_same_way() -> None:
 
 
 def test_lengths_are_given_like_the_threshold() -> None:
-    assert Options(overlap_abs=0.5).at_scale(0.1).overlap == pytest.approx(0.05)
+    assert Options(overlap_abs=0.5).at_scale(0.1).overlap == pytest.approx(0.025)
     assert Options(overlap=0.1).for_node(1.0, 2.0).overlap == pytest.approx(0.2)
     assert Options(overlap=0.1, relative_to="node").for_node(1.0, 2.0).overlap == 0.1
-    assert Options(overlap_abs=0.1, relative_to="node").for_node(1.0, 2.0).overlap == pytest.approx(0.2)
-    assert decompose_options({"overlap": "1%"}) == {"overlap": 0.02}
+    assert Options(overlap_abs=0.1, relative_to="node").for_node(1.0, 2.0).overlap == pytest.approx(0.1)
+    assert decompose_options({"overlap": "1%"}) == {"overlap": 0.01}
     assert decompose_options({"overlap": "2mm"}, metres=True) == {"overlap_abs": 0.002}
     assert decompose_options({"overlap": "0.01"}) == {"overlap": 0.01}
     with pytest.raises(OptionError, match="overlap_abs"):

@@ -1,0 +1,83 @@
+"""How well hulls fit, as a report says it: the criterion's measurement of each part, beside its limit, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+LENGTHS = ("concavity", "distance")
+"""Criteria that measure a length, which the threshold limits."""
+
+
+class Fit(NamedTuple):
+    """What a criterion measured.
+
+    Attributes
+    ----------
+    name : str
+        The measurement; also its key in summaries.
+    per_part : list of float or None
+        None, like `worst`, where there was no time.
+    worst : float or None
+    limit : float or None
+        None for navigable space, of which hulls may touch nothing.
+    balls : int
+        Of navigable space.
+    """
+
+    name: str
+    per_part: list[float] | None
+    worst: float | None
+    limit: float | None
+    balls: int = 0
+
+    @classmethod
+    def of(cls, report: Mapping[str, Any]) -> Fit | None:
+        """Read a report; None if it does not say."""
+        for name in LENGTHS:
+            if name in report:
+                found = report[name]
+                return cls(name, found.get("per_part"), found["max"], report.get("options", {}).get("threshold"))
+        if "volume" in report:
+            found = report["volume"]
+            return cls("added_volume", found["per_part"], found["max"], found["tolerance"])
+        if "navigable" in report:
+            space = report["navigable"]
+            return cls("intrusion", space["intrusion"]["per_part"], space["intrusion"]["max"], None, space["balls"])
+        return None
+
+    @property
+    def key(self) -> str:
+        """Its entry in the report."""
+        return {"added_volume": "volume", "intrusion": "navigable"}.get(self.name, self.name)
+
+    def unit(self, scale: float) -> float:
+        """What a length that measures `scale` measures as the criterion does: nothing else if that is a share."""
+        return 1.0 if self.name == "added_volume" else scale
+
+    def words(self, scale: float = 1.0) -> str | None:
+        """Say how well the hulls fit, with lengths in a unit that is `scale` units of the frame; None if unknown."""
+        if self.name == "intrusion":
+            if self.worst is None:
+                return f"there are {self.balls} balls"
+            if self.worst <= 0:
+                return f"no hull touches any of the {self.balls} balls"
+            return f"hulls reach {self.worst / scale:.4g} into the {self.balls} balls"
+        if self.worst is None:
+            return None
+        if self.limit is None:
+            return f"max {self.name} {self.worst / scale:.4g}"
+        if self.name == "added_volume":
+            most, tolerance = told_apart(100 * self.worst, 100 * self.limit)
+            return f"hulls add up to {most} % of volume (tolerance {tolerance} %)"
+        most, threshold = told_apart(self.worst / scale, self.limit / scale)
+        return f"max {self.name} {most} (threshold {threshold}{', exceeded' * (self.worst > self.limit)})"
+
+
+def told_apart(value: float, limit: float) -> tuple[str, str]:
+    """Write both with four digits, or as many as show on which side of the limit the value is."""
+    for digits in range(4, 18):
+        words = f"{value:.{digits}g}", f"{limit:.{digits}g}"
+        if (float(words[0]) > float(words[1])) == (value > limit):
+            break
+    return words
