@@ -63,7 +63,7 @@ def environment(kind: str, reports: Path) -> dict[str, str]:
 def command(build: Path, words: list[str]) -> list[str]:
     python = str(build / "bin" / "python")
     if words == ["tests"]:
-        tests = [f"tests/test_{name}.py" for name in NATIVE_TESTS]
+        tests = [str(path) for name in NATIVE_TESTS for path in Path("tests").rglob(f"test_{name}.py")]
         return [python, "-m", "pytest", "-p", "no:cacheprovider", *tests]
     if words[:1] == ["meshes"]:
         return [python, str(HERE / "meshes.py"), *words[1:]]
