@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from rlacd.cli.commands import Argument, Command, options_of, taken
 from rlacd.cli.exit_codes import ExitCode, give, say
@@ -54,7 +54,7 @@ class BatchOptions:
     glob: str = option("**", usual="")
     fallback: bool = option(True, usual="fallback")
     folders: bool = option(False)
-    redo: str = option("none", one_of=("none", "failed", "all"))
+    redo: Literal["none", "failed", "all"] = option("none", one_of=("none", "failed", "all"))
     file_format: str | None = option(None, flags=("--format",), metavar="EXT", usual="what --preset says, or glb")
     threads: int = option(1, least=1)
     dry_run: bool = option(False)

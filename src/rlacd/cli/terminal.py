@@ -53,7 +53,7 @@ class Watch:
     def __call__(self, progress: Progress) -> bool:
         """Show `progress`; returns False if the user wants to stop."""
         if self._bar is not None:
-            known = {"description": progress.stage, "completed": progress.done, "total": progress.total}
+            known: dict[str, Any] = {"description": progress.stage, "completed": progress.done, "total": progress.total}
             self._bar.update(self._bar.task_ids[0], **known, parts=progress.parts)
         return not self.interrupted
 
