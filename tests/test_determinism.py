@@ -14,8 +14,8 @@ import pytest
 from rlacd import decompose
 from rlacd.batch import Batch, JobSpec
 from rlacd.pool.local import InProcessPool
-from tests.test_batch import TIMES
-from tests.trouble import tree
+from tests.batch.test_batch import TIMES
+from tests.batch.trouble import tree
 
 MESHES = [
     "test/vhacd/lamp.ply",

@@ -46,6 +46,15 @@ def test_a_decomposition_loads_no_network_runtime() -> None:
     assert not loaded & {"onnxruntime", "torch", "click", "rich"}
 
 
+def test_a_command_does_not_wait_for_libraries_that_it_does_not_use(tmp_path: Path) -> None:
+    """trimesh imports whatever it finds; a bar is for terminals, and watching is for processes."""
+    trimesh.creation.box().export(tmp_path / "box.obj")
+    words = ["decompose", str(tmp_path / "box.obj"), "--quality", "fast", "--quiet"]
+    loaded = modules_after(f"from rlacd.cli.main import app\napp({words!r}, standalone_mode=False)")
+    assert "trimesh" in loaded
+    assert not loaded & {"scipy", "networkx", "shapely", "rich", "mitsuba", "ray", "rlacd.view.picture"}
+
+
 def test_no_module_imports_scipy() -> None:
     """It is installed for the tests, so nothing else would notice."""
     files = list(Path(rlacd.__file__).parent.rglob("*.py"))

@@ -135,7 +135,7 @@ assert 2**23 < peak_memory() < 2**33
 @pytest.mark.parametrize(
     ("file", "marks"),
     [(f"test_{name}.py", "not slow and not nightly") for name in ("load", "formats", "options", "decomposition")]
-    + [("test_pool.py", "not nightly")],
+    + [("pool/test_pool.py", "not nightly")],
 )
 def test_the_tests_of_the_core_pass(file: str, marks: str) -> None:
     tests = ROOT / "tests" / file

@@ -50,4 +50,4 @@ def test_the_picture_is_that_of_the_code() -> None:
 
 def test_the_sanitizers_are_given_tests_that_exist() -> None:
     names = runpy.run_path(str(ROOT / "sanitizers" / "run.py"))["NATIVE_TESTS"]
-    assert [name for name in names if not [*(ROOT / "tests").rglob(f"test_{name}.py")]] == []
+    assert [name for name in names if len([*(ROOT / "tests").rglob(f"test_{name}.py")]) != 1] == []

@@ -40,10 +40,7 @@ _MARKS = {
     ".obj": f"# {GENERATOR}".encode(),
     ".ply": f"comment {GENERATOR}".encode(),
 }
-_HEAD = 128
-
-_XML_HEAD = 2**16
-"""Bytes within which the root element of an XML file has to begin."""
+_MARK_BYTES = 128
 
 
 @dataclass(frozen=True)
@@ -173,12 +170,12 @@ def _is_asset(path: Path) -> bool:
 
 
 def _root(path: Path) -> str:
-    """The name of an XML file's root element; empty if it is not XML."""
+    """The name of an XML file's root element; empty if none begins within its first 64 kB."""
     found: list[str] = []
     parser = expat.ParserCreate()
     parser.StartElementHandler = lambda tag, _: found.append(tag)
     with contextlib.suppress(OSError, expat.ExpatError, ValueError), path.open("rb") as file:
-        parser.Parse(file.read(_XML_HEAD), False)
+        parser.Parse(file.read(2**16), False)
     return found[0] if found else ""
 
 
@@ -202,7 +199,7 @@ def _is_written(path: Path) -> bool:
         return False
     try:
         with path.open("rb") as file:
-            return mark in file.read(_HEAD)
+            return mark in file.read(_MARK_BYTES)
     except OSError:  # reported when the mesh is read
         return False
 

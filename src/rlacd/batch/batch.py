@@ -29,12 +29,6 @@ REDO: tuple[Redo, ...] = ("none", "failed", "all")
 WRITERS = 4
 """Results written concurrently; each waits for the disk, not for a processor."""
 
-ROOM_SECONDS = 1.0
-"""Seconds between checks of how many requests the pool has room for: a cluster grows and shrinks."""
-
-MOST_THREADS = 1024
-"""Threads that wait for answers; they start as they are needed."""
-
 LARGE = 5_000_000
 """Bytes of 100,000 triangles in a binary STL file; larger meshes may take much longer than the rest."""
 
@@ -99,7 +93,7 @@ def _outcomes(work: Work, tasks: Iterator[Task]) -> Generator[tuple[Task, Outcom
     """
     running: dict[Future[Outcome], tuple[Task, bool]] = {}  # whether it is being written
     again: deque[tuple[Task, WorkerDiedError]] = deque()
-    with ThreadPoolExecutor(MOST_THREADS) as threads:
+    with ThreadPoolExecutor(1024) as threads:  # they start as needed, and wait for answers
         try:
             while True:
                 room = max(1, work.pool.room // work.spec.threads)
@@ -112,7 +106,8 @@ def _outcomes(work: Work, tasks: Iterator[Task]) -> Generator[tuple[Task, Outcom
                 if not running or (again and work.pool.many_machines):
                     task, death = again.popleft()
                     running[threads.submit(process, task, work, death)] = task, False
-                for done in wait(running, ROOM_SECONDS, FIRST_COMPLETED).done:
+                # Every second, since a cluster grows and shrinks.
+                for done in wait(running, 1.0, FIRST_COMPLETED).done:
                     task, written = running.pop(done)
                     try:
                         outcome = done.result()

@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from rlacd.cli.commands import Argument, Command, options_of, taken
 from rlacd.cli.exit_codes import ExitCode, give, say
@@ -20,32 +20,6 @@ from rlacd.plain_json import printable
 
 if TYPE_CHECKING:
     from rlacd.batch import Batch
-
-HELP = """Decompose every mesh in a folder, skipping those already done.
-
-\b
-Examples:
-  rlacd batch assets/ -o hulls/
-  rlacd batch assets/ -o hulls/ --glob 'furniture/*.obj' --preset mujoco --jobs 8
-  rlacd batch assets/ -o hulls/ --dry-run
-  rlacd batch assets/ -o s3://bucket/hulls --ray auto
-
-A mesh whose process dies, hangs or needs too much memory is given its convex hull, unless a second
-try succeeds; one that hangs has no second try.
-OUT/manifest.jsonl records the outcome for each mesh. To resume after an interruption, run the same command again.
-Ctrl-C once finishes what is running; twice quits at once.
-"""
-
-BATCH_EPILOG = """\b
-Exit codes:
-  0    all done
-  1    a bug in rlacd (RLACD_DEBUG=1 shows the traceback)
-  2    bad option, or no meshes
-  3    the results cannot be written
-  4    stopped by Ctrl-C; run again to go on
-  5    all done, but some meshes failed or were given their convex hull
-  130  interrupted at once; no file is left half-written
-"""
 
 WRITTEN = ("density", "mass", "up", "one_mesh", "keep_input")
 """Options of `rlacd decompose` that describe how hulls are written."""
@@ -80,7 +54,7 @@ class BatchOptions:
     glob: str = option("**", usual="")
     fallback: bool = option(True, usual="fallback")
     folders: bool = option(False)
-    redo: str = option("none", one_of=("none", "failed", "all"))
+    redo: Literal["none", "failed", "all"] = option("none", one_of=("none", "failed", "all"))
     file_format: str | None = option(None, flags=("--format",), metavar="EXT", usual="what --preset says, or glb")
     threads: int = option(1, least=1)
     dry_run: bool = option(False)
@@ -92,6 +66,20 @@ class BatchOptions:
 
 
 def _batch(assets: Path, quiet: bool | None, **given: Any) -> None:
+    """Decompose every mesh in a folder, skipping those already done.
+
+    \b
+    Examples:
+      rlacd batch assets/ -o hulls/
+      rlacd batch assets/ -o hulls/ --glob 'furniture/*.obj' --preset mujoco --jobs 8
+      rlacd batch assets/ -o hulls/ --dry-run
+      rlacd batch assets/ -o s3://bucket/hulls --ray auto
+
+    A mesh whose process dies, hangs or needs too much memory is given its convex hull, unless a second
+    try succeeds; one that hangs has no second try.
+    OUT/manifest.jsonl records the outcome for each mesh. To resume after an interruption, run the same command again.
+    Ctrl-C once finishes what is running; twice quits at once.
+    """
     from rlacd.batch import Batch, JobSpec
 
     own, where = BatchOptions(**taken(given, BatchOptions)), PoolOptions(**taken(given, PoolOptions))
@@ -108,16 +96,14 @@ def _batch(assets: Path, quiet: bool | None, **given: Any) -> None:
         _run(work, where, quiet=bool(quiet))
 
 
-NAMED = 5
-"""Maximum number of large meshes listed by name."""
-
-
 def _print_large(batch: Batch) -> None:
     """Print one line that lists the large meshes, before any work."""
+    from rlacd.cli.batch_screen import LISTED
+
     large = batch.large()
     if large:
-        named = [f"{printable(asset.name)} ({size / 1e6:.0f} MB)" for asset, size in large[:NAMED]]
-        more = [f"{len(large) - NAMED} more"] if len(large) > NAMED else []
+        named = [f"{printable(asset.name)} ({size / 1e6:.0f} MB)" for asset, size in large[:LISTED]]
+        more = [f"{len(large) - LISTED} more"] if len(large) > LISTED else []
         count = "1 mesh is" if len(large) == 1 else f"{len(large)} meshes are"
         say(f"{count} large and may take minutes and gigabytes each: {', '.join([*named, *more])}")
 
@@ -170,11 +156,9 @@ _HOW = [option for option in how() if option.name not in {own.name for own in _O
 COMMAND = Command(
     "batch",
     _batch,
-    HELP,
     [Argument("assets", "ASSETS", "A folder of meshes, of any depth."), *_OWN, *_HOW],
     first=(
         *(own.name for own in _OWN if own.panel != "Output"),
         *("threshold", "quality", "max_hulls", "max_vertices", "preset", "quiet"),
     ),
-    epilog=BATCH_EPILOG,
 )

@@ -15,14 +15,8 @@ if TYPE_CHECKING:
     from rlacd.batch import Asset, Summary
     from rlacd.batch.manifest import Row
 
-REPORT_EVERY = 30.0
-"""Seconds between progress lines if stderr is not a terminal."""
-
-SHOWN = 10
-"""Maximum number of failures listed in the summary."""
-
-NAMED, LONGEST = 2, 24
-"""Meshes at work that the bar names, and characters of each name; the front of longer ones is cut off."""
+LISTED = 10
+"""Most meshes that a message lists by name."""
 
 
 class Screen:
@@ -73,7 +67,7 @@ class Screen:
         if row["status"] != "done":
             line = printable(failure_line(row))
             say(line) if self._bar is None else self._bar.console.print(line, markup=False, highlight=False)
-        elif self._bar is None and not self._quiet and time.monotonic() - self._reported > REPORT_EVERY:
+        elif self._bar is None and not self._quiet and time.monotonic() - self._reported > 30:
             self._reported = time.monotonic()
             say(f"{self._made + self._passed_over}/{self._total}  {self._state()}")
 
@@ -82,10 +76,10 @@ class Screen:
             self._bar.update(self._bar.task_ids[0], **news)
 
     def _names(self) -> str:
-        """The meshes at work, the latest first: large ones that had to wait come last."""
+        """Two of the meshes at work, the latest first; the front of a long name is cut off."""
         names = [printable(name) for name in reversed(self._running)]
-        short = [name if len(name) <= LONGEST else f"…{name[1 - LONGEST :]}" for name in names[:NAMED]]
-        more = [f"{len(names) - NAMED} more"] if len(names) > NAMED else []
+        short = [name if len(name) <= 24 else f"…{name[-23:]}" for name in names[:2]]
+        more = [f"{len(names) - 2} more"] if len(names) > 2 else []
         return ", ".join(short + more)
 
     def _state(self) -> str:
@@ -113,9 +107,9 @@ def summary_lines(summary: Summary, out: str) -> list[str]:
         f"{out}: {', '.join(words)}",
         f"  {made} now in {duration(summary.seconds)}{rate}; {summary.passed_over} were done before",
     ]
-    lines += [printable(failure_line(row)) for row in summary.failures[:SHOWN]]
-    if len(summary.failures) > SHOWN:
-        lines.append(f"  ... and {len(summary.failures) - SHOWN} more: see manifest.jsonl")
+    lines += [printable(failure_line(row)) for row in summary.failures[:LISTED]]
+    if len(summary.failures) > LISTED:
+        lines.append(f"  ... and {len(summary.failures) - LISTED} more: see manifest.jsonl")
     if summary.others:
         kinds = ", ".join(f"{count} {ending}" for ending, count in summary.others.most_common())
         lines.append(

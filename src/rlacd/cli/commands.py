@@ -45,9 +45,7 @@ class Command(click.Command):
     ----------
     name : str
     run : callable
-        Called with the value of each parameter by its name; its errors become exit codes.
-    text : str
-        The help.
+        Called with the value of each parameter by its name; its errors become exit codes. Its docstring is the help.
     parameters : sequence of Argument or Option
     first : collection of str
         The options that ``--help`` shows, by name; ``--help-all`` shows all. All if there are none.
@@ -57,7 +55,6 @@ class Command(click.Command):
         self,
         name: str,
         run: Callable[..., None],
-        text: str,
         parameters: Sequence[Argument | Option],
         first: Collection[str] = (),
         **settings: Any,
@@ -70,7 +67,7 @@ class Command(click.Command):
         if first:
             params.append(_help_all())
         self._first = first
-        super().__init__(name, callback=guarded, params=params, help=text, **{"epilog": EPILOG, **settings})
+        super().__init__(name, callback=guarded, params=params, help=run.__doc__, epilog=EPILOG, **settings)
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the parameters under their headings."""

@@ -28,21 +28,6 @@ NOT_REWRITTEN = {
 IN_METRES = (*ROBOTS, ".glb", ".gltf", ".vrm")
 """File formats that define the metre as their unit."""
 
-HELP = """Turn a mesh into convex hulls for collision.
-
-\b
-Examples:
-  rlacd decompose chair.glb
-  rlacd decompose chair.glb -o chair_hulls.obj --threshold 0.02
-  rlacd decompose chair.glb -o hulls/ --format stl --max-vertices 64
-  rlacd decompose arm.dae -o arm.glb --picture arm.png --report - | jq .parts
-  rlacd decompose chair.glb -o chair.xml --preset mujoco
-  rlacd decompose robot.urdf -o robot_acd.urdf
-  rlacd decompose house.glb --criterion navigable --radius-abs 0.3 --tolerance-abs 0.05
-
-Ctrl-C once stops and writes the result so far; twice quits at once.
-"""
-
 MESH = (
     "The mesh: obj, stl, ply, off, glb, gltf, vrm, dae, 3mf, usd. It need not be closed or clean. "
     "Or a robot, .urdf or .xml (MJCF), whose collision meshes are to be replaced."
@@ -56,6 +41,20 @@ FIRST = (
 
 
 def _decompose(mesh: Path, **how: Any) -> None:
+    """Turn a mesh into convex hulls for collision.
+
+    \b
+    Examples:
+      rlacd decompose chair.glb
+      rlacd decompose chair.glb -o chair_hulls.obj --threshold 0.02
+      rlacd decompose chair.glb -o hulls/ --format stl --max-vertices 64
+      rlacd decompose arm.dae -o arm.glb --picture arm.png --report - | jq .parts
+      rlacd decompose chair.glb -o chair.xml --preset mujoco
+      rlacd decompose robot.urdf -o robot_acd.urdf
+      rlacd decompose house.glb --criterion navigable --radius-abs 0.3 --tolerance-abs 0.05
+
+    Ctrl-C once stops and writes the result so far; twice quits at once.
+    """
     asked = OutputOptions(**taken(how, OutputOptions))
     _check_input(mesh)
     import_trimesh(mesh)
@@ -237,7 +236,6 @@ def _same(path: str | Path) -> str:
 COMMAND = Command(
     "decompose",
     _decompose,
-    HELP,
     [Argument("mesh", "IN", MESH), *options_of(OutputOptions), *how()],
     first=FIRST,
     context_settings={"allow_extra_args": True},

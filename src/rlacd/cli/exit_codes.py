@@ -1,13 +1,9 @@
-"""Exit codes of the commands, and the conversion of every error into one sentence.
-
-Exit codes: 0 done; 1 a bug in rlacd; 2 bad input or option; 3 the output cannot be written; 4 stopped early (timeout or
-Ctrl-C), a valid decomposition was written; 5 a batch is done, but some meshes failed; 130 interrupted at once, no file
-is left half-written.
-"""
+"""Exit codes of the commands, and the conversion of every error into one sentence."""
 
 from __future__ import annotations
 
 import contextlib
+import inspect
 import os
 import sys
 from collections.abc import Iterator
@@ -18,7 +14,15 @@ from rlacd.errors import OutputError, RlacdError
 
 
 class ExitCode(IntEnum):
-    """Exit codes of the commands."""
+    """Exit codes:
+    0    done
+    1    a bug in rlacd (RLACD_DEBUG=1 shows the traceback)
+    2    bad input or option; no meshes
+    3    the output cannot be written
+    4    stopped early by --timeout or Ctrl-C; what was written is valid
+    5    batch only: some meshes failed or were given their convex hull
+    130  interrupted at once; no file is left half-written
+    """
 
     OK = 0
     BUG = 1
@@ -29,17 +33,8 @@ class ExitCode(IntEnum):
     INTERRUPTED = 130
 
 
-# \b preserves line breaks in the help.
-EPILOG = """\b
-Exit codes:
-  0    done
-  1    a bug in rlacd (RLACD_DEBUG=1 shows the traceback)
-  2    bad input or bad option
-  3    the output cannot be written
-  4    stopped early by --timeout or Ctrl-C; a valid decomposition was written
-  5    batch only: some meshes failed or were given their convex hull
-  130  interrupted at once; no file is left half-written
-"""
+EPILOG = "\b\n" + inspect.cleandoc(ExitCode.__doc__ or "").replace("\n", "\n  ")
+"""The end of every command's help; the mark preserves its lines."""
 
 
 @contextlib.contextmanager

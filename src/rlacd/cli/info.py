@@ -12,16 +12,15 @@ from rlacd.cli.exit_codes import give
 from rlacd.cli.lean import import_trimesh
 from rlacd.plain_json import printable, to_json
 
-HELP = """Show what a file contains and how it would be repaired, without decomposing it.
-
-\b
-Examples:
-  rlacd info chair.glb
-  rlacd info chair.glb --json | jq .repair
-"""
-
 
 def _info(mesh: Path, as_json: bool) -> None:
+    """Show what a file contains and how it would be repaired, without decomposing it.
+
+    \b
+    Examples:
+      rlacd info chair.glb
+      rlacd info chair.glb --json | jq .repair
+    """
     import_trimesh(mesh)
     facts = describe(mesh)
     give(to_json(facts) if as_json else printable(describe_text(facts)))
@@ -30,7 +29,6 @@ def _info(mesh: Path, as_json: bool) -> None:
 COMMAND = Command(
     "info",
     _info,
-    HELP,
     [
         Argument("mesh", "FILE", "The mesh to look at."),
         Option("as_json", "--json", is_flag=True, default=False, help="Print JSON instead of text."),

@@ -24,10 +24,6 @@ if TYPE_CHECKING:
     from rlacd.io.robots import Rewritten
 
 
-GRACE = 1.0
-"""Seconds that the second Ctrl-C leaves to end in good order, before the process ends all the same."""
-
-
 class Watch:
     """Shows progress on a terminal and turns Ctrl-C into a graceful stop.
 
@@ -44,7 +40,7 @@ class Watch:
         # Python runs signal handlers only in the main thread, and refuses to set them from any other.
         if threading.current_thread() is threading.main_thread():
             self._previous = signal.signal(signal.SIGINT, self._on_interrupt)
-            count_interrupts(ExitCode.INTERRUPTED, GRACE)
+            count_interrupts(ExitCode.INTERRUPTED, 1.0)  # the second one leaves a second to end in good order
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
@@ -57,7 +53,7 @@ class Watch:
     def __call__(self, progress: Progress) -> bool:
         """Show `progress`; returns False if the user wants to stop."""
         if self._bar is not None:
-            known = {"description": progress.stage, "completed": progress.done, "total": progress.total}
+            known: dict[str, Any] = {"description": progress.stage, "completed": progress.done, "total": progress.total}
             self._bar.update(self._bar.task_ids[0], **known, parts=progress.parts)
         return not self.interrupted
 

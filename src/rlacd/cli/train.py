@@ -18,22 +18,21 @@ EXTRA = ("torch", "safetensors")
 
 DEFAULT_PRESET = "two-cores"
 
-TRAIN_HELP = """Train a policy that chooses cuts, by the paper's reinforcement learning.
-
-\b
-Examples:
-  rlacd train one_mesh/ --run run/ --preset one-mesh
-  rlacd train meshes/ --run run/ --seed 1
-  rlacd train meshes/ --run run/ --seed 1 --resume --jobs 8
-  rlacd train meshes/ --run run/ --environments 256 --ray auto
-  rlacd train meshes/ --run run/ --preset paper --encoder-weights i2p_mae.pth
-
-The run's folder gets the curves, a checkpoint to --resume from, and policy.npz, the best network so far, which
-decompose takes as --policy. A preset sets all options; those given beside it change it.
-"""
-
 
 def _train(meshes: Path, run: Path, preset: str, resume: bool, **given: Any) -> None:
+    """Train a policy that chooses cuts, by the paper's reinforcement learning.
+
+    \b
+    Examples:
+      rlacd train one_mesh/ --run run/ --preset one-mesh
+      rlacd train meshes/ --run run/ --seed 1
+      rlacd train meshes/ --run run/ --seed 1 --resume --jobs 8
+      rlacd train meshes/ --run run/ --environments 256 --ray auto
+      rlacd train meshes/ --run run/ --preset paper --encoder-weights i2p_mae.pth
+
+    The run's folder gets the curves, a checkpoint to --resume from, and policy.npz, the best network so far, which
+    decompose takes as --policy. A preset sets all options; those given beside it change it.
+    """
     where = PoolOptions(**taken(given, PoolOptions))
     options = TrainOptions.preset(preset, **chosen(given))
     if run.exists() and not run.is_dir():
@@ -58,7 +57,6 @@ def _learn(module: str, name: str) -> Callable[..., Path]:
 COMMAND = Command(
     "train",
     _train,
-    TRAIN_HELP,
     [
         Argument("meshes", "MESHES", "A folder of meshes, of any depth."),
         Option("--run", "-o", type=click.Path(path_type=Path), required=True, help="A folder for this run."),

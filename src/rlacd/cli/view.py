@@ -15,23 +15,22 @@ from rlacd.errors import OptionError
 from rlacd.options import Options
 from rlacd.options.output import OutputOptions
 
-HELP = """Show a mesh and its hulls in the browser, and try thresholds and criteria.
-
-\b
-Examples:
-  rlacd view chair.glb
-  rlacd view chair.glb --threshold 0.02 --port 9000
-  rlacd view chair.glb --no-browser       # tells the address only, e.g. for  ssh -L 8765:localhost:8765
-
-The page turns, pulls apart and colours the hulls, decomposes anew while you move a slider, and downloads any
-format. Nothing leaves this machine. Ctrl-C ends it.
-"""
-
 CONTROLS = ("threshold", "criterion", "quality", "max_hulls", "open")
 """Options of `rlacd decompose` that the page can change."""
 
 
 def _view(mesh: Path, browser: bool, **given: Any) -> None:
+    """Show a mesh and its hulls in the browser, and try thresholds and criteria.
+
+    \b
+    Examples:
+      rlacd view chair.glb
+      rlacd view chair.glb --threshold 0.02 --port 9000
+      rlacd view chair.glb --no-browser       # tells the address only, e.g. for  ssh -L 8765:localhost:8765
+
+    The page turns, pulls apart and colours the hulls, decomposes anew while you move a slider, and downloads any
+    format. Nothing leaves this machine. Ctrl-C ends it.
+    """
     if mesh.suffix.lower() in ROBOTS:
         raise OptionError(f"{mesh} is a robot; view shows a single mesh: give one of the meshes that it refers to.")
     from rlacd.decompose_mesh import decompose
@@ -50,7 +49,6 @@ def _view(mesh: Path, browser: bool, **given: Any) -> None:
 COMMAND = Command(
     "view",
     _view,
-    HELP,
     [
         Argument("mesh", "IN", "The mesh, as for decompose; not a robot."),
         *options_of(Options, only=(*CONTROLS, "threads")),

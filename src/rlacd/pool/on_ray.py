@@ -25,7 +25,7 @@ LOCAL = "local"
 MACHINES = 5
 """Times a request is resent after its machine was lost."""
 
-PATIENCE = 10.0
+CLUSTER_SECONDS = 10.0
 """Seconds allowed for a cluster to answer, and between two counts of its processors."""
 
 
@@ -76,12 +76,12 @@ class RayPool(Pool):
         self._remote = ray.remote(max_retries=MACHINES, retry_exceptions=False)(_do)
         self._running: set[Any] = set()
         self._stored: weakref.WeakKeyDictionary[Shared, Any] = weakref.WeakKeyDictionary()
-        self._processors, self._counted = 0.0, -PATIENCE
+        self._processors, self._counted = 0.0, -CLUSTER_SECONDS
 
     @property
     def room(self) -> int:
         """Single-threaded requests worth submitting at once; clusters grow and shrink."""
-        if time.monotonic() - self._counted > PATIENCE:
+        if time.monotonic() - self._counted > CLUSTER_SECONDS:
             self._processors = self._ray.cluster_resources().get("CPU", 0)
             self._counted = time.monotonic()
         return max(1, int(2 * self._processors))  # one running, and one queued so that the processor never waits
@@ -144,7 +144,7 @@ def _require_answer(address: str) -> None:
     if not (host and port.isdecimal()):
         return
     try:
-        socket.create_connection((host.strip("[]"), int(port)), timeout=PATIENCE).close()
+        socket.create_connection((host.strip("[]"), int(port)), timeout=CLUSTER_SECONDS).close()
     except (OSError, OverflowError) as error:
         raise OptionError(f"there is no Ray cluster at {address} ({error}); start one or use local.") from error
 

@@ -9,27 +9,52 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import cache
 from typing import Literal, TypeVar
 
 from manifold3d import Manifold
 
 from rlacd._native import Stop, Stopped, poll_stop, use_stop
-from rlacd.run.progress import Progress, ProgressCallback
 from rlacd.run.work import Work
+
+
+@dataclass(frozen=True)
+class Progress:
+    """One report from a running decomposition, sent between two steps.
+
+    Attributes
+    ----------
+    stage : str
+        What is being done: the name of a key of ``Decomposition.report["seconds"]``.
+    done : int
+        Steps of this stage finished so far.
+    total : int or None
+        Steps of this stage in all; None where that cannot be known beforehand.
+    parts : int
+        Components the solid is in now.
+    seconds : float
+        Wall time since the decomposition began.
+    """
+
+    stage: str
+    done: int
+    total: int | None
+    parts: int
+    seconds: float
+
+
+ProgressCallback = Callable[[Progress], object]
+"""Called between steps and several times a second in long ones. To stop and keep what was reached it returns False, or
+anything else that counts as false; None, as from a function that returns nothing, goes on."""
+
 
 StoppedBy = Literal["timeout", "cancel"]
 
-GRACE, GRACE_SHARE, LEAST_GRACE = 0.4, 0.04, 0.1
-"""After a stop, finishing may take `GRACE` seconds plus `GRACE_SHARE` of the timeout, and always at least `LEAST_GRACE`
-seconds; then optional work is skipped. After a cancellation it may take half as long: the command line then still has
-to write files. The promise is 1 s and 10 %: the rest is for what cannot be skipped."""
-
-BETWEEN_POLLS = 0.05
-"""Seconds between two looks, while other threads work, at whether they have to stop."""
-
-BLOCKS = 16
-"""Blocks per thread in which many items are handed over."""
+FINISH, FINISH_SHARE, LEAST_FINISH = 0.4, 0.04, 0.1
+"""After a stop, finishing may take `FINISH` seconds plus `FINISH_SHARE` of the timeout, and always at least
+`LEAST_FINISH` seconds; then optional work is skipped. After a cancellation it may take half as long: the command line
+then still has to write files. The promise is 1 s and 10 %: the rest is for what cannot be skipped."""
 
 _T = TypeVar("_T")
 _R = TypeVar("_R")
@@ -212,13 +237,13 @@ class Run:
     def begin_finishing(self) -> None:
         """Declare the parts found: from here on a stop cannot make the result incomplete.
 
-        Finishing has some extra time after a stop or the timeout (see `GRACE`); then `if_in_time` takes its fallback.
+        Finishing has some extra time after a stop or the timeout (see `FINISH`); then `if_in_time` takes its fallback.
         """
         self._is_finishing = True
-        self._finish_by = self._timeout * (1 + GRACE_SHARE) + GRACE
+        self._finish_by = self._timeout * (1 + FINISH_SHARE) + FINISH
         if self.stopped_by == "cancel":
-            self._finish_by = min(self._finish_by, self._stopped_at + GRACE / 2)
-        self.stop.arm(max(self._finish_by - self.elapsed, LEAST_GRACE))
+            self._finish_by = min(self._finish_by, self._stopped_at + FINISH / 2)
+        self.stop.arm(max(self._finish_by - self.elapsed, LEAST_FINISH))
 
     def if_in_time(self, work: Callable[[], _T], otherwise: Callable[[], _T]) -> _T:
         """Do some work; if there is no time left for it, do something quick instead, without interruption."""
@@ -236,7 +261,8 @@ class Run:
         items = list(items)
         if self._pool is None or self.threads == 1 or len(items) < 2:
             return self._each(function, items)
-        size = max(1, len(items) // (BLOCKS * self.threads))
+        # Sixteen blocks per thread keep all busy to the end.
+        size = max(1, len(items) // (16 * self.threads))
         futures = [self._pool.submit(self._each, function, items[i : i + size]) for i in range(0, len(items), size)]
         try:
             self._watch(futures)
@@ -286,7 +312,7 @@ class Run:
         """Wait until all are done or one has failed; only this thread can look whether they have to stop."""
         waiting: set[Future[_R]] = set(futures)
         while waiting:
-            done, waiting = wait(waiting, BETWEEN_POLLS, "FIRST_EXCEPTION")
+            done, waiting = wait(waiting, 0.05, "FIRST_EXCEPTION")
             if any(future.exception() is not None for future in done):
                 return
             poll_stop()
@@ -308,9 +334,9 @@ class Run:
             self._stop_by("cancel")
 
     def _hurry(self) -> None:
-        if self.elapsed + GRACE < self._finish_by:
-            self._finish_by = self.elapsed + GRACE
-            self.stop.arm(GRACE)
+        if self.elapsed + FINISH < self._finish_by:
+            self._finish_by = self.elapsed + FINISH
+            self.stop.arm(FINISH)
 
     def _stop_by(self, reason: StoppedBy) -> None:
         self.stopped_by, self.stopped_in, self._stopped_at = reason, self._stage, self.elapsed

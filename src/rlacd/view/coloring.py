@@ -10,12 +10,12 @@ import numpy.typing as npt
 import trimesh
 
 from rlacd.io.write.palette import DISTINCT, hull_colors
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import BoolArray, FloatArray, IntArray
 
 HUES = len(DISTINCT) // 3
 """Colours that are easy to tell apart, also for the colour-blind; see `rlacd.io.write.palette`."""
 
-NEAR = 2e-3
+TOUCHING = 2e-3
 """Hulls count as touching if closer than this share of their common extent, too close for the eye to separate."""
 
 
@@ -54,40 +54,58 @@ def color_hulls(hulls: Sequence[trimesh.Trimesh]) -> Coloring:
 
 
 def neighbours(hulls: Sequence[trimesh.Trimesh]) -> list[set[int]]:
-    """Find which convex hulls touch or overlap: no facet normal of either separates them by more than `NEAR`.
+    """Find which convex hulls touch or overlap: no facet normal of either separates them by more than `TOUCHING`.
 
     Hulls separated only along the cross product of two edges count as touching.
     """
     beside: list[set[int]] = [set() for _ in hulls]
     if not hulls:
         return beside
-    corners = [np.asarray(hull.vertices, dtype=np.float64) for hull in hulls]
-    lower = np.array([points.min(axis=0) for points in corners])
-    upper = np.array([points.max(axis=0) for points in corners])
-    near = NEAR * float((upper.max(axis=0) - lower.min(axis=0)).max())
-    planes = [_planes(hull) for hull in hulls]
-    for one in range(len(hulls)):
+    solids = [HalfSpaces.of(np.asarray(hull.vertices, dtype=np.float64), np.asarray(hull.faces)) for hull in hulls]
+    lower, upper = np.array([solid.lower for solid in solids]), np.array([solid.upper for solid in solids])
+    near = TOUCHING * float((upper.max(axis=0) - lower.min(axis=0)).max())
+    for one, solid in enumerate(solids):
         boxes = np.all((lower[one + 1 :] <= upper[one] + near) & (upper[one + 1 :] >= lower[one] - near), axis=1)
         for other in (one + 1 + np.flatnonzero(boxes)).tolist():
-            if not (_apart(planes[one], corners[other], near) or _apart(planes[other], corners[one], near)):
+            if not (solid.lies_apart(solids[other], near) or solids[other].lies_apart(solid, near)):
                 beside[one].add(other)
                 beside[other].add(one)
     return beside
 
 
-def _planes(hull: trimesh.Trimesh) -> tuple[FloatArray, FloatArray]:
-    """The facets' outward unit normals and offsets; facets too thin to have a normal are skipped."""
-    triangles = np.asarray(hull.triangles, dtype=np.float64)
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    lengths = np.linalg.norm(normals, axis=1)
-    sound = lengths > 0.0
-    normals = normals[sound] / lengths[sound, None]
-    return normals, np.einsum("ij,ij->i", normals, triangles[sound, 0])
+@dataclass(frozen=True, eq=False)
+class HalfSpaces:
+    """A convex hull as its corners and its facets' planes n·x <= d, and its bounding box."""
 
+    corners: FloatArray
+    normals: FloatArray
+    offsets: FloatArray
+    lower: FloatArray
+    upper: FloatArray
 
-def _apart(planes: tuple[FloatArray, FloatArray], points: FloatArray, near: float) -> bool:
-    normals, offsets = planes
-    return bool(np.any((normals @ points.T).min(axis=1) > offsets + near)) if len(normals) else False
+    @classmethod
+    def of(cls, corners: FloatArray, faces: IntArray) -> HalfSpaces:
+        """Make them from a closed mesh; facets too thin to have a normal are skipped."""
+        triangles = corners[faces]
+        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        lengths = np.linalg.norm(normals, axis=1)
+        sound = lengths > 0
+        normals = normals[sound] / lengths[sound, None]
+        offsets = np.einsum("ij,ij->i", normals, triangles[sound, 0])
+        return cls(corners, normals, offsets, corners.min(axis=0), corners.max(axis=0))
+
+    def holds(self, points: FloatArray, near: float) -> BoolArray:
+        """Tell which points [N, 3] lie in the hull or within `near` of its planes."""
+        held = np.all((points >= self.lower - near) & (points <= self.upper + near), axis=1)
+        inside = np.flatnonzero(held)
+        if len(inside):
+            held[inside] = np.all(points[inside] @ self.normals.T <= self.offsets + near, axis=1)
+        return np.asarray(held)
+
+    def lies_apart(self, other: HalfSpaces, near: float) -> bool:
+        """Whether another hull is further than `near` above one of the planes."""
+        above = (self.normals @ other.corners.T).min(axis=1, initial=np.inf) > self.offsets + near
+        return bool(above.any())
 
 
 def _smallest_last(beside: list[set[int]]) -> list[int]:

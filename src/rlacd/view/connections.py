@@ -32,12 +32,6 @@ REQUEST_SECONDS = 10.0
 ANSWER_SECONDS = 120.0
 """Seconds to send an answer of any size."""
 
-QUIET_SECONDS = 20.0
-"""Seconds for a single send or receive."""
-
-LAST_WORDS = 0.3
-"""Seconds for connections to end by themselves when the server ends."""
-
 FULL = "too many connections to this viewer are open; close a page and reload this one."
 
 
@@ -76,7 +70,7 @@ class BoundedServer(ThreadingHTTPServer):
         until = time.monotonic() + seconds
         with self._changed:
             # Connections that are sending get time to finish.
-            self._changed.wait_for(lambda: not self._deadlines, timeout=min(LAST_WORDS, max(0.0, seconds)))
+            self._changed.wait_for(lambda: not self._deadlines, timeout=min(0.3, max(0.0, seconds)))
             for connection in self._deadlines:
                 _hang_up(connection)
             return self._changed.wait_for(lambda: not self._deadlines, timeout=max(0.0, until - time.monotonic()))
@@ -117,7 +111,7 @@ class BoundedHandler(BaseHTTPRequestHandler):
 
     server: BoundedServer
     protocol_version = "HTTP/1.1"
-    timeout = QUIET_SECONDS
+    timeout = 20.0  # seconds for a single send or receive
 
     def setup(self) -> None:
         """Bound the input before the first byte is read."""

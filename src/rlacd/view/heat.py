@@ -14,8 +14,9 @@ import trimesh
 
 from rlacd import _native
 from rlacd.result import Result
-from rlacd.solid.arrays import BoolArray, FloatArray, IntArray
+from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.frame import Frame
+from rlacd.view.coloring import HalfSpaces
 
 FINEST = 0.02
 """Facets are not subdivided below this edge length: 1 % of the input's longest side."""
@@ -23,7 +24,7 @@ FINEST = 0.02
 INNER = -1.0
 """Marks a vertex on an inner wall, in place of its distance."""
 
-TOUCH = 1e-5
+ON_HULL = 1e-5
 """A point this close to another hull lies on an inner wall: above rounding error, below what is visible."""
 
 
@@ -68,16 +69,16 @@ def heat_map(decomposition: Result, *, triangles: int = 60_000, threads: int | N
     # Equilateral triangles of edge h have the area sqrt(3)/4 h²; narrow facets give smaller ones, hence more of them.
     area = sum(float(trimesh.triangles.area(corners[faces]).sum()) for corners, faces in hulls)
     edge = max(FINEST, float(np.sqrt(4.0 * area / max(triangles, 1))))
-    solids = [_HalfSpaces.of(*hull) for hull in hulls]
+    solids = [HalfSpaces.of(*hull) for hull in hulls]
     lower, upper = np.array([solid.lower for solid in solids]), np.array([solid.upper for solid in solids])
     result = []
     for index, hull in enumerate(hulls):
         vertices, faces = _divided(*hull, edge)
         distance = np.asarray(surface.distance(vertices, threads or 0), dtype=np.float64)
-        meets = np.all((lower <= upper[index] + TOUCH) & (upper >= lower[index] - TOUCH), axis=1)
+        meets = np.all((lower <= upper[index] + ON_HULL) & (upper >= lower[index] - ON_HULL), axis=1)
         for other in np.flatnonzero(meets):
             if other != index:
-                distance[solids[other].holds(vertices)] = INNER
+                distance[solids[other].holds(vertices, ON_HULL)] = INNER
         result.append(HeatMesh(vertices, faces, distance))
     return result
 
@@ -99,31 +100,3 @@ def _divided(vertices: FloatArray, faces: IntArray, edge: float) -> tuple[FloatA
         return vertices, np.ascontiguousarray(faces, dtype=np.int32)
     corners = np.ascontiguousarray(fine.vert_properties[:, :3], dtype=np.float64)
     return corners, np.ascontiguousarray(fine.tri_verts, dtype=np.int32)
-
-
-@dataclass(frozen=True, eq=False)
-class _HalfSpaces:
-    """A convex hull as its facets' planes n·x <= d, and its bounding box."""
-
-    normals: FloatArray
-    offsets: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-
-    @classmethod
-    def of(cls, corners: FloatArray, faces: IntArray) -> _HalfSpaces:
-        triangles = corners[faces]
-        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        lengths = np.linalg.norm(normals, axis=1)
-        sound = lengths > 0  # a facet may be too thin to have a normal
-        normals = normals[sound] / lengths[sound, None]
-        offsets = np.einsum("ij,ij->i", normals, triangles[sound, 0])
-        return cls(normals, offsets, corners.min(axis=0), corners.max(axis=0))
-
-    def holds(self, points: FloatArray) -> BoolArray:
-        """Tell which points [N, 3] lie in the hull or within `TOUCH` of its planes."""
-        held = np.all((points >= self.lower - TOUCH) & (points <= self.upper + TOUCH), axis=1)
-        near = np.flatnonzero(held)
-        if len(near):
-            held[near] = np.all(points[near] @ self.normals.T <= self.offsets + TOUCH, axis=1)
-        return np.asarray(held)

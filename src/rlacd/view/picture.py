@@ -25,7 +25,6 @@ from rlacd.view.render import Body, Render, Spheres, render, require_extra
 
 INPUT_COLOR = np.array([0.46, 0.47, 0.50])  # linear reflectance
 BALL_COLOR = np.array([0.10, 0.30, 0.75])
-PULL = 0.55  # explosion: a hull's distance from the centre grows by this share
 PAPER, INK, FADED = (255, 255, 255), (28, 30, 34), (120, 124, 132)
 TO_Z_UP = {  # rows: the source of the drawing's x, y, z axes
     "x": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
@@ -124,7 +123,7 @@ def picture_bytes(
     panels: list[tuple[str, list[Body], Spheres | None]] = [
         ("input", [_body(decomposition.source.triangles, INPUT_COLOR, up)], None),
         ("hulls", _hull_bodies(decomposition, up, pull=0.0), None),
-        ("pulled apart", _hull_bodies(decomposition, up, pull=PULL), None),
+        ("pulled apart", _hull_bodies(decomposition, up, pull=0.55), None),
     ]
     if decomposition.balls is not None:
         some = apart(decomposition.balls)
@@ -190,6 +189,7 @@ def apart(balls: Balls) -> Balls:
 
 
 def _hull_bodies(decomposition: Result, up: str, *, pull: float) -> list[Body]:
+    """The hulls, each further from the centre by the share `pull`."""
     corners = np.concatenate([hull.bounds for hull in decomposition])
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
     colors = linear_from_srgb(color_hulls(decomposition.hulls).rgb)

@@ -20,8 +20,6 @@ import numpy.typing as npt
 from rlacd.errors import MissingExtraError
 from rlacd.io.write.palette import srgb_from_linear
 
-SKY, KEY = 0.42, 12.0  # radiance: a uniform sky, and one lamp that gives the shadows a direction
-PAPER = 1.0  # background
 FIELD_OF_VIEW = 22.0  # degrees, vertical; narrow, so that perspective barely changes the size of equal hulls
 ELEVATION, AZIMUTH = np.deg2rad(24.0), np.deg2rad(-58.0)
 
@@ -118,7 +116,7 @@ def render(
             "type": "scene",
             "integrator": {"type": "path", "max_depth": 3, "hide_emitters": True},
             "sensor": _sensor(mi, view / size, width, height),
-            "sky": {"type": "constant", "radiance": {"type": "rgb", "value": SKY}},
+            "sky": {"type": "constant", "radiance": {"type": "rgb", "value": 0.42}},
             "key": _lamp(mi),
         }
         for index, body in enumerate(bodies):
@@ -133,7 +131,7 @@ def render(
         covered = np.clip(light[..., 3:], 0.0, 1.0)
         colors = srgb_from_linear(np.clip(light[..., :3] / np.maximum(covered, 1e-6), 0.0, 1.0))
         return np.concatenate([colors, np.rint(255.0 * covered).astype(np.uint8)], axis=2)
-    return srgb_from_linear(np.clip(light[..., :3] + PAPER * (1.0 - light[..., 3:]), 0.0, 1.0))
+    return srgb_from_linear(np.clip(light[..., :3] + (1.0 - light[..., 3:]), 0.0, 1.0))
 
 
 def _view(points: npt.NDArray[np.float64], aspect: float) -> npt.NDArray[np.float64]:
@@ -169,12 +167,13 @@ def _sensor(mi: Any, eye: npt.NDArray[np.float64], width: int, height: int) -> d
 
 
 def _lamp(mi: Any) -> dict[str, Any]:
+    """Beside the uniform sky, one lamp gives the shadows a direction."""
     position = [1.2, -2.2, 3.2]
     facing = mi.ScalarTransform4f().look_at(origin=position, target=[0, 0, 0], up=[0, 1, 0])
     return {
         "type": "rectangle",
         "to_world": facing @ mi.ScalarTransform4f().scale(1.1),
-        "light": {"type": "area", "radiance": {"type": "rgb", "value": KEY}},
+        "light": {"type": "area", "radiance": {"type": "rgb", "value": 12.0}},
     }
 
 

@@ -18,11 +18,6 @@ from rlacd.view.picture import check_up, picture_bytes
 from rlacd.view.render import Render, render
 from rlacd.view.scene import heat_scene, scene
 
-HEAT_TRIANGLES = 16_000
-"""Approximate number of triangles of the error heat map in a file, up to a few times as many: about half a megabyte."""
-
-PICTURE_WIDTH = 1500
-
 
 def is_html(path: str | os.PathLike[str]) -> bool:
     """Tell from its name whether a report should be an HTML page."""
@@ -93,9 +88,10 @@ def report_page(
     up = decomposition.up_axis(up)
     if unit is None:
         unit = "" if decomposition.input is None else decomposition.input.unit
+    # The heat map gets that many triangles, up to a few times as many: about half a megabyte.
     data: dict[str, Any] = {
         **scene(decomposition, up, unit=unit),
-        "heat": heat_scene(heat_map(decomposition, triangles=HEAT_TRIANGLES)),
+        "heat": heat_scene(heat_map(decomposition, triangles=16_000)),
         **(_picture(decomposition, up, render) if picture else {}),
     }
     return still_page(f"{decomposition.name}: convex hulls", {"version": __version__}, data)
@@ -104,7 +100,7 @@ def report_page(
 def _picture(decomposition: Result, up: str, render: Render) -> dict[str, str]:
     """The picture as a data URL, or a note that explains its absence."""
     try:
-        png = picture_bytes(decomposition, width=PICTURE_WIDTH, up=up, clear=True, render=render)
+        png = picture_bytes(decomposition, width=1500, up=up, clear=True, render=render)
     except MissingExtraError as error:
         return {"note": f"The picture is left out: {error}"}
     return {"picture": "data:image/png;base64," + base64.b64encode(png).decode("ascii")}

@@ -19,9 +19,6 @@ from rlacd.view.coloring import color_hulls
 from rlacd.view.heat import HeatMesh, frame_of
 from rlacd.view.picture import apart
 
-SHOWN_BALLS = 4000
-"""Maximum number of balls drawn."""
-
 
 def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, Any]:
     """Describe a decomposition for the page.
@@ -50,10 +47,11 @@ def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, 
     balls = None
     if decomposition.balls is not None and len(decomposition.balls):
         some = apart(decomposition.balls)
+        shown = min(len(some), 4000)  # more are slow to draw
         balls = {
-            "centres": floats(frame.to_frame(some.centres[:SHOWN_BALLS])),
-            "radii": floats(some.radii[:SHOWN_BALLS] * frame.scale),
-            "shown": min(len(some), SHOWN_BALLS),
+            "centres": floats(frame.to_frame(some.centres[:shown])),
+            "radii": floats(some.radii[:shown] * frame.scale),
+            "shown": shown,
             "of": len(decomposition.balls),
         }
     return {

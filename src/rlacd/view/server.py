@@ -53,8 +53,6 @@ ADDRESS = "127.0.0.1"
 USUAL_PORT = 8765
 LONGEST_REQUEST = 10_000  # bytes of JSON
 LARGEST_MESH = 2**28  # bytes of an uploaded file
-QUICKEST = 0.05  # seconds between two reports of progress
-HEARTBEAT = 3.0  # seconds of silence before a stream sends a sign of life, which shows whether the client still reads
 HEAVY = 2  # concurrent scenes, and downloads: answers that take much memory and time
 UPLOADS = 4  # concurrent uploads, each in memory; slow ones keep nothing else waiting
 
@@ -327,7 +325,8 @@ class _Handler(BoundedHandler):
         try:
             self.close_connection = True
             self._send_head(HTTPStatus.OK, "text/event-stream", {"Connection": "close"})
-            for state in _throttled(self.server.session.changes(HEARTBEAT)):
+            # After 3 s of silence a sign of life, which shows whether the client still reads.
+            for state in _throttled(self.server.session.changes(3.0)):
                 event = ": still here" if state is None else f"data: {json.dumps(asdict(state))}"
                 self.wfile.write(f"{event}\n\n".encode())
                 self.wfile.flush()
@@ -414,4 +413,4 @@ def _throttled(changes: Iterator[SessionState | None]) -> Iterator[SessionState 
     for state in changes:
         yield state
         if state is not None and state.state == "working":
-            time.sleep(QUICKEST)  # changes in the meantime are combined
+            time.sleep(0.05)  # changes in the meantime are combined

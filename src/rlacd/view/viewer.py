@@ -18,8 +18,6 @@ from rlacd.view.picture import check_up
 from rlacd.view.server import ViewServer
 from rlacd.view.session import AT_EXIT, Run, Session
 
-LEAVING = 0.8  # seconds for current work to end when the viewer is closed
-
 
 @contextlib.contextmanager
 def open_viewer(
@@ -78,7 +76,7 @@ def open_viewer(
     try:
         yield Viewer(session, server, thread)
     finally:
-        until = time.monotonic() + LEAVING
+        until = time.monotonic() + 0.8  # for current work to end
         session.close(0.0)  # first, so that event streams end
         if not server.end(until - time.monotonic()):
             atexit.register(server.end, AT_EXIT)  # an answer is still being computed

@@ -22,7 +22,7 @@ from rlacd.view import connections
 from rlacd.view.connections import LONGEST_HEAD, MOST_CONNECTIONS, MOST_STREAMS
 from rlacd.view.server import UPLOADS
 from rlacd.view.viewer import Viewer
-from tests.viewing import open_viewer
+from tests.view.viewing import open_viewer
 
 PATIENCE = 60.0
 
@@ -223,9 +223,9 @@ ENDINGS = {
     "done": "rlacd.decompose(mesh, quality='fast')",
     "kept": "import sys; sys.kept = rlacd.decompose(mesh, quality='fast', criterion=rlacd.NavigableSpace())",
     "raised": "rlacd.decompose(mesh, progress=lambda seen: 1 / 0)",
-    "viewed": "from tests.viewing import open_viewer\nwith open_viewer(mesh, port=0): pass",
+    "viewed": "from tests.view.viewing import open_viewer\nwith open_viewer(mesh, port=0): pass",
     "viewed for a while": (
-        "import time\nfrom tests.viewing import open_viewer\nwith open_viewer(mesh, port=0): time.sleep(2)"
+        "import time\nfrom tests.view.viewing import open_viewer\nwith open_viewer(mesh, port=0): time.sleep(2)"
     ),
 }
 

@@ -10,8 +10,8 @@ import pytest
 
 from rlacd.errors import OptionError
 from rlacd.pool import Shared, WorkerDiedError
+from tests.pool.test_pool import ask
 from tests.test_learn_train import assert_same_run, curves, meshes, run
-from tests.test_pool import ask
 
 ray = pytest.importorskip("ray", reason="the extra fleet is not installed")
 
@@ -25,7 +25,7 @@ __all__ = ["meshes"]  # a fixture
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Cluster]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTHONPATH", str(Path(__file__).resolve().parents[1]))
+        patch.setenv("PYTHONPATH", str(Path(__file__).resolve().parents[2]))
         patch.setenv("RAY_worker_register_timeout_seconds", "300")  # a machine may be busy
         cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
         ray.init(address=cluster.address, log_to_driver=False, logging_level="ERROR")

@@ -281,6 +281,15 @@ def test_a_file_in_place_of_a_command_tells_what_to_type(mesh: Path, words: list
     assert "No such command" in rlacd("decompsoe").stderr
 
 
+@pytest.mark.parametrize(("words", "says"), [(["{dir}/ell.stl"] * 2, "--glob '*.stl'"), (["{dir}"], "-o hulls/")])
+def test_many_meshes_are_pointed_to_batch(mesh: Path, words: list[str], says: str) -> None:
+    run = rlacd("decompose", *(word.format(dir=mesh.parent) for word in words))
+    assert run.exit_code == 2
+    assert f"rlacd batch {mesh.parent}" in run.stderr
+    assert says in run.stderr
+    assert run.stderr.count("\n") == 1
+
+
 def test_folders_that_are_missing_are_made(mesh: Path, stand_in: StandIn) -> None:
     new = mesh.parent / "new"
     assert rlacd("decompose", mesh, "-o", new / "a" / "out.glb", "--report", new / "b" / "r.json").exit_code == 0
@@ -336,13 +345,13 @@ def test_help_names_every_exit_code_and_version_is_printed() -> None:
     assert rlacd("--version").stdout == f"rlacd {package.__version__}\n"
 
 
-@pytest.mark.parametrize(
-    ("words", "extra"),
-    [("decompose", "view")],
-)
-def test_help_names_extras_as_pip_takes_them(words: str, extra: str) -> None:
-    """In help, brackets begin markup, which swallows what it does not know."""
-    assert f"rlacd[{extra}]" in rlacd(*words.split(), "--help").output
+def test_help_shows_ten_options_and_help_all_every_one() -> None:
+    asked = (rlacd("decompose", word).output for word in ("--help", "--help-all"))
+    short, whole = (set(re.findall(r"^  (?:-\w, )?(--[a-z-]+)", text, re.MULTILINE)) for text in asked)
+    assert {"--output", "--threshold", "--max-hulls", "--quality"} < short < whole
+    assert len(short - {"--help", "--help-all"}) == 10
+    assert {"--seed", "--balls", "--radius-abs"} <= whole - short
+    assert "rlacd[view]" in rlacd("decompose", "--help").output
 
 
 # --- the real thing ---------------------------------------------------------------------------------------------------
@@ -377,28 +386,11 @@ def test_a_real_run_in_a_pipe(mesh: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_real_missing_file(tmp_path: Path) -> None:
-    run = shell("decompose", tmp_path / "nothing.glb")
-    assert run.returncode == 2
-    assert run.stderr.startswith("rlacd: ")
-    assert "nothing.glb" in run.stderr
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("name", [".", "/", "", "..", "chair.glb/"])
 def test_a_real_odd_name(name: str, tmp_path: Path) -> None:
     run = shell("decompose", name, cwd=tmp_path)
     assert run.returncode in (2, 3), run.stderr
     assert run.stderr.count("\n") == 1
-
-
-@pytest.mark.slow
-def test_a_real_bad_option(mesh: Path) -> None:
-    run = shell("decompose", mesh, "--threshold", "-1")
-    assert run.returncode == 2
-    assert "threshold" in run.stderr
-    assert [path.name for path in mesh.parent.iterdir()] == ["ell.stl"]
 
 
 @pytest.mark.slow

@@ -16,15 +16,15 @@ import pytest
 from rlacd.errors import OptionError
 from rlacd.pool import Pool, ProcessLimits, Request, Shared, TimeLimitError, WorkerDiedError, local, open_pool
 from rlacd.pool.local import InProcessPool, LocalPool
-from tests.pool_server import SERVER
-from tests.pools import pool_processes
+from tests.pool.obedient import SERVER
+from tests.pool.processes import pool_processes
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(autouse=True)
 def server_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).resolve().parents[1]))
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).resolve().parents[2]))
 
 
 @pytest.fixture(params=["here", "local"])

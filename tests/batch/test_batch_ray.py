@@ -14,8 +14,8 @@ from rlacd.batch import Asset, Batch, JobSpec
 from rlacd.errors import OptionError
 from rlacd.pool import ProcessLimits
 from rlacd.pool.local import LocalPool
-from tests.test_batch import TIMES, rows
-from tests.trouble import make_trouble, tree, write_ell
+from tests.batch.test_batch import TIMES, rows
+from tests.batch.trouble import make_trouble, tree, write_ell
 
 ray = pytest.importorskip("ray", reason="the extra fleet is not installed")
 

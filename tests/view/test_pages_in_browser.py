@@ -14,8 +14,8 @@ import trimesh
 
 import rlacd
 from rlacd.view.viewer import Viewer
-from tests.browser import Watched, change, open_browser, open_driver, open_page, pixels
-from tests.viewing import open_viewer
+from tests.view.browser import Watched, change, open_browser, open_driver, open_page, pixels
+from tests.view.viewing import open_viewer
 
 pytest.importorskip("PIL", reason="the extra view is not installed")
 

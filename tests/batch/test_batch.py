@@ -18,7 +18,7 @@ import trimesh
 from click.testing import CliRunner, Result
 
 from rlacd.cli.main import app
-from tests.trouble import make_trouble, tree, write_ell
+from tests.batch.trouble import make_trouble, tree, write_ell
 
 TIMES = "timings.jsonl"
 

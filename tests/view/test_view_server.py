@@ -33,7 +33,7 @@ from rlacd.options.navigable import NavigableSpace
 from rlacd.view.controls import ViewerControls, read_controls
 from rlacd.view.downloads import offered
 from rlacd.view.viewer import Viewer
-from tests.viewing import open_viewer
+from tests.view.viewing import open_viewer
 
 PATIENCE = 60.0
 NAME = "an elbow 'n ümläut"

@@ -25,7 +25,7 @@ from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError, OptionError, OutputError, WeightsError
 from rlacd.io.write import save_hulls
 from rlacd.options import Options
-from tests.trouble import write_ell
+from tests.batch.trouble import write_ell
 
 NOT_OPTIONS = ("self", "path", "file_format", "scene")
 

@@ -13,7 +13,7 @@ from typing import Any
 from rlacd.errors import OptionError
 from rlacd.pool import Blobs, Shared
 
-SERVER = "tests.pool_server:Obedient"
+SERVER = "tests.pool.obedient:Obedient"
 
 
 class Obedient:
