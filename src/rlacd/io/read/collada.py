@@ -16,8 +16,8 @@ from lxml import etree
 from rlacd.errors import MeshFileError
 from rlacd.io.read.beside import PICTURES, FolderFiles
 from rlacd.io.read.contents import Contents, Triangles
-from rlacd.io.read.conventions import HEAD, collada
-from rlacd.io.read.limits import DEEPEST, LONGEST_NAME, MOST_PLACES
+from rlacd.io.read.conventions import COLLADA_HEAD, collada
+from rlacd.io.read.limits import DEEPEST_PART, LONGEST_NAME, MOST_PLACES
 from rlacd.io.read.looks import opened_picture, painted
 from rlacd.io.read.polygons import fan_triangles, places_of, strip_triangles, triangles_within
 from rlacd.io.read.text import rows_of, whole
@@ -80,9 +80,9 @@ class _Document:
         return None if element is None else self.named.get(element.get(attribute, "").removeprefix("#"))
 
     def _place(self, node: Any, transform: FloatArray, depth: int) -> None:
-        if depth > DEEPEST:
+        if depth > DEEPEST_PART:
             raise MeshFileError(
-                f"{self._path} places parts inside parts, or inside itself, more than {DEEPEST} deep: export it again"
+                f"{self._path} places parts inside parts, or in itself, more than {DEEPEST_PART} deep: export it again"
             )
         here = transform @ _transform(node)
         for child in node.iterchildren("{*}*"):
@@ -104,7 +104,7 @@ class _Document:
     def _bound(self, controller: Any) -> tuple[Any, FloatArray]:
         """The geometry that a controller bends, and the matrix that it applies before."""
         matrix = np.eye(4)
-        for _ in range(DEEPEST):
+        for _ in range(DEEPEST_PART):
             shape = None if controller is None else next(controller.iterchildren("{*}skin", "{*}morph"), None)
             if shape is None:
                 break
@@ -314,7 +314,7 @@ def read_collada(path: Path, content: bytes) -> Contents:
         The file is damaged, or would multiply to more than is reasonable.
     """
     content = _unpacked(path, content)
-    up, metres = collada(content[:HEAD])
+    up, metres = collada(content[:COLLADA_HEAD])
     document = _Document(path, content)
     geometry = []
     for one in document.placed.values():

@@ -11,7 +11,7 @@ MOST_PLACES = 100_000
 LONGEST_NAME = 1000
 """Instances of one part. Each gets a unique name by a counting suffix."""
 
-DEEPEST = 20
+DEEPEST_PART = 20
 """Depth of nested instances: the cost of an instance grows with the cube of its depth."""
 
 

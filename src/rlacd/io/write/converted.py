@@ -80,10 +80,9 @@ _Shape: TypeAlias = tuple[FloatArray, IntArray, FloatArray | None]
 """Vertices, faces, and where the vertices are in a picture."""
 
 
-def painted_parts(mesh: InputMesh) -> list[Painted]:
+def painted_parts(mesh: InputMesh | None) -> list[Painted]:
     """The input by materials, in the unit of the hulls; nothing if it has none, or is a glTF file."""
-    asset = mesh.asset
-    if asset is None or asset.is_gltf:
+    if mesh is None or mesh.asset is None or mesh.asset.is_gltf:
         return []
     scene, gone = _scene(mesh, "mesh"), {node.key for node in mesh.left_out}
     groups: dict[Any, list[_Shape]] = {}

@@ -258,8 +258,3 @@ def _read(files: FolderFiles | None, uri: Any) -> bytes | None:
 
 def _is_data(uri: Any) -> bool:
     return isinstance(uri, str) and uri.startswith("data:")
-
-
-def is_kept(result: Result) -> bool:
-    """Whether the input has a scene that a file can keep."""
-    return result.input is not None and result.input.asset is not None
