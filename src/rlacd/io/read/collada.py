@@ -15,9 +15,8 @@ from lxml import etree
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.beside import PICTURES, FolderFiles
-from rlacd.io.read.contents import Contents, Triangles
+from rlacd.io.read.contents import DEEPEST_PART, LONGEST_NAME, MOST_PLACES, Contents, Triangles
 from rlacd.io.read.conventions import COLLADA_HEAD, collada
-from rlacd.io.read.limits import DEEPEST_PART, LONGEST_NAME, MOST_PLACES
 from rlacd.io.read.looks import opened_picture, painted
 from rlacd.io.read.polygons import fan_triangles, places_of, strip_triangles, triangles_within
 from rlacd.io.read.text import rows_of, whole

@@ -13,10 +13,9 @@ import numpy as np
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.beside import FolderFiles
-from rlacd.io.read.contents import Contents, Triangles
+from rlacd.io.read.contents import MOST_PLACES, Contents, Triangles
 from rlacd.io.read.draco import DRACO, decode_draco
 from rlacd.io.read.gltf_arrays import Arrays, Json, item
-from rlacd.io.read.limits import MOST_PLACES
 from rlacd.io.read.polygons import fan_triangles, strip_triangles
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import Asset, SourceNode
@@ -36,10 +35,8 @@ READ = re.compile(
 ENCODED = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 """Extensions that encode the triangles and are not read: without the decoder, the file holds zeros in their place."""
 
-POINTS, LINES, TRIANGLES, STRIP, FAN = (0,), (1, 2, 3), 4, 5, 6
+POINTS, LINES, SURFACES = (0,), (1, 2, 3), (TRIANGLES := 4, STRIP := 5, FAN := 6)
 """Modes of primitives."""
-
-SURFACES = (TRIANGLES, STRIP, FAN)
 
 UNREADABLE = "cannot be read as glTF: it is damaged or cut off"
 

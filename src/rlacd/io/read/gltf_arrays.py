@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rlacd.errors import MeshFileError
-from rlacd.io.read.limits import MOST_PLACES, most_in_memory
+from rlacd.io.read.contents import MOST_PLACES, most_in_memory
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.topology import IntArray
 

@@ -35,7 +35,7 @@ _READERS = {
     "msh": "read.simple_formats:read_msh",
     "stl": "read.simple_formats:read_stl",
     "ply": "read.ply:read_ply",
-    "off": "read.off:read_off",
+    "off": "read.simple_formats:read_off",
     **dict.fromkeys(("glb", "gltf", "vrm"), "read.gltf:read_gltf"),
     **dict.fromkeys(("dae", "zae"), "read.collada:read_collada"),
     "3mf": "read.threemf:read_3mf",

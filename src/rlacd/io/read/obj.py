@@ -15,8 +15,7 @@ import trimesh
 from trimesh.exchange.obj import parse_mtl
 
 from rlacd.io.read.beside import PICTURES, FolderFiles
-from rlacd.io.read.contents import Contents, Triangles, one_shape
-from rlacd.io.read.limits import MOST_PLACES
+from rlacd.io.read.contents import MOST_PLACES, Contents, Triangles, one_shape
 from rlacd.io.read.looks import BETWEEN, painted
 from rlacd.io.read.polygons import places_of
 from rlacd.io.read.text import check_text, numbers_in, plain_text, rows_of

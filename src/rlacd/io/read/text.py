@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rlacd.errors import MeshFileError
-from rlacd.io.read.limits import MOST_TRIANGLES
+from rlacd.io.read.contents import MOST_TRIANGLES
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.topology import IntArray
 

@@ -14,9 +14,8 @@ import trimesh
 from lxml import etree
 
 from rlacd.errors import MeshFileError
-from rlacd.io.read.contents import Contents, Triangles
+from rlacd.io.read.contents import DEEPEST_PART, LONGEST_NAME, MOST_PLACES, Contents, Triangles
 from rlacd.io.read.conventions import METRES
-from rlacd.io.read.limits import DEEPEST_PART, LONGEST_NAME, MOST_PLACES
 from rlacd.io.read.xml import PARSER, check_prologue, open_archive, parse_xml, unpack
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import Asset, SourceNode

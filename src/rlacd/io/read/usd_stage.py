@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from rlacd.errors import MeshFileError, MissingExtraError
-from rlacd.io.read.limits import MOST_PLACES, MOST_TRIANGLES
+from rlacd.io.read.contents import MOST_PLACES, MOST_TRIANGLES
 from rlacd.io.read.open_file import read_file
 from rlacd.io.read.polygons import triangles_of
 from rlacd.pool import Blobs, Shared

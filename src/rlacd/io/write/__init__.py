@@ -16,7 +16,7 @@ from rlacd.errors import ImplausibleBodyWarning, OutputError
 from rlacd.io.read import function_of
 from rlacd.io.write.atomic import write_file
 from rlacd.io.write.balls import check_balls, save_balls
-from rlacd.io.write.encode import ENCODERS, encode_glb, hull_name
+from rlacd.io.write.encode import ENCODERS, ENGINE_NAMES, encode_glb, encode_obj, hull_name
 from rlacd.io.write.folder import write_folder
 from rlacd.io.write.model import (
     MeshFile,
@@ -109,7 +109,7 @@ def save(result: Result, path: str | os.PathLike[str], **options: Any) -> Path:
     elif target.file_format == "usd":
         write_file(target.path, function_of("write.usd:encode_usd")(model, ending))
     else:
-        write_file(target.path, function_of("write.engines:encode_engine")(model, target.file_format, ending))
+        write_file(target.path, _for_engine(model, target.file_format, ending))
     return target.path
 
 
@@ -119,9 +119,8 @@ def _with_scene(result: Result, file_format: str, ending: str, keep_input: bool)
     With `keep_input`, an input without a scene is the triangles in grey.
     """
     has_scene = result.input is not None and result.input.asset is not None
-    if ending == "glb" and has_scene and file_format in ("unreal", "godot"):
-        named = function_of("write.engines:ENGINE_NAMES")[file_format]
-        return bytes(function_of("write.keep:encode_kept")(result, named, colored=False))
+    if ending == "glb" and has_scene and file_format in ENGINE_NAMES:
+        return bytes(function_of("write.keep:encode_kept")(result, ENGINE_NAMES[file_format], colored=False))
     if not keep_input or not result.hulls:
         return None
     if has_scene:
@@ -132,6 +131,14 @@ def _with_scene(result: Result, file_format: str, ending: str, keep_input: bool)
         )
     visual = (node_name(result.name), result.source) if len(result.source.faces) else None
     return encode_glb(result.hulls, visual=visual)
+
+
+def _for_engine(model: Model, engine: str, ending: str) -> bytes:
+    """The input as one grey node, and the hulls named for the engine."""
+    name = node_name(model.name)
+    names = [ENGINE_NAMES[engine](name, index, primitive) for index, primitive in enumerate(model.primitives)]
+    encode = encode_glb if ending == "glb" else encode_obj
+    return encode(model.hulls, names, None if model.visual is None else (name, model.visual))
 
 
 def _save_with_meshes(result: Result, model: Model, target: Target, one_mesh: bool) -> None:
