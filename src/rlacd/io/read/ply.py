@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from rlacd.errors import MeshFileError
 from rlacd.io.read.beside import PICTURES
 from rlacd.io.read.contents import Contents, one_shape
 from rlacd.io.read.polygons import strip_triangles, triangles_of
@@ -130,12 +129,12 @@ def read_ply(path: Path, content: bytes) -> Contents:
         check_text(path, content)
     end = _END.search(content)
     if end is None:
-        raise MeshFileError(f"{path} cannot be read as ply: its header has no end; export it again")
+        raise ValueError("its header has no end")
     header, body = content[: end.end()], content[end.end() :]
-    elements = _elements(path, header)
+    elements = _elements(header)
     for name, element in elements.items():
         if element.count > len(body):
-            raise _cut_off(path, name, element)
+            raise ValueError(f"its header declares {element.count} {name} lines")
     require_memory(elements["face"].count if "face" in elements else 0, BYTES_READ, path.name)
     if is_text:
         body = numbers_in(body).astype("<f8").tobytes()
@@ -150,7 +149,7 @@ def read_ply(path: Path, content: bytes) -> Contents:
             continue
         record = np.dtype([(field, kind) for field, kind, _ in element.properties])
         if at + element.count * record.itemsize > len(body):
-            raise _cut_off(path, name, element)
+            raise ValueError(f"its header declares {element.count} {name} lines")
         if name == "vertex":
             rows = np.frombuffer(body, record, element.count, at)
             points = np.stack([rows[axis].astype(np.float64) for axis in "xyz"], axis=1)
@@ -165,11 +164,7 @@ def scene_of_ply(path: Path, content: bytes) -> trimesh.Scene:
     return parsed(path, content, "ply", PICTURES)
 
 
-def _cut_off(path: Path, name: str, element: _Element) -> MeshFileError:
-    return MeshFileError(f"{path} is cut off: its header declares {element.count} {name} lines; export it again")
-
-
-def _elements(path: Path, header: bytes) -> dict[str, _Element]:
+def _elements(header: bytes) -> dict[str, _Element]:
     order, is_text = "", False
     found: dict[str, _Element] = {}
     for line in header.decode("latin-1").splitlines():
@@ -177,7 +172,7 @@ def _elements(path: Path, header: bytes) -> dict[str, _Element]:
             case ["format", kind, *_]:
                 order, is_text = _ORDERS[kind], kind == "ascii"
             case ["element", name, count]:
-                found[name] = last = _Element(count_in(path, count.encode()))
+                found[name] = last = _Element(count_in(count.encode()))
             case ["property", "list", length, kind, name]:
                 kinds = ("f8", "f8") if is_text else (_KINDS[kind], _KINDS[length])
                 last.properties.append((name, order + kinds[0], order + kinds[1]))

@@ -37,7 +37,7 @@ def read_stl(path: Path, content: bytes) -> Contents:
     more = len(content) - 84 - _STL.itemsize * count
     if b"\0" in content[:512] or more == 0:  # some binary files begin like text
         if more < 0:
-            raise MeshFileError(f"{path} is cut off: its header declares {count} triangles; export it again")
+            raise ValueError(f"its header declares {count} triangles")
         require_memory(count, BYTES_READ, path.name)
         points = np.frombuffer(content, _STL, count, 84)["corners"].reshape(-1, 3).astype(np.float64)
         warnings = [f"{more} bytes after the last triangle of {path.name} were left out"] if more else []
@@ -73,10 +73,10 @@ def read_msh(path: Path, content: bytes) -> Contents:
         raise MeshFileError(f"{path} is a mesh of Gmsh, not of MuJoCo: convert it to glb, obj, stl or ply")
     counts = [int(count) for count in np.frombuffer(content[: len(content[:16]) // 4 * 4], "<i4")]
     if len(counts) < 4 or min(counts) < 0:
-        raise MeshFileError(f"{path} cannot be read as msh: its header lacks the counts; export it again")
+        raise ValueError("its header lacks the counts")
     points, normals, texture, faces = counts
     if len(content) != 16 + 4 * (3 * points + 3 * normals + 2 * texture + 3 * faces):
-        raise MeshFileError(f"{path} is not as long as its header declares: it is damaged or cut off; export it again")
+        raise ValueError("it is not as long as its header declares")
     vertices = np.frombuffer(content, "<f4", 3 * points, 16).reshape(-1, 3).astype(np.float64)
     corners = np.frombuffer(content, "<i4", 3 * faces, len(content) - 12 * faces).reshape(-1, 3)
     return Contents(one_shape(path.stem, vertices, corners.astype(np.int64)))
@@ -106,13 +106,11 @@ def read_off(path: Path, content: bytes) -> Contents:
         _check_dimension(path, letters, lines)
     header = lines[0].split() if lines else []
     if len(header) < 2:
-        raise MeshFileError(f"{path} cannot be read as off: its header lacks the counts; export it again")
-    vertices, faces = (count_in(path, word) for word in header[:2])
+        raise ValueError("its header lacks the counts")
+    vertices, faces = (count_in(word) for word in header[:2])
     body = lines[1:]
     if len(body) < vertices + faces:
-        raise MeshFileError(
-            f"{path} is cut off: its header declares {vertices} vertices and {faces} faces; export it again"
-        )
+        raise ValueError(f"its header declares {vertices} vertices and {faces} faces")
     points = vectors_of(b"\n".join(body[:vertices]), 4 if b"4" in letters else 3)
     if b"4" in letters:
         with np.errstate(all="ignore"):
@@ -121,12 +119,12 @@ def read_off(path: Path, content: bytes) -> Contents:
     first = np.cumsum(words) - words
     counts = whole(numbers[first])
     if (counts > words - 1).any() or (counts < 0).any():
-        raise MeshFileError(f"{path} is cut off: a face has fewer corners than it declares; export it again")
+        raise ValueError("a face has fewer corners than it declares")
     owner = np.repeat(np.arange(faces), counts)
     place = np.arange(len(owner)) - (np.cumsum(counts) - counts)[owner]
     corners = whole(numbers[first[owner] + 1 + place])
     if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
-        raise MeshFileError(f"{path} has faces that refer to missing points: export it again")
+        raise ValueError("a face refers to a missing point")
     return Contents(one_shape(path.stem, points, triangles_of(points, counts, corners)))
 
 
@@ -144,7 +142,7 @@ def _check_dimension(path: Path, letters: bytes, lines: list[bytes]) -> None:
     """Remove the dimension of the space from the lines, and refuse any other than three."""
     word, _, rest = lines[0].partition(b" ") if lines else (b"", b"", b"")
     lines[:1] = [rest.strip()] if rest.strip() else []
-    dimension = count_in(path, word)
+    dimension = count_in(word)
     if dimension != 3 or b"4" in letters:
         what = f"{dimension} dimensions" + (" and homogeneous coordinates" if b"4" in letters else "")
         raise MeshFileError(f"{path} is a mesh in {what}, not in 3 dimensions: project it first")

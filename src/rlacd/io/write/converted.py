@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import re
-from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -35,7 +34,7 @@ def converted(mesh: InputMesh, name: str) -> tuple[dict[str, Any], bytes | None]
         For a mesh without a scene.
     """
     assert mesh.asset is not None
-    header, rest = split(Path(name), bytes(_scene(mesh, name).export(file_type="glb")))
+    header, rest = split(bytes(_scene(mesh, name).export(file_type="glb")))
     if mesh.asset.extension:
         _tell_materials(header)
     if mesh.asset.path is not None:

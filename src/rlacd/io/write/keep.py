@@ -109,7 +109,7 @@ class _Scene(GltfFile):
         asset = mesh.asset
         assert asset is not None
         self._by_name = not asset.is_gltf
-        super().__init__(*(split(Path(name), asset.content) if asset.is_gltf else converted(mesh, name)))
+        super().__init__(*(split(asset.content) if asset.is_gltf else converted(mesh, name)))
         self._take_in(FolderFiles(asset.path.parent, DATA | IMAGES) if asset.is_gltf and asset.path else None)
         self._nodes = {node.get("name"): index for index, node in enumerate(self.header.get("nodes", []))}
         self._take_off([at for node in mesh.left_out if (at := self.index_of(node.key)) is not None])
