@@ -78,6 +78,12 @@ class _Document:
         """What an element refers to; None if that is not there."""
         return None if element is None else self.named.get(element.get(attribute, "").removeprefix("#"))
 
+    def _source(self, element: Any) -> Any:
+        """The source of an input. Raises LookupError if it is missing."""
+        if (source := self.at(element, "source")) is None:
+            raise LookupError(f"{element.get('source')!r:.80} is missing")
+        return source
+
     def _place(self, node: Any, transform: FloatArray, depth: int) -> None:
         if depth > DEEPEST_PART:
             raise MeshFileError(
@@ -143,10 +149,10 @@ class _Document:
         offsets = [0]
         for one in primitive.iterchildren("{*}input"):
             offsets.append(offset := int(one.get("offset", 0)))
-            source = self.at(one, "source")
+            source = self._source(one)
             inputs = source.findall("{*}input") if one.get("semantic") == "VERTEX" else [one]
             for inner in inputs:
-                arrays.setdefault(inner.get("semantic"), (self._rows(self.at(inner, "source")), offset))
+                arrays.setdefault(inner.get("semantic"), (self._rows(self._source(inner)), offset))
         points, offset = arrays["POSITION"]
         if min(offsets) < 0:
             raise ValueError("an offset below zero")
@@ -160,6 +166,8 @@ class _Document:
         name = source.get("id")
         if name not in self._sources:
             accessor = source.find("{*}technique_common/{*}accessor")
+            if accessor is None:
+                raise LookupError(f"{name!r:.80} has no accessor")
             values = _numbers(source.findtext("{*}float_array"))
             params = accessor.findall("{*}param")
             used = [at for at, param in enumerate(params) if param.get("name")] or list(range(len(params)))

@@ -163,9 +163,8 @@ def _baked(name: str, contents: Contents) -> InputMesh:
         count += len(v)
     node_of = np.repeat(np.arange(len(nodes)), [len(f) for f in faces[1:]]) if solid else None
     mesh = _finite(name, np.concatenate(vertices), np.concatenate(faces), node_of)
-    warnings = (*mesh.warnings, *contents.warnings)
-    said = {"up": contents.up, "metres": contents.metres, "asset": contents.asset}
-    return replace(mesh, warnings=warnings, nodes=tuple(nodes), **said)
+    mesh = replace(mesh, warnings=(*mesh.warnings, *contents.warnings), nodes=tuple(nodes))
+    return replace(mesh, up=contents.up, metres=contents.metres, asset=contents.asset)
 
 
 def _finite(name: str, vertices: FloatArray, faces: IntArray, node_of: IntArray | None) -> InputMesh:

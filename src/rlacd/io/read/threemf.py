@@ -122,7 +122,7 @@ def read_3mf(path: Path, content: bytes) -> Contents:
 
 def scene_of_3mf(path: Path, content: bytes) -> trimesh.Scene:
     """The same as a scene with colours."""
-    scene, shared = trimesh.Scene(), {}
+    scene, shared = trimesh.Scene(), dict[int, str]()
     for key, (node, thing) in _Archive(path, content).placed.items():
         if id(thing) in shared:
             scene.graph.update(key, matrix=node.transform, geometry=shared[id(thing)])

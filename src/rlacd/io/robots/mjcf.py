@@ -208,12 +208,8 @@ def plan_mjcf(compiler: Compiler, references: References, named: Callable[[str, 
     ]
     warnings += _caveats(root, geoms)
     rewritten = {mesh.asset for mesh in meshes}
-    relative = [
-        file
-        for element in root.walk()
-        if element.tag in FILES and element not in rewritten
-        if (file := defaults.full(element).get("file")) and not Path(file).is_absolute()
-    ]
+    files = [defaults.full(each).get("file") for each in root.walk() if each.tag in FILES and each not in rewritten]
+    relative = [file for file in files if file and not Path(file).is_absolute()]
 
     def edit(hulls: HullFiles, sources: Mapping[MeshUse, trimesh.Trimesh], copies: Mapping[MeshUse, str]) -> list[Edit]:
         taken = {*assets, *(str(e.attributes.get("name")) for e in root.walk() if e.tag == "geom")}
