@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -177,7 +177,7 @@ def scene_of_obj(path: Path, content: bytes) -> trimesh.Scene:
     file = _File(path, content)
     names, owner = file.objects()
     called, paint = file.named(b"usemtl")
-    beside, paints = FolderFiles(path.parent, PICTURES), {}
+    beside, paints = FolderFiles(path.parent, PICTURES), dict[str, Any]()
     for library in file.libraries:
         try:
             paints |= parse_mtl(beside.get(library), resolver=beside)

@@ -50,15 +50,19 @@ def read_stl(path: Path, content: bytes) -> Contents:
 def _text_stl(path: Path, text: bytes) -> FloatArray:
     require_memory(max(text.count(b"vertex"), text.count(b"VERTEX")) // 3, BYTES_READ, path.name)
     corners = _VERTEX.findall(text)
-    if len(corners) % 3 or (corners and b"end" not in text[text.lower().rfind(b"vertex") :].lower()):
+    if len(corners) % 3 or (corners and b"endsolid" not in text[text.lower().rfind(b"vertex") :].lower()):
         raise ValueError(f"a triangle ends after {len(corners) % 3} vertices")
     return np.array(corners, dtype=np.float64).reshape(-1, 3)
 
 
 def read_xyz(path: Path, content: bytes) -> Contents:
-    """Read points: the first three numbers of each line."""
+    """Read points: the first three numbers of each line, which all have equally many."""
     check_text(path, content)
-    return Contents(one_shape(path.stem, vectors_of(plain_text(content))))
+    numbers, counts = rows_of(plain_text(content).rstrip() + b"\n")
+    width = counts.max()
+    if width < 3 or not np.isin(counts, (0, width)).all():
+        raise ValueError(f"lines of {counts.min()} and of {width} numbers")
+    return Contents(one_shape(path.stem, np.ascontiguousarray(numbers.reshape(-1, width)[:, :3])))
 
 
 def read_msh(path: Path, content: bytes) -> Contents:
