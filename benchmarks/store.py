@@ -15,8 +15,7 @@ import numpy as np
 
 from benchmarks.methods import RawHull
 from rlacd.errors import OutputError
-from rlacd.io.write.atomic import output_errors
-from rlacd.io.write.lock import lock_folder
+from rlacd.io.write.atomic import lock_folder, output_errors
 
 Row: TypeAlias = dict[str, Any]
 """A finished task: ``mesh``, ``method``, ``setting``, and either ``error`` or the metrics."""

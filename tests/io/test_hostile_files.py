@@ -24,7 +24,7 @@ from rlacd.batch.store import FolderStore
 from rlacd.cli.main import app
 from rlacd.errors import MeshFileError, OutputError, RlacdError, TrainingError, WeightsError
 from rlacd.io.read.load import load_mesh
-from rlacd.io.read.open_file import LARGEST
+from rlacd.io.read.open_file import LARGEST_FILE
 from rlacd.io.robots import rewrite_robot
 from rlacd.policies.network import load_network
 from tests.bounded import bounded
@@ -89,7 +89,7 @@ def special(folder: Path, kind: str, ending: str) -> Path:
     else:
         with path.open("wb") as file:
             file.write(b"solid")
-            file.truncate(LARGEST + 1)  # takes no room on the disk
+            file.truncate(LARGEST_FILE + 1)  # takes no room on the disk
     return path
 
 
@@ -245,7 +245,7 @@ def test_files_beside_an_asset_are_read_once_around(tmp_path: Path) -> None:
     path = tmp_path / "mesh.gltf"
     path.write_bytes(gltf(buffers=spelled))
     files = bounded(Asset("mesh.gltf", path, "mesh").files, memory=2**32)
-    assert sum(map(len, files.values())) <= LARGEST + len(path.read_bytes())
+    assert sum(map(len, files.values())) <= LARGEST_FILE + len(path.read_bytes())
 
 
 @pytest.mark.parametrize(

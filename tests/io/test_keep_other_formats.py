@@ -13,7 +13,7 @@ import trimesh
 
 import rlacd
 from rlacd.io.read import looks, obj
-from rlacd.io.read.companions import mesh_files
+from rlacd.io.read.beside import mesh_files
 from tests.assets import Json, painted_obj, png, read_glb, view_of
 from tests.hulls import assert_convex_hull
 
@@ -54,6 +54,43 @@ def test_an_obj_keeps_its_materials_and_its_picture_in_one_node(tmp_path: Path) 
     read = trimesh.load_scene(tmp_path / "out.glb", process=False)
     crate = [mesh for name, mesh in read.geometry.items() if not name.startswith("UCX_")]
     assert sum(mesh.area for mesh in crate) == pytest.approx(trimesh.creation.box((1, 2, 3)).area)
+
+
+def two_painted(folder: Path) -> Path:
+    """Two objects, each half wood and half red, and a hull for an engine."""
+    text = painted_obj(folder).read_text().splitlines()[0] + "\nvt 0 0\nvt 1 0\nvt 1 1\n"
+    for number, name in enumerate(("crate", "lid", "UCX_old")):
+        box = trimesh.creation.box((1, 2, 3)).apply_translation((5 * number, 0, 0))
+        text += f"o {name}\n" + "".join("v {} {} {}\n".format(*point) for point in box.vertices)
+        for half, paint in enumerate(("wood", "red")):
+            faces = box.faces[half::2] + 1 + 8 * number
+            text += f"usemtl {paint}\n" + "".join("f {}/1 {}/2 {}/3\n".format(*face) for face in faces)
+    (folder / "pair.obj").write_text(text)
+    return folder / "pair.obj"
+
+
+def test_hulls_of_an_obj_of_several_objects_lie_below_their_objects(tmp_path: Path) -> None:
+    header, _, result = kept(two_painted(tmp_path), tmp_path / "out.glb", per_node=True)
+    nodes = {node["name"]: node for node in header["nodes"] if "name" in node}
+    assert {hull.metadata["node"] for hull in result} == {"crate", "lid"}
+    assert sorted(nodes) == ["UCX_crate_00", "UCX_lid_00", "crate", "lid"]
+    for name in ("crate", "lid"):
+        assert len(header["meshes"][nodes[name]["mesh"]]["primitives"]) == 2
+        assert [header["nodes"][child]["name"] for child in nodes[name]["children"]] == [f"UCX_{name}_00"]
+
+
+@pytest.mark.parametrize("name", ["crate.obj", "pair.obj", "arm.dae"])
+def test_mjcf_keeps_colours_and_pictures_of_materials(tmp_path: Path, name: str) -> None:
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    path = {"crate.obj": painted_obj, "pair.obj": two_painted, "arm.dae": arm}[name](tmp_path)
+    result = rlacd.decompose(path, quality="fast", threads=1)
+    model = mujoco.MjModel.from_xml_path(str(result.save(tmp_path / "out.xml")))
+    tints = sorted(model.mat_rgba.tolist())
+    assert tints == sorted([[1, 0, 0, 1], [0, 0, 1, 1] if name == "arm.dae" else [1, 1, 1, 1]])
+    assert model.ntex == (name != "arm.dae")
+    seen = [geom for geom in range(model.ngeom) if model.geom_matid[geom] >= 0]
+    assert len(seen) == 2
+    assert all(model.geom_contype[geom] == 0 for geom in seen)
 
 
 @pytest.mark.parametrize("damage", ["missing", "cut off", "huge", "no materials"])

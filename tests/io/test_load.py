@@ -136,7 +136,7 @@ def test_counts_of_every_variant_of_off_are_held_against_the_file(box, tmp_path,
     whole = off(box, letters).split("\n")
     for lines in (whole[:-1], whole[:5], [whole[0], "8 1000000000000 0", *whole[2:]]):
         path.write_text("\n".join(lines))
-        with pytest.raises(MeshFileError, match="cut off: its header declares 8 vertices and 1"):
+        with pytest.raises(MeshFileError, match=r"cut off \(its header declares 8 vertices and 1"):
             load_mesh(path)
     for counts in ("8", "-8 12 0", "many few", "9" * 40 + " 1"):
         path.write_text("\n".join([whole[0], counts, *whole[2:]]))
@@ -472,6 +472,25 @@ OBJ += "v 0 0 0\n" + "".join(f"f {a} {b} {c}\n" for a, b, c in (BOX.faces + 1).t
 def test_an_obj_is_read_whole_whatever_its_encoding_and_line_ends(tmp_path, content):
     (tmp_path / "box.obj").write_bytes(content)
     np.testing.assert_array_equal(triangles(load_mesh(tmp_path / "box.obj")), triangles(BOX))
+
+
+def test_what_an_obj_holds_beside_faces_is_told(tmp_path):
+    (tmp_path / "box.obj").write_text(OBJ + "l 1 2\np 1\ncstype bezier\ncurv 0 1 1 2\nsurf 0 1 0 1 1 2\nend\n")
+    mesh = load_mesh(tmp_path / "box.obj")
+    assert len(mesh.faces) == 12
+    assert mesh.warnings == tuple(
+        f"{what} of box.obj were left out" for what in ("points and lines", "free-form curves and surfaces")
+    )
+
+
+def test_vertices_of_an_obj_may_have_more_numbers_than_others(tmp_path):
+    lines = OBJ.splitlines()
+    lines[:6] = [f"{line} 1 0 0" if i % 2 else f"{line} 1" for i, line in enumerate(lines[:6])]
+    (tmp_path / "box.obj").write_text("\n".join(lines))
+    np.testing.assert_array_equal(triangles(load_mesh(tmp_path / "box.obj")), triangles(BOX))
+    (tmp_path / "box.obj").write_text("v 1 2\n" + OBJ)
+    with pytest.raises(MeshFileError, match="a vertex of 2 coordinates"):
+        load_mesh(tmp_path / "box.obj")
 
 
 @pytest.mark.parametrize("corner", ["0", "0/1", "-0", "0//1 # 1"])

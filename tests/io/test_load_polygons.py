@@ -301,6 +301,13 @@ def test_collada_is_read_as_it_defines(tmp_path: Path, prefix: bytes) -> None:
     with pytest.raises(MeshError, match="leads out of its array"):
         load(spread)
 
+    broken = frame().replace(
+        b"<polygons", b'<polylist count="1"><input semantic="VERTEX" source="#none"/></polylist><polygons'
+    )
+    whole, (warned_of,) = load(broken)
+    np.testing.assert_array_equal(whole.vertices, solid.vertices)
+    assert "were left out, as they are damaged" in warned_of
+
     skin = b"""<library_controllers><controller id="c"><skin source="#g"><bind_shape_matrix>2 0 0 0 0 2 0 0 0 0 2 0
         0 0 0 1</bind_shape_matrix></skin></controller></library_controllers><library_visual_scenes>"""
     bent = frame().replace(b"<library_visual_scenes>", skin)

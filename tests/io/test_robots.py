@@ -501,6 +501,23 @@ def test_a_model_split_over_files_is_rewritten_into_one(tmp_path: Path) -> None:
         rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "again.xml")
 
 
+def test_a_model_whose_paths_are_stripped_is_rewritten_with_the_paths_that_count(tmp_path: Path) -> None:
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    (tmp_path / "meshes").mkdir()
+    for name in ("table", "other"):
+        table().export(tmp_path / "meshes" / f"{name}.stl")
+    (tmp_path / "in.xml").write_text(
+        '<mujoco><compiler strippath="true" meshdir="meshes"/><asset><mesh file="C:\\robot/x/table.stl"/>'
+        '<mesh file="no/where/other.stl"/></asset><worldbody><body><freejoint/><geom type="mesh" mesh="table"/>'
+        '<geom type="mesh" mesh="other" contype="0" conaffinity="0"/></body></worldbody></mujoco>'
+    )
+    before = mujoco.MjModel.from_xml_path(str(tmp_path / "in.xml"))
+    done = rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "out.xml", quality="fast", threads=1)
+    after = mujoco.MjModel.from_xml_path(str(done.path))
+    assert after.ngeom == before.ngeom + len(done.meshes[0].files)
+    assert after.body_inertia == pytest.approx(before.body_inertia, rel=1e-6)
+
+
 def test_a_robot_of_primitives_is_copied(tmp_path: Path) -> None:
     text = "<robot name='r'><link name='l'/></robot>"
     (tmp_path / "r.urdf").write_text(text)
@@ -513,8 +530,8 @@ def test_a_robot_of_primitives_is_copied(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "text", "says"),
     [
-        ("a.urdf.xacro", "<robot/>", "xacro macros.*expand it"),
-        ("w.sdf", "<sdf/>", "rewritten are .urdf and .xml"),
+        ("a.urdf.xacro", "<robot/>", "expand its macros with"),
+        ("w.sdf", "<sdf/>", "rewritten as .urdf and .xml"),
         ("a.urdf", EAR.replace("meshes/table.stl", "package:///x.stl"), "names no package"),
     ],
 )

@@ -16,7 +16,7 @@ from typing import Literal
 from xml.parsers import expat
 
 from rlacd.errors import MeshFileError
-from rlacd.io.read.companions import mesh_files
+from rlacd.io.read.beside import mesh_files
 from rlacd.io.write.encode import GENERATOR
 from rlacd.io.write.folder import listed_hulls
 

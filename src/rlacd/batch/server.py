@@ -19,7 +19,7 @@ from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import ImplausibleBodyWarning, MeshError, OutputNameError, RlacdError
 from rlacd.fit import LENGTHS, Fit
-from rlacd.io.read.companions import lay_out
+from rlacd.io.read.beside import lay_out
 from rlacd.io.read.load import load_mesh
 from rlacd.io.robots import is_robot, rewrite_robot
 from rlacd.pool import Blobs, Shared
@@ -145,7 +145,7 @@ class MeshServer:
             messages; the ``stem`` of its result, and ``hull_only``: see `make`; ``out``, an address to write the files
             to from this process, with the result's ``parent`` folder in it.
         blobs : dict of bytes
-            The files of the mesh (`rlacd.io.read.companions.mesh_files`), if it cannot be read from this machine.
+            The files of the mesh (`rlacd.io.read.beside.mesh_files`), if it cannot be read from this machine.
         shared : dict of Shared
             See `JobSpec.shared`.
 

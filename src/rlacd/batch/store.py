@@ -15,8 +15,7 @@ from filelock import FileLock
 
 from rlacd.errors import MissingExtraError, OptionError, OutputError, OutputNameError
 from rlacd.io.read.open_file import read_file
-from rlacd.io.write.atomic import output_errors, write_file
-from rlacd.io.write.lock import lock_folder
+from rlacd.io.write.atomic import lock_folder, output_errors, write_file
 
 PRIVATE = ".rlacd"
 """Folder inside the results for files that only the next run needs."""

@@ -19,12 +19,6 @@ from rlacd.options.output import OutputOptions
 
 STDOUT = "-"
 ROBOTS = (".urdf", ".xml")
-NOT_REWRITTEN = {
-    ".xacro": "holds xacro macros: expand it with the tool xacro first, xacro IN.xacro -o OUT.urdf.",
-    ".sdf": "is a robot in SDF; the robots that are rewritten are .urdf and .xml (MJCF): give one of those, or a mesh.",
-}
-"""Robots that are not read, and what to do."""
-
 IN_METRES = (*ROBOTS, ".glb", ".gltf", ".vrm")
 """File formats that define the metre as their unit."""
 
@@ -213,8 +207,6 @@ def _check_input(mesh: Path) -> None:
         return
     if mesh.is_dir():
         raise MeshFileError(f"{mesh} is a folder; for all meshes in it run  rlacd batch {mesh} -o hulls/")
-    if mesh.suffix.lower() in NOT_REWRITTEN:
-        raise MeshFileError(f"{mesh} {NOT_REWRITTEN[mesh.suffix.lower()]}")
 
 
 def _check_output(mesh: Path, wanted: OutputOptions) -> None:

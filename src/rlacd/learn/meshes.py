@@ -15,7 +15,7 @@ from manifold3d import Manifold, Mesh64
 from numpy.typing import NDArray
 
 from rlacd.errors import MeshFileError, RlacdError, TrainingError
-from rlacd.io.read.companions import lay_out, mesh_files
+from rlacd.io.read.beside import lay_out, mesh_files
 from rlacd.io.read.load import load_mesh
 from rlacd.learn.files import packed, save_bytes, unpacked
 from rlacd.repair.repair import repair

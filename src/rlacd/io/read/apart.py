@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from rlacd.errors import MeshFileError
@@ -9,8 +10,8 @@ from rlacd.memory import memory_left
 from rlacd.pool import Answer, Blobs, ProcessLimits, Request, Values, WorkerDiedError
 from rlacd.pool.local import Worker
 
-SECONDS, MEMORY = 600.0, 8 * 2**30
-"""Limits of one file."""
+LIMITS = ProcessLimits(seconds=600.0, memory=8 * 2**30)
+"""Of one file."""
 
 
 def answer_of(server: str, path: Path, kind: str, values: Values, blobs: Blobs) -> Answer:
@@ -30,12 +31,12 @@ def answer_of(server: str, path: Path, kind: str, values: Values, blobs: Blobs) 
     Raises
     ------
     MeshFileError
-        The process died, or took more than `SECONDS` or `MEMORY`.
+        The process died, or took more than `LIMITS`.
     RlacdError
         Raised by the server.
     """
     worker = Worker()
-    limits = ProcessLimits(SECONDS, max(min(MEMORY, memory_left()), 1))
+    limits = replace(LIMITS, memory=max(min(LIMITS.memory or 0, memory_left()), 1))
     try:
         return worker.ask(Request(server, values, blobs, limits=limits))
     except WorkerDiedError as error:

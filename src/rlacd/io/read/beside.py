@@ -1,15 +1,19 @@
-"""Files beside a mesh that it refers to: only those of its own folder."""
+"""Files beside a mesh that it refers to: only those of its own folder, or below it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import contextlib
+import json
+import re
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
 from trimesh.resolvers import Resolver
 
-from rlacd.io.read.open_file import LARGEST, read_file
+from rlacd.errors import MeshFileError
+from rlacd.io.read.open_file import LARGEST_FILE, read_file
 
 DATA = frozenset({".bin"})
 """To read triangles: no colours, and no images, whose decoders are the riskier part of any loader."""
@@ -33,21 +37,23 @@ class FolderFiles(Resolver):  # type: ignore[misc]
         self._endings = endings
         self._read: dict[Path, bytes] = {}
 
-    def get(self, name: str) -> bytes:
+    def get(self, name: str, unquoted: bool = True) -> bytes:
         """Return the content of a file in the folder, cached, since a file may be named any number of times.
+
+        The name may be written like that of an address, if it is to be `unquoted`.
 
         Raises
         ------
         FileNotFoundError
             There is no such file, or it may not be read.
         """
-        for spelled in dict.fromkeys((name, unquote(name))):
+        for spelled in dict.fromkeys((name, unquote(name) if unquoted else name)):
             try:
                 path = (self._folder / spelled.strip()).resolve()
                 if path.suffix.lower() not in self._endings or not path.is_relative_to(self._folder):
                     continue
                 if path not in self._read:
-                    self._read[path] = read_file(path, LARGEST - sum(map(len, self._read.values())))
+                    self._read[path] = read_file(path, LARGEST_FILE - sum(map(len, self._read.values())))
             except (OSError, ValueError, RuntimeError):  # a name with a NUL, circular links
                 continue
             return self._read[path]
@@ -64,3 +70,80 @@ class FolderFiles(Resolver):  # type: ignore[misc]
     def keys(self) -> Iterator[str]:
         """List nothing: files are asked for by name."""
         return iter(())
+
+
+def mesh_files(path: Path, name: str | None = None) -> dict[str, bytes]:
+    """Read all files that make up a mesh, by name relative to its folder; the mesh file itself comes first.
+
+    Parameters
+    ----------
+    path : Path
+        The mesh file.
+    name : str, optional
+        Its name in messages.
+
+    Raises
+    ------
+    MeshFileError
+        The mesh file cannot be opened.
+    """
+    try:
+        content = read_file(path)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise MeshFileError(f"{name or path} cannot be opened ({reason}): check its name and permissions") from error
+    return {path.name: content, **_beside(path, content)}
+
+
+def lay_out(files: Mapping[str, bytes], folder: Path) -> Path:
+    """Write the files read by `mesh_files` to a folder, except names that lead outside; returns the mesh file."""
+    for name, content in files.items():
+        target = folder / name
+        if target.resolve().is_relative_to(folder.resolve()):
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(content)
+    return folder / next(iter(files))
+
+
+def _beside(path: Path, content: bytes) -> dict[str, bytes]:
+    """Files beside a mesh that it names: buffers and images of glTF, materials and pictures of OBJ and COLLADA."""
+    match path.suffix.lower():
+        case ".gltf":
+            return _found(path, _of_gltf(content), DATA | IMAGES)
+        case ".obj":
+            materials = _found(path, _values(_MTLLIB, content), PICTURES)
+            pictures = [name for data in materials.values() for name in _values(_MAP, data)]
+            return {**materials, **_found(path, pictures, PICTURES)}
+        case ".dae":
+            return _found(path, _values(_INIT_FROM, content), PICTURES)
+        case _:
+            return {}
+
+
+_MTLLIB = re.compile(rb"^mtllib[ \t]+(.+)$", re.MULTILINE)
+_MAP = re.compile(rb"^[ \t]*map_Kd[ \t]+(.+)$", re.MULTILINE | re.IGNORECASE)
+_INIT_FROM = re.compile(rb"<init_from>([^<]{1,1000})</init_from>")
+
+
+def _values(pattern: re.Pattern[bytes], content: bytes) -> list[str]:
+    return [value.decode(errors="replace").strip() for value in pattern.findall(content)]
+
+
+def _of_gltf(content: bytes) -> list[str]:
+    """The files that buffers and images name; the loader reports what is missing."""
+    try:
+        header = json.loads(content)
+        named = [*header.get("buffers", []), *header.get("images", [])]
+        uris = [str(one["uri"]) for one in named if "uri" in one]
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return []
+    return [uri for uri in uris if not uri.startswith("data:")]
+
+
+def _found(path: Path, uris: list[str], endings: frozenset[str]) -> dict[str, bytes]:
+    """Those that are in the folder of the mesh, or below it."""
+    files, found = FolderFiles(path.parent, endings), {}
+    for name in sorted({spelled for uri in uris for spelled in (uri, unquote(uri))}):
+        with contextlib.suppress(FileNotFoundError):
+            found[name] = files.get(name, unquoted=False)
+    return found

@@ -15,9 +15,8 @@ from lxml import etree
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.beside import PICTURES, FolderFiles
-from rlacd.io.read.contents import Contents, Triangles
-from rlacd.io.read.conventions import HEAD, collada
-from rlacd.io.read.limits import DEEPEST, LONGEST_NAME, MOST_PLACES
+from rlacd.io.read.contents import DEEPEST_PART, LONGEST_NAME, MOST_PLACES, Contents, Triangles
+from rlacd.io.read.conventions import COLLADA_HEAD, collada
 from rlacd.io.read.looks import opened_picture, painted
 from rlacd.io.read.polygons import fan_triangles, places_of, strip_triangles, triangles_within
 from rlacd.io.read.text import rows_of, whole
@@ -79,10 +78,16 @@ class _Document:
         """What an element refers to; None if that is not there."""
         return None if element is None else self.named.get(element.get(attribute, "").removeprefix("#"))
 
+    def _source(self, element: Any) -> Any:
+        """The source of an input. Raises LookupError if it is missing."""
+        if (source := self.at(element, "source")) is None:
+            raise LookupError(f"{element.get('source')!r:.80} is missing")
+        return source
+
     def _place(self, node: Any, transform: FloatArray, depth: int) -> None:
-        if depth > DEEPEST:
+        if depth > DEEPEST_PART:
             raise MeshFileError(
-                f"{self._path} places parts inside parts, or inside itself, more than {DEEPEST} deep: export it again"
+                f"{self._path} places parts inside parts, or in itself, more than {DEEPEST_PART} deep: export it again"
             )
         here = transform @ _transform(node)
         for child in node.iterchildren("{*}*"):
@@ -104,7 +109,7 @@ class _Document:
     def _bound(self, controller: Any) -> tuple[Any, FloatArray]:
         """The geometry that a controller bends, and the matrix that it applies before."""
         matrix = np.eye(4)
-        for _ in range(DEEPEST):
+        for _ in range(DEEPEST_PART):
             shape = None if controller is None else next(controller.iterchildren("{*}skin", "{*}morph"), None)
             if shape is None:
                 break
@@ -144,10 +149,10 @@ class _Document:
         offsets = [0]
         for one in primitive.iterchildren("{*}input"):
             offsets.append(offset := int(one.get("offset", 0)))
-            source = self.at(one, "source")
+            source = self._source(one)
             inputs = source.findall("{*}input") if one.get("semantic") == "VERTEX" else [one]
             for inner in inputs:
-                arrays.setdefault(inner.get("semantic"), (self._rows(self.at(inner, "source")), offset))
+                arrays.setdefault(inner.get("semantic"), (self._rows(self._source(inner)), offset))
         points, offset = arrays["POSITION"]
         if min(offsets) < 0:
             raise ValueError("an offset below zero")
@@ -161,6 +166,8 @@ class _Document:
         name = source.get("id")
         if name not in self._sources:
             accessor = source.find("{*}technique_common/{*}accessor")
+            if accessor is None:
+                raise LookupError(f"{name!r:.80} has no accessor")
             values = _numbers(source.findtext("{*}float_array"))
             params = accessor.findall("{*}param")
             used = [at for at, param in enumerate(params) if param.get("name")] or list(range(len(params)))
@@ -314,7 +321,7 @@ def read_collada(path: Path, content: bytes) -> Contents:
         The file is damaged, or would multiply to more than is reasonable.
     """
     content = _unpacked(path, content)
-    up, metres = collada(content[:HEAD])
+    up, metres = collada(content[:COLLADA_HEAD])
     document = _Document(path, content)
     geometry = []
     for one in document.placed.values():

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 from rlacd.options.output import Axis
 
-HEAD = 1 << 16
+COLLADA_HEAD = 1 << 16
 """Bytes of a COLLADA file in which they are looked for: ``<asset>`` comes first."""
 
 _COLLADA_UNIT = re.compile(rb"""<(?:[\w.-]+:)?unit\b[^>]*?\bmeter\s*=\s*["']\s*([0-9.eE+-]+)\s*["']""")
@@ -35,3 +36,21 @@ def collada(head: bytes) -> tuple[Axis, float | None]:
     except ValueError:
         metres = None
     return axes[up[1]] if up else "z", metres if metres is not None and 0 < metres < float("inf") else None
+
+
+def collada_unit(path: Path) -> tuple[float, list[str]]:
+    """Return the metres per unit of the file, 1 for other formats, and warnings.
+
+    ROS, Gazebo and Bullet apply the unit. Whether a file whose y axis points up is turned differs between them.
+    """
+    if path.suffix.lower() != ".dae" or not path.is_file():
+        return 1.0, []
+    with path.open("rb") as file:
+        up, metres = collada(file.read(COLLADA_HEAD))
+    warnings = []
+    if up != "z":
+        warnings.append(
+            f"{path.name} declares {up.upper()}_UP, and some programs rotate such a file when they read it; its hulls "
+            "keep its coordinates."
+        )
+    return metres or 1.0, warnings

@@ -13,8 +13,8 @@ import numpy as np
 
 from rlacd.errors import MeshFileError, MissingExtraError
 from rlacd.io.read.apart import answer_of
+from rlacd.io.read.contents import MOST_TRIANGLES
 from rlacd.io.read.gltf_arrays import ITEMS, Arrays, Json, as_floats
-from rlacd.io.read.limits import MOST_TRIANGLES
 from rlacd.pool import Blobs, Shared, Values
 
 DRACO = "KHR_draco_mesh_compression"

@@ -13,10 +13,9 @@ import numpy as np
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.beside import FolderFiles
-from rlacd.io.read.contents import Contents, Triangles
+from rlacd.io.read.contents import MOST_PLACES, Contents, Triangles
 from rlacd.io.read.draco import DRACO, decode_draco
 from rlacd.io.read.gltf_arrays import Arrays, Json, item
-from rlacd.io.read.limits import MOST_PLACES
 from rlacd.io.read.polygons import fan_triangles, strip_triangles
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import Asset, SourceNode
@@ -36,12 +35,8 @@ READ = re.compile(
 ENCODED = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 """Extensions that encode the triangles and are not read: without the decoder, the file holds zeros in their place."""
 
-POINTS, LINES, TRIANGLES, STRIP, FAN = (0,), (1, 2, 3), 4, 5, 6
+POINTS, LINES, SURFACES = (0,), (1, 2, 3), (TRIANGLES := 4, STRIP := 5, FAN := 6)
 """Modes of primitives."""
-
-SURFACES = (TRIANGLES, STRIP, FAN)
-
-UNREADABLE = "cannot be read as glTF: it is damaged or cut off"
 
 
 def read_gltf(path: Path, content: bytes) -> Contents:
@@ -57,48 +52,43 @@ def read_gltf(path: Path, content: bytes) -> Contents:
     Raises
     ------
     MeshFileError
-        It is damaged, declares more than it holds or more than is reasonable, or requires what is not read.
+        It has more than is reasonable, or requires what is not read.
+    ValueError, LookupError, TypeError, ...
+        It is damaged, or declares more than it holds.
     MissingExtraError
         It is compressed with Draco, and the extra ``draco`` is not installed.
     FileNotFoundError
         A file that a buffer names is not in the folder.
     """
-    header, rest = split(path, content)
-    try:
-        primitives = _checked(path, header)
-        arrays = Arrays(path, header, rest, len(content), FolderFiles(path.parent).get)
-        required = DRACO in header.get("extensionsRequired", [])
-        if not decode_draco(path, primitives, required, arrays) and required:
-            raise _hidden(path, DRACO)
-        with np.errstate(all="ignore"):  # what is not finite is left out, with a warning
-            geometry, warnings = _Scene(path, header, arrays).read()
-    except MeshFileError:
-        raise
-    except (TypeError, KeyError, IndexError, AttributeError, OverflowError, ValueError) as error:
-        raise MeshFileError(f"{path} {UNREADABLE} ({type(error).__name__}: {error!s:.100}); export it again") from error
+    header, rest = split(content)
+    primitives = _checked(path, header)
+    arrays = Arrays(header, rest, len(content), FolderFiles(path.parent).get)
+    required = DRACO in header.get("extensionsRequired", [])
+    if not decode_draco(path, primitives, required, arrays) and required:
+        raise _hidden(path, DRACO)
+    with np.errstate(all="ignore"):  # what is not finite is left out, with a warning
+        geometry, warnings = _Scene(header, arrays).read()
     return Contents(geometry, warnings, "y", 1.0, Asset(content, path, "gltf"))
 
 
-def split(path: Path, content: bytes) -> tuple[Json, bytes | None]:
-    """Split a file into its JSON and, if it is binary, the bytes that follow."""
+def split(content: bytes) -> tuple[Json, bytes | None]:
+    """Split a file into its JSON and, if it is binary, the bytes that follow. Raises ValueError if it is damaged."""
     text, rest = content, None
     if content.startswith(MAGIC):
         if len(content) < 20 or content[16:20] != JSON_CHUNK:
-            raise MeshFileError(f"{path} {UNREADABLE}; export it again")
+            raise ValueError("it does not begin with JSON")
         length, chunk = struct.unpack_from("<II", content, 8)
         if max(length, 20 + chunk) > len(content):
-            raise MeshFileError(f"{path} is cut off: its header declares {length} bytes; export it again")
+            raise ValueError(f"its header declares {length} bytes")
         if content[4:8] != b"\2\0\0\0":
-            raise MeshFileError(f"{path} is of another version than glTF 2: convert it to glb, obj, stl or ply")
+            raise ValueError("it is of another version than glTF 2")
         text, rest = content[20 : 20 + chunk], content[20 + chunk :]
     try:
         header = json.loads(text.decode())
     except RecursionError as error:
-        raise MeshFileError(f"{path} nests its JSON too deeply: no exporter writes such files") from error
-    except ValueError as error:
-        raise MeshFileError(f"{path} {UNREADABLE} ({error}); export it again") from error
+        raise ValueError("its JSON nests too deeply") from error
     if not isinstance(header, dict):
-        raise MeshFileError(f"{path} {UNREADABLE}; export it again")
+        raise ValueError("its JSON is no object")
     return header, rest
 
 
@@ -130,12 +120,12 @@ def _hidden(path: Path, extension: str) -> MeshFileError:
 class _Scene:
     """The nodes of a file, as its scene places them."""
 
-    def __init__(self, path: Path, header: Json, arrays: Arrays) -> None:
+    def __init__(self, header: Json, arrays: Arrays) -> None:
         self._header, self._arrays = header, arrays
         self._nodes: list[Json] = header.get("nodes", [])
         self._meshes: list[Json] = header.get("meshes", [])
         self._jointed = [all("JOINTS_0" in part["attributes"] for part in _surfaces(mesh)) for mesh in self._meshes]
-        self._worlds = _worlds(path, self._nodes)
+        self._worlds = _worlds(self._nodes)
         self._shapes: dict[Any, Triangles] = {}
         self._unjointed: set[int] = set()
         self._instances = 0
@@ -287,21 +277,19 @@ def _surfaces(mesh: Json) -> list[Json]:
     return [part for part in mesh["primitives"] if part.get("mode", TRIANGLES) in SURFACES]
 
 
-def _worlds(path: Path, nodes: Sequence[Json]) -> FloatArray:
+def _worlds(nodes: Sequence[Json]) -> FloatArray:
     """The transform of each node to the coordinates of the scene ``[N, 4, 4]``."""
     parents: list[int | None] = [None] * len(nodes)
     for index, node in enumerate(nodes):
         for child in node.get("children", ()):
             if item(parents, child) not in (None, index):
-                raise MeshFileError(
-                    f"{path} places the node {child} below two others, or inside itself: export the scene again"
-                )
+                raise ValueError(f"the node {child} is placed below two others, or inside itself")
             parents[child] = index
     order = [index for index, parent in enumerate(parents) if parent is None]
     for index in order:
         order.extend(dict.fromkeys(nodes[index].get("children", ())))
     if len(order) < len(nodes):
-        raise MeshFileError(f"{path} places a node inside itself: export the scene again")
+        raise ValueError("a node is placed inside itself")
     worlds = _locals(nodes)
     for index in order:
         if (parent := parents[index]) is not None:

@@ -9,14 +9,12 @@ from __future__ import annotations
 import base64
 import struct
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from rlacd.errors import MeshFileError
-from rlacd.io.read.limits import MOST_PLACES, most_in_memory
+from rlacd.io.read.contents import MOST_PLACES, most_in_memory
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.topology import IntArray
 
@@ -33,8 +31,6 @@ class Arrays:
 
     Parameters
     ----------
-    path : Path
-        Of the file, for messages.
     header : dict
         Its JSON.
     rest : bytes
@@ -46,23 +42,21 @@ class Arrays:
 
     Raises
     ------
-    MeshFileError
+    ValueError
         It declares more than it holds, or more than is reasonable.
     FileNotFoundError
         Raised by `beside`.
     """
 
-    def __init__(
-        self, path: Path, header: Json, rest: bytes | None, given: int, beside: Callable[[str], bytes]
-    ) -> None:
-        self._path, self._rest, self._beside = path, rest, beside
+    def __init__(self, header: Json, rest: bytes | None, given: int, beside: Callable[[str], bytes]) -> None:
+        self._rest, self._beside = rest, beside
         self._buffers: Sequence[Json] = header.get("buffers", [])
         self._views: Sequence[Json] = header.get("bufferViews", [])
         self._accessors: list[Json] = list(header.get("accessors", []))
         self._content: dict[int, bytes] = {}
         self._added: dict[int, npt.NDArray[Any]] = {}
         given += self._bytes_beside()
-        asked = sum(natural(path, view.get("byteLength", 0), "byteLength") for view in self._views)
+        asked = sum(natural(view.get("byteLength", 0), "byteLength") for view in self._views)
         asked += sum(self._size(accessor) for accessor in self._accessors)
         for mesh in header.get("meshes", []):
             for primitive in mesh["primitives"]:
@@ -70,16 +64,13 @@ class Arrays:
                 asked += sum(self._as_loaded(index) for index in used if index is not None)
         self._most = most_in_memory(given)
         if asked > self._most:
-            raise MeshFileError(
-                f"{path} asks for {asked} bytes, though it holds {given}: export it again, with one buffer view per "
-                "array"
-            )
+            raise ValueError(f"it asks for {asked} bytes, though it holds {given}")
 
     def need(self, count: int) -> None:
         """Refuse a file once what is made of its arrays adds up to too many bytes."""
         self._most -= count
         if self._most < 0:
-            raise MeshFileError(f"{self._path} decodes to more than is reasonable for its length: export it again")
+            raise ValueError("it decodes to more than is reasonable for its length")
 
     def add(self, rows: npt.NDArray[Any]) -> int:
         """Add an array; returns the index of its accessor."""
@@ -111,8 +102,8 @@ class Arrays:
     def view(self, index: int) -> memoryview:
         """The bytes of a buffer view."""
         view = item(self._views, index)
-        start = natural(self._path, view.get("byteOffset", 0), "byteOffset")
-        end = start + natural(self._path, view["byteLength"], "byteLength")
+        start = natural(view.get("byteOffset", 0), "byteOffset")
+        end = start + natural(view["byteLength"], "byteLength")
         buffer = self._buffer(view["buffer"])
         if end > len(buffer):
             raise ValueError(f"view {index} is longer than its buffer")
@@ -132,7 +123,7 @@ class Arrays:
         sparse = accessor.get("sparse")
         if sparse is None:
             return rows
-        changed = natural(self._path, sparse["count"], "count")
+        changed = natural(sparse["count"], "count")
         at = self._part(sparse["indices"], (changed, 1), np.dtype(TYPES[sparse["indices"]["componentType"]]))
         rows = rows.copy()
         rows[at[:, 0]] = self._part(sparse["values"], (changed, width), dtype)
@@ -154,26 +145,22 @@ class Arrays:
 
     def _size(self, accessor: Json) -> int:
         """Bytes of an array, for which its view has to have room."""
-        path = self._path
-        count = natural(path, accessor["count"], "count")
+        count = natural(accessor["count"], "count")
         row = np.dtype(TYPES[accessor["componentType"]]).itemsize * ITEMS[accessor["type"]]
         if "bufferView" in accessor:  # without one: zeros, or data of an extension
-            view = self._views[natural(path, accessor["bufferView"], "bufferView")]
-            start = natural(path, accessor.get("byteOffset", 0), "byteOffset")
-            natural(path, view.get("byteOffset", 0), "byteOffset")
-            stride = natural(path, view.get("byteStride", row), "byteStride")
+            view = self._views[natural(accessor["bufferView"], "bufferView")]
+            start = natural(accessor.get("byteOffset", 0), "byteOffset")
+            natural(view.get("byteOffset", 0), "byteOffset")
+            stride = natural(view.get("byteStride", row), "byteStride")
             length = start + (count - 1) * stride + row if count else 0
             if stride < row or length > view["byteLength"]:
-                raise MeshFileError(f"{path} declares {count} rows but has no room for them; export it again")
+                raise ValueError(f"it declares {count} rows but has no room for them")
         return count * row
 
     def _bytes_beside(self) -> int:
         """Count the bytes of the files that the buffers name."""
         if len(self._buffers) > MOST_PLACES:
-            raise MeshFileError(
-                f"{self._path} has {len(self._buffers)} buffers, more than {MOST_PLACES}: "
-                "export it again with a single buffer"
-            )
+            raise ValueError(f"{len(self._buffers)} buffers, more than {MOST_PLACES}")
         uris = {buffer.get("uri", "data:") for buffer in self._buffers}
         return sum(len(self._beside(uri)) for uri in sorted(uris) if not uri.startswith("data:"))
 
@@ -197,12 +184,10 @@ def item(items: Sequence[Any] | FloatArray, index: Any) -> Any:
     return items[index]
 
 
-def natural(path: Path, number: Any, what: str) -> int:
+def natural(number: Any, what: str) -> int:
     """Check a number that the file gives."""
     if not isinstance(number, int) or number < 0:
-        raise MeshFileError(
-            f"{path} has {number!r:.40} as a {what}, which cannot be negative or fractional; export it again"
-        )
+        raise ValueError(f"{number!r:.40} as a {what}, which cannot be negative or fractional")
     return number
 
 

@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
+import trimesh
 from numpy.typing import ArrayLike
 
 from rlacd.errors import EmptyMeshError, MeshDataError, MeshError, MeshFileError, MissingExtraError
+from rlacd.io.read import function_of
 from rlacd.io.read.contents import Contents, one_shape, require_few
 from rlacd.io.read.engine_hulls import without_engine_hulls
 from rlacd.io.read.open_file import read_file
@@ -27,24 +28,21 @@ from rlacd.solid.input_mesh import Asset, InputMesh
 from rlacd.solid.products import heights
 from rlacd.solid.topology import BoolArray, IntArray
 
-if TYPE_CHECKING:
-    import trimesh
-
-Source: TypeAlias = "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]"
+Source: TypeAlias = str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]
 
 _READERS = {
-    "obj": "obj:read_obj",
-    "msh": "simple_formats:read_msh",
-    "stl": "simple_formats:read_stl",
-    "ply": "ply:read_ply",
-    "off": "off:read_off",
-    **dict.fromkeys(("glb", "gltf", "vrm"), "gltf:read_gltf"),
-    **dict.fromkeys(("dae", "zae"), "collada:read_collada"),
-    "3mf": "threemf:read_3mf",
-    "xyz": "simple_formats:read_xyz",
-    **dict.fromkeys(("usd", "usda", "usdc", "usdz"), "usd:read_usd"),
+    "obj": "read.obj:read_obj",
+    "msh": "read.simple_formats:read_msh",
+    "stl": "read.simple_formats:read_stl",
+    "ply": "read.ply:read_ply",
+    "off": "read.simple_formats:read_off",
+    **dict.fromkeys(("glb", "gltf", "vrm"), "read.gltf:read_gltf"),
+    **dict.fromkeys(("dae", "zae"), "read.collada:read_collada"),
+    "3mf": "read.threemf:read_3mf",
+    "xyz": "read.simple_formats:read_xyz",
+    **dict.fromkeys(("usd", "usda", "usdc", "usdz"), "read.usd:read_usd"),
 }
-"""By extension, the module and function that reads it; a module is imported when it is needed."""
+"""By extension, the function that reads it."""
 
 FORMATS = tuple(_READERS)
 """The formats that are read."""
@@ -82,9 +80,8 @@ def load_mesh(source: Source) -> InputMesh:
     if isinstance(source, str):
         path = Path(source)
         return without_engine_hulls(_baked(path.name, _read(path)))
-    from rlacd.io.read.trimesh_scene import arrays_of, geometry_of, is_trimesh
-
-    if is_trimesh(source):
+    arrays_of, geometry_of = (function_of(f"read.trimesh_scene:{name}") for name in ("arrays_of", "geometry_of"))
+    if isinstance(source, trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud):
         kind, looks = type(source).__name__, hasattr(source, "geometry") or getattr(source, "visual", None)
         asset = Asset(source) if looks is True or getattr(looks, "defined", False) else None
         return without_engine_hulls(_baked(kind, Contents(geometry_of(source, kind), asset=asset)))
@@ -107,9 +104,8 @@ def _read(path: Path) -> Contents:
         raise MeshFileError(
             f"{path} is in a format that rlacd does not read: {hint or 'convert it to glb, obj, stl or ply'}"
         )
-    module, function = _READERS[extension].split(":")
     try:
-        contents: Contents = getattr(import_module(f"rlacd.io.read.{module}"), function)(path, content)
+        contents: Contents = function_of(_READERS[extension])(path, content)
     except Exception as error:  # parsers may raise anything on damaged files
         if renamed:
             raise MeshFileError(f"{path} is not {extension} but {holds}: {renamed}") from error
@@ -167,9 +163,8 @@ def _baked(name: str, contents: Contents) -> InputMesh:
         count += len(v)
     node_of = np.repeat(np.arange(len(nodes)), [len(f) for f in faces[1:]]) if solid else None
     mesh = _finite(name, np.concatenate(vertices), np.concatenate(faces), node_of)
-    warnings = (*mesh.warnings, *contents.warnings)
-    said = {"up": contents.up, "metres": contents.metres, "asset": contents.asset}
-    return replace(mesh, warnings=warnings, nodes=tuple(nodes), **said)
+    mesh = replace(mesh, warnings=(*mesh.warnings, *contents.warnings), nodes=tuple(nodes))
+    return replace(mesh, up=contents.up, metres=contents.metres, asset=contents.asset)
 
 
 def _finite(name: str, vertices: FloatArray, faces: IntArray, node_of: IntArray | None) -> InputMesh:

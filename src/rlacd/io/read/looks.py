@@ -8,24 +8,24 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import trimesh
 
+from rlacd.io.read import function_of
 from rlacd.io.read.beside import FolderFiles
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.topology import IntArray
 
 _READERS = {
-    "obj": "obj:scene_of_obj",
-    "ply": "ply:scene_of_ply",
-    "dae": "collada:scene_of_collada",
-    "3mf": "threemf:scene_of_3mf",
+    "obj": "read.obj:scene_of_obj",
+    "ply": "read.ply:scene_of_ply",
+    "dae": "read.collada:scene_of_collada",
+    "3mf": "read.threemf:scene_of_3mf",
 }
-"""By extension, the module and function that reads a file with its looks."""
+"""By extension, the function that reads a file with its looks."""
 
 MOST_PIXELS = 2**26
 """Of one picture: 8,192 by 8,192."""
@@ -46,9 +46,8 @@ def looks_of(path: Path, content: bytes, extension: str) -> trimesh.Scene | None
     extension : str
         ``obj``, ``ply``, ``dae`` or ``3mf``.
     """
-    module, function = _READERS[extension].split(":")
     try:
-        scene: trimesh.Scene = getattr(import_module(f"rlacd.io.read.{module}"), function)(path, content)
+        scene: trimesh.Scene = function_of(_READERS[extension])(path, content)
         for geometry in scene.geometry.values():
             _drop_bad_pictures(getattr(geometry.visual, "material", None))
     except Exception:  # parsers may raise anything on damaged files; the triangles have been read without looks

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,8 +15,7 @@ import trimesh
 from trimesh.exchange.obj import parse_mtl
 
 from rlacd.io.read.beside import PICTURES, FolderFiles
-from rlacd.io.read.contents import Contents, Triangles, one_shape
-from rlacd.io.read.limits import MOST_PLACES
+from rlacd.io.read.contents import MOST_PLACES, Contents, Triangles, one_shape
 from rlacd.io.read.looks import BETWEEN, painted
 from rlacd.io.read.polygons import places_of
 from rlacd.io.read.text import check_text, numbers_in, plain_text, rows_of
@@ -178,7 +177,7 @@ def scene_of_obj(path: Path, content: bytes) -> trimesh.Scene:
     file = _File(path, content)
     names, owner = file.objects()
     called, paint = file.named(b"usemtl")
-    beside, paints = FolderFiles(path.parent, PICTURES), {}
+    beside, paints = FolderFiles(path.parent, PICTURES), dict[str, Any]()
     for library in file.libraries:
         try:
             paints |= parse_mtl(beside.get(library), resolver=beside)

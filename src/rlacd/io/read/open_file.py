@@ -6,14 +6,14 @@ import errno
 import os
 import stat
 
-LARGEST = 2**30
+LARGEST_FILE = 2**30
 """Bytes of the largest file that is read. A binary STL of this length has 21 million triangles."""
 
 # Opening a pipe would wait for a writer; Windows has no such files, and would translate line ends.
 _FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 
 
-def read_file(path: str | os.PathLike[str], most: int = LARGEST) -> bytes:
+def read_file(path: str | os.PathLike[str], most: int = LARGEST_FILE) -> bytes:
     """Read the content of a file as of opening it, even if it grows meanwhile.
 
     Parameters

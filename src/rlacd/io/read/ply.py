@@ -10,11 +10,10 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from rlacd.errors import MeshFileError
 from rlacd.io.read.beside import PICTURES
 from rlacd.io.read.contents import Contents, one_shape
 from rlacd.io.read.polygons import strip_triangles, triangles_of
-from rlacd.io.read.text import check_text, count_in, numbers_in, plain_text, whole
+from rlacd.io.read.text import check_text, count_in, plain_text, rows_of, whole
 from rlacd.io.read.trimesh_scene import parsed
 from rlacd.memory import BYTES_READ, require_memory
 from rlacd.solid.arrays import FloatArray
@@ -33,6 +32,7 @@ _KINDS = {
 }
 _ORDERS = {"ascii": "<", "binary_little_endian": "<", "binary_big_endian": ">"}
 _CORNERS = ("vertex_indices", "vertex_index")
+_TEXT = re.compile(rb"(?:^|[\r\n])format\s+ascii\b", re.IGNORECASE)
 _END = re.compile(rb"^end_header[ \t]*\r?\n", re.MULTILINE)
 _DESCRIBED = re.compile(rb"^property\s+\S+\s+(?:red|nx|s|u|texture_u)\s|TextureFile", re.MULTILINE)
 
@@ -69,7 +69,11 @@ class _Lists:
     def _walk(self, at: int, rows: int) -> int:
         """Go through rows one by one, and return where they end."""
         steps = [
-            (name, np.dtype(kind).itemsize, length and struct.Struct(length[0] + np.dtype(length).char))
+            (
+                name,
+                np.dtype(kind).itemsize,
+                None if length is None else struct.Struct(length[0] + np.dtype(length).char),
+            )
             for name, kind, length in self._element.properties
         ]
         for _ in range(rows):
@@ -124,37 +128,42 @@ def read_ply(path: Path, content: bytes) -> Contents:
     MeshFileError, MeshDataError, ValueError
         It is damaged, shorter than it declares, or takes too much memory.
     """
-    is_text = b"format ascii" in content[:1000]
-    content = plain_text(content) if is_text else content
+    is_text = _TEXT.search(content[:1000]) is not None
     if is_text:
         check_text(path, content)
+        content = plain_text(content)
     end = _END.search(content)
-    if end is None:
-        raise MeshFileError(f"{path} cannot be read as ply: its header has no end; export it again")
+    if end is None or not content.startswith(b"ply"):
+        raise ValueError("its header has no end, or does not begin with ply")
     header, body = content[: end.end()], content[end.end() :]
-    elements = _elements(path, header)
+    elements = _elements(header, is_text)
     for name, element in elements.items():
         if element.count > len(body):
-            raise _cut_off(path, name, element)
+            raise ValueError(f"its header declares {element.count} {name} lines")
     require_memory(elements["face"].count if "face" in elements else 0, BYTES_READ, path.name)
-    if is_text:
-        body = numbers_in(body).astype("<f8").tobytes()
+    lines = None
+    if is_text:  # read as binary with eight bytes for each number
+        numbers, counts = rows_of(body.rstrip() + b"\n")
+        body, lines = numbers.astype("<f8").tobytes(), 8 * np.append(0, np.cumsum(counts[counts > 0]))
     points, faces = np.empty((0, 3)), [np.empty((0, 3), dtype=np.int64)]
     at = 0
     for name, element in elements.items():
+        begin = at
         if any(length is not None for *_, length in element.properties):
             lists = _Lists(body, at, element)
             at = lists.end
             if name in ("face", STRIPS) and element.count:
                 faces.append(_triangles(lists, name == STRIPS, points))
-            continue
-        record = np.dtype([(field, kind) for field, kind, _ in element.properties])
-        if at + element.count * record.itemsize > len(body):
-            raise _cut_off(path, name, element)
-        if name == "vertex":
-            rows = np.frombuffer(body, record, element.count, at)
-            points = np.stack([rows[axis].astype(np.float64) for axis in "xyz"], axis=1)
-        at += element.count * record.itemsize
+        else:
+            record = np.dtype([(field, kind) for field, kind, _ in element.properties])
+            at += element.count * record.itemsize
+            if at > len(body):
+                raise ValueError(f"its header declares {element.count} {name} lines")
+            if name == "vertex":
+                rows = np.frombuffer(body, record, element.count, begin)
+                points = np.stack([rows[axis].astype(np.float64) for axis in "xyz"], axis=1)
+        if lines is not None and np.searchsorted(lines, at) - np.searchsorted(lines, begin) != element.count:
+            raise ValueError(f"its {element.count} {name} lines are longer or shorter than they should be")
     described = _DESCRIBED.search(header) is not None and STRIPS not in elements
     asset = Asset(content, path, "ply") if described and header.count(b"\n") < MOST_FIELDS else None
     return Contents(one_shape(path.stem, points, np.concatenate(faces)), asset=asset)
@@ -165,19 +174,17 @@ def scene_of_ply(path: Path, content: bytes) -> trimesh.Scene:
     return parsed(path, content, "ply", PICTURES)
 
 
-def _cut_off(path: Path, name: str, element: _Element) -> MeshFileError:
-    return MeshFileError(f"{path} is cut off: its header declares {element.count} {name} lines; export it again")
-
-
-def _elements(path: Path, header: bytes) -> dict[str, _Element]:
-    order, is_text = "", False
+def _elements(header: bytes, is_text: bool) -> dict[str, _Element]:
+    order = "<"
     found: dict[str, _Element] = {}
     for line in header.decode("latin-1").splitlines():
         match line.split():
             case ["format", kind, *_]:
-                order, is_text = _ORDERS[kind], kind == "ascii"
+                order = _ORDERS[kind.lower()]
             case ["element", name, count]:
-                found[name] = last = _Element(count_in(path, count.encode()))
+                if name in found:
+                    raise ValueError(f"its header declares {name!r:.40} twice")
+                found[name] = last = _Element(count_in(count.encode()))
             case ["property", "list", length, kind, name]:
                 kinds = ("f8", "f8") if is_text else (_KINDS[kind], _KINDS[length])
                 last.properties.append((name, order + kinds[0], order + kinds[1]))

@@ -11,7 +11,7 @@ from manifold3d import triangulate
 IntArray = npt.NDArray[np.int64]
 FloatArray = npt.NDArray[np.float64]
 
-FOLDED = 1e-9
+TURNED_SHARE = 1e-9
 """A triangle of a fan is folded over if it is turned against its polygon by more than this share of its area."""
 
 MOST_CORNERS = 10_000
@@ -67,7 +67,7 @@ def _folded(points: FloatArray, fans: IntArray, owner: IntArray, polygons: int) 
         areas = np.cross(b - a, c - a)
         whole = np.stack([np.bincount(owner, areas[:, axis], polygons) for axis in range(3)], axis=1)
         along = (areas * whole[owner]).sum(axis=1)
-        turned = along < -FOLDED * (whole * whole).sum(axis=1)[owner]
+        turned = along < -TURNED_SHARE * (whole * whole).sum(axis=1)[owner]
     return np.unique(owner[turned])
 
 
@@ -100,7 +100,7 @@ def triangles_within(ring: FloatArray, holes: Sequence[FloatArray] = ()) -> IntA
     points = np.concatenate(flat)
     a, b, c = points[found[:, 0]], points[found[:, 1]], points[found[:, 2]]
     areas = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    return np.concatenate(places)[found] if areas.min() >= -FOLDED * length else None
+    return np.concatenate(places)[found] if areas.min() >= -TURNED_SHARE * length else None
 
 
 def _normal(ring: FloatArray) -> FloatArray:

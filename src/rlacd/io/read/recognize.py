@@ -9,8 +9,9 @@ CONVERTERS = {
     "fbx": "import it into Blender and export it as glTF 2.0",
     **dict.fromkeys(("zip", "gz", "bz2", "xz", "zst", "7z", "rar", "tar", "tgz"), "unpack it, and give the mesh in it"),
     **dict.fromkeys(("step", "stp", "iges", "igs"), "export it from a CAD program, such as FreeCAD, as stl or obj"),
-    "xacro": "expand it with the tool xacro, and give the URDF",
-    **dict.fromkeys(("urdf", "sdf"), "it describes a robot, not a mesh: give a mesh that it names"),
+    "xacro": "expand its macros with the tool xacro, and give the URDF",
+    "urdf": "it describes a robot, which rlacd.rewrite_robot takes",
+    "sdf": "robots are rewritten as .urdf and .xml (MJCF): give one of those, or a mesh",
 }
 """What to do with files that people have and that are not read."""
 

@@ -1,4 +1,10 @@
-"""Formats that are lists of numbers: STL, the meshes of MuJoCo (msh), and points (xyz)."""
+"""Formats that are lists of numbers: STL, the meshes of MuJoCo (msh), points (xyz), and OFF in all its variants.
+
+OFF is Geomview's: a keyword, the numbers of vertices, faces and edges, a line per vertex, a line per face. Letters
+before ``OFF`` say what else the line of a vertex holds: texture coordinates (``ST``), a colour (``C``), a normal
+(``N``), a fourth homogeneous coordinate (``4``), or that there are not three dimensions (``n``). The keyword may be
+left out or have the numbers on its own line, and ``#`` begins a comment.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +15,9 @@ import numpy as np
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.contents import Contents, one_shape
-from rlacd.io.read.text import check_text, plain_text, vectors_of
+from rlacd.io.read.polygons import triangles_of
+from rlacd.io.read.recognize import OFF_KEYWORD
+from rlacd.io.read.text import check_text, count_in, plain_text, rows_of, vectors_of, whole
 from rlacd.memory import BYTES_READ, require_memory
 from rlacd.solid.arrays import FloatArray
 
@@ -29,7 +37,7 @@ def read_stl(path: Path, content: bytes) -> Contents:
     more = len(content) - 84 - _STL.itemsize * count
     if b"\0" in content[:512] or more == 0:  # some binary files begin like text
         if more < 0:
-            raise MeshFileError(f"{path} is cut off: its header declares {count} triangles; export it again")
+            raise ValueError(f"its header declares {count} triangles")
         require_memory(count, BYTES_READ, path.name)
         points = np.frombuffer(content, _STL, count, 84)["corners"].reshape(-1, 3).astype(np.float64)
         warnings = [f"{more} bytes after the last triangle of {path.name} were left out"] if more else []
@@ -42,15 +50,19 @@ def read_stl(path: Path, content: bytes) -> Contents:
 def _text_stl(path: Path, text: bytes) -> FloatArray:
     require_memory(max(text.count(b"vertex"), text.count(b"VERTEX")) // 3, BYTES_READ, path.name)
     corners = _VERTEX.findall(text)
-    if len(corners) % 3 or (corners and b"end" not in text[text.lower().rfind(b"vertex") :].lower()):
+    if len(corners) % 3 or (corners and b"endsolid" not in text[text.lower().rfind(b"vertex") :].lower()):
         raise ValueError(f"a triangle ends after {len(corners) % 3} vertices")
     return np.array(corners, dtype=np.float64).reshape(-1, 3)
 
 
 def read_xyz(path: Path, content: bytes) -> Contents:
-    """Read points: the first three numbers of each line."""
+    """Read points: the first three numbers of each line, which all have equally many."""
     check_text(path, content)
-    return Contents(one_shape(path.stem, vectors_of(plain_text(content))))
+    numbers, counts = rows_of(plain_text(content).rstrip() + b"\n")
+    width = counts.max()
+    if width < 3 or not np.isin(counts, (0, width)).all():
+        raise ValueError(f"lines of {counts.min()} and of {width} numbers")
+    return Contents(one_shape(path.stem, np.ascontiguousarray(numbers.reshape(-1, width)[:, :3])))
 
 
 def read_msh(path: Path, content: bytes) -> Contents:
@@ -65,10 +77,76 @@ def read_msh(path: Path, content: bytes) -> Contents:
         raise MeshFileError(f"{path} is a mesh of Gmsh, not of MuJoCo: convert it to glb, obj, stl or ply")
     counts = [int(count) for count in np.frombuffer(content[: len(content[:16]) // 4 * 4], "<i4")]
     if len(counts) < 4 or min(counts) < 0:
-        raise MeshFileError(f"{path} cannot be read as msh: its header lacks the counts; export it again")
+        raise ValueError("its header lacks the counts")
     points, normals, texture, faces = counts
     if len(content) != 16 + 4 * (3 * points + 3 * normals + 2 * texture + 3 * faces):
-        raise MeshFileError(f"{path} is not as long as its header declares: it is damaged or cut off; export it again")
+        raise ValueError("it is not as long as its header declares")
     vertices = np.frombuffer(content, "<f4", 3 * points, 16).reshape(-1, 3).astype(np.float64)
     corners = np.frombuffer(content, "<i4", 3 * faces, len(content) - 12 * faces).reshape(-1, 3)
     return Contents(one_shape(path.stem, vertices, corners.astype(np.int64)))
+
+
+_BINARY = re.compile(rb"\s*BINARY\b")
+
+
+def read_off(path: Path, content: bytes) -> Contents:
+    """Read positions and polygons; normals, colours and texture coordinates are passed over.
+
+    Raises
+    ------
+    MeshFileError, ValueError
+        It is binary or not three-dimensional, or its counts are not numbers or exceed what it holds.
+    """
+    content = plain_text(content)
+    keyword = OFF_KEYWORD.match(content)
+    if keyword is not None and _BINARY.match(content, keyword.end()):
+        raise MeshFileError(
+            f"{path} is a binary OFF file, which rlacd does not read: save it as text, or as ply or obj"
+        )
+    check_text(path, content)
+    lines = [line for line in (raw.split(b"#", 1)[0].strip() for raw in content.splitlines()) if line]
+    letters = _take_keyword(lines)
+    if b"n" in letters:
+        _check_dimension(path, letters, lines)
+    header = lines[0].split() if lines else []
+    if len(header) < 2:
+        raise ValueError("its header lacks the counts")
+    vertices, faces = (count_in(word) for word in header[:2])
+    body = lines[1:]
+    if len(body) < vertices + faces:
+        raise ValueError(f"its header declares {vertices} vertices and {faces} faces")
+    points = vectors_of(b"\n".join(body[:vertices]), 4 if b"4" in letters else 3)
+    if b"4" in letters:
+        with np.errstate(all="ignore"):
+            points = points[:, :3] / points[:, 3:]
+    numbers, words = rows_of(b"\n".join([*body[vertices : vertices + faces], b""]))
+    first = np.cumsum(words) - words
+    counts = whole(numbers[first])
+    if (counts > words - 1).any() or (counts < 0).any():
+        raise ValueError("a face has fewer corners than it declares")
+    owner = np.repeat(np.arange(faces), counts)
+    place = np.arange(len(owner)) - (np.cumsum(counts) - counts)[owner]
+    corners = whole(numbers[first[owner] + 1 + place])
+    if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
+        raise ValueError("a face refers to a missing point")
+    return Contents(one_shape(path.stem, points, triangles_of(points, counts, corners)))
+
+
+def _take_keyword(lines: list[bytes]) -> bytes:
+    """Remove the keyword from the first line, or that line if it holds nothing else; returns the letters before it."""
+    found = OFF_KEYWORD.match(lines[0]) if lines else None
+    if found is None:
+        return b""
+    rest = lines[0][found.end() :].strip()
+    lines[:1] = [rest] if rest else []
+    return found[1] or b""
+
+
+def _check_dimension(path: Path, letters: bytes, lines: list[bytes]) -> None:
+    """Remove the dimension of the space from the lines, and refuse any other than three."""
+    word, _, rest = lines[0].partition(b" ") if lines else (b"", b"", b"")
+    lines[:1] = [rest.strip()] if rest.strip() else []
+    dimension = count_in(word)
+    if dimension != 3 or b"4" in letters:
+        what = f"{dimension} dimensions" + (" and homogeneous coordinates" if b"4" in letters else "")
+        raise MeshFileError(f"{path} is a mesh in {what}, not in 3 dimensions: project it first")

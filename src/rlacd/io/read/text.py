@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rlacd.errors import MeshFileError
-from rlacd.io.read.limits import MOST_TRIANGLES
+from rlacd.io.read.contents import MOST_TRIANGLES
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.topology import IntArray
 
@@ -76,9 +76,8 @@ def whole(numbers: npt.NDArray[Any]) -> IntArray:
     return integers
 
 
-def count_in(path: Path, word: bytes) -> int:
-    """Read a count in a header; raises MeshFileError if it is not one."""
+def count_in(word: bytes) -> int:
+    """Read a count in a header. Raises ValueError if it is none."""
     if not re.fullmatch(rb"\+?\d{1,18}", word):
-        said = word[:20].decode(errors="replace")
-        raise MeshFileError(f"{path} has {said!r} in its header where a count belongs: it is damaged; export it again")
+        raise ValueError(f"{word[:20].decode(errors='replace')!r} is in its header where a count belongs")
     return int(word)

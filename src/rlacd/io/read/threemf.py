@@ -14,9 +14,8 @@ import trimesh
 from lxml import etree
 
 from rlacd.errors import MeshFileError
-from rlacd.io.read.contents import Contents, Triangles
+from rlacd.io.read.contents import DEEPEST_PART, LONGEST_NAME, MOST_PLACES, Contents, Triangles
 from rlacd.io.read.conventions import METRES
-from rlacd.io.read.limits import DEEPEST, LONGEST_NAME, MOST_PLACES
 from rlacd.io.read.xml import PARSER, check_prologue, open_archive, parse_xml, unpack
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import Asset, SourceNode
@@ -90,8 +89,8 @@ class _Archive:
         return self._models[model]
 
     def _place(self, items: Sequence[_Item], transform: FloatArray, around: list[tuple[str, str]]) -> None:
-        if len(around) > DEEPEST:
-            raise MeshFileError(f"{self._path} places parts inside parts more than {DEEPEST} deep: export it again")
+        if len(around) > DEEPEST_PART:
+            raise MeshFileError(f"{self._path} places parts in parts more than {DEEPEST_PART} deep: export it again")
         for item in items:
             where = (item.model, item.number)
             if where in around:
@@ -123,7 +122,7 @@ def read_3mf(path: Path, content: bytes) -> Contents:
 
 def scene_of_3mf(path: Path, content: bytes) -> trimesh.Scene:
     """The same as a scene with colours."""
-    scene, shared = trimesh.Scene(), {}
+    scene, shared = trimesh.Scene(), dict[int, str]()
     for key, (node, thing) in _Archive(path, content).placed.items():
         if id(thing) in shared:
             scene.graph.update(key, matrix=node.transform, geometry=shared[id(thing)])

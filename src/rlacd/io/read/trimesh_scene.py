@@ -30,11 +30,6 @@ def parsed(path: Path, content: bytes, extension: str, endings: frozenset[str] =
     )
 
 
-def is_trimesh(source: object) -> bool:
-    """Whether an object is one of trimesh that is taken."""
-    return isinstance(source, trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud)
-
-
 def geometry_of(source: Any, name: str) -> list[tuple[SourceNode, Triangles]]:
     """All that a scene, mesh or point cloud places; paths are passed over.
 
@@ -54,38 +49,14 @@ def _instances(source: Any, name: str) -> Iterator[tuple[SourceNode, Any]]:
     if not isinstance(source, trimesh.Scene):
         yield SourceNode("mesh", "mesh", np.eye(4)), source
         return
-    data, placed = source.graph.transforms.node_data, {source.graph.base_frame: np.eye(4)}
     for node in source.graph.nodes_geometry:
-        shape = source.geometry[data[node]["geometry"]]
-        yield SourceNode(str(node), node, _placed(source.graph, node, placed, name)), shape
-
-
-def _placed(graph: Any, node: Any, placed: dict[Any, FloatArray], name: str) -> FloatArray:
-    """Return a node's transform [4, 4]; the transforms of its ancestors are multiplied only once."""
-    chain: list[tuple[Any, Any]] = []
-    at = node
-    while at not in placed:
-        parent = graph.transforms.parents.get(at)
-        if parent is None:
-            return _placed_otherwise(graph, node, name)
-        chain.append((parent, at))
-        if len(chain) > len(graph.transforms.parents):
-            raise MeshDataError(f"the node {node!r:.80} of {name} is placed inside itself: export the scene again")
-        at = parent
-    for parent, child in reversed(chain):
-        edge = graph.transforms.edge_data[parent, child]
-        placed[child] = placed[parent] @ np.asarray(edge.get("matrix", np.eye(4)), dtype=np.float64)
-    return placed[node]
-
-
-def _placed_otherwise(graph: Any, node: Any, name: str) -> FloatArray:
-    """Return the transform of a node that is not below the base: a scene in memory may have reversed edges."""
-    try:
-        return np.asarray(graph[node][0], dtype=np.float64)
-    except ValueError as error:
-        raise MeshDataError(
-            f"the node {node!r:.80} of {name} has no place in its scene: export the scene again"
-        ) from error
+        try:
+            transform, shape = source.graph[node]
+        except ValueError as error:
+            raise MeshDataError(
+                f"the node {node!r:.80} of {name} has no place in its scene: export the scene again"
+            ) from error
+        yield SourceNode(str(node), node, np.asarray(transform, dtype=np.float64)), source.geometry[shape]
 
 
 def arrays_of(vertices: Any, faces: Any) -> tuple[FloatArray, IntArray]:

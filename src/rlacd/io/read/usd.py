@@ -16,9 +16,6 @@ from rlacd.io.read.trimesh_scene import geometry_of
 from rlacd.io.read.usd_stage import SERVER
 from rlacd.solid.input_mesh import Asset
 
-_TO_AXIS = {"X": (0, 1, 0, np.pi / 2), "Y": (1, 0, 0, -np.pi / 2), "Z": (1, 0, 0, 0.0)}
-"""How to turn z to an axis: about x, y, z by an angle."""
-
 
 def read_usd(path: Path, _: bytes) -> Contents:
     """Read a stage: a node for each mesh.
@@ -38,12 +35,9 @@ def read_usd(path: Path, _: bytes) -> Contents:
     answer = answer_of(SERVER, path, "USD", {"path": str(path)}, {})
     scene = trimesh.Scene()
     for index, node in enumerate(answer.values["nodes"]):
-        if node["primitive"] is not None:
-            mesh = _primitive(**node["primitive"])
-        else:
-            points = np.frombuffer(answer.blobs[f"{index}.points"]).reshape(-1, 3).copy()
-            faces = np.frombuffer(answer.blobs[f"{index}.faces"], dtype=np.int64).reshape(-1, 3).copy()
-            mesh = trimesh.Trimesh(points, faces, process=False)
+        points = np.frombuffer(answer.blobs[f"{index}.points"]).reshape(-1, 3).copy()
+        faces = np.frombuffer(answer.blobs[f"{index}.faces"], dtype=np.int64).reshape(-1, 3).copy()
+        mesh = trimesh.Trimesh(points, faces, process=False)
         if node["look"]:
             mesh.visual = trimesh.visual.TextureVisuals(material=_material(node["look"]))
         transform = np.reshape(node["transform"], (4, 4))
@@ -63,22 +57,3 @@ def _material(look: dict[str, list[float]]) -> Any:
         emissiveFactor=np.clip(look.get("emissiveColor", [0.0] * 3), 0.0, 1.0),
         alphaMode="BLEND" if opacity < 1.0 else "OPAQUE",
     )
-
-
-def _primitive(kind: str, axis: str, size: float = 0.0, radius: float = 0.0, height: float = 0.0) -> trimesh.Trimesh:
-    """A cube, sphere, cylinder, capsule or cone as a mesh."""
-    match kind:
-        case "Cube":
-            return trimesh.creation.box((size,) * 3)
-        case "Sphere":
-            return trimesh.creation.icosphere(3, radius)
-        case "Cylinder":
-            mesh = trimesh.creation.cylinder(radius, height)
-        case "Capsule":
-            mesh = trimesh.creation.capsule(height, radius)
-            mesh.apply_translation((0, 0, -mesh.bounds.mean(axis=0)[2]))
-        case _:
-            mesh = trimesh.creation.cone(radius, height)
-            mesh.apply_translation((0, 0, -height / 2))
-    *about, angle = _TO_AXIS[axis]
-    return mesh.apply_transform(trimesh.transformations.rotation_matrix(angle, about))

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from rlacd.errors import MeshFileError, MissingExtraError
-from rlacd.io.read.limits import MOST_PLACES, MOST_TRIANGLES
+from rlacd.io.read.contents import MOST_PLACES, MOST_TRIANGLES
 from rlacd.io.read.open_file import read_file
 from rlacd.io.read.polygons import triangles_of
 from rlacd.pool import Blobs, Shared, Values
@@ -21,14 +21,12 @@ from rlacd.solid.arrays import FloatArray
 
 SERVER = "rlacd.io.read.usd_stage:StageReader"
 
-PRIMITIVES = {
-    "Cube": ("size",),
-    "Sphere": ("radius",),
-    "Cylinder": ("radius", "height"),
-    "Capsule": ("radius", "height"),
-    "Cone": ("radius", "height"),
-}
-"""The primitives that are read, and their measures."""
+PRIMITIVES = ("Cube", "Sphere", "Cylinder", "Capsule", "Cone")
+"""The primitives that are read."""
+
+_TO_AXIS = {"X": (0, 1, 0, np.pi / 2), "Y": (1, 0, 0, -np.pi / 2), "Z": (1, 0, 0, 0.0)}
+"""How to turn z to an axis: about x, y, z by an angle."""
+
 
 _LOOK = {"diffuseColor": 3, "emissiveColor": 3, "opacity": 1, "metallic": 1, "roughness": 1}
 """The inputs of a UsdPreviewSurface that are read where they are no pictures, and their numbers."""
@@ -72,20 +70,20 @@ def _stage(path: Path) -> tuple[Values, dict[str, bytes]]:
             )
         if not _is_rendered(prim):
             continue
-        primitive = _primitive(prim)
         if prim.IsA(UsdGeom.Mesh):
             points, faces = _mesh(path, prim)
-            count += len(faces)
-            if count > MOST_TRIANGLES:
-                raise MeshFileError(f"{path} places more than {MOST_TRIANGLES} triangles: simplify it first")
-            arrays |= {f"{len(nodes)}.points": points.tobytes(), f"{len(nodes)}.faces": faces.tobytes()}
-        elif primitive is None:
+        elif str(prim.GetTypeName()) in PRIMITIVES:
+            points, faces = _primitive(prim)
+        else:
             continue
+        count += len(faces)
+        if count > MOST_TRIANGLES:
+            raise MeshFileError(f"{path} places more than {MOST_TRIANGLES} triangles: simplify it first")
+        arrays |= {f"{len(nodes)}.points": points.tobytes(), f"{len(nodes)}.faces": faces.tobytes()}
         name = prim.GetName() if prim.GetName() not in names else str(prim.GetPath())
         names.add(name)
         to_world = np.array(cache.GetLocalToWorldTransform(prim), dtype=np.float64).T
-        node = {"name": name, "transform": to_world.ravel().tolist(), "look": _look(prim)}
-        nodes.append(node | {"primitive": primitive})
+        nodes.append({"name": name, "transform": to_world.ravel().tolist(), "look": _look(prim)})
     up = str(UsdGeom.GetStageUpAxis(stage)).lower()
     return {"nodes": nodes, "up": up, "metres": float(UsdGeom.GetStageMetersPerUnit(stage))}, arrays
 
@@ -180,11 +178,27 @@ def _value(attribute: Any) -> Any:
     return attribute.Get(Usd.TimeCode.EarliestTime())
 
 
-def _primitive(prim: Any) -> Values | None:
-    """The kind of a primitive and its measures; None for anything else."""
-    kind = str(prim.GetTypeName())
-    if kind not in PRIMITIVES:
-        return None
-    measures = {name: float(_value(prim.GetAttribute(name))) for name in PRIMITIVES[kind]}
-    axis = prim.GetAttribute("axis")
-    return {"kind": kind, "axis": str(_value(axis)) if axis else "Z", **measures}
+def _primitive(prim: Any) -> tuple[FloatArray, np.ndarray[Any, Any]]:
+    """A cube, sphere, cylinder, capsule or cone as points and triangles."""
+    import trimesh
+
+    def measure(name: str) -> float:
+        return float(_value(prim.GetAttribute(name)))
+
+    match str(prim.GetTypeName()):
+        case "Cube":
+            mesh = trimesh.creation.box((measure("size"),) * 3)
+        case "Sphere":
+            mesh = trimesh.creation.icosphere(3, measure("radius"))
+        case "Cylinder":
+            mesh = trimesh.creation.cylinder(measure("radius"), measure("height"))
+        case "Capsule":
+            mesh = trimesh.creation.capsule(measure("height"), measure("radius"))
+            mesh.apply_translation((0, 0, -mesh.bounds.mean(axis=0)[2]))
+        case _:
+            mesh = trimesh.creation.cone(measure("radius"), measure("height"))
+            mesh.apply_translation((0, 0, -measure("height") / 2))
+    if axis := prim.GetAttribute("axis"):
+        *about, angle = _TO_AXIS[str(_value(axis))]
+        mesh.apply_transform(trimesh.transformations.rotation_matrix(angle, about))
+    return np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int64)

@@ -13,9 +13,11 @@ nothing is there, to that of the file that names them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import trimesh
@@ -30,7 +32,8 @@ SHOWN, HIDDEN = ("0", "1", "2"), "3"
 """Groups that MuJoCo shows by default, and one that it does not."""
 
 BODIES = ("worldbody", "body", "frame", "replicate")
-FILES = ("mesh", "texture", "hfield", "skin", "include", "model")
+STRIPPED = ("mesh", "texture", "hfield", "skin")
+FILES = (*STRIPPED, "include", "model")
 NAMED_BY = {"geom1": None, "geom2": None, "objname": "objtype", "refname": "reftype"}
 """Attributes that may name a geom, and those that then say so."""
 
@@ -105,6 +108,15 @@ class _Geom:
         return self.is_seen or self.is_weighed or self.attributes.get("fluidshape", "none") != "none"
 
 
+class _Mesh(NamedTuple):
+    """A mesh that is replaced: its name, its asset, the asset's attributes with those of its classes, and its use."""
+
+    name: str
+    asset: Element
+    full: Mapping[str, str]
+    use: MeshUse
+
+
 @dataclass(frozen=True)
 class Compiler:
     """What all ``<compiler>`` elements of a model say together: later ones overrule."""
@@ -114,25 +126,19 @@ class Compiler:
 
     @classmethod
     def of(cls, root: Element) -> Compiler:
-        """Collect the settings.
-
-        Raises
-        ------
-        MeshFileError
-            Paths are to be stripped from the names of meshes.
-        """
+        """Collect the settings."""
         settings: dict[str, str] = {}
         for compiler in root.named("compiler"):
             new = dict(compiler.attributes)
             if "assetdir" in new:
                 new = {"meshdir": new["assetdir"], "texturedir": new["assetdir"], **new}
             settings.update(new)
-        if settings.get("strippath") == "true":
-            raise MeshFileError(
-                f'{root.file.path} has strippath="true", with which meshes cannot be in a folder of their own: '
-                "remove it, and write the paths out."
-            )
         return cls(settings, root)
+
+    @property
+    def strips(self) -> bool:
+        """Whether only the last part of each name counts. Hulls are in a folder, so the result says otherwise."""
+        return self.settings.get("strippath") == "true"
 
     @property
     def mesh_folder(self) -> str:
@@ -140,15 +146,16 @@ class Compiler:
         return self.settings.get("meshdir", "")
 
     def relocated(self, element: Element) -> str | None:
-        """The file that an element of an included file names, seen from the main file, if its text is not that."""
-        name, main = element.attributes.get("file", ""), self.root.file.folder
+        """The file that an element names, seen from the main file and not stripped, if its text is not that."""
+        own, main = element.attributes.get("file", ""), self.root.file.folder
+        name = re.split(r"[/\\]", own)[-1] if self.strips and element.tag in STRIPPED else own
         where = {"include": "", "texture": "texturedir"}.get(element.tag, "meshdir")
         folder = main / self.settings.get(where, "")
         inner = element.file.folder
-        if not name or inner == main or not inner.is_relative_to(main) or (folder / name).exists():
-            return None
-        moved = inner.relative_to(main) / name
-        return moved.as_posix() if (folder / moved).exists() else None
+        if name and inner != main and inner.is_relative_to(main) and not (folder / name).exists():
+            moved = inner.relative_to(main) / name
+            name = moved.as_posix() if (folder / moved).exists() else name
+        return None if name == own else name
 
     def is_weighed(self, geom: Element, full: Mapping[str, str]) -> bool:
         """Tell whether the mass of the geom's body follows from the geom."""
@@ -170,7 +177,7 @@ def read_model(root: Element, references: References, read: Callable[[Path], byt
     Raises
     ------
     MeshFileError
-        A file cannot be read, may not be, or is included twice; or the settings are not supported.
+        A file cannot be read, may not be, or is included twice.
     """
 
     def find(name: str, element: Element) -> Path:
@@ -195,51 +202,51 @@ def plan_mjcf(compiler: Compiler, references: References, named: Callable[[str, 
     for body in (element for element in root.walk() if element.tag in BODIES):
         found = _colliding(body, defaults, compiler)
         geoms += [geom for geom in found if _is_file(assets, geom, defaults, warnings)]
-    uses = {
-        name: _use(assets[name], defaults, references, compiler) for name in dict.fromkeys(geom.mesh for geom in geoms)
-    }
-    warnings += _caveats(root, geoms)
-    rewritten = {assets[name] for name in uses}
-    relative = [
-        file
-        for element in root.walk()
-        if element.tag in FILES and element not in rewritten
-        if (file := defaults.full(element).get("file")) and not Path(file).is_absolute()
+    meshes = [
+        _Mesh(name, assets[name], full := defaults.full(assets[name]), _use(assets[name], full, references, compiler))
+        for name in dict.fromkeys(geom.mesh for geom in geoms)
     ]
+    warnings += _caveats(root, geoms)
+    rewritten = {mesh.asset for mesh in meshes}
+    files = [defaults.full(each).get("file") for each in root.walk() if each.tag in FILES and each not in rewritten]
+    relative = [file for file in files if file and not Path(file).is_absolute()]
 
     def edit(hulls: HullFiles, sources: Mapping[MeshUse, trimesh.Trimesh], copies: Mapping[MeshUse, str]) -> list[Edit]:
         taken = {*assets, *(str(e.attributes.get("name")) for e in root.walk() if e.tag == "geom")}
-        names = {name: _fresh(name, len(hulls[use]), taken) for name, use in uses.items()}
+        names = {mesh.name: _fresh(mesh.name, len(hulls[mesh.use]), taken) for mesh in meshes}
         edits = []
-        for name, use in uses.items():
-            weighed = any(geom.mesh == name and geom.is_weighed and "mass" not in geom.attributes for geom in geoms)
-            asset, full = assets[name], defaults.full(assets[name])
-            edits.append(_asset_edit(asset, full, named, (names[name], hulls[use])))
-            moved = compiler.relocated(asset)
+        for mesh in meshes:
+            edits.append(_hull_assets(mesh, named, zip(names[mesh.name], hulls[mesh.use], strict=True)))
+            moved = compiler.relocated(mesh.asset)
             values = {} if moved is None else {"file": moved}
-            if use in copies:
-                values["file"] = named(full["file"], copies[use])
-            if _lacks_volume(sources[use], full.get("inertia", "legacy")):
+            if mesh.use in copies:
+                values["file"] = named(mesh.full["file"], copies[mesh.use])
+            if _lacks_volume(sources[mesh.use], mesh.full.get("inertia", "legacy")):
                 values["inertia"] = "shell"
-                density = " Its mass is its area times the density." if weighed else ""
-                warnings.append(f'{use.path.name} has no volume, so its mesh got inertia="shell".{density}')
-            if values:
-                edits.append(Edit(asset.file, asset.start, asset.end, asset.with_attributes(values)))
+                warnings.append(_as_shell(mesh, geoms))
+            edits += [_with(mesh.asset, values)] if values else []
         edits += [_geom_edit(geom, names[geom.mesh], taken) for geom in geoms]
         return edits + _relocations(compiler, edits, rewritten)
 
-    return Plan(list(dict.fromkeys(uses.values())), edit, relative, warnings)
+    return Plan(list(dict.fromkeys(mesh.use for mesh in meshes)), edit, relative, warnings)
 
 
-def _asset_edit(
-    asset: Element, full: Mapping[str, str], named: Callable[[str, str], str], hulls: tuple[list[str], Sequence[str]]
-) -> Edit:
-    """Add the hulls' assets behind that of their mesh."""
+def _with(element: Element, values: Mapping[str, str]) -> Edit:
+    """The edit that sets attributes of an element."""
+    return Edit(element.file, element.start, element.end, element.with_attributes(values))
+
+
+def _as_shell(mesh: _Mesh, geoms: Sequence[_Geom]) -> str:
+    weighed = any(geom.mesh == mesh.name and geom.is_weighed and "mass" not in geom.attributes for geom in geoms)
+    density = " Its mass is its area times the density." if weighed else ""
+    return f'{mesh.use.path.name} has no volume, so its mesh got inertia="shell".{density}'
+
+
+def _hull_assets(mesh: _Mesh, named: Callable[[str, str], str], hulls: Iterable[tuple[str, str]]) -> Edit:
+    """Add the hulls' assets, by name and file, behind that of their mesh."""
+    asset, full = mesh.asset, mesh.full
     shell = {"inertia": "shell"} if "inertia" in full else {}  # hulls weigh nothing, and may be too thin for the others
-    copies = [
-        asset.with_attributes({"name": new, "file": named(full["file"], file), **shell})
-        for new, file in zip(*hulls, strict=True)
-    ]
+    copies = [asset.with_attributes({"name": new, "file": named(full["file"], file), **shell}) for new, file in hulls]
     return Edit(asset.file, asset.end, asset.end, b"".join(asset.indent + copy for copy in copies))
 
 
@@ -251,14 +258,16 @@ def _relocations(compiler: Compiler, edits: Sequence[Edit], done: set[Element]) 
         if element.included is not None and id(element.included.file) in changed:
             changed.add(id(element.file))
     moved = []
+    for element in compiler.root.named("compiler"):
+        if compiler.strips and "strippath" in element.attributes:
+            moved.append(_with(element, {"strippath": "false"}))
     for element in compiler.root.walk():
-        if element.tag in FILES and id(element.file) in changed and element not in done:
+        if element.tag in FILES and (compiler.strips or id(element.file) in changed) and element not in done:
             if element.included is not None and id(element.included.file) in changed:
                 continue
             name = compiler.relocated(element)
             if name is not None:
-                new = element.with_attributes({"file": name})
-                moved.append(Edit(element.file, element.start, element.end, new))
+                moved.append(_with(element, {"file": name}))
     return moved
 
 
@@ -352,9 +361,8 @@ def _is_file(assets: Mapping[str, Element], geom: _Geom, defaults: Defaults, war
     return False
 
 
-def _use(asset: Element, defaults: Defaults, references: References, compiler: Compiler) -> MeshUse:
-    full = defaults.full(asset)
-    where = f"mesh {_mesh_name(asset, defaults)} of {asset.file.path}"
+def _use(asset: Element, full: Mapping[str, str], references: References, compiler: Compiler) -> MeshUse:
+    where = f"mesh {full.get('name', full['file'])} of {asset.file.path}"
     folder = compiler.root.file.folder / compiler.mesh_folder
     place = references.find(compiler.relocated(asset) or full["file"], folder)
     return MeshUse(place, read_scale(full.get("scale"), where))

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError, MeshFileError, OptionError, OutputError
+from rlacd.io.read.conventions import collada_unit
 from rlacd.io.read.load import load_mesh
 from rlacd.io.read.open_file import read_file
-from rlacd.io.robots.collada import collada_unit
 from rlacd.io.robots.mjcf import mujoco_reads, plan_mjcf, read_model
 from rlacd.io.robots.plan import MeshUse, Plan
 from rlacd.io.robots.references import References
@@ -26,6 +26,7 @@ from rlacd.io.robots.urdf import plan_urdf
 from rlacd.io.write import check_file, check_name, file_stem, write_file
 from rlacd.io.write.encode import encode_plain_obj
 from rlacd.io.write.folder import check_names, write_folder
+from rlacd.io.write.single_precision import Triangles
 from rlacd.options import LENGTHS, OPTION_NAMES, Options
 from rlacd.options.fields import checked, path_like, read, shown
 from rlacd.options.output import OutputOptions
@@ -115,10 +116,7 @@ def rewrite_robot(
     source, place = Path(read(path_like(), "robot", robot)), Path(read(path_like(), "output", output))
     packages = checked(OutputOptions, "package_dirs", package_dirs, called="package_dirs") or ()
     check_rewrite(source, place)
-    kind = ENDINGS[source.suffix.lower()]
-    root = parse(source, _read(source))
-    if root.tag != ROOTS[kind]:
-        raise MeshFileError(f"{source} is not {kind.upper()}: it starts with <{root.tag}>, not <{ROOTS[kind]}>.")
+    kind, root = _parsed(source)
     for name in ("unit", "scale", "per_node"):
         if options.get(name):
             raise OptionError(f"{name} is for a single mesh; a robot file states it for each of its meshes.")
@@ -129,25 +127,19 @@ def rewrite_robot(
         write_file(place, root.file.data)
         return Rewritten(place, folder, [], [f"{source} has no collision mesh, so this is a copy.", *warnings])
     stem = file_stem(place.stem)
-    names = _stems([use.path for use in plan.uses])
     meshes: dict[MeshUse, RewrittenMesh] = {}
     files: dict[str, bytes] = {}
     copies: dict[MeshUse, str] = {}
-    for use, name in zip(plan.uses, names, strict=True):
+    for use, name in zip(plan.uses, _stems([use.path for use in plan.uses]), strict=True):
         unit, said = collada_unit(use.path)
-        warnings += said
         result = _decomposed(use, unit, options)
-        written = {
-            f"{stem}_{name}_{i:03d}.obj": encode_plain_obj(_unscaled(h, use)) for i, h in enumerate(result.hulls)
-        }
-        files.update(written)
+        hulls = {f"{stem}_{name}_{i:03d}.obj": encode_plain_obj(_unscaled(h, use)) for i, h in enumerate(result.hulls)}
         if kind == "mjcf" and not mujoco_reads(use.path):
-            faces = _oriented(result.source.faces, use)
-            mesh = trimesh.Trimesh(result.source.vertices / use.scale, faces, process=False)
             copies[use] = f"{stem}_{name}_visual.obj"
-            files[copies[use]] = encode_plain_obj(mesh)
-        meshes[use] = RewrittenMesh(use.path, list(written), result)
-        warnings += [f"{use.path.name}: {warning}" for warning in result.report.get("warnings", [])]
+            files[copies[use]] = _as_obj(result.source, use)
+        files |= hulls
+        meshes[use] = RewrittenMesh(use.path, list(hulls), result)
+        warnings += [*said, *(f"{use.path.name}: {warning}" for warning in result.report.get("warnings", []))]
     named = {use: mesh.files for use, mesh in meshes.items()}
     edits = plan.edit(named, {use: mesh.result.source for use, mesh in meshes.items()}, copies)
     data = edited(root, edits, [element for element in root.walk() if element.included is not None])
@@ -155,6 +147,19 @@ def rewrite_robot(
     check_names(folder, stem, list(files))
     write_folder(folder, stem, files, then=lambda: write_file(place, data))
     return Rewritten(place, folder, list(meshes.values()), warnings)
+
+
+def _as_obj(source: trimesh.Trimesh, use: MeshUse) -> bytes:
+    """A copy of a mesh that the consumer cannot read, without the scale of its use."""
+    return encode_plain_obj(Triangles(source.vertices / use.scale, _oriented(source.faces, use)))
+
+
+def _parsed(source: Path) -> tuple[str, Element]:
+    """The kind of a robot file and its root."""
+    kind, root = ENDINGS[source.suffix.lower()], parse(source, _read(source))
+    if root.tag != ROOTS[kind]:
+        raise MeshFileError(f"{source} is not {kind.upper()}: it starts with <{root.tag}>, not <{ROOTS[kind]}>.")
+    return kind, root
 
 
 def check_rewrite(source: Path, place: Path) -> None:

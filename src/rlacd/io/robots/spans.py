@@ -16,7 +16,7 @@ from xml.sax.saxutils import quoteattr
 
 from rlacd.errors import MeshFileError
 
-DEEPEST = 500
+DEEPEST_ELEMENT = 500
 """Depth of nested elements; robots have about fifty."""
 
 MOST_ELEMENTS = 500_000
@@ -127,49 +127,57 @@ def parse(path: Path, data: bytes, depth: int = 0) -> Element:
         It is not well-formed, has a document type, nests too deep or is too long, or is not in an encoding that is a
         superset of ASCII.
     """
-    parser = expat.ParserCreate()
-    top: list[Element] = []
-    open_elements: list[Element] = []
-    file, count = File(path, data), [0]
-
-    def refuse(*_: object) -> None:
-        raise MeshFileError(
-            f"{path} has a document type (<!DOCTYPE>), which is not allowed, as it can refer to anything: remove it."
-        )
-
-    def declared(version: str, encoding: str | None, standalone: int) -> None:
-        file.encoding = encoding or "utf-8"
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        at = parser.CurrentByteIndex
-        if depth + len(open_elements) >= DEEPEST:
-            raise MeshFileError(f"{path} nests elements more than {DEEPEST} deep, too deep for a robot file.")
-        count[0] += 1
-        if count[0] > MOST_ELEMENTS:
-            raise MeshFileError(f"{path} has more than {MOST_ELEMENTS} elements, too many for a robot file.")
-        element = Element(tag, attributes, open_elements[-1] if open_elements else None, file, at, _tag_end(data, at))
-        (open_elements[-1].children if open_elements else top).append(element)
-        open_elements.append(element)
-
-    def end(tag: str) -> None:
-        element = open_elements.pop()
-        at = parser.CurrentByteIndex
-        # An element without content has one tag, and expat reports both of its ends at or just after its start.
-        element.end = element.head if data[element.head - 2 : element.head] == b"/>" else _tag_end(data, at)
-
-    parser.StartDoctypeDeclHandler = refuse
-    parser.XmlDeclHandler = declared
-    parser.StartElementHandler = start
-    parser.EndElementHandler = end
     if data.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in data[:200]:
         raise MeshFileError(f"{path} is in UTF-16 or UTF-32: save it as UTF-8.")
+    builder = _Builder(File(path, data), depth)
     try:
-        parser.Parse(data, True)
+        builder.parser.Parse(data, True)
     except expat.ExpatError as error:
         raise MeshFileError(f"{path} is not well-formed XML ({error}): correct it first.") from error
     except (LookupError, ValueError) as error:
         raise MeshFileError(f"{path} is in an unknown encoding ({error}): save it as UTF-8.") from error
-    return top[0]
+    return builder.top[0]
+
+
+class _Builder:
+    """Makes the tree of a file as its parser reports it."""
+
+    def __init__(self, file: File, depth: int) -> None:
+        self.parser = expat.ParserCreate()
+        self.top: list[Element] = []
+        self._file, self._depth, self._count = file, depth, 0
+        self._open: list[Element] = []
+        self.parser.StartDoctypeDeclHandler = self._refuse
+        self.parser.XmlDeclHandler = self._declared
+        self.parser.StartElementHandler = self._start
+        self.parser.EndElementHandler = self._end
+
+    def _refuse(self, *_: object) -> None:
+        raise MeshFileError(
+            f"{self._file.path} has a document type (<!DOCTYPE>), which is not allowed, as it can refer to anything: "
+            "remove it."
+        )
+
+    def _declared(self, version: str, encoding: str | None, standalone: int) -> None:
+        self._file.encoding = encoding or "utf-8"
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        path, at = self._file.path, self.parser.CurrentByteIndex
+        if self._depth + len(self._open) >= DEEPEST_ELEMENT:
+            raise MeshFileError(f"{path} nests elements more than {DEEPEST_ELEMENT} deep, too deep for a robot file.")
+        self._count += 1
+        if self._count > MOST_ELEMENTS:
+            raise MeshFileError(f"{path} has more than {MOST_ELEMENTS} elements, too many for a robot file.")
+        parent = self._open[-1] if self._open else None
+        element = Element(tag, attributes, parent, self._file, at, _tag_end(self._file.data, at))
+        (self.top if parent is None else parent.children).append(element)
+        self._open.append(element)
+
+    def _end(self, tag: str) -> None:
+        element, data = self._open.pop(), self._file.data
+        at = self.parser.CurrentByteIndex
+        # An element without content has one tag, and expat reports both of its ends at or just after its start.
+        element.end = element.head if data[element.head - 2 : element.head] == b"/>" else _tag_end(data, at)
 
 
 def expand(root: Element, find: Callable[[str, Element], Path], read: Callable[[Path], bytes]) -> None:

@@ -6,23 +6,21 @@ import os
 import re
 import warnings
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import trimesh
 
 from rlacd.errors import ImplausibleBodyWarning, OutputError
+from rlacd.io.read import function_of
 from rlacd.io.write.atomic import write_file
 from rlacd.io.write.balls import check_balls, save_balls
-from rlacd.io.write.converted import painted_parts
-from rlacd.io.write.encode import ENCODERS, encode_glb, hull_name
-from rlacd.io.write.engines import ENGINE_NAMES, encode_engine
+from rlacd.io.write.encode import ENCODERS, ENGINE_NAMES, encode_glb, encode_obj, hull_name
 from rlacd.io.write.folder import write_folder
-from rlacd.io.write.keep import encode_kept, is_kept
 from rlacd.io.write.model import (
     MeshFile,
     Model,
-    Painted,
     check_model_options,
     hollow,
     implausible,
@@ -31,9 +29,7 @@ from rlacd.io.write.model import (
     shapes_of,
     visuals_of,
 )
-from rlacd.io.write.simulators import encode_mjcf, encode_sdf, encode_urdf
 from rlacd.io.write.target import FORMATS, MODELS, WITH_MESHES, Target, check_file, check_name, hull_target, mesh_folder
-from rlacd.io.write.usd import encode_usd
 from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.options.output import DENSITY, Axis
 from rlacd.result import Result
@@ -59,7 +55,6 @@ __all__ = [
 SIMULATED = (*WITH_MESHES, "usd")
 """Formats whose readers take lengths to be in metres."""
 
-_WITH_MESHES = {"mjcf": encode_mjcf, "urdf": encode_urdf, "sdf": encode_sdf}
 _PRIMITIVES: dict[str, tuple[PrimitiveKind, ...]] = {
     "mjcf": PRIMITIVE_KINDS,
     "urdf": ("sphere", "box", "cylinder"),  # many of its readers refuse a file with a capsule
@@ -67,19 +62,21 @@ _PRIMITIVES: dict[str, tuple[PrimitiveKind, ...]] = {
 }
 
 
-def save(
-    result: Result,
-    path: str | os.PathLike[str],
-    *,
-    file_format: str | None = None,
-    density: float = DENSITY,
-    mass: float | None = None,
-    up: Axis | None = None,
-    one_mesh: bool = False,
-    keep_input: bool = False,
-    scene: bool = False,
-) -> Path:
-    """Write a decomposition; see `rlacd.Decomposition.save`.
+@dataclass(frozen=True)
+class Saving:
+    """How to save a decomposition; see `rlacd.Decomposition.save`."""
+
+    file_format: str | None = None
+    density: float = DENSITY
+    mass: float | None = None
+    up: Axis | None = None
+    one_mesh: bool = False
+    keep_input: bool = False
+    scene: bool = False
+
+
+def save(result: Result, path: str | os.PathLike[str], **options: Any) -> Path:
+    """Write a decomposition, with the options of `Saving`.
 
     Raises
     ------
@@ -88,49 +85,72 @@ def save(
     MissingExtraError
         The format needs an extra that is not installed.
     """
-    check_model_options(density, up)
-    target = hull_target(path, file_format, one_mesh=one_mesh, keep_input=keep_input, scene=scene)
+    asked = Saving(**options)
+    check_model_options(asked.density, asked.up)
+    target = hull_target(
+        path, asked.file_format, one_mesh=asked.one_mesh, keep_input=asked.keep_input, scene=asked.scene
+    )
     ending = target.path.suffix.lower().lstrip(".")
-    if target.file_format in ENGINE_NAMES and ending == "glb" and is_kept(result):
-        write_file(target.path, encode_kept(result, ENGINE_NAMES[target.file_format], colored=False))
-        return target.path
-    if keep_input and result.hulls:
-        write_file(target.path, _with_input(result))
+    unused = [name for name in ("density", "mass") if getattr(asked, name) != getattr(Saving, name)]
+    if unused and target.file_format not in SIMULATED:
+        warnings.warn(f"{unused[0]} had no effect: {target.path.name} holds no mass", UserWarning, stacklevel=3)
+    if (data := _with_scene(result, target.file_format, ending, asked.keep_input)) is not None:
+        write_file(target.path, data)
         return target.path
     if target.file_format not in MODELS:
-        return save_hulls(result.hulls, path, stem=result.name, file_format=file_format)
-    model = replace(model_of(result, density=density, mass=mass, up=up), is_scene=scene)
+        return save_hulls(result.hulls, path, stem=result.name, file_format=asked.file_format)
+    model = model_of(result, density=asked.density, mass=asked.mass, up=asked.up)
     if target.file_format in SIMULATED:
-        for doubt in (implausible(model), None if mass is not None else hollow(result)):
+        for doubt in (implausible(model), None if asked.mass is not None else hollow(result)):
             if doubt is not None:
                 warnings.warn(doubt, ImplausibleBodyWarning, stacklevel=3)
     if target.file_format in WITH_MESHES:
-        painted = painted_parts(result.input) if target.file_format == "mjcf" and result.input is not None else []
-        _save_with_meshes(model, target, one_mesh, painted)
+        _save_with_meshes(result, replace(model, is_scene=asked.scene), target, asked.one_mesh)
     elif target.file_format == "usd":
-        write_file(target.path, encode_usd(model, ending))
+        write_file(target.path, function_of("write.usd:encode_usd")(model, ending))
     else:
-        write_file(target.path, encode_engine(model, target.file_format, ending))
+        write_file(target.path, _for_engine(model, target.file_format, ending))
     return target.path
 
 
-def _with_input(result: Result) -> bytes:
-    """GLB of the input with its hulls: its own scene, or the triangles in grey where it has none."""
-    if is_kept(result):
-        return encode_kept(result, lambda name, index, primitive: f"{name}_{hull_name(index)}", colored=True)
+def _with_scene(result: Result, file_format: str, ending: str, keep_input: bool) -> bytes | None:
+    """GLB of the input's own scene with its hulls; None if something else is to be written.
+
+    With `keep_input`, an input without a scene is the triangles in grey.
+    """
+    has_scene = result.input is not None and result.input.asset is not None
+    if ending == "glb" and has_scene and file_format in ENGINE_NAMES:
+        return bytes(function_of("write.keep:encode_kept")(result, ENGINE_NAMES[file_format], colored=False))
+    if not keep_input or not result.hulls:
+        return None
+    if has_scene:
+        return bytes(
+            function_of("write.keep:encode_kept")(
+                result, lambda name, index, primitive: f"{name}_{hull_name(index)}", colored=True
+            )
+        )
     visual = (node_name(result.name), result.source) if len(result.source.faces) else None
     return encode_glb(result.hulls, visual=visual)
 
 
-def _save_with_meshes(model: Model, target: Target, one_mesh: bool, painted: Sequence[Painted]) -> None:
-    folder = mesh_folder(target.path, target.file_format)
-    stem = file_stem(model.name)
+def _for_engine(model: Model, engine: str, ending: str) -> bytes:
+    """The input as one grey node, and the hulls named for the engine."""
+    name = node_name(model.name)
+    names = [ENGINE_NAMES[engine](name, index, primitive) for index, primitive in enumerate(model.primitives)]
+    encode = encode_glb if ending == "glb" else encode_obj
+    return encode(model.hulls, names, None if model.visual is None else (name, model.visual))
+
+
+def _save_with_meshes(result: Result, model: Model, target: Target, one_mesh: bool) -> None:
+    folder, stem = mesh_folder(target.path, target.file_format), file_stem(model.name)
     shapes = shapes_of(model, stem, _PRIMITIVES[target.file_format], one_mesh=one_mesh)
-    visuals = visuals_of(model, stem, painted)
+    mjcf = target.file_format == "mjcf"
+    visuals = visuals_of(model, stem, function_of("write.converted:painted_parts")(result.input) if mjcf else ())
     meshes = [shape for shape in (*visuals, *shapes) if isinstance(shape, MeshFile)]
     files = {file.name: file.data for file in meshes}
     files |= {file.picture_name: file.look.picture for file in meshes if file.look and file.look.picture}
-    described = _WITH_MESHES[target.file_format](model, shapes, visuals, folder.name)
+    encode = function_of(f"write.simulators:encode_{target.file_format}")
+    described = encode(model, shapes, visuals, folder.name)
     write_folder(folder, stem, files, then=lambda: write_file(target.path, described))
 
 

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import io
-import json
 import re
-import struct
-from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 import trimesh
 
-from rlacd.io.read.gltf import MAGIC, split
+from rlacd.io.read.gltf import split
 from rlacd.io.read.looks import BETWEEN, looks_of
 from rlacd.io.write.encode import VISUAL_COLOR
-from rlacd.io.write.glb import JSON_CHUNK, ROUGHNESS, chunk
+from rlacd.io.write.glb import ROUGHNESS
 from rlacd.io.write.model import Look, Painted
 from rlacd.io.write.palette import linear_from_srgb
 from rlacd.io.write.single_precision import Triangles
@@ -24,8 +21,8 @@ from rlacd.solid.input_mesh import InputMesh, SourceNode
 from rlacd.solid.topology import IntArray
 
 
-def converted(mesh: InputMesh, name: str) -> bytes:
-    """Write the input's scene as GLB, in the unit of the hulls.
+def converted(mesh: InputMesh, name: str) -> tuple[dict[str, Any], bytes | None]:
+    """Convert the input's scene to GLB, in the unit of the hulls: its JSON, and what follows.
 
     A file with one mesh becomes one node called `name`, whatever number of materials the mesh has.
 
@@ -36,17 +33,13 @@ def converted(mesh: InputMesh, name: str) -> bytes:
     name : str
         For a mesh without a scene.
     """
-    asset = mesh.asset
-    assert asset is not None
-    scene = _scene(mesh, name)
-    header, rest = split(Path(f"{name}.glb"), bytes(scene.export(file_type="glb")))
-    if asset.extension:
+    assert mesh.asset is not None
+    header, rest = split(bytes(_scene(mesh, name).export(file_type="glb")))
+    if mesh.asset.extension:
         _tell_materials(header)
-    if asset.path is not None:
+    if mesh.asset.path is not None:
         _join(header, name if len(mesh.nodes) + len(mesh.left_out) < 2 else None)
-    text = json.dumps(header, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
-    chunks = chunk(JSON_CHUNK, text + b" " * (-len(text) % 4)) + (rest or b"")
-    return struct.pack("<4sII", MAGIC, 2, 12 + len(chunks)) + chunks
+    return header, rest
 
 
 def nodes_of(mesh: InputMesh, name: str) -> tuple[SourceNode, ...]:
@@ -80,10 +73,9 @@ _Shape: TypeAlias = tuple[FloatArray, IntArray, FloatArray | None]
 """Vertices, faces, and where the vertices are in a picture."""
 
 
-def painted_parts(mesh: InputMesh) -> list[Painted]:
+def painted_parts(mesh: InputMesh | None) -> list[Painted]:
     """The input by materials, in the unit of the hulls; nothing if it has none, or is a glTF file."""
-    asset = mesh.asset
-    if asset is None or asset.is_gltf:
+    if mesh is None or mesh.asset is None or mesh.asset.is_gltf:
         return []
     scene, gone = _scene(mesh, "mesh"), {node.key for node in mesh.left_out}
     groups: dict[Any, list[_Shape]] = {}

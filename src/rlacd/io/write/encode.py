@@ -13,9 +13,10 @@ from typing import TypeAlias
 import numpy as np
 import trimesh
 
-from rlacd.io.write.glb import Placed, glb
+from rlacd.io.write.glb import GltfFile, Placed
 from rlacd.io.write.palette import hull_colors, linear_from_srgb
 from rlacd.io.write.single_precision import Triangulated, placed_mesh, required_hull, rounded_hull
+from rlacd.solid.primitive import Primitive
 
 GENERATOR = "rlacd"
 
@@ -46,11 +47,13 @@ def encode_glb(
     OutputError
         A hull is too thin for its size for float32 even about its own centre.
     """
-    solids = [] if visual is None else [Placed(visual[0], *placed_mesh(visual[1]), linear_from_srgb(VISUAL_COLOR))]
+    file = GltfFile({"asset": {"version": "2.0", "generator": GENERATOR}, "scene": 0, "scenes": [{}]})
+    if visual is not None:
+        file.add(Placed(visual[0], *placed_mesh(visual[1]), linear_from_srgb(VISUAL_COLOR)), visual[0])
     names = names or [hull_name(index) for index in range(len(hulls))]
     for name, hull, color in zip(names, hulls, linear_from_srgb(hull_colors(len(hulls))), strict=True):
-        solids.append(Placed(name, *required_hull(hull, name, "as GLB"), color))
-    return glb(solids, GENERATOR)
+        file.add(Placed(name, *required_hull(hull, name, "as GLB"), color), name)
+    return file.encoded()
 
 
 def encode_obj(
@@ -143,3 +146,16 @@ ENCODERS: dict[str, Callable[[Sequence[trimesh.Trimesh]], bytes]] = {
     "ply": encode_ply,
     "stl": encode_stl,
 }
+
+
+ENGINE_NAMES: dict[str, Callable[[str, int, Primitive | None], str]] = {
+    "unreal": lambda name, index, primitive: f"{_prefix(primitive)}_{name}_{index:02d}",
+    "godot": lambda name, index, primitive: f"{name}_{index:03d}-convcolonly",
+}
+"""Names of hulls. Unreal: ``UCX_<name>_00``, ``UCX_<name>_01``, ... are the hulls of the node or mesh ``<name>``; boxes
+begin with ``UBX``, spheres with ``USP``, capsules with ``UCP``. Godot: nodes ending in ``-convcolonly`` become convex
+shapes of a static body and are not drawn."""
+
+
+def _prefix(primitive: Primitive | None) -> str:
+    return {"box": "UBX", "sphere": "USP", "capsule": "UCP"}.get("" if primitive is None else primitive.kind, "UCX")

@@ -1,13 +1,14 @@
-"""Binary glTF 2.0: a node, a mesh and a material per solid.
+"""Binary glTF 2.0: solids added to a file, each with a node, a mesh and a material of its own.
 
 trimesh's writer takes a quarter of a millisecond per mesh, which is too long for thousands of hulls after a timeout.
 """
 
 from __future__ import annotations
 
+import base64
 import json
 import struct
-from collections.abc import Iterable, Sequence
+from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,9 +18,16 @@ from rlacd.io.write.single_precision import Triangles
 
 ROUGHNESS = 0.8
 
-JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
-_FLOAT, _UNSIGNED_INT = 5126, 5125
-ATTRIBUTES, INDICES = 34962, 34963
+
+class Code(IntEnum):
+    """Numbers of the specification: kinds of chunks, types of components, targets of views."""
+
+    JSON = 0x4E4F534A
+    BINARY = 0x004E4942
+    FLOAT = 5126
+    UNSIGNED_INT = 5125
+    ATTRIBUTES = 34962
+    INDICES = 34963
 
 
 class Placed(NamedTuple):
@@ -43,70 +51,93 @@ class Placed(NamedTuple):
     color: npt.NDArray[np.float64]
 
 
-def glb(solids: Iterable[Placed], generator: str) -> bytes:
-    """Write solids as the bytes of a GLB file, in their order."""
-    solids = list(solids)
-    (positions, indices), accessors = packed([solid.mesh for solid in solids], 0)
-    described = {
-        "asset": {"version": "2.0", "generator": generator},
-        "scene": 0,
-        "scenes": [{"nodes": list(range(len(solids)))}],
-        "nodes": [_node(index, solid) for index, solid in enumerate(solids)],
-        "meshes": [
-            {
-                "name": solid.name,
-                "primitives": [{"attributes": {"POSITION": 2 * i}, "indices": 2 * i + 1, "material": i, "mode": 4}],
-            }
-            for i, solid in enumerate(solids)
-        ],
-        "materials": [material(solid) for solid in solids],
-        "accessors": accessors,
-        "bufferViews": [
-            # glTF demands a stride where accessors share a view.
-            {"buffer": 0, "byteOffset": 0, "byteLength": len(positions), "byteStride": 12, "target": ATTRIBUTES},
-            {"buffer": 0, "byteOffset": len(positions), "byteLength": len(indices), "target": INDICES},
-        ],
-        "buffers": [{"byteLength": len(positions) + len(indices)}],
-    }
-    text = json.dumps(described, separators=(",", ":"), allow_nan=False).encode()
-    chunks = chunk(JSON_CHUNK, text + b" " * (-len(text) % 4)) + chunk(BINARY_CHUNK, positions + indices)
-    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+class GltfFile:
+    """A file that is being added to; no index that it holds changes.
 
+    Parameters
+    ----------
+    header : dict
+        Its JSON, changed in place.
+    rest : bytes, optional
+        What follows the JSON in a binary file.
+    """
 
-def packed(meshes: Sequence[Triangles], first_view: int) -> tuple[tuple[bytes, bytes], list[dict[str, Any]]]:
-    """All positions and all indices, and the accessors of each mesh into views of the two."""
-    positions = [np.asarray(mesh.vertices).astype("<f4") for mesh in meshes]
-    indices = [np.asarray(mesh.faces).astype("<u4") for mesh in meshes]
-    accessors: list[dict[str, Any]] = []
-    at = [0, 0]
-    for points, corners in zip(positions, indices, strict=True):
-        where = {"bufferView": first_view, "byteOffset": at[0], "componentType": _FLOAT}
+    def __init__(self, header: dict[str, Any], rest: bytes | None = None) -> None:
+        self.header = header
+        self.binary, self._others = _chunks(rest)
+        self._added: list[bytes] = []
+        self._length = 0
+
+    def add(self, placed: Placed, mesh_name: str, parent: int | None = None, colored: bool = True) -> None:
+        """Add a solid below a node, or at the top, with a mesh of that name."""
+        header = self.header
+        nodes, meshes = header.setdefault("nodes", []), header.setdefault("meshes", [])
+        accessors = header.setdefault("accessors", [])
+        points = np.asarray(placed.mesh.vertices).astype("<f4")
+        corners = np.asarray(placed.mesh.faces).astype("<u4").ravel()
+        primitive = {"attributes": {"POSITION": len(accessors)}, "indices": len(accessors) + 1, "mode": 4}
         bounds = {"min": points.min(axis=0).tolist(), "max": points.max(axis=0).tolist()}
-        accessors.append(where | {"count": len(points), "type": "VEC3"} | bounds)
-        where = {"bufferView": first_view + 1, "byteOffset": at[1], "componentType": _UNSIGNED_INT}
-        accessors.append(where | {"count": corners.size, "type": "SCALAR"})
-        at = [at[0] + points.nbytes, at[1] + corners.nbytes]
-    data = b"".join(array.tobytes() for array in positions), b"".join(array.tobytes() for array in indices)
-    return data, accessors
+        for array, kind, component, target in (
+            (points, "VEC3", Code.FLOAT, Code.ATTRIBUTES),
+            (corners, "SCALAR", Code.UNSIGNED_INT, Code.INDICES),
+        ):
+            view = self.append(array.tobytes(), target)
+            described = {"bufferView": view, "componentType": component, "count": len(array), "type": kind}
+            accessors.append(described | (bounds if kind == "VEC3" else {}))
+        if colored:
+            materials = header.setdefault("materials", [])
+            primitive["material"] = len(materials)
+            looks = {"baseColorFactor": [*placed.color.tolist(), 1.0], "metallicFactor": 0.0}
+            materials.append({"name": placed.name, "pbrMetallicRoughness": looks | {"roughnessFactor": ROUGHNESS}})
+        node: dict[str, Any] = {"name": placed.name, "mesh": len(meshes)}
+        if placed.shift.any():
+            node["translation"] = placed.shift.tolist()
+        meshes.append({"name": mesh_name, "primitives": [primitive]})
+        if parent is not None:
+            nodes[parent].setdefault("children", []).append(len(nodes))
+        else:
+            scenes = header.setdefault("scenes", [{}])
+            scenes[header.setdefault("scene", 0)].setdefault("nodes", []).append(len(nodes))
+        nodes.append(node)
+
+    def append(self, data: bytes, target: int | None = None) -> int:
+        """Add bytes, and return the index of the view of them."""
+        buffers, views = self.header.get("buffers", []), self.header.setdefault("bufferViews", [])
+        own = self.binary is None and len(buffers) > 0
+        start = self._length + (0 if own else len(self.binary or b""))
+        self._added.append(data + bytes(-len(data) % 4))
+        self._length += len(self._added[-1])
+        view = {"buffer": len(buffers) if own else 0, "byteOffset": start, "byteLength": len(data)}
+        views.append(view if target is None else view | {"target": target})
+        return len(views) - 1
+
+    def encoded(self) -> bytes:
+        """The file."""
+        buffers, added = self.header.setdefault("buffers", []), b"".join(self._added)
+        if self.binary is None and buffers:  # the first buffer is an extension's own: its place is taken
+            data = base64.b64encode(added).decode("ascii")
+            buffers.append({"byteLength": len(added), "uri": f"data:application/octet-stream;base64,{data}"})
+            binary = b""
+        else:
+            binary = (self.binary or b"") + added
+            buffers[:1] = [{**(buffers[0] if buffers else {}), "byteLength": len(binary)}]
+        text = json.dumps(self.header, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+        chunks = _chunk(Code.JSON, text + b" " * (-len(text) % 4))
+        chunks += (_chunk(Code.BINARY, binary) if binary else b"") + self._others
+        return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 
-def material(solid: Placed) -> dict[str, Any]:
-    """The material of a solid, in its colour."""
-    return {
-        "name": solid.name,
-        "pbrMetallicRoughness": {
-            "baseColorFactor": [*solid.color.tolist(), 1.0],
-            "metallicFactor": 0.0,
-            "roughnessFactor": ROUGHNESS,
-        },
-    }
-
-
-def _node(mesh: int, solid: Placed) -> dict[str, Any]:
-    node = {"name": solid.name, "mesh": mesh}
-    return node | {"translation": solid.shift.tolist()} if solid.shift.any() else node
-
-
-def chunk(kind: int, content: bytes) -> bytes:
+def _chunk(kind: int, content: bytes) -> bytes:
     """A chunk with its header."""
     return struct.pack("<II", len(content), kind) + content
+
+
+def _chunks(rest: bytes | None) -> tuple[bytes | None, bytes]:
+    """The binary chunk, if there is one, and all others as they are."""
+    if not rest:
+        return None, b""
+    length, kind = struct.unpack_from("<II", rest, 0)
+    if kind != Code.BINARY:
+        return None, rest
+    binary = rest[8 : 8 + length]
+    return binary + bytes(-len(binary) % 4), rest[8 + length :]

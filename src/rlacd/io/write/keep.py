@@ -9,8 +9,6 @@ that the binary file stands alone. Anything else is converted first.
 from __future__ import annotations
 
 import base64
-import json
-import struct
 from collections import Counter
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -20,9 +18,9 @@ import numpy as np
 import trimesh
 
 from rlacd.io.read.beside import DATA, IMAGES, FolderFiles
-from rlacd.io.read.gltf import MAGIC, split
+from rlacd.io.read.gltf import split
 from rlacd.io.write.converted import converted, nodes_of
-from rlacd.io.write.glb import ATTRIBUTES, BINARY_CHUNK, INDICES, JSON_CHUNK, Placed, chunk, material, packed
+from rlacd.io.write.glb import GltfFile, Placed
 from rlacd.io.write.palette import hull_colors, linear_from_srgb
 from rlacd.io.write.single_precision import Triangles, required_hull
 from rlacd.result import Result
@@ -104,20 +102,16 @@ def _keeps_shape(transform: FloatArray) -> bool:
     return bool(np.allclose(product, product[0, 0] * np.eye(3), rtol=0, atol=1e-6 * product[0, 0]))
 
 
-class _Scene:
-    """A glTF file that is being added to."""
+class _Scene(GltfFile):
+    """The input as a glTF file."""
 
     def __init__(self, mesh: InputMesh, name: str) -> None:
         asset = mesh.asset
         assert asset is not None
         self._by_name = not asset.is_gltf
-        content = asset.content if asset.is_gltf else converted(mesh, name)
-        header, rest = split(Path(f"{name}.glb"), content)
-        self._header: dict[str, Any] = header
-        self._binary, self._others = _chunks(rest)
-        self._added: list[bytes] = []
+        super().__init__(*(split(asset.content) if asset.is_gltf else converted(mesh, name)))
         self._take_in(FolderFiles(asset.path.parent, DATA | IMAGES) if asset.is_gltf and asset.path else None)
-        self._nodes = {node.get("name"): index for index, node in enumerate(header.get("nodes", []))}
+        self._nodes = {node.get("name"): index for index, node in enumerate(self.header.get("nodes", []))}
         self._take_off([at for node in mesh.left_out if (at := self.index_of(node.key)) is not None])
 
     def index_of(self, key: int | str) -> int | None:
@@ -126,66 +120,20 @@ class _Scene:
 
     def is_skinned(self, index: int | None) -> bool:
         """Whether a node's mesh follows a skeleton: engines move such a node away from below its hulls."""
-        return index is not None and "skin" in self._header["nodes"][index]
+        return index is not None and "skin" in self.header["nodes"][index]
 
     def mesh_name(self, index: int | None) -> str:
         """The name of the mesh that a node places; empty if it has none."""
-        mesh = None if index is None else self._header["nodes"][index].get("mesh")
-        name = "" if mesh is None else self._header["meshes"][mesh].get("name", "")
+        mesh = None if index is None else self.header["nodes"][index].get("mesh")
+        name = "" if mesh is None else self.header["meshes"][mesh].get("name", "")
         return name if isinstance(name, str) else ""
-
-    def add(self, placed: Placed, mesh_name: str, parent: int | None, colored: bool) -> None:
-        """Add a hull below a node, or at the top, with a mesh of that name."""
-        header = self._header
-        nodes, meshes = header.setdefault("nodes", []), header.setdefault("meshes", [])
-        views, accessors = header.setdefault("bufferViews", []), header.setdefault("accessors", [])
-        (points, corners), described = packed([placed.mesh], len(views))
-        views += [self._append(points, ATTRIBUTES), self._append(corners, INDICES)]
-        primitive = {"attributes": {"POSITION": len(accessors)}, "indices": len(accessors) + 1, "mode": 4}
-        accessors += described
-        if colored:
-            materials = header.setdefault("materials", [])
-            primitive["material"] = len(materials)
-            materials.append(material(placed))
-        node: dict[str, Any] = {"name": placed.name, "mesh": len(meshes)}
-        if placed.shift.any():
-            node["translation"] = placed.shift.tolist()
-        meshes.append({"name": mesh_name, "primitives": [primitive]})
-        if parent is not None:
-            nodes[parent].setdefault("children", []).append(len(nodes))
-        else:
-            scenes = header.setdefault("scenes", [{}])
-            scenes[header.setdefault("scene", 0)].setdefault("nodes", []).append(len(nodes))
-        nodes.append(node)
-
-    def encoded(self) -> bytes:
-        """The file."""
-        header = self._header
-        buffers = header.setdefault("buffers", [])
-        added = b"".join(self._added)
-        if self._binary is None and buffers:  # the first buffer is an extension's own: its place is taken
-            data = base64.b64encode(added).decode("ascii")
-            buffers.append({"byteLength": len(added), "uri": f"data:application/octet-stream;base64,{data}"})
-            binary = b""
-        else:
-            binary = (self._binary or b"") + added
-            if buffers:
-                buffers[0]["byteLength"] = len(binary)
-            else:
-                buffers.append({"byteLength": len(binary)})
-        text = json.dumps(header, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
-        chunks = chunk(JSON_CHUNK, text + b" " * (-len(text) % 4))
-        if binary:
-            chunks += chunk(BINARY_CHUNK, binary)
-        chunks += self._others
-        return struct.pack("<4sII", MAGIC, 2, 12 + len(chunks)) + chunks
 
     def _take_off(self, hulls: Iterable[int | None]) -> None:
         """Take the meshes off nodes, and the nodes off the scene unless there is something below them.
 
         They stay in their lists, nameless, so that all other indices stay too.
         """
-        nodes, meshes = self._header.get("nodes", []), self._header.get("meshes", [])
+        nodes, meshes = self.header.get("nodes", []), self.header.get("meshes", [])
         off = [index for index in hulls if index is not None]
         unplaced = {nodes[index].get("mesh") for index in off}
         for index in off:
@@ -195,56 +143,30 @@ class _Scene:
             meshes[mesh].pop("name", None)
         ends = {index for index in off if not nodes[index].get("children")}
         holders = [(node, "children") for node in nodes]
-        holders += [(scene, "nodes") for scene in self._header.get("scenes", [])]
+        holders += [(scene, "nodes") for scene in self.header.get("scenes", [])]
         for holder, below in holders:
             if not ends.isdisjoint(holder.get(below, ())):
                 holder[below] = [index for index in holder[below] if index not in ends]
                 if not holder[below]:
                     del holder[below]  # no list is empty in glTF
 
-    def _append(self, data: bytes, target: int | None) -> dict[str, Any]:
-        """Add bytes, and return the view of them."""
-        buffers = self._header.get("buffers", [])
-        own = self._binary is None and len(buffers) > 0
-        start = sum(map(len, self._added)) + (0 if own else len(self._binary or b""))
-        self._added.append(data + bytes(-len(data) % 4))
-        view: dict[str, Any] = {
-            "buffer": len(buffers) if own else 0,
-            "byteOffset": start,
-            "byteLength": len(data),
-        }
-        return view if target is None else view | {"target": target}
-
     def _take_in(self, files: FolderFiles | None) -> None:
         """Put the files that buffers and images name into this one; those that are missing stay named."""
-        for index, buffer in enumerate(self._header.get("buffers", [])):
+        for index, buffer in enumerate(self.header.get("buffers", [])):
             data = _read(files, buffer.get("uri"))
-            if index == 0 and self._binary is None and (data is not None or _is_data(buffer.get("uri"))):
+            if index == 0 and self.binary is None and (data is not None or _is_data(buffer.get("uri"))):
                 data = base64.b64decode(buffer["uri"].partition(",")[2]) if data is None else data
                 del buffer["uri"]
-                self._binary = data + bytes(-len(data) % 4)
+                self.binary = data + bytes(-len(data) % 4)
             elif data is not None:
                 buffer["uri"] = "data:application/octet-stream;base64," + base64.b64encode(data).decode("ascii")
-        for image in self._header.get("images", []):
+        for image in self.header.get("images", []):
             uri = image.get("uri")
             data = _read(files, uri)
             if data is not None:
-                views = self._header.setdefault("bufferViews", [])
-                views.append(self._append(data, None))
-                image["bufferView"] = len(views) - 1
+                image["bufferView"] = self.append(data)
                 image.setdefault("mimeType", _MIME.get(Path(uri).suffix.lower(), "image/png"))
                 del image["uri"]
-
-
-def _chunks(rest: bytes | None) -> tuple[bytes | None, bytes]:
-    """The binary chunk, if there is one, and all others as they are."""
-    if not rest:
-        return None, b""
-    length, kind = struct.unpack_from("<II", rest, 0)
-    if kind != BINARY_CHUNK:
-        return None, rest
-    binary = rest[8 : 8 + length]
-    return binary + bytes(-len(binary) % 4), rest[8 + length :]
 
 
 def _read(files: FolderFiles | None, uri: Any) -> bytes | None:
@@ -258,8 +180,3 @@ def _read(files: FolderFiles | None, uri: Any) -> bytes | None:
 
 def _is_data(uri: Any) -> bool:
     return isinstance(uri, str) and uri.startswith("data:")
-
-
-def is_kept(result: Result) -> bool:
-    """Whether the input has a scene that a file can keep."""
-    return result.input is not None and result.input.asset is not None

@@ -15,7 +15,7 @@ from rlacd.errors import OutputError
 # much more, or all of it, when float32 has no digits left for its thickness.
 VOLUME_TOLERANCE = 1e-3
 
-STEP = 1e-4
+VISIBLE_STEP = 1e-4
 """Of a visible mesh's size."""
 
 
@@ -88,11 +88,11 @@ def required_hull(hull: Triangulated, name: str, where: str) -> tuple[Triangles,
 
 
 def placed_mesh(mesh: Triangulated) -> tuple[Triangles, npt.NDArray[np.float64]]:
-    """Do the same for a visible mesh, where a change below `STEP` of its size cannot be seen."""
+    """Do the same for a visible mesh, where a change below `VISIBLE_STEP` of its size cannot be seen."""
     used = mesh.vertices[np.unique(mesh.faces)]
     lower, upper = used.min(axis=0), used.max(axis=0)
     step = np.abs([lower, upper]).max() * np.finfo(np.float32).eps
-    shift = np.zeros(3) if step <= STEP * (upper - lower).max() else lower / 2 + upper / 2
+    shift = np.zeros(3) if step <= VISIBLE_STEP * (upper - lower).max() else lower / 2 + upper / 2
     return Triangles(np.asarray(mesh.vertices - shift), np.asarray(mesh.faces)), shift
 
 

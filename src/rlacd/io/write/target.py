@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rlacd.errors import OptionError, OutputError
+from rlacd.io.read import function_of
 from rlacd.io.write.atomic import output_errors
-from rlacd.io.write.usd import require_usd
 from rlacd.options.fields import checked, flag, path_like, read, shown
 from rlacd.options.output import OutputOptions
 
@@ -164,7 +164,7 @@ def _model_target(text: str, file_format: str) -> Target:
         )
     check_file(place)
     if file_format == "usd":
-        require_usd()
+        function_of("write.usd:require_usd")()
     if file_format in WITH_MESHES:
         check_name(place)
         _check_folder(mesh_folder(place, file_format))
