@@ -23,9 +23,9 @@ ADDR_NO_RANDOMIZE = 0x0040000
 
 NATIVE_TESTS = (
     *("hull", "sweep", "glue", "surface", "distance", "concavity", "concave_edges", "limits", "component", "metrics"),
-    *("plane_cut", "bridges", "least_excess", "overlap", "redistribute", "caps", "frame", "tangles", "fuzz_found"),
-    *("convex_clip", "proxy", "topology", "repair_kernels", "repair_openings", "repair_sheets", "stop"),
-    *("navigable", "navigable_decompose", "merge", "repair", "decompose", "search", "networks", "fuzz", "bad_input"),
+    *("plane_cut", "bridges", "least_excess", "overlap", "redistribute", "caps", "frame", "fuzz_found"),
+    *("convex_clip", "proxy", "topology", "stop"),
+    *("navigable", "navigable_decompose", "merge", "decompose", "search", "networks", "fuzz", "bad_input"),
 )
 """Files of tests/ that reach the kernels."""
 
@@ -63,7 +63,8 @@ def environment(kind: str, reports: Path) -> dict[str, str]:
 def command(build: Path, words: list[str]) -> list[str]:
     python = str(build / "bin" / "python")
     if words == ["tests"]:
-        tests = [str(path) for name in NATIVE_TESTS for path in Path("tests").rglob(f"test_{name}.py")]
+        named = [str(path) for name in NATIVE_TESTS for path in Path("tests").rglob(f"test_{name}.py")]
+        tests = ["tests/repair", *named]
         return [python, "-m", "pytest", "-p", "no:cacheprovider", *tests]
     if words[:1] == ["meshes"]:
         return [python, str(HERE / "meshes.py"), *words[1:]]

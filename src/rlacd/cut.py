@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -19,13 +19,6 @@ FILM = 2e-4
 
 MISSED = 1e-3
 """No point of a shaving is farther than this from the solid across the cut."""
-
-DOUBTFUL, DOUBTFUL_PER_FACE = 1e6, 150
-"""Units of work, and units per triangle of the solid, after which it is asked whether the solid can be cut at all. Of
-181 real meshes none took more than 0.90 of it."""
-
-FAILING = 3
-"""Multiple of that after which cutting seems to fail."""
 
 MANY = 1000
 """With more components than this, the policy may have failed: there are solids that one breaks into thousands of parts
@@ -87,9 +80,6 @@ class CutTree:
     run : Run
     cache : CutCache, optional
         Cuts shared with other trees.
-    doubt : callable, optional
-        Called with False if cutting takes much work, and with True if it takes `FAILING` times as much; may raise an
-        error for a solid that cannot be cut as it is.
     second : Policy, optional
         Takes over if it leaves far fewer components than thousands.
     """
@@ -100,12 +90,9 @@ class CutTree:
         policy: Policy,
         run: Run,
         cache: CutCache | None = None,
-        doubt: Callable[[bool], None] | None = None,
         second: Policy | None = None,
     ) -> None:
         self.root = root
-        self._doubt = doubt
-        self._doubtful = DOUBTFUL + DOUBTFUL_PER_FACE * root.size
         self._policy = policy
         self._run = run
         self._cache = cache or CutCache()
@@ -141,7 +128,6 @@ class CutTree:
                 return done, left + frontier
             unmet = frontier
             try:
-                self._ask_after(run.work.done - begin)
                 verdicts = self._run.map(criterion.is_met, frontier)
                 done += [c for c, met in zip(frontier, verdicts, strict=True) if met]
                 unmet = [c for c, met in zip(frontier, verdicts, strict=True) if not met]
@@ -178,16 +164,6 @@ class CutTree:
             return None
         self._policy, self._children, self._second = second._policy, second._children, None
         return done
-
-    def _ask_after(self, units: float) -> None:
-        """Ask whether the solid can be cut, once if cutting has taken much work, and again if it seems to fail."""
-        if self._doubt is None or units <= self._doubtful:
-            return
-        failing = self._doubtful > DOUBTFUL + DOUBTFUL_PER_FACE * self.root.size
-        self._doubtful *= FAILING
-        self._doubt(failing)
-        if failing:
-            self._doubt = None
 
     def _divide(self, components: Sequence[Component]) -> None:
         """Split components into their connected pieces, and cut those that are connected."""

@@ -1,15 +1,12 @@
 """From a mesh to the parts of its solid: repair, simplify, cut, merge, search, lift.
 
-Each stage returns the best so far when the run stops, and none sends the data back but for one case: bodies that turn
-out to cross too much of their own surface to be cut are repaired another way.
+Each stage returns the best so far when the run stops, and none sends the data back.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import NamedTuple
 
 from rlacd._native import Stopped
@@ -22,7 +19,6 @@ from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
 from rlacd.proxy import Model
 from rlacd.repair.repair import repair
-from rlacd.repair.tangles import TangledError, refuse_tangles
 from rlacd.run import Run
 from rlacd.search import SearchContext, SearchSummary, at_least, eliminate_parts, search
 from rlacd.solid.component import Component, Part
@@ -30,7 +26,6 @@ from rlacd.solid.cover import cover
 from rlacd.solid.hull import Hull
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import Solid
-from rlacd.solid.topology import IntArray
 
 
 class Reached(NamedTuple):
@@ -62,16 +57,8 @@ class Reached(NamedTuple):
 def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
     """Decompose a mesh until done or stopped."""
     try:
-        return _find_parts(source, options, run)
-    except TangledError as tangle:
-        return _find_parts(source, options, run, tangle.bodies)
-
-
-def _find_parts(source: InputMesh, options: Options, run: Run, tangled: IntArray | None = None) -> Reached:
-    """Make one attempt; raises `TangledError` if some bodies cannot be cut, unless `tangled` names them."""
-    try:
         with run.stage("repair"):
-            solid = _repaired(source, options, run, tangled)
+            solid = _repaired(source, options, run)
         options = options.at_scale(solid.frame.scale)
         goal = LimitedCriterion.prepare(options, solid, run)
         root = Component(solid.shape, run.threads)
@@ -83,8 +70,7 @@ def _find_parts(source: InputMesh, options: Options, run: Run, tangled: IntArray
         return Reached(solid, options, goal, pieces if len(pieces) == 1 else [root], None, root)
     model = Model.of(root, solid.pieces, goal, run)
     solid.pieces.clear()
-    doubt = None if tangled is not None else partial(refuse_tangles, solid, run.threads)
-    decomposer = _Decomposer.of(model, goal, options, run, doubt)
+    decomposer = _Decomposer.of(model, goal, options, run)
     parts, goal, found = decomposer.decompose(goal)
     if not decomposer.keeps_limit(parts):
         parts = decomposer.at_most(parts, goal)
@@ -119,14 +105,12 @@ class _Decomposer:
     tree: CutTree
 
     @classmethod
-    def of(
-        cls, model: Model, goal: Criterion, options: Options, run: Run, doubt: Callable[[bool], None] | None
-    ) -> _Decomposer:
-        """Prepare to decompose a model; for `doubt` see `CutTree`."""
+    def of(cls, model: Model, goal: Criterion, options: Options, run: Run) -> _Decomposer:
+        """Prepare to decompose a model."""
         sweeps = SweepCache()
         second = Greedy("hull-sum", sweeps=sweeps) if options.policy == "greedy" else None
         policy = make_policy(options.policy, sweeps, _scale(model.tighter(goal)))
-        tree = CutTree(model.component, policy, run, doubt=doubt, second=second)
+        tree = CutTree(model.component, policy, run, second=second)
         return cls(model, options, run, sweeps, tree)
 
     def decompose(self, goal: Criterion, factor: float = 1.0) -> tuple[list[Part], Criterion, SearchSummary | None]:
@@ -189,7 +173,7 @@ class _Decomposer:
         return parts, found
 
 
-def _repaired(source: InputMesh, options: Options, run: Run, tangled: IntArray | None) -> Solid:
+def _repaired(source: InputMesh, options: Options, run: Run) -> Solid:
     return repair(
         source,
         resolution=options.resolution,
@@ -197,7 +181,6 @@ def _repaired(source: InputMesh, options: Options, run: Run, tangled: IntArray |
         gap=2 * options.gap,
         threads=run.threads,
         keep_cavities=options.sees_cavities,
-        tangled=tangled,
     )
 
 

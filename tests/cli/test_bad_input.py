@@ -18,7 +18,7 @@ from trimesh import creation
 import rlacd
 from rlacd.cli.main import app
 from rlacd.errors import EmptyMeshError, MeshDataError, OptionError, OutputError, RlacdError
-from rlacd.repair import attempt
+from rlacd.repair import repair as repairing
 from tests.hulls import assert_convex_hull
 from tests.shapes_bad import arrays, ell, folded_sphere, klein_bottle, moebius_strip
 
@@ -155,7 +155,7 @@ def test_a_triangle_that_ends_far_away_is_kept() -> None:
 
 @pytest.mark.promise("loss-named")
 def test_a_triangle_that_is_given_up_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(attempt, "_MOST_KEPT", 0)
+    monkeypatch.setattr(repairing, "MOST_PATCHES", 0)
     result = check(FAR)
     missed = result.report["hausdorff"]["under"]
     assert missed > 1

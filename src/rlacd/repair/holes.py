@@ -1,214 +1,281 @@
-"""Welding cracks and capping holes: new faces that connect the free edges of a soup.
+"""Which holes of a soup are closed: those left by damage, not those made on purpose.
 
-Input: a soup and its edges. Output: changed faces, or extra ones. Nothing here decides whether a cap is justified; the
-caller measures that.
+A body is closed only if every one of its holes may be closed: a cap that leaves another hole open would be one more
+sheet. Whether a hole may be closed is decided by the first of these questions that is answered with yes:
+
+- Does its cap stay near the surface, or where the ball cannot reach it?
+- Is it a wound? It has few edges, and its cap smoothly continues the faces around it, as at missing faces. Around the
+  mouth of a bottle, faces turn away from the cap. A mesh with many wounds gets its other small holes closed too. A hole
+  with another body all along its rim, such as a counter's with a basin in it, is no wound, nor is a round ring.
+- Is it small beside its body, and its cap not far from the surface? Where a tube ends, it may be larger: one end of a
+  bar may be open where it was joined to something, and so may both if they are not round, as a pipe's are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import defaultdict
+from dataclasses import dataclass
+from functools import cached_property
 
-import mapbox_earcut
 import numpy as np
 
-from rlacd._native import PointTree, least_bent, poll_stop
+from rlacd._native import poll_stop
+from rlacd.repair.caps import caps_of, smooth_share
+from rlacd.repair.cracks import MOST_FREE_EDGES
+from rlacd.repair.distance import SurfaceQuery, affordable, spread_points
+from rlacd.repair.rims import Rims, rims_of
+from rlacd.repair.soup import FLAPS, Soup
+from rlacd.repair.windings import trust_windings
+from rlacd.repair.work import Work
 from rlacd.solid.frame import FloatArray
-from rlacd.solid.products import dots
+from rlacd.solid.solid import Hole
+from rlacd.solid.thickness import HALF_THICKNESS
 from rlacd.solid.topology import (
     BoolArray,
-    Edges,
     IntArray,
     components,
+    face_areas,
     first_of_doubled,
-    has_marked,
     marked,
-    nondegenerate,
+    signed_tetrahedra,
 )
 
-# Optimal triangulation considers all triples of corners; longer loops are cut by ears, or up to a length if that fails.
-_EXACT_LOOP = 60
-LONGEST_EXACT_LOOP = 250
-"""Loops of more edges than this are not triangulated optimally."""
+HOLE, HOLE_SHARE = 0.1, 0.02
+"""A nearly closed body, with holes of at most this share of its area, is closed with caps up to this far away: a scan
+with a few holes is meant as a solid, a cup is not. The caps are reported."""
 
-MOST_NEAR = 50_000_000
-"""Pairs of a free edge and a free vertex near it; where there are more, none is split."""
-
-# Tracing loops is the one repair step that walks edge by edge; a soup with more free edges is not a scan with holes.
-MOST_FREE_EDGES = 500_000
-
-
-def close_cracks(
-    vertices: FloatArray, faces: IntArray, edges: Edges, tolerances: Sequence[float]
-) -> tuple[IntArray, IntArray]:
-    """Merge free edges that nearly coincide, with increasing tolerances.
-
-    An attempt that closes nothing, or leaves no face, is undone. No two of the faces have the same three corners.
-
-    Returns the faces ``[G, 3]``, the given ones if nothing changed, and ``[G]`` the given face each comes from.
-    """
-    origin = np.arange(len(faces))
-    free = free_edges(faces, edges)
-    for tolerance in tolerances:
-        poll_stop()
-        if not 0 < len(free) <= MOST_FREE_EDGES:
-            break
-        # Only faces with free vertices change. All faces at their corners are needed, for the valence of their edges.
-        changing = has_marked(marked(free, len(vertices)), faces)
-        inner = marked(faces[changing], len(vertices))
-        near = has_marked(inner, faces)
-        welded = weld_free_vertices(vertices, faces[near], free, tolerance)
-        split, parent, is_piece = split_at_free_vertices(vertices, welded, inner, tolerance)
-        poll_stop()
-        keep = nondegenerate(split)
-        keep[keep] = first_of_doubled(split[keep], len(vertices))
-        left = free_edges(split[keep], Edges.of(split[keep], len(vertices)), inner)
-        if len(left) < len(free) and (keep.any() or not near.all()):
-            whole = keep & ~is_piece
-            changed, at = faces.copy(), np.flatnonzero(near)
-            kept = np.logical_not(near)
-            changed[at[parent[whole]]] = split[whole]
-            kept[at[parent[whole]]] = True
-            pieces = keep & is_piece
-            faces = np.concatenate([changed[kept], split[pieces]])
-            origin = np.concatenate([origin[kept], origin[at[parent[pieces]]]])
-            free = left
-    return faces, origin
+# The same share for the ends of a bar: it is four times as long as wide if one is open.
+_END = 3 * HOLE_SHARE
+# The volume per area of a tube is half the radius of a hole at its end, to this accuracy; that of a bottle, which is
+# wider than its neck, is more, and that of folded sheets less.
+_TUBE = 0.2
+# Limits on a wound's edges and on its share of the area of its body.
+_WOUND_EDGES, _WOUND = 12, 0.1
+# The cap of a wound continues the faces along this share of its rim.
+_SMOOTH_SHARE = 0.3
+# If there are this many wounds, and they are at least the same share of all holes, the mesh is damaged.
+_DAMAGED, _DAMAGED_SHARE = 4, 0.3
+# A ring of more edges than this is a mouth, not a wound, if its corners lie on a circle to this accuracy.
+_RING, _ROUND = 6, 0.1
 
 
-def weld_free_vertices(vertices: FloatArray, faces: IntArray, free: IntArray, tolerance: float) -> IntArray:
-    """Merge vertices of free edges ``[B, 2]`` that lie within `tolerance` of each other.
+@dataclass
+class _Hole:
+    """One hole and the cap that would close it.
 
-    Returns faces of the same number, of which some may be degenerate. Vertices keep their places: each group is
-    represented by its first vertex.
-    """
-    ends = np.unique(free)
-    counts, near = PointTree(vertices[ends]).within(vertices[ends], np.full(len(ends), tolerance))
-    if len(near) == len(ends):  # each is near itself only
-        return faces
-    _, label = components(len(ends), np.repeat(np.arange(len(ends)), counts), near.astype(np.int64))
-    _, first = np.unique(label, return_index=True)
-    target = np.arange(len(vertices))
-    target[ends] = ends[first[label]]
-    return target[faces]
-
-
-def split_at_free_vertices(
-    vertices: FloatArray, faces: IntArray, inner: BoolArray, tolerance: float
-) -> tuple[IntArray, IntArray, BoolArray]:
-    """Insert free vertices into the free edges they lie on (T-junctions).
-
-    Returns the faces ``[G, 3]``, split ones replaced by several; ``[G]`` the old face each comes from; and ``[G]``
-    whether it is a piece of it. Edges without an end among the `inner` vertices ``[V]`` are not looked at.
-    """
-    edges = Edges.of(faces, len(vertices))
-    is_free = (edges.valence == 1) & inner[edges.vertices].any(axis=1)
-    halfedge = np.flatnonzero(is_free[edges.of_halfedge])
-    # One edge per face and round, so that the pieces of a face do not depend on each other.
-    _, first = np.unique(halfedge // 3, return_index=True)
-    halfedge = halfedge[first]
-    poll_stop()
-    free = np.unique(edges.vertices[is_free])
-    none = faces, np.arange(len(faces)), np.zeros(len(faces), dtype=bool)
-    if len(halfedge) == 0:
-        return none
-    face, corner = halfedge // 3, halfedge % 3
-    a, b, c = faces[face, corner], faces[face, (corner + 1) % 3], faces[face, (corner + 2) % 3]
-    span = vertices[b] - vertices[a]
-    length = np.linalg.norm(span, axis=1)
-    tree = PointTree(vertices[free])
-    count, near = tree.within((vertices[a] + vertices[b]) / 2, length / 2 + tolerance, MOST_NEAR)
-    if len(near) > MOST_NEAR or len(near) == 0:
-        return none
-    poll_stop()
-    edge = np.repeat(np.arange(len(halfedge)), count)
-    vertex = free[near]
-    offset = vertices[vertex] - vertices[a[edge]]
-    along = dots(offset, span[edge]) / np.maximum(length[edge] ** 2, np.finfo(float).tiny)
-    away = np.linalg.norm(offset - along[:, None] * span[edge], axis=1)
-    margin = tolerance / np.maximum(length[edge], tolerance)
-    on = (away <= tolerance) & (along > margin) & (along < 1 - margin) & (vertex != c[edge])
-    edge, vertex, along = edge[on], vertex[on], along[on]
-    if len(edge) == 0:
-        return none
-    poll_stop()
-    order = np.lexsort((vertex, along, edge))
-    edge, vertex = edge[order], vertex[order]
-    split = np.unique(edge)
-    # The corners along each split edge: a, the inserted vertices, b; every consecutive pair forms a face with c.
-    chain_edge = np.concatenate([split, edge, split])
-    chain_vertex = np.concatenate([a[split], vertex, b[split]])
-    place = np.concatenate([np.zeros(len(split)), np.ones(len(edge)), np.full(len(split), 2)])
-    order = np.lexsort((np.arange(len(place)), place, chain_edge))
-    chain_edge, chain_vertex = chain_edge[order], chain_vertex[order]
-    pair = np.flatnonzero(chain_edge[1:] == chain_edge[:-1])
-    pieces = np.stack([chain_vertex[pair], chain_vertex[pair + 1], c[chain_edge[pair]]], axis=1)
-    whole = np.ones(len(faces), dtype=bool)
-    whole[face[split]] = False
-    new = np.concatenate([faces[whole], pieces])
-    origin = np.concatenate([np.flatnonzero(whole), face[chain_edge[pair]]])
-    is_piece = np.repeat([False, True], [len(new) - len(pieces), len(pieces)])
-    good = nondegenerate(new)
-    return new[good], origin[good], is_piece[good]
-
-
-def free_edges(faces: IntArray, edges: Edges, inner: BoolArray | None = None) -> IntArray:
-    """Return the directed edges ``[B, 2]`` that only one face uses, as that face runs along them.
-
-    If `inner` vertices ``[V]`` are given, only edges with an end among them.
-    """
-    is_free = edges.valence == 1
-    if inner is not None:
-        is_free &= inner[edges.vertices].any(axis=1)
-    halfedge = np.flatnonzero(is_free[edges.of_halfedge])
-    face, corner = halfedge // 3, halfedge % 3
-    return np.stack([faces[face, corner], faces[face, (corner + 1) % 3]], axis=1)
-
-
-def cap(points: FloatArray, beside: FloatArray, taken: BoolArray | None = None, bend: float = 1.0) -> IntArray:
-    """Triangulate a closed loop of points; a loop may visit a place twice.
-
-    Parameters
+    Attributes
     ----------
-    points
-        ``[N, 3]``.
-    beside
-        ``[N, 3]``, the unit normal of the face on the other side of the edge from each point to the next. It runs along
-        that edge in the order of the loop.
-    taken
-        ``[N, N]``, pairs of points that must not get an edge, because one exists already or because they are equal.
-    bend
-        Weight of bending; with 0 the area is minimised.
-
-    Returns
-    -------
-    IntArray
-        ``[N - 2, 3]`` corners, all of them points of the loop, oriented against the loop to match the adjacent faces.
+    loop
+        The vertices around it.
+    body
+        The first of the bodies that share it.
+    share, of_all
+        Area of its cap, and of all caps of its body, as shares of the body's.
+    depth, reached
+        How far the cap leads away from the surface: anywhere; where the ball can reach it, 0 if that is near.
+    is_smooth, is_ring, is_tube
+        Whether the cap continues the faces around it; whether it is a round ring; whether its body is a tube that ends
+        here.
+    is_end, is_wound
+        Whether it is an end of a bar; whether missing faces left it. Both depend on the other holes.
     """
-    if len(points) <= 3:
-        return np.array([[0, 2, 1]])
-    if len(points) <= _EXACT_LOOP:
-        return least_bent(points, beside, taken, bend)[:, ::-1].astype(np.int64)
-    middle = points.mean(axis=0)
-    _, _, axes = np.linalg.svd(points - middle, full_matrices=False)
-    flat = np.ascontiguousarray((points - middle) @ axes[:2].T)
-    ears = mapbox_earcut.triangulate_float64(flat, np.array([len(points)], dtype=np.uint32)).reshape(-1, 3)
-    if len(ears) != len(points) - 2:  # the loop's projection crosses itself: no plane fits
-        if len(points) <= LONGEST_EXACT_LOOP:
-            return least_bent(points, beside, taken, bend)[:, ::-1].astype(np.int64)
-        return _strips(len(points))[:, ::-1]
-    triangles: IntArray = ears.astype(np.int64)
-    a, b, c = triangles.T
-    along = ((b - a) % len(points) < (c - a) % len(points)).sum() * 2 > len(triangles)
-    return triangles[:, ::-1] if along else triangles
+
+    loop: IntArray
+    body: int
+    share: float
+    of_all: float
+    depth: float
+    reached: float
+    is_smooth: bool
+    is_ring: bool
+    is_tube: bool
+    is_end: bool = False
+    is_wound: bool = False
+
+    def may_lead(self, depth: float) -> bool:
+        """Whether its cap may lead so far away from the surface where the ball can reach it."""
+        is_no_mouth = self.is_smooth or not self.is_ring or self.is_tube
+        is_small = is_no_mouth and self.of_all <= (_END if self.is_end else HOLE_SHARE)
+        return self.is_wound or (is_small and depth <= HOLE)
+
+    def described(self, is_closed: bool, vertices: FloatArray) -> Hole:
+        """What the report says of it."""
+        corners = vertices[self.loop]
+        centre = corners.mean(axis=0)
+        width = 2 * float(np.linalg.norm(corners - centre, axis=1).max())
+        at = (float(centre[0]), float(centre[1]), float(centre[2]))
+        return Hole(self.body, at, width, is_closed, self.is_smooth, self.reached if is_closed else 0.0)
 
 
-def _strips(count: int) -> IntArray:
-    """Zigzag between both ends of the index range until they meet."""
-    low, high, triangles = 0, count - 1, []
-    while high - low > 1:
-        triangles.append((low, low + 1, high))
-        low += 1
-        if high - low > 1:
-            triangles.append((low, high - 1, high))
-            high -= 1
-    return np.array(triangles, dtype=np.int64)
+class _Caps:
+    """The holes of a soup, their caps, and points of these."""
+
+    def __init__(self, work: Work, rims: Rims) -> None:
+        soup, bodies = work.soup, work.record.bodies
+        self._work, self._soup, self._rims, self._bodies = work, soup, rims, bodies
+        self._gap, self._fill = work.wanted.gap, work.wanted.open_bodies == "solid"
+        self._faces, self._hole_of = caps_of(soup, rims)
+        first_body = np.array([soup.body[beside[0]] for beside in rims.beside])
+        lengths = [len(loop) for loop in rims.loops]
+        _, group = components(bodies, np.repeat(first_body, lengths), soup.body[np.concatenate(rims.beside)])
+        _, first = np.unique(group, return_index=True)
+        self._joined = first[group]  # the first of the bodies that share holes
+        self._body, self._body_of_hole = self._joined[soup.body], self._joined[first_body]
+        self._area = np.bincount(self._body, soup.area, bodies)
+        cap_area = face_areas(soup.vertices, self._faces)
+        self._cap_area = np.bincount(self._hole_of, cap_area, len(rims.loops))
+        spacing = affordable(self._gap / 2, float(cap_area.sum()))
+        self._points, self._on = spread_points(soup.vertices, self._faces, spacing)
+        self._distance, self._is_reached = self._looked_at()
+        self.holes = self._told_apart()
+
+    def _looked_at(self) -> tuple[FloatArray, BoolArray]:
+        """The distance ``[N]`` of each point from the surface, and whether the ball can reach it."""
+        gap, points = self._gap, self._points
+        # Corners lie on the surface, and how far points are matters only beyond a certain distance.
+        corners = self._soup.vertices[self._faces[self._on]]
+        beyond = (np.linalg.norm(points[:, None] - corners, axis=2) > min(gap, HOLE)).all(axis=1)
+        distance = np.zeros(len(points))
+        distance[beyond] = self._work.surface.distance(points[beyond])
+        is_reached = distance > gap
+        # If cavities are kept, everything connected to them is open.
+        if is_reached.any() and not self._fill and not self._work.wanted.keep_cavities:
+            is_reached[is_reached] = self._work.reach.covers(points[is_reached])
+        return distance, is_reached
+
+    @cached_property
+    def _volume(self) -> FloatArray:
+        """The volume ``[bodies]`` that all caps together would enclose, by the windings found."""
+        soup, rims, own = self._soup, self._rims, self._body_of_hole[self._hole_of]
+        sign = np.where(rims.inverted, -1, 1) * ~rims.flap
+        volume = np.bincount(self._body, sign * signed_tetrahedra(soup.vertices, soup.faces), self._bodies)
+        volume += np.bincount(own, signed_tetrahedra(soup.vertices, self._faces), self._bodies)
+        return np.asarray(np.abs(volume))
+
+    def _told_apart(self) -> list[_Hole]:
+        """The holes, and what each of them is."""
+        loops, own, tiny = self._rims.loops, self._body_of_hole, np.finfo(float).tiny
+        body_area = np.maximum(self._area[own], tiny)
+        of_all = np.bincount(own, self._cap_area, self._bodies)[own]
+        radius = np.sqrt(np.maximum(self._cap_area, tiny) / np.pi)
+        is_tube = np.abs(self._volume[own] / body_area / radius - 0.5) <= _TUBE
+        depth, reached = np.zeros((2, len(loops)))
+        np.maximum.at(depth, self._hole_of[self._on], self._distance)
+        there = self._is_reached
+        np.maximum.at(reached, self._hole_of[self._on[there]], self._distance[there])
+        smooth = smooth_share(self._soup, self._rims, self._faces, self._hole_of) >= _SMOOTH_SHARE
+        ring = np.array([len(loop) > _RING and _is_round(self._soup.vertices[loop]) for loop in loops])
+        columns = (own, self._cap_area / body_area, of_all / body_area, depth, reached, smooth, ring, is_tube)
+        holes = [_Hole(*row) for row in zip(loops, *(column.tolist() for column in columns), strict=True)]
+        _find_ends(holes)
+        _find_wounds(holes)
+        for hole in holes:
+            hole.is_wound &= hole.depth <= self._gap or not self._is_plugged(hole)
+        return holes
+
+    def _is_plugged(self, hole: _Hole) -> bool:
+        """Whether another body, such as a basin in a counter, lies all along a hole."""
+        others = self._soup.faces[self._body != hole.body]
+        corners = self._soup.vertices[hole.loop]
+        middles = (corners + np.roll(corners, -1, axis=0)) / 2
+        poll_stop()
+        query = SurfaceQuery(self._soup.vertices, others)
+        return len(others) > 0 and bool((query.distance(np.concatenate([corners, middles])) <= self._gap).all())
+
+    def may_be_closed(self) -> BoolArray:
+        """Return ``[bodies]`` the bodies all of whose holes may be closed."""
+        chosen = marked(self._body_of_hole, self._bodies)
+        if not self._fill:
+            chosen[[hole.body for hole in self.holes if hole.reached and not hole.may_lead(hole.reached)]] = False
+        return chosen
+
+    def added(self, chosen: BoolArray) -> tuple[Soup, BoolArray]:
+        """The soup with the caps of chosen bodies ``[bodies]``, and which of its faces are flaps."""
+        soup, rims, own = self._soup, self._rims, self._body_of_hole[self._hole_of]
+        some, whole = chosen[own], chosen[self._body]
+        turned = np.where((whole & rims.inverted)[:, None], soup.faces[:, ::-1], soup.faces)
+        faces = np.concatenate([turned, self._faces[some]])
+        owners = np.concatenate([np.where(whole, self._body, soup.body), own[some]])
+        no_cap = np.zeros(int(some.sum()), dtype=bool)
+        kept = first_of_doubled(faces, len(soup.vertices))
+        # Where more than two faces met before, which of them continue each other is a guess: caps did not cause that.
+        sure = whole & ~rims.flap & ~soup.at_valence(soup.edges.valence > 2)
+        before = ~whole & (False if soup.trusted is None else soup.trusted)
+        trusted = np.concatenate([sure | before, ~no_cap])
+        flap = np.concatenate([rims.flap, no_cap])[kept]
+        return trust_windings(Soup(soup.vertices, faces, owners, trusted).only(kept), self._bodies, flap), flap
+
+    def have_inside(self, closed: Soup, flap: BoolArray) -> BoolArray:
+        """Return ``[bodies]`` the bodies that caps give an inside: a strip whose cap lies on itself stays a sheet."""
+        volume = np.bincount(closed.body_of_side, np.maximum(closed.sides.volume, 0), self._bodies)
+        has_volume = volume > HALF_THICKNESS / 2 * np.bincount(closed.body, closed.area, self._bodies)
+        return np.asarray(has_volume & (closed.sheet_share(self._bodies, flap) <= FLAPS))
+
+    def by_room(self) -> BoolArray:
+        """Return ``[bodies]`` the bodies with caps that may lead where they do only because nothing can reach them."""
+        hole = self._hole_of[self._on]
+        far = np.flatnonzero((self._distance > self._gap) & ~self._is_reached)
+        may = np.array([one.may_lead(HOLE) for one in self.holes])[hole[far]] & (self._distance[far] <= HOLE)
+        may |= np.array([one.is_wound for one in self.holes])[hole[far]]
+        return marked(self._body_of_hole[hole[far[~may]]], self._bodies)
+
+    def bodies_of(self, chosen: BoolArray) -> IntArray:
+        """The bodies that belong to chosen ones ``[bodies]``: all that share a hole."""
+        return np.flatnonzero(chosen[self._joined])
+
+    def described(self, chosen: BoolArray) -> list[Hole]:
+        """The holes of chosen bodies ``[bodies]``, and those of bodies to which caps would give an inside."""
+        said = chosen | (self._volume > self._gap * self._area)  # with less it is a leaf or cloth
+        return [one.described(bool(chosen[one.body]), self._soup.vertices) for one in self.holes if said[one.body]]
+
+
+def may_have_holes(work: Work) -> bool:
+    """Whether bodies that are still to be built have free edges, and may be closed."""
+    free = int((work.soup.edges.valence == 1).sum())
+    return not work.parts and 0 < free <= MOST_FREE_EDGES and work.wanted.open_bodies != "thin"
+
+
+def close_holes(work: Work) -> None:
+    """Cap the bodies all of whose holes may be closed."""
+    rims = rims_of(work.soup)
+    if not rims.loops:
+        return
+    caps = _Caps(work, rims)
+    chosen = caps.may_be_closed()
+    closed, flap = caps.added(chosen)
+    useful = chosen & caps.have_inside(closed, flap)
+    if (useful != chosen).any():
+        closed, _ = caps.added(useful)
+    work.record.note(caps.bodies_of(useful), "capped")
+    work.by_room |= useful & caps.by_room()
+    work.holes = caps.described(useful)
+    if useful.any():
+        work.soup = closed
+
+
+def _find_ends(holes: list[_Hole]) -> None:
+    """Mark the ends of bars: a pipe has two round ones."""
+    of_body: dict[int, list[_Hole]] = defaultdict(list)
+    for hole in holes:
+        of_body[hole.body].append(hole)
+    for own in of_body.values():
+        is_bar = len(own) == 1 or not any(hole.is_ring for hole in own)
+        for hole in own:
+            hole.is_end = is_bar and hole.is_tube
+
+
+def _find_wounds(holes: list[_Hole]) -> None:
+    """Mark those that missing faces left."""
+    for hole in holes:
+        has_few_edges = len(hole.loop) <= _WOUND_EDGES
+        hole.is_wound = has_few_edges and (hole.is_smooth or len(hole.loop) == 3) and hole.share <= _WOUND
+    is_damaged = sum(hole.is_wound for hole in holes) >= max(_DAMAGED, _DAMAGED_SHARE * len(holes))
+    for hole in holes:
+        is_harmless = hole.share <= HOLE_SHARE or hole.depth <= HOLE or hole.is_smooth
+        hole.is_wound |= is_damaged and is_harmless and hole.share <= _WOUND
+        hole.is_wound &= is_damaged or not hole.is_ring
+
+
+def _is_round(points: FloatArray) -> bool:
+    radii = np.linalg.norm(points - points.mean(axis=0), axis=1)
+    return bool(radii.std() <= _ROUND * radii.mean())

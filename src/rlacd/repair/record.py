@@ -1,12 +1,17 @@
-"""What repair does to each body of an input: the step it needed, how far its surface moved, its triangles."""
+"""What repair does to each body of an input: the step it needed, and how far its surface and the input's deviate."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from rlacd import _native
+from rlacd._native import PointTree, poll_stop
+from rlacd.repair.distance import SurfaceQuery, affordable, points_covering, shared_faces
+from rlacd.repair.voxels import GAP
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.solid import BodyRepair
-from rlacd.solid.topology import BoolArray, IntArray, marked
+from rlacd.solid.thickness import HALF_THICKNESS
+from rlacd.solid.topology import BoolArray, IntArray, face_areas, marked
 
 STEPS = ("closed", "reoriented", "outer skin", "welded", "capped", "slab", "wrapped", "hull")
 """The possible steps for a body, from the least change to the most."""
@@ -27,8 +32,6 @@ class Record:
         The step that changed a body most, an index of `STEPS`.
     beyond, lost : float64 [bodies]
         Greatest distance of the repaired surface from the input's, and of the input's outside the solid from it.
-    faces_out : int64 [bodies]
-        Triangles after the repair.
     """
 
     def __init__(self, bodies: int, body_of_input: IntArray) -> None:
@@ -36,7 +39,6 @@ class Record:
         self.body_of_input = body_of_input
         self.step = np.zeros(bodies, dtype=np.int64)
         self.beyond, self.lost = np.zeros((2, bodies))
-        self.faces_out = np.zeros(bodies, dtype=np.int64)
 
     @property
     def deviation(self) -> FloatArray:
@@ -52,8 +54,59 @@ class Record:
         """Return ``[bodies]`` whether this is the step of a body."""
         return np.asarray(self.step == STEPS.index(step))
 
-    def rows(self) -> tuple[BodyRepair, ...]:
-        """One row per body."""
+    def rows(self, faces_out: IntArray) -> tuple[BodyRepair, ...]:
+        """One row per body, given the triangles ``[bodies]`` after the repair."""
         faces_in = np.bincount(self.body_of_input, minlength=self.bodies)
-        rows = zip(self.step.tolist(), faces_in.tolist(), self.faces_out.tolist(), self.deviation.tolist(), strict=True)
+        rows = zip(self.step.tolist(), faces_in.tolist(), faces_out.tolist(), self.deviation.tolist(), strict=True)
         return tuple(BodyRepair(i, STEPS[s], a, b, d) for i, (s, a, b, d) in enumerate(rows))
+
+
+# Farther away from a solid, what is outside is lost: the middle of a slab is half as far from its surface.
+_OFF = 2 * HALF_THICKNESS
+
+
+def measure(record: Record, surface: SurfaceQuery, solid: SurfaceQuery) -> IntArray:
+    """Record, for the changed bodies, how far the solid and the input deviate; returns faces that lead out of it."""
+    if record.step.max() < STEPS.index("outer skin"):
+        return np.empty(0, dtype=np.int64)
+    kept, taken_over = shared_faces(solid.vertices, solid.faces, surface.vertices, surface.faces)
+    poll_stop()
+    own = solid.faces[~kept]
+    points, _ = points_covering(solid.vertices, own, affordable(GAP, float(face_areas(solid.vertices, own).sum())))
+    closest, face = surface.closest(points)
+    np.maximum.at(record.beyond, record.body_of_input[face], np.linalg.norm(points - closest, axis=1))
+
+    replaced = np.flatnonzero((record.step[record.body_of_input] >= STEPS.index("outer skin")) & ~taken_over)
+    faces = surface.faces[replaced]
+    spacing = affordable(GAP, float(face_areas(surface.vertices, faces).sum()))
+    points, on = points_covering(surface.vertices, faces, spacing)
+    distance = solid.distance(points)
+    lost = _outside(solid, points, distance)
+    np.maximum.at(record.lost, record.body_of_input[replaced[on[lost]]], distance[lost])
+    corners = np.unique(faces[_native.longest_edges(surface.vertices, faces) <= spacing])  # the first of the points
+    is_out = marked(corners[lost[lost < len(corners)]], len(surface.vertices))
+    leads_out = np.asarray(is_out[faces].any(axis=1))
+    leads_out[on[lost]] = True
+    return replaced[leads_out]
+
+
+def _outside(solid: SurfaceQuery, points: FloatArray, distance: FloatArray) -> IntArray:
+    """Return which of some points are lost, given their distances from the solid."""
+    away = np.flatnonzero(distance > _OFF)
+    return away[~inside_by_balls(solid, points[away], distance[away])]
+
+
+def inside_by_balls(solid: SurfaceQuery, points: FloatArray, distance: FloatArray) -> BoolArray:
+    """Return ``[N]`` whether a closed surface winds around points at known distances from it.
+
+    A ball around a point up to the surface lies on one side of it, with all points in it: that is quicker.
+    """
+    ball = np.full(len(points), -1, dtype=np.int64)
+    centers: list[int] = []
+    tree = PointTree(points)
+    for i in np.argsort(-distance, kind="stable").tolist():
+        if ball[i] < 0:
+            _, near = tree.within(points[i : i + 1], 0.99 * distance[i : i + 1])
+            ball[near] = len(centers)
+            centers.append(i)
+    return solid.inside(points[centers])[ball]

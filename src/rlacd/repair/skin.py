@@ -13,7 +13,7 @@ import numpy as np
 from rlacd._native import poll_stop
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.products import angles, dots
-from rlacd.solid.topology import BoolArray, IntArray, Sides, components
+from rlacd.solid.topology import BoolArray, IntArray, Sides, components, nondegenerate
 
 # A sharp fold would push its vertex far out to keep the distance to both flanks; stop at this multiple.
 _LONGEST_MITER = 2.0
@@ -43,75 +43,62 @@ def skin(
         New vertices ``[N, 3]``, faces ``[M, 3]`` and the side component ``[M]`` of each new face.
     """
     kept = np.flatnonzero(keep[sides.label])  # sides
-    corner_slot = np.full(6 * len(faces), -1, dtype=np.int64)
-    slots = (3 * kept[:, None] + np.arange(3)).ravel()
-    corner_slot[slots] = np.arange(len(slots))
-
-    first, second = sides.wedges.T
-    side_first, side_second = sides.facing.T
+    used = keep[sides.label[sides.facing[:, 0]]]
+    wedges, facing = sides.wedges[used], sides.facing[used]
+    is_rim = wedges[:, 0] == wedges[:, 1]
     poll_stop()
-    used = keep[sides.label[side_first]]
-    first, second, side_first, side_second = first[used], second[used], side_first[used], side_second[used]
+    # Corners of the first and of the second side of a wedge, at the smaller and at the larger end of its edge.
+    slot = np.full(2 * len(faces), -1, dtype=np.int64)
+    slot[kept] = 3 * np.arange(len(kept))
+    ends = [_corners_at(faces, halfedge, slot[side]) for halfedge, side in zip(wedges.T, facing.T, strict=True)]
+    low, high = (np.stack(some) for some in zip(*ends, strict=True))
     poll_stop()
-    rim = first == second
-
-    def corners_at(halfedge: IntArray, side: IntArray) -> tuple[IntArray, IntArray]:
-        """Slots of the corners of `side` at the smaller and at the larger end of `halfedge`."""
-        here, there = halfedge % 3, (halfedge + 1) % 3
-        there = (halfedge % 3 + 1) % 3
-        face = halfedge // 3
-        forward = faces[face, here] < faces[face, there]
-        low, high = np.where(forward, here, there), np.where(forward, there, here)
-        return corner_slot[3 * side + low], corner_slot[3 * side + high]
-
-    low_first, high_first = corners_at(first, side_first)
-    low_second, high_second = corners_at(second, side_second)
-    poll_stop()
-    inner = ~rim
+    inner = ~is_rim
     number, fan = components(
-        len(slots),
-        np.concatenate([low_first[inner], high_first[inner]]),
-        np.concatenate([low_second[inner], high_second[inner]]),
+        3 * len(kept), np.concatenate([low[0, inner], high[0, inner]]), np.concatenate([low[1, inner], high[1, inner]])
     )
-
-    face_of_side = kept // 2
-    back = kept % 2 == 1
-    corner_vertex = faces[face_of_side].ravel()
-    poll_stop()
+    face, back = kept // 2, kept % 2 == 1
     base = np.empty(number, dtype=np.int64)
-    base[fan] = corner_vertex
-    positions = vertices[base].copy()
+    base[fan] = faces[face].ravel()
+    positions = vertices[base]
     poll_stop()
     if thin.any():
-        positions += half_thickness * _fan_offsets(vertices, faces[face_of_side], back, thin[face_of_side], fan, number)
-
-    poll_stop()
+        positions += half_thickness * _fan_offsets(vertices, faces[face], back, thin[face], fan, number)
     triangles = fan.reshape(-1, 3).copy()
     triangles[back] = triangles[back][:, ::-1]
-    label = sides.label[kept]
-    if not rim.any():
-        return positions, triangles, label
+    if not is_rim.any():
+        return positions, triangles, sides.label[kept]
+    rim_label = sides.label[facing[is_rim, 0]]
+    rim_faces, rim_faces_label, centers = _rims(fan[low[:, is_rim]], fan[high[:, is_rim]], rim_label, number)
+    return (
+        np.concatenate([positions, vertices[base[centers]]]),
+        np.concatenate([triangles, rim_faces]),
+        np.concatenate([sides.label[kept], rim_faces_label]),
+    )
 
-    # A rim edge from low to high: its face shows one side to the wedge's beginning and the other to its end.
-    low_a, high_a, low_b, high_b = (fan[s[rim]] for s in (low_first, high_first, low_second, high_second))
-    rim_label = sides.label[side_first[rim]]
-    quads = [np.stack([high_a, low_a, low_b], axis=1), np.stack([high_a, low_b, high_b], axis=1)]
+
+def _corners_at(faces: IntArray, halfedge: IntArray, slot: IntArray) -> tuple[IntArray, IntArray]:
+    """Slots of the corners of sides at the smaller and the larger end of halfedges, given where those of each begin."""
+    face, here = np.divmod(halfedge, 3)
+    there = (here + 1) % 3
+    forward = faces[face, here] < faces[face, there]
+    return slot + np.where(forward, here, there), slot + np.where(forward, there, here)
+
+
+def _rims(low: IntArray, high: IntArray, label: IntArray, number: int) -> tuple[IntArray, IntArray, IntArray]:
+    """Close rims: the faces ``[M, 3]``, their labels, and for every new vertex (from `number` on) a fan at its place.
+
+    A rim edge runs from low to high; its face shows one side to the wedge's beginning, fans ``low[0]`` and ``high[0]``,
+    and the other to its end.
+    """
+    quads = [np.stack([high[0], low[0], low[1]], axis=1), np.stack([high[0], low[1], high[1]], axis=1)]
     caps, cap_label, centers = _rim_caps(
-        np.concatenate([low_b, high_a]), np.concatenate([low_a, high_b]), np.tile(rim_label, 2), number
+        np.concatenate([low[1], high[0]]), np.concatenate([low[0], high[1]]), np.tile(label, 2), number
     )
     poll_stop()
     rim_faces = np.concatenate([*quads, caps])
-    rim_faces_label = np.concatenate([rim_label, rim_label, cap_label])
-    real = (
-        (rim_faces[:, 0] != rim_faces[:, 1])
-        & (rim_faces[:, 1] != rim_faces[:, 2])
-        & (rim_faces[:, 2] != rim_faces[:, 0])
-    )
-    return (
-        np.concatenate([positions, vertices[base[centers]]]),
-        np.concatenate([triangles, rim_faces[real]]),
-        np.concatenate([label, rim_faces_label[real]]),
-    )
+    real = nondegenerate(rim_faces)
+    return rim_faces[real], np.concatenate([label, label, cap_label])[real], centers
 
 
 def _fan_offsets(

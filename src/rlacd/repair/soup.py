@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from rlacd._native import poll_stop
-from rlacd.repair.distance import SurfaceQuery
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.products import dots
 from rlacd.solid.topology import (
+    NO_FILM,
     BoolArray,
     Edges,
     IntArray,
@@ -19,15 +19,9 @@ from rlacd.solid.topology import (
     components,
     face_areas,
     has_marked,
-    is_balanced,
     long_normals,
-    marked,
     sides_of,
-    signed_tetrahedra,
 )
-
-NO_AREA = 1e-14
-"""Faces with less area than this, in the frame, are degenerate."""
 
 FLAT = 1e-6
 """A closed body with less volume per area is flat: there is nothing to cut."""
@@ -35,15 +29,11 @@ FLAT = 1e-6
 FLAPS = 0.05
 """A solid may have a few faces sticking out of it, up to this share of its area, beside flaps."""
 
-# Sheets of a body are separated before thickening if there are at most so many. If they have more faces than this,
-# there may be more of them, unless they are layers: a face lies in the boxes of more than so many, on average.
-_MOST_PATCHES, _MOST_PATCHED, _MOST_DENSE, _LAYERS = 100, 4000, 300, 1.5
-# How many faces tell.
-_ASKED = 10_000
+# Sheets of a body are thickened one by one if there are at most so many, and they are no layers: of a body with more
+# faces than this, each lies in the boxes of more than so many sheets, on average. Layers take minutes to unite.
+MOST_PATCHES, _MOST_LAYERED, _LAYERS = 100, 4000, 1.5
 # Cosine of the angle between two faces below which a sheet is folded onto itself (20 degrees).
 _FOLD = 0.94
-# Distance from a face at which the winding number is evaluated.
-_BESIDE = 2e-4
 
 
 @dataclass(frozen=True)
@@ -89,7 +79,7 @@ class Soup:
     def sheet_share(self, bodies: int, flap: BoolArray | bool = False) -> FloatArray:
         """Return ``[bodies]`` the share of the area of each body that has no inside and is no flap."""
         sheet = np.bincount(self.body, self.area * (self.sides.sheet & ~np.asarray(flap)), bodies)
-        share: FloatArray = sheet / np.maximum(np.bincount(self.body, self.area, bodies), NO_AREA)
+        share: FloatArray = sheet / np.maximum(np.bincount(self.body, self.area, bodies), NO_FILM)
         return share
 
     def in_patches(self) -> Soup:
@@ -104,15 +94,13 @@ class Soup:
         poll_stop()
         halfedge = halfedge[dots(*away) < _FOLD]
         count, patch = components(len(self.faces), halfedge[:, 0] // 3, halfedge[:, 1] // 3)
-        # Layers of thousands of stacked faces take minutes to unite: there, thin spots are the lesser evil.
         poll_stop()
         patches = np.unique(self.body * count + patch) // max(count, 1)
-        is_tangled = np.bincount(patches) > _MOST_PATCHES
-        for one in np.flatnonzero(np.bincount(self.body) > _MOST_PATCHED):
+        together = np.bincount(patches) > MOST_PATCHES
+        for one in np.flatnonzero((np.bincount(self.body) > _MOST_LAYERED) & ~together):
             own = self.body == one
-            is_tangled[one] = _are_layers(self.vertices[self.faces[own]], patch[own])
-        tangled = is_tangled[self.body]
-        patch = np.where(tangled, count + self.body, patch)
+            together[one] = _layers(self.vertices[self.faces[own]], patch[own]) > _LAYERS
+        patch = np.where(together[self.body], count + self.body, patch)
         count += int(self.body.max(initial=0)) + 1
         key = self.faces * count + patch[:, None]
         poll_stop()
@@ -127,53 +115,21 @@ class Soup:
         return Soup(self.vertices, self.faces[keep], self.body[keep], trusted)
 
 
-def _are_layers(corners: FloatArray, patch: IntArray) -> bool:
-    """Whether patches of faces lie on each other, given the corners ``[F, 3, 3]`` and the patch ``[F]`` of each."""
+def _layers(corners: FloatArray, patch: IntArray) -> float:
+    """In how many boxes of patches a face lies on average, given its corners ``[F, 3, 3]`` and its patch ``[F]``."""
+    lower, upper = boxes_of(corners, patch)
+    middle = corners.mean(axis=1)
+    inside = [((middle >= low) & (middle <= high)).all(axis=1).mean() for low, high in zip(lower, upper, strict=True)]
+    return float(sum(inside))
+
+
+def boxes_of(corners: FloatArray, patch: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Return the lower and upper corners ``[P, 3]`` of the boxes of patches, given the patch ``[F]`` of each face."""
     order = np.argsort(patch, kind="stable")
     first = np.flatnonzero(np.diff(patch[order], prepend=-1))
-    if len(first) > _MOST_DENSE:
-        return True
     lower = np.minimum.reduceat(corners.min(axis=1)[order], first)
     upper = np.maximum.reduceat(corners.max(axis=1)[order], first)
-    middle = corners[:: -(-len(corners) // _ASKED)].mean(axis=1)
-    inside = [((middle >= low) & (middle <= high)).all(axis=1).mean() for low, high in zip(lower, upper, strict=True)]
-    return bool(sum(inside) > _LAYERS)
-
-
-def trust_windings(soup: Soup, bodies: int, flap: BoolArray | bool = False, most_crossed: float = 1.0) -> Soup:
-    """Trust the windings of closed bodies if the angles between their faces join the inside with the outside.
-
-    Where corners were rounded, slivers fold over, and noise turns faces that nearly lie in one plane: then angles
-    around an edge with four faces are wrong.
-
-    Parameters
-    ----------
-    soup
-    bodies
-        Number of bodies.
-    flap
-        Faces ``[F]`` that need no inside.
-    most_crossed
-        Share of a body's area that may cross it if its windings are trusted.
-    """
-    is_crowded = soup.edges.valence > 2
-    if not is_crowded.any():
-        return soup
-    crowded = marked(soup.body[soup.at_valence(is_crowded)], bodies)
-    uneven = marked(soup.body[soup.at_valence(~is_balanced(soup.faces, soup.edges))], bodies)
-    if not (crowded & ~uneven).any():
-        return soup
-    share = soup.sheet_share(bodies, flap)
-    doubted = crowded & ~uneven & (share > FLAPS)
-    if not doubted.any():
-        return soup
-    before = False if soup.trusted is None else soup.trusted
-    trusting = replace(soup, known_edges=soup.edges, trusted=before | doubted[soup.body])
-    better = doubted & (trusting.sheet_share(bodies, flap) < share / 2)
-    for one in np.flatnonzero(better) if most_crossed < 1 else ():
-        own = (soup.body == one) & ~np.asarray(flap)
-        better[one] = crossed_parts(trusting.only(own)) <= most_crossed
-    return replace(soup, known_edges=soup.edges, trusted=before | better[soup.body]) if better.any() else soup
+    return lower, upper
 
 
 def no_faces(vertices: FloatArray) -> Soup:
@@ -204,50 +160,3 @@ def on_repeated_edge(faces: IntArray, count: int) -> BoolArray:
     _, inverse, number = np.unique(key, return_inverse=True, return_counts=True)
     result: BoolArray = (number[inverse.reshape(-1, 3)] > 1).any(axis=1)
     return result
-
-
-def hidden_faces(vertices: FloatArray, faces: IntArray) -> BoolArray:
-    """Return ``[F]`` which faces of one body it winds around on both sides."""
-    front, back = _beside(vertices, faces)
-    query = SurfaceQuery(vertices, faces)
-    sign = -1 if signed_tetrahedra(vertices, faces).sum() < 0 else 1
-    # On a skin the sides have 0 and 1; a wall inside has 0.5 and 1.5. A skin that lies double has 0 and 2.
-    before = sign * query.winding(front)
-    hidden: BoolArray = before > 0.25
-    behind = sign * query.winding(back[hidden])
-    hidden[hidden] = (behind > 0.25) & ((before[hidden] + behind) / 2 > 0.75)
-    return hidden
-
-
-def crossed_share(vertices: FloatArray, faces: IntArray) -> float:
-    """Return the share of the area of one closed body that lies inside it, or bounds what is inside out."""
-    front, back = winding_beside(vertices, faces)
-    area = face_areas(vertices, faces)
-    wrong = (np.abs(front) > 0.25) | (np.abs(back - 1) > 0.25)
-    return float(area[wrong].sum() / max(area.sum(), NO_AREA))
-
-
-def crossed_parts(soup: Soup) -> float:
-    """Return the share of the area of a soup in which what its sides enclose crosses itself; it may cross others."""
-    front, back = soup.sides.label[0::2], soup.sides.label[1::2]
-    inside = soup.sides.volume > 0
-    part = np.where(inside[front], front, back)
-    crossed = 0.0
-    for one in np.unique(part):
-        own = part == one
-        crossed += crossed_share(soup.vertices, soup.faces[own]) * soup.area[own].sum()
-    return float(crossed / max(soup.area.sum(), NO_AREA))
-
-
-def winding_beside(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return ``[2, F]`` how often faces wind around a point before each face and one behind; positive inside."""
-    query = SurfaceQuery(vertices, faces)
-    beside = np.stack([query.winding(points) for points in _beside(vertices, faces)])
-    return -beside[::-1] if signed_tetrahedra(vertices, faces).sum() < 0 else beside
-
-
-def _beside(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Return a point ``[F, 3]`` in front of each face and one behind it."""
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    middle, step = (a + b + c) / 3, _BESIDE * face_normals(vertices, faces)
-    return middle + step, middle - step

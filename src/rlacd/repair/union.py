@@ -1,4 +1,4 @@
-"""From closed meshes to one solid: overlapping ones united, enclosed cavities filled."""
+"""Solids as they are handed on, and their union: overlapping ones united, enclosed cavities filled."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from rlacd.solid.component import concatenated
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import Shape, mesh_of, surface_of
+from rlacd.solid.thickness import thickened
 from rlacd.solid.topology import IntArray
 
 Index = TypeVar("Index", bound=np.signedinteger)
@@ -30,11 +31,11 @@ _THIN = 1e-11
 # Uniting takes time per mesh even without overlaps; above this number, disjoint meshes are composed instead.
 MOST_UNITED = 4000
 
-# Number of triangles united at once, and of corners that their arrangement may have; the work may be stopped between
-# batches.
-_AT_ONCE, _CORNERS_AT_ONCE = 20_000, 300_000
+# Number of triangles united at once; the work may be stopped between batches.
+_AT_ONCE = 20_000
 
-# Pairs of crossing triangles after which solids are not united exactly, and more per triangle: manifold3d takes about
+# Pairs of crossing triangles, or corners of their arrangement, that are united at once; pairs after which solids are
+# not united exactly, and more per triangle: manifold3d takes about
 # 6 microseconds for each, and the unions of solids that cross themselves have ever more of them.
 _MOST_CROSSINGS, _PER_TRIANGLE = 200_000, 5
 
@@ -90,6 +91,17 @@ def tunnels_in(solid: Shape) -> int:
     """Return the number of tunnels through a solid, less one for each of its surfaces but the first."""
     vertices = solid.num_vert() if isinstance(solid, Manifold) else len(solid[0])
     return 1 - (vertices - size_of(solid) // 2) // 2
+
+
+def hull_of_points(points: FloatArray) -> Manifold:
+    """Return the hull of points ``[N, 3]``, thickened along the axes in which they have no extent."""
+    poll_stop()
+    return Manifold.hull_points(thickened(np.unique(points, axis=0)))
+
+
+def slab_of_faces(vertices: FloatArray, faces: IntArray) -> Manifold:
+    """Return the union of triangles, each of them thickened."""
+    return as_manifold(unite([hull_of_points(vertices[face]) for face in faces]))
 
 
 def split_labels(vertices: FloatArray, faces: IntArray, label: IntArray) -> list[tuple[FloatArray, IntArray]]:
@@ -229,7 +241,7 @@ def _united(solids: list[Manifold]) -> Manifold:
             group.append(heapq.heappop(waiting))
         some = [solid for *_, solid in group]
         pairs, corners = _crossings(some, left)
-        if len(group) > 2 and (pairs > left or corners > _CORNERS_AT_ONCE):
+        if len(group) > 2 and (pairs > left or corners > _MOST_CROSSINGS):
             at_once = 0  # two at a time from here on
             for one in group:
                 heapq.heappush(waiting, one)

@@ -67,11 +67,6 @@ class Reach:
         room = np.where(outside, 0, label)
         return cls(origin, pitch, radius, reached, occupied, room)
 
-    @property
-    def place(self) -> float:
-        """A quarter of a cell."""
-        return self.pitch / 4
-
     def covers(self, points: FloatArray) -> BoolArray:
         """Return ``[N]`` whether the ball can reach each point; it can reach all points off the grid."""
         cell = np.rint((points - self.origin) / self.pitch).astype(np.int64)
@@ -80,19 +75,12 @@ class Reach:
         result[inside] = self.reached[tuple(cell[inside].T)]
         return result
 
-    def rooms_outside(self, solid: SurfaceQuery) -> IntArray:
-        """Return the labels of the rooms whose deepest cell lies outside a solid."""
-        labels = np.unique(self.room)
-        labels = labels[labels > 0]
-        if len(labels) == 0:
-            return labels
-        depth = _steps_away(self.occupied)
-        cells = np.flatnonzero(self.room)
-        deepest_first = cells[np.argsort(-depth.ravel()[cells], kind="stable")]
-        _, first = np.unique(self.room.ravel()[deepest_first], return_index=True)
-        deepest = np.stack(np.unravel_index(deepest_first[first], self.room.shape), axis=1)
-        centers = self.origin + deepest * self.pitch
-        return labels[~solid.inside(centers)]
+    def rooms_outside(self, rooms: IntArray, solid: SurfaceQuery) -> IntArray:
+        """Return the cells ``[N]`` of some rooms that lie outside a solid: of every fourth one along each axis."""
+        cells = np.flatnonzero(np.isin(self.room, rooms))
+        at = np.stack(np.unravel_index(cells, self.room.shape), axis=1)
+        some = at.sum(axis=1) % 4 == 0  # some in each layer of cells
+        return cells[some][~solid.inside(self.origin + at[some] * self.pitch)]
 
     def volumes(self, rooms: IntArray) -> FloatArray:
         """Return the volume of the cells of each of some rooms: where the ball's centre may be."""
@@ -104,35 +92,15 @@ class Reach:
         reached = self.reached.astype(self.room.dtype)
         return np.asarray(nearest_labels(reached, cell, depth / self.pitch + _ROUNDING) == 0)
 
-    def one_in_each_place(self, points: FloatArray) -> IntArray:
-        """Return the indices of the first point in each cube of size `place`."""
-        first = _native.first_in_place(np.floor((points - self.origin) / self.place))
-        return np.flatnonzero(first == np.arange(len(points)))
-
-    def points_in(self, cells: BoolArray, count: int) -> FloatArray:
-        """Return `count` random points or a few more ``[N, 3]``, as many in each cell, the same ones every time."""
-        inside = np.argwhere(cells)
-        inside = np.repeat(inside, -(-count // len(inside)), axis=0)
-        return self.origin + (inside + np.random.default_rng(0).uniform(-0.5, 0.5, inside.shape)) * self.pitch
-
     def rooms_near(self, points: FloatArray) -> IntArray:
         """Return ``[N]`` the label of a room whose walls may contain each point, 0 for none."""
         cell = np.clip(np.rint((points - self.origin) / self.pitch).astype(np.int64), 0, np.array(self.room.shape) - 1)
         return nearest_labels(self.room, cell, self.radius / self.pitch + 2 + _ROUNDING)
 
-    def around_rooms(self, rooms: IntArray) -> BoolArray:
-        """Return ``[X, Y, Z]`` the unreachable cells of some rooms and of their walls."""
-        return _grown(np.isin(self.room, rooms), self.radius / self.pitch + 2) & ~self.reached
-
-    def around_rest(self, points: FloatArray, solid: SurfaceQuery) -> BoolArray:
-        """Return ``[X, Y, Z]`` the unreachable cells of what a solid leaves of the rooms that hold some points."""
-        labels = self.room[tuple(np.rint((points - self.origin) / self.pitch).astype(np.int64).T)]
-        if not labels.any():
-            return np.zeros(self.room.shape, dtype=bool)
-        rest = np.flatnonzero(np.isin(self.room, labels[labels > 0]))
-        centers = self.origin + np.stack(np.unravel_index(rest, self.room.shape), axis=1) * self.pitch
+    def around_cells(self, cells: IntArray) -> BoolArray:
+        """Return ``[X, Y, Z]`` the unreachable cells at some cells of rooms, and those of the walls there."""
         mark = np.zeros(self.room.shape, dtype=bool)
-        mark.ravel()[rest[~solid.inside(centers)]] = True
+        mark.ravel()[cells] = True
         return _grown(mark, self.radius / self.pitch + 2) & ~self.reached
 
     def around_points(self, points: FloatArray) -> BoolArray:
@@ -164,17 +132,6 @@ class Reach:
         return points, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
-def _steps_away(cells: BoolArray) -> IntArray:
-    """Count ``[X, Y, Z]`` the steps along the axes from each cell to the nearest of `cells`."""
-    steps = np.where(cells, 0, sum(cells.shape))
-    for axis, count in enumerate(cells.shape):
-        at = np.arange(count).reshape(np.roll([count, 1, 1], axis))
-        from_below = np.minimum.accumulate(steps - at, axis=axis) + at
-        from_above = np.flip(np.minimum.accumulate(np.flip(steps + at, axis), axis=axis), axis) - at
-        steps = np.minimum(from_below, from_above)
-    return steps
-
-
 def _grown(cells: BoolArray, radius: float) -> BoolArray:
     """Return ``[X, Y, Z]`` which cells are at most `radius` cells away from one of `cells`."""
     result = np.zeros_like(cells)
@@ -196,33 +153,21 @@ def _grown(cells: BoolArray, radius: float) -> BoolArray:
 
 def _boundary_squares(solid: BoolArray) -> tuple[FloatArray, IntArray]:
     """Return corner coordinates ``[N, 3]`` (cell (0, 0, 0) spans 0 to 1), outward squares ``[Q, 4]`` of a cell set."""
-    shape = np.array(solid.shape) + 1
+    shape = tuple(np.array(solid.shape) + 1)
     squares = []
     for axis in range(3):
-        u, v = (axis + 1) % 3, (axis + 2) % 3
-        for direction in (1, -1):
-            beyond = np.zeros_like(solid)
-            to: list[slice] = [slice(None)] * 3
-            frm: list[slice] = [slice(None)] * 3
-            to[axis], frm[axis] = (
-                (slice(None, -1), slice(1, None)) if direction == 1 else (slice(1, None), slice(None, -1))
-            )
-            beyond[tuple(to)] = solid[tuple(frm)]
-            cells = np.argwhere(solid & ~beyond)
-            cells[:, axis] += direction == 1
-            ring = [(0, 0), (1, 0), (1, 1), (0, 1)]
-            if direction == -1:
-                ring.reverse()
+        ends = np.diff(solid.astype(np.int8), axis=axis, prepend=0, append=0)
+        for outward in (-1, 1):  # what ends shows upwards, what begins downwards
             loop = []
-            for du, dv in ring:
-                corner = cells.copy()
-                corner[:, u] += du
-                corner[:, v] += dv
-                loop.append(np.ravel_multi_index(tuple(corner.T), tuple(shape)))
+            for du, dv in [(0, 0), (1, 0), (1, 1), (0, 1)][::-outward]:
+                corner = np.argwhere(ends == outward)
+                corner[:, (axis + 1) % 3] += du
+                corner[:, (axis + 2) % 3] += dv
+                loop.append(np.ravel_multi_index(tuple(corner.T), shape))
             squares.append(np.stack(loop, axis=1))
     flat = np.concatenate(squares)
     used, index = np.unique(flat, return_inverse=True)
-    corners = np.stack(np.unravel_index(used, tuple(shape)), axis=1).astype(np.float64)
+    corners = np.stack(np.unravel_index(used, shape), axis=1).astype(np.float64)
     return corners, index.reshape(-1, 4)
 
 

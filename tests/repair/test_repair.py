@@ -10,14 +10,14 @@ from scipy.spatial.transform import Rotation
 
 from rlacd.errors import EmptyMeshError
 from rlacd.io.read.load import load_mesh
-from rlacd.repair.caps import HOLE
 from rlacd.repair.distance import points_covering
+from rlacd.repair.holes import HOLE
 from rlacd.repair.repair import repair
 from rlacd.repair.union import to_arrays
 from rlacd.repair.voxels import GAP
 from rlacd.solid.component import Component
 from rlacd.solid.manifold import to_manifold
-from tests.repaired import BOX, check_closed, join, moved, solid_of, steps, volume
+from tests.repair.repaired import BOX, check_closed, join, moved, solid_of, steps, volume
 
 
 def soup(mesh):

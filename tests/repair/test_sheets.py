@@ -12,7 +12,7 @@ from rlacd.repair.repair import repair
 from rlacd.repair.union import to_arrays
 from rlacd.repair.voxels import GAP
 from rlacd.solid.thickness import HALF_THICKNESS
-from tests.repaired import BOX, join, moved, solid_of, steps, volume, with_hole
+from tests.repair.repaired import BOX, join, moved, solid_of, steps, volume, with_hole
 
 
 def test_a_flat_card_becomes_a_thin_slab():
@@ -190,27 +190,6 @@ def test_a_sheet_attached_to_a_solid_stays():
     assert volume(solid) == pytest.approx(8, rel=5e-3)
     vertices, _ = to_arrays(solid.manifold)
     assert solid.frame.to_input(vertices)[:, 2].max() == pytest.approx(1.1, abs=1e-2)
-
-
-@pytest.mark.parametrize("tilt", [0.2, 0.45, 0.6])
-def test_profiles_thinner_than_a_slab_that_cross_leave_no_wedge(tilt):
-    """The slab of each crosses itself, and a boolean of two such slabs filled up to 0.1 of what lies between them."""
-    metal, width, length = 0.0008, 0.02, 0.5
-    outline = [(0, 0), (width, 0), (width, width), (width - metal, width), (width - metal, metal), (metal, metal)]
-    outline = np.array([*outline, (metal, width), (0, width)]) - width / 2
-    count = len(outline)
-    corners = np.concatenate([np.column_stack([outline, np.full(count, z)]) for z in (-length / 2, length / 2)])
-    i = np.arange(count)
-    j = (i + 1) % count
-    faces = np.concatenate([np.column_stack([i, j, count + j]), np.column_stack([i, count + j, count + i])])
-    beams = []
-    for sign in (1, -1):
-        turn = trimesh.transformations.rotation_matrix(sign * tilt, (1, 0, 0))
-        beams.append(trimesh.Trimesh(corners, faces, process=False).apply_transform(turn))
-    post = trimesh.creation.box((0.1, 0.1, 2)).apply_translation((0.5, 0, 0))
-    solid = solid_of(join(*beams, post))
-    assert steps(solid) == ["slab", "slab", "closed"]
-    assert max(body.deviation for body in solid.bodies) < 3 * HALF_THICKNESS
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.repair import repair
 from rlacd.repair.union import to_arrays
 from tests.noisy import noisy_copy
-from tests.repaired import BOX, join, solid_of, volume, without
+from tests.repair.repaired import BOX, join, solid_of, volume, without
 
 AS_SOLID = [
     "test/capod/class6__m64.ply",  # a hole in a hull whose wings touch along edges

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rlacd import _native
-from rlacd.repair.holes import close_cracks, free_edges, split_at_free_vertices, weld_free_vertices
+from rlacd.repair.cracks import close_cracks, free_edges, split_at_free_vertices, weld_free_vertices
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.topology import Edges, IntArray, first_of_doubled, nondegenerate
 

@@ -1,0 +1,158 @@
+"""Welding cracks: free edges that nearly coincide become one.
+
+Input: a soup and its edges. Output: changed faces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rlacd._native import PointTree, poll_stop
+from rlacd.solid.frame import FloatArray
+from rlacd.solid.products import dots
+from rlacd.solid.topology import (
+    BoolArray,
+    Edges,
+    IntArray,
+    components,
+    first_of_doubled,
+    has_marked,
+    marked,
+    nondegenerate,
+)
+
+MOST_FREE_EDGES = 500_000
+"""A soup with more free edges is not a scan with holes: tracing loops is the one step that walks edge by edge."""
+
+MOST_NEAR = 100 * MOST_FREE_EDGES
+"""Pairs of a free edge and a free vertex near it; where there are more, none is split."""
+
+
+def close_cracks(
+    vertices: FloatArray, faces: IntArray, edges: Edges, tolerances: Sequence[float]
+) -> tuple[IntArray, IntArray]:
+    """Merge free edges that nearly coincide, with increasing tolerances.
+
+    An attempt that closes nothing, or leaves no face, is undone. No two of the faces have the same three corners.
+
+    Returns the faces ``[G, 3]``, the given ones if nothing changed, and ``[G]`` the given face each comes from.
+    """
+    origin = np.arange(len(faces))
+    free = free_edges(faces, edges)
+    for tolerance in tolerances:
+        poll_stop()
+        if not 0 < len(free) <= MOST_FREE_EDGES:
+            break
+        # Only faces with free vertices change. All faces at their corners are needed, for the valence of their edges.
+        changing = has_marked(marked(free, len(vertices)), faces)
+        inner = marked(faces[changing], len(vertices))
+        near = has_marked(inner, faces)
+        welded = weld_free_vertices(vertices, faces[near], free, tolerance)
+        split, parent, is_piece = split_at_free_vertices(vertices, welded, inner, tolerance)
+        poll_stop()
+        keep = nondegenerate(split)
+        keep[keep] = first_of_doubled(split[keep], len(vertices))
+        left = free_edges(split[keep], Edges.of(split[keep], len(vertices)), inner)
+        if len(left) < len(free) and (keep.any() or not near.all()):
+            whole = keep & ~is_piece
+            changed, at = faces.copy(), np.flatnonzero(near)
+            kept = np.logical_not(near)
+            changed[at[parent[whole]]] = split[whole]
+            kept[at[parent[whole]]] = True
+            pieces = keep & is_piece
+            faces = np.concatenate([changed[kept], split[pieces]])
+            origin = np.concatenate([origin[kept], origin[at[parent[pieces]]]])
+            free = left
+    return faces, origin
+
+
+def weld_free_vertices(vertices: FloatArray, faces: IntArray, free: IntArray, tolerance: float) -> IntArray:
+    """Merge vertices of free edges ``[B, 2]`` that lie within `tolerance` of each other.
+
+    Returns faces of the same number, of which some may be degenerate. Vertices keep their places: each group is
+    represented by its first vertex.
+    """
+    ends = np.unique(free)
+    counts, near = PointTree(vertices[ends]).within(vertices[ends], np.full(len(ends), tolerance))
+    if len(near) == len(ends):  # each is near itself only
+        return faces
+    _, label = components(len(ends), np.repeat(np.arange(len(ends)), counts), near.astype(np.int64))
+    _, first = np.unique(label, return_index=True)
+    target = np.arange(len(vertices))
+    target[ends] = ends[first[label]]
+    return target[faces]
+
+
+def split_at_free_vertices(
+    vertices: FloatArray, faces: IntArray, inner: BoolArray, tolerance: float
+) -> tuple[IntArray, IntArray, BoolArray]:
+    """Insert free vertices into the free edges they lie on (T-junctions).
+
+    Returns the faces ``[G, 3]``, split ones replaced by several; ``[G]`` the old face each comes from; and ``[G]``
+    whether it is a piece of it. Edges without an end among the `inner` vertices ``[V]`` are not looked at.
+    """
+    edges = Edges.of(faces, len(vertices))
+    is_free = (edges.valence == 1) & inner[edges.vertices].any(axis=1)
+    halfedge = np.flatnonzero(is_free[edges.of_halfedge])
+    # One edge per face and round, so that the pieces of a face do not depend on each other.
+    _, first = np.unique(halfedge // 3, return_index=True)
+    face, corner = np.divmod(halfedge[first], 3)
+    a, b, c = (faces[face, (corner + i) % 3] for i in range(3))
+    edge, vertex = _on_edges(vertices, np.stack([a, b, c], axis=1), np.unique(edges.vertices[is_free]), tolerance)
+    if len(edge) == 0:
+        return faces, np.arange(len(faces)), np.zeros(len(faces), dtype=bool)
+    split = np.unique(edge)
+    # The corners along each split edge: a, the inserted vertices, b; every consecutive pair forms a face with c.
+    chain_edge = np.concatenate([split, edge, split])
+    order = np.argsort(chain_edge, kind="stable")
+    chain_edge, chain_vertex = chain_edge[order], np.concatenate([a[split], vertex, b[split]])[order]
+    pair = np.flatnonzero(chain_edge[1:] == chain_edge[:-1])
+    pieces = np.stack([chain_vertex[pair], chain_vertex[pair + 1], c[chain_edge[pair]]], axis=1)
+    whole = np.delete(np.arange(len(faces)), face[split])
+    new = np.concatenate([faces[whole], pieces])
+    origin = np.concatenate([whole, face[chain_edge[pair]]])
+    good = nondegenerate(new)
+    return new[good], origin[good], (np.arange(len(new)) >= len(whole))[good]
+
+
+def _on_edges(vertices: FloatArray, corners: IntArray, free: IntArray, tolerance: float) -> tuple[IntArray, IntArray]:
+    """Which of some vertices lie on which edges, from the first to the second of the corners ``[N, 3]`` of each face.
+
+    Returns pairs of an edge and a vertex, in the order in which they follow each other along the edges.
+    """
+    none = np.empty((2, 0), dtype=np.int64)
+    poll_stop()
+    if len(corners) == 0:
+        return none[0], none[1]
+    a, b, c = corners.T
+    span = vertices[b] - vertices[a]
+    length = np.linalg.norm(span, axis=1)
+    middle = (vertices[a] + vertices[b]) / 2
+    count, near = PointTree(vertices[free]).within(middle, length / 2 + tolerance, MOST_NEAR)
+    if len(near) > MOST_NEAR or len(near) == 0:
+        return none[0], none[1]
+    poll_stop()
+    edge, vertex = np.repeat(np.arange(len(corners)), count), free[near]
+    offset = vertices[vertex] - vertices[a[edge]]
+    along = dots(offset, span[edge]) / np.maximum(length[edge] ** 2, np.finfo(float).tiny)
+    away = np.linalg.norm(offset - along[:, None] * span[edge], axis=1)
+    margin = tolerance / np.maximum(length[edge], tolerance)
+    on = np.flatnonzero((away <= tolerance) & (along > margin) & (along < 1 - margin) & (vertex != c[edge]))
+    poll_stop()
+    on = on[np.lexsort((vertex[on], along[on], edge[on]))]
+    return edge[on], vertex[on]
+
+
+def free_edges(faces: IntArray, edges: Edges, inner: BoolArray | None = None) -> IntArray:
+    """Return the directed edges ``[B, 2]`` that only one face uses, as that face runs along them.
+
+    If `inner` vertices ``[V]`` are given, only edges with an end among them.
+    """
+    is_free = edges.valence == 1
+    if inner is not None:
+        is_free &= inner[edges.vertices].any(axis=1)
+    halfedge = np.flatnonzero(is_free[edges.of_halfedge])
+    face, corner = halfedge // 3, halfedge % 3
+    return np.stack([faces[face, corner], faces[face, (corner + 1) % 3]], axis=1)

@@ -1,0 +1,170 @@
+"""What is known of an input while the steps of repair turn it into one solid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from manifold3d import Manifold
+from numpy.typing import ArrayLike
+
+from rlacd.repair.cracks import close_cracks
+from rlacd.repair.distance import SurfaceQuery
+from rlacd.repair.record import Record
+from rlacd.repair.soup import Soup, no_faces
+from rlacd.repair.union import size_of, to_arrays, volume_of
+from rlacd.repair.voxels import Reach
+from rlacd.solid.frame import Frame
+from rlacd.solid.solid import Hole, Shape, Solid
+from rlacd.solid.topology import BoolArray, Edges, bodies_of
+
+_WELDS = (2e-5, 5e-4)
+
+# A warning names this many holes.
+_NAMED = 5
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What the caller wants of a repair; see `rlacd.repair.repair.repair`.
+
+    Attributes
+    ----------
+    open_bodies : str
+    gap : float
+    cells : int
+        Along the longest side of the grid on which a ball of this radius rolls.
+    keep_cavities : bool
+    """
+
+    open_bodies: str
+    gap: float
+    cells: int
+    keep_cavities: bool
+
+
+class Piece(NamedTuple):
+    """A closed solid that a body, or some of its faces, became.
+
+    Attributes
+    ----------
+    shape : Manifold or (vertices, faces)
+    body : int
+    is_slab : bool
+        Whether it was built of sheets.
+    """
+
+    shape: Shape
+    body: int
+    is_slab: bool = False
+
+
+class Work:
+    """The input in the normalised frame, and what became of its bodies, which are numbered after cracks are welded.
+
+    Attributes
+    ----------
+    surface : SurfaceQuery
+        The input.
+    wanted : Wanted
+    record : Record
+        What was done to each body.
+    soup : Soup
+        Its faces, with the caps.
+    sheets : Soup
+        Those of them that become slabs, in patches.
+    parts : list of Piece
+        What was built so far.
+    solid : Manifold or (vertices, faces)
+        Their union, but for cavities.
+    by_room, is_tangled : bool [bodies]
+        Whether a body was capped only because nothing can reach the caps; was built from the place of its faces alone.
+    holes : list of Hole
+    warnings : list of str
+    """
+
+    def __init__(self, surface: SurfaceQuery, frame: Frame, wanted: Wanted) -> None:
+        self.surface, self.wanted, self._frame = surface, wanted, frame
+        edges = Edges.of(surface.faces, len(surface.vertices))
+        faces, origin = close_cracks(surface.vertices, surface.faces, edges, _WELDS)
+        if faces is not surface.faces:
+            edges = Edges.of(faces, len(surface.vertices))
+        count, body = bodies_of(faces, edges)
+        body_of_input = np.zeros(len(surface.faces), dtype=np.int64)
+        body_of_input[origin] = body
+        self.record = Record(count, body_of_input)
+        self.record.note(body[(faces != surface.faces[origin]).any(axis=1)], "welded")
+        self.soup = Soup(surface.vertices, faces, body, known_edges=edges)
+        self.sheets = no_faces(surface.vertices)
+        self.parts: list[Piece] = []
+        self.solid: Shape = Manifold()
+        self.by_room, self.is_tangled = np.zeros((2, count), dtype=bool)
+        self.holes: list[Hole] = []
+        self.warnings: list[str] = []
+        self._asked: tuple[Shape, SurfaceQuery] | None = None
+
+    @cached_property
+    def reach(self) -> Reach:
+        """Where the ball can go."""
+        return Reach.of(self.surface.vertices, self.surface.faces, self.wanted.gap, self.wanted.cells)
+
+    def query(self) -> SurfaceQuery:
+        """Queries of the solid as it is now."""
+        if self._asked is None or self._asked[0] is not self.solid:
+            self._asked = self.solid, SurfaceQuery(*to_arrays(self.solid), self.surface.threads)
+        return self._asked[1]
+
+    @property
+    def volume(self) -> float:
+        """Volume of the solid."""
+        return volume_of(self.solid)
+
+    def of_bodies(self, marked: BoolArray) -> Soup:
+        """The faces of marked bodies."""
+        return self.soup.only(marked[self.soup.body])
+
+    def result(self, warnings: tuple[str, ...]) -> Solid:
+        """The solid that is reported, with warnings of the input before those of its repair."""
+        self._warn_of_holes()
+        faces_out = np.zeros(self.record.bodies, dtype=np.int64)
+        for part in self.parts:
+            faces_out[part.body] += size_of(part.shape)
+        return Solid(
+            self.solid,
+            (self.surface.vertices, self.surface.faces.astype(np.int32)),
+            self._frame,
+            self.record.rows(faces_out),
+            (*warnings, *self.warnings),
+            holes=tuple(self.holes),
+            body_of=self.record.body_of_input,
+            index=self.surface.index,
+            pieces=[part.shape for part in self.parts] if len(self.parts) > 1 and not self.wanted.keep_cavities else [],
+        )
+
+    def _warn_of_holes(self) -> None:
+        """Say which holes were closed though that is a guess, and where bodies stayed open."""
+        self.holes.sort(key=lambda hole: hole.doubt, reverse=True)
+        if any(hole.depth for hole in self.holes):
+            depth = max(hole.depth for hole in self.holes)
+            self.warnings.append(
+                f"Holes were closed although the caps lead up to {depth:.3f} (longest side = 2) away from the surface,"
+                f" at {self._places([hole for hole in self.holes if hole.is_closed])}."
+            )
+        is_slab = self.record.has("slab")
+        openings = [hole for hole in self.holes if not hole.is_closed and is_slab[hole.body]]
+        shells = len({hole.body for hole in openings})
+        if shells:
+            became = "1 open body became a thin shell; --open solid fills it"
+            if shells > 1:
+                became = f"{shells} open bodies became thin shells; --open solid fills them"
+            self.warnings.append(f"{became} (open at {self._places(openings)}).")
+
+    def _places(self, holes: list[Hole]) -> str:
+        """Where holes are, the most doubtful first."""
+        named = "; ".join(self._place(hole.at, hole.body) for hole in holes[:_NAMED])
+        return named + (f"; and {len(holes) - _NAMED} more, see `holes`" if len(holes) > _NAMED else "")
+
+    def _place(self, point: ArrayLike, body: int) -> str:
+        return self._frame.place(point, body if self.record.bodies > 1 else None)
