@@ -1,7 +1,6 @@
 // Python bindings of plane cuts, of the pieces they leave, and of reuniting them.
-#include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
-#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/vector.h>
 
 #include "base/arrays.hpp"
@@ -26,7 +25,7 @@ std::optional<PieceOut> out(std::optional<Piece>&& piece) {
   return piece ? std::optional(out(std::move(*piece))) : std::nullopt;
 }
 
-std::array<std::optional<PieceOut>, 2> out(std::array<std::optional<Piece>, 2>&& sides) {
+std::pair<std::optional<PieceOut>, std::optional<PieceOut>> out(std::array<std::optional<Piece>, 2>&& sides) {
   return {out(std::move(sides[0])), out(std::move(sides[1]))};
 }
 
