@@ -20,7 +20,7 @@ SEED    ?= 0
 MESHES  ?= ../shared/meshes
 SECONDS_TO_FUZZ = $(shell expr 60 \* $(MINUTES))
 
-.PHONY: install demo docs benchmarks test test-fast test-all nightly lint soak soak-light soak-totals fuzz-files fuzz-shapes sanitize sanitize-address sanitize-thread format clean
+.PHONY: install demo docs benchmarks test test-fast test-all nightly lint soak soak-light soak-totals stubs fuzz-files fuzz-shapes sanitize sanitize-address sanitize-thread format clean
 
 install: $(VENV)/installed
 
@@ -55,6 +55,10 @@ $(VENV)/docs: $(VENV)/installed
 # The table of README; `python -m benchmarks --help` lists what else is published. CoACD takes most of an hour.
 benchmarks: $(VENV)/test-extras
 	$(BIN)/python -m benchmarks compare $(MESHES) --list $(MESHES)/quick.txt --out build/benchmarks
+
+# The types of the kernels, as they were last built.
+stubs: $(VENV)/installed
+	$(BIN)/python -m nanobind.stubgen --quiet --exclude-docstrings -m rlacd._native -o src/rlacd/_native.pyi
 
 lint: $(VENV)/test-extras
 	$(BIN)/ruff check .

@@ -111,3 +111,11 @@ def test_no_module_hides_a_public_name() -> None:
 def test_no_policy_needs_an_extra() -> None:
     loaded = modules_after("from rlacd.policies import POLICIES, make_policy\nfor name in POLICIES: make_policy(name)")
     assert "rlacd.policies.greedy" in loaded
+
+
+def test_the_types_of_the_kernels_are_those_of_the_bindings(tmp_path) -> None:
+    """`make stubs` writes them."""
+    stubgen = pytest.importorskip("nanobind.stubgen")
+    written = tmp_path / "_native.pyi"
+    stubgen.main(["--quiet", "--exclude-docstrings", "-m", "rlacd._native", "-o", str(written)])
+    assert written.read_text() == (Path(rlacd.__file__).parent / "_native.pyi").read_text()

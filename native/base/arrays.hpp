@@ -3,9 +3,11 @@
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/tuple.h>
 
 #include <cstring>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -94,6 +96,11 @@ struct Rows {
 template <class Scalar, class Row>
 Rows<Scalar, Row> rows(std::vector<Row> own) {
   return {std::move(own)};
+}
+
+using MeshOut = std::tuple<Rows<double, Vec3>, Rows<std::int32_t, Triangle>>;
+inline MeshOut out(Mesh mesh) {
+  return {rows<double>(std::move(mesh.vertices)), rows<std::int32_t>(std::move(mesh.faces))};
 }
 
 // The GIL is held while arguments and results are converted, and not in between.

@@ -1,5 +1,4 @@
 // Python bindings of concave edges and their planes.
-#include <nanobind/stl/tuple.h>
 
 #include "base/arrays.hpp"
 #include "cut/concave_edges.hpp"
@@ -7,7 +6,7 @@
 namespace rlacd {
 namespace {
 
-nb::tuple to_arrays(const std::vector<ReflexEdge>& edges) {
+auto to_rows(const std::vector<ReflexEdge>& edges) {
   std::vector<std::array<std::int32_t, 2>> ends, faces;
   std::vector<std::array<Vec3, 2>> normals;
   std::vector<double> angles;
@@ -17,8 +16,8 @@ nb::tuple to_arrays(const std::vector<ReflexEdge>& edges) {
     normals.push_back({edge.normal[0], edge.normal[1]});
     angles.push_back(edge.angle);
   }
-  return nb::make_tuple(to_array<std::int32_t>(std::move(ends)), to_array<std::int32_t>(std::move(faces)),
-                        to_array<double>(std::move(normals)), to_array<double>(std::move(angles)));
+  return std::tuple(rows<std::int32_t>(std::move(ends)), rows<std::int32_t>(std::move(faces)),
+                    rows<double>(std::move(normals)), rows<double>(std::move(angles)));
 }
 
 }  // namespace
@@ -28,14 +27,10 @@ void bind_concave_edges(nb::module_& m) {
       "reflex_edges",
       [](const PointsIn& vertices, const FacesIn& faces) {
         const Mesh mesh = to_mesh(vertices, faces);
-        std::vector<ReflexEdge> edges;
-        {
-          nb::gil_scoped_release release;
-          edges = reflex_edges(mesh);
-        }
-        return to_arrays(edges);
+        std::vector<ReflexEdge> edges = reflex_edges(mesh);
+        return to_rows(edges);
       },
-      nb::arg("vertices"), nb::arg("faces"),
+      Released(), nb::arg("vertices"), nb::arg("faces"),
       "Edges whose dihedral angle exceeds a straight one by more than 10 degrees: (vertices [E, 2], the faces on both\n"
       "sides [E, 2], their outward unit normals [E, 6], by how much the angle exceeds a straight one [E]).");
   m.def(
@@ -43,14 +38,11 @@ void bind_concave_edges(nb::module_& m) {
       [](const PointsIn& vertices, const FacesIn& faces, const PointsIn& hull_vertices, const FacesIn& hull_faces,
          std::size_t count) {
         const Mesh mesh = to_mesh(vertices, faces), hull = to_mesh(hull_vertices, hull_faces);
-        std::vector<ReflexEdge> edges;
-        {
-          nb::gil_scoped_release release;
-          edges = choose_concave_edges(mesh, hull, count);
-        }
-        return to_arrays(edges);
+        std::vector<ReflexEdge> edges = choose_concave_edges(mesh, hull, count);
+        return to_rows(edges);
       },
-      nb::arg("vertices"), nb::arg("faces"), nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("count"),
+      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("hull_vertices"), nb::arg("hull_faces"),
+      nb::arg("count"),
       "Up to `count` of the reflex edges, deep, sharp ones of long creases first, and spread out; as `reflex_edges`.");
   m.def(
       "candidate_planes",

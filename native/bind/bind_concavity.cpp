@@ -16,11 +16,10 @@ void bind_concavity(nb::module_& m) {
       [](const PointsIn& part_vertices, const FacesIn& part_faces, const PointsIn& hull_vertices,
          const FacesIn& hull_faces, double part_volume, double hull_volume, double threshold, const TreeCache* tree) {
         const Mesh part = to_finite_mesh(part_vertices, part_faces), hull = to_finite_mesh(hull_vertices, hull_faces);
-        nb::gil_scoped_release release;
         const TreeCache own;
         return meets_concavity(part, hull, part_volume, hull_volume, threshold, tree ? *tree : own);
       },
-      nb::arg("part_vertices"), nb::arg("part_faces"), nb::arg("hull_vertices"), nb::arg("hull_faces"),
+      Released(), nb::arg("part_vertices"), nb::arg("part_faces"), nb::arg("hull_vertices"), nb::arg("hull_faces"),
       nb::arg("part_volume"), nb::arg("hull_volume"), nb::arg("threshold"), nb::arg("tree") = nb::none(),
       "Whether the concavity of a closed part with this hull is certainly <= threshold.\n\n"
       "False when it is larger, or so close (0.1 %) that branch and bound gave up. The hull must hold the part.\n"
@@ -33,15 +32,12 @@ void bind_concavity(nb::module_& m) {
         const Mesh part = to_finite_mesh(part_vertices, part_faces), hull = to_finite_mesh(hull_vertices, hull_faces);
         if (!(tolerance > 0)) throw std::invalid_argument("the tolerance must be positive");
         Concavity c;
-        {
-          nb::gil_scoped_release release;
-          const TreeCache own;
-          c = concavity(part, hull, part_volume, hull_volume, tolerance, floor, tree ? *tree : own);
-        }
-        const auto pair = [](const Interval& i) { return nb::make_tuple(i.lower, i.upper); };
-        return nb::make_tuple(pair(c.value()), pair(c.part_to_hull), pair(c.hull_to_part), c.volume_radius);
+        const TreeCache own;
+        c = concavity(part, hull, part_volume, hull_volume, tolerance, floor, tree ? *tree : own);
+        const auto pair = [](const Interval& i) { return std::tuple(i.lower, i.upper); };
+        return std::tuple(pair(c.value()), pair(c.part_to_hull), pair(c.hull_to_part), c.volume_radius);
       },
-      nb::arg("part_vertices"), nb::arg("part_faces"), nb::arg("hull_vertices"), nb::arg("hull_faces"),
+      Released(), nb::arg("part_vertices"), nb::arg("part_faces"), nb::arg("hull_vertices"), nb::arg("hull_faces"),
       nb::arg("part_volume"), nb::arg("hull_volume"), nb::arg("tolerance"), nb::arg("floor") = 0.0,
       nb::arg("tree") = nb::none(),
       "Concavity of a closed part with this hull: (value, part_to_hull, hull_to_part, volume_radius).\n\n"
@@ -64,19 +60,17 @@ void bind_concavity(nb::module_& m) {
           [](Filling* self, const PointsIn& vertices, const FacesIn& faces, int threads) {
             const Mesh solid = to_finite_mesh(vertices, faces);
             if (solid.faces.empty()) throw std::invalid_argument("the solid has no faces");
-            nb::gil_scoped_release release;
             new (self) Filling(solid, threads);
           },
-          nb::arg("vertices"), nb::arg("faces"), nb::arg("threads") = 1)
+          Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("threads") = 1)
       .def_prop_ro("surface", &Filling::surface, nb::rv_policy::reference_internal, "The solid's surface.")
       .def(
           "feasibility",
           [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces, double threshold) {
             const Mesh hull = to_finite_mesh(hull_vertices, hull_faces);
-            nb::gil_scoped_release release;
             return static_cast<int>(self.feasibility(hull, threshold));
           },
-          nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("threshold"),
+          Released(), nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("threshold"),
           "Whether the surfaces of a hull and of the solid's share of it may be as near as the threshold.\n\n"
           "0: they may; 1: they are not; 2: nor are those of any hull that holds this one.")
       .def(
@@ -90,18 +84,15 @@ void bind_concavity(nb::module_& m) {
                 throw std::invalid_argument("pair out of range");
             std::vector<double> volumes(pairs.shape(0));
             std::vector<std::int32_t> verdicts(pairs.shape(0));
-            {
-              nb::gil_scoped_release release;
-              parallel_for(volumes.size(), resolve_threads(threads), [&](std::size_t i) {
-                const Filling::Joint joint =
-                    self.joint_feasibility(*hulls[pair[2 * i]], *hulls[pair[2 * i + 1]], threshold);
-                volumes[i] = joint.volume;
-                verdicts[i] = static_cast<std::int32_t>(joint.feasibility);
-              });
-            }
-            return nb::make_tuple(to_array<double>(std::move(volumes)), to_array<std::int32_t>(std::move(verdicts)));
+            parallel_for(volumes.size(), resolve_threads(threads), [&](std::size_t i) {
+              const Filling::Joint joint =
+                  self.joint_feasibility(*hulls[pair[2 * i]], *hulls[pair[2 * i + 1]], threshold);
+              volumes[i] = joint.volume;
+              verdicts[i] = static_cast<std::int32_t>(joint.feasibility);
+            });
+            return std::tuple(rows<double>(std::move(volumes)), rows<std::int32_t>(std::move(verdicts)));
           },
-          nb::arg("hulls"), nb::arg("pairs"), nb::arg("threshold"), nb::arg("threads") = 0,
+          Released(), nb::arg("hulls"), nb::arg("pairs"), nb::arg("threshold"), nb::arg("threads") = 0,
           "Volumes [P] of the joint hulls of pairs [P, 2] of hulls, and the `feasibility` [P] of each, decided less\n"
           "thoroughly than for a single hull, where the hulls themselves are close enough to their shares of the "
           "solid.\n"
@@ -110,24 +101,19 @@ void bind_concavity(nb::module_& m) {
           "comes_deeper",
           [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces, double threshold) {
             const Mesh hull = to_finite_mesh(hull_vertices, hull_faces);
-            nb::gil_scoped_release release;
             return self.comes_deeper(hull, threshold);
           },
-          nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("threshold"),
+          Released(), nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("threshold"),
           "Whether the solid's surface comes deeper than the threshold inside a hull: `feasibility` is 2.")
       .def(
           "clipped",
           [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces) {
-            ClippedSolid clip;
-            {
-              nb::gil_scoped_release release;
-              clip = self.clipped(to_finite_mesh(hull_vertices, hull_faces));
-            }
-            return nb::make_tuple(to_array<double>(std::move(clip.mesh.vertices)),
-                                  to_array<std::int32_t>(std::move(clip.mesh.faces)), clip.volume,
-                                  new TreeCache(std::move(clip.shape)));
+            ClippedSolid clip = self.clipped(to_finite_mesh(hull_vertices, hull_faces));
+            return std::tuple(rows<double>(std::move(clip.mesh.vertices)),
+                              rows<std::int32_t>(std::move(clip.mesh.faces)), clip.volume,
+                              new TreeCache(std::move(clip.shape)));
           },
-          nb::arg("hull_vertices"), nb::arg("hull_faces"),
+          Released(), nb::arg("hull_vertices"), nb::arg("hull_faces"),
           "The solid clipped to a convex hull and closed by caps on the hull's facets: vertices [V, 3], faces [F, 3],\n"
           "volume, and what makes the tree of that surface.")
       .def(
@@ -139,16 +125,12 @@ void bind_concavity(nb::module_& m) {
             if (!(grain > 0)) throw std::invalid_argument("the grain must be positive");
             std::vector<Mesh> hulls;
             for (std::size_t i = 0; i < vertices.size(); ++i) hulls.push_back(to_finite_mesh(vertices[i], faces[i]));
-            std::vector<std::vector<Vec3>> points;
-            {
-              nb::gil_scoped_release release;
-              points = self.uncovered(hulls, reach, grain, threads);
-            }
-            nb::list result;
-            for (std::vector<Vec3>& own : points) result.append(to_array<double>(std::move(own)));
+            std::vector<std::vector<Vec3>> points = self.uncovered(hulls, reach, grain, threads);
+            std::vector<Rows<double, Vec3>> result;
+            for (std::vector<Vec3>& own : points) result.push_back(rows<double>(std::move(own)));
             return result;
           },
-          nb::arg("vertices"), nb::arg("faces"), nb::arg("reach"), nb::arg("grain"), nb::arg("threads") = 0,
+          Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("reach"), nb::arg("grain"), nb::arg("threads") = 0,
           "Points [N, 3] that each convex hull has to take in, so that together they cover the solid's surface.\n\n"
           "Hulls grow by at most `grain` more than they must. Hulls farther than `reach` from a face are only looked "
           "at\n"

@@ -1,4 +1,5 @@
 // Python bindings of the surface queries: closest points, winding numbers, samples, one-sided Hausdorff distance.
+
 #include "base/arrays.hpp"
 #include "base/parallel.hpp"
 #include "distance/apart.hpp"
@@ -58,24 +59,21 @@ void bind_distance(nb::module_& m) {
           [](Surface* self, const PointsIn& vertices, const FacesIn& faces, int threads) {
             const Mesh mesh = to_finite_mesh(vertices, faces);
             if (mesh.faces.empty()) throw std::invalid_argument("the surface has no faces");
-            nb::gil_scoped_release release;
             new (self) Surface(mesh, threads);
           },
-          nb::arg("vertices"), nb::arg("faces"), nb::arg("threads") = 1)
+          Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("threads") = 1)
       .def(
           "distance",
           [](const Surface& self, const PointsIn& array, int threads) {
             const std::vector<Vec3> points = to_points(array);
             require_finite(points);
             std::vector<double> distances(points.size());
-            {
-              nb::gil_scoped_release release;
-              for_each_closest(self.bvh(), points, threads,
-                               [&](std::size_t i, const Bvh::Hit& hit) { distances[i] = std::sqrt(hit.distance2); });
-            }
-            return to_array<double>(std::move(distances));
+            for_each_closest(self.bvh(), points, threads,
+                             [&](std::size_t i, const Bvh::Hit& hit) { distances[i] = std::sqrt(hit.distance2); });
+            return rows<double>(std::move(distances));
           },
-          nb::arg("points"), nb::arg("threads") = 0, "Unsigned distances [N] of points [N, 3] to the surface.")
+          Released(), nb::arg("points"), nb::arg("threads") = 0,
+          "Unsigned distances [N] of points [N, 3] to the surface.")
       .def(
           "closest",
           [](const Surface& self, const PointsIn& array, int threads) {
@@ -83,16 +81,13 @@ void bind_distance(nb::module_& m) {
             require_finite(points);
             std::vector<Vec3> closest(points.size());
             std::vector<std::int32_t> faces(points.size());
-            {
-              nb::gil_scoped_release release;
-              for_each_closest(self.bvh(), points, threads, [&](std::size_t i, const Bvh::Hit& hit) {
-                closest[i] = hit.point;
-                faces[i] = self.bvh().face(hit.slot);
-              });
-            }
-            return nb::make_tuple(to_array<double>(std::move(closest)), to_array<std::int32_t>(std::move(faces)));
+            for_each_closest(self.bvh(), points, threads, [&](std::size_t i, const Bvh::Hit& hit) {
+              closest[i] = hit.point;
+              faces[i] = self.bvh().face(hit.slot);
+            });
+            return std::tuple(rows<double>(std::move(closest)), rows<std::int32_t>(std::move(faces)));
           },
-          nb::arg("points"), nb::arg("threads") = 0,
+          Released(), nb::arg("points"), nb::arg("threads") = 0,
           "Closest points of the surface [N, 3] to points [N, 3], and the faces [N] they lie on.")
       .def(
           "winding",
@@ -101,15 +96,12 @@ void bind_distance(nb::module_& m) {
             require_finite(points);
             if (!(accuracy >= 1)) throw std::invalid_argument("the accuracy must be at least 1");
             std::vector<double> windings(points.size());
-            {
-              nb::gil_scoped_release release;
-              const Winding& winding = self.winding();
-              for_each_point(points.size(), threads,
-                             [&](std::size_t i) { windings[i] = winding.at(points[i], accuracy); });
-            }
-            return to_array<double>(std::move(windings));
+            const Winding& winding = self.winding();
+            for_each_point(points.size(), threads,
+                           [&](std::size_t i) { windings[i] = winding.at(points[i], accuracy); });
+            return rows<double>(std::move(windings));
           },
-          nb::arg("points"), nb::arg("accuracy") = 2.0, nb::arg("threads") = 0,
+          Released(), nb::arg("points"), nb::arg("accuracy") = 2.0, nb::arg("threads") = 0,
           "Generalised winding numbers [N] of points [N, 3].\n\n"
           "Groups of triangles farther than `accuracy` times their radius are expanded to second order: with the\n"
           "default 2 errors up to 0.03 were seen close to real surfaces, with 4 up to 0.01; infinity is exact.");
@@ -118,15 +110,10 @@ void bind_distance(nb::module_& m) {
       "sample_surface",
       [](const PointsIn& vertices, const FacesIn& faces, std::size_t count, std::uint64_t seed) {
         const Mesh mesh = to_finite_mesh(vertices, faces);
-        SurfaceSamples samples;
-        {
-          nb::gil_scoped_release release;
-          samples = sample_surface(mesh, count, seed);
-        }
-        return nb::make_tuple(to_array<double>(std::move(samples.points)),
-                              to_array<std::int32_t>(std::move(samples.faces)));
+        SurfaceSamples samples = sample_surface(mesh, count, seed);
+        return std::tuple(rows<double>(std::move(samples.points)), rows<std::int32_t>(std::move(samples.faces)));
       },
-      nb::arg("vertices"), nb::arg("faces"), nb::arg("count"), nb::arg("seed"),
+      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("count"), nb::arg("seed"),
       "Points [count, 3] spread evenly by area over a surface, and their faces [count]; the same bits for a seed.");
 
   m.def(
@@ -134,14 +121,11 @@ void bind_distance(nb::module_& m) {
       [](const PointsIn& vertices, const FacesIn& faces, const Surface& surface, double tolerance, int threads) {
         const Mesh mesh = to_finite_mesh(vertices, faces);
         require_positive_tolerance(tolerance);
-        Interval found;
-        {
-          nb::gil_scoped_release release;
-          found = directed_hausdorff(mesh, surface.bvh(), tolerance, threads);
-        }
-        return nb::make_tuple(found.lower, found.upper);
+        Interval found = directed_hausdorff(mesh, surface.bvh(), tolerance, threads);
+        return std::tuple(found.lower, found.upper);
       },
-      nb::arg("vertices"), nb::arg("faces"), nb::arg("surface"), nb::arg("tolerance"), nb::arg("threads") = 0,
+      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("surface"), nb::arg("tolerance"),
+      nb::arg("threads") = 0,
       "(lower, upper) around the greatest distance from a point of the mesh's faces to the surface;\n"
       "upper - lower <= tolerance.");
 
@@ -153,12 +137,11 @@ void bind_distance(nb::module_& m) {
         const std::vector<std::int64_t> body(array.data(), array.data() + array.shape(0));
         Crossings found;
         if (!mesh.faces.empty()) {
-          nb::gil_scoped_release release;
           found = crossings(mesh, body, most);
         }
-        return nb::make_tuple(found.pairs, found.corners);
+        return std::tuple(found.pairs, found.corners);
       },
-      nb::arg("vertices"), nb::arg("faces"), nb::arg("body"), nb::arg("most"),
+      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("body"), nb::arg("most"),
       "How many pairs of faces of different bodies [F] touch, and a bound on the corners of their arrangement.\n"
       "Stops to count once there are more than `most` pairs.");
 
@@ -168,14 +151,9 @@ void bind_distance(nb::module_& m) {
         const std::vector<Vec3> points = to_points(array);
         require_finite(points);
         if (!(reach > 0)) throw std::invalid_argument("the reach must be positive");
-        std::vector<std::int32_t> found;
-        {
-          nb::gil_scoped_release release;
-          found = apart_points(surface, points, reach, enough);
-        }
-        return to_array<std::int32_t>(std::move(found));
+        return rows<std::int32_t>(apart_points(surface, points, reach, enough));
       },
-      nb::arg("surface"), nb::arg("points"), nb::arg("reach"), nb::arg("enough"),
+      Released(), nb::arg("surface"), nb::arg("points"), nb::arg("reach"), nb::arg("enough"),
       "Indices [K] of points [N, 3] of a closed solid of which no two can lie in one convex set whose surface stays\n"
       "within `reach` of the solid; the search ends when `enough` are found.");
 }

@@ -1,4 +1,5 @@
 // Python bindings of contacts between convex polytopes.
+
 #include <cmath>
 
 #include "base/arrays.hpp"
@@ -17,31 +18,25 @@ void bind_flush(nb::module_& m) {
           "__init__",
           [](FlushBody* self, const PointsIn& vertices, const FacesIn& faces) {
             const Mesh hull = to_finite_mesh(vertices, faces);
-            nb::gil_scoped_release release;
             new (self) FlushBody(hull);
           },
-          nb::arg("vertices"), nb::arg("faces"))
+          Released(), nb::arg("vertices"), nb::arg("faces"))
       .def(
           "depths",
           [](const FlushBody& self, const PointsIn& array) {
             std::vector<double> depths;
             for (const Vec3 point : to_points(array)) depths.push_back(self.depth(point));
-            return to_array<double>(std::move(depths));
+            return rows<double>(std::move(depths));
           },
-          nb::arg("points"), "How deep points [N, 3] lie inside [N]; negative outside.")
+          Released(), nb::arg("points"), "How deep points [N, 3] lie inside [N]; negative outside.")
       .def(
           "contact",
           [=](const FlushBody& self, const FlushBody& other, double depth, double touch) {
             require_depth(depth, touch);
-            FlushBody::Contact contact;
-            {
-              nb::gil_scoped_release release;
-              contact = self.contact(other, depth, touch);
-            }
-            return nb::make_tuple(to_array<std::int32_t>(std::move(contact.sides)),
-                                  to_array<double>(std::move(contact.places)));
+            FlushBody::Contact contact = self.contact(other, depth, touch);
+            return std::tuple(rows<std::int32_t>(std::move(contact.sides)), rows<double>(std::move(contact.places)));
           },
-          nb::arg("other"), nb::arg("depth"), nb::arg("touch"),
+          Released(), nb::arg("other"), nb::arg("depth"), nb::arg("touch"),
           "Where a side of another body, turned the other way, lies less deep than `depth` under a side of this one:\n"
           "(sides [S] of this body, places [N, 3] on the other). Sides touch that are no farther apart than `touch`.")
       .def(
@@ -52,14 +47,10 @@ void bind_flush(nb::module_& m) {
             for (const std::int32_t side : sides)
               if (side < 0 || side >= static_cast<std::int64_t>(self.size()))
                 throw std::invalid_argument("side out of range");
-            std::vector<Vec3> points;
-            {
-              nb::gil_scoped_release release;
-              points = self.layer(other, sides, depth, touch);
-            }
-            return to_array<double>(std::move(points));
+            std::vector<Vec3> points = self.layer(other, sides, depth, touch);
+            return rows<double>(std::move(points));
           },
-          nb::arg("other"), nb::arg("sides"), nb::arg("depth"), nb::arg("touch"),
+          Released(), nb::arg("other"), nb::arg("sides"), nb::arg("depth"), nb::arg("touch"),
           "What another body fills of this one with some of its sides, and those within 60 degrees of them, moved\n"
           "outwards: points [N, 3] whose hull it is. Planes that it crosses by at most `touch` are left out.");
 }

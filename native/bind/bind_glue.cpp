@@ -1,4 +1,5 @@
 // Python bindings of gluing.
+
 #include "base/arrays.hpp"
 #include "distance/glue.hpp"
 
@@ -8,25 +9,18 @@ void bind_glue(nb::module_& m) {
   m.def(
       "glue",
       [](const PointsIn& va, const FacesIn& fa, const PointsIn& vb, const FacesIn& fb) {
-        const Mesh a = to_mesh(va, fa), b = to_mesh(vb, fb);
-        Mesh out;
-        {
-          nb::gil_scoped_release release;
-          out = glue(a, b);
-        }
-        return nb::make_tuple(to_array<double>(std::move(out.vertices)), to_array<std::int32_t>(std::move(out.faces)));
+        return out(glue(to_mesh(va, fa), to_mesh(vb, fb)));
       },
-      nb::arg("vertices_a"), nb::arg("faces_a"), nb::arg("vertices_b"), nb::arg("faces_b"),
+      Released(), nb::arg("vertices_a"), nb::arg("faces_a"), nb::arg("vertices_b"), nb::arg("faces_b"),
       "Surface (vertices [V, 3], faces [F, 3]) of the union of two closed solids with disjoint interiors: both "
       "surfaces\n"
       "without the regions where they touch face to face (within 1e-8). Not a closed mesh: for measuring only.");
   m.def(
       "do_touch",
       [](const PointsIn& va, const FacesIn& fa, const PointsIn& vb, const FacesIn& fb) {
-        nb::gil_scoped_release release;
         return do_touch(to_mesh(va, fa), to_mesh(vb, fb));
       },
-      nb::arg("vertices_a"), nb::arg("faces_a"), nb::arg("vertices_b"), nb::arg("faces_b"),
+      Released(), nb::arg("vertices_a"), nb::arg("faces_a"), nb::arg("vertices_b"), nb::arg("faces_b"),
       "Whether two solids touch face to face, not just in an edge or a point.");
 }
 

@@ -1,6 +1,5 @@
 // Python bindings of the convex hull and of mesh volume and area.
 #include <nanobind/stl/optional.h>
-#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <cmath>
@@ -36,15 +35,11 @@ void bind_hull(nb::module_& m) {
       [](const PointsIn& array) {
         const std::vector<Vec3> points = to_points(array);
         require_numbers(points);
-        Hull hull;
-        {
-          nb::gil_scoped_release release;
-          hull = convex_hull(points);
-        }
-        return nb::make_tuple(to_array<std::int32_t>(std::move(hull.indices)),
-                              to_array<std::int32_t>(std::move(hull.faces)), hull.rank);
+        Hull hull = convex_hull(points);
+        return std::tuple(rows<std::int32_t>(std::move(hull.indices)), rows<std::int32_t>(std::move(hull.faces)),
+                          hull.rank);
       },
-      nb::arg("points"),
+      Released(), nb::arg("points"),
       "Convex hull of points [N, 3]: (indices [H] into points, faces [F, 3] into those H points, rank).\n\n"
       "Every index is an extreme point, the facets are exactly convex (no rounding in the decisions) and outward\n"
       "oriented. rank < 3 (all points coplanar): no indices, no faces.");
@@ -73,10 +68,9 @@ void bind_hull(nb::module_& m) {
       "holds_ball",
       [](const PointsIn& vertices, const FacesIn& faces, double radius) {
         const Mesh hull = to_finite_mesh(vertices, faces);
-        nb::gil_scoped_release release;
         return holds_ball(hull, radius);
       },
-      nb::arg("vertices"), nb::arg("faces"), nb::arg("radius"),
+      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("radius"),
       "Whether a ball of this radius fits into a convex hull.");
   m.def(
       "outline",
@@ -87,9 +81,9 @@ void bind_hull(nb::module_& m) {
           if (!std::isfinite(points[i][0]) || !std::isfinite(points[i][1]))
             throw std::invalid_argument("a point is not finite");
         }
-        return to_array<std::int32_t>(outline(points));
+        return rows<std::int32_t>(outline(points));
       },
-      nb::arg("points"),
+      Released(), nb::arg("points"),
       "The corners of the convex hull of points [N, 2] of the plane as indices, counter-clockwise; fewer than three if "
       "the\n"
       "points lie on a line up to rounding.");
@@ -101,21 +95,18 @@ void bind_hull(nb::module_& m) {
         for (const std::int32_t g : pair)
           if (g < 0 || g >= static_cast<std::int64_t>(groups.size())) throw std::invalid_argument("pair out of range");
         std::vector<double> volumes(pairs.shape(0));
-        {
-          nb::gil_scoped_release release;
-          const auto worth_threads = static_cast<int>(1 + volumes.size() / kPairsAThread);
-          parallel_for(volumes.size(), std::min(resolve_threads(threads), worth_threads), [&](std::size_t i) {
-            HullBuilder hull;
-            std::vector<Vec3> both = to_points(groups[pair[2 * i]]);
-            const std::vector<Vec3> other = to_points(groups[pair[2 * i + 1]]);
-            both.insert(both.end(), other.begin(), other.end());
-            hull.add(both);
-            volumes[i] = hull.volume();
-          });
-        }
-        return to_array<double>(std::move(volumes));
+        const auto worth_threads = static_cast<int>(1 + volumes.size() / kPairsAThread);
+        parallel_for(volumes.size(), std::min(resolve_threads(threads), worth_threads), [&](std::size_t i) {
+          HullBuilder hull;
+          std::vector<Vec3> both = to_points(groups[pair[2 * i]]);
+          const std::vector<Vec3> other = to_points(groups[pair[2 * i + 1]]);
+          both.insert(both.end(), other.begin(), other.end());
+          hull.add(both);
+          volumes[i] = hull.volume();
+        });
+        return rows<double>(std::move(volumes));
       },
-      nb::arg("groups"), nb::arg("pairs"), nb::arg("threads") = 0,
+      Released(), nb::arg("groups"), nb::arg("pairs"), nb::arg("threads") = 0,
       "Volumes [P] of the joint hulls of pairs [P, 2] of point groups, a list of arrays [N, 3].");
   m.def(
       "mesh_volume",
@@ -123,27 +114,26 @@ void bind_hull(nb::module_& m) {
         const Mesh mesh = to_mesh(v, f);
         return mesh_volume(mesh.vertices, mesh.faces);
       },
-      nb::arg("vertices"), nb::arg("faces"), "Signed volume of a closed triangle mesh.");
+      Released(), nb::arg("vertices"), nb::arg("faces"), "Signed volume of a closed triangle mesh.");
   m.def(
       "principal_axes",
       [](const PointsIn& vertices, const FacesIn& faces) {
         const Mesh mesh = to_mesh(vertices, faces);
-        const std::array<Vec3, 3> rows = principal_axes(mesh.vertices, mesh.faces);
-        return to_array<double>(std::vector<Vec3>(rows.begin(), rows.end()));
+        const std::array<Vec3, 3> axes = principal_axes(mesh.vertices, mesh.faces);
+        return rows<double>(std::vector<Vec3>(axes.begin(), axes.end()));
       },
-      nb::arg("vertices"), nb::arg("faces"),
+      Released(), nb::arg("vertices"), nb::arg("faces"),
       "Principal axes [3, 3] of a surface, one per row, longest first, the largest entry of each positive.");
   m.def(
       "mesh_mass",
       [](const PointsIn& vertices, const FacesIn& faces) {
         const Mesh mesh = to_mesh(vertices, faces);
         const Mass mass = mesh_mass(mesh.vertices, mesh.faces);
-        const auto& rows = mass.inertia;
-        return nb::make_tuple(mass.volume,
-                              to_array<double>(std::vector<double>{mass.centre.x, mass.centre.y, mass.centre.z}),
-                              to_array<double>(std::vector<Vec3>(rows.begin(), rows.end())));
+        const auto& inertia = mass.inertia;
+        return std::tuple(mass.volume, rows<double>(std::vector<double>{mass.centre.x, mass.centre.y, mass.centre.z}),
+                          rows<double>(std::vector<Vec3>(inertia.begin(), inertia.end())));
       },
-      nb::arg("vertices"), nb::arg("faces"),
+      Released(), nb::arg("vertices"), nb::arg("faces"),
       "Volume, centre of mass [3], and inertia about it [3, 3] of the solid of density one in a closed mesh.");
   m.def(
       "mesh_area",
@@ -151,7 +141,7 @@ void bind_hull(nb::module_& m) {
         const Mesh mesh = to_mesh(v, f);
         return mesh_area(mesh.vertices, mesh.faces);
       },
-      nb::arg("vertices"), nb::arg("faces"), "Area of a triangle mesh.");
+      Released(), nb::arg("vertices"), nb::arg("faces"), "Area of a triangle mesh.");
 }
 
 }  // namespace rlacd

@@ -52,10 +52,6 @@ std::vector<bool> to_marks(const std::optional<MarksIn>& array, std::size_t coun
   return std::vector<bool>(array->data(), array->data() + count);
 }
 
-nb::tuple as_tuple(Mesh&& mesh) {
-  return nb::make_tuple(to_array<double>(std::move(mesh.vertices)), to_array<std::int32_t>(std::move(mesh.faces)));
-}
-
 // Binds what is measured on every face of a mesh, given its corners.
 template <class Value, class Measure>
 void def_on_faces(nb::module_& m, const char* name, const char* text, const Measure& measure) {
@@ -64,17 +60,14 @@ void def_on_faces(nb::module_& m, const char* name, const char* text, const Meas
       [measure](const PointsIn& vertices, const WideFacesIn& faces) {
         const Mesh mesh = to_wide_mesh(vertices, faces);
         std::vector<Value> values(mesh.faces.size());
-        {
-          nb::gil_scoped_release release;
-          for (std::size_t f = 0; f < values.size(); ++f) {
-            if (f % kBetweenPolls == 0) poll_stop();
-            const auto [a, b, c] = mesh.faces[f];
-            values[f] = measure(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]);
-          }
+        for (std::size_t f = 0; f < values.size(); ++f) {
+          if (f % kBetweenPolls == 0) poll_stop();
+          const auto [a, b, c] = mesh.faces[f];
+          values[f] = measure(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]);
         }
-        return to_array<double>(std::move(values));
+        return rows<double>(std::move(values));
       },
-      nb::arg("vertices"), nb::arg("faces"), text);
+      Released(), nb::arg("vertices"), nb::arg("faces"), text);
 }
 
 }  // namespace
@@ -84,16 +77,11 @@ void bind_mesh(nb::module_& m) {
       "weld",
       [](const PointsIn& vertices, const WideFacesIn& faces) {
         const Mesh mesh = to_wide_mesh(vertices, faces);
-        Welded welded;
-        {
-          nb::gil_scoped_release release;
-          welded = weld(mesh);
-        }
-        return nb::make_tuple(to_array<double>(std::move(welded.mesh.vertices)),
-                              to_array<std::int32_t>(std::move(welded.mesh.faces)),
-                              to_array<bool>(std::move(welded.is_film)));
+        Welded welded = weld(mesh);
+        return std::tuple(rows<double>(std::move(welded.mesh.vertices)),
+                          rows<std::int32_t>(std::move(welded.mesh.faces)), rows<bool>(std::move(welded.is_film)));
       },
-      nb::arg("vertices"), nb::arg("faces"),
+      Released(), nb::arg("vertices"), nb::arg("faces"),
       "The distinct places of the used vertices, in order of first appearance [U, 3]; the faces [G, 3] with three\n"
       "different corners, and whether they are films [G]. Of faces with the same corners, the first that is wound "
       "like\n"
@@ -103,42 +91,30 @@ void bind_mesh(nb::module_& m) {
       [](const PointsIn& array) {
         const std::vector<Vec3> points = to_points(array);
         std::vector<std::int64_t> first;
-        {
-          nb::gil_scoped_release release;
-          const std::vector<std::int32_t> found = first_in_place(points);
-          first.assign(found.begin(), found.end());
-        }
-        return to_array<std::int64_t>(std::move(first));
+        const std::vector<std::int32_t> found = first_in_place(points);
+        first.assign(found.begin(), found.end());
+        return rows<std::int64_t>(std::move(first));
       },
-      nb::arg("points"),
+      Released(), nb::arg("points"),
       "The first of the points [N, 3] at the same place as each [N]; zeros of either sign are equal.");
   m.def(
       "first_of_doubled",
       [](const WideFacesIn& array, std::int64_t vertices) {
         const std::vector<Triangle> faces = to_faces(array, vertices);
-        std::vector<char> is_first;
-        {
-          nb::gil_scoped_release release;
-          is_first = first_of_doubled(faces, static_cast<std::size_t>(vertices));
-        }
-        return to_array<bool>(std::move(is_first));
+        std::vector<char> is_first = first_of_doubled(faces, static_cast<std::size_t>(vertices));
+        return rows<bool>(std::move(is_first));
       },
-      nb::arg("faces"), nb::arg("count"),
+      Released(), nb::arg("faces"), nb::arg("count"),
       "Whether each of the faces [F, 3] over `count` vertices is the first with its three corners, in any order [F].");
   m.def(
       "edges",
       [](const WideFacesIn& array, std::int64_t vertices) {
         const std::vector<Triangle> faces = to_faces(array, vertices);
-        Edges found;
-        {
-          nb::gil_scoped_release release;
-          found = edges_of(faces, static_cast<std::size_t>(vertices));
-        }
-        return nb::make_tuple(to_array<std::int64_t>(std::move(found.of_halfedge)),
-                              to_array<std::int64_t>(std::move(found.vertices)),
-                              to_array<std::int64_t>(std::move(found.valence)));
+        Edges found = edges_of(faces, static_cast<std::size_t>(vertices));
+        return std::tuple(rows<std::int64_t>(std::move(found.of_halfedge)),
+                          rows<std::int64_t>(std::move(found.vertices)), rows<std::int64_t>(std::move(found.valence)));
       },
-      nb::arg("faces"), nb::arg("count"),
+      Released(), nb::arg("faces"), nb::arg("count"),
       "The undirected edges of faces [F, 3]: the edge [3F] of each halfedge, the edges' vertices [E, 2], ascending, "
       "and how\n"
       "many halfedges each has [E].");
@@ -153,15 +129,10 @@ void bind_mesh(nb::module_& m) {
         for (const std::int64_t e : edge)
           if (e < 0 || e >= edges) throw std::invalid_argument("edge out of range");
         const std::vector<bool> sure = to_marks(trusted, mesh.faces.size());
-        Wedges found;
-        {
-          nb::gil_scoped_release release;
-          found = wedges_of(mesh, edge, static_cast<std::size_t>(edges), sure);
-        }
-        return nb::make_tuple(to_array<std::int64_t>(std::move(found.halfedges)),
-                              to_array<std::int64_t>(std::move(found.sides)));
+        Wedges found = wedges_of(mesh, edge, static_cast<std::size_t>(edges), sure);
+        return std::tuple(rows<std::int64_t>(std::move(found.halfedges)), rows<std::int64_t>(std::move(found.sides)));
       },
-      nb::arg("vertices"), nb::arg("faces"), nb::arg("edge_of_halfedge"), nb::arg("edges"),
+      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("edge_of_halfedge"), nb::arg("edges"),
       nb::arg("trusted") = nb::none(),
       "The wedges of space around the edges: the halfedges [3F, 2] that bound each, going around its edge from its "
       "smaller\n"
@@ -177,14 +148,10 @@ void bind_mesh(nb::module_& m) {
         if (!(bend >= 0)) throw std::invalid_argument("the weight of bending must not be negative");
         const Loop loop = {to_points(points), to_points(beside), to_marks(taken, count * count), bend};
         require_finite(loop.points);
-        std::vector<Triangle> triangles;
-        {
-          nb::gil_scoped_release release;
-          triangles = least_bent(loop);
-        }
-        return to_array<std::int32_t>(std::move(triangles));
+        std::vector<Triangle> triangles = least_bent(loop);
+        return rows<std::int32_t>(std::move(triangles));
       },
-      nb::arg("points"), nb::arg("beside"), nb::arg("taken") = nb::none(), nb::arg("bend") = 1.0,
+      Released(), nb::arg("points"), nb::arg("beside"), nb::arg("taken") = nb::none(), nb::arg("bend") = 1.0,
       "Triangulates a closed loop [N, 3] with the least bending; [N - 2, 3], wound like the loop. `beside` [N, 3] has "
       "the\n"
       "unit normals of the faces beyond its edges, which run against it; `taken` [N, N] marks pairs of points that "
@@ -198,18 +165,15 @@ void bind_mesh(nb::module_& m) {
           for (std::size_t i = 0; i < ends->shape(0); ++i)
             if ((*ends)(i) < 0 || (*ends)(i) >= count) throw std::invalid_argument("node out of range");
         std::pair<std::int64_t, std::vector<std::int64_t>> found;
-        {
-          nb::gil_scoped_release release;
-          Groups groups(static_cast<std::size_t>(count));
-          for (std::size_t i = 0; i < a.shape(0); ++i) {
-            if (i % kBetweenPolls == 0) poll_stop();
-            groups.join(a(i), b(i));
-          }
-          found = groups.labels();
+        Groups groups(static_cast<std::size_t>(count));
+        for (std::size_t i = 0; i < a.shape(0); ++i) {
+          if (i % kBetweenPolls == 0) poll_stop();
+          groups.join(a(i), b(i));
         }
-        return nb::make_tuple(found.first, to_array<std::int64_t>(std::move(found.second)));
+        found = groups.labels();
+        return std::tuple(found.first, rows<std::int64_t>(std::move(found.second)));
       },
-      nb::arg("count"), nb::arg("a"), nb::arg("b"),
+      Released(), nb::arg("count"), nb::arg("a"), nb::arg("b"),
       "Connected components under links a[i] - b[i]: their number, and the label [count] of each node, by first "
       "nodes.");
   def_on_faces<double>(m, "face_areas", "The area [F] of each face.",
@@ -226,15 +190,10 @@ void bind_mesh(nb::module_& m) {
       [](const PointsIn& vertices, const WideFacesIn& faces, double spacing) {
         const Mesh mesh = to_wide_mesh(vertices, faces);
         if (!(spacing > 0)) throw std::invalid_argument("the spacing must be positive");
-        SpreadPoints spread;
-        {
-          nb::gil_scoped_release release;
-          spread = spread_points(mesh, spacing);
-        }
-        return nb::make_tuple(to_array<double>(std::move(spread.points)),
-                              to_array<std::int32_t>(std::move(spread.faces)));
+        SpreadPoints spread = spread_points(mesh, spacing);
+        return std::tuple(rows<double>(std::move(spread.points)), rows<std::int32_t>(std::move(spread.faces)));
       },
-      nb::arg("vertices"), nb::arg("faces"), nb::arg("spacing"),
+      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("spacing"),
       "Points [N, 3], corners included, such that no point of a face is farther than `spacing` from one of them, and "
       "the\n"
       "face [N] each lies on, ascending.");
@@ -244,34 +203,24 @@ void bind_mesh(nb::module_& m) {
         const Mesh mesh = to_wide_mesh(vertices, faces);
         if (mesh.faces.empty()) throw std::invalid_argument("no faces, no cells");
         if (!(spacing > 0 && pitch > 0 && margin >= 0)) throw std::invalid_argument("sizes must be positive");
-        MarkedCells cells;
-        {
-          nb::gil_scoped_release release;
-          cells = mark_cells(mesh, spacing, pitch, margin);
-        }
-        const std::vector<double> origin = {cells.origin.x, cells.origin.y, cells.origin.z};
-        return nb::make_tuple(to_array<double>(std::vector<double>(origin)),
-                              nb::bytes(cells.marks.data(), cells.marks.size()),
-                              nb::make_tuple(cells.shape[0], cells.shape[1], cells.shape[2]));
+        MarkedCells cells = mark_cells(mesh, spacing, pitch, margin);
+        const Vec3 origin = cells.origin;
+        return std::tuple(rows<double>(std::vector{origin.x, origin.y, origin.z}), rows<bool>(std::move(cells.marks)),
+                          std::tuple(cells.shape[0], cells.shape[1], cells.shape[2]));
       },
-      nb::arg("vertices"), nb::arg("faces"), nb::arg("spacing"), nb::arg("pitch"), nb::arg("margin"),
+      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("spacing"), nb::arg("pitch"), nb::arg("margin"),
       "A grid of cells around a mesh: the middle of the first, which of them hold points of faces spread at this\n"
-      "spacing, as bytes, and how many there are along each axis. So many at each end are free.");
+      "spacing, and how many there are along each axis. So many at each end are free.");
   m.def(
       "closed_bodies",
-      [](const PointsIn& vertices, const FacesIn& faces) -> nb::object {
-        const Mesh mesh = to_mesh(vertices, faces);
-        ClosedBodies found;
-        {
-          nb::gil_scoped_release release;
-          found = closed_bodies(mesh);
-        }
-        if (found.count == 0) return nb::none();
-        return nb::make_tuple(to_array<std::int64_t>(std::move(found.body)), to_array<double>(std::move(found.volume)),
-                              to_array<double>(std::move(found.area)), to_array<double>(std::move(found.box)),
-                              found.has_no_pinch, found.least_height, found.least_fold);
+      [](const PointsIn& vertices, const FacesIn& faces) {
+        ClosedBodies found = closed_bodies(to_mesh(vertices, faces));
+        auto bodies = std::tuple(rows<std::int64_t>(std::move(found.body)), rows<double>(std::move(found.volume)),
+                                 rows<double>(std::move(found.area)), rows<double>(std::move(found.box)),
+                                 found.has_no_pinch, found.least_height, found.least_fold);
+        return found.count == 0 ? std::nullopt : std::optional(std::move(bodies));
       },
-      nb::arg("vertices"), nb::arg("faces"),
+      Released(), nb::arg("vertices"), nb::arg("faces"),
       "The bodies of a mesh all of whose edges join two faces that run along them in opposite directions, else None:\n"
       "the body [F] of each face; signed volume [B], area [B] and box [B, 6] of each body; whether the faces around "
       "each\n"
@@ -279,27 +228,13 @@ void bind_mesh(nb::module_& m) {
       "of neighbours.");
   m.def(
       "separate_fans",
-      [](const PointsIn& vertices, const FacesIn& faces) {
-        Mesh mesh = to_mesh(vertices, faces);
-        {
-          nb::gil_scoped_release release;
-          mesh = separate_fans(mesh);
-        }
-        return as_tuple(std::move(mesh));
-      },
-      nb::arg("vertices"), nb::arg("faces"),
+      [](const PointsIn& vertices, const FacesIn& faces) { return out(separate_fans(to_mesh(vertices, faces))); },
+      Released(), nb::arg("vertices"), nb::arg("faces"),
       "A closed mesh in which faces that meet at a vertex only have a vertex each: copies [V', 3] follow the others.");
   m.def(
       "along_a_curve",
-      [](const PointsIn& vertices, const FacesIn& faces) {
-        Mesh mesh = to_mesh(vertices, faces);
-        {
-          nb::gil_scoped_release release;
-          mesh = along_a_curve(mesh);
-        }
-        return as_tuple(std::move(mesh));
-      },
-      nb::arg("vertices"), nb::arg("faces"),
+      [](const PointsIn& vertices, const FacesIn& faces) { return out(along_a_curve(to_mesh(vertices, faces))); },
+      Released(), nb::arg("vertices"), nb::arg("faces"),
       "The same mesh with vertices [V, 3] and faces [F, 3] along a space-filling curve: neighbours in space are near "
       "in\n"
       "memory.");
@@ -320,14 +255,10 @@ void bind_mesh(nb::module_& m) {
       "point_bodies",
       [](const PointsIn& vertices, const FacesIn& faces) {
         const Mesh mesh = to_mesh(vertices, faces);
-        std::vector<std::int32_t> body;
-        {
-          nb::gil_scoped_release release;
-          body = point_bodies(mesh);
-        }
-        return to_array<std::int32_t>(std::move(body));
+        std::vector<std::int32_t> body = point_bodies(mesh);
+        return rows<std::int32_t>(std::move(body));
       },
-      nb::arg("vertices"), nb::arg("faces"),
+      Released(), nb::arg("vertices"), nb::arg("faces"),
       "The body [V] of each vertex of a mesh of any quality, numbered from 0 by their first faces, -1 for those of "
       "none:\n"
       "faces are connected where they share a corner, or have corners in one place.");
@@ -337,10 +268,9 @@ void bind_mesh(nb::module_& m) {
           [](PointTree* self, const PointsIn& array) {
             std::vector<Vec3> points = to_points(array);
             require_finite(points);
-            nb::gil_scoped_release release;
             new (self) PointTree(std::move(points));
           },
-          nb::arg("points"))
+          Released(), nb::arg("points"))
       .def(
           "within",
           [](const PointTree& self, const PointsIn& array, const VectorIn& radii, std::size_t most) {
@@ -349,18 +279,15 @@ void bind_mesh(nb::module_& m) {
             if (radii.shape(0) != centres.size()) throw std::invalid_argument("one radius a centre");
             std::vector<std::int64_t> counts(centres.size());
             std::vector<std::int32_t> found;
-            {
-              nb::gil_scoped_release release;
-              for (std::size_t i = 0; i < centres.size() && found.size() <= most; ++i) {
-                if (i % kBetweenPolls == 0) poll_stop();
-                const std::size_t before = found.size();
-                self.within(centres[i], radii(i), found);
-                counts[i] = static_cast<std::int64_t>(found.size() - before);
-              }
+            for (std::size_t i = 0; i < centres.size() && found.size() <= most; ++i) {
+              if (i % kBetweenPolls == 0) poll_stop();
+              const std::size_t before = found.size();
+              self.within(centres[i], radii(i), found);
+              counts[i] = static_cast<std::int64_t>(found.size() - before);
             }
-            return nb::make_tuple(to_array<std::int64_t>(std::move(counts)), to_array<std::int32_t>(std::move(found)));
+            return std::tuple(rows<std::int64_t>(std::move(counts)), rows<std::int32_t>(std::move(found)));
           },
-          nb::arg("centres"), nb::arg("radii"), nb::arg("most") = std::numeric_limits<std::size_t>::max(),
+          Released(), nb::arg("centres"), nb::arg("radii"), nb::arg("most") = std::numeric_limits<std::size_t>::max(),
           "How many points [M] are at most radii [M] away from each centre [M, 3]; their indices, one centre after "
           "the\n"
           "other, ascending. The search ends once more than `most` are found.");

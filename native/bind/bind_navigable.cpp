@@ -41,16 +41,14 @@ void bind_navigable(nb::module_& m) {
           require_finite({half_spaces.back().normal});
         }
         Balls balls;
-        {
-          nb::gil_scoped_release release;
-          const ConvexBody hull(std::move(mesh));
-          const NavigableField field(surface.bvh(), hull, std::move(half_spaces), radius, tolerance);
-          balls = spread_balls(surface, field, sources, pitch, threads);
-        }
-        return nb::make_tuple(to_array<double>(std::move(balls.centres)), to_array<double>(std::move(balls.radii)));
+        const ConvexBody hull(std::move(mesh));
+        const NavigableField field(surface.bvh(), hull, std::move(half_spaces), radius, tolerance);
+        balls = spread_balls(surface, field, sources, pitch, threads);
+        return std::tuple(rows<double>(std::move(balls.centres)), rows<double>(std::move(balls.radii)));
       },
-      nb::arg("surface"), nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("radius"), nb::arg("tolerance"),
-      nb::arg("reachable_only"), nb::arg("seeds").none(), nb::arg("closed"), nb::arg("pitch"), nb::arg("threads") = 0,
+      Released(), nb::arg("surface"), nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("radius"),
+      nb::arg("tolerance"), nb::arg("reachable_only"), nb::arg("seeds").none(), nb::arg("closed"), nb::arg("pitch"),
+      nb::arg("threads") = 0,
       "Balls (centres [B, 3], radii [B]) that stand for the navigable space around a closed surface with this hull.\n\n"
       "Balls come from the seeds [S, 3], or from outside where there are none; closed [P, 4] are half-spaces\n"
       "(unit normal n, offset d) with n.x < d that they keep out of; pitch is the grid's.");
@@ -78,18 +76,15 @@ void bind_navigable(nb::module_& m) {
                 throw std::invalid_argument("ball out of range");
             std::vector<std::int32_t> balls;
             std::vector<double> depths;
-            {
-              nb::gil_scoped_release release;
-              const ConvexBody hull(std::move(mesh));
-              for (const Intrusion& found :
-                   intrusions(hull, self.centres, self.radii, candidates ? &among : nullptr, least, first)) {
-                balls.push_back(found.ball);
-                depths.push_back(found.depth);
-              }
+            const ConvexBody hull(std::move(mesh));
+            for (const Intrusion& found :
+                 intrusions(hull, self.centres, self.radii, candidates ? &among : nullptr, least, first)) {
+              balls.push_back(found.ball);
+              depths.push_back(found.depth);
             }
-            return nb::make_tuple(to_array<std::int32_t>(std::move(balls)), to_array<double>(std::move(depths)));
+            return std::tuple(rows<std::int32_t>(std::move(balls)), rows<double>(std::move(depths)));
           },
-          nb::arg("vertices"), nb::arg("faces"), nb::arg("candidates").none(), nb::arg("least"),
+          Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("candidates").none(), nb::arg("least"),
           nb::arg("first") = false,
           "Which of the candidates (None: of all balls) a convex hull reaches deeper than `least` into: (balls [K],\n"
           "depths [K]), in the order of the candidates. A depth is the ball's radius less the signed distance of its\n"

@@ -1,7 +1,6 @@
 // Python bindings of plane cuts, of the pieces they leave, and of reuniting them.
-#include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
-#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/vector.h>
 
 #include "base/arrays.hpp"
@@ -26,7 +25,7 @@ std::optional<PieceOut> out(std::optional<Piece>&& piece) {
   return piece ? std::optional(out(std::move(*piece))) : std::nullopt;
 }
 
-std::array<std::optional<PieceOut>, 2> out(std::array<std::optional<Piece>, 2>&& sides) {
+std::pair<std::optional<PieceOut>, std::optional<PieceOut>> out(std::array<std::optional<Piece>, 2>&& sides) {
   return {out(std::move(sides[0])), out(std::move(sides[1]))};
 }
 
@@ -42,19 +41,6 @@ void bind_plane_cut(nb::module_& m) {
       nb::arg("least"),
       "The closed sides below and above a plane of a closed mesh: for each its vertices [V, 3], faces [F, 3] and\n"
       "volume, and those of its hull; None for a side of no more than the least volume, or without a hull.");
-  m.def(
-      "halve",
-      [](const PointsIn& vertices, const FacesIn& faces, const PointsIn& hull, bool along_principal, double share,
-         double least) {
-        const Mesh mesh = to_finite_mesh(vertices, faces);
-        std::array<Vec3, 3> axes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-        if (along_principal) axes = principal_axes(mesh.vertices, mesh.faces);
-        return out(halve(mesh, to_points(hull), axes, share, least));
-      },
-      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("hull"), nb::arg("along_principal"), nb::arg("share"),
-      nb::arg("least"),
-      "The sides, as `cut` returns them, of the plane across the longest coordinate axis or principal axis of a mesh\n"
-      "that leaves this share of its length below.");
   m.def(
       "connected_pieces",
       [](const PointsIn& vertices, const FacesIn& faces, double least) {

@@ -11,22 +11,16 @@ void bind_simplifier(nb::module_& m) {
           "__init__",
           [](Simplifier* self, const PointsIn& vertices, const FacesIn& faces) {
             const Mesh mesh = to_finite_mesh(vertices, faces);
-            nb::gil_scoped_release release;
             new (self) Simplifier(mesh);
           },
-          nb::arg("vertices"), nb::arg("faces"))
+          Released(), nb::arg("vertices"), nb::arg("faces"))
       .def(
           "reduce",
           [](Simplifier& self, std::size_t count, int threads) { self.reduce(count, resolve_threads(threads)); },
-          nb::arg("count"), nb::arg("threads") = 1, nb::call_guard<nb::gil_scoped_release>(),
+          nb::arg("count"), nb::arg("threads") = 1, Released(),
           "Collapse edges until at most `count` triangles are left, or hardly any edge can be collapsed.")
       .def(
-          "mesh",
-          [](const Simplifier& self) {
-            Mesh mesh = self.mesh();
-            return nb::make_tuple(to_array<double>(std::move(mesh.vertices)),
-                                  to_array<std::int32_t>(std::move(mesh.faces)));
-          },
+          "mesh", [](const Simplifier& self) { return out(self.mesh()); }, Released(),
           "The vertices [V, 3] and faces [F, 3] reached.");
 }
 

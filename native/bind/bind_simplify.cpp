@@ -1,4 +1,5 @@
 // Python binding of hull simplification.
+
 #include "base/arrays.hpp"
 #include "hull/simplify_hull.hpp"
 
@@ -20,15 +21,11 @@ void bind_simplify(nb::module_& m) {
           above.push_back({{-row[0], -row[1], -row[2]}, -row[3]});
           require_finite({above.back().normal});
         }
-        {
-          nb::gil_scoped_release release;
-          hull = simplify_hull(hull, max_vertices, max_faces, tolerance, above);
-        }
-        return nb::make_tuple(to_array<double>(std::move(hull.vertices)),
-                              to_array<std::int32_t>(std::move(hull.faces)));
+        hull = simplify_hull(hull, max_vertices, max_faces, tolerance, above);
+        return out(std::move(hull));
       },
-      nb::arg("vertices"), nb::arg("faces"), nb::arg("max_vertices"), nb::arg("max_faces"), nb::arg("tolerance"),
-      nb::arg("bounds"),
+      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("max_vertices"), nb::arg("max_faces"),
+      nb::arg("tolerance"), nb::arg("bounds"),
       "A convex hull (vertices [V, 3], faces [F, 3]) around a convex hull with at most max_vertices corners and\n"
       "max_faces triangles and little added volume; corners that cost no more than `tolerance` of distance go anyway.\n"
       "It stays in the half-spaces n.x <= d of bounds [P, 4] (unit n, d), unless the limits leave no such hull.");

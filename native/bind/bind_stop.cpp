@@ -25,7 +25,7 @@ void bind_stop(nb::module_& m) {
               look();
             });
           },
-          nb::arg("look"),
+          nb::arg("look"), nb::sig("def begin(self, look: collections.abc.Callable[[], object]) -> None"),
           "Watch the deadline; `look` is called some ten times a second by polls in this thread, until `end`.")
       .def(
           "end", [](Stop& self) { self.end(); }, "Watch no longer, and forget `look`.")

@@ -16,14 +16,11 @@ void bind_sweep(nb::module_& m) {
         const Mesh mesh = to_mesh(vertices, faces);
         const std::vector<Vec3> normals = to_points(directions);
         const std::vector<double> d(offsets.data(), offsets.data() + offsets.size());
-        std::vector<PlaneScore> scores;
-        {
-          nb::gil_scoped_release release;
-          scores = sweep(mesh, normals, d, threads);
-        }
-        return to_array<double>(std::move(scores));
+        std::vector<PlaneScore> scores = sweep(mesh, normals, d, threads);
+        return rows<double>(std::move(scores));
       },
-      nb::arg("vertices"), nb::arg("faces"), nb::arg("directions"), nb::arg("offsets"), nb::arg("threads") = 0,
+      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("directions"), nb::arg("offsets"),
+      nb::arg("threads") = 0,
       "Scores of the planes n.x = d for unit directions n [K, 3] and ascending offsets d [K, M]: float64 [K * M, "
       "10].\n\n"
       "Columns: hull volume below, above; solid volume below, above; section area, perimeter; thickness below, above;\n"
@@ -37,11 +34,10 @@ void bind_sweep(nb::module_& m) {
         const Mesh mesh = to_finite_mesh(vertices, faces);
         const std::vector<Vec3> normals = to_points(directions);
         const std::vector<double> d(offsets.data(), offsets.data() + offsets.size());
-        nb::gil_scoped_release release;
         return static_cast<std::int64_t>(
             find_least_excess(mesh, normals, d, {exponent, tie, least_solid, slivers}, threads));
       },
-      nb::arg("vertices"), nb::arg("faces"), nb::arg("directions"), nb::arg("offsets"), nb::arg("exponent"),
+      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("directions"), nb::arg("offsets"), nb::arg("exponent"),
       nb::arg("tie"), nb::arg("least_solid"), nb::arg("slivers"), nb::arg("threads") = 0,
       "The first of the planes n.x = d, for unit directions n [K, 3] and ascending offsets d [K, M], whose sides'\n"
       "excesses (volume of the hull less that of the solid) have the least norm; -1 where no plane is valid.\n\n"

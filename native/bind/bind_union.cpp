@@ -20,10 +20,9 @@ void bind_union(nb::module_& m) {
             if (vertices.size() != faces.size()) throw std::invalid_argument("one array of faces a hull");
             std::vector<Mesh> hulls;
             for (std::size_t i = 0; i < vertices.size(); ++i) hulls.push_back(to_finite_mesh(vertices[i], faces[i]));
-            nb::gil_scoped_release release;
             new (self) HullUnion(std::move(hulls), threads);
           },
-          nb::arg("vertices"), nb::arg("faces"), nb::arg("threads") = 0)
+          Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("threads") = 0)
       .def(
           "only", [](const HullUnion& self, const std::vector<std::int32_t>& some) { return self.only(some); },
           nb::arg("some"), "The union of the hulls with these numbers, which are not prepared again.")
@@ -32,47 +31,35 @@ void bind_union(nb::module_& m) {
           [=](const HullUnion& self, double gap, int threads) {
             require_positive(1, gap);
             Mesh mesh;
-            {
-              nb::gil_scoped_release release;
-              HullUnion::Exposed found = self.exposed(gap, threads);
-              mesh = std::move(found.exposed);
-              const auto first = static_cast<std::int32_t>(mesh.vertices.size());
-              mesh.vertices.insert(mesh.vertices.end(), found.unresolved.vertices.begin(),
-                                   found.unresolved.vertices.end());
-              for (const Triangle& face : found.unresolved.faces)
-                mesh.faces.push_back({face[0] + first, face[1] + first, face[2] + first});
-            }
-            return nb::make_tuple(to_array<double>(std::move(mesh.vertices)),
-                                  to_array<std::int32_t>(std::move(mesh.faces)));
+            HullUnion::Exposed found = self.exposed(gap, threads);
+            mesh = std::move(found.exposed);
+            const auto first = static_cast<std::int32_t>(mesh.vertices.size());
+            mesh.vertices.insert(mesh.vertices.end(), found.unresolved.vertices.begin(),
+                                 found.unresolved.vertices.end());
+            for (const Triangle& face : found.unresolved.faces)
+              mesh.faces.push_back({face[0] + first, face[1] + first, face[2] + first});
+            return out(std::move(mesh));
           },
-          nb::arg("gap") = 1e-6, nb::arg("threads") = 0,
+          Released(), nb::arg("gap") = 1e-6, nb::arg("threads") = 0,
           "Surface of the union as triangles (vertices [V, 3], faces [F, 3]); touching facets are no part of it.")
       .def(
           "over",
           [=](const HullUnion& self, const Surface& surface, double tolerance, double gap, int threads) {
             require_positive(tolerance, gap);
-            Greatest found;
-            {
-              nb::gil_scoped_release release;
-              found = self.over(surface.bvh(), tolerance, gap, threads);
-            }
-            return nb::make_tuple(found.lower, found.upper, nb::make_tuple(found.at.x, found.at.y, found.at.z));
+            Greatest found = self.over(surface.bvh(), tolerance, gap, threads);
+            return std::tuple(found.lower, found.upper, std::tuple(found.at.x, found.at.y, found.at.z));
           },
-          nb::arg("surface"), nb::arg("tolerance"), nb::arg("gap") = 1e-6, nb::arg("threads") = 0,
+          Released(), nb::arg("surface"), nb::arg("tolerance"), nb::arg("gap") = 1e-6, nb::arg("threads") = 0,
           "(lower, upper, place) of the greatest distance from the union's surface to the given surface.")
       .def(
           "under",
           [=](const HullUnion& self, const PointsIn& vertices, const FacesIn& faces, double tolerance, int threads) {
             require_positive(tolerance, 1);
             const Mesh mesh = to_finite_mesh(vertices, faces);
-            Greatest found;
-            {
-              nb::gil_scoped_release release;
-              found = self.under(mesh, tolerance, threads);
-            }
-            return nb::make_tuple(found.lower, found.upper, nb::make_tuple(found.at.x, found.at.y, found.at.z));
+            Greatest found = self.under(mesh, tolerance, threads);
+            return std::tuple(found.lower, found.upper, std::tuple(found.at.x, found.at.y, found.at.z));
           },
-          nb::arg("vertices"), nb::arg("faces"), nb::arg("tolerance"), nb::arg("threads") = 0,
+          Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("tolerance"), nb::arg("threads") = 0,
           "(lower, upper, place) of the greatest distance from the mesh's faces to the union as a solid, 0 inside.")
       .def(
           "distance",
@@ -80,17 +67,15 @@ void bind_union(nb::module_& m) {
             const std::vector<Vec3> points = to_points(array);
             require_finite(points);
             std::vector<double> distances(points.size());
-            {
-              nb::gil_scoped_release release;
-              constexpr std::size_t kChunk = 64;
-              parallel_for((points.size() + kChunk - 1) / kChunk, threads, [&](std::size_t chunk) {
-                for (std::size_t i = chunk * kChunk; i < std::min(points.size(), (chunk + 1) * kChunk); ++i)
-                  distances[i] = self.distance(points[i]);
-              });
-            }
-            return to_array<double>(std::move(distances));
+            constexpr std::size_t kChunk = 64;
+            parallel_for((points.size() + kChunk - 1) / kChunk, threads, [&](std::size_t chunk) {
+              for (std::size_t i = chunk * kChunk; i < std::min(points.size(), (chunk + 1) * kChunk); ++i)
+                distances[i] = self.distance(points[i]);
+            });
+            return rows<double>(std::move(distances));
           },
-          nb::arg("points"), nb::arg("threads") = 0, "Distances [N] of points [N, 3] to the solid, 0 inside a hull.");
+          Released(), nb::arg("points"), nb::arg("threads") = 0,
+          "Distances [N] of points [N, 3] to the solid, 0 inside a hull.");
 }
 
 }  // namespace rlacd

@@ -44,18 +44,6 @@ std::array<std::optional<Piece>, 2> cut(const Mesh& mesh, Vec3 normal, double of
   return {piece_of(capped(std::move(sides[0]), normal), least), piece_of(capped(std::move(sides[1]), -normal), least)};
 }
 
-std::array<std::optional<Piece>, 2> halve(const Mesh& mesh, const std::vector<Vec3>& hull,
-                                          const std::array<Vec3, 3>& axes, double share, double least) {
-  Vec3 across;
-  double lowest = 0, longest = -1;
-  for (const Vec3 axis : axes) {
-    double low = std::numeric_limits<double>::infinity(), high = -low;
-    for (const Vec3 p : hull) low = std::min(low, dot(p, axis)), high = std::max(high, dot(p, axis));
-    if (high - low > longest) longest = high - low, lowest = low, across = axis;
-  }
-  return cut(mesh, across, lowest + share * longest, least);
-}
-
 std::optional<std::vector<Piece>> connected_pieces(const Mesh& mesh, double least) {
   std::vector<Mesh> all = bodies(mesh);
   if (all.size() == 1) return std::nullopt;

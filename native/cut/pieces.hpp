@@ -23,10 +23,6 @@ std::optional<Piece> piece_of(Mesh mesh, double least);
 
 std::array<std::optional<Piece>, 2> cut(const Mesh& mesh, Vec3 normal, double offset, double least);
 
-// Across the longest of three axes, with a share of its length below.
-std::array<std::optional<Piece>, 2> halve(const Mesh& mesh, const std::vector<Vec3>& hull,
-                                          const std::array<Vec3, 3>& axes, double share, double least);
-
 // Nothing if all is one piece.
 std::optional<std::vector<Piece>> connected_pieces(const Mesh& mesh, double least);
 

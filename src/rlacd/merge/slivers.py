@@ -57,7 +57,7 @@ def drop_slivers(parts: Sequence[Part], run: Run, suspects: Sequence[Part] | Non
     def is_missed(own: int) -> bool:
         others = stood_in[own] = kept & _near(boxes, boxes[own])
         some = np.flatnonzero(others)
-        return len(some) == 0 or _misses(union.only(number[some]), parts[own], run.threads)
+        return len(some) == 0 or _misses(union.only(number[some].tolist()), parts[own], run.threads)
 
     smallest_first = sorted(slivers, key=lambda i: parts[i].hull.volume)
     for own in smallest_first:

@@ -23,6 +23,10 @@ LOST = 1e-6
 """Share of a solid's volume that may be lost in a boolean, or as shavings (see `rlacd.cut`)."""
 
 
+Piece = tuple[FloatArray, IntArray, float, FloatArray, IntArray, float]
+"""What kernels make of a solid: vertices [V, 3], faces [F, 3] and volume, and those of its hull."""
+
+
 @dataclass(frozen=True)
 class Plane:
     """The plane n.x = d, n a unit normal; *below* is n.x < d, *above* n.x > d."""
@@ -229,11 +233,11 @@ class Component(Part):
         self._threads = threads
 
     @classmethod
-    def of(cls, piece: _native.Piece, within: Component | None = None) -> Component:
+    def of(cls, piece: Piece, within: Component | None = None) -> Component:
         """Take over what a kernel made."""
-        vertices, faces, volume, *hull = piece
+        vertices, faces, volume, corners, facets, hull_volume = piece
         component = cls.__new__(cls)
-        Part.__init__(component, vertices, faces, volume, Hull(*hull))
+        Part.__init__(component, vertices, faces, volume, Hull(corners, facets, hull_volume))
         component._threads = 1
         component.within = within
         return component
@@ -261,13 +265,6 @@ class Component(Part):
         """Cut by a plane: returns the sides below and above, None for a side of no more than the least volume."""
         below, above = _native.cut(self.vertices, self.faces, *plane.normal, plane.offset, least)
         return below and Component.of(below, self), above and Component.of(above, self)
-
-    def halve(self, along_principal: bool, share: float) -> list[Component]:
-        """Cut across the longest coordinate axis or principal axis, a share of its length below; empty if it fails."""
-        below, above = _native.halve(
-            self.vertices, self.faces, self.hull.vertices, along_principal, share, NEGLIGIBLE_VOLUME
-        )
-        return [] if below is None or above is None else [Component.of(below, self), Component.of(above, self)]
 
     def inside(self, hull: Hull) -> Part:
         """Return all that the solid fills of a hull, closed by caps on the hull's facets; without faces if nothing."""

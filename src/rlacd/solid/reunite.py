@@ -22,8 +22,7 @@ def reunite(components: Sequence[Component]) -> Component | None:
     components = _joined_again(components)
     if len(components) == 1:
         return components[0]
-    surfaces = [(component.vertices, component.faces) for component in components]
-    whole = _native.reunite(*map(list, zip(*surfaces, strict=True)), NEGLIGIBLE_VOLUME)
+    whole = _native.reunite([one.vertices for one in components], [one.faces for one in components], NEGLIGIBLE_VOLUME)
     return whole and Component.of(whole)
 
 
