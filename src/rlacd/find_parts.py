@@ -20,7 +20,7 @@ from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
 from rlacd.proxy import Model
 from rlacd.repair.repair import repair
 from rlacd.run import Run
-from rlacd.search import SearchContext, SearchSummary, at_least, eliminate_parts, search
+from rlacd.search import SearchContext, SearchSummary, at_least, cost, eliminate_parts, search
 from rlacd.solid.component import Component, Part
 from rlacd.solid.cover import cover
 from rlacd.solid.hull import Hull
@@ -159,15 +159,21 @@ class _Decomposer:
         given = options.quality, options.budget, options.search_steps
         quality, seconds, steps = given if asked is not None else ("balanced", None, None)
         assert quality is not None, "filled in by the options"
+        eliminates = options.merge and goal.eliminates and policy not in AS_PUBLISHED
+        searches = options.quality != "fast"
+        first = eliminates and (not searches or goal.obstacles is not None)
         try:
-            if options.merge and goal.eliminates and policy not in AS_PUBLISHED and run.stopped_by is None:
+            if first and run.stopped_by is None:
                 with run.stage("search"):
                     parts = eliminate_parts(context, parts, run)
-            if options.quality != "fast" and run.stopped_by is None:
+            if searches and run.stopped_by is None:
                 with run.stage("search"):
                     if asked is not None:
                         context = replace(context, enough=at_least(self.model.solid, parts, asked.overhang, run))
-                    parts, found = search(context, parts, run, quality, seconds, steps, policy)
+                    merged = parts
+                    parts, found = search(context, merged, run, quality, seconds, steps, policy)
+                    if eliminates and not first and run.stopped_by is None:  # no level is worse than the one before it
+                        parts = min(parts, eliminate_parts(context, merged, run), key=cost)
         except Stopped:
             run.note_stop()
         return parts, found

@@ -147,7 +147,7 @@ class Distance(Criterion):
 
     @property
     def eliminates(self) -> bool:
-        """Yes: a quarter more time saves a ninth of the parts, and the parts around a hole need not be 8, 16 or 32."""
+        """Yes: a third more time saves a tenth of the parts, and the parts around a hole need not be 8, 16 or 32."""
         return True
 
     @property

@@ -12,9 +12,6 @@ from rlacd.options.lengths import LENGTH, relative
 
 Point: TypeAlias = tuple[float, float, float]
 
-NAVIGABLE = "navigable"
-"""The criterion's name on the command line."""
-
 SHARES = (1e-4, 10.0)
 """Shares of the longest side that radius and tolerance may be: less takes no end of balls, more fills everything."""
 
