@@ -41,7 +41,7 @@ with open("/dev/null", "w") as sys.stdout:
         import numpy, rlacd.cli.main, rlacd.io.write
         rlacd.decompose(([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), threads=1)
         numpy.ones((64, 64)) @ numpy.ones((64, 64))
-        rlacd.cli.main.main()
+        rlacd.cli.main.app()
     except SystemExit:
         sys.argv, sys.stdout = argv, sys.__stdout__
 held = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()

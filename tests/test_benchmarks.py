@@ -26,7 +26,7 @@ from benchmarks.runner import Bench, Limits, find_meshes
 from benchmarks.store import Store, Task, load_hulls, save_hulls
 from benchmarks.tables import Ratio, Table, common_meshes, fill, ratio_of
 from benchmarks.tuning import CLOSE, next_setting, tune
-from click.testing import CliRunner
+from typer.testing import CliRunner
 
 import rlacd
 from rlacd.errors import MissingExtraError, OptionError, OutputError

@@ -11,7 +11,7 @@ import trimesh
 from benchmarks import simulate
 from benchmarks.handle import handle_in_mujoco
 from benchmarks.physics import app
-from click.testing import CliRunner
+from typer.testing import CliRunner
 
 import rlacd
 

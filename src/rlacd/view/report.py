@@ -19,11 +19,6 @@ from rlacd.view.render import Render, render
 from rlacd.view.scene import heat_scene, scene
 
 
-def is_html(path: str | os.PathLike[str]) -> bool:
-    """Tell from its name whether a report should be an HTML page."""
-    return Path(path).suffix.lower() in (".html", ".htm")
-
-
 def check_report_page(path: str | os.PathLike[str], up: str | None = None) -> Path:
     """Check, before any work, that `save_report_page` will be able to write to `path`.
 
@@ -35,7 +30,7 @@ def check_report_page(path: str | os.PathLike[str], up: str | None = None) -> Pa
         The place is not writable.
     """
     place = Path(read(path_like(), "path", path))
-    if not is_html(place):
+    if place.suffix.lower() not in (".html", ".htm"):
         raise OptionError(f"cannot write the report {shown(str(place))}: it must end in .html; rename it.")
     check_up(up)
     check_file(place)
