@@ -408,7 +408,14 @@ def test_text_ply_is_read_whole_or_refused(kind: str, tail: bytes, tmp_path: Pat
     mesh = load_mesh(path)
     np.testing.assert_allclose(mesh.vertices, np.array([line.split() for line in lines[:40]], float)[:, [0, 2, 3]])
     assert mesh.faces.tolist() == faces.tolist()
-    for end in ("", "3 1 nan 2", "3 1 2", "3 1 0.5 2", "3 1 -1 2", "3 1 40 2"):
+    path.write_bytes(path.read_bytes().replace(b"format ascii", b"format\tASCII"))
+    np.testing.assert_array_equal(load_mesh(path).vertices, mesh.vertices)
+    twice = head.replace("element face", "element face 60\nproperty list uchar int vertex_indices\nelement face")
+    for wrong in (twice, head[3:]):
+        path.write_bytes(wrong.encode() + "\n".join(lines).encode() + tail)
+        with pytest.raises(MeshFileError, match="damaged"):
+            load_mesh(path)
+    for end in ("", "3 1 nan 2", "3 1 2", "3 1 0 2 5", "3 1 0.5 2", "3 1 -1 2", "3 1 40 2"):
         path.write_bytes(head.encode() + "\n".join([*lines[:-1], end]).encode() + tail)
         with pytest.raises(MeshFileError, match=r"damaged|cut off"):
             load_mesh(path)
@@ -498,6 +505,14 @@ def test_an_obj_counted_from_zero_is_refused(tmp_path, corner):
     (tmp_path / "box.obj").write_text(OBJ + f"f 1 2 {corner}\n")
     with pytest.raises(MeshFileError, match="counts from 1"):
         load_mesh(tmp_path / "box.obj")
+
+
+def test_a_text_stl_that_is_cut_off_and_points_of_uneven_lines_are_refused(tmp_path):
+    whole = BOX.export(file_type="stl_ascii")
+    for name, text in (("box.stl", whole[: whole.rindex("endsolid")]), ("box.xyz", "0 0 0\n1 0 0 1\n0 1 0\n")):
+        (tmp_path / name).write_text(text)
+        with pytest.raises(MeshFileError, match="damaged or cut off"):
+            load_mesh(tmp_path / name)
 
 
 def test_an_stl_is_read_whole_whatever_its_encoding_and_line_ends(tmp_path):

@@ -145,5 +145,7 @@ def _found(path: Path, uris: list[str], endings: frozenset[str]) -> dict[str, by
     files, found = FolderFiles(path.parent, endings), {}
     for name in sorted({spelled for uri in uris for spelled in (uri, unquote(uri))}):
         with contextlib.suppress(FileNotFoundError):
-            found[name] = files.get(name, unquoted=False)
+            data = files.get(name, unquoted=False)
+            if len(data) + sum(map(len, found.values())) <= LARGEST_FILE:  # one file may have many names
+                found[name] = data
     return found

@@ -59,6 +59,7 @@ class _Lists:
 
     def __init__(self, body: bytes, at: int, element: _Element) -> None:
         self._body, self._element, self._stride = body, element, 0
+        self._begins: list[int] = []
         names = [name for name, _, length in element.properties if length is not None]
         self.places: dict[str, list[int]] = {name: [] for name in names}
         self.counts: dict[str, list[int]] = {name: [] for name in names}
@@ -77,6 +78,7 @@ class _Lists:
             for name, kind, length in self._element.properties
         ]
         for _ in range(rows):
+            self._begins.append(at)
             for name, size, length in steps:
                 if length is None:
                     at += size
@@ -104,6 +106,12 @@ class _Lists:
         self._stride, self.end = stride, at + rows * stride
         return True
 
+    def begins(self) -> IntArray:
+        """Where each row begins."""
+        if self._stride:
+            return self._begins[0] + self._stride * np.arange(self._element.count)
+        return np.array(self._begins, dtype=np.int64)
+
     def items(self, name: str) -> tuple[IntArray, IntArray]:
         """The lengths of all lists of a name, and all their items."""
         (kind,) = (kind for other, kind, length in self._element.properties if other == name and length is not None)
@@ -128,14 +136,8 @@ def read_ply(path: Path, content: bytes) -> Contents:
     MeshFileError, MeshDataError, ValueError
         It is damaged, shorter than it declares, or takes too much memory.
     """
-    is_text = _TEXT.search(content[:1000]) is not None
-    if is_text:
-        check_text(path, content)
-        content = plain_text(content)
-    end = _END.search(content)
-    if end is None or not content.startswith(b"ply"):
-        raise ValueError("its header has no end, or does not begin with ply")
-    header, body = content[: end.end()], content[end.end() :]
+    content, is_text, end = _header(path, content)
+    header, body = content[:end], content[end:]
     elements = _elements(header, is_text)
     for name, element in elements.items():
         if element.count > len(body):
@@ -151,22 +153,37 @@ def read_ply(path: Path, content: bytes) -> Contents:
         begin = at
         if any(length is not None for *_, length in element.properties):
             lists = _Lists(body, at, element)
-            at = lists.end
+            at, begins = lists.end, lists.begins()
             if name in ("face", STRIPS) and element.count:
                 faces.append(_triangles(lists, name == STRIPS, points))
         else:
             record = np.dtype([(field, kind) for field, kind, _ in element.properties])
+            begins = at + record.itemsize * np.arange(element.count)
             at += element.count * record.itemsize
             if at > len(body):
                 raise ValueError(f"its header declares {element.count} {name} lines")
             if name == "vertex":
                 rows = np.frombuffer(body, record, element.count, begin)
                 points = np.stack([rows[axis].astype(np.float64) for axis in "xyz"], axis=1)
-        if lines is not None and np.searchsorted(lines, at) - np.searchsorted(lines, begin) != element.count:
-            raise ValueError(f"its {element.count} {name} lines are longer or shorter than they should be")
+        if lines is not None:
+            own = lines[np.searchsorted(lines, begin) :][: element.count + 1]
+            if not np.array_equal(own, np.append(begins, at)):
+                raise ValueError(f"a {name} line of another length than declared")
     described = _DESCRIBED.search(header) is not None and STRIPS not in elements
     asset = Asset(content, path, "ply") if described and header.count(b"\n") < MOST_FIELDS else None
     return Contents(one_shape(path.stem, points, np.concatenate(faces)), asset=asset)
+
+
+def _header(path: Path, content: bytes) -> tuple[bytes, bool, int]:
+    """A file, its text plain; whether it is text; and where its header ends."""
+    is_text = _TEXT.search(content[:1000]) is not None
+    if is_text:
+        check_text(path, content)
+        content = plain_text(content)
+    end = _END.search(content)
+    if end is None or not content.startswith(b"ply"):
+        raise ValueError("its header has no end, or does not begin with ply")
+    return content, is_text, end.end()
 
 
 def scene_of_ply(path: Path, content: bytes) -> trimesh.Scene:
@@ -190,6 +207,8 @@ def _elements(header: bytes, is_text: bool) -> dict[str, _Element]:
                 last.properties.append((name, order + kinds[0], order + kinds[1]))
             case ["property", kind, name]:
                 last.properties.append((name, order + ("f8" if is_text else _KINDS[kind]), None))
+            case ["element" | "property", *_]:
+                raise ValueError(f"{line!r:.40} in its header")
     return found
 
 

@@ -41,6 +41,8 @@ def triangles_of(points: FloatArray, counts: IntArray, corners: IntArray) -> Int
 
 def places_of(points: FloatArray, counts: IntArray, corners: IntArray) -> IntArray:
     """The triangles of `triangles_of` as places in ``corners``."""
+    if (counts == 3).all():
+        return np.arange(len(corners)).reshape(-1, 3)
     places, owner = fans_of(counts)
     begins = np.searchsorted(owner, np.arange(len(counts) + 1))
     first = np.cumsum(counts) - counts
