@@ -28,7 +28,7 @@ from rlacd.search.recut import Exchange, recut
 from rlacd.search.redistribute import redistribute
 from rlacd.solid.component import Part
 
-LAG = 8
+LAG = 4
 """A trial starts from the state that all trials but the `LAG` - 1 before it have left, so that many can be under way
 at a time. It does not depend on the number of threads, so neither does the result."""
 
@@ -158,14 +158,16 @@ class Neighbourhood:
 
     def _recuts(self, most: float) -> Iterator[tuple[_Trial, Cluster]]:
         """Recut clusters until `most` steps are made in total."""
+        failed = 0
         while self._steps < most and self._may_continue():
             drawn = self._recutting()
             if drawn is not None:
+                failed = 0
                 self._steps += 1
                 yield drawn
             elif self._begun:  # parts that are being recut may be drawn again, or others in their place
                 self._settle()
-            else:
+            elif (failed := failed + 1) == LAG:
                 self._exhausted = True
                 return
 
@@ -229,11 +231,12 @@ class Neighbourhood:
 
     @property
     def _allowance(self) -> float:
-        """Units for another trial: an equal share of what is left, without what those under way may use."""
-        left = self._run.work.left
-        if math.isinf(left):
-            return left
-        return (left - sum(begun.run.work.most for begun in self._begun)) // (LAG - len(self._begun))
+        """Units for another trial: an equal share of what those under way leave, or twice what the last ones took."""
+        free = self._run.work.left
+        if math.isinf(free):
+            return free
+        free -= sum(begun.run.work.most for begun in self._begun)
+        return max(free // (LAG - len(self._begun)), min(free, 2 * self._price))
 
     def _settle(self) -> None:
         """Apply what the first of the trials under way has found, unless parts that it changes have gone."""
