@@ -28,7 +28,7 @@ from rlacd.repair.union import CrossingsError, hull_of_points, one_body, unite, 
 from rlacd.repair.voxels import GAP
 from rlacd.repair.walls import are_unbuilt, build_slabs, build_walls, has_sheets, skins
 from rlacd.repair.windings import are_crowded, are_oriented, sort_out, take_as_they_are
-from rlacd.repair.work import Piece, Wanted, Work
+from rlacd.repair.work import Piece, Wanted, Work, query_of
 from rlacd.repair.wraps import (
     fill_rooms,
     fill_slits,
@@ -167,7 +167,7 @@ def repair(
     poll_stop()
     welded_vertices, welded_faces, is_film = _native.weld(points, corners)
     taken = one_body(welded_vertices, welded_faces)
-    if taken is not None and not (len(corners) <= MOST_TANGLED and is_tangle(SurfaceQuery(*taken[0], threads))):
+    if taken is not None and not (len(corners) <= MOST_TANGLED and is_tangle(query_of(taken[0], threads))):
         shape, was_inward = taken
         row = BodyRepair(0, "reoriented" if was_inward else "closed", len(welded_faces), len(welded_faces), 0.0)
         return Solid(shape, (welded_vertices, welded_faces), frame, (row,), mesh.warnings, is_as_given=True)

@@ -80,7 +80,8 @@ class Reach:
         cells = np.flatnonzero(np.isin(self.room, rooms))
         at = np.stack(np.unravel_index(cells, self.room.shape), axis=1)
         some = at.sum(axis=1) % 4 == 0  # some in each layer of cells
-        return cells[some][~solid.inside(self.origin + at[some] * self.pitch)]
+        outside: IntArray = cells[some][~solid.inside(self.origin + at[some] * self.pitch)]
+        return outside
 
     def volumes(self, rooms: IntArray) -> FloatArray:
         """Return the volume of the cells of each of some rooms: where the ball's centre may be."""
@@ -98,10 +99,11 @@ class Reach:
         return nearest_labels(self.room, cell, self.radius / self.pitch + 2 + _ROUNDING)
 
     def around_cells(self, cells: IntArray) -> BoolArray:
-        """Return ``[X, Y, Z]`` the unreachable cells at some cells of rooms, and those of the walls there."""
+        """Return ``[X, Y, Z]`` the unreachable cells of rooms at and between some cells, and of their walls there."""
         mark = np.zeros(self.room.shape, dtype=bool)
         mark.ravel()[cells] = True
-        return _grown(mark, self.radius / self.pitch + 2) & ~self.reached
+        between = _grown(mark, 2) & (self.room > 0)
+        return _grown(between, self.radius / self.pitch + 2) & ~self.reached
 
     def around_points(self, points: FloatArray) -> BoolArray:
         """Return ``[X, Y, Z]`` the unreachable cells at and between some points."""
@@ -123,8 +125,10 @@ class Reach:
         closest, _ = surface.closest(points)
         away = points - closest
         distance = np.linalg.norm(away, axis=1)
-        is_free = np.ones(len(points), dtype=bool) if solid is None else ~solid.inside(points)
         attached = distance <= 2 * self.pitch
+        is_free = np.ones(len(points), dtype=bool)
+        if solid is not None:
+            is_free[attached] = ~solid.inside(points[attached])
         step = thickness / np.maximum(distance, np.finfo(float).tiny)
         moved = attached & is_free
         points[moved] = (closest + np.minimum(step, 1)[:, None] * away)[moved]

@@ -45,6 +45,11 @@ class Wanted:
     keep_cavities: bool
 
 
+def query_of(solid: Shape, threads: int | None) -> SurfaceQuery:
+    """Queries of a solid."""
+    return SurfaceQuery(*to_arrays(solid), threads)
+
+
 class Piece(NamedTuple):
     """A closed solid that a body, or some of its faces, became.
 
@@ -113,7 +118,7 @@ class Work:
     def query(self) -> SurfaceQuery:
         """Queries of the solid as it is now."""
         if self._asked is None or self._asked[0] is not self.solid:
-            self._asked = self.solid, SurfaceQuery(*to_arrays(self.solid), self.surface.threads)
+            self._asked = self.solid, query_of(self.solid, self.surface.threads)
         return self._asked[1]
 
     @property

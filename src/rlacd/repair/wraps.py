@@ -9,10 +9,10 @@ from rlacd._native import poll_stop
 from rlacd.repair.distance import SurfaceQuery, once_in_each_place, points_covering, spread_points
 from rlacd.repair.soup import Soup, boxes_of, face_normals, no_faces
 from rlacd.repair.tangles import MOST_TANGLED, is_tangle, tangled_bodies
-from rlacd.repair.union import MOST_UNITED, area_of, as_manifold, slab_of_faces, to_arrays, tunnels_in, unite, volume_of
+from rlacd.repair.union import MOST_UNITED, area_of, as_manifold, slab_of_faces, tunnels_in, unite, volume_of
 from rlacd.repair.voxels import GAP, Reach
 from rlacd.repair.walls import skins
-from rlacd.repair.work import Piece, Work
+from rlacd.repair.work import Piece, Work, query_of
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.thickness import HALF_THICKNESS
@@ -25,7 +25,7 @@ _ROOM = 0.01
 # A slit is filled from this depth on, up to this width (multiples of the gap), if all slits hold no more than this
 # share of the volume: what is shallower needs no cut, and what is wider leaves steps of the grid. It may have no
 # volume, but this share of the surface has to go with the slits.
-_DEEP, _HAIR, _LITTLE, _BARED = 1.25, 1 / 16, 3e-3, 0.004
+_DEEP, _HAIR, _LITTLE, _BARED = 1.5, 1 / 16, 3e-3, 0.004
 # Noise leaves slits between walls of dense bodies that touch, full of bridges: a union with so many tunnels has them.
 _TUNNELS = 25
 # More sheets than this are not united one by one: that would take seconds, and cutting the result even longer. Neither
@@ -120,8 +120,7 @@ def fill_rooms(work: Work) -> None:
     if len(cells) == 0:
         return
     rooms = np.unique(reach.room.ravel()[cells])
-    has_shells = bool(np.isin(in_shells, rooms).any())
-    wrap = _wrap(work, reach.around_cells(cells), _WRAP_ERROR, work.query() if has_shells else None)
+    wrap = _wrap(work, reach.around_cells(cells), _WRAP_ERROR, work.query())
     left, walled = _sheets_but_walls(work, rooms, wrap)
     parts = work.parts
     # More parts than can be united overlap in what was made of them.
@@ -158,7 +157,7 @@ def _sheets_but_walls(work: Work, rooms: IntArray, wrap: Manifold) -> tuple[Soup
     is_wall = np.bincount(on, is_elsewhere, len(sheets.faces)) == 0
     bodies = np.unique(sheets.body[is_wall])
     points, on = points[is_wall[on]], on[is_wall[on]]
-    wrapped = SurfaceQuery(*to_arrays(wrap), work.surface.threads)
+    wrapped = query_of(wrap, work.surface.threads)
 
     def is_left_out(points: FloatArray) -> BoolArray:
         away = wrapped.distance(points) > HALF_THICKNESS
