@@ -7,13 +7,13 @@ sheet. Whether a hole may be closed is decided by the first of these questions t
 - Is it a wound? It has few edges, and its cap smoothly continues the faces around it, as at missing faces. Around the
   mouth of a bottle, faces turn away from the cap. A mesh with many wounds gets its other small holes closed too. A hole
   with another body all along its rim, such as a counter's with a basin in it, is no wound, nor is a round ring.
-- Is it small beside its body, and its cap not far from the surface? Where a tube ends, it may be larger: one end of a
-  bar may be open where it was joined to something, and so may both if they are not round, as a pipe's are.
+- Is it small beside its body, and its cap not far from the surface? Where a tube ends, it may be larger if it is the
+  only hole: one end of a bar may be open where it was joined to something. A pipe has two.
 """
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -25,6 +25,7 @@ from rlacd.repair.cracks import MOST_FREE_EDGES
 from rlacd.repair.distance import SurfaceQuery, affordable, spread_points
 from rlacd.repair.rims import Rims, rims_of
 from rlacd.repair.soup import FLAPS, Soup
+from rlacd.repair.tangles import is_tangle
 from rlacd.repair.windings import trust_windings
 from rlacd.repair.work import Work
 from rlacd.solid.frame import FloatArray
@@ -205,11 +206,17 @@ class _Caps:
         flap = np.concatenate([rims.flap, no_cap])[kept]
         return trust_windings(Soup(soup.vertices, faces, owners, trusted).only(kept), self._bodies, flap), flap
 
-    def have_inside(self, closed: Soup, flap: BoolArray) -> BoolArray:
-        """Return ``[bodies]`` the bodies that caps give an inside: a strip whose cap lies on itself stays a sheet."""
+    def useful(self, chosen: BoolArray, closed: Soup, flap: BoolArray) -> BoolArray:
+        """Return ``[bodies]`` the chosen bodies to which caps give an inside: a strip whose cap lies on it has none."""
         volume = np.bincount(closed.body_of_side, np.maximum(closed.sides.volume, 0), self._bodies)
         has_volume = volume > HALF_THICKNESS / 2 * np.bincount(closed.body, closed.area, self._bodies)
-        return np.asarray(has_volume & (closed.sheet_share(self._bodies, flap) <= FLAPS))
+        has_inside = np.asarray(chosen & has_volume & (closed.sheet_share(self._bodies, flap) <= FLAPS))
+        # Caps that lead away from the surface may cross the body, and turn it inside out in places.
+        for one in {hole.body for hole in self.holes if hole.depth > self._gap and has_inside[hole.body]}:
+            faces = closed.faces[(closed.body == one) & ~flap]
+            outward = faces if signed_tetrahedra(closed.vertices, faces).sum() > 0 else faces[:, ::-1]
+            has_inside[one] = not is_tangle(SurfaceQuery(closed.vertices, outward))
+        return has_inside
 
     def by_room(self) -> BoolArray:
         """Return ``[bodies]`` the bodies with caps that may lead where they do only because nothing can reach them."""
@@ -243,7 +250,7 @@ def close_holes(work: Work) -> None:
     caps = _Caps(work, rims)
     chosen = caps.may_be_closed()
     closed, flap = caps.added(chosen)
-    useful = chosen & caps.have_inside(closed, flap)
+    useful = caps.useful(chosen, closed, flap)
     if (useful != chosen).any():
         closed, _ = caps.added(useful)
     work.record.note(caps.bodies_of(useful), "capped")
@@ -254,14 +261,10 @@ def close_holes(work: Work) -> None:
 
 
 def _find_ends(holes: list[_Hole]) -> None:
-    """Mark the ends of bars: a pipe has two round ones."""
-    of_body: dict[int, list[_Hole]] = defaultdict(list)
+    """Mark the ends of bars: the only hole of a body; a pipe has two."""
+    count = Counter(hole.body for hole in holes)
     for hole in holes:
-        of_body[hole.body].append(hole)
-    for own in of_body.values():
-        is_bar = len(own) == 1 or not any(hole.is_ring for hole in own)
-        for hole in own:
-            hole.is_end = is_bar and hole.is_tube
+        hole.is_end = hole.is_tube and count[hole.body] == 1
 
 
 def _find_wounds(holes: list[_Hole]) -> None:
