@@ -16,7 +16,7 @@ from rlacd.cli.terminal import summary
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
 from rlacd.run import Run
-from rlacd.search.at_least import MISSED, at_least
+from rlacd.search.at_least import UNCOVERED, at_least
 from rlacd.solid.component import Component
 from tests.shapes import Closed, Floats, box, depth_in, from_manifold
 
@@ -36,7 +36,7 @@ def mesh_of(solid: Manifold) -> trimesh.Trimesh:
     return trimesh.Trimesh(closed.vertices, closed.faces, process=False)
 
 
-def apart(solid: Component, points: Floats, reach: float = REACH + MISSED) -> Floats:
+def apart(solid: Component, points: Floats, reach: float = REACH + UNCOVERED) -> Floats:
     return points[_native.apart_points(solid.filling.surface, points, reach, len(points))]
 
 
@@ -66,7 +66,7 @@ def test_pairs_that_are_apart_pass_a_place_that_is_far_from_the_solid() -> None:
     for a, b in itertools.combinations(found, 2):
         between = a + np.linspace(0, 1, 400)[:, None] * (b - a)
         outside = solid.filling.surface.winding(between) < 0.5
-        assert (solid.filling.surface.distance(between)[outside] > REACH + MISSED).any()
+        assert (solid.filling.surface.distance(between)[outside] > REACH + UNCOVERED).any()
 
 
 def test_what_lies_in_a_cavity_is_not_open_to_the_outside() -> None:
@@ -88,7 +88,7 @@ def test_no_valid_hull_of_a_real_mesh_holds_two_of_the_points(corpus: Path, name
     assert len(found) > 3
     for options in ({}, {"quality": "fast"}, {"threshold": 0.03}, {"seed": 5}, {"policy": "navacd", "quality": "fast"}):
         for hull in rlacd.decompose(mesh, threads=1, **options):
-            inside = depth_in(Closed(solid.frame.to_frame(hull.vertices), np.asarray(hull.faces)), found) > -MISSED
+            inside = depth_in(Closed(solid.frame.to_frame(hull.vertices), np.asarray(hull.faces)), found) > -UNCOVERED
             assert inside.sum() <= 1
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from manifold3d import Manifold
 
-from rlacd.merge.slivers import MISSED, drop_slivers, is_film, is_sliver
+from rlacd.merge.slivers import SLIVER_LOSS, drop_slivers, is_film, is_sliver
 from rlacd.planes.candidates import OFFSETS_PER_AXIS, axis_and_principal
 from rlacd.policies import SCORES, Greedy
 from rlacd.run import Run
@@ -94,7 +94,7 @@ def test_of_a_stack_of_slivers_enough_stay_for_all_of_them() -> None:
     assert len(kept) < len(stack)
     tops = np.array([part.vertices[:, 2].max() for part in kept])
     for part in stack:
-        assert np.abs(tops - part.vertices[:, 2].max()).min() <= MISSED + 0.0015
+        assert np.abs(tops - part.vertices[:, 2].max()).min() <= SLIVER_LOSS + 0.0015
 
 
 def test_many_slivers_are_compared_at_once(monkeypatch) -> None:

@@ -156,4 +156,6 @@ def test_the_command_offers_every_argument_of_the_function() -> None:
     command = app.get_command(click.Context(app), "decompose")
     assert command is not None
     offered = {parameter.name for parameter in command.params}
-    assert set(inspect.signature(rlacd.decompose).parameters) - {"progress"} <= offered
+    assert (
+        set(inspect.signature(rlacd.decompose).parameters) - {"progress", "volume_tolerance"} <= offered
+    )  # --tolerance

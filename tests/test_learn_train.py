@@ -246,7 +246,7 @@ def test_when_no_process_can_play_that_is_one_clear_error(meshes: Path, tmp_path
 def test_solids_without_anything_to_cut_are_one_clear_error(
     meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rlacd.learn.rollouts.TRIES", 100)
+    monkeypatch.setattr("rlacd.learn.rollouts.SOLIDS_TRIED", 100)
     for path in meshes.rglob("*.ply"):
         if path.stem not in ("box", "broken"):
             path.unlink()

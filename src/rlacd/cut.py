@@ -17,10 +17,10 @@ from rlacd.solid.component import Component, Plane
 FILM = 2e-4
 """Mean thickness (twice the volume over the area) below which a piece may be a shaving; sheets are 10 times thicker."""
 
-MISSED = 1e-3
+SHAVING = 1e-3
 """No point of a shaving is farther than this from the solid across the cut."""
 
-MANY = 1000
+MANY_COMPONENTS = 1000
 """With more components than this, the policy may have failed: there are solids that one breaks into thousands of parts
 and another into tens (research/learning.md). So a second one is tried, ..."""
 
@@ -69,7 +69,7 @@ class CutTree:
     """The tree of cuts that a policy makes of a solid, computed on demand.
 
     Which plane cuts a component does not depend on the criterion's threshold, so a coarser criterion only stops higher
-    up in the same tree. Only where there are more than `MANY` components, a second policy may take over for good.
+    up in the same tree. Only with more than `MANY_COMPONENTS` components, a second policy may take over for good.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ class CutTree:
         left : list of Component
             Components that do not: no plane cuts them, the run ended, or there would be more than `most`.
         """
-        run, many = self._run, MANY
+        run, many = self._run, MANY_COMPONENTS
         begin = run.work.done
         done: list[Component] = []
         left: list[Component] = []
@@ -186,7 +186,7 @@ def halves(film: Component) -> list[Component]:
     """
     lower, upper = film.box
     axis = int(np.argmax(upper - lower))
-    if upper[axis] - lower[axis] <= MISSED:
+    if upper[axis] - lower[axis] <= SHAVING:
         return []
     normal = (float(axis == 0), float(axis == 1), float(axis == 2))
     below, above = film.cut(Plane(normal, float(lower[axis] + upper[axis]) / 2), least=-math.inf)
@@ -202,10 +202,10 @@ def is_shaving(piece: Component, across: Component) -> bool:
     """Whether a piece is a film that a cut nearly parallel to the surface has shaved off the solid across the cut.
 
     Films have ragged outlines that take very many cuts to become convex. They can be dropped because every point of a
-    shaving is within `MISSED` of the solid across the cut.
+    shaving is within `SHAVING` of the solid across the cut.
     """
     if not is_film(piece):
         return False
     surface = _native.Surface(across.vertices, across.faces)
-    _, farthest = _native.directed_hausdorff(piece.vertices, piece.faces, surface, MISSED / 4, 1)
-    return farthest <= MISSED
+    _, farthest = _native.directed_hausdorff(piece.vertices, piece.faces, surface, SHAVING / 4, 1)
+    return farthest <= SHAVING

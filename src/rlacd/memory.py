@@ -12,7 +12,7 @@ BYTES_READ = 450
 BYTES_REPAIRED = 1300
 """Bytes that a triangle takes at the peak of repair, if bodies overlap or are open."""
 
-_SMALL = 2**28  # what needs less is not worth the question
+_UNQUESTIONED = 2**28  # what needs less is not worth the question
 _CGROUPS = Path("/sys/fs/cgroup")
 
 
@@ -34,7 +34,7 @@ def require_memory(triangles: int, bytes_each: int, name: str) -> None:
         It does not fit; the message says what it would need.
     """
     need = triangles * bytes_each
-    if need < _SMALL or need <= (left := memory_left()):
+    if need < _UNQUESTIONED or need <= (left := memory_left()):
         return
     raise MeshDataError(
         f"{name} has {triangles:,} triangles, which need about {need / 2**30:.1f} GB of memory, but {left / 2**30:.1f} "

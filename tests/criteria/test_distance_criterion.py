@@ -9,7 +9,7 @@ import manifold3d
 import numpy as np
 import pytest
 import trimesh
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 import rlacd
 from rlacd import _native

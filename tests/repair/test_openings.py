@@ -14,7 +14,7 @@ from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.holes import HOLE
 from rlacd.repair.repair import repair
 from rlacd.repair.union import to_arrays
-from rlacd.repair.voxels import GAP
+from rlacd.repair.voxels import DEFAULT_GAP
 from rlacd.solid.distance import hull_union
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
@@ -37,10 +37,10 @@ def test_a_box_with_a_missing_side_is_a_thin_walled_box():
 
 
 def test_a_pinhole_is_closed_without_a_word():
-    mesh, full = with_hole(GAP / 2, subdivisions=6)
+    mesh, full = with_hole(DEFAULT_GAP / 2, subdivisions=6)
     solid = solid_of(mesh)
     assert steps(solid) == ["capped"]
-    assert solid.bodies[0].deviation <= GAP
+    assert solid.bodies[0].deviation <= DEFAULT_GAP
     assert volume(solid) == pytest.approx(full, rel=1e-3)
     assert not solid.warnings
 
@@ -50,7 +50,7 @@ def test_a_small_hole_in_a_scan_is_closed_and_reported():
     mesh, full = with_hole(0.08)
     solid = solid_of(mesh)
     assert steps(solid) == ["capped"]
-    assert GAP < solid.bodies[0].deviation <= HOLE
+    assert DEFAULT_GAP < solid.bodies[0].deviation <= HOLE
     assert volume(solid) == pytest.approx(full, rel=1e-2)
     assert "Holes were closed" in solid.warnings[0]
 
@@ -68,7 +68,7 @@ def test_a_ball_that_does_not_pass_a_hole_decides(gap, filled):
     assert volume(solid_of(mesh, gap=gap)) / full == pytest.approx(1.0 if filled else 0.0, abs=0.01)
 
 
-@pytest.mark.parametrize(("gap", "filled"), [(0.015, False), (GAP, True)])
+@pytest.mark.parametrize(("gap", "filled"), [(0.015, False), (DEFAULT_GAP, True)])
 def test_a_small_ball_rolls_on_a_grid_fine_enough(gap, filled):
     box = without(BOX, *np.flatnonzero(BOX.face_normals[:, 2] > 0.9))
     lid = trimesh.Trimesh([[-1, -1, 1.05], [1, -1, 1.05], [1, 1, 1.05], [-1, 1, 1.05]], [[0, 1, 2], [0, 2, 3]])

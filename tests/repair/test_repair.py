@@ -14,7 +14,7 @@ from rlacd.repair.distance import points_covering
 from rlacd.repair.holes import HOLE
 from rlacd.repair.repair import repair
 from rlacd.repair.union import to_arrays
-from rlacd.repair.voxels import GAP
+from rlacd.repair.voxels import DEFAULT_GAP
 from rlacd.solid.component import Component
 from rlacd.solid.manifold import to_manifold
 from tests.repair.repaired import BOX, check_closed, join, moved, solid_of, steps, volume
@@ -121,7 +121,7 @@ def test_six_separate_sides_make_one_box():
     apart = [moved(side, *(gap * side.face_normals[0])) for side in sides]
     solid = solid_of(join(*apart))
     assert volume(solid) == pytest.approx(8 * (1 + gap) ** 3, rel=0.05)
-    assert max(body.deviation for body in solid.bodies) < 2 * GAP
+    assert max(body.deviation for body in solid.bodies) < 2 * DEFAULT_GAP
 
 
 def test_a_crack_and_a_t_junction_are_welded():

@@ -10,7 +10,7 @@ from rlacd.io.read.load import load_mesh
 from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.repair import repair
 from rlacd.repair.union import to_arrays
-from rlacd.repair.voxels import GAP
+from rlacd.repair.voxels import DEFAULT_GAP
 from rlacd.solid.thickness import HALF_THICKNESS
 from tests.repair.repaired import BOX, join, moved, solid_of, steps, volume, with_hole
 
@@ -129,7 +129,7 @@ def klein_bottle(count=40):
 
 def test_a_klein_bottle_is_a_result():
     solid = solid_of(klein_bottle())
-    assert max(body.deviation for body in solid.bodies) < 2 * GAP
+    assert max(body.deviation for body in solid.bodies) < 2 * DEFAULT_GAP
 
 
 @pytest.mark.parametrize(
@@ -171,7 +171,7 @@ def with_leaves(count):
 def test_hundreds_of_leaves_are_one_crowd():
     solid = solid_of(with_leaves(600))
     assert set(steps(solid)) == {"wrapped"}
-    assert max(body.deviation for body in solid.bodies) < 2 * GAP
+    assert max(body.deviation for body in solid.bodies) < 2 * DEFAULT_GAP
 
 
 @pytest.mark.slow

@@ -18,7 +18,7 @@ import trimesh
 import rlacd
 from rlacd import _native, decompose_mesh
 from rlacd.io.read.load import load_mesh
-from rlacd.merge.slivers import THIN
+from rlacd.merge.slivers import SLIVER_RADIUS
 from rlacd.run import Run
 from rlacd.solid.cover import MOST_HULLS, cover
 from rlacd.solid.distance import hull_distances
@@ -94,7 +94,7 @@ def test_what_an_engine_does_not_take_is_said_when_no_time_is_left(monkeypatch: 
         self.stop.trip()
 
     monkeypatch.setattr(Run, "begin_finishing", at_once)
-    plate = trimesh.creation.box((1, 1, 1.2 * THIN))
+    plate = trimesh.creation.box((1, 1, 1.2 * SLIVER_RADIUS))
     result = rlacd.decompose(plate, preset="physx-gpu", quality="fast", threads=1)
     assert result.report["hausdorff"] == {"over": None, "under": None}
     assert_covers(result, np.array(plate.vertices), np.array(plate.faces))

@@ -1,8 +1,8 @@
 """The volume that a hull adds, as a share: V-HACD's criterion, decided exactly on the solid instead of on voxels.
 
-A part is done when ``|CH| - |part| <= tolerance * max(base, LEAST |CH(solid)|)``, with the volume of the part or of the
-whole solid as the base. The least base, a thousandth of the whole's convex hull, stands for V-HACD's voxels: without
-it, a shell as thin as a sheet of paper would be cut until each piece is flat to a hundredth of the paper.
+A part is done when ``|CH| - |part| <= tolerance * max(base, LEAST_PART |CH(solid)|)``, with the volume of the part or
+of the whole solid as the base. The least base, a thousandth of the whole's convex hull, stands for V-HACD's voxels:
+without it, a shell as thin as a sheet of paper would be cut until each piece is flat to a hundredth of the paper.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from rlacd.solid.component import Part
 from rlacd.solid.hull import Hull
 from rlacd.solid.solid import Solid
 
-LEAST = 1e-3
+LEAST_PART = 1e-3
 """Of the volume of the whole's convex hull: parts smaller than this count as this large."""
 
 REACH = 0.2
@@ -77,7 +77,7 @@ class AddedVolume(Criterion):
             return cls(options.volume_tolerance, None, 0.0)
         hull = Hull.of(solid.vertices) if len(solid.vertices) else None
         whole = float(mesh_volume(*solid.mesh)) if options.volume_of == "whole" else None
-        return cls(options.volume_tolerance, whole, LEAST * hull.volume if hull is not None else 0.0)
+        return cls(options.volume_tolerance, whole, LEAST_PART * hull.volume if hull is not None else 0.0)
 
     def share(self, volume: float, hull_volume: float) -> float:
         """The error of a part with these volumes."""

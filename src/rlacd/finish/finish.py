@@ -12,9 +12,9 @@ from rlacd import _native
 from rlacd.find_parts import Reached
 from rlacd.finish.flat import kept_within, resting_sides, within_reach
 from rlacd.finish.in_input import as_carried, in_input
-from rlacd.finish.limit import MOST, limit_part, limit_roughly, simple_part
+from rlacd.finish.limit import MOST_GROWTH, limit_part, limit_roughly, simple_part
 from rlacd.finish.overlap import Seams, overlap_parts
-from rlacd.finish.primitives import SLACK, primitive_part
+from rlacd.finish.primitives import PRIMITIVE_SLACK, primitive_part
 from rlacd.finish.report import COVERAGE_TOLERANCE, NEARLY, make_report
 from rlacd.finish.take_in import take_in
 from rlacd.merge import drop_slivers
@@ -27,7 +27,7 @@ from rlacd.solid.limit_hull import NO_SIDES
 from rlacd.solid.provenance import owners
 from rlacd.solid.solid import Solid
 
-GRAIN = 2e-4
+GROWTH_TO_SPARE = 2e-4
 """Hulls may grow by this more than they must to take in the input."""
 
 
@@ -98,7 +98,7 @@ def _taking_in(reached: Reached, finished: Sequence[Part], run: Run) -> list[Par
             [hull.vertices for hull in hulls],
             [hull.faces for hull in hulls],
             COVERAGE_TOLERANCE,
-            GRAIN,
+            GROWTH_TO_SPARE,
             run.threads,
         )
     )
@@ -112,14 +112,14 @@ def _cleaned(reached: Reached, run: Run) -> tuple[list[Part], Seams | None]:
     """The parts without slivers, overlapping if asked for, as primitives or with simple hulls inside the limits."""
     options, goal, limits = reached.options, reached.goal, reached.options.hull_limits
     sides = NO_SIDES if reached.root is None else resting_sides(reached.root)
-    slack = SLACK + 8 * reached.solid.frame.resolution
+    slack = PRIMITIVE_SLACK + 8 * reached.solid.frame.resolution
 
     def cleaned(part: Part) -> Part:
         part.tree = part.tree or _native.TreeCache()
         shaped = primitive_part(part, goal, options.primitive_kinds, limits, slack, reached.root)
         if shaped is not part:
             return shaped
-        near = within_reach(sides, part.hull, MOST)
+        near = within_reach(sides, part.hull, MOST_GROWTH)
         part = kept_within(part, near, goal)
         return limit_part(
             simple_part(part, goal, limits, near) if options.detail == SIMPLE else part, limits, goal, near

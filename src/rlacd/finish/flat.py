@@ -10,7 +10,7 @@ from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part
 from rlacd.solid.hull import Hull
 
-SHARE = 0.02
+SIDE_AREA = 0.02
 """A side has at least this share of the area of the convex hull: the facets of curved surfaces have less."""
 
 FLUSH = 1e-6
@@ -40,7 +40,7 @@ def resting_sides(solid: Component) -> FloatArray:
         offset = (corners[face] @ normal).max()
         coplanar = (corners @ normal > offset - FLUSH).all(axis=1)
         seen |= coplanar
-        if areas[coplanar].sum() >= SHARE * areas.sum():
+        if areas[coplanar].sum() >= SIDE_AREA * areas.sum():
             sides.append([*normal, offset + FLUSH])
     return np.array(sides).reshape(-1, 4)
 

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import trimesh
 
-from rlacd.options.navigable import LARGEST
+from rlacd.options.navigable import LARGEST_COORDINATE
 from rlacd.options.presets import HullLimits
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
@@ -51,7 +51,7 @@ def as_carried(part: Part, there: trimesh.Trimesh, frame: Frame) -> Part:
     The same part if no vertex moved by more than `TOLERANCE`, as always unless the coordinates resolve little.
     """
     points = frame.to_frame(there.vertices)
-    if part.hull.primitive is not None or np.abs(points).max() > LARGEST:
+    if part.hull.primitive is not None or np.abs(points).max() > LARGEST_COORDINATE:
         return part
     if points.shape == part.hull.vertices.shape and np.abs(points - part.hull.vertices).max() <= TOLERANCE:
         return part

@@ -11,13 +11,13 @@ from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
 from rlacd.solid.limit_hull import NO_SIDES, keeps, limit_hull
 
-ROOM = 0.2
+SHARE_OF_OVERHANG = 0.2
 """A simple hull grows by at most this share of what the criterion allows beyond a part."""
 
-MOST = 0.02
+MOST_GROWTH = 0.02
 """Nor by more than this (the longest side of the input is 2), however large the threshold."""
 
-TRIES = 3
+GROWTHS_TRIED = 3
 """If the criterion is no longer met, half the growth is tried, and so on."""
 
 
@@ -29,8 +29,8 @@ def simple_part(part: Part, criterion: Criterion, limits: HullLimits, sides: Flo
     """
     if not math.isfinite(criterion.overhang):
         return part
-    growth = min(ROOM * criterion.overhang, MOST)
-    for _ in range(TRIES):
+    growth = min(SHARE_OF_OVERHANG * criterion.overhang, MOST_GROWTH)
+    for _ in range(GROWTHS_TRIED):
         hull = limit_hull(part.hull, limits, growth, sides)
         if hull is part.hull:
             return part

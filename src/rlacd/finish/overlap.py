@@ -18,7 +18,7 @@ from rlacd import _native
 from rlacd.criteria import Criterion
 from rlacd.merge.boxes import Boxes
 from rlacd.solid.arrays import FloatArray, IntArray
-from rlacd.solid.component import LOST, Component, Part
+from rlacd.solid.component import LOST_VOLUME, Component, Part
 from rlacd.solid.hull import Hull
 from rlacd.solid.limit_hull import TOLERANCE
 
@@ -176,7 +176,7 @@ def _changes(
 def _judged(part: Part, hull: Hull, solid: Component, criterion: Criterion, tolerated: float | None) -> Part | None:
     """All that the solid fills of a grown hull, if it meets the criterion or is no worse than the worst part."""
     candidate = solid.inside(hull)
-    if candidate.volume < (1 - LOST) * part.volume:  # the clipping failed
+    if candidate.volume < (1 - LOST_VOLUME) * part.volume:  # the clipping failed
         return None
     if criterion.is_met(candidate) or (tolerated is not None and criterion.error(candidate) <= tolerated):
         return candidate

@@ -13,12 +13,12 @@ from rlacd.criteria import Criterion
 from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.options.presets import HullLimits
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.component import LOST, Component, Part
+from rlacd.solid.component import LOST_VOLUME, Component, Part
 from rlacd.solid.hull import Hull
 from rlacd.solid.limit_hull import NO_LIMITS, keeps
 from rlacd.solid.primitive import Primitive
 
-SLACK = 1e-9
+PRIMITIVE_SLACK = 1e-9
 """Primitives are larger than what they are fitted to by this, so that rounding leaves no point outside (frame)."""
 
 SIMPLER = 1.25
@@ -43,7 +43,7 @@ def primitive_part(
     criterion: Criterion,
     kinds: Collection[PrimitiveKind],
     limits: HullLimits = NO_LIMITS,
-    slack: float = SLACK,
+    slack: float = PRIMITIVE_SLACK,
     solid: Component | None = None,
 ) -> Part:
     """Get the part with a primitive for a hull, if one meets the criterion; otherwise the same part.
@@ -103,7 +103,7 @@ def _candidates(part: Part, hull: Hull, solid: Component | None, criterion: Crit
     if solid is None or criterion.obstacles is not None or screen.forbids(solid.filling, hull):
         return
     inside = solid.inside(hull)
-    if inside.volume >= (1 - LOST) * part.volume and not screen.excludes(inside.volume, hull.volume):
+    if inside.volume >= (1 - LOST_VOLUME) * part.volume and not screen.excludes(inside.volume, hull.volume):
         yield inside  # otherwise the clipping failed
 
 

@@ -12,7 +12,7 @@ from rlacd.solid.component import Part
 from rlacd.solid.distance import hull_union
 from rlacd.solid.hull import Hull
 
-MOST = 10_000
+MOST_POINTS_TAKEN_IN = 10_000
 """Of more points than this, only every second, third, ... is looked at."""
 
 
@@ -31,7 +31,7 @@ def take_in(parts: Sequence[Part], points: FloatArray, criterion: Criterion) -> 
     list of Part
         In the same order, some with larger hulls.
     """
-    points = points[:: 1 + len(points) // MOST]
+    points = points[:: 1 + len(points) // MOST_POINTS_TAKEN_IN]
     distance = np.array([hull_union([part.hull], 1).distance(points, 1) for part in parts])
     taker = np.where(distance > 0, distance, np.inf).argmin(axis=0)
     grown = list(parts)

@@ -31,10 +31,10 @@ from rlacd.policies.network import Network, parse_network
 from rlacd.pool import Answer, Blobs, Pool, ProcessLimits, Request, Shared, WorkerDiedError
 from rlacd.solid.component import Component
 
-LOST = 10
+LOST_IN_A_ROW = 10
 """Training stops after this many consecutive episodes that could not be played, since the meshes cannot be at fault."""
 
-TRIES = 1000
+SOLIDS_TRIED = 1000
 """Training stops after this many consecutive solids without anything to cut."""
 
 REMEMBERED = 10_000
@@ -111,15 +111,15 @@ class Rollouts:
         episode = self._played(self._ahead.popleft())
         self._without_cuts = 0 if len(episode.planes) else self._without_cuts + 1
         self._lost = self._lost + 1 if episode.how == "lost" else 0
-        if self._lost == LOST:
+        if self._lost == LOST_IN_A_ROW:
             raise TrainingError(
-                f"{LOST} episodes in a row were lost with their processes; give more --memory or a longer --limit, or "
-                "fewer --jobs, and use --resume."
+                f"{LOST_IN_A_ROW} episodes in a row were lost with their processes; give more --memory or a longer "
+                "--limit, or fewer --jobs, and use --resume."
             )
-        if self._without_cuts == TRIES:
+        if self._without_cuts == SOLIDS_TRIED:
             raise TrainingError(
-                f"none of {TRIES} solids drawn from {len(self._names)} meshes needs a cut; give other meshes, or a "
-                "smaller threshold."
+                f"none of {SOLIDS_TRIED} solids drawn from {len(self._names)} meshes needs a cut; give other meshes, "
+                "or a smaller threshold."
             )
         return episode
 

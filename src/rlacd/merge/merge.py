@@ -17,14 +17,14 @@ from rlacd.criteria.screen import Feasibility
 from rlacd.merge.boxes import Boxes
 from rlacd.run import Run, Work, work
 from rlacd.solid.arrays import IntArray
-from rlacd.solid.component import LOST, ClippedPart, Component, Part
+from rlacd.solid.component import LOST_VOLUME, ClippedPart, Component, Part
 from rlacd.solid.hull import Hull
 
-FEW = 100
+FEW_TO_PAIR = 100
 """Up to this many parts, any pair may be united across other parts; with more, only pairs near each other or near a
 common third part."""
 
-AT_ONCE = 512
+PAIRS_AT_ONCE = 512
 """Number of pairs tested against the solid between two checks of the run."""
 
 
@@ -227,12 +227,12 @@ class _Adjoining:
 
 @dataclass(frozen=True)
 class _Bridged:
-    """All pairs (see `FEW`), judged by the solid clipped to their joint hull."""
+    """All pairs (see `FEW_TO_PAIR`), judged by the solid clipped to their joint hull."""
 
     criterion: Criterion
     run: Run
     solid: Component
-    few: int = FEW
+    few: int = FEW_TO_PAIR
 
     def pairs(
         self, alive: Mapping[int, Part], boxes: Boxes, new: Sequence[int]
@@ -243,7 +243,7 @@ class _Bridged:
         pairs = boxes.pairs(new, reach, across=True)
         found: list[_Pair] = []
         never: list[tuple[int, int]] = []
-        for some in np.split(pairs, range(AT_ONCE, len(pairs), AT_ONCE)):
+        for some in np.split(pairs, range(PAIRS_AT_ONCE, len(pairs), PAIRS_AT_ONCE)):
             if not self.run.may_continue() or not self.run.work.pay(_sum_over(alive, some, work.screening)):
                 break
             used, places = _places(some)
@@ -349,7 +349,7 @@ def price_of_clipping(first: Part, second: Part) -> float:
 
 def is_alone(part: Part) -> bool:
     """Whether a part consists only of its members and shares nothing with other parts."""
-    return part.volume <= (1 + LOST) * sum(member.volume for member in part.members)
+    return part.volume <= (1 + LOST_VOLUME) * sum(member.volume for member in part.members)
 
 
 def _clipped(first: Part, second: Part, hull: Hull, criterion: Criterion, solid: Component) -> ClippedPart | None:

@@ -15,13 +15,13 @@ from rlacd.solid.distance import hull_union
 from rlacd.solid.hull import Hull
 from rlacd.solid.topology import BoolArray
 
-THIN = 0.01
+SLIVER_RADIUS = 0.01
 """A hull is a sliver if the radius of its inscribed ball is below this share of its largest extent."""
 
 FILM = 2e-4
 """Mean thickness below which a part is a film left by rounding: repair makes real sheets ten times thicker."""
 
-MISSED = 2e-3
+SLIVER_LOSS = 2e-3
 """A sliver is dropped if none of its points is farther than this from the other hulls (0.1 % of the longest side)."""
 
 
@@ -71,9 +71,9 @@ def drop_slivers(parts: Sequence[Part], run: Run, suspects: Sequence[Part] | Non
 
 def _misses(union: _native.HullUnion, sliver: Part, threads: int) -> bool:
     """Whether some point of a sliver is too far from other hulls; most are told by their corners."""
-    if (union.distance(sliver.vertices[np.unique(sliver.faces)], threads) > MISSED).any():
+    if (union.distance(sliver.vertices[np.unique(sliver.faces)], threads) > SLIVER_LOSS).any():
         return True
-    return union.under(sliver.vertices, sliver.faces, MISSED / 4, threads)[1] > MISSED
+    return union.under(sliver.vertices, sliver.faces, SLIVER_LOSS / 4, threads)[1] > SLIVER_LOSS
 
 
 def is_film(part: Part) -> bool:
@@ -82,16 +82,18 @@ def is_film(part: Part) -> bool:
 
 
 def is_sliver(hull: Hull) -> bool:
-    """Whether the radius of the hull's inscribed ball is less than `THIN` times its largest extent."""
+    """Whether the radius of the hull's inscribed ball is less than `SLIVER_RADIUS` times its largest extent."""
     extent = float(np.ptp(hull.vertices, axis=0).max())
     # A convex body's inradius lies between volume / area and three times that.
     ratio = hull.volume / _native.mesh_area(hull.vertices, hull.faces)
-    if ratio > THIN * extent:
+    if ratio > SLIVER_RADIUS * extent:
         return False
-    return 3 * ratio < THIN * extent or not _native.holds_ball(hull.vertices, hull.faces, THIN * extent)
+    return 3 * ratio < SLIVER_RADIUS * extent or not _native.holds_ball(
+        hull.vertices, hull.faces, SLIVER_RADIUS * extent
+    )
 
 
 def _near(boxes: FloatArray, sliver: FloatArray) -> BoolArray:
-    """Which of the boxes [N, 2, 3] are within `MISSED` of a sliver's."""
+    """Which of the boxes [N, 2, 3] are within `SLIVER_LOSS` of a sliver's."""
     gap = np.maximum(boxes[:, 0] - sliver[1], sliver[0] - boxes[:, 1])
-    return np.asarray((gap <= MISSED).all(axis=1))
+    return np.asarray((gap <= SLIVER_LOSS).all(axis=1))

@@ -17,7 +17,7 @@ from rlacd.solid.component import Part
 COARSER = 1.5
 """The threshold grows by this factor until one part is left. In between, parts are united two at a time."""
 
-LONG = 8e6
+LONG_MERGING = 8e6
 """Units of work (see `rlacd.run.work`) after which it grows by the fourth power of that: only tangles take so long."""
 
 MEASURING = 5e6
@@ -59,7 +59,7 @@ def best_within(
                     best, least = state, error
             if len(parts) <= 1 or run.stopped_by is not None:
                 return best
-            factor *= COARSER if run.work.done - begin < LONG else COARSER**4
+            factor *= COARSER if run.work.done - begin < LONG_MERGING else COARSER**4
     except Stopped:
         run.note_stop()
     return best

@@ -15,11 +15,11 @@ Point: TypeAlias = tuple[float, float, float]
 SHARES = (1e-4, 10.0)
 """Shares of the longest side that radius and tolerance may be: less takes no end of balls, more fills everything."""
 
-LARGEST = 1e100
+LARGEST_COORDINATE = 1e100
 """Coordinates: of larger ones, products would be infinite."""
 
 
-_coordinate = number(-LARGEST, LARGEST).read
+_coordinate = number(-LARGEST_COORDINATE, LARGEST_COORDINATE).read
 
 
 def _rows(given: Any) -> Sequence[Any]:

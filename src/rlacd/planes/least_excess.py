@@ -6,7 +6,7 @@ import math
 
 from rlacd import _native
 from rlacd.planes.candidates import Candidates
-from rlacd.planes.sweep import ROUNDING, SLIVER
+from rlacd.planes.sweep import ROUNDING_FACTOR, SLIVER
 from rlacd.solid.component import NEGLIGIBLE_VOLUME, Component, Plane
 
 SLIVERS = (SLIVER, SLIVER / 100)
@@ -38,7 +38,7 @@ def least_excess(component: Component, candidates: Candidates, exponent: float, 
         candidates.offsets,
         exponent,
         TIE * (most if math.isinf(exponent) else most**exponent),
-        ROUNDING * NEGLIGIBLE_VOLUME,
+        ROUNDING_FACTOR * NEGLIGIBLE_VOLUME,
         SLIVERS,
         threads,
     )

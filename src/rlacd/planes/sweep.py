@@ -14,7 +14,7 @@ from rlacd.solid.component import NEGLIGIBLE_VOLUME, Component
 SLIVER = 0.02
 """A side thinner than this share of its largest extent (an inscribed ball of 1/100) is a sliver."""
 
-ROUNDING = 10
+ROUNDING_FACTOR = 10
 """Least volume of a side as a multiple of the negligible volume: the sweep and the cut round differently."""
 
 
@@ -51,8 +51,8 @@ class Sweep:
     def valid(self, sliver: float = SLIVER) -> BoolArray:
         """Whether each plane meets the solid and leaves no side thinner than `sliver` times its largest extent."""
         return (
-            (self.solid_below > ROUNDING * NEGLIGIBLE_VOLUME)
-            & (self.solid_above > ROUNDING * NEGLIGIBLE_VOLUME)
+            (self.solid_below > ROUNDING_FACTOR * NEGLIGIBLE_VOLUME)
+            & (self.solid_above > ROUNDING_FACTOR * NEGLIGIBLE_VOLUME)
             & (self.thickness_below > sliver * self.extent_below)
             & (self.thickness_above > sliver * self.extent_above)
         )

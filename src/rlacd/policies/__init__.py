@@ -4,7 +4,7 @@ from rlacd.options.names import AS_PUBLISHED, CONTROLS, EDGES, POLICIES, WEIGHTS
 from rlacd.planes.sweep_cache import SweepCache
 from rlacd.policies.greedy import SCORES, Greedy
 from rlacd.policies.learned import Learned
-from rlacd.policies.navacd import CONCAVE_EDGES, NavACD
+from rlacd.policies.navacd import EDGES_PER_COMPONENT, NavACD
 from rlacd.policies.policy import CheckedPolicy, Policy
 from rlacd.policies.qpolicy import deployed
 from rlacd.policies.shortlist import RandomShortlist
@@ -50,9 +50,9 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
         return deployed(name, scale)
     family, _, score = name.partition("-")
     if family == "greedy" and score.removesuffix(EDGES) in SCORES:
-        return Greedy(score.removesuffix(EDGES), concave_edges=CONCAVE_EDGES if score.endswith(EDGES) else 0)
+        return Greedy(score.removesuffix(EDGES), concave_edges=EDGES_PER_COMPONENT if score.endswith(EDGES) else 0)
     if name in CONTROLS:
-        return RandomShortlist(int(score.removesuffix(EDGES)), CONCAVE_EDGES if score.endswith(EDGES) else 0)
+        return RandomShortlist(int(score.removesuffix(EDGES)), EDGES_PER_COMPONENT if score.endswith(EDGES) else 0)
     raise KeyError(name)
 
 

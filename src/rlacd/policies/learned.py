@@ -37,7 +37,7 @@ SIMPLE = 3.0
 """Excess of the component's hull, as the edge of a cube over the criterion's length, below which greedy decides:
 nearly all such components end in two parts, whatever the plane, and a sweep takes longer than greedy's bounds."""
 
-TYPICAL = 0.05
+TYPICAL_LENGTH = 0.05
 """Stands for the criterion's length if it has none."""
 
 
@@ -61,7 +61,7 @@ class Learned:
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None if every candidate misses it or shaves off a film."""
         excess = max(component.hull.volume - component.volume, 0.0)
-        if math.cbrt(excess) < SIMPLE * (self._scale or TYPICAL):
+        if math.cbrt(excess) < SIMPLE * (self._scale or TYPICAL_LENGTH):
             return self._greedy.choose(component, threads)
         scored = self._sweeps.of(component, threads)
         valid = next((v for sliver in SLIVERS if (v := scored.valid(sliver)).any()), None)

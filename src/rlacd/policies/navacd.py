@@ -10,7 +10,7 @@ from rlacd.planes.sweep import sweep
 from rlacd.policies.greedy import cheapest, hull_sum
 from rlacd.solid.component import Component, Plane
 
-CONCAVE_EDGES = 4
+EDGES_PER_COMPONENT = 4
 """Maximum number of concave edges whose planes are tried."""
 
 
@@ -30,7 +30,7 @@ class NavACD:
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None if every candidate misses it or shaves off a film."""
-        candidates = Candidates.joined(mid_planes(component), concave_edge_planes(component, CONCAVE_EDGES))
+        candidates = Candidates.joined(mid_planes(component), concave_edge_planes(component, EDGES_PER_COMPONENT))
         scored = sweep(component, candidates, threads)
         return cheapest(scored, hull_sum(scored))
 

@@ -17,7 +17,7 @@ TINY = 1e-12
 
 FEATURES = 38
 
-MOST = 8.0
+GREATEST_FEATURE = 8.0
 """No feature is larger, whatever the mesh; ordinary ones are at most 5."""
 
 
@@ -67,7 +67,7 @@ def plane_features(
         *(np.log(np.cbrt(excess) / scale), volume / hull, *(np.sort(box)[:2] / longest), np.log(longest / scale)),
         *(float(length is None), valid.mean(), lowest),
     ]
-    return np.column_stack([*columns, np.tile(own, (len(cost), 1))]).clip(-MOST, MOST)
+    return np.column_stack([*columns, np.tile(own, (len(cost), 1))]).clip(-GREATEST_FEATURE, GREATEST_FEATURE)
 
 
 def _rank(cost: FloatArray) -> FloatArray:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from rlacd.policies.navacd import CONCAVE_EDGES
+from rlacd.policies.navacd import EDGES_PER_COMPONENT
 from rlacd.policies.network import load_network
 from rlacd.policies.observe import Float32Array, paper_planes, valid_planes
 from rlacd.policies.shortlist import least_hulls
@@ -60,7 +60,9 @@ def deployed(path: str, scale: float | None = None) -> QPolicy:
     network = load_network(path, KIND, FEATURES, PLANES)
     threshold = network.threshold if scale is None else scale
     return QPolicy(
-        lambda c: network(sweep_features(c, threshold, bool(network.about.get("hull", True)))), SHORTLIST, CONCAVE_EDGES
+        lambda c: network(sweep_features(c, threshold, bool(network.about.get("hull", True)))),
+        SHORTLIST,
+        EDGES_PER_COMPONENT,
     )
 
 

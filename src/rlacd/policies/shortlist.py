@@ -11,7 +11,7 @@ from rlacd.planes.candidates import Candidates, axis_and_principal
 from rlacd.planes.concave_edges import concave_edge_planes
 from rlacd.planes.sweep import sweep
 from rlacd.policies.greedy import cheapest, hull_sum
-from rlacd.policies.navacd import CONCAVE_EDGES
+from rlacd.policies.navacd import EDGES_PER_COMPONENT
 from rlacd.policies.observe import valid_planes
 from rlacd.solid.component import Component, Plane
 
@@ -61,7 +61,7 @@ class RandomShortlist:
         See `generator_of`.
     """
 
-    def __init__(self, planes: int = 10, concave_edges: int = CONCAVE_EDGES, seed: int = 0) -> None:
+    def __init__(self, planes: int = 10, concave_edges: int = EDGES_PER_COMPONENT, seed: int = 0) -> None:
         self._planes = planes
         self._concave_edges = concave_edges
         self._seed = seed

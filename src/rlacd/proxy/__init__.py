@@ -2,6 +2,6 @@
 
 from rlacd.proxy.lift import Lift
 from rlacd.proxy.model import Model
-from rlacd.proxy.simplify import FEW, Proxy, simplify
+from rlacd.proxy.simplify import FEW_TRIANGLES, Proxy, simplify
 
-__all__ = ["FEW", "Lift", "Model", "Proxy", "simplify"]
+__all__ = ["FEW_TRIANGLES", "Lift", "Model", "Proxy", "simplify"]

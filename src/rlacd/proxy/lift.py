@@ -24,16 +24,16 @@ from rlacd.solid.hull import Hull
 from rlacd.solid.limit_hull import TOLERANCE, limit_hull
 from rlacd.solid.reunite import reunite
 
-GRAIN = 5e-4
+GROWTH_TO_COVER = 5e-4
 """Hulls may grow by this more than they must to cover the solid (the longest side is 2)."""
 
-SMOOTH = 2e-3
+SIMPLE_FIRST = 2e-3
 """The hulls of a proxy's parts are simplified within this first: they have to grow anyway."""
 
 TRIM = 1e-3
 """Grown hulls are simplified within this: noise gives them many corners."""
 
-TIGHTER = 0.8
+TIGHTENING = 0.8
 """Parts that fail on the solid are cut again under a criterion tighter by this factor, and by its powers."""
 
 ROUNDS = 3
@@ -116,7 +116,7 @@ class Lift:
             Cut parts again if they meet their criterion on the proxy only.
         """
         with self.run.shielded():
-            lifted = [_Lifted(limit_hull(part.hull, tolerance=SMOOTH), part) for part in parts]
+            lifted = [_Lifted(limit_hull(part.hull, tolerance=SIMPLE_FIRST), part) for part in parts]
             self._cover(lifted)
             hulls = [each.hull for each in lifted]
         try:
@@ -133,7 +133,7 @@ class Lift:
             failing = self._failing(lifted)
             if not failing:
                 break
-            criterion = criterion.scaled(TIGHTER)
+            criterion = criterion.scaled(TIGHTENING)
             for i in reversed(failing):
                 lifted[i : i + 1] = self._cut_again(lifted[i], criterion, left)
             self._cover(lifted)
@@ -148,8 +148,8 @@ class Lift:
             for _ in range(left):
                 new = [part for tree in trees for part in self._cut(tree, criterion)]
                 if len(new) > 1:
-                    return [_Lifted(limit_hull(part.hull, tolerance=SMOOTH), part) for part in new]
-                criterion = criterion.scaled(TIGHTER)
+                    return [_Lifted(limit_hull(part.hull, tolerance=SIMPLE_FIRST), part) for part in new]
+                criterion = criterion.scaled(TIGHTENING)
         part = failing.on_solid
         new = self._cut(self._tree(Component((part.vertices, part.faces))), self.goal) or [part]
         return [_Lifted(part.hull, None, part) for part in new]
@@ -164,8 +164,8 @@ class Lift:
         points = self.solid.filling.uncovered(
             [each.hull.vertices for each in lifted],
             [each.hull.faces for each in lifted],
-            2 * self.deviation + SMOOTH,
-            GRAIN,
+            2 * self.deviation + SIMPLE_FIRST,
+            GROWTH_TO_COVER,
             self.run.threads,
         )
         for each, own in zip(lifted, points, strict=True):

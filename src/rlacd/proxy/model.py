@@ -11,7 +11,7 @@ from rlacd.criteria import Criterion
 from rlacd.merge import merge_lifted
 from rlacd.policies import Policy
 from rlacd.proxy.lift import Lift
-from rlacd.proxy.simplify import FEW, Proxy, simplify
+from rlacd.proxy.simplify import FEW_TRIANGLES, Proxy, simplify
 from rlacd.run import Run
 from rlacd.solid.component import Component, Part
 from rlacd.solid.solid import Shape
@@ -40,7 +40,7 @@ class Model:
     def of(cls, solid: Component, pieces: Sequence[Shape], goal: Criterion, run: Run) -> Model:
         """Make the model of a solid; `pieces` are closed solids whose union it is (see `simplify`)."""
         proxy = None
-        if math.isfinite(goal.overhang) and len(solid.faces) >= FEW:
+        if math.isfinite(goal.overhang) and len(solid.faces) >= FEW_TRIANGLES:
             try:
                 with run.stage("simplify"):
                     proxy = simplify(solid, goal.overhang, run.threads, pieces)

@@ -24,7 +24,7 @@ from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component
 from rlacd.solid.solid import Shape, mesh_of
 
-FEW = 10_000
+FEW_TRIANGLES = 10_000
 """Solids with fewer triangles are decomposed as they are: little time is to be gained, and a few parts to be lost."""
 
 NEAR = 0.1
@@ -43,7 +43,7 @@ are noisy, and tell nothing about points far from them."""
 COARSEST, COARSEST_PIECE = 100, 12
 """No proxy has fewer triangles, nor a piece of one if it had more before."""
 
-LOST, LOST_OF_PIECES = 0.02, 0.1
+LOST_OF_SOLID, LOST_OF_PIECES = 0.02, 0.1
 """A proxy's volume may differ from the solid's by this share: thin walls would fold up sooner than they deviate. Pieces
 may lose more: a sheet of even thickness has less volume once its noise, and so some of its area, is gone."""
 
@@ -53,10 +53,10 @@ WORTHWHILE = 0.5
 LARGE_STEP = 0.5
 """The same while the proxy is larger than any that is looked at."""
 
-TYPICAL = 8
+TYPICAL_REDUCTION = 8
 """Proxies with more than one triangle in this many are only looked at where smaller ones are not near enough."""
 
-SAMPLES, LEAST_SAMPLES = 2000, 50
+VERTICES_MEASURED, LEAST_MEASURED = 2000, 50
 """Number of the solid's vertices whose distances are measured, besides one of each body; and of each of its pieces, at
 least."""
 
@@ -112,9 +112,9 @@ def _copies(solid: Component, threshold: float, threads: int, pieces: Sequence[S
     """Copies of a solid made in several ways, the best first; None for each way in which none is near enough."""
     mesh, size = (solid.vertices, solid.faces), len(solid.faces)
     if pieces:
-        yield _smallest(mesh, threshold, threads, FEW)
+        yield _smallest(mesh, threshold, threads, FEW_TRIANGLES)
         yield _of_pieces(pieces, solid, threshold, threads)
-    yield _smallest(mesh, threshold, threads, max(FEW, size // TYPICAL))
+    yield _smallest(mesh, threshold, threads, max(FEW_TRIANGLES, size // TYPICAL_REDUCTION))
     yield _smallest(mesh, threshold, threads)
 
 
@@ -124,8 +124,8 @@ def _of_pieces(pieces: Sequence[Shape], solid: Component, threshold: float, thre
     size = sum(len(faces) for _, faces in meshes)
     copies = []
     for mesh in meshes:
-        samples = max(LEAST_SAMPLES, SAMPLES * len(mesh[1]) // size)
-        copy = _smallest(mesh, threshold, threads, FEW, samples, COARSEST_PIECE, LOST_OF_PIECES)
+        samples = max(LEAST_MEASURED, VERTICES_MEASURED * len(mesh[1]) // size)
+        copy = _smallest(mesh, threshold, threads, FEW_TRIANGLES, samples, COARSEST_PIECE, LOST_OF_PIECES)
         copies.append(copy or _Copy(mesh, np.zeros(1)))
     if sum(len(copy.mesh[1]) for copy in copies) > WORTHWHILE * size:
         return None
@@ -143,9 +143,9 @@ def _smallest(
     threshold: float,
     threads: int,
     largest: float = math.inf,
-    samples: int = SAMPLES,
+    samples: int = VERTICES_MEASURED,
     coarsest: int = COARSEST,
-    lost: float = LOST,
+    lost: float = LOST_OF_SOLID,
 ) -> _Copy | None:
     """The smallest copy that is near enough; None if none with at most `largest` triangles is, or so many are needed
     that it is not worthwhile."""

@@ -18,7 +18,7 @@ from rlacd.solid.topology import BoolArray, IntArray, nondegenerate
 # Optimal triangulation considers all triples of corners; longer loops are cut by ears.
 _EXACT_LOOP = 60
 # Where a cap turns by less than this from a face beside it, it continues the face (cosine of 45 degrees).
-_SMOOTH = 0.7
+_SMOOTH_RIM = 0.7
 
 
 def caps_of(soup: Soup, rims: Rims) -> tuple[IntArray, IntArray]:
@@ -99,7 +99,7 @@ def smooth_share(soup: Soup, rims: Rims, caps: IntArray, owner: IntArray) -> Flo
     wanted = head * count + tail + loop_of * count**2
     at = np.minimum(np.searchsorted(key[order], wanted), len(key) - 1)
     cosine = dots(rims.normals[np.concatenate(rims.beside)], normal[order[at] // 3])
-    smooth = (cosine > _SMOOTH) & (key[order][at] == wanted)
+    smooth = (cosine > _SMOOTH_RIM) & (key[order][at] == wanted)
     length = np.linalg.norm(soup.vertices[head] - soup.vertices[tail], axis=1)
     share: FloatArray = np.bincount(loop_of, length * smooth) / np.bincount(loop_of, length)
     return share

@@ -7,7 +7,7 @@ import numpy as np
 from rlacd import _native
 from rlacd._native import PointTree, poll_stop
 from rlacd.repair.distance import SurfaceQuery, affordable, points_covering, shared_faces
-from rlacd.repair.voxels import GAP
+from rlacd.repair.voxels import DEFAULT_GAP
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.solid import BodyRepair
 from rlacd.solid.thickness import HALF_THICKNESS
@@ -72,13 +72,15 @@ def measure(record: Record, surface: SurfaceQuery, solid: SurfaceQuery) -> IntAr
     kept, taken_over = shared_faces(solid.vertices, solid.faces, surface.vertices, surface.faces)
     poll_stop()
     own = solid.faces[~kept]
-    points, _ = points_covering(solid.vertices, own, affordable(GAP, float(face_areas(solid.vertices, own).sum())))
+    points, _ = points_covering(
+        solid.vertices, own, affordable(DEFAULT_GAP, float(face_areas(solid.vertices, own).sum()))
+    )
     closest, face = surface.closest(points)
     np.maximum.at(record.beyond, record.body_of_input[face], np.linalg.norm(points - closest, axis=1))
 
     replaced = np.flatnonzero((record.step[record.body_of_input] >= STEPS.index("outer skin")) & ~taken_over)
     faces = surface.faces[replaced]
-    spacing = affordable(GAP, float(face_areas(surface.vertices, faces).sum()))
+    spacing = affordable(DEFAULT_GAP, float(face_areas(surface.vertices, faces).sum()))
     points, on = points_covering(surface.vertices, faces, spacing)
     distance = solid.distance(points)
     lost = _outside(solid, points, distance)

@@ -25,7 +25,7 @@ from rlacd.repair.record import measure
 from rlacd.repair.soup import MOST_PATCHES, Soup
 from rlacd.repair.tangles import MOST_TANGLED, is_tangle
 from rlacd.repair.union import CrossingsError, hull_of_points, one_body, unite, unite_around_cavities
-from rlacd.repair.voxels import GAP
+from rlacd.repair.voxels import DEFAULT_GAP
 from rlacd.repair.walls import are_unbuilt, build_slabs, build_walls, has_sheets, skins
 from rlacd.repair.windings import are_crowded, are_oriented, sort_out, take_as_they_are
 from rlacd.repair.work import Piece, Wanted, Work, query_of
@@ -120,7 +120,7 @@ def repair(
     *,
     resolution: int = 100,
     open_bodies: str = "auto",
-    gap: float = GAP,
+    gap: float = DEFAULT_GAP,
     threads: int | None = None,
     keep_cavities: bool = False,
 ) -> Solid:
@@ -181,7 +181,7 @@ def repair(
         solid = hull_of_points(points)
         body = BodyRepair(0, "hull", len(mesh.faces), solid.num_tri(), 0.0)
         return Solid(solid, surface, frame, (body,), (*mesh.warnings, said))
-    cells = max(resolution, math.ceil(2 * CELLS_ACROSS / gap)) if gap < GAP else resolution
+    cells = max(resolution, math.ceil(2 * CELLS_ACROSS / gap)) if gap < DEFAULT_GAP else resolution
     work = Work(SurfaceQuery(vertices, faces, threads), frame, Wanted(open_bodies, gap, cells, keep_cavities))
     _take_steps(work)
     return work.result(mesh.warnings)

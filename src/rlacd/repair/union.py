@@ -26,13 +26,13 @@ Index = TypeVar("Index", bound=np.signedinteger)
 
 # manifold3d collapses edges shorter than 1e-12, and swaps those of faces that are no higher, or folded back onto a
 # neighbour in a plane within 1e-12.
-_THIN = 1e-11
+_FLAT_MESH = 1e-11
 
 # Uniting takes time per mesh even without overlaps; above this number, disjoint meshes are composed instead.
 MOST_UNITED = 4000
 
 # Number of triangles united at once; the work may be stopped between batches.
-_AT_ONCE = 20_000
+_MESHES_UNITED = 20_000
 
 # Pairs of crossing triangles, or corners of their arrangement, that are united at once; pairs after which solids are
 # not united exactly, and more per triangle: manifold3d takes about
@@ -60,7 +60,7 @@ def one_body(vertices: FloatArray, faces: Indices) -> tuple[tuple[FloatArray, In
     if found is None or len(found[1]) > 1:
         return None
     _, (volume,), (area,), _, has_no_pinch, least_height, least_fold = found
-    if abs(volume) <= 2 * FLAT * area or least_height * min(least_fold, 1.0) <= _THIN:
+    if abs(volume) <= 2 * FLAT * area or least_height * min(least_fold, 1.0) <= _FLAT_MESH:
         return None
     outward = faces if volume > 0 else np.ascontiguousarray(faces[:, ::-1])
     separate = (vertices, outward) if has_no_pinch else _native.separate_fans(vertices, outward)
@@ -234,7 +234,7 @@ def _united(solids: list[Manifold]) -> Manifold:
     waiting = [(solid.num_tri(), i, solid) for i, solid in enumerate(solids)]
     heapq.heapify(waiting)
     left = _MOST_CROSSINGS + _PER_TRIANGLE * sum(triangles for triangles, *_ in waiting)
-    at_once, newest = _AT_ONCE, len(solids)
+    at_once, newest = _MESHES_UNITED, len(solids)
     while len(waiting) > 1:
         group = [heapq.heappop(waiting), heapq.heappop(waiting)]
         while waiting and sum(triangles for triangles, *_ in group) + waiting[0][0] <= at_once:

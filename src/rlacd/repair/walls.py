@@ -13,7 +13,7 @@ from rlacd.repair.record import Record
 from rlacd.repair.skin import skin
 from rlacd.repair.soup import FLAT, Soup, on_repeated_edge
 from rlacd.repair.union import one_body, slab_of_faces, split_labels, to_arrays, volume_of
-from rlacd.repair.voxels import GAP
+from rlacd.repair.voxels import DEFAULT_GAP
 from rlacd.repair.work import Piece, Work
 from rlacd.solid.frame import FloatArray
 from rlacd.solid.manifold import to_manifold
@@ -43,8 +43,8 @@ def build_walls(work: Work) -> None:
 def _leads_away(shape: Shape, surface: SurfaceQuery) -> bool:
     """Whether a skin leads farther away from the input than caps may."""
     vertices, faces = to_arrays(shape)
-    points, _ = points_covering(vertices, faces, GAP)
-    return bool((surface.distance(points) > GAP).any())
+    points, _ = points_covering(vertices, faces, DEFAULT_GAP)
+    return bool((surface.distance(points) > DEFAULT_GAP).any())
 
 
 def has_sheets(work: Work) -> bool:

@@ -10,7 +10,7 @@ from rlacd.repair.distance import SurfaceQuery, once_in_each_place, points_cover
 from rlacd.repair.soup import Soup, boxes_of, face_normals, no_faces
 from rlacd.repair.tangles import MOST_TANGLED, is_tangle, tangled_bodies
 from rlacd.repair.union import MOST_UNITED, area_of, as_manifold, slab_of_faces, tunnels_in, unite, volume_of
-from rlacd.repair.voxels import GAP, Reach
+from rlacd.repair.voxels import DEFAULT_GAP, Reach
 from rlacd.repair.walls import skins
 from rlacd.repair.work import Piece, Work, query_of
 from rlacd.solid.frame import FloatArray
@@ -21,11 +21,11 @@ from rlacd.solid.topology import BoolArray, IntArray
 _WRAP_ERROR = 4 * HALF_THICKNESS
 # A room of an outer skin is filled from this share of the solid's volume on: rooms in furniture have 0.04 and more,
 # crevices at most 0.0023.
-_ROOM = 0.01
+_SLIT_VOLUME = 0.01
 # A slit is filled from this depth on, up to this width (multiples of the gap), if all slits hold no more than this
 # share of the volume: what is shallower needs no cut, and what is wider leaves steps of the grid. It may have no
 # volume, but this share of the surface has to go with the slits.
-_DEEP, _HAIR, _LITTLE, _BARED = 1.5, 1 / 16, 3e-3, 0.004
+_DEEP, _BESIDE, _LITTLE, _BARED = 1.5, 1 / 16, 3e-3, 0.004
 # Noise leaves slits between walls of dense bodies that touch, full of bridges: a union with so many tunnels has them.
 _TUNNELS = 25
 # More sheets than this are not united one by one: that would take seconds, and cutting the result even longer. Neither
@@ -115,7 +115,7 @@ def fill_rooms(work: Work) -> None:
     """Fill rooms with openings too narrow for the ball: all rooms that sheets enclose, large ones in outer skins."""
     reach, record = work.reach, work.record
     in_sheets, in_shells = (_rooms_near(work, walls) for walls in _walls(work))
-    in_shells = in_shells[reach.volumes(in_shells) >= _ROOM * work.volume]
+    in_shells = in_shells[reach.volumes(in_shells) >= _SLIT_VOLUME * work.volume]
     cells = reach.rooms_outside(np.union1d(in_sheets, in_shells), work.query())
     if len(cells) == 0:
         return
@@ -142,7 +142,7 @@ def _rooms_near(work: Work, walls: Soup) -> IntArray:
     """The rooms that faces may be walls of."""
     if not work.reach.room.any() or not _is_large(work, walls):
         return np.empty(0, dtype=np.int64)
-    near = np.unique(work.reach.rooms_near(points_covering(walls.vertices, walls.faces, GAP)[0]))
+    near = np.unique(work.reach.rooms_near(points_covering(walls.vertices, walls.faces, DEFAULT_GAP)[0]))
     return near[near > 0]
 
 
@@ -152,7 +152,7 @@ def _sheets_but_walls(work: Work, rooms: IntArray, wrap: Manifold) -> tuple[Soup
     It replaces those that are only walls, unless it leaves some of their body's outside, as noise does.
     """
     sheets = work.sheets
-    points, on = spread_points(sheets.vertices, sheets.faces, GAP)
+    points, on = spread_points(sheets.vertices, sheets.faces, DEFAULT_GAP)
     is_elsewhere = once_in_each_place(lambda some: ~np.isin(work.reach.rooms_near(some), rooms), points)
     is_wall = np.bincount(on, is_elsewhere, len(sheets.faces)) == 0
     bodies = np.unique(sheets.body[is_wall])
@@ -184,10 +184,10 @@ def _with_slits(work: Work) -> BoolArray:
 def fill_slits(work: Work) -> None:
     """Fill slits that nothing can reach: cuts would have to follow them."""
     query, gap = work.query(), work.wanted.gap
-    points, on = spread_points(query.vertices, query.faces, GAP)
+    points, on = spread_points(query.vertices, query.faces, DEFAULT_GAP)
     deep = work.reach.is_deep(points, _DEEP * gap)
     points, on = points[deep], on[deep]
-    for width in (_HAIR * gap, -_HAIR * gap):  # the solid lies on both sides of a slit, so far away
+    for width in (_BESIDE * gap, -_BESIDE * gap):  # the solid lies on both sides of a slit, so far away
         inside = query.inside(points + width * face_normals(query.vertices, query.faces[on]))
         points, on = points[inside], on[inside]
     if len(points) == 0:

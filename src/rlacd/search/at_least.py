@@ -18,10 +18,10 @@ from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part
 
-MISSED = 1e-3
+UNCOVERED = 1e-3
 """How far outside the hulls a point of the solid may lie, in the normalised frame."""
 
-SAMPLES = 1000
+CANDIDATES = 1000
 """Points of the solid's surface to choose from, besides the corners of the hulls."""
 
 POINTS, POINTS_PER_PART = 60, 3
@@ -38,7 +38,7 @@ def at_least(solid: Component, parts: Sequence[Part], reach: float, run: Run) ->
         A decomposition, whose corners are good candidates; the search for a better bound ends at their number.
     reach : float
         How far from the solid the surface of a hull may lie, in the normalised frame. The hulls have to cover the
-        solid but for points at most `MISSED` outside.
+        solid but for points at most `UNCOVERED` outside.
     run : Run
 
     Returns
@@ -49,11 +49,11 @@ def at_least(solid: Component, parts: Sequence[Part], reach: float, run: Run) ->
     if not math.isfinite(reach) or len(parts) == 1:
         return 1
     surface = solid.filling.surface
-    samples, _ = _native.sample_surface(solid.vertices, solid.faces, SAMPLES, 0)
+    samples, _ = _native.sample_surface(solid.vertices, solid.faces, CANDIDATES, 0)
     corners, _ = surface.closest(np.concatenate([part.hull.vertices for part in parts]), run.threads)
     points = np.concatenate([corners, samples])
     points = points[_far_apart(points, POINTS + POINTS_PER_PART * len(parts))]
-    found = _native.apart_points(surface, points, reach + MISSED, len(parts))
+    found = _native.apart_points(surface, points, reach + UNCOVERED, len(parts))
     return max(1, len(found))
 
 

@@ -45,7 +45,7 @@ REPEATS = 4
 OPENING = 16
 """Recuts before the first attempt to redistribute all parts: later recuts undo some of what that gains."""
 
-SMALL = 0.5
+SMALLEST_FIRST = 0.5
 """Share of the parts, the smallest, that are redistributed first: nothing saves more parts per unit of work."""
 
 RECUTS_PER_PART = 2
@@ -139,7 +139,7 @@ class Neighbourhood:
         self._make(self._redistributions())
 
     def _trials(self, most: float) -> Iterator[tuple[_Trial, Cluster]]:
-        yield from self._redistributions(SMALL)
+        yield from self._redistributions(SMALLEST_FIRST)
         yield from self._recuts(min(most, OPENING))
         yield from self._redistributions()
         while not self._exhausted and self._steps < most and self._may_continue():

@@ -12,7 +12,7 @@ from rlacd.run import work
 from rlacd.search.recut import Exchange
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
-from rlacd.solid.reunite import TOUCHING, touch
+from rlacd.solid.reunite import TOUCHING_FACES, touch
 
 Cluster = tuple[int, ...]
 """Ids of parts, ascending."""
@@ -63,7 +63,7 @@ class PartGraph:
         self.parts.update(zip(ids, new, strict=True))
         self._gaps.update((i, {}) for i in ids)
         filled = {i: self._screen.filled(part) for i, part in self.parts.items()}
-        near = neighbours(self.parts, ids, TOUCHING, 1)
+        near = neighbours(self.parts, ids, TOUCHING_FACES, 1)
         self._work += sum(
             work.joining(len(self.parts[i].hull.vertices) + len(self.parts[j].hull.vertices))
             + work.gluing(self.parts[i].size + self.parts[j].size)

@@ -10,13 +10,13 @@ from rlacd.cut import CutTree
 from rlacd.merge.merge import merge_parts
 from rlacd.policies import Policy
 from rlacd.run import Run, work
-from rlacd.solid.component import LOST, Component, Part
+from rlacd.solid.component import LOST_VOLUME, Component, Part
 from rlacd.solid.reunite import reunite
 
-SLACK = 5
+EXTRA_PIECES = 5
 """Pieces allowed beyond the number of parts: merging rarely makes up for more."""
 
-TIGHTER = 1e-4
+LEAST_SHRINKAGE = 1e-4
 """Equally many parts are better only if their hulls are smaller by this share; otherwise the search would stall."""
 
 
@@ -78,8 +78,8 @@ def recut(
     solid = reunite(members)
     if solid is None:
         return None
-    pieces, left = CutTree(solid, policy, run).cut_until(criterion, len(parts) + SLACK)
-    if left or sum(piece.volume for piece in pieces) < (1 - LOST) * solid.volume:
+    pieces, left = CutTree(solid, policy, run).cut_until(criterion, len(parts) + EXTRA_PIECES)
+    if left or sum(piece.volume for piece in pieces) < (1 - LOST_VOLUME) * solid.volume:
         return None
     if _volumes(pieces) == _volumes(parts):  # cut as before: merging these has already been tried
         return None
@@ -87,7 +87,7 @@ def recut(
     if run.is_over:
         return None
     exchange = Exchange.between([*parts, *around], merged)
-    tighter = hull_volume(exchange.into) < (1 - TIGHTER) * hull_volume(exchange.out)
+    tighter = hull_volume(exchange.into) < (1 - LEAST_SHRINKAGE) * hull_volume(exchange.out)
     return exchange if exchange.gain > 0 or (exchange.gain == 0 and tighter) else None
 
 

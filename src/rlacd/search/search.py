@@ -37,10 +37,10 @@ ANOTHER_PASS = 1.5
 HOPELESS = 5
 """... or when its pieces outnumber the parts by this factor: merging will not make up for that."""
 
-FEW = 20
+FEW_PARTS = 20
 """With more parts than this, searching around the first pass gains more per unit of work than another pass."""
 
-SHARE = 2 / 5
+SHARE_OF_TIME = 2 / 5
 """Further passes are made while one takes at most this share of the seconds left."""
 
 ROUNDS = 3
@@ -140,7 +140,7 @@ def search(
     state = _Search(context, others, run, first_pass, a_pass, HOPELESS * len(parts))
     if bounded:
         with run.limited(allowed):
-            starts = state.passes(parts, others[:1] if len(parts) <= FEW else [])
+            starts = state.passes(parts, others[:1] if len(parts) <= FEW_PARTS else [])
             done = Neighbourhood(context, starts[0], run, BOUNDED_PATIENCE).improve()
         if quality == "best":
             with run.limited(seconds=BEST_SECONDS - (time.perf_counter() - begin)):
@@ -191,7 +191,7 @@ class _Search:
         run, context, cache = self.run, self.context, CutCache()
         found = [parts]
         for ranking in rankings:
-            if run.is_over or len(parts) <= context.enough or self.seconds_of_a_pass > SHARE * run.seconds_left:
+            if run.is_over or len(parts) <= context.enough or self.seconds_of_a_pass > SHARE_OF_TIME * run.seconds_left:
                 break
             tree = CutTree(context.root, ranking(context.sweeps), run, cache)
             with run.quietly(), run.limited(ANOTHER_PASS * self.first_pass):

@@ -9,7 +9,7 @@ from manifold3d import Manifold
 
 from rlacd._native import Stopped, poll_stop, seconds_left
 
-LONG = 50_000
+LONG_BOOLEAN = 50_000
 """A number of triangles that manifold3d processes in some tenths of a second."""
 
 LATE = 0.3
@@ -25,7 +25,7 @@ def require_time_for(triangles: int) -> None:
     """
     poll_stop()
     left = seconds_left()
-    if triangles < LONG or math.isinf(left):
+    if triangles < LONG_BOOLEAN or math.isinf(left):
         return
     ball = Manifold.sphere(1.0, _SEGMENTS).to_mesh64()
     start = time.perf_counter()

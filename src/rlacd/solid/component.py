@@ -19,7 +19,7 @@ from rlacd.solid.solid import Shape, mesh_of
 NEGLIGIBLE_VOLUME = 1e-12
 """Solids below this volume (the frame's box has 8) are rounding left over by a cut."""
 
-LOST = 1e-6
+LOST_VOLUME = 1e-6
 """Share of a solid's volume that may be lost in a boolean, or as shavings (see `rlacd.cut`)."""
 
 
@@ -205,7 +205,7 @@ class ClippedPart(Part):
     @property
     def is_whole(self) -> bool:
         """Whether no member lost volume in the clipping: booleans are unreliable where a surface touches the hull."""
-        return self.volume >= (1 - LOST) * sum(member.volume for member in self.members)
+        return self.volume >= (1 - LOST_VOLUME) * sum(member.volume for member in self.members)
 
 
 class Component(Part):

@@ -27,12 +27,12 @@ MOST_HULLS = 2000
 SECONDS = 0.3
 """After this time the remaining bodies get a looser hull: exact hulls of half a million corners take seconds."""
 
-FEW = 10_000
+FEW_POINTS = 10_000
 """After that time, bodies with fewer points than this get their box only."""
 
 _WIDER = 1e-9
 _DIRECTIONS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
-_AT_ONCE = 100_000
+_POINTS_AT_ONCE = 100_000
 
 
 def cover(mesh: InputMesh, run: Run) -> tuple[Solid, list[Part]]:
@@ -110,7 +110,7 @@ def _hull(points: FloatArray, run: Run) -> Hull:
             return exact
     except Stopped:
         with run.shielded():
-            return _touching(points) if len(points) > FEW else _box(points)
+            return _touching(points) if len(points) > FEW_POINTS else _box(points)
     with run.shielded():
         return Hull.of(thickened(points)) or _box(points)
 
@@ -118,8 +118,8 @@ def _hull(points: FloatArray, run: Run) -> Hull:
 def _touching(points: FloatArray) -> Hull:
     """The polytope of the supporting planes of points [N, 3] in `_DIRECTIONS`."""
     reach = np.full(len(_DIRECTIONS), -np.inf)
-    for first in range(0, len(points), _AT_ONCE):
-        np.maximum(reach, heights(points[first : first + _AT_ONCE], _DIRECTIONS).max(axis=0), out=reach)
+    for first in range(0, len(points), _POINTS_AT_ONCE):
+        np.maximum(reach, heights(points[first : first + _POINTS_AT_ONCE], _DIRECTIONS).max(axis=0), out=reach)
     box = _box(points)
     body = to_manifold(box.vertices, box.faces)
     for direction, offset in zip(_DIRECTIONS, reach + 2 * _WIDER, strict=True):

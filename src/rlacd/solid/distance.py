@@ -22,10 +22,10 @@ Interval = tuple[float, float]
 
 Place = tuple[float, float, float]
 
-TOLERANCE = 2e-3
+DISTANCE_ACCURACY = 2e-3
 """Default width of the intervals: 0.1 % of the input's longest side in the normalised frame."""
 
-GAP = 1e-6
+CRACK = 1e-6
 """Cracks between hulls narrower than this are closed: the two sides of a cut are not part of the union's surface."""
 
 
@@ -33,7 +33,7 @@ def directed_hausdorff(
     vertices: FloatArray,
     faces: IntArray,
     surface: _native.Surface,
-    tolerance: float = TOLERANCE,
+    tolerance: float = DISTANCE_ACCURACY,
     threads: int | None = None,
 ) -> Interval:
     """Greatest distance from a point on the triangles of a mesh to a surface.
@@ -85,7 +85,7 @@ def hull_distances(
     hulls: Sequence[Hull],
     vertices: FloatArray,
     faces: IntArray,
-    tolerance: float = TOLERANCE,
+    tolerance: float = DISTANCE_ACCURACY,
     threads: int | None = None,
     surface: _native.Surface | None = None,
 ) -> HullDistances:
@@ -119,7 +119,7 @@ def hull_distances(
     _require_positive(tolerance)
     union = hull_union(hulls, threads)
     surface = surface or _native.Surface(vertices, faces)
-    least_over, over, over_at = union.over(surface, tolerance, GAP, threads or 0)
+    least_over, over, over_at = union.over(surface, tolerance, CRACK, threads or 0)
     least_under, under, under_at = union.under(vertices, faces, tolerance, threads or 0)
     return HullDistances((least_over, over), (least_under, under), over_at, under_at)
 
@@ -135,4 +135,4 @@ def hull_union(hulls: Sequence[Hull], threads: int | None = None) -> _native.Hul
 
 def _require_positive(tolerance: float) -> None:
     if not tolerance > 0:
-        raise OptionError(f"The tolerance must be positive, not {tolerance}; {TOLERANCE} is usual.")
+        raise OptionError(f"The tolerance must be positive, not {tolerance}; {DISTANCE_ACCURACY} is usual.")

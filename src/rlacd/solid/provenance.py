@@ -13,11 +13,11 @@ from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import Frame
 from rlacd.solid.topology import IntArray
 
-SAMPLES = 10_000
-LEAST = 32
+SURFACE_SAMPLES = 10_000
+LEAST_OF_LABEL = 32
 """Points spread over the surface, and at least over each label's share of it."""
 
-SLACK = 1e-3
+OUTSIDE_HULL = 1e-3
 """How far outside a hull a point of the surface may lie, as a share of the hull's size."""
 
 
@@ -51,7 +51,7 @@ def owners(
         poll_stop()
         corners = frame.to_frame(hull.vertices)[hull.faces]
         lower, upper = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
-        slack = SLACK * float((upper - lower).max())
+        slack = OUTSIDE_HULL * float((upper - lower).max())
         first, last = np.searchsorted(points[:, 0], (lower[0] - slack, upper[0] + slack))
         some = points[first:last]
         near = first + np.flatnonzero(((some >= lower - slack) & (some <= upper + slack)).all(axis=1))
@@ -78,7 +78,7 @@ def _spread(vertices: FloatArray, faces: NDArray[np.integer], label_of: IntArray
     for mine in np.split(order, np.flatnonzero(np.diff(label_of[order])) + 1):
         poll_stop()
         weight = area[mine]
-        count = max(LEAST, round(SAMPLES * weight.sum() / whole)) if whole > 0 else LEAST
+        count = max(LEAST_OF_LABEL, round(SURFACE_SAMPLES * weight.sum() / whole)) if whole > 0 else LEAST_OF_LABEL
         share = weight / weight.sum() if weight.sum() > 0 else None
         chosen.append(draw.choice(mine, count, p=share))
     face = np.concatenate(chosen)

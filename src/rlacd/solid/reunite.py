@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rlacd import _native
-from rlacd.solid.component import LOST, NEGLIGIBLE_VOLUME, ClippedPart, Component, Part
+from rlacd.solid.component import LOST_VOLUME, NEGLIGIBLE_VOLUME, ClippedPart, Component, Part
 
-TOUCHING = 1e-8
+TOUCHING_FACES = 1e-8
 """Distance at which faces count as touching (see native/distance/glue.hpp)."""
 
 
@@ -37,7 +37,7 @@ def _joined_again(components: Sequence[Component]) -> list[Component]:
         whole = [
             origin
             for origin, pieces in siblings.items()
-            if sum(piece.volume for piece in pieces) >= (1 - LOST) * origin.volume
+            if sum(piece.volume for piece in pieces) >= (1 - LOST_VOLUME) * origin.volume
         ]
         if not whole:
             return found

@@ -15,7 +15,7 @@ from rlacd.solid.arrays import BoolArray, FloatArray, IntArray
 HUES = len(DISTINCT) // 3
 """Colours that are easy to tell apart, also for the colour-blind; see `rlacd.io.write.palette`."""
 
-TOUCHING = 2e-3
+TOO_CLOSE_TO_SEE = 2e-3
 """Hulls count as touching if closer than this share of their common extent, too close for the eye to separate."""
 
 
@@ -54,7 +54,7 @@ def color_hulls(hulls: Sequence[trimesh.Trimesh]) -> Coloring:
 
 
 def neighbours(hulls: Sequence[trimesh.Trimesh]) -> list[set[int]]:
-    """Find which convex hulls touch or overlap: no facet normal of either separates them by more than `TOUCHING`.
+    """Find which convex hulls touch or overlap: no facet normal of either separates them by `TOO_CLOSE_TO_SEE`.
 
     Hulls separated only along the cross product of two edges count as touching.
     """
@@ -63,7 +63,7 @@ def neighbours(hulls: Sequence[trimesh.Trimesh]) -> list[set[int]]:
         return beside
     solids = [HalfSpaces.of(np.asarray(hull.vertices, dtype=np.float64), np.asarray(hull.faces)) for hull in hulls]
     lower, upper = np.array([solid.lower for solid in solids]), np.array([solid.upper for solid in solids])
-    near = TOUCHING * float((upper.max(axis=0) - lower.min(axis=0)).max())
+    near = TOO_CLOSE_TO_SEE * float((upper.max(axis=0) - lower.min(axis=0)).max())
     for one, solid in enumerate(solids):
         boxes = np.all((lower[one + 1 :] <= upper[one] + near) & (upper[one + 1 :] >= lower[one] - near), axis=1)
         for other in (one + 1 + np.flatnonzero(boxes)).tolist():

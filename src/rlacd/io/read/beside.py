@@ -142,10 +142,11 @@ def _of_gltf(content: bytes) -> list[str]:
 
 def _found(path: Path, uris: list[str], endings: frozenset[str]) -> dict[str, bytes]:
     """Those that are in the folder of the mesh, or below it."""
-    files, found = FolderFiles(path.parent, endings), {}
+    files = FolderFiles(path.parent, endings)
+    found: dict[str, bytes] = {}
     for name in sorted({spelled for uri in uris for spelled in (uri, unquote(uri))}):
         with contextlib.suppress(FileNotFoundError):
             data = files.get(name, unquoted=False)
-            if len(data) + sum(map(len, found.values())) <= LARGEST_FILE:  # one file may have many names
+            if len(data) + sum(len(known) for known in found.values()) <= LARGEST_FILE:  # one file may have many names
                 found[name] = data
     return found

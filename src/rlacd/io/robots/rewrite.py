@@ -211,7 +211,7 @@ def _fewer(meshes: Mapping[MeshUse, RewrittenMesh], options: Mapping[str, Any]) 
     hulls = sum(len(mesh.files) for mesh in meshes.values())
     asked = Options(**{name: options[name] for name in OPTION_NAMES if name in options})
     stated = any(options.get(name) is not None for name in ("threshold_abs", "max_hulls", "timeout"))
-    if "threshold" not in asked.numbers or stated or len(meshes) < 2 or hulls < MANY * len(meshes):
+    if "threshold" not in asked.numbers or stated or len(meshes) < 2 or hulls < MANY_HULLS * len(meshes):
         return []
     largest = min(mesh.result.report["scale"] for mesh in meshes.values())
     quick = {name: value for name, value in options.items() if name not in ("threshold", "budget", "search_steps")}
@@ -219,7 +219,7 @@ def _fewer(meshes: Mapping[MeshUse, RewrittenMesh], options: Mapping[str, Any]) 
     for times in LARGER:
         length = float(f"{times * _threshold(meshes) / largest:.1g}")
         fewer = sum(len(_coarse(mesh.result.source, {**quick, "threshold_abs": length})) for mesh in meshes.values())
-        if fewer <= FEWER * hulls:
+        if fewer <= WORTH_SAYING * hulls:
             return [
                 f"{len(meshes)} meshes became {hulls} hulls, because the threshold is relative to each; "
                 f"--threshold-abs {length:g} gives {fewer} or fewer."
@@ -227,7 +227,7 @@ def _fewer(meshes: Mapping[MeshUse, RewrittenMesh], options: Mapping[str, Any]) 
     return []
 
 
-MANY, FEWER = 10, 0.7
+MANY_HULLS, WORTH_SAYING = 10, 0.7
 """Hulls per mesh from which on fewer are suggested, and the share of them that is worth a word."""
 
 LARGER = (1, 2)

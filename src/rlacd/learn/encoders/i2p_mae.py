@@ -25,7 +25,7 @@ from rlacd.learn.encoders.weights_file import load_weights
 
 SCALES = 3
 
-LARGEST = 65536
+LARGEST_BATCH = 65536
 """Upper bound of every size."""
 
 
@@ -70,7 +70,10 @@ class Sizes:
         lists, numbers = (self.groups, self.neighbors, self.widths), (self.depth, self.heads, self.embedding)
         if not all(isinstance(values, tuple) and len(values) == SCALES for values in lists):
             return False
-        if not all(type(n) is int and 1 <= n <= LARGEST for n in (*sum(lists, ()), *numbers)) or self.embedding < 2:
+        if (
+            not all(type(n) is int and 1 <= n <= LARGEST_BATCH for n in (*sum(lists, ()), *numbers))
+            or self.embedding < 2
+        ):
             return False
         above = zip(self.groups, self.groups[1:], self.neighbors[1:], strict=False)
         if not all(count <= before and members <= before for before, count, members in above):
