@@ -17,6 +17,10 @@ constexpr double kApart = 1e-10;        // facet planes are moved out by this, s
 constexpr double kHalf = 0.5;           // a winding number between inside and outside
 constexpr double kWindingAccuracy = 2;  // see winding.hpp
 
+// Where a solid crosses itself, each cut may multiply its crossings: one that doubles its faces, and adds so many, is
+// given up.
+constexpr std::size_t kManyNewFaces = 1000;
+
 void append(Mesh& out, const Mesh& other) {
   const auto first = static_cast<std::int32_t>(out.vertices.size());
   out.vertices.insert(out.vertices.end(), other.vertices.begin(), other.vertices.end());
@@ -77,6 +81,7 @@ std::optional<std::vector<Piece>> connected_pieces(const Mesh& mesh, double leas
 }
 
 Mesh inside_all(Mesh mesh, const Mesh& hull) {
+  std::size_t fewest = mesh.faces.size();
   for (const Triangle& f : hull.faces) {
     const Vec3 a = hull.vertices[f[0]];
     const Vec3 normal = normalized(cross(hull.vertices[f[1]] - a, hull.vertices[f[2]] - a));
@@ -84,6 +89,8 @@ Mesh inside_all(Mesh mesh, const Mesh& hull) {
     if (std::none_of(mesh.vertices.begin(), mesh.vertices.end(), [&](Vec3 p) { return dot(normal, p) > offset; }))
       continue;
     mesh = capped(std::move(cut_by_plane(mesh, normal, offset)[0]), normal);
+    if (mesh.faces.size() > 2 * fewest + kManyNewFaces) return {};
+    fewest = std::min(fewest, mesh.faces.size());
   }
   return mesh;
 }

@@ -27,6 +27,7 @@ std::array<std::optional<Piece>, 2> cut(const Mesh& mesh, Vec3 normal, double of
 std::optional<std::vector<Piece>> connected_pieces(const Mesh& mesh, double least);
 
 // What is below all facet planes of a hull, cut by one after the other: slower than convex_clip.hpp, but always closed.
+// Empty if the solid crosses itself so often that cuts multiply its faces.
 Mesh inside_all(Mesh mesh, const Mesh& hull);
 
 }  // namespace rlacd
