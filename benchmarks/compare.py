@@ -38,7 +38,7 @@ def compare(
     fast:space[=RADIUS]    with navigable space (tolerance 0.1, half of it as radius; longest side 2)
     coacd, vhacd           other tools with their default options
     disjoint               rlacd's cuts, united only where hulls stay disjoint
-    planes[:ap=N][:ce=N][:no-spatial][:no-principal][:excess|:random|:FILE.onnx]
+    planes[:ap=N][:ce=N][:no-spatial][:no-principal][:excess|:random|:FILE.npz]
                            the paper's deployment
     """
     groups = {}

@@ -45,7 +45,7 @@ PAPER = Table(
 
 MeanError: TypeAlias = Annotated[list[float] | None, typer.Option(help="Mean D_h to tune to; may be repeated.")]
 Close: TypeAlias = Annotated[float, typer.Option(min=0.001, help="How far from it the mean may be, relative to it.")]
-Ranking: TypeAlias = Annotated[str, typer.Option(help="What ranks the axis planes: excess, random or FILE.onnx.")]
+Ranking: TypeAlias = Annotated[str, typer.Option(help="What ranks the axis planes: excess, random or FILE.npz.")]
 
 
 def _check(methods: str, **_: object) -> None:
@@ -61,7 +61,7 @@ def table_1(bench: Bench, methods: str = TABLE_1, at: MeanError = None, close: C
 
 @experiment(app, "greedy", _check)
 def greedy(bench: Bench, methods: str = GREEDY, at: MeanError = None, close: Close = CLOSE) -> Page:
-    """The same for greedy policies, one step ahead, and random shortlists; add planes:FILE.onnx (4.4.3)."""
+    """The same for greedy policies, one step ahead, and random shortlists; add planes:FILE.npz (4.4.3)."""
     return _equal_accuracy(bench, "Greedy against the policy (4.4.3)", methods, at, close)
 
 

@@ -124,7 +124,7 @@ def decompose(
         Unite parts whose joint hull still meets the threshold.
     policy : str or Policy
         What chooses the cuts of the first pass: ``greedy``, ``greedy-SCORE``, ``navacd``, ``random-N``, the path of
-        an ONNX file (see `rlacd.policies.make_policy`), or any object with a method ``choose``: see `rlacd.Policy`.
+        an .npz file of a network, or any object with a method ``choose``: see `rlacd.Policy`.
     resolution : int
         Cells along the longest side of the grid on which repair looks for enclosed spaces.
     open : "auto", "solid" or "thin"
