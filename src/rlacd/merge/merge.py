@@ -220,7 +220,7 @@ class _Adjoining:
     def unite(self, first: Part, second: Part) -> _Verdict:
         """Glue the two parts."""
         union, price = Part.glued(first, second), price_of_gluing(first, second)
-        if self.criterion.is_met(union):
+        if union.size and self.criterion.is_met(union):  # without faces: it could not be clipped
             return _Verdict(union, price)
         return _Verdict(None, price, self.criterion.is_hereditary)
 
