@@ -19,19 +19,15 @@ from rlacd.finish.limit import limit_part
 from rlacd.io.read.load import load_mesh
 from rlacd.options.names import WEIGHTS_ENDING
 from rlacd.planes.candidates import OFFSETS_PER_AXIS, axis_and_principal
-from rlacd.planes.sweep import SLIVER, Sweep, sweep
-from rlacd.policies.greedy import excess_norm
-from rlacd.policies.network import load_network
-from rlacd.policies.observe import paper_planes
-from rlacd.policies.qpolicy import KIND
-from rlacd.policies.shortlist import generator_of, least_hulls
-from rlacd.policies.sweep_features import FEATURES, PLANES, sweep_features
+from rlacd.planes.sweep import SLIVER, Sweep, paper_planes, sweep
+from rlacd.policies.greedy import excess_norm, generator_of, least_hulls
+from rlacd.policies.network import KIND, load_network
+from rlacd.policies.plane_features import PLANES, SWEEP_FEATURES, sweep_features
 from rlacd.repair.repair import repair
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Plane
-from rlacd.solid.hull import Hull
-from rlacd.solid.limit_hull import NO_LIMITS
+from rlacd.solid.hull import NO_LIMITS, Hull
 
 RANKINGS = ("excess", "random")
 
@@ -108,7 +104,7 @@ class Deployed:
         self._threshold = threshold
         self._network = None
         if deployment.ranking.endswith(WEIGHTS_ENDING):
-            self._network = load_network(deployment.ranking, KIND, FEATURES, PLANES)
+            self._network = load_network(deployment.ranking, KIND, SWEEP_FEATURES, PLANES)
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None when no candidate is valid."""

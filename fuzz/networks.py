@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from rlacd.policies.network import Network
-from rlacd.policies.qpolicy import KIND
-from rlacd.policies.sweep_features import FEATURES, PLANES
+from rlacd.policies.network import KIND, Network
+from rlacd.policies.plane_features import FEATURES, PLANES
 
 ABOUT: Mapping[str, Any] = MappingProxyType({"kind": KIND, "threshold": 0.05, "encoder": "sweep", "hull": True})
 """What a sound network says of itself."""

@@ -8,8 +8,7 @@ import numpy as np
 import trimesh
 from manifold3d import Manifold
 
-from rlacd.planes.sweep import sweep
-from rlacd.policies.observe import paper_planes, valid_planes
+from rlacd.planes.sweep import paper_planes, sweep, valid_planes
 from rlacd.solid.component import Component, Plane
 from tests.shapes import box, from_manifold
 

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from manifold3d import CrossSection, Manifold, Mesh64
 
 from rlacd import _native
-from rlacd.solid.component import Component, Part
-from rlacd.solid.reunite import reunite
+from rlacd.solid.component import Component, Part, reunite
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rlacd.solid.arrays import angles, dots, heights, length
 from rlacd.solid.component import Component
-from rlacd.solid.products import angles, dots, heights, length
 from tests import bits
 
 ROOT = Path(__file__).resolve().parents[1]

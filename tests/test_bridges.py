@@ -13,16 +13,15 @@ from manifold3d import CrossSection, Manifold, Mesh64, OpType
 import rlacd
 from rlacd import _native
 from rlacd.criteria import Concavity
+from rlacd.criteria.criterion import Feasibility
 from rlacd.criteria.navigable import Navigable
-from rlacd.criteria.screen import Feasibility
 from rlacd.merge import merge_parts
 from rlacd.merge.merge import united_in_turn
 from rlacd.run import Run, Work
-from rlacd.solid.balls import Balls
-from rlacd.solid.component import ClippedPart, Component, Part, Plane
+from rlacd.solid.component import ClippedPart, Component, Part, Plane, reunite
 from rlacd.solid.hull import Hull
 from rlacd.solid.manifold import to_manifold
-from rlacd.solid.reunite import reunite
+from rlacd.solid.primitive import Balls
 from tests.shapes import strangers
 
 TIGHT = Concavity(0.02)

@@ -16,10 +16,9 @@ from scipy.spatial.transform import Rotation
 import rlacd
 from rlacd import _native
 from rlacd.io.read.load import load_mesh
-from rlacd.planes.candidates import Candidates
-from rlacd.planes.concave_edges import concave_edge_planes, concave_edges, reflex_edges
+from rlacd.planes.candidates import Candidates, concave_edge_planes, concave_edges, reflex_edges
 from rlacd.policies import Greedy, NavACD, Policy
-from rlacd.policies.navacd import mid_planes
+from rlacd.policies.greedy import mid_planes
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component, Plane
 from tests import reference_concave_edges as reference

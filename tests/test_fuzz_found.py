@@ -11,9 +11,8 @@ from fuzz.recipes import make_shape
 from rlacd import _native
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
-from rlacd.solid.component import Component, Plane
+from rlacd.solid.component import Component, Plane, reunite
 from rlacd.solid.hull import Hull
-from rlacd.solid.reunite import reunite
 from tests.shapes import strangers
 
 

@@ -16,8 +16,7 @@ from rlacd.errors import TrainingError
 from rlacd.io.read.load import load_mesh
 from rlacd.learn.meshes import list_meshes
 from rlacd.learn.process import CutProcess, Reward, terminal_reward
-from rlacd.planes.sweep import sweep
-from rlacd.policies.observe import paper_planes, valid_planes
+from rlacd.planes.sweep import paper_planes, sweep, valid_planes
 from rlacd.repair.repair import repair
 from rlacd.run import Run
 from rlacd.solid.component import Component, Plane

@@ -23,8 +23,8 @@ from rlacd.learn.options import TrainOptions
 from rlacd.learn.process import CutProcess, Memory
 from rlacd.learn.q_network import load_policy
 from rlacd.learn.train import train
+from rlacd.planes.sweep import paper_planes, valid_planes
 from rlacd.policies import Policy
-from rlacd.policies.observe import paper_planes, valid_planes
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component
 from tests.learning import small_solids
@@ -140,7 +140,7 @@ def two_planes(monkeypatch: pytest.MonkeyPatch) -> None:
         allowed = np.isin(np.arange(150), TWO)
         return allowed & valid_planes(component, paper_planes(component))
 
-    for module in ("learn.process", "learn.episodes", "policies.qpolicy"):
+    for module in ("learn.process", "learn.episodes", "policies.network"):
         monkeypatch.setattr(f"rlacd.{module}.valid_planes", two)
 
 

@@ -14,9 +14,7 @@ from manifold3d import Manifold
 from rlacd import _native
 from rlacd.io.read.load import load_mesh
 from rlacd.planes.candidates import Candidates, axis_and_principal
-from rlacd.planes.least_excess import least_excess
-from rlacd.planes.sweep import SLIVER, Sweep, sweep
-from rlacd.planes.sweep_cache import SweepCache
+from rlacd.planes.sweep import SLIVER, Sweep, SweepCache, least_excess, sweep
 from rlacd.policies import SCORES, Greedy
 from rlacd.policies.greedy import cheapest, excess_norm, hull_sum, max_excess
 from rlacd.repair.repair import repair

@@ -11,8 +11,8 @@ from rlacd.criteria.navigable import Navigable
 from rlacd.merge import merge_parts
 from rlacd.merge.boxes import Boxes
 from rlacd.run import Run
-from rlacd.solid.balls import Balls
 from rlacd.solid.component import Component, Part, Plane
+from rlacd.solid.primitive import Balls
 
 
 def pieces_of(solid: Manifold, *planes: Plane) -> list[Component]:

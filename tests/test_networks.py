@@ -13,11 +13,10 @@ import pytest
 import rlacd
 from fuzz.networks import ABOUT, q_network
 from rlacd.errors import WeightsError
+from rlacd.planes.sweep import paper_planes, valid_planes
 from rlacd.policies import make_policy
-from rlacd.policies.network import load_network
-from rlacd.policies.observe import paper_planes, valid_planes
-from rlacd.policies.qpolicy import KIND, QPolicy, best_planes
-from rlacd.policies.sweep_features import FEATURES, PLANES, sweep_features
+from rlacd.policies.network import KIND, QPolicy, best_planes, load_network
+from rlacd.policies.plane_features import PLANES, SWEEP_FEATURES, sweep_features
 from rlacd.solid.component import Component
 
 
@@ -55,8 +54,8 @@ def test_the_papers_planes_lie_about_the_centre_a_25th_of_the_longest_side_apart
 def test_a_component_anywhere_has_the_same_features_but_for_its_size() -> None:
     one = sweep_features(Component(chair()), 0.05)
     moved = sweep_features(Component(chair().translate((3, -2, 1)).scale([0.25] * 3)), 0.0125)
-    assert one.shape == (FEATURES,)
-    assert np.abs(one - moved)[: FEATURES - 6].max() < 1e-3
+    assert one.shape == (SWEEP_FEATURES,)
+    assert np.abs(one - moved)[: SWEEP_FEATURES - 6].max() < 1e-3
     assert one[-6] - moved[-6] == pytest.approx(2, abs=1e-5)
 
 
@@ -64,7 +63,7 @@ def test_a_component_anywhere_has_the_same_features_but_for_its_size() -> None:
 def test_alone_the_greatest_value_decides_and_deployed_the_least_hulls_of_the_ten_best(
     network: Path, shortlist: int, edges: int
 ) -> None:
-    component, values = Component(chair()), load_network(network, KIND, FEATURES, PLANES)
+    component, values = Component(chair()), load_network(network, KIND, SWEEP_FEATURES, PLANES)
     candidates = paper_planes(component)
     best = best_planes(values(sweep_features(component, 0.05)), valid_planes(component, candidates), shortlist)
     planes = [candidates.plane(int(i)) for i in best]

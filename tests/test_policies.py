@@ -16,9 +16,8 @@ import rlacd
 from rlacd.planes.candidates import axis_and_principal
 from rlacd.planes.sweep import sweep
 from rlacd.policies import make_policy
-from rlacd.policies.greedy import excess_norm, hull_sum
+from rlacd.policies.greedy import RandomShortlist, excess_norm, hull_sum
 from rlacd.policies.learned import PROMISING, features_of
-from rlacd.policies.shortlist import RandomShortlist
 
 DOCS = Path(__file__).parent.parent / "docs" / "policies.md"
 

@@ -12,7 +12,7 @@ from manifold3d import Manifold, Mesh64
 import rlacd
 from rlacd import _native
 from rlacd.criteria import Concavity
-from rlacd.planes.sweep_cache import SweepCache
+from rlacd.planes.sweep import SweepCache
 from rlacd.policies import make_policy
 from rlacd.proxy import Lift, simplify
 from rlacd.repair.union import unite

@@ -17,7 +17,7 @@ from rlacd.cut import CutTree
 from rlacd.io.read.load import load_mesh
 from rlacd.merge import merge_parts
 from rlacd.options.navigable import NavigableSpace
-from rlacd.planes.sweep_cache import SweepCache
+from rlacd.planes.sweep import SweepCache
 from rlacd.policies import make_policy
 from rlacd.repair.repair import repair
 from rlacd.run import Run

@@ -23,7 +23,7 @@ from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.io.read.load import load_mesh
 from rlacd.merge import merge_parts
-from rlacd.planes.sweep_cache import SweepCache
+from rlacd.planes.sweep import SweepCache
 from rlacd.policies import make_policy
 from rlacd.repair.repair import repair
 from rlacd.run import Run
@@ -32,8 +32,7 @@ from rlacd.search.neighbourhood import LAG, LEAST_TRIALS, Neighbourhood, cost
 from rlacd.search.part_graph import PartGraph
 from rlacd.search.recut import Exchange, recut
 from rlacd.search.search import BOUNDED_PATIENCE, search
-from rlacd.solid.component import Component, Part, Plane
-from rlacd.solid.reunite import reunite, touch
+from rlacd.solid.component import Component, Part, Plane, reunite, touch
 from tests.shapes import box, from_manifold, strangers
 
 SHAPES = ("test/coacd_examples/SnowFlake.ply", "test/vhacd/ob_chess_table.ply", "test/capod/class8__m85.ply")

@@ -26,9 +26,7 @@ from rlacd.cut import CutTree
 from rlacd.errors import RlacdError
 from rlacd.io.read.load import load_mesh
 from rlacd.options.navigable import NavigableSpace
-from rlacd.planes.least_excess import SLIVERS
-from rlacd.planes.sweep import Sweep
-from rlacd.planes.sweep_cache import SweepCache
+from rlacd.planes.sweep import SLIVERS, Sweep, SweepCache
 from rlacd.policies import Greedy
 from rlacd.policies.greedy import excess_norm, hull_sum, max_excess
 from rlacd.repair.repair import repair

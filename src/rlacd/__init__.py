@@ -1,33 +1,8 @@
 """Approximate convex decomposition: any mesh in, few tight convex hulls out."""
 
 from importlib import import_module
-from typing import TYPE_CHECKING
 
 from rlacd._version import __version__
-
-if TYPE_CHECKING:
-    from rlacd.decompose_mesh import decompose
-    from rlacd.decomposition import Decomposition
-    from rlacd.errors import (
-        EmptyMeshError,
-        ImplausibleBodyWarning,
-        MeshDataError,
-        MeshError,
-        MeshFileError,
-        MissingExtraError,
-        OptionError,
-        OutputError,
-        RlacdError,
-    )
-    from rlacd.io.robots import Rewritten, rewrite_robot
-    from rlacd.options.navigable import NavigableSpace
-    from rlacd.options.presets import PRESETS, Preset
-    from rlacd.planes.sweep import Sweep
-    from rlacd.planes.sweep_cache import SweepCache
-    from rlacd.policies import Policy
-    from rlacd.run import Progress
-    from rlacd.solid.component import Component, Plane
-    from rlacd.solid.primitive import Primitive
 
 __all__ = [
     "PRESETS",
@@ -56,9 +31,9 @@ __all__ = [
     "rewrite_robot",
 ]
 
-# Where each public name lives. Its module is imported when the name is first used (PEP 562), so that `rlacd --help`
-# and programs that only might decompose do not wait for trimesh and numpy. No module may be called like a public name:
-# importing it would hide that.
+# Where each public name lives; `__init__.pyi` says the same to editors and type checkers. Its module is imported when
+# the name is first used (PEP 562), so that `rlacd --help` and programs that might not decompose do not wait for trimesh
+# and numpy. No module may be called like a public name: importing it would hide that.
 _HOME = {
     "NavigableSpace": "options.navigable",
     "decompose": "decompose_mesh",
@@ -73,7 +48,7 @@ _HOME = {
     "Plane": "solid.component",
     "Primitive": "solid.primitive",
     "Sweep": "planes.sweep",
-    "SweepCache": "planes.sweep_cache",
+    "SweepCache": "planes.sweep",
     **dict.fromkeys((name for name in __all__ if name.endswith(("Error", "Warning"))), "errors"),
 }
 

@@ -15,7 +15,7 @@ from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.merge import best_within, drop_slivers
 from rlacd.options import Options
-from rlacd.planes.sweep_cache import SweepCache
+from rlacd.planes.sweep import SweepCache
 from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
 from rlacd.proxy import Model
 from rlacd.repair.repair import repair

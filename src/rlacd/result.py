@@ -13,9 +13,8 @@ from rlacd.fit import Fit
 from rlacd.options.fields import checked
 from rlacd.options.names import PRIMITIVE_KINDS
 from rlacd.options.output import Axis, OutputOptions
-from rlacd.solid.balls import Balls
 from rlacd.solid.input_mesh import InputMesh
-from rlacd.solid.primitive import PRIMITIVE, Primitive
+from rlacd.solid.primitive import PRIMITIVE, Balls, Primitive
 
 
 @dataclass(frozen=True, eq=False, repr=False)

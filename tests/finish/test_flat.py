@@ -9,12 +9,12 @@ import pytest
 from manifold3d import Manifold
 
 import rlacd
-from rlacd.finish.flat import FLUSH, resting_sides
+from rlacd.finish.limit import FLUSH, resting_sides
 from rlacd.io.read.load import load_mesh
 from rlacd.options.presets import HullLimits
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component
-from rlacd.solid.limit_hull import limit_hull
+from rlacd.solid.hull import limit_hull
 from tests.shapes import box
 
 DEEP = 1e-4

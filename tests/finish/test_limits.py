@@ -19,8 +19,7 @@ from rlacd.errors import OptionError
 from rlacd.finish.limit import limit_part
 from rlacd.options.presets import HullLimits
 from rlacd.solid.component import Part
-from rlacd.solid.hull import Hull
-from rlacd.solid.limit_hull import NO_LIMITS, NO_SIDES, limit_hull
+from rlacd.solid.hull import NO_LIMITS, NO_SIDES, Hull, limit_hull
 
 
 def hull_of(points: np.ndarray) -> Hull:

@@ -8,7 +8,7 @@ import trimesh
 
 import rlacd
 from rlacd.criteria import Concavity
-from rlacd.finish.take_in import take_in
+from rlacd.finish.limit import take_in
 from rlacd.solid.component import Component, Part
 from rlacd.solid.distance import hull_union
 

@@ -16,9 +16,8 @@ from rlacd.repair.repair import repair
 from rlacd.repair.union import to_arrays
 from rlacd.repair.voxels import DEFAULT_GAP
 from rlacd.solid.distance import hull_union
-from rlacd.solid.frame import Frame
+from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.hull import Hull
-from rlacd.solid.thickness import HALF_THICKNESS
 from tests.repair.repaired import BOX, join, moved, solid_of, steps, volume, with_hole, without
 
 

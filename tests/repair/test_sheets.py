@@ -11,7 +11,7 @@ from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.repair import repair
 from rlacd.repair.union import to_arrays
 from rlacd.repair.voxels import DEFAULT_GAP
-from rlacd.solid.thickness import HALF_THICKNESS
+from rlacd.solid.frame import HALF_THICKNESS
 from tests.repair.repaired import BOX, join, moved, solid_of, steps, volume, with_hole
 
 

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rlacd.cli.commands import Option, chosen, options_of
 from rlacd.errors import OptionError
 from rlacd.options import OPTION_NAMES, Options, with_criterion
-from rlacd.options.fields import check_fields, number, option, stated
-from rlacd.options.lengths import LONGEST_SIDE
+from rlacd.options.fields import LONGEST_SIDE, check_fields, number, option, stated
 from rlacd.options.navigable import NavigableSpace
 
 if TYPE_CHECKING:

@@ -14,8 +14,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from rlacd import _native
-from rlacd.criteria.criterion import Criterion, CriterionSummary
-from rlacd.criteria.screen import Feasibility, Screen
+from rlacd.criteria.criterion import Criterion, CriterionSummary, Feasibility, Screen
 from rlacd.errors import OptionError
 from rlacd.fit import told_apart
 from rlacd.options import Options

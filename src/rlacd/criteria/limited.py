@@ -6,16 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rlacd.criteria.concavity import Concavity, Distance
-from rlacd.criteria.criterion import Criterion, CriterionSummary
+from rlacd.criteria.criterion import Criterion, CriterionSummary, Screen
 from rlacd.criteria.navigable import Navigable
-from rlacd.criteria.screen import Screen
 from rlacd.criteria.volume import AddedVolume
 from rlacd.options import Options
 from rlacd.options.presets import HullLimits
 from rlacd.run import Run
-from rlacd.solid.balls import Balls
 from rlacd.solid.component import Part
-from rlacd.solid.limit_hull import keeps, limit_hull
+from rlacd.solid.hull import keeps, limit_hull
+from rlacd.solid.primitive import Balls
 from rlacd.solid.solid import Solid
 
 CRITERIA: dict[str, type[Criterion]] = {

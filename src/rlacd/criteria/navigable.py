@@ -25,18 +25,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rlacd import _native
-from rlacd.criteria.criterion import Criterion, CriterionSummary
-from rlacd.criteria.screen import Screen
+from rlacd.criteria.criterion import Criterion, CriterionSummary, Screen
 from rlacd.errors import OptionError
 from rlacd.options import Options
 from rlacd.options.navigable import NavigableSpace, Point
 from rlacd.run import Run
-from rlacd.solid.arrays import FloatArray, IntArray
-from rlacd.solid.balls import Balls
+from rlacd.solid.arrays import FloatArray, IntArray, dots, heights
 from rlacd.solid.component import Part
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
-from rlacd.solid.products import dots, heights
+from rlacd.solid.primitive import Balls
 from rlacd.solid.solid import Solid
 
 MOST_CELLS = 256

@@ -12,8 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from rlacd._native import mesh_volume
-from rlacd.criteria.criterion import Criterion, CriterionSummary
-from rlacd.criteria.screen import Screen
+from rlacd.criteria.criterion import Criterion, CriterionSummary, Screen
 from rlacd.fit import told_apart
 from rlacd.options import Options
 from rlacd.run import Run

@@ -10,20 +10,27 @@ import trimesh
 
 from rlacd import _native
 from rlacd.find_parts import Reached
-from rlacd.finish.flat import kept_within, resting_sides, within_reach
 from rlacd.finish.in_input import as_carried, in_input
-from rlacd.finish.limit import MOST_GROWTH, limit_part, limit_roughly, simple_part
+from rlacd.finish.limit import (
+    MOST_GROWTH,
+    kept_within,
+    limit_part,
+    limit_roughly,
+    resting_sides,
+    simple_part,
+    take_in,
+    within_reach,
+)
 from rlacd.finish.overlap import Seams, overlap_parts
 from rlacd.finish.primitives import PRIMITIVE_SLACK, primitive_part
 from rlacd.finish.report import COVERAGE_TOLERANCE, NEARLY, make_report
-from rlacd.finish.take_in import take_in
 from rlacd.merge import drop_slivers
 from rlacd.options import SIMPLE
 from rlacd.run import Run
-from rlacd.solid.balls import Balls
 from rlacd.solid.component import Part
 from rlacd.solid.distance import hull_union
-from rlacd.solid.limit_hull import NO_SIDES
+from rlacd.solid.hull import NO_SIDES
+from rlacd.solid.primitive import Balls
 from rlacd.solid.provenance import owners
 from rlacd.solid.solid import Solid
 

@@ -13,8 +13,7 @@ from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
 from rlacd.solid.distance import hull_union
 from rlacd.solid.frame import Frame
-from rlacd.solid.hull import Hull
-from rlacd.solid.limit_hull import NO_LIMITS, TOLERANCE, keeps, limit_hull
+from rlacd.solid.hull import NO_LIMITS, TOLERANCE, Hull, keeps, limit_hull
 from rlacd.solid.primitive import PRIMITIVE
 
 _LARGEST = float(np.finfo(np.float64).max)

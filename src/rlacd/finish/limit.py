@@ -1,15 +1,23 @@
-"""Final hulls inside limits on vertices and faces, and with few corners."""
+"""Final hulls: with few corners, inside limits, flat where the solid can rest.
+
+They grow to points just outside them, where repair moved the surface or a sliver was dropped.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
+import numpy as np
+
+from rlacd import _native
 from rlacd.criteria import Criterion
 from rlacd.finish.in_input import plain_hull
 from rlacd.options.presets import HullLimits
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.component import Part
-from rlacd.solid.limit_hull import NO_SIDES, keeps, limit_hull
+from rlacd.solid.component import Component, Part
+from rlacd.solid.distance import hull_union
+from rlacd.solid.hull import NO_SIDES, Hull, keeps, limit_hull
 
 SHARE_OF_OVERHANG = 0.2
 """A simple hull grows by at most this share of what the criterion allows beyond a part."""
@@ -61,3 +69,99 @@ def limit_part(
 def limit_roughly(part: Part, limits: HullLimits) -> Part:
     """Get the part with a hull inside the limits, cheaply: if its hull exceeds them, a box or tetrahedron around it."""
     return part if keeps(part.hull, limits) else part.with_hull(plain_hull(part.hull.vertices, limits))
+
+
+SIDE_AREA = 0.02
+"""A side has at least this share of the area of the convex hull: the facets of curved surfaces have less."""
+
+FLUSH = 1e-6
+"""What lies within this of a side's plane is in it, and hulls stay within it."""
+
+
+def resting_sides(solid: Component) -> FloatArray:
+    """Find the sides of a solid's convex hull over which its centre of mass lies.
+
+    Returns
+    -------
+    FloatArray
+        Half-spaces n.x <= d around the solid: rows of unit n, and d, [P, 4].
+    """
+    hull, (_, centre, _) = solid.hull, _native.mesh_mass(solid.vertices, solid.faces)
+    corners = hull.vertices[hull.faces]
+    edges = np.roll(corners, -1, axis=1) - corners
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    areas = np.linalg.norm(normals, axis=1)
+    outwards = np.cross(edges, normals[:, None])
+    below = (np.einsum("fec,fec->fe", outwards, centre - corners) <= 0).all(axis=1)  # the centre, in each facet's prism
+    sides, seen = [], areas == 0
+    for face in np.flatnonzero(below):
+        if seen[face]:
+            continue
+        normal = normals[face] / areas[face]
+        offset = (corners[face] @ normal).max()
+        coplanar = (corners @ normal > offset - FLUSH).all(axis=1)
+        seen |= coplanar
+        if areas[coplanar].sum() >= SIDE_AREA * areas.sum():
+            sides.append([*normal, offset + FLUSH])
+    return np.array(sides).reshape(-1, 4)
+
+
+def within_reach(sides: FloatArray, hull: Hull, growth: float) -> FloatArray:
+    """Those of the half-spaces that a hull could leave by growing so much."""
+    reach = (hull.vertices @ sides[:, :3].T).max(axis=0)
+    return np.ascontiguousarray(sides[reach > sides[:, 3] - growth])
+
+
+def kept_within(part: Part, sides: FloatArray, criterion: Criterion) -> Part:
+    """Get the part without what its hull, that of a simpler copy of the solid, has beyond the half-spaces.
+
+    The part stays as it is if nothing is beyond, or if it would no longer meet the criterion.
+    """
+    hull = part.hull
+    for *normal, offset in sides:
+        beyond = hull.vertices @ normal - offset
+        if beyond.max() > 0:
+            a, b = (hull.faces[:, [0, 1, 2]].ravel(), hull.faces[:, [1, 2, 0]].ravel())
+            crossing = (beyond[a] <= 0) & (beyond[b] > 0)
+            a, b = a[crossing], b[crossing]
+            share = beyond[a] / (beyond[a] - beyond[b])
+            on_plane = hull.vertices[a] + share[:, None] * (hull.vertices[b] - hull.vertices[a])
+            hull = Hull.of(np.concatenate([hull.vertices[beyond <= 0], on_plane])) or hull
+    if hull is part.hull:
+        return part
+    clipped = part.with_hull(hull)
+    return clipped if criterion.is_met(clipped) or not criterion.is_met(part) else part
+
+
+MOST_POINTS_TAKEN_IN = 10_000
+"""Of more points than this, only every second, third, ... is looked at."""
+
+
+def take_in(parts: Sequence[Part], points: FloatArray, criterion: Criterion) -> list[Part]:
+    """Grow the hull nearest to each point to take it in, unless the hull's part then breaks the criterion.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+    points : float64 [N, 3]
+        A hull that holds one already is not asked: its part is going to be dropped.
+    criterion : Criterion
+
+    Returns
+    -------
+    list of Part
+        In the same order, some with larger hulls.
+    """
+    points = points[:: 1 + len(points) // MOST_POINTS_TAKEN_IN]
+    distance = np.array([hull_union([part.hull], 1).distance(points, 1) for part in parts])
+    taker = np.where(distance > 0, distance, np.inf).argmin(axis=0)
+    grown = list(parts)
+    for i in np.unique(taker):
+        part = parts[i]
+        hull = Hull.of(np.concatenate([part.hull.vertices, points[taker == i]]))
+        if hull is None:
+            continue
+        larger = part.with_hull(hull)
+        if criterion.is_met(larger) or not criterion.is_met(part):
+            grown[i] = larger
+    return grown

@@ -19,8 +19,7 @@ from rlacd.criteria import Criterion
 from rlacd.merge.boxes import Boxes
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import LOST_VOLUME, Component, Part
-from rlacd.solid.hull import Hull
-from rlacd.solid.limit_hull import TOLERANCE
+from rlacd.solid.hull import TOLERANCE, Hull
 
 HELD = 0.7
 """A seam overlaps enough if each of its points lies deep in some hull: as deep as in the solid or by half the overlap,

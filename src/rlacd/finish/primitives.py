@@ -14,8 +14,7 @@ from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.options.presets import HullLimits
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import LOST_VOLUME, Component, Part
-from rlacd.solid.hull import Hull
-from rlacd.solid.limit_hull import NO_LIMITS, keeps
+from rlacd.solid.hull import NO_LIMITS, Hull, keeps
 from rlacd.solid.primitive import Primitive
 
 PRIMITIVE_SLACK = 1e-9

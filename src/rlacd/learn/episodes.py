@@ -12,9 +12,9 @@ from rlacd.learn.encoders import Encoder
 from rlacd.learn.files import packed, unpacked
 from rlacd.learn.options import TrainOptions
 from rlacd.learn.process import CutProcess
+from rlacd.planes.sweep import valid_planes
 from rlacd.policies.network import Network
-from rlacd.policies.observe import Float32Array, valid_planes
-from rlacd.solid.arrays import BoolArray, FloatArray
+from rlacd.solid.arrays import BoolArray, Float32Array, FloatArray
 from rlacd.solid.component import Component
 
 Longs = NDArray[np.int64]

@@ -14,7 +14,7 @@ from rlacd.criteria import Criterion
 from rlacd.cut import CutCache
 from rlacd.learn.options import TrainOptions
 from rlacd.planes.candidates import Candidates
-from rlacd.policies.observe import paper_planes, valid_planes
+from rlacd.planes.sweep import paper_planes, valid_planes
 from rlacd.solid.component import Component, Plane
 
 

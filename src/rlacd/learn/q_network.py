@@ -14,10 +14,9 @@ from torch import Tensor, nn
 from rlacd.errors import OptionError
 from rlacd.learn.encoders import Encoder, make_encoder
 from rlacd.learn.options import TrainOptions
-from rlacd.policies.network import Network, load_network
-from rlacd.policies.observe import Float32Array
-from rlacd.policies.qpolicy import KIND, QPolicy
-from rlacd.policies.sweep_features import PLANES
+from rlacd.policies.network import KIND, Network, QPolicy, load_network
+from rlacd.policies.plane_features import PLANES
+from rlacd.solid.arrays import Float32Array
 from rlacd.solid.component import Component
 
 HIDDEN = (1024, 512, 256, 128)

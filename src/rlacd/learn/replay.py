@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd.errors import RlacdError
-from rlacd.policies.observe import Float32Array
-from rlacd.solid.arrays import BoolArray
+from rlacd.solid.arrays import BoolArray, Float32Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -40,8 +40,8 @@ from rlacd.learn.replay import Replay, Seen, Transition
 from rlacd.learn.rollouts import Acting, Rollouts
 from rlacd.options.fields import require_same
 from rlacd.policies import make_policy
-from rlacd.policies.qpolicy import KIND, SHORTLIST
-from rlacd.policies.shortlist import RandomShortlist
+from rlacd.policies.greedy import RandomShortlist
+from rlacd.policies.network import KIND, SHORTLIST
 from rlacd.pool import Pool, ProcessLimits
 from rlacd.pool.local import InProcessPool
 

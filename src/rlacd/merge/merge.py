@@ -12,8 +12,7 @@ import numpy as np
 
 from rlacd import _native
 from rlacd._native import Stopped
-from rlacd.criteria.criterion import Criterion
-from rlacd.criteria.screen import Feasibility
+from rlacd.criteria.criterion import Criterion, Feasibility
 from rlacd.merge.boxes import Boxes
 from rlacd.run import Run, Work, work
 from rlacd.solid.arrays import IntArray

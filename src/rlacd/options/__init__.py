@@ -12,8 +12,19 @@ from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias, cast
 
 from rlacd.errors import OptionError
-from rlacd.options.fields import about, check_fields, custom, integer, number, one_of, option, read, stated
-from rlacd.options.lengths import LENGTH, relative
+from rlacd.options.fields import (
+    LENGTH,
+    about,
+    check_fields,
+    custom,
+    integer,
+    number,
+    one_of,
+    option,
+    read,
+    relative,
+    stated,
+)
 from rlacd.options.names import POLICIES, PRIMITIVE_KINDS, PrimitiveKind, policy_name, read_policy, read_primitives
 from rlacd.options.navigable import NavigableSpace
 from rlacd.options.presets import PRESETS, HullLimits, PresetName, find_preset

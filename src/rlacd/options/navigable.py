@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from rlacd.options.fields import check_fields, custom, number, option, stated
-from rlacd.options.lengths import LENGTH, relative
+from rlacd.options.fields import LENGTH, check_fields, custom, number, option, relative, stated
 
 Point: TypeAlias = tuple[float, float, float]
 

@@ -1,15 +1,21 @@
-"""The sweep: scores of all candidate planes of a component, without cutting it."""
+"""The sweep: scores of all candidate planes of a component, without cutting it, each computed once for all policies.
+
+The plane whose two sides have the least excess hull volume is found without a full sweep.
+"""
 
 from __future__ import annotations
 
+import math
+import threading
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from rlacd import _native
-from rlacd.planes.candidates import Candidates
+from rlacd.planes.candidates import OFFSETS_PER_AXIS, Candidates, axis_and_principal
 from rlacd.solid.arrays import BoolArray, FloatArray
-from rlacd.solid.component import NEGLIGIBLE_VOLUME, Component
+from rlacd.solid.component import NEGLIGIBLE_VOLUME, Component, Plane
 
 SLIVER = 0.02
 """A side thinner than this share of its largest extent (an inscribed ball of 1/100) is a sliver."""
@@ -62,3 +68,116 @@ def sweep(component: Component, candidates: Candidates, threads: int = 1) -> Swe
     """Score all candidates of a component: exact volumes of both sides' solids and hulls (see native/cut/sweep.hpp)."""
     scores = _native.sweep(component.vertices, component.faces, candidates.directions, candidates.offsets, threads)
     return Sweep(candidates, *np.ascontiguousarray(scores.T))
+
+
+class SweepCache:
+    """Candidate planes of components and their sweeps, kept as long as the component lives.
+
+    Parameters
+    ----------
+    per_axis : int
+        Planes along each of the six axes.
+    concave_edges : int
+        Number of concave edges whose planes are added.
+    """
+
+    def __init__(self, per_axis: int = OFFSETS_PER_AXIS, concave_edges: int = 4) -> None:
+        self._per_axis = per_axis
+        self._concave_edges = concave_edges
+        self._candidates: WeakKeyDictionary[Component, Candidates] = WeakKeyDictionary()
+        self._sweeps: WeakKeyDictionary[Component, Sweep] = WeakKeyDictionary()
+        self._lock = threading.Lock()
+
+    def candidates(self, component: Component) -> Candidates:
+        """Get the planes of a component."""
+        with self._lock:
+            known = self._candidates.get(component)
+        if known is None:
+            known = self._found(component)
+            with self._lock:  # another thread may have done the same, with the same result
+                self._candidates[component] = known
+        return known
+
+    def _found(self, component: Component) -> Candidates:
+        if self._concave_edges == 0:
+            return axis_and_principal(component, self._per_axis)
+        hull = component.hull
+        normals, offsets = _native.candidate_planes(
+            component.vertices, component.faces, hull.vertices, hull.faces, self._per_axis, self._concave_edges
+        )
+        return Candidates(normals, offsets[:, None])
+
+    def of(self, component: Component, threads: int = 1) -> Sweep:
+        """Get the sweep of a component."""
+        with self._lock:
+            known = self._sweeps.get(component)
+        if known is None:
+            known = sweep(component, self.candidates(component), threads)
+            with self._lock:
+                self._sweeps[component] = known
+        return known
+
+
+SLIVERS = (SLIVER, SLIVER / 100)
+"""Thresholds for slivers, strictest first: planes that leave slivers are used only if there is no other."""
+
+TIE = 1e-9
+"""Costs that differ by less than this share of the largest count as equal."""
+
+
+def least_excess(component: Component, candidates: Candidates, exponent: float, threads: int = 1) -> Plane | None:
+    """Get the valid plane of least cost; None if every plane misses the solid or shaves off a film.
+
+    The cost is the `exponent`-norm of the two sides' |CH(m_i)| - |m_i|. It is computed only for planes that bounds do
+    not rule out (see native/cut/least_excess.hpp). Of planes whose costs are equal up to rounding, as in symmetric
+    shapes, the first is taken, so that the cuts do not depend on the unit and position of the input.
+
+    Parameters
+    ----------
+    exponent : float
+        1 for the sum, which orders planes as the sum of hull volumes does (and is given that sum's tolerance for ties);
+        infinity for the maximum.
+    """
+    # No plane costs more than the whole component: the hulls of the two sides are disjoint and lie in its hull.
+    most = component.hull.volume if exponent == 1 else max(component.hull.volume - component.volume, 0.0)
+    number = _native.find_least_excess(
+        component.vertices,
+        component.faces,
+        candidates.directions,
+        candidates.offsets,
+        exponent,
+        TIE * (most if math.isinf(exponent) else most**exponent),
+        ROUNDING_FACTOR * NEGLIGIBLE_VOLUME,
+        SLIVERS,
+        threads,
+    )
+    return candidates.plane(number) if number >= 0 else None
+
+
+def paper_planes(component: Component) -> Candidates:
+    """The paper's 150 planes: 25 a direction about the centre of the component's box, 1/25 of its longest side apart.
+
+    Along a shorter side, the outer ones miss the component; they are not valid.
+    """
+    lower, upper = component.box
+    directions = axis_and_principal(component).directions
+    steps = (np.arange(OFFSETS_PER_AXIS) - OFFSETS_PER_AXIS // 2) / OFFSETS_PER_AXIS * float((upper - lower).max())
+    return Candidates(directions, (directions @ ((lower + upper) / 2))[:, None] + steps)
+
+
+def valid_planes(component: Component, candidates: Candidates) -> BoolArray:
+    """Whether each of the candidates [K * M] leaves no side thinner than 2 % of the component's extent.
+
+    The component is connected, so every plane within its extent meets it, and the thickness of a side is the plane's
+    distance from that end: no sweep is needed. This is slightly stricter than `Sweep.valid`, which compares a side with
+    its own extent. If no plane is valid, as in a thin sheet, the limit is lowered to a hundredth.
+    """
+    heights = component.hull.vertices @ candidates.directions.T
+    lower, upper = heights.min(axis=0), heights.max(axis=0)
+    extent = float((upper - lower).max())
+    thinner = np.minimum(candidates.offsets - lower[:, None], upper[:, None] - candidates.offsets).ravel()
+    for sliver in (SLIVER, SLIVER / 100):
+        valid: BoolArray = thinner > sliver * extent
+        if valid.any():
+            break
+    return valid

@@ -1,13 +1,11 @@
 """Policies: which plane cuts a component."""
 
 from rlacd.options.names import AS_PUBLISHED, CONTROLS, EDGES, POLICIES, WEIGHTS_ENDING, is_policy
-from rlacd.planes.sweep_cache import SweepCache
-from rlacd.policies.greedy import SCORES, Greedy
+from rlacd.planes.sweep import SweepCache
+from rlacd.policies.greedy import EDGES_PER_COMPONENT, SCORES, Greedy, NavACD, RandomShortlist
 from rlacd.policies.learned import Learned
-from rlacd.policies.navacd import EDGES_PER_COMPONENT, NavACD
+from rlacd.policies.network import deployed
 from rlacd.policies.policy import CheckedPolicy, Policy
-from rlacd.policies.qpolicy import deployed
-from rlacd.policies.shortlist import RandomShortlist
 
 
 def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: float | None = None) -> Policy:

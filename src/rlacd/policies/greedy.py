@@ -1,16 +1,19 @@
-"""Greedy: the valid candidate plane whose two sides have the best score, looking one step ahead."""
+"""Policies that look one step ahead: greedy, over all candidate planes; NavACD, over the middle of the box and a few
+concave edges; the paper's deployment rule, and its control, the same rule on random planes.
+"""
 
 from __future__ import annotations
 
 import math
+import zlib
 from collections.abc import Mapping
 from types import MappingProxyType
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rlacd.planes.least_excess import SLIVERS, TIE, least_excess
-from rlacd.planes.sweep import Sweep
-from rlacd.planes.sweep_cache import SweepCache
+from rlacd.planes.candidates import Candidates, axis_and_principal, concave_edge_planes
+from rlacd.planes.sweep import SLIVERS, TIE, Sweep, SweepCache, least_excess, sweep, valid_planes
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
 
@@ -73,3 +76,91 @@ class Greedy:
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None if every candidate misses it or shaves off a film."""
         return least_excess(component, self._sweep_cache.candidates(component), self._exponent, threads)
+
+
+EDGES_PER_COMPONENT = 4
+"""Maximum number of concave edges whose planes are tried."""
+
+
+class NavACD:
+    """Chooses the plane with the least sum of the two sides' hull volumes among at most 15.
+
+    Candidates are the planes through the middle of the component's box along x, y and z, and those of up to four
+    concave edges (J. Andrews, "Navigation-Driven Approximate Convex Decomposition", SIGGRAPH 2024).
+
+    Notes
+    -----
+    NavACD cuts one part at a time, starting with the largest |CH(m_i)| - |m_i|. Here all unfinished components of a
+    round are cut. The plane that cuts a component does not depend on the others, so both reach the same parts. The
+    order matters only if the process is stopped early (`timeout`); `max_hulls` counts parts of finished
+    decompositions.
+    """
+
+    def choose(self, component: Component, threads: int = 1) -> Plane | None:
+        """Choose the plane to cut a component by; None if every candidate misses it or shaves off a film."""
+        candidates = Candidates.joined(mid_planes(component), concave_edge_planes(component, EDGES_PER_COMPONENT))
+        scored = sweep(component, candidates, threads)
+        return cheapest(scored, hull_sum(scored))
+
+
+def mid_planes(component: Component) -> Candidates:
+    """Candidates of one component: the planes that bisect its bounding box, one along each coordinate axis."""
+    return Candidates(np.eye(3), component.box.mean(axis=0)[:, None])
+
+
+def least_hulls(
+    component: Component, candidates: Candidates, chosen: NDArray[np.intp], concave_edges: int, threads: int = 1
+) -> Plane | None:
+    """Get the plane with the least sum of hull volumes among some candidates and those of concave edges.
+
+    Parameters
+    ----------
+    candidates : Candidates
+        Candidates of this component, K directions with M planes each.
+    chosen : int [N]
+        Indices of the planes on the shortlist; the first is taken if none is valid.
+    concave_edges : int
+        Number of concave edges whose planes join the shortlist.
+    """
+    directions = candidates.directions[chosen // candidates.offsets.shape[1]]
+    short = Candidates(directions, candidates.offsets.ravel()[chosen][:, None])
+    if concave_edges:
+        short = Candidates.joined(short, concave_edge_planes(component, concave_edges))
+    if not len(short):
+        return None
+    scored = sweep(component, short, threads)
+    fallback = candidates.plane(int(chosen[0])) if len(chosen) else None
+    return cheapest(scored, hull_sum(scored)) or fallback
+
+
+def generator_of(component: Component, seed: int = 0) -> np.random.Generator:
+    """Get a random generator that a component's vertices and the seed determine, whatever was cut before."""
+    return np.random.default_rng([seed, zlib.crc32(component.vertices.tobytes())])
+
+
+class RandomShortlist:
+    """Chooses the plane with the least sum of hull volumes among random planes and those of concave edges.
+
+    With ten planes and four edges, this is the paper's deployment of its network without the network.
+
+    Parameters
+    ----------
+    planes : int
+        Number of valid planes drawn from the 150.
+    concave_edges : int
+        Number of concave edges whose planes join them.
+    seed : int
+        See `generator_of`.
+    """
+
+    def __init__(self, planes: int = 10, concave_edges: int = EDGES_PER_COMPONENT, seed: int = 0) -> None:
+        self._planes = planes
+        self._concave_edges = concave_edges
+        self._seed = seed
+
+    def choose(self, component: Component, threads: int = 1) -> Plane | None:
+        """Choose the plane to cut a component by; None if no candidate is valid."""
+        candidates = axis_and_principal(component)
+        valid = np.flatnonzero(valid_planes(component, candidates))
+        drawn = generator_of(component, self._seed).choice(valid, min(self._planes, len(valid)), replace=False)
+        return least_hulls(component, candidates, drawn, self._concave_edges, threads)

@@ -12,9 +12,7 @@ from importlib.resources import as_file, files
 
 import numpy as np
 
-from rlacd.planes.least_excess import SLIVERS
-from rlacd.planes.sweep import Sweep
-from rlacd.planes.sweep_cache import SweepCache
+from rlacd.planes.sweep import SLIVERS, Sweep, SweepCache
 from rlacd.policies.greedy import Greedy, excess_norm, hull_sum
 from rlacd.policies.network import Network, load_network
 from rlacd.policies.plane_features import FEATURES, plane_features

@@ -1,14 +1,17 @@
-"""What the shipped policy sees of a plane: what the sweep gives for it, its neighbours, and its component."""
+"""What networks see of a plane, its neighbours and its component, as the sweep gives it."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rlacd import _native
+from rlacd.criteria.concavity import VOLUME_WEIGHT, volume_radius
 from rlacd.planes.candidates import OFFSETS_PER_AXIS
-from rlacd.planes.sweep import Sweep
+from rlacd.planes.sweep import Sweep, paper_planes, sweep, valid_planes
 from rlacd.policies.greedy import excess_norm
-from rlacd.solid.arrays import BoolArray, FloatArray
+from rlacd.solid.arrays import BoolArray, Float32Array, FloatArray
+from rlacd.solid.component import Component
 
 STEPS = (1, 2)
 """Distances of the neighbours that are looked at, in planes of the same direction."""
@@ -86,3 +89,69 @@ def _neighbours(values: FloatArray, axes: NDArray[np.intp]) -> list[FloatArray]:
         gaps[1, step:] = np.where(same, values[:-step] - values[step:], 0)
         found += [gaps.min(axis=0), gaps.max(axis=0)]
     return found
+
+
+def surface_points(component: Component, count: int) -> Float32Array:
+    """Points on the surfaces of a component and of its hull [2, count, 3]; box centred, longest side 2.
+
+    The same component gives the same points.
+    """
+    lower, upper = component.box
+    shapes = (component, component.hull)
+    points = np.stack([_native.sample_surface(shape.vertices, shape.faces, count, 0)[0] for shape in shapes])
+    seen: Float32Array = ((points - (lower + upper) / 2) / (float((upper - lower).max()) / 2)).astype(np.float32)
+    return seen
+
+
+PLANES = 150
+
+PER_PLANE, PER_COMPONENT = 6, 6
+"""Numbers of features."""
+
+SWEEP_FEATURES = PER_PLANE * PLANES + PER_COMPONENT
+
+
+def sweep_features(component: Component, threshold: float, hull: bool = True) -> Float32Array:
+    """Features [906] of a component for the network of the paper: those of 150 planes, then those of the component.
+
+    The same component always gives the same features; its size in the frame is among them.
+
+    Parameters
+    ----------
+    threshold : float
+        The criterion's length in the frame.
+    hull : bool
+        Whether hulls are seen (the paper's 4.5.2 leaves them out).
+    """
+    planes = paper_planes(component)
+    scored = sweep(component, planes)
+    longest = float(np.ptp(component.box, axis=0).max())
+    excess = max(component.hull.volume - component.volume, 1e-12)
+    below, above = _excess(scored)
+    features = np.stack(
+        [
+            below / excess * hull,
+            above / excess * hull,
+            scored.hull_below / component.hull.volume * hull,
+            scored.solid_below / component.volume,
+            scored.section_area / longest**2,
+            valid_planes(component, planes),
+        ],
+        axis=1,
+    )
+    own = [
+        np.log2(longest / 2),
+        np.log2(longest / threshold),
+        np.log2(1e-3 + VOLUME_WEIGHT * volume_radius(component.volume, component.hull.volume) / threshold) * hull,
+        component.volume / component.hull.volume * hull,
+        *(np.sort(np.ptp(component.box, axis=0))[:2] / longest),
+    ]
+    found: Float32Array = np.nan_to_num(np.concatenate([features.ravel(), own])).astype(np.float32)
+    return found
+
+
+def _excess(scored: Sweep) -> tuple[Float32Array, Float32Array]:
+    return (
+        np.maximum(scored.hull_below - scored.solid_below, 0),
+        np.maximum(scored.hull_above - scored.solid_above, 0),
+    )

@@ -19,10 +19,8 @@ from rlacd.cut_and_merge import cut_and_merge
 from rlacd.policies import Policy
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.component import Component, Part
-from rlacd.solid.hull import Hull
-from rlacd.solid.limit_hull import TOLERANCE, limit_hull
-from rlacd.solid.reunite import reunite
+from rlacd.solid.component import Component, Part, reunite
+from rlacd.solid.hull import TOLERANCE, Hull, limit_hull
 
 GROWTH_TO_COVER = 5e-4
 """Hulls may grow by this more than they must to cover the solid (the longest side is 2)."""

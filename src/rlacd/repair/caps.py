@@ -11,8 +11,7 @@ import numpy as np
 from rlacd._native import least_bent, poll_stop
 from rlacd.repair.rims import Rims
 from rlacd.repair.soup import Soup, face_normals
-from rlacd.solid.frame import FloatArray
-from rlacd.solid.products import dots
+from rlacd.solid.arrays import FloatArray, dots
 from rlacd.solid.topology import BoolArray, IntArray, nondegenerate
 
 # Optimal triangulation considers all triples of corners; longer loops are cut by ears.

@@ -10,8 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rlacd._native import PointTree, poll_stop
-from rlacd.solid.frame import FloatArray
-from rlacd.solid.products import dots
+from rlacd.solid.arrays import FloatArray, dots
 from rlacd.solid.topology import (
     BoolArray,
     Edges,

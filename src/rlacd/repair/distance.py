@@ -10,7 +10,7 @@ import numpy as np
 
 from rlacd import _native
 from rlacd._native import Surface, poll_stop
-from rlacd.solid.frame import FloatArray
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.topology import BoolArray, IntArray, first_of_doubled
 
 # Points of a triangle at which it is looked whether it lies inside a body: near its corners, its edges, its middle.

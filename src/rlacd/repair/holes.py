@@ -28,9 +28,9 @@ from rlacd.repair.soup import FLAPS, Soup
 from rlacd.repair.tangles import is_tangle
 from rlacd.repair.windings import trust_windings
 from rlacd.repair.work import Work
-from rlacd.solid.frame import FloatArray
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.solid import Hole
-from rlacd.solid.thickness import HALF_THICKNESS
 from rlacd.solid.topology import (
     BoolArray,
     IntArray,

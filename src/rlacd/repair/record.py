@@ -8,9 +8,9 @@ from rlacd import _native
 from rlacd._native import PointTree, poll_stop
 from rlacd.repair.distance import SurfaceQuery, affordable, points_covering, shared_faces
 from rlacd.repair.voxels import DEFAULT_GAP
-from rlacd.solid.frame import FloatArray
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.solid import BodyRepair
-from rlacd.solid.thickness import HALF_THICKNESS
 from rlacd.solid.topology import BoolArray, IntArray, face_areas, marked
 
 STEPS = ("closed", "reoriented", "outer skin", "welded", "capped", "slab", "wrapped", "hull")

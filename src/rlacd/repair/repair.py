@@ -40,10 +40,10 @@ from rlacd.repair.wraps import (
     wrap_all,
     wrap_sheets,
 )
-from rlacd.solid.frame import FloatArray, Frame
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import BodyRepair, Solid
-from rlacd.solid.thickness import HALF_THICKNESS
 from rlacd.solid.topology import NO_FILM, BoolArray, IntArray, bodies_of, detach_films, face_areas, signed_tetrahedra
 
 CELLS_ACROSS = 1.5

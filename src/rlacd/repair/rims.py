@@ -18,8 +18,7 @@ import numpy as np
 
 from rlacd._native import poll_stop
 from rlacd.repair.soup import FLAPS, Soup, across
-from rlacd.solid.frame import FloatArray
-from rlacd.solid.products import dots
+from rlacd.solid.arrays import FloatArray, dots
 from rlacd.solid.topology import BoolArray, IntArray, both_sides, components, has_marked, long_normals, marked
 
 _NEXT = np.array([1, 2, 0])

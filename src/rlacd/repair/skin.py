@@ -11,8 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from rlacd._native import poll_stop
-from rlacd.solid.frame import FloatArray
-from rlacd.solid.products import angles, dots
+from rlacd.solid.arrays import FloatArray, angles, dots
 from rlacd.solid.topology import BoolArray, IntArray, Sides, components, nondegenerate
 
 # A sharp fold would push its vertex far out to keep the distance to both flanks; stop at this multiple.

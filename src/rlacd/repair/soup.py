@@ -8,8 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from rlacd._native import poll_stop
-from rlacd.solid.frame import FloatArray
-from rlacd.solid.products import dots
+from rlacd.solid.arrays import FloatArray, dots
 from rlacd.solid.topology import (
     NO_FILM,
     BoolArray,

@@ -12,7 +12,7 @@ from rlacd import _native
 from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.soup import face_normals
 from rlacd.repair.windings import BESIDE
-from rlacd.solid.frame import FloatArray
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.topology import BoolArray, IntArray
 
 TANGLED = 0.02

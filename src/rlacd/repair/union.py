@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 from rlacd import _native
 from rlacd._native import poll_stop
 from rlacd.repair.soup import FLAT
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.arrays import IntArray as Indices
-from rlacd.solid.boolean_time import require_time_for
 from rlacd.solid.component import concatenated
-from rlacd.solid.frame import FloatArray
-from rlacd.solid.manifold import to_manifold
+from rlacd.solid.frame import thickened
+from rlacd.solid.manifold import require_time_for, to_manifold
 from rlacd.solid.solid import Shape, mesh_of, surface_of
-from rlacd.solid.thickness import thickened
 from rlacd.solid.topology import IntArray
 
 Index = TypeVar("Index", bound=np.signedinteger)

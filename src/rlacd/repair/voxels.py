@@ -15,7 +15,7 @@ import numpy as np
 from rlacd import _native
 from rlacd._native import label_cells, nearest_labels, poll_stop
 from rlacd.repair.distance import SurfaceQuery
-from rlacd.solid.frame import FloatArray
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.topology import BoolArray, IntArray
 
 DEFAULT_GAP = 0.03

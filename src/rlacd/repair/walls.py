@@ -15,10 +15,10 @@ from rlacd.repair.soup import FLAT, Soup, on_repeated_edge
 from rlacd.repair.union import one_body, slab_of_faces, split_labels, to_arrays, volume_of
 from rlacd.repair.voxels import DEFAULT_GAP
 from rlacd.repair.work import Piece, Work
-from rlacd.solid.frame import FloatArray
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import Shape
-from rlacd.solid.thickness import HALF_THICKNESS
 from rlacd.solid.topology import BoolArray, IntArray, marked
 
 

@@ -11,9 +11,9 @@ from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.soup import FLAPS, FLAT, Soup, face_normals
 from rlacd.repair.union import split_labels
 from rlacd.repair.work import Piece, Work
-from rlacd.solid.frame import FloatArray
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.manifold import to_manifold
-from rlacd.solid.thickness import HALF_THICKNESS
 from rlacd.solid.topology import BoolArray, IntArray, is_balanced, marked, signed_tetrahedra
 
 BESIDE = HALF_THICKNESS / 5

@@ -13,9 +13,9 @@ from rlacd.repair.union import MOST_UNITED, area_of, as_manifold, slab_of_faces,
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
 from rlacd.repair.walls import skins
 from rlacd.repair.work import Piece, Work, query_of
-from rlacd.solid.frame import FloatArray
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.manifold import to_manifold
-from rlacd.solid.thickness import HALF_THICKNESS
 from rlacd.solid.topology import BoolArray, IntArray
 
 _WRAP_ERROR = 4 * HALF_THICKNESS

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from rlacd.criteria.criterion import Criterion
-from rlacd.planes.sweep_cache import SweepCache
+from rlacd.planes.sweep import SweepCache
 from rlacd.policies import Greedy, Policy
 from rlacd.solid.component import Component
 

@@ -11,8 +11,7 @@ from rlacd.merge.merge import neighbours
 from rlacd.run import work
 from rlacd.search.recut import Exchange
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.component import Part
-from rlacd.solid.reunite import TOUCHING_FACES, touch
+from rlacd.solid.component import TOUCHING_FACES, Part, touch
 
 Cluster = tuple[int, ...]
 """Ids of parts, ascending."""

@@ -10,8 +10,7 @@ from rlacd.cut import CutTree
 from rlacd.merge.merge import merge_parts
 from rlacd.policies import Policy
 from rlacd.run import Run, work
-from rlacd.solid.component import LOST_VOLUME, Component, Part
-from rlacd.solid.reunite import reunite
+from rlacd.solid.component import LOST_VOLUME, Component, Part, reunite
 
 EXTRA_PIECES = 5
 """Pieces allowed beyond the number of parts: merging rarely makes up for more."""

@@ -16,11 +16,9 @@ from rlacd.criteria.criterion import Criterion
 from rlacd.merge.merge import Uniter
 from rlacd.run import Run, work
 from rlacd.search.recut import Exchange
-from rlacd.solid.arrays import FloatArray
-from rlacd.solid.component import Component, Part, Plane
+from rlacd.solid.arrays import FloatArray, dots, heights
+from rlacd.solid.component import Component, Part, Plane, reunite
 from rlacd.solid.hull import Hull
-from rlacd.solid.products import dots, heights
-from rlacd.solid.reunite import reunite
 
 TAKERS = 6
 """Number of parts a piece is offered to, starting with those whose hulls would grow the least."""

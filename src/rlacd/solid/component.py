@@ -1,11 +1,14 @@
 """A piece of the solid on its way to becoming a part: its surface, its hull, and how it is cut and glued.
 
 Everything is in the normalised frame (bounding box of the input centred, longest side 2).
+
+Components that touch can be reunited into one that can be cut again.
 """
 
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -284,3 +287,53 @@ def concatenated(surfaces: list[tuple[FloatArray, IntArray]]) -> tuple[FloatArra
     firsts = np.cumsum([0, *(len(vertices) for vertices, _ in surfaces[:-1])])
     faces = [own + first for (_, own), first in zip(surfaces, firsts, strict=True)]
     return np.concatenate([vertices for vertices, _ in surfaces]), np.concatenate(faces).astype(np.int32)
+
+
+TOUCHING_FACES = 1e-8
+"""Distance at which faces count as touching (see native/distance/glue.hpp)."""
+
+
+def reunite(components: Sequence[Component]) -> Component | None:
+    """Unite components with disjoint interiors into one; None if the result is not a clean solid.
+
+    Parameters
+    ----------
+    components : sequence of Component
+        Pieces of one solid; those that touch do so face to face.
+    """
+    components = _joined_again(components)
+    if len(components) == 1:
+        return components[0]
+    whole = _native.reunite([one.vertices for one in components], [one.faces for one in components], NEGLIGIBLE_VOLUME)
+    return whole and Component.of(whole)
+
+
+def _joined_again(components: Sequence[Component]) -> list[Component]:
+    """Put back the component that pieces were cut from if all of them are present: nothing is as fast or clean."""
+    found = list(components)
+    while True:
+        siblings: dict[Component, list[Component]] = {}
+        for component in found:
+            if isinstance(component.within, Component):
+                siblings.setdefault(component.within, []).append(component)
+        whole = [
+            origin
+            for origin, pieces in siblings.items()
+            if sum(piece.volume for piece in pieces) >= (1 - LOST_VOLUME) * origin.volume
+        ]
+        if not whole:
+            return found
+        found = [component for component in found if component.within not in whole] + whole
+
+
+def touch(first: Part, second: Part) -> bool:
+    """Tell whether two parts, or members of them, touch face to face."""
+    return any(
+        _native.do_touch(a.vertices, a.faces, b.vertices, b.faces)
+        for a in _disjoint_pieces(first)
+        for b in _disjoint_pieces(second)
+    )
+
+
+def _disjoint_pieces(part: Part) -> Sequence[Part]:
+    return part.members if isinstance(part, ClippedPart) else (part,)

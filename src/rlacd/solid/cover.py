@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 from rlacd import _native
 from rlacd._native import Stopped
 from rlacd.run import Run
-from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.arrays import FloatArray, IntArray, heights, length
 from rlacd.solid.component import Part
-from rlacd.solid.frame import Frame
+from rlacd.solid.frame import HALF_THICKNESS, Frame, thickened
 from rlacd.solid.hull import Hull
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.manifold import to_manifold
-from rlacd.solid.products import heights, length
 from rlacd.solid.solid import Solid, surface_of
-from rlacd.solid.thickness import HALF_THICKNESS, thickened
 
 MOST_HULLS = 2000
 """If there are more bodies, neighbours along a space-filling curve share a hull."""

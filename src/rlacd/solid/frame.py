@@ -1,13 +1,16 @@
-"""The normalised frame in which every length is measured: bounding box centred, longest side 2."""
+"""The normalised frame in which every length is measured: bounding box centred, longest side 2.
+
+Here is also how thick sheets are made, which have no volume of their own.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from rlacd.solid.arrays import FloatArray
 
 SMALLEST = 1e-300
 """Half the longest side of the smallest box that is scaled to fill the frame; a smaller one becomes a speck in it."""
@@ -67,3 +70,17 @@ class Frame:
         place[np.abs(place) < _NAUGHT / self.scale] = 0.0
         where = "(" + ", ".join(f"{x:.4g}" for x in place) + ")"
         return where if body is None else f"{where}, body {body}"
+
+
+HALF_THICKNESS = 1e-3
+"""Half the thickness of the slab a sheet becomes, in frame units."""
+
+
+def thickened(points: FloatArray) -> FloatArray:
+    """Return points ``[N, 3]``, with copies to both sides along the axes in which they have no extent."""
+    middle = points.mean(axis=0)
+    _, _, axes = np.linalg.svd(np.concatenate([points - middle, np.zeros((3, 3))]), full_matrices=False)
+    extent = np.ptp((points - middle) @ axes.T, axis=0)
+    for axis in axes[extent < HALF_THICKNESS]:
+        points = np.concatenate([points - HALF_THICKNESS * axis, points + HALF_THICKNESS * axis])
+    return np.ascontiguousarray(points)

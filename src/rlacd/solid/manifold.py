@@ -1,15 +1,20 @@
-"""Closed meshes as solids of manifold3d, without the faces it would move."""
+"""Closed meshes as solids of manifold3d, without the faces it would move.
+
+Its operations cannot be interrupted, so the time left is checked before each.
+"""
 
 from __future__ import annotations
 
+import math
+import time
 from typing import TypeAlias
 
 import numpy as np
 from manifold3d import Error, Manifold, Mesh64
 from numpy.typing import NDArray
 
-from rlacd.solid.boolean_time import require_time_for
-from rlacd.solid.frame import FloatArray
+from rlacd._native import Stopped, poll_stop, seconds_left
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.topology import face_areas, signed_tetrahedra
 
 Faces: TypeAlias = NDArray[np.int64] | NDArray[np.int32]
@@ -52,3 +57,28 @@ def _moved(manifold: Manifold, vertices: FloatArray, faces: Faces) -> float:
     faces = faces.astype(np.int64)
     area = float(face_areas(vertices, faces).sum())
     return abs(manifold.volume() - float(signed_tetrahedra(vertices, faces).sum())) / area if area > 0 else 0.0
+
+
+LONG_BOOLEAN = 50_000
+"""A number of triangles that manifold3d processes in some tenths of a second."""
+
+LATE = 0.3
+"""Seconds by which a boolean may overrun the time left."""
+
+_SEGMENTS = 64
+
+
+def require_time_for(triangles: int) -> None:
+    """Raise `Stopped` if the work must stop, or would have to before a boolean of this many triangles could finish.
+
+    How long a boolean takes depends on the machine and its load, so a small task of the same kind is timed.
+    """
+    poll_stop()
+    left = seconds_left()
+    if triangles < LONG_BOOLEAN or math.isinf(left):
+        return
+    ball = Manifold.sphere(1.0, _SEGMENTS).to_mesh64()
+    start = time.perf_counter()
+    some = Manifold(ball).num_tri()
+    if (time.perf_counter() - start) * triangles / some > left + LATE:
+        raise Stopped

@@ -1,4 +1,7 @@
-"""Boxes, spheres, capsules and cylinders: shapes that physics engines collide faster than hulls."""
+"""Boxes, spheres, capsules and cylinders: shapes that physics engines collide faster than hulls.
+
+Also the balls that stand for the space a decomposition must leave free.
+"""
 
 from __future__ import annotations
 
@@ -146,3 +149,24 @@ def _around_unit_ball(subdivisions: int) -> FloatArray:
     least = np.einsum("fi,fi->f", ball.face_normals, ball.triangles[:, 0]).min()
     around: FloatArray = np.asarray(ball.vertices) / (least * (1 - 1e-12))
     return around
+
+
+@dataclass(frozen=True, eq=False)
+class Balls:
+    """Balls, in the order they were placed.
+
+    Attributes
+    ----------
+    centres : float64 [B, 3]
+    radii : float64 [B]
+    """
+
+    centres: FloatArray
+    radii: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.radii)
+
+    def in_input(self, frame: Frame) -> Balls:
+        """Map balls from the normalised frame to the input's frame and unit."""
+        return Balls(frame.to_input(self.centres), self.radii / frame.scale)

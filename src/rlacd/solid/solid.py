@@ -11,7 +11,8 @@ from manifold3d import Manifold, Mesh64
 from numpy.typing import NDArray
 
 from rlacd._native import Surface
-from rlacd.solid.frame import FloatArray, Frame
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.frame import Frame
 
 Shape: TypeAlias = Manifold | tuple[FloatArray, NDArray[np.int32]]
 """A closed solid: a manifold, or vertices float64 ``[V, 3]`` and faces int32 ``[F, 3]``."""

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from rlacd import _native
 from rlacd._native import poll_stop
-from rlacd.solid.frame import FloatArray
+from rlacd.solid.arrays import FloatArray
 
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]

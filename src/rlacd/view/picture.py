@@ -19,7 +19,7 @@ from rlacd.io.write.palette import linear_from_srgb
 from rlacd.options.fields import checked, integer, path_like, read, shown
 from rlacd.options.output import OutputOptions
 from rlacd.result import Result
-from rlacd.solid.balls import Balls
+from rlacd.solid.primitive import Balls
 from rlacd.view.coloring import color_hulls
 from rlacd.view.render import Body, Render, Spheres, render, require_extra
 

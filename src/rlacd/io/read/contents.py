@@ -1,8 +1,14 @@
-"""What a file shows, in the terms of all readers: nodes with the triangles that each places; and its limits."""
+"""What a file shows, in the terms of all readers: nodes with the triangles that each places; and its limits.
+
+Hulls for an engine that a scene holds already, from an earlier run or made by hand, are no shapes to decompose: their
+names, those that engines go by and `--keep-input` gives, tell them.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,7 +16,7 @@ import numpy as np
 from rlacd.errors import MeshDataError
 from rlacd.options.output import Axis
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.input_mesh import Asset, SourceNode
+from rlacd.solid.input_mesh import Asset, InputMesh, SourceNode
 from rlacd.solid.topology import IntArray
 
 MOST_TRIANGLES = 20_000_000
@@ -71,3 +77,42 @@ def require_few(shapes: Iterable[tuple[Any, Any]], name: str) -> None:
     count = sum(max(len(faces), len(points) // 3) for faces, points in shapes)
     if count > MOST_TRIANGLES:
         raise MeshDataError(f"{name} places {count} triangles, more than {MOST_TRIANGLES}: simplify it first")
+
+
+_ENGINE = re.compile(r"(?:UCX|UBX|USP|UCP)_.+|.+-(?:convcolonly|colonly)(?:\.\d+)?", re.DOTALL)
+"""Unreal's prefixes and Godot's endings; Blender numbers names that are not unique."""
+
+_KEPT = re.compile(r"(.+)_hull_\d{3,}", re.DOTALL)
+
+
+def without_engine_hulls(mesh: InputMesh) -> InputMesh:
+    """Leave out the nodes that are hulls for an engine, with a warning.
+
+    A mesh of hulls and nothing else stays as it is: then they are what was meant.
+    """
+    names = {node.name for node in mesh.nodes}
+    hulls = np.array([_is_hull(node.name, names) for node in mesh.nodes], dtype=bool)
+    if mesh.node_of is None or not hulls.any() or hulls.all():
+        return mesh
+    gone = hulls[mesh.node_of]
+    unused = np.zeros(len(mesh.vertices), dtype=bool)
+    unused[mesh.faces[gone]] = True
+    unused[mesh.faces[~gone]] = False
+    left_out = tuple(node for node, hull in zip(mesh.nodes, hulls, strict=True) if hull)
+    said = f"hulls of an engine ({left_out[0].name:.60}{', ...' if len(left_out) > 1 else ''}) were left out"
+    return replace(
+        mesh,
+        vertices=np.ascontiguousarray(mesh.vertices[~unused]),
+        faces=np.ascontiguousarray((np.cumsum(~unused) - 1)[mesh.faces[~gone]]),
+        warnings=(*mesh.warnings, f"{len(left_out)} of {len(mesh.nodes)} nodes, {said}"),
+        nodes=tuple(node for node, hull in zip(mesh.nodes, hulls, strict=True) if not hull),
+        node_of=(np.cumsum(~hulls) - 1)[mesh.node_of[~gone]],
+        left_out=left_out,
+    )
+
+
+def _is_hull(name: str, names: Collection[str]) -> bool:
+    if _ENGINE.fullmatch(name):
+        return True
+    kept = _KEPT.fullmatch(name)
+    return kept is not None and kept[1] in names

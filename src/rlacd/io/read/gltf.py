@@ -17,9 +17,8 @@ from rlacd.io.read.contents import MOST_PLACES, Contents, Triangles
 from rlacd.io.read.draco import DRACO, decode_draco
 from rlacd.io.read.gltf_arrays import Arrays, Json, item
 from rlacd.io.read.polygons import fan_triangles, strip_triangles
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import FloatArray, dots, heights
 from rlacd.solid.input_mesh import Asset, SourceNode
-from rlacd.solid.products import dots, heights
 from rlacd.solid.topology import IntArray
 
 MAGIC, JSON_CHUNK = b"glTF", b"JSON"

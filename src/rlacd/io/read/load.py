@@ -18,14 +18,11 @@ from numpy.typing import ArrayLike
 
 from rlacd.errors import EmptyMeshError, MeshDataError, MeshError, MeshFileError, MissingExtraError
 from rlacd.io.read import function_of
-from rlacd.io.read.contents import Contents, one_shape, require_few
-from rlacd.io.read.engine_hulls import without_engine_hulls
-from rlacd.io.read.open_file import read_file
-from rlacd.io.read.recognize import CONVERTERS, format_of
+from rlacd.io.read.contents import Contents, one_shape, require_few, without_engine_hulls
+from rlacd.io.read.open_file import CONVERTERS, format_of, read_file
 from rlacd.memory import BYTES_READ, require_memory
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import FloatArray, heights
 from rlacd.solid.input_mesh import Asset, InputMesh
-from rlacd.solid.products import heights
 from rlacd.solid.topology import BoolArray, IntArray
 
 Source: TypeAlias = str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]

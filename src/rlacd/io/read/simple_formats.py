@@ -15,8 +15,8 @@ import numpy as np
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.contents import Contents, one_shape
+from rlacd.io.read.open_file import OFF_KEYWORD
 from rlacd.io.read.polygons import triangles_of
-from rlacd.io.read.recognize import OFF_KEYWORD
 from rlacd.io.read.text import check_text, count_in, plain_text, rows_of, vectors_of, whole
 from rlacd.memory import BYTES_READ, require_memory
 from rlacd.solid.arrays import FloatArray

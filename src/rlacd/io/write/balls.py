@@ -12,7 +12,7 @@ from rlacd.errors import OptionError
 from rlacd.io.write.atomic import write_file
 from rlacd.io.write.target import check_file
 from rlacd.options.fields import path_like, read, shown
-from rlacd.solid.balls import Balls
+from rlacd.solid.primitive import Balls
 
 COLOR = (86, 156, 214, 90)  # translucent, so that the hulls show through
 

@@ -10,8 +10,8 @@ import torch
 from rlacd.errors import OptionError
 from rlacd.learn.encoders.i2p_mae import I2PMAEEncoder
 from rlacd.learn.options import TrainOptions
-from rlacd.policies.observe import Float32Array, surface_points
-from rlacd.policies.sweep_features import FEATURES, sweep_features
+from rlacd.policies.plane_features import SWEEP_FEATURES, surface_points, sweep_features
+from rlacd.solid.arrays import Float32Array
 from rlacd.solid.component import Component
 
 PUBLISHED = "https://github.com/ZrrSkywalker/I2P-MAE"
@@ -34,7 +34,7 @@ class Encoder(Protocol):
 class SweepEncoder:
     """The cheap default: see `sweep_features`."""
 
-    dim = FEATURES
+    dim = SWEEP_FEATURES
 
     def __init__(self, threshold: float, hull: bool) -> None:
         self._threshold, self._hull = threshold, hull
