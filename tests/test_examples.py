@@ -159,3 +159,14 @@ def test_the_command_offers_every_argument_of_the_function() -> None:
     assert (
         set(inspect.signature(rlacd.decompose).parameters) - {"progress", "volume_tolerance"} <= offered
     )  # --tolerance
+
+
+@pytest.mark.nightly
+def test_the_guide_to_tight_fits_shows_the_numbers_that_its_script_prints(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    script("tight_fits").main(tmp_path / "hulls.webp")
+    page = (ROOT / "docs/guides/tight_fits.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^(\S+ mm): (\d+) chords, (\d+) hulls, at least (\d+)$", capsys.readouterr().out, re.MULTILINE)
+    assert len(rows) == 3
+    assert all(f"| {' | '.join(row)} |" in page.replace("| 1 mm", "| 1.0 mm") for row in rows)

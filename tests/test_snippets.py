@@ -50,7 +50,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     post = trimesh.creation.box((1, 1, 3))
     seat = trimesh.creation.box((3, 1, 1), trimesh.transformations.translation_matrix((1, 0, -1)))
     ell = trimesh.boolean.union([post, seat])
-    for name in ("chair.glb", "house.glb", "link.obj"):
+    for name in ("chair.glb", "house.glb", "link.obj", "block.stl"):
         ell.export(tmp_path / name)
     (tmp_path / "robot.urdf").write_text(
         '<robot name="r"><link name="l"><collision><geometry><mesh filename="link.obj"/></geometry></collision></link>'
