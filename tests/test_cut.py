@@ -35,7 +35,7 @@ def cross() -> Component:
 
 @pytest.fixture
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cut, "MANY", 12)
+    monkeypatch.setattr(cut, "MANY_COMPONENTS", 12)
 
 
 def cut_by(tree: CutTree, criterion: Concavity = CRITERION) -> list[Component]:
@@ -87,7 +87,7 @@ def test_work_ends_the_cutting(units: float) -> None:
 
 def test_limits_on_parts_see_the_same_tree(monkeypatch: pytest.MonkeyPatch) -> None:
     """The default policy, made to fail, is replaced in `decompose` too; a chosen one is not."""
-    monkeypatch.setattr(cut, "MANY", 12)
+    monkeypatch.setattr(cut, "MANY_COMPONENTS", 12)
     monkeypatch.setattr("rlacd.find_parts.make_policy", lambda *_: Slices())
     solid = from_manifold(box((-1, -0.1, -0.1), (1, 0.1, 0.1)) + box((-0.1, -1, -0.1), (0.1, 1, 0.1)))
     options = {"quality": "fast", "merge": False, "threshold": 0.02, "threads": 1}

@@ -24,7 +24,7 @@ def test_a_file_that_declares_too_much_is_refused_before_it_is_parsed(kind: str,
     path = tmp_path / f"ball.{kind}"
     ball = trimesh.creation.icosphere(3)
     ball.export(path)
-    monkeypatch.setattr(memory, "_SMALL", 0)
+    monkeypatch.setattr(memory, "_UNQUESTIONED", 0)
     monkeypatch.setattr(memory, "memory_left", lambda: len(ball.faces) * memory.BYTES_READ - 1)
     monkeypatch.setattr(np, "frombuffer", lambda *_, **__: pytest.fail("it was parsed"))
     with pytest.raises(
@@ -36,7 +36,7 @@ def test_a_file_that_declares_too_much_is_refused_before_it_is_parsed(kind: str,
 
 def test_a_closed_mesh_needs_less_than_one_that_has_to_be_repaired(monkeypatch) -> None:
     ball = trimesh.creation.icosphere(3)
-    monkeypatch.setattr(memory, "_SMALL", 0)
+    monkeypatch.setattr(memory, "_UNQUESTIONED", 0)
     monkeypatch.setattr(memory, "memory_left", lambda: len(ball.faces) * memory.BYTES_READ)
     assert repair(load_mesh(ball)).bodies[0].step == "closed"
     opened = load_mesh((ball.vertices, ball.faces[1:]))
