@@ -23,9 +23,10 @@ _WRAP_ERROR = 4 * HALF_THICKNESS
 # crevices at most 0.0023.
 _SLIT_VOLUME = 0.01
 # A slit is filled from this depth on, up to this width (multiples of the gap), if all slits hold no more than this
-# share of the volume: what is shallower needs no cut, and what is wider leaves steps of the grid. It may have no
-# volume, but this share of the surface has to go with the slits.
-_DEEP, _BESIDE, _LITTLE, _BARED = 1.5, 1 / 16, 3e-3, 0.004
+# share of the volume: what is shallower needs no cut, and what is wider leaves steps of the grid. Between caps it may
+# be wider, as in a fridge whose bodies close each other. It may have no volume, but this share of the surface has to go
+# with the slits.
+_DEEP, _BESIDE, _BETWEEN_CAPS, _LITTLE, _BARED = 1.5, 1 / 16, 1 / 4, 1e-2, 0.004
 # Noise leaves slits between walls of dense bodies that touch, full of bridges: a union with so many tunnels has them.
 _TUNNELS = 25
 # More sheets than this are not united one by one: that would take seconds, and cutting the result even longer. Neither
@@ -186,10 +187,12 @@ def fill_slits(work: Work) -> None:
     query, gap = work.query(), work.wanted.gap
     points, on = spread_points(query.vertices, query.faces, DEFAULT_GAP)
     deep = work.reach.is_deep(points, _DEEP * gap)
-    points, on = points[deep], on[deep]
-    for width in (_BESIDE * gap, -_BESIDE * gap):  # the solid lies on both sides of a slit, so far away
-        inside = query.inside(points + width * face_normals(query.vertices, query.faces[on]))
-        points, on = points[inside], on[inside]
+    points, across = points[deep], face_normals(query.vertices, query.faces[on[deep]])
+    is_on_cap = work.surface.distance(points) > 2 * HALF_THICKNESS
+    across *= gap * np.where(is_on_cap, _BETWEEN_CAPS, _BESIDE)[:, None]
+    for side in (1, -1):  # the solid lies on both sides of a slit
+        inside = query.inside(points + side * across)
+        points, across = points[inside], across[inside]
     if len(points) == 0:
         return
     wrap = _wrap(work, work.reach.around_points(points), _WRAP_ERROR, query)
