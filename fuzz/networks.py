@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rlacd.policies.network import KIND, Network
-from rlacd.policies.plane_features import SWEEP_FEATURES, PLANES
+from rlacd.policies.plane_features import PLANES, SWEEP_FEATURES
 
 ABOUT: Mapping[str, Any] = MappingProxyType({"kind": KIND, "threshold": 0.05, "encoder": "sweep", "hull": True})
 """What a sound network says of itself."""
