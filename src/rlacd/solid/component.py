@@ -207,8 +207,8 @@ class ClippedPart(Part):
 
     @property
     def is_whole(self) -> bool:
-        """Whether no member lost volume in the clipping: booleans are unreliable where a surface touches the hull."""
-        return self.volume >= (1 - LOST_VOLUME) * sum(member.volume for member in self.members)
+        """Whether the clipping left faces, and no member lost volume in it."""
+        return self.size > 0 and self.volume >= (1 - LOST_VOLUME) * sum(member.volume for member in self.members)
 
 
 class Component(Part):
