@@ -138,9 +138,8 @@ class _Decomposer:
         """The best decomposition into at most `max_hulls` parts, among those under coarser goals."""
 
         def unite(first: Part, second: Part) -> Part:
-            if self.model.proxy is None:
-                return Part.glued(first, second)
-            return self.model.solid.inside(Hull.around(first.hull, second.hull))
+            clipped = self.model.proxy and self.model.solid.inside(Hull.around(first.hull, second.hull))
+            return clipped if clipped and clipped.size else Part.glued(first, second)
 
         def decompose(factor: float) -> list[Part]:
             return free if factor == 1.0 else self.decompose(goal, factor)[0]
