@@ -64,7 +64,7 @@ def hull_of(mesh: Soup, random: np.random.Generator) -> Hull | None:
     hull = Hull(vertices, faces, _native.mesh_volume(vertices, faces))
     limit = int(random.integers(4, 40))
     try:
-        fewer, few_faces = _native.simplify_hull(vertices, faces, limit, 2**31 - 1)
+        fewer, few_faces = _native.simplify_hull(vertices, faces, limit, 2**31 - 1, 1e-6, np.empty((0, 4)))
     except ValueError as error:
         if "flat" not in str(error):
             raise

@@ -55,12 +55,14 @@ def limit_part(
     """Get the part with a hull inside the limits and without nearly redundant corners; the same part if unchanged.
 
     Without such corners a hull is up to 1e-6 larger. They stay if the part would then no longer meet a given criterion.
-    For `sides` see `limit_hull`.
+    For `sides` see `limit_hull`; if the limits leave no room for them, the criterion comes first.
     """
     hull = limit_hull(part.hull, limits, sides=sides)
     if hull is part.hull:
         return part
     limited = part.with_hull(hull)
+    if len(sides) and criterion is not None and not criterion.is_met(limited):
+        return limit_part(part, limits, criterion)
     fits = criterion is not None and keeps(part.hull, limits)
     spoilt = fits and criterion is not None and not criterion.is_met(limited) and criterion.is_met(part)
     return part if spoilt else limited
