@@ -134,8 +134,13 @@ assert 2**23 < peak_memory() < 2**33
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "marks"),
-    [(f"test_{name}.py", "not slow and not nightly") for name in ("load", "formats", "options", "decomposition")]
-    + [("pool/test_pool.py", "not nightly")],
+    [
+        ("io/test_load.py", "not slow and not nightly"),
+        ("io/test_formats.py", "not slow and not nightly"),
+        ("options/test_options.py", "not slow and not nightly"),
+        ("test_decomposition.py", "not slow and not nightly"),
+        ("pool/test_pool.py", "not nightly"),
+    ],
 )
 def test_the_tests_of_the_core_pass(file: str, marks: str) -> None:
     tests = ROOT / "tests" / file
