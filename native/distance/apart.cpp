@@ -12,7 +12,7 @@ namespace {
 constexpr double kShortest = 0.1;  // of the reach: the least step along a segment, and the least room of a ball
 constexpr int kClimbs = 6;
 constexpr std::size_t kStarts = 4;
-constexpr double kAccuracy = 4;      // of winding numbers
+constexpr double kAccuracy = 4;       // of winding numbers
 constexpr int kMostQueries = 150000;  // of distances, about 0.15 s; pairs not decided by then count as together
 
 struct Ball {
