@@ -158,16 +158,13 @@ def picture_bytes(
 
 
 def caption(decomposition: Result) -> str:
-    """One line of numbers: hulls, faces, concavity, seconds; omits what the report lacks."""
+    """One line of numbers: hulls, faces, how well they fit; the same on every machine."""
     report = decomposition.report
     count = len(decomposition)
     words = [f"{count} hull{'s' * (count != 1)}", f"{sum(len(hull.faces) for hull in decomposition)} triangles"]
     fit = Fit.of(report)
     if fit is not None and (said := fit.words()):
         words.append(said)
-    total = report.get("seconds", {}).get("total")
-    if total is not None:
-        words.append(f"{total:.2f} s")
     if not report.get("complete", True):
         words.append(f"stopped early by {report.get('stopped_by')}")
     return "   ·   ".join(words)
