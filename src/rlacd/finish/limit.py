@@ -14,7 +14,7 @@ from rlacd import _native
 from rlacd.criteria import Criterion
 from rlacd.finish.in_input import plain_hull
 from rlacd.options.presets import HullLimits
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import FloatArray, dots, heights
 from rlacd.solid.component import Component, Part
 from rlacd.solid.distance import hull_union
 from rlacd.solid.hull import NO_SIDES, Hull, keeps, limit_hull
@@ -92,16 +92,16 @@ def resting_sides(solid: Component) -> FloatArray:
     corners = hull.vertices[hull.faces]
     edges = np.roll(corners, -1, axis=1) - corners
     normals = np.cross(edges[:, 0], edges[:, 1])
-    areas = np.linalg.norm(normals, axis=1)
+    areas = np.sqrt(dots(normals, normals))
     outwards = np.cross(edges, normals[:, None])
-    below = (np.einsum("fec,fec->fe", outwards, centre - corners) <= 0).all(axis=1)  # the centre, in each facet's prism
+    below = (dots(outwards, centre - corners) <= 0).all(axis=1)  # whether the centre is in each facet's prism
     sides, seen = [], areas == 0
     for face in np.flatnonzero(below):
         if seen[face]:
             continue
         normal = normals[face] / areas[face]
-        offset = (corners[face] @ normal).max()
-        coplanar = (corners @ normal > offset - FLUSH).all(axis=1)
+        offset = dots(corners[face], normal).max()
+        coplanar = (dots(corners, normal) > offset - FLUSH).all(axis=1)
         seen |= coplanar
         if areas[coplanar].sum() >= SIDE_AREA * areas.sum():
             sides.append([*normal, offset + FLUSH])
@@ -110,7 +110,7 @@ def resting_sides(solid: Component) -> FloatArray:
 
 def within_reach(sides: FloatArray, hull: Hull, growth: float) -> FloatArray:
     """Those of the half-spaces that a hull could leave by growing so much."""
-    reach = (hull.vertices @ sides[:, :3].T).max(axis=0)
+    reach = heights(hull.vertices, sides[:, :3]).max(axis=0)
     return np.ascontiguousarray(sides[reach > sides[:, 3] - growth])
 
 
@@ -120,10 +120,10 @@ def kept_within(part: Part, sides: FloatArray, criterion: Criterion) -> Part:
     The part stays as it is if nothing is beyond, or if it would no longer meet the criterion.
     """
     hull = part.hull
-    for *normal, offset in sides:
-        beyond = hull.vertices @ normal - offset
+    for side in sides:
+        beyond = dots(hull.vertices, side[:3]) - side[3]
         if beyond.max() > 0:
-            a, b = (hull.faces[:, [0, 1, 2]].ravel(), hull.faces[:, [1, 2, 0]].ravel())
+            a, b = hull.faces.ravel(), np.roll(hull.faces, -1, axis=1).ravel()
             crossing = (beyond[a] <= 0) & (beyond[b] > 0)
             a, b = a[crossing], b[crossing]
             share = beyond[a] / (beyond[a] - beyond[b])
@@ -146,7 +146,7 @@ def take_in(parts: Sequence[Part], points: FloatArray, criterion: Criterion) -> 
     ----------
     parts : sequence of Part
     points : float64 [N, 3]
-        A hull that holds one already is not asked: its part is going to be dropped.
+        A hull that holds one already is skipped: its part is going to be dropped.
     criterion : Criterion
 
     Returns

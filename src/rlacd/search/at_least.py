@@ -15,7 +15,7 @@ import numpy as np
 
 from rlacd import _native
 from rlacd.run import Run
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import FloatArray, dots
 from rlacd.solid.component import Component, Part
 
 UNCOVERED = 1e-3
@@ -59,9 +59,11 @@ def at_least(solid: Component, parts: Sequence[Part], reach: float, run: Run) ->
 
 def _far_apart(points: FloatArray, count: int) -> list[int]:
     """Farthest-point sampling, from the point farthest from the centre on."""
-    chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
+    gaps = points - points.mean(axis=0)
+    chosen = [int(dots(gaps, gaps).argmax())]
     away = np.full(len(points), np.inf)
     while len(chosen) < min(count, len(points)):
-        away = np.minimum(away, np.linalg.norm(points - points[chosen[-1]], axis=1))
+        gaps = points - points[chosen[-1]]
+        away = np.minimum(away, dots(gaps, gaps))
         chosen.append(int(away.argmax()))
     return chosen
