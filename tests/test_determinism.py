@@ -29,26 +29,13 @@ SMALL = ["test/vhacd/ob_chair_gothic.ply", "test/gazebo_models/door_handle__hand
 FORMATS = [("glb", "glb"), ("mjcf", "xml"), ("usd", "usd")]
 """As a batch is told, and the ending of the file."""
 
-RUN = """
-import sys
-from rlacd.cli.main import main
-for words in " ".join(sys.argv[1:]).split(" ; "):
-    sys.argv = ["rlacd", *words.split(" ")]
-    try:
-        main()
-    except SystemExit as end:
-        if end.code:
-            raise
-"""
-
-
 def rlacd(*commands: Sequence[object], hash_seed: int) -> None:
-    """Run commands one after another in a new process, in which sets and dicts have an order of their own."""
-    words = " ; ".join(" ".join(str(word) for word in command) for command in commands)
+    """Run commands, each in a new process, in which sets and dicts have an order of their own."""
     environment = {**os.environ, "PYTHONHASHSEED": str(hash_seed)}
-    command = [sys.executable, "-c", RUN, *words.split(" ")]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=1800)
-    assert done.returncode == 0, done.stderr
+    for command in commands:
+        words = [sys.executable, "-m", "rlacd", *(str(word) for word in command)]
+        done = subprocess.run(words, env=environment, capture_output=True, text=True, timeout=1800)
+        assert done.returncode == 0, done.stderr
 
 
 def copied(corpus: Path, names: Sequence[str], folder: Path) -> Path:

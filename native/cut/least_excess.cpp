@@ -19,6 +19,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t kFewPlanes = 3;  // a direction with fewer planes gets this many extra sections to bound its hulls
 constexpr std::size_t kFewTrials = 1 << 17;  // pairs of a point and a corner
+constexpr std::size_t kManyFaces = 1000;     // from here on, planes are measured two at a time, on two threads
 constexpr double kRounding = 1e-12;          // share of a box's volume; rounding of a hull's volume stays far below
 
 enum Side : std::size_t { kBelow, kAbove };
@@ -205,7 +206,7 @@ class Search {
  public:
   Search(const Mesh& mesh, const std::vector<Vec3>& normals, const std::vector<double>& offsets,
          const LeastExcess& wanted, int threads)
-      : wanted_(wanted), solid_(mesh) {
+      : wanted_(wanted), solid_(mesh), threads_(threads), at_a_time_(mesh.faces.size() < kManyFaces ? 1 : 2) {
     const Bundles bundles = bundle_planes(normals, offsets);
     std::vector<std::vector<std::ptrdiff_t>> numbers;
     for (const Bundle& bundle : bundles.all) numbers.emplace_back(bundle.offsets.size(), -1);
@@ -235,6 +236,13 @@ class Search {
       if (direction != other.direction) return direction > other.direction;
       return first > other.first;
     }
+  };
+
+  // A plane to measure.
+  struct Probe {
+    Interval interval;
+    std::size_t plane;
+    double cost;
   };
 
   double cost(double below, double above) const {
@@ -274,22 +282,42 @@ class Search {
     };
     std::vector<Measured> measured;
     for (std::size_t k = 0; k < directions_.size(); ++k) put(k, 0, directions_[k]->planes(), sliver);
-    while (!queue_.empty()) {
-      const Interval here = queue_.top();
-      queue_.pop();
-      const std::vector<std::size_t> open = open_planes(here, sliver);
-      if (open.empty()) continue;
-      const std::size_t j = open[open.size() / 2];
-      RLACD_ASSERT(here.bound <= bound(*directions_[here.direction], j));  // bounds only rise
-      measured.push_back({measure(*directions_[here.direction], j), directions_[here.direction]->number(j)});
-      least_cost_ = std::min(least_cost_, measured.back().cost);
-      put(here.direction, here.first, j, sliver);
-      put(here.direction, j + 1, here.last, sliver);
+    for (std::vector<Probe> probes; !(probes = next_probes(sliver)).empty();) {
+      parallel_for(probes.size(), threads_, [&](std::size_t i) {
+        probes[i].cost = measure(*directions_[probes[i].interval.direction], probes[i].plane);
+      });
+      for (const auto& [here, j, cost] : probes) {
+        measured.push_back({cost, directions_[here.direction]->number(j)});
+        least_cost_ = std::min(least_cost_, cost);
+      }
+      for (const auto& [here, j, cost] : probes) {
+        put(here.direction, here.first, j, sliver);
+        put(here.direction, j + 1, here.last, sliver);
+      }
     }
     std::ptrdiff_t first = -1;
     for (const Measured& plane : measured)
       if (plane.cost < kInfinity && plane.cost <= limit() && (first < 0 || plane.number < first)) first = plane.number;
     return first;
+  }
+
+  // The planes to measure next: those with the least bounds, each of another direction.
+  std::vector<Probe> next_probes(double sliver) {
+    std::vector<Probe> probes;
+    std::vector<Interval> later;
+    while (!queue_.empty() && probes.size() < at_a_time_) {
+      const Interval here = queue_.top();
+      queue_.pop();
+      if (std::any_of(probes.begin(), probes.end(),
+                      [&](const Probe& probe) { return probe.interval.direction == here.direction; })) {
+        later.push_back(here);
+        continue;
+      }
+      const std::vector<std::size_t> open = open_planes(here, sliver);
+      if (!open.empty()) probes.push_back({here, open[open.size() / 2], kInfinity});
+    }
+    for (const Interval& interval : later) queue_.push(interval);
+    return probes;
   }
 
   // The cost of a plane; infinity if one side alone rules it out.
@@ -304,6 +332,8 @@ class Search {
   const SolidMesh solid_;
   std::vector<std::unique_ptr<Direction>> directions_;
   std::priority_queue<Interval> queue_;
+  const int threads_;
+  const std::size_t at_a_time_;
   double least_cost_ = kInfinity;
 };
 

@@ -11,7 +11,6 @@ namespace {
 
 constexpr double kShortest = 0.1;  // of the reach: the least step along a segment, and the least room of a ball
 constexpr int kClimbs = 6;
-constexpr std::size_t kStarts = 4;
 constexpr double kAccuracy = 4;       // of winding numbers
 constexpr int kMostQueries = 150000;  // of distances, about 0.15 s; pairs not decided by then count as together
 
@@ -223,16 +222,12 @@ bool grow(ApartGraph& graph, Clique& clique) {
 
 std::vector<std::int32_t> apart_points(const Surface& surface, const std::vector<Vec3>& points, double reach,
                                        std::size_t enough) {
+  if (points.empty()) return {};
   ApartGraph graph(surface, points, reach);
-  Clique best;
-  const std::size_t starts = std::min(kStarts, points.size());
-  for (std::size_t s = 0; s < starts && best.size() < enough; ++s) {
-    Clique clique = packed(graph, static_cast<std::int32_t>(s * points.size() / starts));
-    while (grow(graph, clique)) {
-    }
-    if (clique.size() > best.size()) best = std::move(clique);
+  Clique clique = packed(graph, 0);
+  while (clique.size() < enough && grow(graph, clique)) {
   }
-  return best;
+  return clique;
 }
 
 }  // namespace rlacd

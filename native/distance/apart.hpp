@@ -8,7 +8,7 @@
 // How: an exterior ball (c, R) has its centre in the exterior and no surface inside; all within R - T of c is exterior.
 //      Balls come from paths of straight rays, whose steps are as long as the distance to the surface allows. What is
 //      not found makes the bound smaller, never wrong. The set of points is a clique in the graph of pairs that are
-//      apart: packed greedily from a few starts, then one point is exchanged for two while that is possible.
+//      apart: packed greedily from the first, then one point is exchanged for two while that is possible.
 #pragma once
 
 #include <cstdint>

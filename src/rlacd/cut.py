@@ -167,16 +167,21 @@ class CutTree:
 
     def _divide(self, components: Sequence[Component]) -> None:
         """Split components into their connected pieces, and cut those that are connected."""
-        pieces = [self._cache.pieces(component) or [component] for component in components]
-        whole = [c for c, own in zip(components, pieces, strict=True) if own == [c]]
-        threads = self._run.share(len(whole))
-        planes = self._run.map(lambda c: self._policy.choose(c, threads), whole)
-        self._children.update((c, own) for c, own in zip(components, pieces, strict=True) if own != [c])
-        for component, plane in zip(whole, planes, strict=True):
-            if plane is not None:
-                self._children[component] = self._cache.sides(component, plane)
-            else:
-                self._children[component] = halves(component) if is_film(component) else []
+        prices = {c: work.choosing(c.size) for c in components}
+        each = self._run.threads / max(sum(prices.values()), 1)
+        costliest = sorted(components, key=prices.__getitem__, reverse=True)
+        divided = self._run.map(lambda c: self._divided(c, math.ceil(each * prices[c])), costliest)
+        self._children.update(zip(costliest, divided, strict=True))
+
+    def _divided(self, component: Component, threads: int) -> list[Component]:
+        """The connected pieces of a component, or the sides of the plane that cuts it; empty if none does."""
+        pieces = self._cache.pieces(component) or [component]
+        if pieces != [component]:
+            return pieces
+        plane = self._policy.choose(component, threads)
+        if plane is None:
+            return halves(component) if is_film(component) else []
+        return self._cache.sides(component, plane)
 
 
 def halves(film: Component) -> list[Component]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rlacd import _native
-from rlacd.solid.arrays import IntArray
+from rlacd.solid.arrays import BoolArray, IntArray
 from rlacd.solid.component import Part
 
 
@@ -25,14 +25,14 @@ class Boxes:
 
     def add(self, new: int, part: Part, gone: Sequence[int]) -> None:
         """Replace parts by a new one, whose id is larger than all before."""
-        kept = ~np.isin(self.ids, gone)
+        kept = ~self._are(gone)
         self.ids = np.append(self.ids[kept], np.int32(new))
         self._boxes = np.concatenate([self._boxes[kept], part.box.reshape(1, 6)])
 
     def without(self, ids: Sequence[int]) -> Boxes:
         """Get all boxes except those with the given ids."""
         other = Boxes.__new__(Boxes)
-        kept = ~np.isin(self.ids, ids)
+        kept = ~self._are(ids)
         other.ids, other._boxes = self.ids[kept], self._boxes[kept]
         return other
 
@@ -41,4 +41,10 @@ class Boxes:
 
         With `across`, also pairs that are both within reach of a third part.
         """
-        return self.ids[_native.near_pairs(self._boxes, np.isin(self.ids, new), reach, across)]
+        return self.ids[_native.near_pairs(self._boxes, self._are(new), reach, across)]
+
+    def _are(self, ids: Sequence[int]) -> BoolArray:
+        """Whether each box has one of these ids, all of which are there."""
+        mask = np.zeros(len(self.ids), dtype=bool)
+        mask[np.searchsorted(self.ids, ids)] = True
+        return mask

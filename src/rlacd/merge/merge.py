@@ -151,7 +151,7 @@ def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, run: Run) -
         verdicts: dict[_Pair, _Verdict] = {}  # for pairs put back into the queue
         count = newest = len(alive)
         while queue and run.step(count - len(alive), None, len(alive)):
-            batch = _cheapest(queue, alive, 2 * run.threads)
+            batch = _cheapest(queue, alive, run.threads)
             fresh = [pair for pair in batch if pair not in verdicts]
             verdicts.update(
                 zip(fresh, run.map(lambda p: pairing.unite(alive[p.first], alive[p.second]), fresh), strict=True)
@@ -170,9 +170,10 @@ def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, run: Run) -
                 alive[newest] = union
                 boxes.add(newest, union, [pair.first, pair.second])
                 refused[newest] = refused.pop(pair.first) | refused.pop(pair.second)
-                for i in refused[newest] & alive.keys():
+                never_with = refused[newest] & alive.keys()
+                for i in never_with:
                     refused[i].add(newest)
-                found, never = pairing.pairs(alive, boxes.without([*refused[newest]]), [newest])
+                found, never = pairing.pairs(alive, boxes.without([*never_with]), [newest])
                 for first, second in never:
                     refuse(first, second)
                 for other in [*batch[taken:], *found]:

@@ -8,10 +8,12 @@ import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import TimeoutError as NotYet
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
-from typing import Literal, TypeVar
+from itertools import count
+from typing import Any, Literal, TypeVar
 
 from manifold3d import Manifold
 
@@ -137,12 +139,14 @@ class Run:
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
         """Count the time inside towards stage `name`."""
-        self._stage = name
-        start = time.perf_counter()
+        outer, start = self._stage, time.perf_counter()
+        self._stage = outer if self._is_quiet else name
+
         self.step(0, None, self._parts)
         try:
             yield
         finally:
+            self._stage = outer
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
 
     @property
@@ -259,21 +263,33 @@ class Run:
         When an exception leaves this, no thread works on any of them any more.
         """
         items = list(items)
-        if self._pool is None or self.threads == 1 or len(items) < 2:
-            return self._each(function, items)
-        # Sixteen blocks per thread keep all busy to the end.
-        size = max(1, len(items) // (16 * self.threads))
-        futures = [self._pool.submit(self._each, function, items[i : i + size]) for i in range(0, len(items), size)]
+        results: list[Any] = [None] * len(items)
+        numbers, end = count(), len(items)
+
+        def work() -> None:
+            nonlocal end
+            try:
+                while (i := next(numbers)) < end:
+                    poll_stop()
+                    results[i] = function(items[i])
+            except BaseException:
+                end = 0
+                raise
+
+        others: list[Future[None]] = []
         try:
-            self._watch(futures)
-            return [result for future in futures for result in future.result()]
+            if self._pool is not None and self.threads > 1:
+                others += (self._pool.submit(work) for _ in range(min(self.threads, len(items)) - 1))
+            work()
+            self._watch(others)
+            for other in others:
+                other.result()
         except BaseException as error:
-            for future in futures:
-                future.cancel()
             if not isinstance(error, (Exception, Stopped)):  # Ctrl-C does not wait
                 self.stop.trip()
-            wait(futures)
+            wait(others)
             raise
+        return results
 
     def start(self, function: Callable[[], _R]) -> Future[_R]:
         """Begin some work on another thread, or do it at once where there is only this one."""
@@ -295,27 +311,14 @@ class Run:
             future.cancel()
         wait(begun)
 
-    def share(self, count: int) -> int:
-        """Threads for each of `count` items that are worked on at the same time."""
-        return max(1, self.threads // max(1, count))
-
-    @staticmethod
-    def _each(function: Callable[[_T], _R], items: list[_T]) -> list[_R]:
-        results = []
-        for item in items:
-            poll_stop()
-            results.append(function(item))
-        return results
-
     @staticmethod
     def _watch(futures: Sequence[Future[_R]]) -> None:
-        """Wait until all are done or one has failed; only this thread can look whether they have to stop."""
-        waiting: set[Future[_R]] = set(futures)
-        while waiting:
-            done, waiting = wait(waiting, 0.05, "FIRST_EXCEPTION")
-            if any(future.exception() is not None for future in done):
-                return
-            poll_stop()
+        """Wait until all are done; only this thread can look whether they have to stop."""
+        for future in futures:
+            while not future.done():
+                with contextlib.suppress(NotYet):
+                    future.exception(0.05)
+                poll_stop()
 
     def _ask_caller(self) -> None:
         """Report the last step, and note if the caller or the clock wants an end."""

@@ -90,11 +90,10 @@ _Trial = Callable[[Run], Exchange | None]
 
 @dataclass(frozen=True)
 class _Begun:
-    """A trial under way: its own run, what it will find, and the cluster that it recuts."""
+    """A trial under way: its own run, and what it will find."""
 
     run: Run
     found: Future[Exchange | None]
-    cluster: Cluster
 
 
 class Neighbourhood:
@@ -138,7 +137,7 @@ class Neighbourhood:
         """Offer each part to those around."""
         self._make(self._redistributions())
 
-    def _trials(self, most: float) -> Iterator[tuple[_Trial, Cluster]]:
+    def _trials(self, most: float) -> Iterator[_Trial]:
         yield from self._redistributions(SMALLEST_FIRST)
         yield from self._recuts(min(most, OPENING))
         yield from self._redistributions()
@@ -146,7 +145,7 @@ class Neighbourhood:
             yield from self._recuts(min(most, self._steps + RECUTS_PER_PART * len(self._graph.parts)))
             yield from self._redistributions()
 
-    def _redistributions(self, share: float = 1.0) -> Iterator[tuple[_Trial, Cluster]]:
+    def _redistributions(self, share: float = 1.0) -> Iterator[_Trial]:
         """Offer each part, or the smallest share of them, to those around."""
         graph = self._graph
         waiting = sorted(graph.parts, key=lambda i: (graph.parts[i].hull.volume, i))
@@ -154,9 +153,9 @@ class Neighbourhood:
             if not self._may_continue():
                 return
             if (trial := self._redistributing(which)) is not None:
-                yield trial, ()
+                yield trial
 
-    def _recuts(self, most: float) -> Iterator[tuple[_Trial, Cluster]]:
+    def _recuts(self, most: float) -> Iterator[_Trial]:
         """Recut clusters until `most` steps are made in total."""
         failed = 0
         while self._steps < most and self._may_continue():
@@ -165,7 +164,7 @@ class Neighbourhood:
                 failed = 0
                 self._steps += 1
                 yield drawn
-            elif self._begun:  # parts that are being recut may be drawn again, or others in their place
+            elif self._begun:  # what they find may bring new clusters
                 self._settle()
             elif (failed := failed + 1) == LAG:
                 self._exhausted = True
@@ -184,19 +183,18 @@ class Neighbourhood:
             return False
         return self._run.step(self._steps, None, len(self._best))
 
-    def _recutting(self) -> tuple[_Trial, Cluster] | None:
-        """Draw a cluster without parts that are being recut; it has not been recut by the drawn policy."""
-        taken = {i for begun in self._begun for i in begun.cluster}
+    def _recutting(self) -> _Trial | None:
+        """Draw a cluster and a policy by which it has not been recut."""
         for _ in range(DRAWS):
             cluster = self._graph.draw(CLUSTER, self._random)
             if cluster is None:
                 return None
             policy = int(self._random.integers(len(self._policies)))
-            if taken.isdisjoint(cluster) and (cluster, policy) not in self._recut:
+            if (cluster, policy) not in self._recut:
                 self._recut.add((cluster, policy))
                 parts, around = self._graph.of(cluster), self._graph.of(self._graph.around(cluster))
                 context, chosen = self._context, self._policies[policy]
-                return partial(recut, parts, around, chosen, context.criterion, whole=context.root), cluster
+                return partial(recut, parts, around, chosen, context.criterion, whole=context.root)
         return None
 
     def _redistributing(self, which: int) -> _Trial | None:
@@ -210,17 +208,16 @@ class Neighbourhood:
         part, takers, context = self._graph.parts[which], self._graph.of(around), self._context
         return lambda run: redistribute(part, takers, context.criterion, np.random.default_rng(seed), context.root, run)
 
-    def _make(self, trials: Iterator[tuple[_Trial, Cluster]]) -> None:
+    def _make(self, trials: Iterator[_Trial]) -> None:
         """Make trials, `LAG` at a time, and apply what they find in the order in which they began."""
         try:
             while True:
                 while self._begun and (len(self._begun) == LAG or self._allowance < self._price):
                     self._settle()
-                if (drawn := next(trials, None)) is None:
+                if (trial := next(trials, None)) is None:
                     break
-                trial, cluster = drawn
                 alone = self._run.alone(self._allowance)
-                self._begun.append(_Begun(alone, self._run.start(partial(trial, alone)), cluster))
+                self._begun.append(_Begun(alone, self._run.start(partial(trial, alone))))
             while self._begun:
                 self._settle()
         except Stopped:  # raised between two exchanges: the best state so far is kept
