@@ -141,7 +141,6 @@ class Run:
         """Count the time inside towards stage `name`."""
         outer, start = self._stage, time.perf_counter()
         self._stage = outer if self._is_quiet else name
-
         self.step(0, None, self._parts)
         try:
             yield
