@@ -28,7 +28,7 @@ from rlacd.search.recut import Exchange, recut
 from rlacd.search.redistribute import redistribute
 from rlacd.solid.component import Part
 
-LAG = 4
+LAG = 8
 """A trial starts from the state that all trials but the `LAG` - 1 before it have left, so that many can be under way
 at a time. It does not depend on the number of threads, so neither does the result."""
 
