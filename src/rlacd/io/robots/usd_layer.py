@@ -58,7 +58,8 @@ def _answer(path: Path, values: Values, blobs: Blobs) -> tuple[Values, dict[str,
             _replace(stage, prim, [(blobs[f"{index}.{k}.points"], blobs[f"{index}.{k}.faces"]) for k in range(count)])
         layer.subLayerPaths = [f"./{values['sublayer']}"]
         return {}, {"layer": stage_bytes(layer, values["ending"])}
-    nodes, arrays = [], {}
+    nodes: list[Values] = []
+    arrays: dict[str, bytes] = {}
     for index, prim in enumerate(colliders):
         points, faces = prim_geometry(path, prim)
         nodes.append({"path": str(prim.GetPath()), "scale": _scale(prim)})
