@@ -20,7 +20,7 @@ SEED    ?= 0
 MESHES  ?= ../shared/meshes
 SECONDS_TO_FUZZ = $(shell expr 60 \* $(MINUTES))
 
-.PHONY: install demo docs benchmarks test test-fast test-all nightly lint soak soak-light soak-totals stubs fuzz-files fuzz-shapes sanitize sanitize-address sanitize-thread format clean
+.PHONY: install demo docs benchmarks test test-fast test-all nightly engines lint soak soak-light soak-totals stubs fuzz-files fuzz-shapes sanitize sanitize-address sanitize-thread format clean
 
 install: $(VENV)/installed
 
@@ -77,6 +77,17 @@ test-all: lint
 	RLACD_RANDOM=1 $(PYTEST)
 
 nightly: test-all sanitize soak
+
+# Physics engines, from the registries, to hold hulls and files against: 12 GB, most of it PyTorch for Genesis.
+engines: $(VENV)/test-extras build/engines/installed
+	$(BIN)/pytest -m nightly tests/engines
+
+build/engines/installed: tests/engines/requirements.txt tests/engines/package.json
+	test -x build/engines/bin/python || $(PYTHON) -m venv build/engines
+	build/engines/bin/pip install --quiet --requirement tests/engines/requirements.txt
+	cp tests/engines/package.json build/engines
+	npm install --no-audit --no-fund --prefix build/engines
+	touch $@
 
 # The native tests and a cross-section of $$RLACD_MESHES, decomposed in every way, watched by sanitizers.
 sanitize: sanitize-address sanitize-thread

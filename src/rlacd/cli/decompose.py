@@ -55,7 +55,7 @@ def _decompose(mesh: Path, **how: Any) -> None:
     if asked.report == STDOUT:
         give("")  # before any work
     wanted = _named(mesh, asked, how.get("preset"))
-    robot = mesh.suffix.lower() in ROBOTS
+    robot = mesh.suffix.lower() in ROBOTS or _is_stage(mesh, wanted)
     _check_output(mesh, wanted)
     _check_robot(asked, wanted) if robot else _check_mesh(mesh, wanted)
     if wanted.balls is not None and how.get("criterion") != "navigable":
@@ -129,6 +129,16 @@ def _rewrite(robot: Path, wanted: OutputOptions, options: dict[str, Any], unit: 
         say(rewrite_summary(done, unit))
     _write_report(wanted, to_json({str(mesh.path): mesh.result.report for mesh in done.meshes}))
     return done.complete
+
+
+def _is_stage(mesh: Path, wanted: OutputOptions) -> bool:
+    """Tell whether a USD stage whose meshes collide is to become another."""
+    endings = (".usd", ".usda", ".usdc")
+    if not {mesh.suffix.lower(), Path(str(wanted.output)).suffix.lower()} <= set(endings):
+        return False
+    from rlacd.io.robots.usd import collides
+
+    return collides(mesh)
 
 
 def _named(mesh: Path, asked: OutputOptions, preset: str | None) -> OutputOptions:

@@ -358,7 +358,7 @@ def engine_shortcomings(engine: Preset, hulls: Sequence[Hull]) -> list[str]:
                 f"{_hulls(len(over), 'has', 'have')} up to {max(over)} {what}, more than {limit}, the limit for "
                 f"{engine.engine}."
             )
-    thin = 0 if engine.slivers else sum(is_sliver(hull) for hull in hulls)
+    thin = 0 if engine.slivers else sum(is_sliver(hull, 1 / 200) for hull in hulls)  # a ball is two radii thick
     if thin:
         sentences.append(
             f"{_hulls(thin, 'is', 'are')} thinner than 1/100 of the largest extent, which {engine.engine} refuses or "

@@ -81,16 +81,12 @@ def is_film(part: Part) -> bool:
     return 2 * part.volume < FILM * _native.mesh_area(part.vertices, part.faces)
 
 
-def is_sliver(hull: Hull) -> bool:
-    """Whether the radius of the hull's inscribed ball is less than `SLIVER_RADIUS` times its largest extent."""
-    extent = float(np.ptp(hull.vertices, axis=0).max())
+def is_sliver(hull: Hull, radius: float = SLIVER_RADIUS) -> bool:
+    """Whether the radius of the hull's inscribed ball is less than `radius` times its largest extent."""
+    least = radius * float(np.ptp(hull.vertices, axis=0).max())
     # A convex body's inradius lies between volume / area and three times that.
     ratio = hull.volume / _native.mesh_area(hull.vertices, hull.faces)
-    if ratio > SLIVER_RADIUS * extent:
-        return False
-    return 3 * ratio < SLIVER_RADIUS * extent or not _native.holds_ball(
-        hull.vertices, hull.faces, SLIVER_RADIUS * extent
-    )
+    return ratio <= least and (3 * ratio < least or not _native.holds_ball(hull.vertices, hull.faces, least))
 
 
 def _near(boxes: FloatArray, sliver: FloatArray) -> BoolArray:

@@ -3,15 +3,15 @@
 The numbers are the engines' own where they have any:
 
 - PhysX: at most 255 vertices and polygons a convex mesh. On a GPU 64 of both, at most 32 corners a polygon and 32
-  polygons a corner, which 62 triangles cannot exceed, and an inscribed ball no smaller than 1/100 of the largest extent
+  polygons a corner, which 62 triangles cannot exceed, and no thickness below 1/100 of the largest extent
   (`PxConvexMeshDesc` and `PxConvexMeshCookingResult` in its reference).
 - Unity: 255 triangles a convex `MeshCollider`.
 - Newton: 64 vertices (`maxhullvert`), its default for meshes it imports.
 
-MuJoCo, Bullet, Unreal and Godot set none; there, every corner costs time in every contact, so 64 are a good limit, and
-32 for Unreal, the most that its own tool for convex collision offers, and for Godot, the default of its own
-(``max_num_vertices_per_convex_hull``). Triangles stand for polygons, of which there are never
-more.
+MuJoCo, Bullet, Unreal and Godot need none (Jolt, in Godot 4, keeps 256 corners); there, every corner costs time in
+every contact, so 64 are a good limit, and 32 for Unreal, the most that its own tool for convex collision offers, and
+for Godot, the default of its own (``max_num_vertices_per_convex_hull``). Triangles stand for polygons, of which there
+are never more. The engines themselves hold us to this: ``tests/engines``.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Preset:
     file_format
         The format, where the ending does not tell it.
     slivers
-        Whether it takes hulls whose inscribed ball is smaller than 1/100 of their largest extent.
+        Whether it takes hulls that are thinner than 1/100 of their largest extent.
     """
 
     engine: str

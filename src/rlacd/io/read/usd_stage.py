@@ -54,7 +54,7 @@ class StageReader:
 def _stage(path: Path) -> tuple[Values, dict[str, bytes]]:
     from pxr import Usd, UsdGeom
 
-    _check_files(path)
+    check_files(path)
     stage = Usd.Stage.Open(str(path))
     cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
     nodes: list[Values] = []
@@ -70,12 +70,9 @@ def _stage(path: Path) -> tuple[Values, dict[str, bytes]]:
             )
         if not _is_rendered(prim):
             continue
-        if prim.IsA(UsdGeom.Mesh):
-            points, faces = _mesh(path, prim)
-        elif str(prim.GetTypeName()) in PRIMITIVES:
-            points, faces = _primitive(prim)
-        else:
+        if not prim.IsA(UsdGeom.Mesh) and str(prim.GetTypeName()) not in PRIMITIVES:
             continue
+        points, faces = prim_geometry(path, prim)
         count += len(faces)
         if count > MOST_TRIANGLES:
             raise MeshFileError(f"{path} places more than {MOST_TRIANGLES} triangles: simplify it first")
@@ -113,7 +110,7 @@ def _numbers(value: Any, count: int) -> list[float] | None:
     return numbers.tolist() if len(numbers) == count and np.isfinite(numbers).all() else None
 
 
-def _check_files(path: Path) -> None:
+def check_files(path: Path) -> None:
     """Refuse a file that names others outside its folder, or missing ones, before any of them is composed."""
     from pxr import Sdf
 
@@ -123,7 +120,7 @@ def _check_files(path: Path) -> None:
         layer = Sdf.Layer.FindOrOpen(waiting.pop())
         if layer is None:
             raise MeshFileError(f"{path} cannot be read as USD: it is damaged or cut off; export it again")
-        for named in layer.GetCompositionAssetDependencies():
+        for named in filter(None, layer.GetCompositionAssetDependencies()):  # a file may refer to its own prims
             found = layer.ComputeAbsolutePath(named)
             if found in known:
                 continue
@@ -145,6 +142,11 @@ def _is_rendered(prim: Any) -> bool:
     if not prim.IsA(UsdGeom.Gprim) or shown.ComputeVisibility() == UsdGeom.Tokens.invisible:
         return False
     return shown.ComputePurpose() in (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
+
+
+def prim_geometry(path: Path, prim: Any) -> tuple[FloatArray, np.ndarray[Any, Any]]:
+    """The points and triangles of a mesh or primitive, in its own coordinates."""
+    return _primitive(prim) if str(prim.GetTypeName()) in PRIMITIVES else _mesh(path, prim)
 
 
 def _mesh(path: Path, prim: Any) -> tuple[FloatArray, np.ndarray[Any, Any]]:

@@ -18,6 +18,7 @@ from rlacd.errors import MeshError, MeshFileError, OptionError, OutputError
 from rlacd.io.read.conventions import collada_unit
 from rlacd.io.read.load import load_mesh
 from rlacd.io.read.open_file import read_file
+from rlacd.io.robots import usd
 from rlacd.io.robots.mjcf import mujoco_reads, plan_mjcf, read_model
 from rlacd.io.robots.plan import MeshUse, Plan
 from rlacd.io.robots.references import References
@@ -85,15 +86,17 @@ def rewrite_robot(
     package_dirs: Sequence[str] = (),
     **options: Any,
 ) -> Rewritten:
-    """Replace every collision mesh of a URDF or MJCF file by its hulls, and keep all other bytes.
+    """Replace every collision mesh of a URDF, MJCF or USD file by its hulls, and keep everything else.
 
     Parameters
     ----------
     robot : path-like
-        ``*.urdf``, or ``*.xml`` for MJCF. Its meshes are looked up relative to it and in packages
-        (``package://NAME/...``), never outside the packages it refers to and `package_dirs`.
+        ``*.urdf``, ``*.xml`` for MJCF, or a USD stage (``*.usd``, ``*.usda``, ``*.usdc``). Its meshes are looked up
+        relative to it and in packages (``package://NAME/...``), never outside the packages it refers to and
+        `package_dirs`; a USD stage refers only to files in its folder or below.
     output : path-like
-        The new file, of the same kind. Hulls go to a folder beside it, ``robot_acd_urdf`` for ``robot_acd.urdf``.
+        The new file, of the same kind. Hulls go to a folder beside it, ``robot_acd_urdf`` for ``robot_acd.urdf``. For a
+        USD stage it is a layer over the original, which it refers to, and holds the hulls.
     package_dirs : sequence of str
         ``NAME=FOLDER`` says where a package is; ``FOLDER`` alone may be read and is searched for packages.
     **options
@@ -114,12 +117,12 @@ def rewrite_robot(
         The place cannot be written to.
     """
     source, place = Path(read(path_like(), "robot", robot)), Path(read(path_like(), "output", output))
+    if source.suffix.lower() in usd.ENDINGS:
+        return _rewrite_stage(source, place, options)
     packages = checked(OutputOptions, "package_dirs", package_dirs, called="package_dirs") or ()
     check_rewrite(source, place)
     kind, root = _parsed(source)
-    for name in ("unit", "scale", "per_node"):
-        if options.get(name):
-            raise OptionError(f"{name} is for a single mesh; a robot file states it for each of its meshes.")
+    _check_options(options)
     references = References(source, packages)
     folder = place.with_name(f"{place.stem}_{kind}")
     plan, warnings = _plan(root, kind, references, place, folder)
@@ -147,6 +150,37 @@ def rewrite_robot(
     check_names(folder, stem, list(files))
     write_folder(folder, stem, files, then=lambda: write_file(place, data))
     return Rewritten(place, folder, list(meshes.values()), warnings)
+
+
+def _rewrite_stage(source: Path, place: Path, options: Mapping[str, Any]) -> Rewritten:
+    """Write a layer over a USD stage."""
+    check_stage(source, place)
+    _check_options(options)
+    data, done, warnings = usd.rewrite_stage(source, place, lambda mesh: _coarse(mesh, options))
+    meshes = [
+        RewrittenMesh(Path(path), [f"hull_{i:03d}" for i in range(count)], result)
+        for path, (result, count) in done.items()
+    ]
+    if not meshes:
+        warnings.append(f"{source} has no mesh that collides, so the layer changes nothing.")
+    write_file(place, data)
+    return Rewritten(place, place, meshes, warnings)
+
+
+def check_stage(source: Path, place: Path) -> None:
+    """Check, before any work, that a USD stage can get a layer at `place`; raises as `rewrite_robot`."""
+    if place.suffix.lower() not in usd.ENDINGS:
+        raise OptionError(f"{source} can only be rewritten as {' or '.join(usd.ENDINGS)}, not as {shown(str(place))}.")
+    if os.path.realpath(source) == os.path.realpath(place):
+        raise OptionError(f"{place} would overwrite the input; choose another name.")
+    check_name(place)
+    check_file(place)
+
+
+def _check_options(options: Mapping[str, Any]) -> None:
+    for name in ("unit", "scale", "per_node"):
+        if options.get(name):
+            raise OptionError(f"{name} is for a single mesh; a robot file states it for each of its meshes.")
 
 
 def _as_obj(source: trimesh.Trimesh, use: MeshUse) -> bytes:

@@ -75,7 +75,7 @@ def encode_usd(model: Model, ending: str) -> bytes:
         mesh = _mesh(stage, path, *required_hull(hull, hull_name(index), "as USD"))
         _collider(mesh, color)
         UsdPhysics.MeshCollisionAPI.Apply(mesh.GetPrim()).CreateApproximationAttr(UsdPhysics.Tokens.convexHull)
-    return _bytes(layer, ending)
+    return stage_bytes(layer, ending)
 
 
 def identifier(name: str) -> str:
@@ -85,17 +85,24 @@ def identifier(name: str) -> str:
 
 
 def _mesh(stage: Any, path: Any, mesh: Triangulated, shift: np.ndarray[Any, Any]) -> Any:
-    from pxr import Gf, UsdGeom, Vt
+    from pxr import Gf
 
-    prim = UsdGeom.Mesh.Define(stage, path)
-    points = np.ascontiguousarray(mesh.vertices, dtype=np.float32)
-    prim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
-    prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(mesh.faces), 3, dtype=np.int32)))
-    prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(mesh.faces, dtype=np.int32).ravel()))
-    prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    prim.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(axis=0), points.max(axis=0)])))
+    prim = mesh_prim(stage, path, np.asarray(mesh.vertices, dtype=np.float32), np.asarray(mesh.faces, dtype=np.int32))
     if shift.any():
         prim.AddTranslateOp().Set(Gf.Vec3d(*shift.tolist()))
+    return prim
+
+
+def mesh_prim(stage: Any, path: Any, points: np.ndarray[Any, Any], faces: np.ndarray[Any, Any]) -> Any:
+    """Define a mesh of triangles, of points in single precision."""
+    from pxr import UsdGeom, Vt
+
+    prim = UsdGeom.Mesh.Define(stage, path)
+    prim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(points)))
+    prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(faces), 3, dtype=np.int32)))
+    prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(faces).ravel()))
+    prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    prim.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(axis=0), points.max(axis=0)])))
     return prim
 
 
@@ -139,7 +146,8 @@ def _set_mass(api: Any, model: Model) -> None:
     api.CreatePrincipalAxesAttr(Gf.Quatf(turn))
 
 
-def _bytes(layer: Any, ending: str) -> bytes:
+def stage_bytes(layer: Any, ending: str) -> bytes:
+    """The bytes of a layer as a file: text for ``usda``, else binary."""
     import tempfile
     from pathlib import Path
 

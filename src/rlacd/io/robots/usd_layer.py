@@ -1,0 +1,174 @@
+"""Colliding meshes of a USD stage, and the layer that puts hulls in their place; runs in a process of its own."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rlacd.errors import MeshFileError
+from rlacd.io.read.usd_stage import check_files, prim_geometry
+from rlacd.io.write.usd import mesh_prim, stage_bytes
+from rlacd.pool import Blobs, Shared, Values
+
+OF_THE_MESH = re.compile(r"(Mass|RigidBody|MeshCollision|ConvexHull|ConvexDecomposition|SDFMesh|TriangleMesh|Binding)")
+"""Schemas that say how a mesh itself collides, moves and looks; the others go to its hulls too."""
+
+OF_COLLISIONS = re.compile(r"(physics|physx\w*|newton|mjc):|material:binding:physics$|material:binding$")
+"""Properties that go from a mesh to its hulls."""
+
+
+class StageRewriter:
+    """The server of a process that reads colliders and writes layers (see `rlacd.pool.Server`)."""
+
+    def __init__(self, folder: Path) -> None:
+        os.environ["TMPDIR"] = str(folder)  # OpenUSD writes a report of a crash there
+
+    def __call__(self, values: Values, blobs: Blobs, shared: Mapping[str, Shared]) -> tuple[Values, dict[str, bytes]]:
+        """List the colliding meshes; if ``counts`` are given, write the layer with so many hulls for each."""
+        from pxr import Tf
+
+        path = Path(values["path"])
+        try:
+            return _answer(path, values, blobs)
+        except Tf.ErrorException as error:
+            raise MeshFileError(f"{path} cannot be read as USD: it is damaged or cut off; export it again") from error
+
+
+def _answer(path: Path, values: Values, blobs: Blobs) -> tuple[Values, dict[str, bytes]]:
+    from pxr import Sdf, Usd
+
+    check_files(path)
+    original = Sdf.Layer.FindOrOpen(str(path))
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    for key in original.pseudoRoot.ListInfoKeys():  # of a stage, only its topmost layer says up axis, unit, ...
+        if key not in ("subLayers", "subLayerOffsets"):
+            layer.pseudoRoot.SetInfo(key, original.pseudoRoot.GetInfo(key))
+    layer.subLayerPaths = [original.realPath]
+    stage = Usd.Stage.Open(layer)
+    colliders, warnings = _colliders(path, stage)
+    if "counts" in values:
+        for body in {body.GetPath(): body for prim in colliders if (body := _body(prim))}.values():
+            _fix_mass(path, body)
+        for index, (prim, count) in enumerate(zip(colliders, values["counts"], strict=True)):
+            _replace(stage, prim, [(blobs[f"{index}.{k}.points"], blobs[f"{index}.{k}.faces"]) for k in range(count)])
+        layer.subLayerPaths = [f"./{values['sublayer']}"]
+        return {}, {"layer": stage_bytes(layer, values["ending"])}
+    nodes: list[Values] = []
+    arrays: dict[str, bytes] = {}
+    for index, prim in enumerate(colliders):
+        points, faces = prim_geometry(path, prim)
+        nodes.append({"path": str(prim.GetPath()), "scale": _scale(prim)})
+        arrays |= {f"{index}.points": points.tobytes(), f"{index}.faces": faces.tobytes()}
+    return {"nodes": nodes, "warnings": warnings}, arrays
+
+
+def _colliders(path: Path, stage: Any) -> tuple[list[Any], list[str]]:
+    """The meshes that collide; instances that hold some become prims of their own, as instances cannot be edited."""
+    from pxr import Usd, UsdGeom, UsdPhysics
+
+    opened = 0
+    while True:
+        prims = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
+        found = [prim for prim in prims if prim.HasAPI(UsdPhysics.CollisionAPI)]
+        proxy = next((prim for prim in found if prim.IsInstanceProxy() and prim.IsA(UsdGeom.Mesh)), None)
+        if proxy is None:
+            break
+        while not proxy.IsInstance() or proxy.IsInstanceProxy():
+            proxy = proxy.GetParent()
+        proxy.SetInstanceable(False)
+        opened += 1
+    warnings = [f"{opened} instances with colliding meshes are no longer instances."] if opened else []
+    on = [prim for prim in found if UsdPhysics.CollisionAPI(prim).GetCollisionEnabledAttr().Get() is not False]
+    groups = [prim for prim in on if not prim.IsA(UsdGeom.Gprim)]
+    if groups:
+        warnings.append(
+            f"{len(groups)} prims collide and are no shapes, such as {groups[0].GetPath()}: left unchanged."
+        )
+    if any(prim.IsA(UsdGeom.PointInstancer) for prim in stage.Traverse()):
+        raise MeshFileError(f"{path} has a point instancer, which is not rewritten: convert its instances first")
+    return [prim for prim in on if prim.IsA(UsdGeom.Mesh)], warnings
+
+
+def _scale(prim: Any) -> list[float]:
+    """How long a unit along each axis of a prim is on the stage."""
+    from pxr import Usd, UsdGeom
+
+    cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
+    rows = np.array(cache.GetLocalToWorldTransform(prim))[:3, :3]
+    lengths = np.linalg.norm(rows, axis=1)
+    if not (np.isfinite(lengths) & (lengths > 0)).all():
+        raise MeshFileError(f"{prim.GetPath()} is scaled to nothing, or to infinity: correct its scale")
+    return [float(f"{length:.9g}") for length in lengths]
+
+
+def _body(prim: Any) -> Any:
+    """The rigid body that a prim belongs to, if any."""
+    from pxr import UsdPhysics
+
+    while prim and not prim.HasAPI(UsdPhysics.RigidBodyAPI):
+        prim = prim.GetParent()
+    return prim
+
+
+def _fix_mass(path: Path, body: Any) -> None:
+    """State the mass, centre and inertia of a body, as they follow from its shapes before hulls are among them."""
+    import trimesh
+    from pxr import Gf, Usd, UsdGeom, UsdPhysics
+
+    cache, scale = UsdGeom.XformCache(Usd.TimeCode.EarliestTime()), np.array(_scale(body))
+
+    def of(prim: Any) -> Any:
+        points, faces = prim_geometry(path, prim)
+        to_body = np.array(cache.ComputeRelativeTransform(prim, body)[0])
+        solid = trimesh.Trimesh((points @ to_body[:3, :3] + to_body[3, :3]) * scale, faces, process=False)
+        solid = solid if solid.is_volume else solid.convex_hull
+        said = UsdPhysics.RigidBodyAPI.MassInformation()
+        said.volume, said.centerOfMass = float(solid.volume), Gf.Vec3f(*solid.center_mass.tolist())
+        said.inertia = Gf.Matrix3f(*np.asarray(solid.moment_inertia).ravel().tolist())
+        said.localPos, said.localRot = Gf.Vec3f(0), Gf.Quatf(1)
+        return said
+
+    mass, inertia, centre, axes = UsdPhysics.RigidBodyAPI(body).ComputeMassProperties(of)
+    api = UsdPhysics.MassAPI.Apply(body)
+    api.CreateMassAttr(mass)
+    api.CreateCenterOfMassAttr(Gf.Vec3f(*(np.array(centre) / scale).tolist()))
+    api.CreateDiagonalInertiaAttr(inertia)
+    api.CreatePrincipalAxesAttr(axes)
+
+
+def _replace(stage: Any, prim: Any, hulls: list[tuple[bytes, bytes]]) -> None:
+    """Put hulls beside a mesh, or below it if it is a rigid body, and let it no longer collide."""
+    from pxr import UsdGeom, UsdPhysics
+
+    inside = prim.HasAPI(UsdPhysics.RigidBodyAPI)
+    parent, name = (prim if inside else prim.GetParent()), f"{prim.GetName()}_hulls"
+    while parent.GetChild(name):
+        name += "_"
+    group = UsdGeom.Xform.Define(stage, parent.GetPath().AppendChild(name))
+    group.CreatePurposeAttr(UsdGeom.Tokens.guide)
+    if not inside:
+        moved = UsdGeom.Xformable(prim)
+        group.AddTransformOp().Set(moved.GetLocalTransformation())
+        group.SetResetXformStack(moved.GetResetXformStack())
+    schemas = [name for name in prim.GetAppliedSchemas() if not OF_THE_MESH.search(name)]
+    settings = [each for each in prim.GetAuthoredProperties() if OF_COLLISIONS.match(each.GetName())]
+    for number, (points, faces) in enumerate(hulls):
+        corners, triangles = np.frombuffer(points, "<f4").reshape(-1, 3), np.frombuffer(faces, "<i4").reshape(-1, 3)
+        hull = mesh_prim(stage, group.GetPath().AppendChild(f"hull_{number:03d}"), corners, triangles).GetPrim()
+        UsdPhysics.CollisionAPI.Apply(hull)
+        UsdPhysics.MeshCollisionAPI.Apply(hull).CreateApproximationAttr(UsdPhysics.Tokens.convexHull)
+        for schema in schemas:
+            hull.AddAppliedSchema(schema)
+        for each in settings:
+            if not re.search(
+                r"physics:(approximation|mass|density|rigid|velocity|angular|kinematic|start|diagonal"
+                r"|principal|center|simulation)",
+                each.GetName(),
+            ):
+                each.FlattenTo(hull)
+    UsdPhysics.CollisionAPI(prim).CreateCollisionEnabledAttr(False)

@@ -1,0 +1,28 @@
+"""Pinocchio and Coal, which answer questions on distances and do not simulate: URDF."""
+
+from pathlib import Path
+
+import coal
+import numpy as np
+import pinocchio
+from harness import run, volume
+
+
+def take(file):
+    folder = str(Path(file).parent)
+    model = pinocchio.buildModelFromUrdf(file, pinocchio.JointModelFreeFlyer())
+    geometry = pinocchio.buildGeomFromUrdf(model, file, pinocchio.GeometryType.COLLISION, package_dirs=[folder])
+    said = []
+    for shape in geometry.geometryObjects:
+        assert isinstance(shape.geometry, coal.BVHModelOBBRSS)  # as it is read
+        shape.geometry.buildConvexRepresentation(False)
+        convex = shape.geometry.convex
+        points = np.array(convex.points())
+        faces = [
+            [triangle[k] for k in range(3)] for triangle in (convex.polygons(i) for i in range(convex.num_polygons))
+        ]
+        said.append({"vertices": convex.num_points, "volume": volume(points, faces), "mass": model.inertias[1].mass})
+    return said
+
+
+run("Pinocchio and Coal", "coal", take, None)

@@ -1,0 +1,129 @@
+"""USD stages: hulls collide where meshes did, in a layer over the original; mass, unit and everything else stay."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from click.testing import CliRunner
+
+import rlacd
+from rlacd.cli.main import app
+from rlacd.errors import MeshFileError, OptionError
+from tests.models import TABLE_VOLUME, table
+
+pytest.importorskip("pxr", reason="the extra usd is not installed")
+from pxr import Usd, UsdGeom, UsdPhysics, UsdValidation, Vt
+
+SCALE = (100.0, 200.0, 100.0)
+
+
+def add_table(stage: Any, path: str) -> Any:
+    """A table that collides, moved and stretched unequally."""
+    shape, mesh = table(), UsdGeom.Mesh.Define(stage, path)
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.array(shape.vertices, dtype=np.float32)))
+    mesh.CreateFaceVertexCountsAttr([3] * len(shape.faces))
+    mesh.CreateFaceVertexIndicesAttr(shape.faces.ravel().tolist())
+    mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.array(shape.bounds, dtype=np.float32)))
+    mesh.AddTranslateOp().Set((1, 2, 3))
+    mesh.AddScaleOp().Set(SCALE)
+    UsdPhysics.CollisionAPI.Apply(mesh.GetPrim())
+    UsdPhysics.MeshCollisionAPI.Apply(mesh.GetPrim()).CreateApproximationAttr("convexDecomposition")
+    return mesh
+
+
+def write_stage(path: Path, body: str = "/robot") -> Path:
+    stage = Usd.Stage.CreateNew(str(path))
+    UsdGeom.SetStageMetersPerUnit(stage, 0.01)
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+    root = UsdGeom.Xform.Define(stage, "/robot")
+    Usd.ModelAPI(root).SetKind("component")
+    stage.SetDefaultPrim(root.GetPrim())
+    add_table(stage, "/robot/table")
+    UsdPhysics.RigidBodyAPI.Apply(stage.GetPrimAtPath(body))
+    stage.Save()
+    return path
+
+
+def colliders(stage: Any) -> list[Any]:
+    prims = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
+    found = [prim for prim in prims if prim.HasAPI(UsdPhysics.CollisionAPI)]
+    return [prim for prim in found if UsdPhysics.CollisionAPI(prim).GetCollisionEnabledAttr().Get() is not False]
+
+
+def placed(prim: Any) -> trimesh.Trimesh:
+    to_world = np.array(UsdGeom.XformCache().GetLocalToWorldTransform(prim)).T
+    mesh = UsdGeom.Mesh(prim)
+    points = trimesh.transform_points(np.array(mesh.GetPointsAttr().Get(), dtype=float), to_world)
+    return trimesh.Trimesh(points, np.array(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3), process=False)
+
+
+@pytest.mark.parametrize("body", ["/robot", "/robot/table"])
+@pytest.mark.parametrize("ending", ["usda", "usdc"])
+def test_hulls_lie_where_the_mesh_lay_and_nothing_else_changes(tmp_path: Path, body: str, ending: str) -> None:
+    source = write_stage(tmp_path / "in.usda", body)
+    before = source.read_bytes()
+    done = rlacd.rewrite_robot(source, tmp_path / f"out.{ending}", threads=1, quality="fast")
+    assert done.warnings == []
+    assert source.read_bytes() == before
+    stage = Usd.Stage.Open(str(done.path))
+    assert list(stage.GetRootLayer().subLayerPaths) == ["./in.usda"]
+    assert UsdGeom.GetStageMetersPerUnit(stage) == 0.01
+    assert UsdGeom.GetStageUpAxis(stage) == "Y"
+    hulls = colliders(stage)
+    assert len(hulls) == len(done.meshes[0].files) > 1
+    for hull in hulls:
+        assert UsdPhysics.MeshCollisionAPI(hull).GetApproximationAttr().Get() == "convexHull"
+        assert UsdGeom.Imageable(hull).ComputePurpose() == "guide"
+        assert str(hull.GetPath()).startswith(body)
+        assert placed(hull).volume == pytest.approx(placed(hull).convex_hull.volume, rel=1e-4)
+    mesh = placed(stage.GetPrimAtPath("/robot/table"))
+    together = trimesh.util.concatenate([placed(hull) for hull in hulls])
+    assert together.bounds == pytest.approx(mesh.bounds, rel=1e-5)
+    assert UsdGeom.Imageable(stage.GetPrimAtPath("/robot/table")).ComputePurpose() == "default"
+    mass = UsdPhysics.MassAPI(stage.GetPrimAtPath(body)).GetMassAttr().Get()
+    assert mass == pytest.approx(TABLE_VOLUME * np.prod(SCALE) * 0.01**3 * 1000, rel=1e-5)
+
+
+def test_the_validators_of_usd_find_nothing(tmp_path: Path) -> None:
+    rlacd.rewrite_robot(write_stage(tmp_path / "in.usda"), tmp_path / "out.usda", threads=1, quality="fast")
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    stage = Usd.Stage.Open(str(tmp_path / "out.usda"))
+    assert [error.GetMessage() for error in UsdValidation.ValidationContext(validators).Validate(stage)] == []
+
+
+def test_instances_that_collide_are_opened_and_each_gets_the_hulls(tmp_path: Path) -> None:
+    write_stage(tmp_path / "part.usda")
+    stage = Usd.Stage.CreateNew(str(tmp_path / "scene.usda"))
+    for x in range(2):
+        prim = UsdGeom.Xform.Define(stage, f"/part{x}").GetPrim()
+        prim.GetReferences().AddReference("./part.usda")
+        prim.SetInstanceable(True)
+    stage.Save()
+    done = rlacd.rewrite_robot(tmp_path / "scene.usda", tmp_path / "out.usda", threads=1, quality="fast")
+    assert any("2 instances" in warning for warning in done.warnings)
+    one, other = done.meshes
+    assert one.result is other.result
+    assert len(colliders(Usd.Stage.Open(str(done.path)))) == 2 * len(one.files)
+
+
+def test_the_command_rewrites_a_stage_whose_meshes_collide(tmp_path: Path) -> None:
+    source = write_stage(tmp_path / "in.usda")
+    given = ["decompose", str(source), "-o", str(tmp_path / "out.usda"), "--quality", "fast", "--threads", "1"]
+    done = CliRunner().invoke(app, given)
+    assert done.exit_code == 0, done.output
+    assert "@./in.usda@" in (tmp_path / "out.usda").read_text()
+
+
+def test_what_cannot_be_rewritten_is_refused(tmp_path: Path) -> None:
+    source = write_stage(tmp_path / "in.usda")
+    for place in (source, tmp_path / "out.urdf"):
+        with pytest.raises(OptionError):
+            rlacd.rewrite_robot(source, place)
+    damaged = tmp_path / "damaged.usda"
+    damaged.write_text("#usda 1.0\ndef Xform {")
+    with pytest.raises(MeshFileError, match="damaged"):
+        rlacd.rewrite_robot(damaged, tmp_path / "out.usda")
