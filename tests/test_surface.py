@@ -80,6 +80,24 @@ def test_winding_tells_inside_from_outside() -> None:
     assert np.array_equal(surface.winding(points) > 0.5, inside)
 
 
+@pytest.mark.parametrize("width", [1.0, 1e-9])
+def test_around_a_closed_surface_windings_are_whole_numbers(width: float) -> None:
+    """Two rings through each other, at best as thick as rounding; rays meet their edges, corners, and faces edge on."""
+    ring, other = trimesh.creation.torus(1.0, 0.3), trimesh.creation.torus(1.0, 0.3).apply_translation([0.3, 0, 0])
+    both = trimesh.util.concatenate([ring, other])
+    scale = np.array([1, 1, width])
+    vertices = np.ascontiguousarray(both.vertices * scale)
+    surface = _native.Surface(vertices, np.ascontiguousarray(both.faces, dtype=np.int32))
+    ray = np.array([2, 3, 4]) / np.sqrt(29)
+    at = np.concatenate([vertices, vertices[both.faces].mean(axis=1), vertices[both.edges_unique].mean(axis=1)])
+    points = np.concatenate([at[:, None] - ray * np.array([0.1, 1.0])[:, None], at[:, None] + ray * 0.1], axis=1)
+    points = points.reshape(-1, 3)
+    points = points[surface.distance(points) > 1e-3]
+    exact = surface.winding(points, accuracy=np.inf)
+    assert width < 1 or set(np.round(exact)) == {0, 1, 2}
+    np.testing.assert_array_equal(surface.winding(points, is_closed=True), np.round(exact))
+
+
 def test_winding_of_an_open_surface_is_the_solid_angle_it_covers() -> None:
     half = trimesh.creation.icosphere(subdivisions=4)
     half = half.submesh([np.flatnonzero(half.triangles_center[:, 2] < 0)], append=True)

@@ -13,9 +13,8 @@ namespace rlacd {
 
 namespace {
 
-constexpr double kApart = 1e-10;        // facet planes are moved out by this, so that faces on them stay whole
-constexpr double kHalf = 0.5;           // a winding number between inside and outside
-constexpr double kWindingAccuracy = 2;  // see winding.hpp
+constexpr double kApart = 1e-10;  // facet planes are moved out by this, so that faces on them stay whole
+constexpr double kHalf = 0.5;     // a winding number between inside and outside
 
 // Where a solid crosses itself, each cut may multiply its crossings: one that doubles its faces, and adds so many, is
 // given up.
@@ -67,7 +66,7 @@ std::optional<std::vector<Piece>> connected_pieces(const Mesh& mesh, double leas
     if (!(volumes[i] < 0)) continue;
     for (const std::size_t shell : by_volume) {
       if (!surfaces[shell]) surfaces[shell] = std::make_unique<Surface>(all[shell]);
-      if (surfaces[shell]->winding().at(all[i].vertices[0], kWindingAccuracy) <= kHalf) continue;
+      if (surfaces[shell]->winding().of_closed(all[i].vertices[0]) <= kHalf) continue;
       cavities[shell].push_back(i);
       break;
     }

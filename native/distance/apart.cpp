@@ -11,7 +11,6 @@ namespace {
 
 constexpr double kShortest = 0.1;  // of the reach: the least step along a segment, and the least room of a ball
 constexpr int kClimbs = 6;
-constexpr double kAccuracy = 4;       // of winding numbers
 constexpr int kMostQueries = 150000;  // of distances, about 0.15 s; pairs not decided by then count as together
 
 struct Ball {
@@ -70,7 +69,7 @@ class Exterior {
   bool is_inside(Vec3 x, double away) {
     for (const Ball& ball : inner_)
       if (norm2(x - ball.centre) < ball.radius * ball.radius) return true;
-    if (surface_.winding().at(x, kAccuracy) <= 0.5) return false;
+    if (surface_.winding().of_closed(x) <= 0.5) return false;
     inner_.push_back({x, away});
     return true;
   }

@@ -14,7 +14,7 @@ namespace {
 // contradict each other, it is tried again with larger ones.
 constexpr double kNudge = 1e-8;
 constexpr double kLarger[] = {1, 3.3, 11};
-constexpr double kInside = 0.5, kAccuracy = 4;
+constexpr double kInside = 0.5;
 // Corners are in the solid once or not at all; in spots where noise makes it overlap itself they may be in it twice, or
 // less than not at all.
 constexpr std::int32_t kLeastState = -1, kMostState = 2;
@@ -271,7 +271,7 @@ class Clip {
       const double distance = surface_.bvh().closest(polytope_.corners[c]).distance2;
       if (distance > farthest) farthest = distance, best = c;
     }
-    const double winding = surface_.winding().at(polytope_.corners[best], kAccuracy);
+    const double winding = surface_.winding().of_closed(polytope_.corners[best]);
     return static_cast<std::int32_t>(std::lround(winding)) - states_[best];
   }
 
@@ -297,7 +297,7 @@ class Clip {
       const double distance = surface_.bvh().closest(middle).distance2;
       if (distance > farthest) farthest = distance, best = middle;
     }
-    return surface_.winding().at(best, kAccuracy) > kInside;
+    return surface_.winding().of_closed(best) > kInside;
   }
 
   // Adds the parts of the polytope's edges that are inside the solid to the rims on both sides.

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kMaybe = 40;  // corners; with more than this it pays to test some of them first
 
-constexpr double kInside = 0.5, kAccuracy = 2;
+constexpr double kInside = 0.5;
 constexpr double kBeyond = 1 + 1e-9;
 
 // Limits on the cells examined: this many besides the facets, down to this share of the threshold. Most pairs of hulls
@@ -214,7 +214,7 @@ bool Filling::is_missed(const Mesh& hull, const std::vector<Triangle>& facets, d
     const Bvh::Hit hit = surface_.bvh().closest(cell.middle, cell.hint, enough, within);
     const double distance = std::sqrt(hit.distance2);  // `within` if nothing is nearer
     const bool is_far = distance > threshold;
-    if (is_far && surface_.winding().at(cell.middle, kAccuracy) < kInside) return true;
+    if (is_far && surface_.winding().of_closed(cell.middle) < kInside) return true;
     // On the way from a middle inside the solid to a point outside, the surface comes no sooner than its distance.
     cell.most = kFarther * cell.radius + (is_far ? -distance : distance);
     cell.hint = hit.slot;

@@ -1,5 +1,8 @@
 #include "distance/winding.hpp"
 
+#include <limits>
+#include <optional>
+
 namespace rlacd {
 namespace {
 
@@ -17,6 +20,39 @@ double radius_around(Vec3 centre, const Box& box) {
                       std::max(centre.y - box.lower.y, box.upper.y - centre.y),
                       std::max(centre.z - box.lower.z, box.upper.z - centre.z)};
   return norm(reach);
+}
+
+// The direction of rays: few edges or faces that people make are parallel to it.
+constexpr Vec3 kRay = {0.3713906763541037, 0.5570860145311556, 0.7427813527082074};
+
+// Products of lengths are known to this share of them; where that does not decide, the expansion does, to `kInDoubt`.
+constexpr double kRounding = 1e-13, kInDoubt = 4;
+
+bool meets(const Box& box, Vec3 p) {
+  double enter = 0, leave = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 3; ++i) {
+    enter = std::max(enter, (box.lower[i] - p[i]) / kRay[i]);
+    leave = std::min(leave, (box.upper[i] - p[i]) / kRay[i]);
+  }
+  return enter <= leave * (1 + kRounding);
+}
+
+// 1 where the ray from p leaves through the triangle, -1 where it enters, 0 where it passes by (Moeller and Trumbore,
+// 1997); nothing if rounding could decide that.
+std::optional<int> crossing(const TriangleFrame& t, Vec3 p) {
+  const Vec3 away = p - t.a, across = cross(kRay, t.ac), above = cross(away, t.ab);
+  const double b = dot(away, across), c = dot(kRay, above), a = dot(t.ab, across) - b - c;
+  const double edge = std::sqrt(t.longest2), rounding = kRounding * edge * (edge + norm(away));
+  int least = 1, most = -1;
+  for (const double part : {a, b, c}) {
+    const int sign = part > rounding ? 1 : part < -rounding ? -1 : 0;
+    least = std::min(least, sign), most = std::max(most, sign);
+  }
+  const int side = least + most;
+  const double ahead = side * dot(t.ac, above);
+  if (least * most < 0 || ahead < -rounding * edge) return 0;
+  if (least * most == 0 || ahead <= rounding * edge) return std::nullopt;
+  return side < 0 ? 1 : -1;
 }
 
 // Adds the first moments of a group about its own centre to those about `centre`.
@@ -99,6 +135,31 @@ double Winding::at(Vec3 p, double accuracy) const {
     }
   }
   return angle / (4 * kPi);
+}
+
+double Winding::of_closed(Vec3 p) const {
+  const std::vector<Bvh::Node>& nodes = bvh_.nodes();
+  int left = 0;
+  std::int32_t stack[96];
+  int top = 0;
+  stack[top++] = 0;
+  while (top > 0) {
+    const Bvh::Node& node = nodes[stack[--top]];
+    for (int side = 0; side < 2; ++side) {
+      const std::int32_t child = node.child[side];
+      if (!meets(node.box[side], p)) continue;
+      if (child >= 0) {
+        stack[top++] = child;
+        continue;
+      }
+      for (std::int32_t i = 0; i < node.leaf_size[side]; ++i) {
+        const std::optional<int> sign = crossing(bvh_.triangle(~child + i), p);
+        if (!sign) return std::round(at(p, kInDoubt));
+        left += *sign;
+      }
+    }
+  }
+  return left;
 }
 
 }  // namespace rlacd

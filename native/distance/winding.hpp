@@ -5,7 +5,8 @@
 //      the holes of an open one.
 // How: Jacobson, Kavan, Sorkine-Hornung, "Robust Inside-Outside Segmentation using Generalized Winding Numbers" (2013):
 //      the sum of the solid angles of the triangles / 4 pi. Far groups of triangles are replaced by the first two terms
-//      of their multipole expansion: Barill et al., "Fast Winding Numbers for Soups and Clouds" (2018).
+//      of their multipole expansion: Barill et al., "Fast Winding Numbers for Soups and Clouds" (2018). Around a closed
+//      surface it is a whole number: how often a ray leaves it less how often the ray enters.
 #pragma once
 
 #include <vector>
@@ -21,6 +22,9 @@ class Winding {
   // A group is expanded when p is farther from its centre than `accuracy` times its radius; infinity sums every
   // triangle exactly.
   double at(Vec3 p, double accuracy) const;
+
+  // The same for a closed surface. Long thin triangles, which are never far, cost it no more than others.
+  double of_closed(Vec3 p) const;
 
  private:
   struct Moments {

@@ -13,7 +13,6 @@ namespace {
 
 constexpr double kSlack = 1e-9;  // absolute: the frame is 2 wide
 constexpr double kTouch = 1e-9;
-constexpr double kWindingAccuracy = 3;
 constexpr std::size_t kChunk = 64;
 
 struct Candidate {
@@ -215,7 +214,7 @@ class Spreading {
   }
   bool is_inside(std::int32_t region, Vec3 x) const {
     const auto [entry, is_new] = inside_.try_emplace(region);
-    if (is_new) entry->second = surface_.winding().at(x, kWindingAccuracy) > 0.5;
+    if (is_new) entry->second = surface_.winding().of_closed(x) > 0.5;
     return entry->second;
   }
 

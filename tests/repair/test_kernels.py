@@ -13,8 +13,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from rlacd import _native
-from rlacd.repair.distance import SurfaceQuery, points_covering, shared_faces
-from rlacd.repair.record import inside_by_balls
+from rlacd.repair.distance import points_covering, shared_faces
 from rlacd.repair.voxels import Reach, _grown
 from rlacd.solid.topology import Edges
 
@@ -117,16 +116,6 @@ def test_nearest_points_do_not_depend_on_their_neighbours() -> None:
 def test_cells_grow_to_all_cells_within_a_radius(radius: float) -> None:
     cells = np.random.default_rng(1).random((14, 11, 17)) < 0.01
     np.testing.assert_array_equal(_grown(cells, radius), ndimage.distance_transform_edt(~cells) <= radius + 1e-12)
-
-
-def test_balls_tell_inside_from_outside() -> None:
-    ring = trimesh.creation.torus(1.0, 0.3)
-    solid = SurfaceQuery(np.array(ring.vertices), np.array(ring.faces, dtype=np.int64))
-    points = np.random.default_rng(2).uniform(-1.4, 1.4, (3000, 3)) * [1, 1, 0.4]
-    distance = solid.distance(points)
-    points, distance = points[distance > 1e-3], distance[distance > 1e-3]
-    np.testing.assert_array_equal(inside_by_balls(solid, points, distance), solid.inside(points))
-    assert len(inside_by_balls(solid, points[:0], distance[:0])) == 0
 
 
 def test_shared_faces_are_found_whatever_their_order_and_winding() -> None:

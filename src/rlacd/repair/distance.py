@@ -54,15 +54,16 @@ class SurfaceQuery:
         found, face = self._surface.closest(np.ascontiguousarray(points), threads=self.threads or 0)
         return np.asarray(found), np.asarray(face, dtype=np.int64)
 
-    def winding(self, points: FloatArray) -> FloatArray:
-        """Return ``[N]`` how many times the faces wind around each point."""
+    def winding(self, points: FloatArray, *, is_closed: bool = False) -> FloatArray:
+        """Return ``[N]`` how many times the faces wind around each point: a whole number if they are closed."""
         if len(points) == 0:
             return np.empty(0)
-        return np.asarray(self._surface.winding(np.ascontiguousarray(points), threads=self.threads or 0))
+        points = np.ascontiguousarray(points)
+        return np.asarray(self._surface.winding(points, threads=self.threads or 0, is_closed=is_closed))
 
     def inside(self, points: FloatArray) -> BoolArray:
         """Return ``[N]`` whether the faces, a closed outward surface, wind around each point."""
-        result: BoolArray = self.winding(points) > 0.5
+        result: BoolArray = self.winding(points, is_closed=True) > 0.5
         return result
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from rlacd import _native
-from rlacd._native import PointTree, poll_stop
+from rlacd._native import poll_stop
 from rlacd.repair.distance import SurfaceQuery, affordable, points_covering, shared_faces
 from rlacd.repair.voxels import DEFAULT_GAP
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.frame import HALF_THICKNESS
+from rlacd.solid.frame import COVERAGE_TOLERANCE, HALF_THICKNESS
 from rlacd.solid.solid import BodyRepair
 from rlacd.solid.topology import BoolArray, IntArray, face_areas, marked
 
@@ -61,12 +61,8 @@ class Record:
         return tuple(BodyRepair(i, STEPS[s], a, b, d) for i, (s, a, b, d) in enumerate(rows))
 
 
-# Farther away from a solid, what is outside is lost: the middle of a slab is half as far from its surface.
-_OFF = 2 * HALF_THICKNESS
-
-
 def measure(record: Record, surface: SurfaceQuery, solid: SurfaceQuery) -> IntArray:
-    """Record, for the changed bodies, how far the solid and the input deviate; returns faces that lead out of it."""
+    """Record, for the changed bodies, how far the solid and the input deviate; returns the faces that would be lost."""
     if record.step.max() < STEPS.index("outer skin"):
         return np.empty(0, dtype=np.int64)
     kept, taken_over = shared_faces(solid.vertices, solid.faces, surface.vertices, surface.faces)
@@ -83,32 +79,12 @@ def measure(record: Record, surface: SurfaceQuery, solid: SurfaceQuery) -> IntAr
     spacing = affordable(DEFAULT_GAP, float(face_areas(surface.vertices, faces).sum()))
     points, on = points_covering(surface.vertices, faces, spacing)
     distance = solid.distance(points)
-    lost = _outside(solid, points, distance)
+    lost = np.flatnonzero(distance > 2 * HALF_THICKNESS)  # the middle of a slab is half as far from its surface
+    lost = lost[~solid.inside(points[lost])]
     np.maximum.at(record.lost, record.body_of_input[replaced[on[lost]]], distance[lost])
+    lost = lost[distance[lost] > COVERAGE_TOLERANCE]  # hulls grow to what lies nearer
     corners = np.unique(faces[_native.longest_edges(surface.vertices, faces) <= spacing])  # the first of the points
     is_out = marked(corners[lost[lost < len(corners)]], len(surface.vertices))
     leads_out = np.asarray(is_out[faces].any(axis=1))
     leads_out[on[lost]] = True
     return replaced[leads_out]
-
-
-def _outside(solid: SurfaceQuery, points: FloatArray, distance: FloatArray) -> IntArray:
-    """Return which of some points are lost, given their distances from the solid."""
-    away = np.flatnonzero(distance > _OFF)
-    return away[~inside_by_balls(solid, points[away], distance[away])]
-
-
-def inside_by_balls(solid: SurfaceQuery, points: FloatArray, distance: FloatArray) -> BoolArray:
-    """Return ``[N]`` whether a closed surface winds around points at known distances from it.
-
-    A ball around a point up to the surface lies on one side of it, with all points in it: that is quicker.
-    """
-    ball = np.full(len(points), -1, dtype=np.int64)
-    centers: list[int] = []
-    tree = PointTree(points)
-    for i in np.argsort(-distance, kind="stable").tolist():
-        if ball[i] < 0:
-            _, near = tree.within(points[i : i + 1], 0.99 * distance[i : i + 1])
-            ball[near] = len(centers)
-            centers.append(i)
-    return solid.inside(points[centers])[ball]

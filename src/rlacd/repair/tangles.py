@@ -44,4 +44,5 @@ def _inside_out(solid: SurfaceQuery, count: int) -> tuple[FloatArray, BoolArray]
     """Points ``[N, 3]`` spread evenly over a closed surface, and whether it is inside out there."""
     points, on = _native.sample_surface(solid.vertices, solid.faces.astype(np.int32), count, 0)
     step = BESIDE * face_normals(solid.vertices, solid.faces[on].astype(np.int64))
-    return points, np.minimum(solid.winding(points + step), solid.winding(points - step)) < -0.25
+    beside = (solid.winding(points + way * step, is_closed=True) for way in (1, -1))
+    return points, np.minimum(*beside) < 0

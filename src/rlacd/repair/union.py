@@ -174,7 +174,7 @@ def _around(solids: list[Manifold]) -> list[list[int]]:
         surface = _native.Surface(np.ascontiguousarray(vertices), np.ascontiguousarray(faces, dtype=np.int32))
         candidates = np.flatnonzero(inner)
         points = np.stack([to_arrays(solids[i])[0][0] for i in candidates])
-        for i in candidates[surface.winding(points) > 0.5]:
+        for i in candidates[surface.winding(points, is_closed=True) > 0]:
             around[i].append(j)
     return around
 
@@ -203,7 +203,8 @@ def _without_cavities(solid: Manifold) -> Shape:
         if len(some) == 0:
             continue
         around = _native.Surface(vertices, np.ascontiguousarray(faces[order[begin[cavity] : begin[cavity + 1]]]))
-        kept[some[around.winding(vertices[faces[order[begin[some]], 0]]) < -0.5]] = False
+        standing = around.winding(vertices[faces[order[begin[some]], 0]], is_closed=True) < 0
+        kept[some[standing]] = False
     return _of_faces(vertices, faces[kept[shell]])
 
 

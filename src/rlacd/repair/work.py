@@ -157,8 +157,9 @@ class Work:
                 f"Holes were closed although the caps lead up to {depth:.3f} (longest side = 2) away from the surface,"
                 f" at {self._places([hole for hole in self.holes if hole.is_closed])}."
             )
-        is_slab = self.record.has("slab")
-        openings = [hole for hole in self.holes if not hole.is_closed and is_slab[hole.body]]
+        is_thin = self.record.has("slab")
+        is_thin[[part.body for part in self.parts if not part.is_slab]] = False  # only fins of it are
+        openings = [hole for hole in self.holes if not hole.is_closed and is_thin[hole.body]]
         shells = len({hole.body for hole in openings})
         if shells:
             became = "1 open body became a thin shell; --open solid fills it"
