@@ -19,6 +19,7 @@ pytest.importorskip("torch", reason="needs the extra train")
 
 import torch
 
+from rlacd.learn.encoders import PublishedEncoder
 from rlacd.learn.encoders.i2p_mae import I2PMAEEncoder
 from rlacd.learn.q_network import QNetwork, load_policy
 from rlacd.learn.train import train
@@ -94,7 +95,7 @@ def test_too_few_points_and_unusable_files_are_reported_before_a_run_begins(
 def test_the_paper_preset_sees_what_the_paper_sees() -> None:
     paper = TrainOptions.preset("paper")
     assert (paper.encoder, paper.points) == ("i2p-mae", 2048)
-    network = QNetwork(I2PMAEEncoder().dim)
+    network = QNetwork(I2PMAEEncoder().dim, PublishedEncoder.outputs)
     widths = [layer.out_features for layer in network.layers if isinstance(layer, torch.nn.Linear)]
     assert widths == [1024, 512, 256, 128, 150]
     assert network.layers[0].in_features == 384 + 384
