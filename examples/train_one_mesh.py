@@ -2,8 +2,8 @@
 
     python examples/train_one_mesh.py [MESH] [RUN]        # needs pip install 'rlacd[train]'
 
-The page *Train a policy in ten minutes* explains what is printed; change the options below and run it again. `# %%` begins
-a cell in editors that know them.
+The page *Train a policy in ten minutes* explains what is printed; change the options below and run it again. `# %%`
+begins a cell in editors that know them.
 """
 
 # %% A folder with one mesh. By default, a chair.
@@ -44,7 +44,7 @@ def main(mesh: Path | None, run: Path, **changes: object) -> list[dict[str, floa
         shutil.copy(mesh, folder)
 
     # %% The run. All options: rlacd train --help
-    options = TrainOptions.preset("one-mesh", **{"warmup": 200, "validate_every": 250, "seed": 0, **changes})
+    options = TrainOptions.preset("one-mesh", **{"seed": 0, **changes})
     policy = train(folder, run, options, say=lambda line: print(line) if "validation" not in line else None)
 
     # %% The curve: parts by the network's own planes, over greedy's. The bar of random planes is the longest at first.

@@ -176,12 +176,13 @@ PRESETS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
         "one-mesh": {
             **_TWO_CORES,
             "iterations": 5_000,
-            "warmup": 500,
+            "warmup": 200,
+            "learn_every": 1,
             "rotate": False,
             "max_faces": 5000,
             "environments": 1,
             "validation": 0,
-            "validate_every": 500,
+            "validate_every": 250,
         },
     }
 )
