@@ -22,7 +22,7 @@ from rlacd.planes.candidates import OFFSETS_PER_AXIS, axis_and_principal
 from rlacd.planes.sweep import SLIVER, Sweep, paper_planes, sweep
 from rlacd.policies.greedy import excess_norm, generator_of, least_hulls
 from rlacd.policies.network import KIND, load_network
-from rlacd.policies.plane_features import PLANES, SWEEP_FEATURES, sweep_features
+from rlacd.policies.plane_features import FEATURES, sweep_features
 from rlacd.repair.repair import repair
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray
@@ -104,7 +104,7 @@ class Deployed:
         self._threshold = threshold
         self._network = None
         if deployment.ranking.endswith(WEIGHTS_ENDING):
-            self._network = load_network(deployment.ranking, KIND, SWEEP_FEATURES, PLANES)
+            self._network = load_network(deployment.ranking, KIND, FEATURES, 1)
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None when no candidate is valid."""
@@ -118,8 +118,7 @@ class Deployed:
 
     def _cost(self, component: Component, swept: Sweep) -> FloatArray:
         if self._network is not None:
-            features = sweep_features(component, self._threshold, bool(self._network.about.get("hull", True)))
-            return np.asarray(-self._network(features), dtype=np.float64)
+            return np.asarray(-self._network(sweep_features(component, self._threshold))[:, 0], dtype=np.float64)
         if self._of.ranking == "random":
             return generator_of(component).random(len(swept.candidates))
         return excess_norm(swept)

@@ -96,7 +96,7 @@ def _grow(component: Component, criterion: Criterion, planes: Sequence[int], dep
         if cut.made:
             children = [_grow(child, criterion, planes, depth - 1, bins) for child in cut.unfinished]
             node.outcomes.append(
-                TabularOutcome(action, cut.reward.own_saved, cut.reward.sides_finished, children, list(cut.discounts))
+                TabularOutcome(action, cut.reward.saved, cut.reward.finished, children, list(cut.discounts))
             )
     return node
 

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from rlacd.policies.network import KIND, Network
-from rlacd.policies.plane_features import PLANES, SWEEP_FEATURES
+from rlacd.policies.plane_features import FEATURES
 
-ABOUT: Mapping[str, Any] = MappingProxyType({"kind": KIND, "threshold": 0.05, "encoder": "sweep", "hull": True})
+ABOUT: Mapping[str, Any] = MappingProxyType({"kind": KIND, "threshold": 0.05})
 """What a sound network says of itself."""
 
 
-def q_network(about: Mapping[str, Any] = ABOUT, inputs: int = SWEEP_FEATURES, outputs: int = PLANES) -> bytes:
+def q_network(about: Mapping[str, Any] = ABOUT, inputs: int = FEATURES, outputs: int = 1) -> bytes:
     """A network whose values are a fixed random function of the features."""
     rng = np.random.default_rng(0)
     shapes = ((4, inputs), (outputs, 4))

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
-import json
 from pathlib import Path
 
 import numpy as np
 import torch
-from safetensors.torch import save_file
 
 from rlacd.learn.encoders.i2p_mae import I2PMAEEncoder, Sizes
-from rlacd.learn.encoders.weights_file import METADATA
 
 TINY = Sizes((32, 16, 8), (8, 4, 4), (12, 24, 48), depth=1, heads=2, embedding=16)
 
@@ -36,12 +32,7 @@ def tiny_encoder(seed: int = 0) -> I2PMAEEncoder:
     return encoder
 
 
-def save_sized(path: Path, state: dict[str, torch.Tensor], sizes: object) -> None:
-    """Weights as a safetensors file that states their sizes."""
-    save_file(state, path, {METADATA: json.dumps({"sizes": sizes})})
-
-
 def write_tiny_weights(path: Path, seed: int = 0) -> Path:
     """Its weights as a file."""
-    save_sized(path, tiny_encoder(seed).state_dict(), dataclasses.asdict(TINY))
+    torch.save(tiny_encoder(seed).state_dict(), path)
     return path

@@ -21,13 +21,12 @@ from rlacd.errors import OptionError, WeightsError
 pytest.importorskip("torch", reason="needs the extra train")
 
 import torch
-from safetensors.torch import save_file
 
 from rlacd.learn.encoders import PublishedEncoder
 from rlacd.learn.encoders.i2p_mae import HierarchicalEncoder, I2PMAEEncoder, Sizes, seen_below
 from rlacd.learn.encoders.point_groups import farthest_points, gather, nearest_points
 from rlacd.solid.component import Component
-from tests.encoding import TINY, clouds, tiny_encoder, write_tiny_weights
+from tests.encoding import TINY, clouds, tiny_encoder
 from tests.learning import small_solids, write_meshes
 
 pytestmark = pytest.mark.slow
@@ -90,13 +89,6 @@ def test_features_are_those_of_the_official_code(
         assert np.abs(official.features(points).numpy() - expected).max() < 1e-4
         for i in range(len(points)):
             assert np.abs(official.features(points[i : i + 1]).numpy() - expected[i]).max() < 1e-4
-
-
-def test_a_safetensors_file_of_the_same_weights_gives_the_same(
-    stand_in: dict[str, torch.Tensor], official: I2PMAEEncoder, tmp_path: Path
-) -> None:
-    save_file(stand_in, tmp_path / "weights.safetensors")
-    assert I2PMAEEncoder.from_checkpoint(tmp_path / "weights.safetensors").digest() == official.digest()
 
 
 # Grouping
@@ -174,12 +166,6 @@ def test_too_few_points_are_reported() -> None:
 # Files
 
 
-def test_our_own_files_say_their_sizes(tmp_path: Path) -> None:
-    encoder = I2PMAEEncoder.from_checkpoint(write_tiny_weights(tmp_path / "tiny.safetensors"))
-    assert encoder.sizes == TINY
-    assert encoder.digest() == tiny_encoder().digest() != tiny_encoder(seed=1).digest()
-
-
 def test_the_first_missing_parameter_is_named(tmp_path: Path) -> None:
     state = dict(I2PMAEEncoder(Sizes()).state_dict())
     names = list(state)
@@ -200,16 +186,9 @@ def test_weights_of_another_size_or_not_finite_are_reported(tmp_path: Path) -> N
         I2PMAEEncoder.from_checkpoint(published(state, tmp_path / "nan.pth"))
 
 
-@pytest.mark.parametrize("ending", [".pth", ".safetensors"])
 @pytest.mark.parametrize("share", [0.0, 0.001, 0.5, 0.999])
-def test_files_cut_short_are_one_error_that_names_the_first_parameter(
-    tmp_path: Path, ending: str, share: float
-) -> None:
-    path = tmp_path / f"weights{ending}"
-    if ending == ".pth":
-        published(dict(tiny_encoder().state_dict()), path)
-    else:
-        write_tiny_weights(path)
+def test_files_cut_short_are_one_error_that_names_the_first_parameter(tmp_path: Path, share: float) -> None:
+    path = published(dict(tiny_encoder().state_dict()), tmp_path / "weights.pth")
     whole = path.read_bytes()
     path.write_bytes(whole[: int(share * len(whole))])
     with pytest.raises(WeightsError, match=r"h_encoder\.token_embed\.0\.first_conv\.0\.weight"):
@@ -218,21 +197,13 @@ def test_files_cut_short_are_one_error_that_names_the_first_parameter(
 
 @pytest.mark.filterwarnings("ignore:Detected pickle protocol")
 @pytest.mark.parametrize("content", [b"hello", b"\x80\x04N.", pickle.dumps([1, 2]), b"PK\x05\x06" + 18 * b"\0"])
-@pytest.mark.parametrize("ending", [".pth", ".safetensors"])
-def test_files_of_something_else_are_reported(tmp_path: Path, content: bytes, ending: str) -> None:
-    path = tmp_path / f"weights{ending}"
+def test_files_of_something_else_are_reported(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "weights.pth"
     path.write_bytes(content)
     with pytest.raises(WeightsError, match="not a file of weights"):
         I2PMAEEncoder.from_checkpoint(path)
     with pytest.raises(WeightsError, match="there is no file"):
         I2PMAEEncoder.from_checkpoint(tmp_path / "nowhere.pth")
-
-
-@pytest.mark.parametrize("sizes", [{"groups": [1]}, {"depth": "deep"}, {"layers": 3}, {"heads": 7}, [1], 3])
-def test_damaged_sizes_are_reported(tmp_path: Path, sizes: object) -> None:
-    save_file(tiny_encoder().state_dict(), tmp_path / "w.safetensors", {"rlacd": json.dumps({"sizes": sizes})})
-    with pytest.raises(WeightsError, match=r"w\.safetensors"):
-        I2PMAEEncoder.from_checkpoint(tmp_path / "w.safetensors")
 
 
 class Harmful:

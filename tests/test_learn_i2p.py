@@ -10,8 +10,6 @@ import pytest
 
 from rlacd.errors import OptionError, WeightsError
 from rlacd.learn.options import TrainOptions
-from rlacd.pool import Pool
-from rlacd.pool.local import LocalPool
 from rlacd.solid.component import Component
 from tests.learning import small_solids, write_meshes
 
@@ -19,9 +17,11 @@ pytest.importorskip("torch", reason="needs the extra train")
 
 import torch
 
+from rlacd.learn.encoders import PublishedEncoder
 from rlacd.learn.encoders.i2p_mae import I2PMAEEncoder
 from rlacd.learn.q_network import QNetwork, load_policy
 from rlacd.learn.train import train
+from tests.encoding import TINY as TINY_SIZES
 from tests.encoding import write_tiny_weights
 from tests.test_learn_train import TINY
 from tests.test_learn_train import weights as state
@@ -44,22 +44,21 @@ def meshes(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def weights(tmp_path: Path) -> Path:
-    return write_tiny_weights(tmp_path / "tiny.safetensors")
+def weights(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr("rlacd.learn.encoders.i2p_mae.Sizes", lambda: TINY_SIZES)
+    return write_tiny_weights(tmp_path / "tiny.pth")
 
 
-def run(
-    meshes: Path, folder: Path, weights: Path, resume: bool = False, pool: Pool | None = None, **changes: Any
-) -> Path:
+def run(meshes: Path, folder: Path, weights: Path, resume: bool = False, **changes: Any) -> Path:
     options = TrainOptions(**{**SHORT, "encoder_weights": str(weights), **changes})
-    return train(meshes, folder, options, resume=resume, say=lambda line: None, pool=pool)
+    return train(meshes, folder, options, resume=resume, say=lambda line: None)
 
 
 @pytest.mark.slow
 def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, weights: Path, tmp_path: Path) -> None:
     run(meshes, tmp_path / "whole", weights)
     run(meshes, tmp_path / "halves", weights, iterations=34)
-    elsewhere = shutil.copy(weights, tmp_path / "the_same.safetensors")
+    elsewhere = shutil.copy(weights, tmp_path / "the_same.pth")
     run(meshes, tmp_path / "halves", elsewhere, resume=True)
     assert state(tmp_path / "whole") == state(tmp_path / "halves")
     assert load_policy(tmp_path / "halves").choose(Component(small_solids()["angle"])) is not None
@@ -67,17 +66,9 @@ def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, weights: 
 
 def test_other_weights_do_not_go_on_with_a_run(meshes: Path, weights: Path, tmp_path: Path) -> None:
     run(meshes, tmp_path / "run", weights, iterations=30, validation=0)
-    other = write_tiny_weights(tmp_path / "other.safetensors", seed=1)
-    with pytest.raises(OptionError, match=r"other\.safetensors holds other weights than the run began with"):
+    other = write_tiny_weights(tmp_path / "other.pth", seed=1)
+    with pytest.raises(OptionError, match=r"other\.pth holds other weights than the run began with"):
         run(meshes, tmp_path / "run", other, resume=True, validation=0)
-
-
-@pytest.mark.nightly
-def test_worker_processes_change_nothing(meshes: Path, weights: Path, tmp_path: Path) -> None:
-    run(meshes, tmp_path / "alone", weights)
-    with LocalPool(2) as pool:
-        run(meshes, tmp_path / "spread", weights, pool=pool)
-    assert state(tmp_path / "alone") == state(tmp_path / "spread")
 
 
 def test_too_few_points_and_unusable_files_are_reported_before_a_run_begins(
@@ -94,7 +85,7 @@ def test_too_few_points_and_unusable_files_are_reported_before_a_run_begins(
 def test_the_paper_preset_sees_what_the_paper_sees() -> None:
     paper = TrainOptions.preset("paper")
     assert (paper.encoder, paper.points) == ("i2p-mae", 2048)
-    network = QNetwork(I2PMAEEncoder().dim)
+    network = QNetwork(I2PMAEEncoder().dim, PublishedEncoder.outputs)
     widths = [layer.out_features for layer in network.layers if isinstance(layer, torch.nn.Linear)]
     assert widths == [1024, 512, 256, 128, 150]
     assert network.layers[0].in_features == 384 + 384

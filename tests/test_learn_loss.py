@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 torch = pytest.importorskip("torch", reason="needs the extra train")
 
 from rlacd.errors import RlacdError  # noqa: E402
-from rlacd.learn.episodes import Episode  # noqa: E402
 from rlacd.learn.q_network import bellman_loss, dual_state_target, soft_value  # noqa: E402
 from rlacd.learn.replay import Replay, Seen, Transition  # noqa: E402
 
@@ -51,26 +50,26 @@ def test_loss_by_hand_and_only_through_the_planes_taken() -> None:
     q = Q.clone().requires_grad_()
     loss = bellman_loss(q, torch.tensor([1, 0]), torch.tensor([12.0, 4.0]), 10.0)
     assert loss.item() == pytest.approx(0.5 * (1 + 0) / 2)
+    assert (
+        bellman_loss(torch.tensor([2.0, 4.0]), torch.tensor([1, 0]), torch.tensor([12.0, 4.0]), 10.0) == loss.detach()
+    )
     loss.backward()
     assert q.grad is not None
     assert q.grad.tolist() == [pytest.approx([0, -1.0 / 10 / 2, 0]), [0, 0, 0]]
 
 
-def test_whole_returns_by_hand() -> None:
-    # 0 falls into 1 and 2, then 2 into 3 and 4, and 1 is finished by its cut; 3 and 4 are left when the episode ends.
-    episode = Episode(
-        *(np.zeros((5, 1), np.float16), np.ones((5, 2), bool)),
-        *(np.array([0, 2, 1]), np.zeros(3, int), np.array([1.0, 10.0, 100.0])),
-        *(np.array([1, 2, 3, 4]), np.array([0, 0, 1, 1]), np.array([0.5, 0.25, 0.5, 1.0])),
-        parts=3,
-        ended=2,
-    )
-    expected = [(1 + 0.5 * 100 + 0.25 * 10, {3: 0.125, 4: 0.25}), (10.0, {3: 0.5, 4: 1.0}), (100.0, {})]
-    assert Episode.from_bytes(episode.to_bytes()).returns() == expected
+def component(number: int, replay: Replay) -> Seen:
+    return replay.seen(np.full(3, number, np.float16), np.arange(11) == number % 11)
 
 
-def component(number: int) -> Seen:
-    return Seen(np.full(3, number, np.float16), np.arange(11) == number % 11)
+def test_fewest_cuts_by_hand() -> None:
+    replay = Replay(9, unknown=100)
+    a, b, c, d = (component(i, replay) for i in range(4))
+    replay.count([(a, ((b, 1.0), (c, 1.0))), (b, ()), (c, ((d, 1.0),))])  # d is left when the episode ends
+    assert [x.fewest for x in (a, b, c, d)] == [1 + 1 + 101, 1, 1 + 100, math.inf]
+    replay.count([(component(2, replay), ((d, 1.0),)), (d, ())])  # another episode comes to the same component
+    assert [x.fewest for x in (a, b, c, d)] == [103, 1, 2, 1]
+    assert replay.cuts(((b, 1.0), (c, 1.0))) == 4
 
 
 @given(st.integers(1, 9), st.lists(st.integers(0, 3), min_size=1, max_size=60))
@@ -78,8 +77,10 @@ def component(number: int) -> Seen:
 def test_replay_gives_back_the_last_transitions_also_when_restored(capacity: int, children: list[int]) -> None:
     replay, made, added = Replay(capacity), 1, {}
     for count in children:
-        left = tuple((component(made + 1 + i), 0.5 / (i + 1)) for i in range(count))
-        added[float(made)] = Transition(component(made), made % 11, -made, left)
+        state, *below = (component(made + i, replay) for i in range(count + 1))
+        left = tuple((child, 0.5 / (i + 1)) for i, child in enumerate(below))
+        replay.count([(state, left)])
+        added[float(made)] = Transition(state, made % 11, state.features, -made, left)
         replay.add(added[float(made)])
         made += 1 + count
     restored = Replay(capacity)
@@ -91,7 +92,7 @@ def test_replay_gives_back_the_last_transitions_also_when_restored(capacity: int
         assert np.array_equal(getattr(batch, name), getattr(again, name)), name
     for i in range(40):
         cut, mine = kept[float(batch.features[i, 0])], batch.owner == i
-        assert (batch.planes[i], batch.rewards[i]) == (cut.plane, cut.reward)
+        assert (batch.planes[i], batch.rewards[i], batch.cuts[i]) == (cut.plane, cut.reward, 1 + len(cut.children))
         assert batch.child_features[mine, 0].tolist() == [float(c.features[0]) for c, _ in cut.children]
         assert [m.tolist() for m in batch.child_masks[mine]] == [c.mask.tolist() for c, _ in cut.children]
         assert batch.child_discounts[mine] == pytest.approx([d for _, d in cut.children])

@@ -40,8 +40,8 @@ def volumes(components: list[Component]) -> list[tuple[float, float]]:
     return sorted((c.volume, c.hull.volume) for c in components)
 
 
-def cut_greedily(cutting: CutProcess) -> list[tuple[float, Reward]]:
-    """Cut to the end; the hull volumes of the components cut, and the rewards."""
+def cut_greedily(cutting: CutProcess) -> list[Reward]:
+    """Cut to the end; the rewards."""
     earned = []
     while not cutting.over:
         index = cutting.largest()
@@ -49,7 +49,7 @@ def cut_greedily(cutting: CutProcess) -> list[tuple[float, Reward]]:
         number = greedy_plane(component)
         assert number is not None
         cut = cutting.cut(index, cutting.candidates(component).plane(number))
-        earned.append((component.hull.volume, cut.reward))
+        earned.append(cut.reward)
     return earned
 
 
@@ -62,9 +62,9 @@ def check_same_as_decompose(solid: Component) -> None:
     assert volumes(cutting.finished) == volumes(done)
     assert volumes(cutting.stuck) == volumes(left)
     end = sum(c.hull.volume for c in cutting.finished + cutting.stuck)
-    assert sum(hull * reward.own_saved for hull, reward in earned) == pytest.approx(start - end, abs=1e-9)
+    assert sum(reward.saved for reward in earned) * solid.hull.volume == pytest.approx(start - end, abs=1e-9)
     paid = terminal_reward(len(cutting.finished)) if earned and cutting.terminal else 0
-    assert sum(reward.finished for _, reward in earned) == paid
+    assert sum(reward.finished for reward in earned) == paid
 
 
 @pytest.mark.parametrize("name", small_solids())
@@ -86,8 +86,7 @@ def test_reward_of_an_angle_by_hand() -> None:
     hull = (2 * 1.5 - (2 - 0.3) * (1.5 - 0.3) / 2) * 1.0
     assert solid.hull.volume == pytest.approx(hull)
     assert cut.reward.saved == pytest.approx((hull - 0.6 - 0.36) / hull)
-    assert cut.reward.own_saved == cut.reward.saved
-    assert cut.reward.finished == cut.reward.sides_finished == 1
+    assert cut.reward.finished == 1
     assert cutting.terminal
     assert (cut.unfinished, cut.discounts, len(cut.finished)) == ([], [], 2)
 

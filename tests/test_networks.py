@@ -16,7 +16,7 @@ from rlacd.errors import WeightsError
 from rlacd.planes.sweep import paper_planes, valid_planes
 from rlacd.policies import make_policy
 from rlacd.policies.network import KIND, QPolicy, best_planes, load_network
-from rlacd.policies.plane_features import PLANES, SWEEP_FEATURES, sweep_features
+from rlacd.policies.plane_features import FEATURES, PLANES, sweep_features
 from rlacd.solid.component import Component
 
 
@@ -51,27 +51,26 @@ def test_the_papers_planes_lie_about_the_centre_a_25th_of_the_longest_side_apart
     assert 75 < valid_planes(component, planes).sum() < 150
 
 
-def test_a_component_anywhere_has_the_same_features_but_for_its_size() -> None:
+def test_a_component_anywhere_has_the_same_features_at_the_same_size_in_thresholds() -> None:
     one = sweep_features(Component(chair()), 0.05)
     moved = sweep_features(Component(chair().translate((3, -2, 1)).scale([0.25] * 3)), 0.0125)
-    assert one.shape == (SWEEP_FEATURES,)
-    assert np.abs(one - moved)[: SWEEP_FEATURES - 6].max() < 1e-3
-    assert one[-6] - moved[-6] == pytest.approx(2, abs=1e-5)
+    assert one.shape == (PLANES, FEATURES)
+    np.testing.assert_allclose(one, moved, atol=1e-3)
 
 
 @pytest.mark.parametrize(("shortlist", "edges"), [(1, 0), (10, 4)])
 def test_alone_the_greatest_value_decides_and_deployed_the_least_hulls_of_the_ten_best(
     network: Path, shortlist: int, edges: int
 ) -> None:
-    component, values = Component(chair()), load_network(network, KIND, SWEEP_FEATURES, PLANES)
+    component, values = Component(chair()), load_network(network, KIND, FEATURES, 1)
     candidates = paper_planes(component)
-    best = best_planes(values(sweep_features(component, 0.05)), valid_planes(component, candidates), shortlist)
+    best = best_planes(values(sweep_features(component, 0.05))[:, 0], valid_planes(component, candidates), shortlist)
     planes = [candidates.plane(int(i)) for i in best]
     if edges:
         cache = rlacd.SweepCache(1, 4).candidates(component)
         planes += [cache.plane(i) for i in range(6, len(cache))]
     sums = [sum(side.hull.volume for side in component.cut(plane) if side is not None) for plane in planes]
-    chosen = QPolicy(lambda c: values(sweep_features(c, 0.05)), shortlist, edges).choose(component)
+    chosen = QPolicy(lambda c: values(sweep_features(c, 0.05))[:, 0], shortlist, edges).choose(component)
     assert chosen in planes
     assert sums[planes.index(chosen)] == pytest.approx(min(sums), rel=1e-9)
     if edges:

@@ -13,6 +13,7 @@ import trimesh
 from manifold3d import Manifold, Mesh64
 
 import rlacd
+from rlacd.options.names import LEARNED
 from rlacd.planes.candidates import axis_and_principal
 from rlacd.planes.sweep import sweep
 from rlacd.policies import make_policy
@@ -98,12 +99,13 @@ def test_the_shipped_policy_sees_the_same_in_a_mirror() -> None:
     np.testing.assert_allclose(seen[0], seen[1][::-1], atol=0.05)  # equal costs are ranked by their numbers
 
 
+@pytest.mark.parametrize("policy", LEARNED)
 @pytest.mark.parametrize("criterion", ["concavity", "navigable"])
-def test_decompose_takes_the_shipped_policy_with_any_criterion_and_number_of_threads(criterion: str) -> None:
+def test_decompose_takes_shipped_networks_with_any_criterion_and_number_of_threads(policy: str, criterion: str) -> None:
     mesh = hollow_table().to_mesh64()
     given = (mesh.vert_properties[:, :3], mesh.tri_verts)
     space = {"criterion": rlacd.NavigableSpace(radius=0.05)} if criterion == "navigable" else {"threshold": 0.02}
-    one, two = (rlacd.decompose(given, policy="learned", quality="fast", threads=n, **space) for n in (1, 2))
+    one, two = (rlacd.decompose(given, policy=policy, quality="fast", threads=n, **space) for n in (1, 2))
     assert len(one) > 2
     assert [hull.vertices.tobytes() for hull in one.hulls] == [hull.vertices.tobytes() for hull in two.hulls]
 

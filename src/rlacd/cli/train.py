@@ -14,8 +14,6 @@ from rlacd.cli.options import PoolOptions
 from rlacd.errors import MissingExtraError, OptionError
 from rlacd.learn.options import PRESETS, TrainOptions
 
-EXTRA = ("torch", "safetensors")
-
 DEFAULT_PRESET = "two-cores"
 
 
@@ -46,7 +44,7 @@ def _learn(module: str, name: str) -> Callable[..., Path]:
     try:
         run: Callable[..., Path] = getattr(importlib.import_module(module), name)
     except ModuleNotFoundError as error:
-        if (error.name or "").split(".")[0] in EXTRA:
+        if (error.name or "").split(".")[0] == "torch":
             raise MissingExtraError(
                 "training needs an extra: run  pip install 'rlacd[train]'  and try again."
             ) from error

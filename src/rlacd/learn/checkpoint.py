@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rlacd.errors import OutputError, TrainingError
 from rlacd.learn.files import packed, save_bytes
 
-FORMAT = 4
+FORMAT = 5
 
 Arrays = Mapping[str, NDArray[Any]]
 

@@ -29,7 +29,7 @@ class Episode:
 
     Attributes
     ----------
-    features : float16 [N, D]
+    features : float16 [N, D] or [N, A, D]
     masks : bool [N, A]
         Their valid planes.
     state, planes : int64 [T]
@@ -71,22 +71,6 @@ class Episode:
         for child, owner, discount in zip(*(a.tolist() for a in (self.child, self.owner, self.discounts)), strict=True):
             left[owner][child] = discount
         return left
-
-    def returns(self) -> list[tuple[float, dict[int, float]]]:
-        """For each cut, the discounted sum of its reward and of all later ones of the same component.
-
-        Returned with the components that were left uncut when the episode was broken off, and their discounts.
-        """
-        of: dict[int, tuple[float, dict[int, float]]] = {}
-        backwards = zip(self.state[::-1].tolist(), self.rewards[::-1].tolist(), self.children()[::-1], strict=True)
-        for state, total, children in backwards:
-            left: dict[int, float] = {}
-            for child, discount in children.items():
-                gained, below = of.get(child, (0.0, {child: 1.0}))
-                total += discount * gained
-                left |= {row: discount * weight for row, weight in below.items()}
-            of[state] = total, left
-        return [of[state] for state in self.state.tolist()]
 
     def to_bytes(self) -> bytes:
         """Pack it for `from_bytes`."""
@@ -166,4 +150,4 @@ class Player:
         features, mask = self._see(component)
         if self.network is None or self.rng.random() < self.epsilon:
             return int(self.rng.choice(np.flatnonzero(mask)))
-        return int(np.where(mask, self.network(features), -np.inf).argmax())
+        return int(np.where(mask, self.network(features).reshape(-1), -np.inf).argmax())

@@ -3,7 +3,6 @@
 Commands of the published results (`docs/training.md` explains them)::
 
     rlacd train MESHES --run RUN --preset paper --encoder-weights i2p_mae.pth           # Table 1
-    rlacd train MESHES --run RUN --preset paper ... --encoder sweep-without-hull        # 4.5.2, on cheap features
     rlacd train MESHES --run RUN --preset paper ... --volume-reward 0                   # 4.5.3, without r1
     rlacd train MESHES --run RUN --preset paper ... --finish-reward 0                   # 4.5.3, without r2
     rlacd train MESHES --run RUN --preset paper ... --discount static                   # Fig. 7, diverges
@@ -31,14 +30,8 @@ class TrainOptions:
         Concavity at which a component is finished (paper, 4.1: 4 %).
     volume_reward
         Weight of the reward for hull volume saved, lambda 1 (4.1).
-    volume_of
-        What that volume is relative to: the hull of the whole solid (paper, eq. 2), or the component's own.
     finish_reward
         Weight of the reward for finishing, lambda 2 (4.1).
-    finish_counts
-        What has to be finished for that reward: the whole solid (paper, eq. 3), or the component's own two sides.
-    cut_cost
-        Reward every cut costs (the paper: none).
     max_parts
         Components after which an episode is broken off.
     rotate
@@ -46,11 +39,15 @@ class TrainOptions:
     max_faces
         Leave out meshes with more triangles than this.
     encoder
-        What describes a component: the volumes on both sides of each plane, or the paper's pre-trained I2P-MAE.
+        What the network sees: the volumes on both sides of each plane, and values it plane by plane; or the paper's
+        pre-trained I2P-MAE of the component, and values all planes at once.
     encoder_weights
         The file of i2p-mae's weights: the published checkpoint.
     points
         i2p-mae: points on a component's surface and on its hull (4.1).
+    objective
+        What a plane is worth: rewards, its reward and the values of the sides (eq. 8); or fewest-cuts, minus the
+        logarithm of the fewest cuts that any episode needed from there on.
     iterations
         Cuts made, each followed by learning (4.1).
     warmup
@@ -75,9 +72,6 @@ class TrainOptions:
         What the values of the sides are weighted by: their share of the hull volume (eq. 9), or a constant.
     static_discount
         That constant, for each side.
-    returns
-        What the network learns from: a cut's reward and the values of its sides (eq. 8), or the rewards of the rest of
-        the episode.
     seed
         The same seed, meshes and options give the same weights on CPU.
     environments
@@ -104,20 +98,18 @@ class TrainOptions:
     # The decision process (3.1)
     threshold: float = option(0.04, least=0.001, most=1)
     volume_reward: float = option(1000.0, least=0)
-    volume_of: str = option("solid", one_of=("solid", "component"))
     finish_reward: float = option(1000.0, least=0)
-    finish_counts: str = option("solid", one_of=("solid", "component"))
-    cut_cost: float = option(0.0, least=0)
     max_parts: int = option(512, least=2)
     rotate: bool = option(True)
     max_faces: int = option(2000, least=4)
 
     # What the network sees (3.3)
-    encoder: str = option("sweep", one_of=("sweep", "sweep-without-hull", "i2p-mae"))
+    encoder: str = option("sweep", one_of=("sweep", "i2p-mae"))
     encoder_weights: str = option("")
     points: int = option(2048, least=16, most=65536)
 
     # Q-learning (3.5, 4.1)
+    objective: str = option("rewards", one_of=("rewards", "fewest-cuts"))
     iterations: int = option(1_000_000, least=1)
     warmup: int = option(10_000, least=0)
     epsilon: float = option(0.2, least=0, most=1)
@@ -130,7 +122,6 @@ class TrainOptions:
     temperature: float = option(0.0, least=0, most=0.1)
     discount: str = option("hull", one_of=("hull", "static"))
     static_discount: float = option(0.99, least=0, most=1)
-    returns: str = option("one-step", one_of=("one-step", "episode"))
 
     # The run
     seed: int = option(0, least=0, most=2**63 - 1)
@@ -144,13 +135,13 @@ class TrainOptions:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        if self.volume_reward == self.finish_reward == self.cut_cost == 0:
-            raise OptionError("volume_reward, finish_reward and cut_cost are all 0; there is nothing to learn from.")
+        if self.volume_reward == self.finish_reward == 0:
+            raise OptionError("volume_reward and finish_reward are both 0; there is nothing to learn from.")
 
     @property
     def unit(self) -> float:
         """Scale of the values: the network predicts them in this unit, so that its outputs are of order 1."""
-        return max(self.volume_reward, self.finish_reward, 10 * self.cut_cost, 1e-9)
+        return max(self.volume_reward, self.finish_reward, 1e-9) if self.objective == "rewards" else 1.0
 
     @classmethod
     def preset(cls, name: str, **changes: Any) -> TrainOptions:
@@ -167,7 +158,16 @@ class TrainOptions:
         return cls(**{**PRESETS[name], **changes})
 
 
-_TWO_CORES: Mapping[str, Any] = {"batch": 64, "learn_every": 4, "learning_rate": 3e-4, "max_faces": 700}
+_TWO_CORES: Mapping[str, Any] = {
+    "objective": "fewest-cuts",
+    "iterations": 100_000,
+    "warmup": 1_000,
+    "epsilon": 0.1,
+    "batch": 64,
+    "learn_every": 2,
+    "learning_rate": 1e-3,
+    "max_faces": 700,
+}
 
 PRESETS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
     {
@@ -175,25 +175,16 @@ PRESETS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
         "two-cores": _TWO_CORES,
         "one-mesh": {
             **_TWO_CORES,
-            "volume_reward": 0.0,
-            "finish_reward": 0.0,
-            "cut_cost": 10.0,
-            "discount": "static",
-            "static_discount": 1.0,
-            "returns": "episode",
-            "epsilon": 0.1,
-            "learn_every": 2,
-            "learning_rate": 1e-3,
-            "target_every": 200,
-            "iterations": 6_000,
-            "warmup": 500,
+            "iterations": 5_000,
+            "warmup": 200,
+            "learn_every": 1,
             "rotate": False,
             "max_faces": 5000,
             "environments": 1,
             "validation": 0,
-            "validate_every": 500,
+            "validate_every": 250,
         },
     }
 )
-"""Changes to the defaults: the paper's run; the same with cheap features, for two cores; a run of minutes that learns
-the few meshes it is given by heart, with a reward of -10 a cut and whole episodes."""
+"""Changes to the defaults: the paper's run; cheap features and the fewest cuts seen, for two cores; the same for a few
+meshes that are learned by heart in a minute."""

@@ -26,24 +26,16 @@ class Reward:
     ----------
     saved : float
         Eq. 2: (|CH(m_i)| - the sum of |CH| over its pieces) / |CH(m)|, where m is the original solid.
-    own_saved : float
-        The same for the process whose solid is m_i: relative to |CH(m_i)|.
     finished : float
         Eq. 3: 1 / (1 + log(|M'| - 1)) if this cut leaves every component of the solid finished, else 0.
-    sides_finished : float
-        The same for the process whose solid is m_i, when all its pieces are finished.
     """
 
     saved: float
-    own_saved: float
     finished: float
-    sides_finished: float
 
     def worth(self, options: TrainOptions) -> float:
-        """r = lambda_1 r_1 + lambda_2 r_2, less the cost of a cut."""
-        saved = self.saved if options.volume_of == "solid" else self.own_saved
-        finished = self.finished if options.finish_counts == "solid" else self.sides_finished
-        return options.volume_reward * saved + options.finish_reward * finished - options.cut_cost
+        """r = lambda_1 r_1 + lambda_2 r_2."""
+        return options.volume_reward * self.saved + options.finish_reward * self.finished
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,9 +163,7 @@ class CutProcess:
         last = all_finished and len(self.frontier) == 1 and not self.stuck
         reward = Reward(
             saved=(own - sum(children)) / self._hull_volume if made else 0.0,
-            own_saved=(own - sum(children)) / own if made else 0.0,
             finished=terminal_reward(len(self.finished) + len(settled.finished)) if last else 0.0,
-            sides_finished=terminal_reward(len(children)) if all_finished else 0.0,
         )
         # Hulls of connected pieces may overlap (two links of a chain, say); discounts must not add up to more than 1.
         whole = max(own, sum(children))

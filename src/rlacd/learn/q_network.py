@@ -1,9 +1,9 @@
-"""The Q network and its loss: values of all 150 planes of a component from its features (paper, 3.3, 3.5, 4.1)."""
+"""The Q network and its loss: values of a component's 150 planes from features (paper, 3.3, 3.5, 4.1)."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -15,12 +15,14 @@ from rlacd.errors import OptionError
 from rlacd.learn.encoders import Encoder, make_encoder
 from rlacd.learn.options import TrainOptions
 from rlacd.policies.network import KIND, Network, QPolicy, load_network
-from rlacd.policies.plane_features import PLANES
 from rlacd.solid.arrays import Float32Array
 from rlacd.solid.component import Component
 
 HIDDEN = (1024, 512, 256, 128)
 """Widths of the paper's layers."""
+
+SHARED = (128, 128)
+"""Widths for a network that values planes one by one: 22,000 weights."""
 
 
 class QNetwork(nn.Module):
@@ -28,25 +30,26 @@ class QNetwork(nn.Module):
 
     Parameters
     ----------
-    inputs : int
-        Number of features per component.
+    inputs, outputs : int
+        Features, and values that they give: 1 where each plane has features of its own, and all share the network.
     unit : float
         Factor applied to the outputs. Rewards are weighted by 1000; without the factor the last layer needs the first
         hundred thousand steps just to reach that scale.
     """
 
-    def __init__(self, inputs: int, unit: float = 1.0, hidden: Sequence[int] = HIDDEN, outputs: int = PLANES) -> None:
+    def __init__(self, inputs: int, outputs: int, unit: float = 1.0) -> None:
         super().__init__()
         self.unit = unit
+        hidden = SHARED if outputs == 1 else HIDDEN
         layers: list[nn.Module] = []
         for before, after in pairwise((inputs, *hidden)):
             layers += [nn.Linear(before, after), nn.ReLU()]
-        self.layers = nn.Sequential(*layers, nn.Linear((inputs, *hidden)[-1], outputs))
+        self.layers = nn.Sequential(*layers, nn.Linear(hidden[-1], outputs))
 
     def forward(self, features: Tensor) -> Tensor:
-        """Values Q(p, m) [B, 150] of features [B, inputs]."""
+        """Values Q(p, m) [B, 150] of features [B, inputs] or [B, 150, inputs]; [B] of those of one plane each."""
         out: Tensor = self.unit * self.layers(features)
-        return out
+        return out.squeeze(-1)
 
     def plain(self, about: Mapping[str, Any]) -> Network:
         """Copy the network for a file (`rlacd.policies.network`); its values are in units of `unit`."""
@@ -80,8 +83,11 @@ def dual_state_target(reward: Tensor, values: Tensor, discounts: Tensor, owner: 
 
 
 def bellman_loss(q: Tensor, planes: Tensor, target: Tensor, unit: float) -> Tensor:
-    """Half the mean squared error of Q(p, m), in units of `unit`: q [B, A], planes taken int64 [B], target [B]."""
-    taken = q.gather(1, planes[:, None])[:, 0]
+    """Half the mean squared error of Q(p, m), in units of `unit`: of q [B, A], those of the planes taken, int64 [B].
+
+    A network shared by the planes has seen those only: q [B].
+    """
+    taken = q if q.dim() == 1 else q.gather(1, planes[:, None])[:, 0]
     return 0.5 * ((taken - target) / unit).square().mean()
 
 
@@ -90,7 +96,7 @@ def policy_of(network: QNetwork | Network, encoder: Encoder, **deployment: int) 
     fixed = network if isinstance(network, Network) else network.plain({"threshold": 1.0})
 
     def values(component: Component) -> Float32Array:
-        return fixed(encoder.describe(component))
+        return fixed(encoder.describe(component)).reshape(-1)
 
     return QPolicy(values, **deployment)
 
@@ -101,4 +107,4 @@ def load_policy(run: Path, **deployment: int) -> QPolicy:
         raise OptionError(f"{run} holds no run.")
     options = TrainOptions(**json.loads((run / "options.json").read_text(encoding="utf-8")))
     encoder = make_encoder(options)
-    return policy_of(load_network(str(run / "policy.npz"), KIND, encoder.dim, PLANES), encoder, **deployment)
+    return policy_of(load_network(str(run / "policy.npz"), KIND, encoder.dim, encoder.outputs), encoder, **deployment)

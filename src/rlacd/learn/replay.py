@@ -1,10 +1,13 @@
-"""The replay buffer: a ring of transitions, which share the arrays of the components that they refer to."""
+"""The replay buffer: a ring of transitions, which share what is known of the components that they refer to."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import hashlib
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,23 +15,36 @@ from numpy.typing import NDArray
 from rlacd.errors import RlacdError
 from rlacd.solid.arrays import BoolArray, Float32Array
 
+KEY = 16
+"""Bytes of a component's key."""
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(eq=False)
 class Seen:
-    """A component: features float16 [D], and valid planes bool [A]."""
+    """A component: its key, a digest of its features; those, or none if values are not asked for; and valid planes.
 
+    `fewest` is the number of cuts that the best of all episodes needed to finish it, infinite for those never cut.
+    """
+
+    key: bytes
     features: NDArray[np.float16]
     mask: BoolArray
+    fewest: float = math.inf
+
+
+Children = Sequence[tuple[Seen, float]]
+"""The unfinished components that a cut left, with discounts."""
 
 
 @dataclass(frozen=True)
 class Transition:
-    """A cut: what it divided and by which plane, its reward, and the unfinished components it left with discounts."""
+    """A cut: what it divided, by which plane, what the network sees of that, its reward, and what it left."""
 
     state: Seen
     plane: int
+    features: NDArray[np.float16]
     reward: float
-    children: tuple[tuple[Seen, float], ...]
+    children: Children
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +55,9 @@ class TransitionBatch:
     ----------
     features : float32 [B, D]
     planes : int64 [B]
-    rewards : float32 [B]
-    child_features : float32 [C, D]
+    rewards, cuts : float32 [B]
+        Rewards; the fewest cuts seen, from this one on.
+    child_features : float32 [C, D] or [C, A, D]
     child_masks : bool [C, A]
         Never all False in a row.
     child_discounts : float32 [C]
@@ -52,6 +69,7 @@ class TransitionBatch:
     features: Float32Array
     planes: NDArray[np.int64]
     rewards: Float32Array
+    cuts: Float32Array
     child_features: Float32Array
     child_masks: BoolArray
     child_discounts: Float32Array
@@ -59,15 +77,42 @@ class TransitionBatch:
 
 
 class Replay:
-    """A ring of transitions; a full one forgets its oldest."""
+    """A ring of transitions; a full one forgets its oldest.
 
-    def __init__(self, capacity: int) -> None:
-        self.capacity = capacity
+    Parameters
+    ----------
+    capacity : int
+    unknown : float
+        Cuts that a component counts which no episode has finished.
+    values : bool
+        Whether values of children are asked for, so that their features are kept.
+    """
+
+    def __init__(self, capacity: int, unknown: float = 1.0, values: bool = True) -> None:
+        self.capacity, self._unknown, self._values = capacity, unknown, values
         self._held: list[Transition] = []
         self._next = 0
+        self._seen: WeakValueDictionary[bytes, Seen] = WeakValueDictionary()
 
     def __len__(self) -> int:
         return len(self._held)
+
+    def seen(self, features: NDArray[np.float16], mask: BoolArray) -> Seen:
+        """Get what is known of a component: the same for all with the same features."""
+        key = hashlib.blake2b(features.tobytes(), digest_size=KEY).digest()
+        known = self._seen.get(key)
+        if known is None:
+            known = self._seen[key] = Seen(key, features if self._values else features[:0, ..., :0], mask)
+        return known
+
+    def cuts(self, children: Children) -> float:
+        """The fewest cuts seen, from one on that left `children`."""
+        return 1 + sum(child.fewest if child.fewest < math.inf else self._unknown for child, _ in children)
+
+    def count(self, cuts: Sequence[tuple[Seen, Children]]) -> None:
+        """Note the fewest cuts of the components that an episode cut, in its order."""
+        for component, children in reversed(cuts):
+            component.fewest = min(component.fewest, self.cuts(children))
 
     def add(self, transition: Transition) -> None:
         """Add a transition."""
@@ -85,11 +130,12 @@ class Replay:
         children = [(row, child, discount) for row, t in enumerate(drawn) for child, discount in t.children]
         first = drawn[0].state
         return TransitionBatch(
-            np.stack([t.state.features for t in drawn]).astype(np.float32),
+            np.stack([t.features for t in drawn]).astype(np.float32),
             np.array([t.plane for t in drawn]),
             np.array([t.reward for t in drawn], np.float32),
-            np.array([c.features for _, c, _ in children], np.float32).reshape(-1, len(first.features)),
-            np.array([c.mask for _, c, _ in children], np.bool_).reshape(-1, len(first.mask)),
+            np.array([self.cuts(t.children) for t in drawn], np.float32),
+            np.array([c.features for _, c, _ in children], np.float32).reshape(len(children), *first.features.shape),
+            np.array([c.mask for _, c, _ in children], np.bool_).reshape(len(children), len(first.mask)),
             np.array([discount for _, _, discount in children], np.float32),
             np.array([row for row, _, _ in children], np.int64),
         )
@@ -103,8 +149,11 @@ class Replay:
         links = [(i, number[c], d) for i, t in enumerate(self._held) for c, d in t.children]
         cuts = [(number[t.state], t.plane, t.reward) for t in self._held]
         return {
+            "keys": np.frombuffer(b"".join(seen.key for seen in number), np.uint8).reshape(-1, KEY),
             "features": np.array([seen.features for seen in number], np.float16),
             "masks": np.array([np.packbits(seen.mask) for seen in number], np.uint8),
+            "fewest": np.array([seen.fewest for seen in number]),
+            "taken": np.array([t.features for t in self._held], np.float16),
             "cuts": np.array(cuts, np.float64).reshape(-1, 3),
             "links": np.array(links, np.float64).reshape(-1, 3),
             "cursor": np.array([self._next, len(next(iter(number)).mask) if number else 0]),
@@ -114,9 +163,12 @@ class Replay:
         """Restore the result of `state`."""
         self._next, actions = (int(x) for x in state["cursor"])
         masks: Any = np.unpackbits(state["masks"], axis=1, count=actions).astype(bool) if actions else []
-        seen = [Seen(*pair) for pair in zip(state["features"], masks, strict=True)]
+        keys = [key.tobytes() for key in state["keys"]]
+        columns = (keys, state["features"], masks, state["fewest"].tolist())
+        seen = [Seen(*row) for row in zip(*columns, strict=True)]
+        self._seen = WeakValueDictionary(zip(keys, seen, strict=True))
         children: list[list[tuple[Seen, float]]] = [[] for _ in state["cuts"]]
         for owner, child, discount in state["links"].tolist():
             children[int(owner)].append((seen[int(child)], discount))
-        cuts = zip(state["cuts"].tolist(), children, strict=True)
-        self._held = [Transition(seen[int(s)], int(p), r, tuple(left)) for (s, p, r), left in cuts]
+        cuts = zip(state["cuts"].tolist(), state["taken"], children, strict=True)
+        self._held = [Transition(seen[int(s)], int(p), f, r, tuple(left)) for (s, p, r), f, left in cuts]

@@ -36,7 +36,7 @@ from rlacd.learn.meshes import MeshList, Solids, list_once
 from rlacd.learn.options import TrainOptions
 from rlacd.learn.parts import count_parts, mean_ratio
 from rlacd.learn.q_network import QNetwork, bellman_loss, dual_state_target, policy_of, soft_value
-from rlacd.learn.replay import Replay, Seen, Transition
+from rlacd.learn.replay import Replay, Transition
 from rlacd.learn.rollouts import Acting, Rollouts
 from rlacd.options.fields import require_same
 from rlacd.policies import make_policy
@@ -122,11 +122,11 @@ class Training:
         self.encoder = make_encoder(options)
         self.device = pick_device(options.device)
         torch.manual_seed(options.seed)
-        self.network = QNetwork(self.encoder.dim, options.unit).to(self.device)
-        self.target = QNetwork(self.encoder.dim, options.unit).to(self.device)
+        self.network = QNetwork(self.encoder.dim, self.encoder.outputs, options.unit).to(self.device)
+        self.target = QNetwork(self.encoder.dim, self.encoder.outputs, options.unit).to(self.device)
         self.target.load_state_dict(self.network.state_dict())
         self.optimizer = torch.optim.Adam(self.network.parameters(), lr=options.learning_rate, fused=True)
-        self.replay = Replay(options.replay)
+        self.replay = Replay(options.replay, options.max_parts, options.objective == "rewards")
         self.rng = np.random.default_rng([options.seed, 0])
         self.cuts = self.learned = 0
         self.best = np.inf
@@ -164,14 +164,13 @@ class Training:
 
     def learn_from(self, episode: Episode) -> None:
         """Add an episode to the replay buffer cut by cut, and learn after each."""
-        seen = [Seen(*pair) for pair in zip(episode.features, episode.masks, strict=True)]
-        targets = list(zip(episode.rewards.tolist(), episode.children(), strict=True))
-        if self.options.returns == "episode":
-            targets = episode.returns()
-        cuts = zip(episode.state.tolist(), episode.planes.tolist(), targets, strict=True)
-        for state, plane, (gained, children) in cuts:
-            left = tuple((seen[child], discount) for child, discount in children.items())
-            self.replay.add(Transition(seen[state], plane, gained, left))
+        seen = [self.replay.seen(*pair) for pair in zip(episode.features, episode.masks, strict=True)]
+        left = [tuple((seen[child], d) for child, d in children.items()) for children in episode.children()]
+        cuts = list(zip(episode.state.tolist(), episode.planes.tolist(), episode.rewards.tolist(), left, strict=True))
+        self.replay.count([(seen[state], children) for state, _, _, children in cuts])
+        for state, plane, reward, children in cuts:
+            features = episode.features[state] if self.encoder.outputs > 1 else episode.features[state, plane]
+            self.replay.add(Transition(seen[state], plane, features.copy(), reward, children))
             self.cuts += 1
             if self.cuts > self.options.warmup and self.cuts % self.options.learn_every == 0:
                 self.learn()
@@ -180,11 +179,13 @@ class Training:
         self._add(**{f"ended_{episode.how}": 1.0})
 
     def learn(self) -> None:
-        """Take a gradient step on the dual-state Bellman loss (eq. 8) of one batch."""
+        """Take a gradient step on one batch: the dual-state Bellman loss (eq. 8), or that to the fewest cuts seen."""
         options, batch = self.options, self.replay.sample(self.options.batch, self.rng)
         tensor = {name: torch.from_numpy(array).to(self.device) for name, array in vars(batch).items()}
-        with torch.no_grad():
-            values = soft_value(self.target(tensor["child_features"]), tensor["child_masks"], options.temperature)
+        target = -tensor["cuts"].log()
+        if options.objective == "rewards":
+            with torch.no_grad():
+                values = soft_value(self.target(tensor["child_features"]), tensor["child_masks"], options.temperature)
             target = dual_state_target(tensor["rewards"], values, tensor["child_discounts"], tensor["owner"])
         loss = bellman_loss(self.network(tensor["features"]), tensor["planes"], target, options.unit)
         self.optimizer.zero_grad()
@@ -210,8 +211,7 @@ class Training:
         self._point({f"validation_{name}": value for name, value in ratios.items()})
         if ratios["own_plane"] <= self.best:
             self.best = ratios["own_plane"]
-            about = {"kind": KIND, "threshold": self.options.threshold, "hull": self.options.encoder == "sweep"}
-            about["encoder"] = self.options.encoder
+            about = {"kind": KIND, "threshold": self.options.threshold, "encoder": self.options.encoder}
             save_bytes(self.folder / "policy.npz", self.network.plain(about).to_bytes())
 
     def save(self) -> None:

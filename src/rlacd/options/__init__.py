@@ -85,7 +85,7 @@ _PRIMITIVES = custom(
 _POLICY = custom(
     f"one of {', '.join(POLICIES)}, an .npz file, or (in Python) an object with a method `choose`",
     read_policy,
-    "greedy navacd learned FILE.npz …",
+    "greedy navacd learned rl-acd FILE.npz …",
 )
 _CORNERS = integer(4, rule="an integer, at least 4 (a tetrahedron)")
 _SECONDS = number(above=0, rule="a positive number of seconds")
@@ -158,7 +158,7 @@ class Options:
     merge
         Join hulls where one is tight enough, also across what lies between them.
     policy
-        What chooses the next cut: navacd is the quickest, learned asks a network; FILE.npz is your own.
+        What chooses the next cut: navacd is the quickest, learned and rl-acd ask networks; FILE.npz is your own.
     resolution
         Grid cells along the longest side, used to repair bodies that are not closed.
     open

@@ -24,7 +24,7 @@ AS_PUBLISHED = (*(f"greedy-{score}" for score in SCORES), *(f"greedy-{score}{EDG
 CONTROLS = (f"random-10{EDGES}", f"random-1{EDGES}", "random-10")
 """The paper's deployment with random planes in place of the network's best: what a learned policy has to beat."""
 
-LEARNED = ("learned",)
+LEARNED = ("learned", "rl-acd")
 """Networks in the package."""
 
 POLICIES = ("greedy", *LEARNED, *AS_PUBLISHED, *CONTROLS)

@@ -1,5 +1,7 @@
 """Policies: which plane cuts a component."""
 
+from importlib.resources import as_file, files
+
 from rlacd.options.names import AS_PUBLISHED, CONTROLS, EDGES, POLICIES, WEIGHTS_ENDING, is_policy
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies.greedy import EDGES_PER_COMPONENT, SCORES, Greedy, NavACD, RandomShortlist
@@ -18,8 +20,8 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
     - ``random-N+edges``: the plane with the least sum of hull volumes among N random ones of the 150 and those of four
       concave edges; ``random-N``: among the random ones alone. Controls for learned policies.
     - ``learned``: of the most promising planes, the one after which networks predict the fewest parts.
-    - the path of a Q network as written by ``rlacd train`` (.npz): the paper's rule, the plane with the
-      least sum of hull volumes among the network's ten best planes and those of four concave edges.
+    - ``rl-acd``, or the path of a Q network as written by ``rlacd train`` (.npz): the paper's rule, the plane with
+      the least sum of hull volumes among the network's ten best planes and those of four concave edges.
 
     Parameters
     ----------
@@ -44,6 +46,9 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
         return NavACD()
     if name == "learned":
         return Learned(sweeps, scale)
+    if name == "rl-acd":
+        with as_file(files("rlacd.policies") / "rl_acd.npz") as path:
+            return deployed(str(path), scale)
     if name.endswith(WEIGHTS_ENDING):
         return deployed(name, scale)
     family, _, score = name.partition("-")

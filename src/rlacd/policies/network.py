@@ -22,7 +22,7 @@ from rlacd.errors import WeightsError
 from rlacd.io.read.open_file import read_file
 from rlacd.planes.sweep import paper_planes, valid_planes
 from rlacd.policies.greedy import EDGES_PER_COMPONENT, least_hulls
-from rlacd.policies.plane_features import PLANES, SWEEP_FEATURES, sweep_features
+from rlacd.policies.plane_features import FEATURES, sweep_features
 from rlacd.solid.arrays import Float32Array
 from rlacd.solid.component import Component, Plane
 
@@ -156,17 +156,13 @@ class QPolicy:
 
 
 def deployed(path: str, scale: float | None = None) -> QPolicy:
-    """Deploy a network as the paper does; `path` is a file written by ``rlacd train``.
+    """Deploy a network as the paper does; `path` is a file written by ``rlacd train`` with cheap features.
 
     `scale` is the criterion's length in the frame; the network's own by default.
     """
-    network = load_network(path, KIND, SWEEP_FEATURES, PLANES)
+    network = load_network(path, KIND, FEATURES, 1)
     threshold = network.threshold if scale is None else scale
-    return QPolicy(
-        lambda c: network(sweep_features(c, threshold, bool(network.about.get("hull", True)))),
-        SHORTLIST,
-        EDGES_PER_COMPONENT,
-    )
+    return QPolicy(lambda c: network(sweep_features(c, threshold))[:, 0], SHORTLIST, EDGES_PER_COMPONENT)
 
 
 def best_planes(values: Float32Array, mask: NDArray[np.bool_], count: int) -> NDArray[np.intp]:

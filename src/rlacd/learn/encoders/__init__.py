@@ -10,7 +10,7 @@ import torch
 from rlacd.errors import OptionError
 from rlacd.learn.encoders.i2p_mae import I2PMAEEncoder
 from rlacd.learn.options import TrainOptions
-from rlacd.policies.plane_features import SWEEP_FEATURES, surface_points, sweep_features
+from rlacd.policies.plane_features import FEATURES, PLANES, surface_points, sweep_features
 from rlacd.solid.arrays import Float32Array
 from rlacd.solid.component import Component
 
@@ -22,26 +22,30 @@ class Encoder(Protocol):
 
     @property
     def dim(self) -> int:
-        """Number of features."""
+        """Number of features, of a component or of each of its planes."""
+
+    @property
+    def outputs(self) -> int:
+        """Values that the network finds from them: one of each plane's own features, or those of all 150 at once."""
 
     def describe(self, component: Component) -> Float32Array:
-        """Features [dim] of a component; the same component always has the same."""
+        """Features of a component, [dim] or [150, dim]; the same component always has the same."""
 
     def digest(self) -> str:
         """Identify the encoder's weights; empty if it has none."""
 
 
 class SweepEncoder:
-    """The cheap default: see `sweep_features`."""
+    """The cheap default: see `sweep_features`. One small network values any plane, also those never tried."""
 
-    dim = SWEEP_FEATURES
+    dim, outputs = FEATURES, 1
 
-    def __init__(self, threshold: float, hull: bool) -> None:
-        self._threshold, self._hull = threshold, hull
+    def __init__(self, threshold: float) -> None:
+        self._threshold = threshold
 
     def describe(self, component: Component) -> Float32Array:
         """See `Encoder`."""
-        return sweep_features(component, self._threshold, self._hull)
+        return sweep_features(component, self._threshold)
 
     def digest(self) -> str:
         """See `Encoder`."""
@@ -50,6 +54,8 @@ class SweepEncoder:
 
 class PublishedEncoder:
     """I2P-MAE of the component's surface and of its hull's, as in the paper."""
+
+    outputs = PLANES
 
     def __init__(self, network: I2PMAEEncoder, points: int) -> None:
         network.require_points(points)
@@ -88,7 +94,7 @@ def make_encoder(options: TrainOptions) -> Encoder:
         return PublishedEncoder(network, options.points)
     if weights:
         raise OptionError(f"encoder {options.encoder} takes no weights; leave --encoder-weights out, or use i2p-mae.")
-    return SweepEncoder(options.threshold, hull=options.encoder == "sweep")
+    return SweepEncoder(options.threshold)
 
 
 def pick_device(name: str) -> torch.device:

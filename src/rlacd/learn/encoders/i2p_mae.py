@@ -8,25 +8,18 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from rlacd.errors import OptionError, WeightsError
+from rlacd.errors import OptionError
 from rlacd.learn.encoders.point_groups import farthest_points, gather, nearest_points
 from rlacd.learn.encoders.transformer import Blocks, position_embedding
 from rlacd.learn.encoders.weights_file import load_weights
-
-SCALES = 3
-
-LARGEST_BATCH = 65536
-"""Upper bound of every size."""
 
 
 @dataclass(frozen=True)
@@ -49,36 +42,6 @@ class Sizes:
     depth: int = 5
     heads: int = 6
     embedding: int = 256
-
-    @classmethod
-    def from_plain(cls, plain: Mapping[str, Any]) -> Sizes:
-        """Make them from plain JSON values; missing values are as published.
-
-        Raises
-        ------
-        ValueError
-            The values are not valid sizes.
-        """
-        known = {field.name for field in dataclasses.fields(cls)}
-        given: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in plain.items()}
-        sizes = cls(**given) if set(given) <= known else None
-        if sizes is None or not sizes._possible():
-            raise ValueError("its sizes are damaged")
-        return sizes
-
-    def _possible(self) -> bool:
-        lists, numbers = (self.groups, self.neighbors, self.widths), (self.depth, self.heads, self.embedding)
-        if not all(isinstance(values, tuple) and len(values) == SCALES for values in lists):
-            return False
-        if (
-            not all(type(n) is int and 1 <= n <= LARGEST_BATCH for n in (*sum(lists, ()), *numbers))
-            or self.embedding < 2
-        ):
-            return False
-        above = zip(self.groups, self.groups[1:], self.neighbors[1:], strict=False)
-        if not all(count <= before and members <= before for before, count, members in above):
-            return False
-        return all(width % self.heads == 0 for width in self.widths)
 
 
 class GroupEmbedding(nn.Module):
@@ -192,7 +155,7 @@ class I2PMAEEncoder(nn.Module):
 
     @classmethod
     def from_checkpoint(cls, path: str | Path) -> I2PMAEEncoder:
-        """Read the published checkpoint (``.pth``), or weights that state their sizes (``.safetensors``).
+        """Read the published checkpoint.
 
         Only tensors are read, never arbitrary pickle; anything else in the file is ignored.
 
@@ -201,13 +164,8 @@ class I2PMAEEncoder(nn.Module):
         WeightsError
             The file is missing, damaged, or for another encoder; the message names the first missing parameter.
         """
-        weights = load_weights(Path(path))
-        try:
-            sizes = Sizes.from_plain(weights.sizes)
-        except ValueError as error:
-            raise WeightsError(f"{path} is not a file of weights: {error}; make it again.") from error
-        encoder = cls(sizes)
-        encoder.load_state_dict(weights.fitted(encoder.state_dict()))
+        encoder = cls()
+        encoder.load_state_dict(load_weights(Path(path), encoder.state_dict()))
         return encoder
 
     def features(self, clouds: Tensor) -> Tensor:

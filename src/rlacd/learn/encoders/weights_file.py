@@ -1,23 +1,17 @@
-"""Files of encoder weights: the published checkpoint, or safetensors; read as tensors, never as arbitrary pickle."""
+"""The published checkpoint of the encoder, read as tensors, never as arbitrary pickle."""
 
 from __future__ import annotations
 
-import json
 import pickle
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from safetensors import SafetensorError, safe_open
 from torch import Tensor
 
 from rlacd.errors import WeightsError
-
-METADATA = "rlacd"
-"""Key of our JSON in a safetensors file's metadata."""
 
 WRAPPERS = ("base_model", "model", "state_dict")
 """Keys under which checkpoints keep the state; the published one uses the first."""
@@ -29,76 +23,42 @@ HARMLESS = [np.dtype, np.dtypes.Float64DType, np.dtypes.Float32DType, np.dtypes.
 """Kinds of numpy numbers, used by checkpoints for their score; nothing else is allowed beyond torch's own list."""
 
 
-@dataclass(frozen=True)
-class Weights:
-    """Contents of a weights file.
-
-    Attributes
-    ----------
-    path : Path
-    state : dict of Tensor
-    sizes : dict
-        The sizes stated in the file; empty for the published one.
-    """
-
-    path: Path
-    state: Mapping[str, Tensor]
-    sizes: Mapping[str, Any]
-
-    def fitted(self, expected: Mapping[str, Tensor]) -> dict[str, Tensor]:
-        """Get the tensors that an encoder expects.
-
-        Raises
-        ------
-        WeightsError
-            A tensor is missing, has another shape, or is not finite; the first is named.
-        """
-        for name, wanted in expected.items():
-            found = self.state.get(name)
-            if found is None:
-                raise WeightsError(
-                    f"{self.path} is not an I2P-MAE checkpoint: {name} is missing; give the published pre-trained file."
-                )
-            if found.shape != wanted.shape:
-                raise WeightsError(
-                    f"{self.path} is not an I2P-MAE checkpoint of this size: {name} has shape {list(found.shape)}, "
-                    f"not {list(wanted.shape)}."
-                )
-            if not torch.isfinite(found).all():
-                raise WeightsError(f"{self.path} is damaged: {name} holds values that are not finite.")
-        return {name: self.state[name].to(wanted.dtype) for name, wanted in expected.items()}
-
-
-def load_weights(path: Path) -> Weights:
-    """Read a file of weights; keys may be nested under ``base_model`` and begin with ``module.``.
+def load_weights(path: Path, expected: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """Read the tensors that an encoder expects; keys may be nested under ``base_model`` and begin with ``module.``.
 
     Raises
     ------
     WeightsError
-        The file is missing, damaged, or holds anything but named tensors.
+        The file is missing, damaged, or holds anything but named tensors; or the first tensor that is missing, has
+        another shape, or is not finite.
     """
     if not path.is_file():
         raise WeightsError(f"there is no file {path}; give the file of weights as --encoder-weights.")
     try:
-        state, sizes = _read_safetensors(path) if path.suffix == ".safetensors" else (_read_torch(path), {})
-    except (SafetensorError, pickle.UnpicklingError, RuntimeError, ValueError, EOFError, KeyError, OSError) as error:
+        state = {name.removeprefix("module."): value for name, value in _read(path).items()}
+    except (pickle.UnpicklingError, RuntimeError, ValueError, EOFError, KeyError, OSError) as error:
         reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:160].rstrip(".")
         raise WeightsError(
             f"{path} is damaged, cut off or not a file of weights ({reason}): {FIRST} and all that should follow it "
             "are missing; fetch or make it again."
         ) from error
-    return Weights(path, {name.removeprefix("module."): value for name, value in state.items()}, sizes)
+    for name, wanted in expected.items():
+        found = state.get(name)
+        if found is None:
+            raise WeightsError(
+                f"{path} is not an I2P-MAE checkpoint: {name} is missing; give the published pre-trained file."
+            )
+        if found.shape != wanted.shape:
+            raise WeightsError(
+                f"{path} is not an I2P-MAE checkpoint of this size: {name} has shape {list(found.shape)}, "
+                f"not {list(wanted.shape)}."
+            )
+        if not torch.isfinite(found).all():
+            raise WeightsError(f"{path} is damaged: {name} holds values that are not finite.")
+    return {name: state[name].to(wanted.dtype) for name, wanted in expected.items()}
 
 
-def _read_safetensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
-    with safe_open(path, "pt") as file:
-        about = json.loads((file.metadata() or {}).get(METADATA, "{}"))
-        if not isinstance(about, dict) or not isinstance(about.get("sizes", {}), dict):
-            raise ValueError("its metadata are damaged")
-        return {name: file.get_tensor(name) for name in file.keys()}, about.get("sizes", {})  # noqa: SIM118
-
-
-def _read_torch(path: Path) -> dict[str, Tensor]:
+def _read(path: Path) -> dict[str, Tensor]:
     scalar = np.float64(0).__reduce__()[0]
     harmless: list[Any] = [*HARMLESS, *((scalar, f"numpy.{core}.multiarray.scalar") for core in ("core", "_core"))]
     with torch.serialization.safe_globals(harmless):
