@@ -23,13 +23,12 @@ from rlacd.finish.limit import (
 )
 from rlacd.finish.overlap import Seams, overlap_parts
 from rlacd.finish.primitives import PRIMITIVE_SLACK, primitive_part
-from rlacd.finish.report import NEARLY, make_report
+from rlacd.finish.report import COVERAGE_TOLERANCE, NEARLY, make_report
 from rlacd.merge import drop_slivers
 from rlacd.options import SIMPLE
 from rlacd.run import Run
 from rlacd.solid.component import Part
 from rlacd.solid.distance import hull_union
-from rlacd.solid.frame import COVERAGE_TOLERANCE
 from rlacd.solid.hull import NO_SIDES
 from rlacd.solid.primitive import Balls
 from rlacd.solid.provenance import owners

@@ -21,7 +21,7 @@ LONG_MERGING = 8e6
 """Units of work (see `rlacd.run.work`) after which it grows by the fourth power of that: only tangles take so long."""
 
 MEASURING = 5e6
-"""Units of work for measuring pairs of parts, for all thresholds together."""
+"""Units of work for measuring pairs of parts, under each threshold: a coarser one has fewer."""
 
 
 def best_within(
@@ -49,12 +49,12 @@ def best_within(
         Measures the errors.
     """
     best, least = [whole], math.inf
-    factor, account, begin = 1.0, Work(MEASURING), run.work.done
+    factor, begin = 1.0, run.work.done
     try:
         least = criterion.error(whole)
         while True:
             parts = decompose(factor)
-            for state, error in united_in_turn(parts, unite, criterion, account, run):
+            for state, error in united_in_turn(parts, unite, criterion, Work(MEASURING), run):
                 if len(state) <= most and error < least:
                     best, least = state, error
             if len(parts) <= 1 or run.stopped_by is not None:

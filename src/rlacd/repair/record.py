@@ -9,7 +9,7 @@ from rlacd._native import poll_stop
 from rlacd.repair.distance import SurfaceQuery, affordable, points_covering, shared_faces
 from rlacd.repair.voxels import DEFAULT_GAP
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.frame import COVERAGE_TOLERANCE, HALF_THICKNESS
+from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.solid import BodyRepair
 from rlacd.solid.topology import BoolArray, IntArray, face_areas, marked
 
@@ -62,7 +62,7 @@ class Record:
 
 
 def measure(record: Record, surface: SurfaceQuery, solid: SurfaceQuery) -> IntArray:
-    """Record, for the changed bodies, how far the solid and the input deviate; returns the faces that would be lost."""
+    """Record, for the changed bodies, how far the solid and the input deviate; returns faces that lead out of it."""
     if record.step.max() < STEPS.index("outer skin"):
         return np.empty(0, dtype=np.int64)
     kept, taken_over = shared_faces(solid.vertices, solid.faces, surface.vertices, surface.faces)
@@ -82,7 +82,6 @@ def measure(record: Record, surface: SurfaceQuery, solid: SurfaceQuery) -> IntAr
     lost = np.flatnonzero(distance > 2 * HALF_THICKNESS)  # the middle of a slab is half as far from its surface
     lost = lost[~solid.inside(points[lost])]
     np.maximum.at(record.lost, record.body_of_input[replaced[on[lost]]], distance[lost])
-    lost = lost[distance[lost] > COVERAGE_TOLERANCE]  # hulls grow to what lies nearer
     corners = np.unique(faces[_native.longest_edges(surface.vertices, faces) <= spacing])  # the first of the points
     is_out = marked(corners[lost[lost < len(corners)]], len(surface.vertices))
     leads_out = np.asarray(is_out[faces].any(axis=1))

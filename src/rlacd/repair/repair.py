@@ -41,7 +41,7 @@ from rlacd.repair.wraps import (
     wrap_sheets,
 )
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.frame import COVERAGE_TOLERANCE, Frame
+from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import BodyRepair, Solid
 from rlacd.solid.topology import NO_FILM, BoolArray, IntArray, bodies_of, detach_films, face_areas, signed_tetrahedra
@@ -78,7 +78,7 @@ def _take_hull(work: Work) -> None:
 
 
 def _keep_lost(work: Work) -> None:
-    """Add slabs of the faces that hulls would miss: a skin that crosses itself, or a wrap, loses some."""
+    """Add slabs of the faces that the solid leaves outside: a skin that crosses itself, or a wrap, loses some."""
     faces = measure(work.record, work.surface, work.query())
     body = work.record.body_of_input[faces]
     soup = Soup(work.surface.vertices, work.surface.faces[faces], body).in_patches()
@@ -91,7 +91,7 @@ def _keep_lost(work: Work) -> None:
     except CrossingsError:  # they stay lost
         return
     work.parts += slabs
-    np.minimum.at(work.record.lost, body, COVERAGE_TOLERANCE)
+    work.record.lost[body] = HALF_THICKNESS
 
 
 STEPS: tuple[tuple[Callable[[Work], bool], Callable[[Work], None]], ...] = (

@@ -9,7 +9,16 @@ from rlacd._native import poll_stop
 from rlacd.repair.distance import SurfaceQuery, once_in_each_place, points_covering, spread_points
 from rlacd.repair.soup import Soup, boxes_of, face_normals, no_faces
 from rlacd.repair.tangles import MOST_TANGLED, is_tangle, tangled_bodies
-from rlacd.repair.union import MOST_UNITED, area_of, as_manifold, slab_of_faces, tunnels_in, unite, volume_of
+from rlacd.repair.union import (
+    MOST_UNITED,
+    area_of,
+    as_manifold,
+    size_of,
+    slab_of_faces,
+    tunnels_in,
+    unite,
+    volume_of,
+)
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
 from rlacd.repair.walls import skins
 from rlacd.repair.work import Piece, Work, query_of
@@ -29,6 +38,9 @@ _SLIT_VOLUME = 0.01
 _DEEP, _BESIDE, _BETWEEN_CAPS, _LITTLE, _BARED = 1.5, 1 / 16, 1 / 4, 1e-2, 0.004
 # Noise leaves slits between walls of dense bodies that touch, full of bridges: a union with so many tunnels has them.
 _TUNNELS = 25
+# Where a filled room has twice the triangles, at least 1 - 2 ** -0.05 of the surface has to be gone. Of 30 meshes of
+# the corpus with filled rooms, those that meet this have 0.73 of the hulls without filling, the others 1.04.
+_TRIANGLES = 0.05
 # More sheets than this are not united one by one: that would take seconds, and cutting the result even longer. Neither
 # are fewer sheets that all cross each other: 40 have 780 crossings (a second or two), 80 have 3,160 (ten seconds).
 _CROWD, _CROSSINGS = 300, 1000
@@ -131,7 +143,8 @@ def fill_rooms(work: Work) -> None:
         filled = unite([*(part.shape for part in parts), wrap])
     else:
         filled = unite([as_manifold(work.solid), wrap])
-    if volume_of(filled) <= work.volume:
+    triangles = size_of(filled) / size_of(work.solid)
+    if volume_of(filled) <= work.volume or area_of(filled) * triangles**_TRIANGLES >= area_of(work.solid):
         return
     wrapped = np.concatenate([walled, np.flatnonzero(work.by_room)])
     record.note(wrapped, "wrapped")

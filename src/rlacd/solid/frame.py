@@ -75,10 +75,6 @@ class Frame:
 HALF_THICKNESS = 1e-3
 """Half the thickness of the slab a sheet becomes, in frame units."""
 
-COVERAGE_TOLERANCE = 5e-3
-"""Slack for repair and measurement, in frame units: hulls grow to what of the input lies no farther outside, and the
-report warns where they miss more, or reach that far beyond the threshold."""
-
 
 def thickened(points: FloatArray) -> FloatArray:
     """Return points ``[N, 3]``, with copies to both sides along the axes in which they have no extent."""
