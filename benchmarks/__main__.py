@@ -15,7 +15,7 @@ COMMANDS = {
     "batch": "the overhead of a batch beside its meshes",
     "physics": "the hulls in simulators: piles, balls dropped into holes, grasps, pegs; primitives",
     "paper": "the paper's tables without a training: equal accuracy, V-HACD, kinds and numbers of planes",
-    "training": "the paper's tables that train: rewards, encoding, discounts",
+    "training": "the paper's tables that train: rewards, discounts",
     "prices": "the prices of rlacd.work against measured times",
     "tables": "copies the tables of pages into a document that names them",
 }

@@ -1,11 +1,7 @@
 """The paper's experiments that train one policy per arm: all arms equally long, with the same seeds and meshes.
 
-They are short compared with the paper's million cuts; the page states their length. With the presets of the paper an
-arm learns the values of planes by one-step targets; with `counting` the same rewards, discounts and inputs are learned
-as values of components from whole episodes. An interrupted arm is resumed, and a finished one is not trained again.
-
-Of ``rlacd.learn`` this module uses ``TrainOptions.preset``, ``train``, the ``curves.jsonl`` of a run, and for the
-discounts ``rlacd.learn.paper.tabular``.
+They are short compared with the paper's million cuts; the page states their length. An interrupted arm is resumed, and
+a finished one is not trained again.
 """
 
 from __future__ import annotations
@@ -46,15 +42,15 @@ LARGEST_WEIGHT = 1000.0
 """The larger of the two weights, as in the paper; the ratio determines the smaller one."""
 
 
-HULL: Changes = {"discount": "hull"}
+PAPER: Changes = {"objective": "rewards"}
 
 
 def _static(discount: float) -> Changes:
-    return {"discount": "static", "static_discount": discount}
+    return {**PAPER, "static_discount": discount}
 
 
-def _weights(volume: float, finish: float, cut: float = 0.0) -> Changes:
-    return {"volume_reward": volume, "finish_reward": finish, "cut_cost": cut}
+def _weights(volume: float, finish: float) -> Changes:
+    return {**PAPER, "volume_reward": volume, "finish_reward": finish}
 
 
 def _ratio(ratio: float) -> Changes:
@@ -63,17 +59,13 @@ def _ratio(ratio: float) -> Changes:
 
 ARMS: Mapping[str, Mapping[str, Changes]] = {
     "rewards": {
-        **{f"λ1/λ2 = {ratio:g}": {**_ratio(ratio), **HULL} for ratio in RATIOS},
-        "without r1": {**_weights(0.0, LARGEST_WEIGHT), **HULL},
-        "without r2": {**_weights(LARGEST_WEIGHT, 0.0), **HULL},
-        "-1 a cut (not paper)": {**_weights(0.0, 0.0, 1.0), **_static(1.0)},
-    },
-    "encoding": {
-        "component and hull": {},
-        "component alone": {"encoder": "sweep-without-hull"},
+        **{f"λ1/λ2 = {ratio:g}": _ratio(ratio) for ratio in RATIOS},
+        "without r1": _weights(0.0, LARGEST_WEIGHT),
+        "without r2": _weights(LARGEST_WEIGHT, 0.0),
+        "fewest cuts (not paper)": {"objective": "fewest-cuts"},
     },
     "curves": {
-        "share of the hull (eq. 9)": HULL,
+        "share of the hull (eq. 9)": PAPER,
         **{f"{share:g} + {share:g}": _static(share) for share in (0.5, 0.9, 0.99)},
     },
 }
@@ -82,7 +74,6 @@ every preset."""
 
 TITLES = {
     "rewards": "Weights of the rewards (4.5.3)",
-    "encoding": "State encoding without the hull (4.5.2)",
     "curves": "Training curves by discount (Fig. 7)",
 }
 
@@ -110,7 +101,7 @@ def train_arms(
     folder : Path
         Run folder; each arm and seed gets a subfolder.
     preset : str
-        See `rlacd.learn.paper.options.PRESETS`.
+        See `rlacd.learn.options.PRESETS`.
     iterations : int, optional
         Cuts per arm; the preset's number by default.
     seeds : int
@@ -144,7 +135,7 @@ def train_arms(
         _last_validations(curves),
         "## Curves",
     )
-    for key, name in (("loss", "loss"), ("value", "mean greatest value"), ("validation_merged_ratio", "merged parts")):
+    for key, name in (("loss", "loss"), ("target", "mean target"), ("validation_own_plane", "parts by the own plane")):
         drawn = [curve for label, runs in curves.items() if (curve := _mean_curve(label, runs, key)).x]
         if drawn:
             chart = curves_chart(drawn, "cuts", name, log_y=key == "loss")
@@ -184,10 +175,10 @@ def _mean_curve(label: str, runs: list[Points], key: str) -> Curve:
 
 
 def _last_validations(curves: Mapping[str, list[Points]]) -> Table:
-    ratios = ("parts_ratio", "merged_ratio", "deployed_parts_ratio", "deployed_merged_ratio")
+    ratios = ("own_plane", "ten_best", "random")
     cells = [*((f"validation_{key}", ".2f") for key in ratios), ("loss", ".3g"), ("seconds", ".0f")]
     lines = [[label, *(_over_seeds(runs, key, form) for key, form in cells)] for label, runs in curves.items()]
-    header = ["arm", "parts ×", "merged ×", "deployed: parts ×", "deployed: merged ×", "loss", "seconds"]
+    header = ["arm", "own plane ×", "ten best ×", "random ×", "loss", "seconds"]
     return Table(header, lines)
 
 
@@ -307,7 +298,6 @@ def _command(name: str, about: str) -> None:
 
 
 _command("rewards", "Train with other weights of the two rewards, and without each (4.5.3).")
-_command("encoding", "Train with a network that does not see the hull (4.5.2).")
 _command("curves", "Train with other discounts, and draw the curves (Fig. 7).")
 
 

@@ -89,7 +89,7 @@ def test_presets_are_valid_and_the_papers_is_the_papers() -> None:
     assert (paper.epsilon, paper.epsilon_decay, paper.points, paper.encoder) == (0.2, 0.99, 2048, "i2p-mae")
     assert (paper.temperature, paper.objective) == (0, "rewards")
     assert paper.max_parts >= 512
-    assert (paper.discount, paper.rotate) == ("hull", True)
+    assert (paper.static_discount, paper.rotate) == (0, True)
     assert TrainOptions.preset("two-cores", seed=3).seed == 3
 
 
@@ -101,7 +101,7 @@ def test_presets_are_valid_and_the_papers_is_the_papers() -> None:
         ("threshold", 0.0),
         ("threshold", float("nan")),
         ("epsilon", 1.1),
-        ("discount", "both"),
+        ("objective", "both"),
         ("rotate", 1),
         ("seed", -1),
     ],

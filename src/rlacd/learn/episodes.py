@@ -111,14 +111,13 @@ class Player:
         cutting, numbers = self.cutting, {c: i for i, c in enumerate(self.cutting.frontier)}
         cuts: list[tuple[int, int, float]] = []
         children: list[tuple[int, int, float]] = []
-        static = self.options.static_discount if self.options.discount == "static" else None
         while not (ended := self._ended(len(cuts))):
             component = cutting.frontier[cutting.largest()]
             plane = self._choose(component)
             cut = cutting.cut(cutting.largest(), cutting.candidates(component).plane(plane))
             for child, share in zip(cut.unfinished, cut.discounts, strict=True):
                 numbers[child] = len(numbers)
-                children.append((numbers[child], len(cuts), share if static is None else static))
+                children.append((numbers[child], len(cuts), self.options.static_discount or share))
             cuts.append((numbers[component], plane, cut.reward.worth(self.options)))
         seen = [self._see(component) for component in numbers]
         state, planes, rewards = (np.array(column) for column in zip(*cuts, strict=True))

@@ -5,7 +5,7 @@ Commands of the published results (`docs/training.md` explains them)::
     rlacd train MESHES --run RUN --preset paper --encoder-weights i2p_mae.pth           # Table 1
     rlacd train MESHES --run RUN --preset paper ... --volume-reward 0                   # 4.5.3, without r1
     rlacd train MESHES --run RUN --preset paper ... --finish-reward 0                   # 4.5.3, without r2
-    rlacd train MESHES --run RUN --preset paper ... --discount static                   # Fig. 7, diverges
+    rlacd train MESHES --run RUN --preset paper ... --static-discount 0.99              # Fig. 7, diverges
 """
 
 from __future__ import annotations
@@ -68,10 +68,8 @@ class TrainOptions:
         Gradient steps between copies to the target network.
     temperature
         Of the soft value, in rewards; 0: the greatest value (eq. 7).
-    discount
-        What the values of the sides are weighted by: their share of the hull volume (eq. 9), or a constant.
     static_discount
-        That constant, for each side.
+        What the values of the sides are weighted by: a constant; 0: their share of the hull volume (eq. 9).
     seed
         The same seed, meshes and options give the same weights on CPU.
     environments
@@ -120,8 +118,7 @@ class TrainOptions:
     learning_rate: float = option(1e-4, least=0)
     target_every: int = option(1000, least=1)
     temperature: float = option(0.0, least=0, most=0.1)
-    discount: str = option("hull", one_of=("hull", "static"))
-    static_discount: float = option(0.99, least=0, most=1)
+    static_discount: float = option(0.0, least=0, most=1)
 
     # The run
     seed: int = option(0, least=0, most=2**63 - 1)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
@@ -14,37 +13,23 @@ from rlacd.run import Run
 from rlacd.solid.component import Component
 
 
-@dataclass(frozen=True)
-class Score:
-    """Parts of each solid, after cutting and after merging."""
-
-    raw: list[int]
-    merged: list[int]
-
-
-def count_parts(
-    policy: Policy, solids: Sequence[Component], criterion: Concavity, most: float = math.inf, *, merge: bool = True
-) -> Score:
-    """Decompose solids and count parts, on one thread.
+def count_parts(policy: Policy, solids: Sequence[Component], criterion: Concavity, most: float = math.inf) -> list[int]:
+    """Cut solids and count their parts, without merging, on one thread.
 
     Parameters
     ----------
     policy : Policy
     solids : sequence of Component
     criterion : Concavity
-    merge : bool
-        Whether to merge; otherwise `merged` repeats `raw`.
     most : float
         Number of parts at which a decomposition is stopped, since some never end. The counts are then too small, not
         too large.
     """
-    raw, merged = [], []
     with Run(1) as run:
-        for solid in solids:
-            done = cut_and_merge(CutTree(solid, policy, run), criterion, run, merge=merge, most=most)
-            raw.append(len(done.pieces))
-            merged.append(len(done.parts))
-    return Score(raw, merged)
+        return [
+            len(cut_and_merge(CutTree(solid, policy, run), criterion, run, merge=False, most=most).pieces)
+            for solid in solids
+        ]
 
 
 def mean_ratio(counts: Sequence[int], others: Sequence[int]) -> float:

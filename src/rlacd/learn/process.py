@@ -38,35 +38,19 @@ class Reward:
         return options.volume_reward * self.saved + options.finish_reward * self.finished
 
 
-@dataclass(frozen=True, eq=False)
-class Cut:
-    """Outcome of a cut.
+@dataclass(eq=False)
+class CutResult:
+    """Components sorted by status.
 
     Attributes
     ----------
     unfinished : list of Component
         Connected components that miss the criterion and have a valid plane left: they join the frontier.
-    discounts : list of float
-        Eq. 9 for each of those: |CH(child)| / |CH(component)|; their sum is at most 1.
     finished : list of Component
         Components that meet the criterion.
     stuck : list of Component
         Components that miss the criterion and have no valid plane left.
-    made : bool
-        False if the plane left nothing, or only a sliver, on one side: the component is then `stuck`.
     """
-
-    reward: Reward
-    unfinished: list[Component]
-    discounts: list[float]
-    finished: list[Component]
-    stuck: list[Component]
-    made: bool
-
-
-@dataclass
-class CutResult:
-    """Components sorted by status."""
 
     unfinished: list[Component] = field(default_factory=list)
     finished: list[Component] = field(default_factory=list)
@@ -76,6 +60,24 @@ class CutResult:
     def all(self) -> list[Component]:
         """All components."""
         return self.unfinished + self.finished + self.stuck
+
+
+@dataclass(eq=False, kw_only=True)
+class Cut(CutResult):
+    """Outcome of a cut.
+
+    Attributes
+    ----------
+    reward : Reward
+    discounts : list of float
+        Eq. 9 for each unfinished component: |CH(child)| / |CH(component)|; their sum is at most 1.
+    made : bool
+        False if the plane left nothing, or only a sliver, on one side: the component is then `stuck`.
+    """
+
+    reward: Reward
+    discounts: list[float]
+    made: bool
 
 
 def terminal_reward(parts: int) -> float:
@@ -168,7 +170,7 @@ class CutProcess:
         # Hulls of connected pieces may overlap (two links of a chain, say); discounts must not add up to more than 1.
         whole = max(own, sum(children))
         discounts = [child.hull.volume / whole for child in settled.unfinished]
-        return Cut(reward, settled.unfinished, discounts, settled.finished, settled.stuck, made)
+        return Cut(**vars(settled), reward=reward, discounts=discounts, made=made)
 
     def _settle(self, component: Component) -> CutResult:
         """Evaluate a component, split it if it has to be cut, and evaluate its pieces."""

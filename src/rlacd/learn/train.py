@@ -20,15 +20,7 @@ import torch
 
 from rlacd.criteria import Concavity
 from rlacd.errors import OptionError, TrainingError
-from rlacd.learn.checkpoint import (
-    adam_state,
-    load_checkpoint,
-    of,
-    restore_adam,
-    save_checkpoint,
-    tensors,
-    under,
-)
+from rlacd.learn.checkpoint import adam_state, load_checkpoint, of, restore_adam, save_checkpoint, tensors, under
 from rlacd.learn.encoders import Encoder, make_encoder, pick_device
 from rlacd.learn.episodes import Episode
 from rlacd.learn.files import save_bytes
@@ -278,12 +270,11 @@ class Validation:
         if not solids:
             raise TrainingError("none of the meshes held out for validation can be repaired; hold out more.")
         if not self._greedy:
-            self._greedy = count_parts(make_policy("greedy-hull-sum"), solids, criterion, most, merge=False).raw
-            by_chance = count_parts(RandomShortlist(1, concave_edges=0), solids, criterion, most, merge=False).raw
+            self._greedy = count_parts(make_policy("greedy-hull-sum"), solids, criterion, most)
+            by_chance = count_parts(RandomShortlist(1, concave_edges=0), solids, criterion, most)
             self._random = mean_ratio(by_chance, self._greedy)
         own, ten = (
-            count_parts(policy_of(network, encoder, shortlist=n), solids, criterion, most, merge=False).raw
-            for n in (1, SHORTLIST)
+            count_parts(policy_of(network, encoder, shortlist=n), solids, criterion, most) for n in (1, SHORTLIST)
         )
         return {
             "parts": sum(own) / len(own),
