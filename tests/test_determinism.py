@@ -29,6 +29,7 @@ SMALL = ["test/vhacd/ob_chair_gothic.ply", "test/gazebo_models/door_handle__hand
 FORMATS = [("glb", "glb"), ("mjcf", "xml"), ("usd", "usd")]
 """As a batch is told, and the ending of the file."""
 
+
 def rlacd(*commands: Sequence[object], hash_seed: int) -> None:
     """Run commands, each in a new process, in which sets and dicts have an order of their own."""
     environment = {**os.environ, "PYTHONHASHSEED": str(hash_seed)}
