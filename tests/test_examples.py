@@ -45,6 +45,15 @@ def test_the_sample_is_two_closed_bodies_of_a_few_thousand_triangles() -> None:
     assert height == pytest.approx(0.9, abs=0.02), "metres, y up"
 
 
+@pytest.mark.nightly
+def test_the_script_that_trains_on_one_mesh_falls_from_random_planes_to_greedys(tmp_path: Path) -> None:
+    pytest.importorskip("torch", reason="needs the extra train")
+    points = script("train_one_mesh").main(None, tmp_path / "run")
+    own = [point["validation_own_plane"] for point in points]
+    assert min(own) <= 1 < own[0] < points[0]["validation_random"]
+    assert points[-1]["seconds"] < 300
+
+
 def test_the_sample_is_the_same_every_time() -> None:
     sample = script("sample").sample
     assert sample().export(file_type="glb") == sample().export(file_type="glb")
