@@ -168,6 +168,16 @@ def test_an_input_without_a_scene_is_kept_in_grey(tmp_path: Path) -> None:
         result.save(tmp_path / "out.obj", keep_input=True)
 
 
+def test_an_input_whose_looks_cannot_be_read_is_grey_and_a_warning_says_so(tmp_path: Path, monkeypatch: Any) -> None:
+    path = tmp_path / "ball.obj"
+    trimesh.creation.icosphere(2).export(path, include_texture=True)
+    path.write_text("usemtl red\n" + path.read_text())
+    result = rlacd.decompose(path, threads=1)
+    monkeypatch.setattr("rlacd.io.read.obj.MOST_PARTS", 0)
+    with pytest.warns(UserWarning, match=r"looks of ball\.obj could not be read"):
+        result.save(tmp_path / "out.glb", keep_input=True)
+
+
 def test_files_outside_the_folder_stay_outside(tmp_path: Path) -> None:
     """A hostile scene names a picture above its folder: it is not copied."""
     (tmp_path / "in").mkdir()

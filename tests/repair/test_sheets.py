@@ -192,6 +192,15 @@ def test_a_sheet_attached_to_a_solid_stays():
     assert solid.frame.to_input(vertices)[:, 2].max() == pytest.approx(1.1, abs=1e-2)
 
 
+def test_a_solid_with_a_bent_fin_is_not_called_a_shell():
+    fin = [[1, -1, 1], [1, 1, 1], [2, 1, 1], [2, -1, 1], [2, 1, 2], [2, -1, 2]]
+    faces = [[0, 1, 2], [0, 2, 3], [3, 2, 4], [3, 4, 5]]
+    solid = solid_of(join(BOX, trimesh.Trimesh(fin, faces, process=False)))
+    assert volume(solid) == pytest.approx(8, rel=1e-2)
+    assert solid.holes
+    assert not solid.warnings
+
+
 @pytest.mark.slow
 @given(st.integers(0, 10**6), st.integers(1, 12))
 @settings(max_examples=25, deadline=None)
