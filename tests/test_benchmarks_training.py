@@ -10,6 +10,7 @@ from benchmarks.tables import Table
 from benchmarks.training import ARMS, LARGEST_WEIGHT, _options, train_arms
 
 from rlacd.errors import OptionError
+from rlacd.learn.options import PRESETS
 from tests.shapes import box, from_manifold
 
 CROSS = box((-1, -0.2, -0.2), (1, 0.2, 0.2)) + box((-0.2, -1, -0.2), (0.2, 1, 0.2))
@@ -45,6 +46,7 @@ def test_arms_are_trained_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     for number in range(6):
         mesh = from_manifold(CROSS + box((0, 0, 0), (0.3 + 0.1 * number, 0.4, 1)))
         trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(folder / f"{number}.stl")
+    monkeypatch.setattr("rlacd.learn.options.PRESETS", {"two-cores": {**PRESETS["two-cores"], "validation": 2}})
     said: list[str] = []
     page = train_arms("curves", folder, tmp_path / "run", "two-cores", 40, seeds=2, say=said.append)
     table = next(block for block in page.blocks if isinstance(block, Table))
