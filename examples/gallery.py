@@ -35,7 +35,7 @@ WIDTH = 1200
 """Pixels of a picture."""
 
 TITLE = 0.17
-"""Share of a picture above what it shows: it holds the seconds taken, which depend on the machine."""
+"""Share of a picture above what it shows: its caption, which the table repeats."""
 
 
 def main(meshes: Path, out: Path) -> None:
