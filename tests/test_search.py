@@ -326,9 +326,8 @@ def test_cancelling_a_search_keeps_what_it_has_reached(corpus: Path) -> None:
 
 @pytest.mark.nightly
 def test_time_does_not_make_the_best_level_worse_than_balanced(corpus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        import_module("rlacd.search.search"), "BEST_SECONDS", 0.01
-    )  # the package exports a function of that name
+    module = import_module("rlacd.search.search")  # as an attribute, that name is the function
+    monkeypatch.setattr(module, "BEST_SECONDS", 0.01)
     balanced, best = (rlacd.decompose(corpus / SHAPES[0], quality=quality) for quality in ("balanced", "best"))
     assert len(best) <= len(balanced)
     assert best.report["search"]["steps"] >= balanced.report["search"]["steps"]
