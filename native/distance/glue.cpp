@@ -138,8 +138,15 @@ Box box_of(const Mesh& mesh) {
 // Appends to `out` the part of mesh `a` that does not touch `b`.
 void append_untouched(Mesh& out, const Mesh& a, const Mesh& b, const Box& common) {
   const std::vector<Facet> others = facets_within(b, common);
-  const auto base = static_cast<std::int32_t>(out.vertices.size());
-  out.vertices.insert(out.vertices.end(), a.vertices.begin(), a.vertices.end());
+  // Unions are glued again and again, so vertices that no triangle needs any more are left behind.
+  std::vector<std::int32_t> place(a.vertices.size(), -1);
+  const auto taken_over = [&](std::int32_t vertex) {
+    if (place[vertex] < 0) {
+      place[vertex] = static_cast<std::int32_t>(out.vertices.size());
+      out.vertices.push_back(a.vertices[vertex]);
+    }
+    return place[vertex];
+  };
   std::vector<Polygon> polygons;
   for (const Triangle& face : a.faces) {
     poll_stop();
@@ -160,7 +167,7 @@ void append_untouched(Mesh& out, const Mesh& a, const Mesh& b, const Box& common
       }
     }
     if (whole) {
-      out.faces.push_back({face[0] + base, face[1] + base, face[2] + base});
+      out.faces.push_back({taken_over(face[0]), taken_over(face[1]), taken_over(face[2])});
       continue;
     }
     for (const Polygon& p : polygons) {
