@@ -30,14 +30,24 @@ bool is_film(const Polygon& p) {
   return doubled_area(p) <= kCoincident * std::sqrt(longest2);
 }
 
+// Positive for a point left of the line from a to b, negative right of it.
+double side_of(Point2 a, Point2 b, Point2 q) { return (b.u - a.u) * (q.v - a.v) - (b.v - a.v) * (q.u - a.u); }
+
+// Whether an edge of the triangle has all of a polygon on its right: they share no area.
+bool is_beside(const Polygon& p, const std::array<Point2, 3>& triangle) {
+  for (int e = 0; e < 3; ++e)
+    if (std::all_of(p.begin(), p.end(), [&](Point2 q) { return side_of(triangle[e], triangle[(e + 1) % 3], q) <= 0; }))
+      return true;
+  return false;
+}
+
 // Splits a convex polygon by the line through a and b into the part left of it (inside) and right of it (outside).
 void split(const Polygon& p, Point2 a, Point2 b, Polygon& inside, Polygon& outside) {
   inside.clear();
   outside.clear();
-  const auto side = [a, b](Point2 q) { return (b.u - a.u) * (q.v - a.v) - (b.v - a.v) * (q.u - a.u); };
   for (std::size_t i = 0; i < p.size(); ++i) {
     const Point2 q = p[i], r = p[(i + 1) % p.size()];
-    const double sq = side(q), sr = side(r);
+    const double sq = side_of(a, b, q), sr = side_of(a, b, r);
     if (sq >= 0) inside.push_back(q);
     if (sq <= 0) outside.push_back(q);
     if ((sq > 0 && sr < 0) || (sq < 0 && sr > 0)) {
@@ -54,6 +64,10 @@ void subtract(std::vector<Polygon>& polygons, const std::array<Point2, 3>& trian
   std::vector<Polygon> left;
   Polygon inside, outside;
   for (Polygon& p : polygons) {
+    if (is_beside(p, triangle)) {
+      left.push_back(std::move(p));
+      continue;
+    }
     Polygon rest = p;
     std::vector<Polygon> pieces;
     for (int e = 0; e < 3 && !rest.empty(); ++e) {
