@@ -20,7 +20,7 @@ SEED    ?= 0
 MESHES  ?= ../shared/meshes
 SECONDS_TO_FUZZ = $(shell expr 60 \* $(MINUTES))
 
-.PHONY: install demo docs benchmarks test test-fast test-all nightly engines lint soak soak-light soak-totals stubs fuzz-files fuzz-shapes sanitize sanitize-address sanitize-thread format clean
+.PHONY: install demo docs pictures benchmarks test test-fast test-all nightly engines lint soak soak-light soak-totals stubs fuzz-files fuzz-shapes sanitize sanitize-address sanitize-thread format clean
 
 install: $(VENV)/installed
 
@@ -51,6 +51,10 @@ docs: $(VENV)/docs
 $(VENV)/docs: $(VENV)/installed
 	$(BIN)/pip install --quiet --constraint constraints-dev.txt --group docs
 	touch $@
+
+# Every picture of README and docs; needs Chromium.
+pictures: $(VENV)/test-extras
+	$(BIN)/python examples/pictures.py docs $(MESHES)
 
 # The table of README; `python -m benchmarks --help` lists what else is published. CoACD takes most of an hour.
 benchmarks: $(VENV)/test-extras

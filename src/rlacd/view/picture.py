@@ -20,6 +20,7 @@ from rlacd.options.fields import checked, integer, path_like, read, shown
 from rlacd.options.output import OutputOptions
 from rlacd.result import Result
 from rlacd.solid.primitive import Balls
+from rlacd.view.apart import renderer
 from rlacd.view.coloring import color_hulls
 from rlacd.view.render import Body, Render, Spheres, render, require_extra
 
@@ -98,7 +99,9 @@ def draw_picture(
         The name does not end in ``.png``, or `width`, `samples` or `up` is out of range.
     """
     place = check_picture(path, up=up)
-    write_file(place, picture_bytes(decomposition, width=width, samples=samples, up=up))
+    # In a process of its own, since other libraries disturb Mitsuba: CoACD hides its plugins.
+    with renderer() as render_apart:
+        write_file(place, picture_bytes(decomposition, width=width, samples=samples, up=up, render=render_apart))
     return place
 
 

@@ -95,7 +95,7 @@ export class Controls {
         ["concavity", "Concavity", "Every hull stays within the threshold of the surface, everywhere, and adds little volume: CoACD's measure."],
         ["distance", "Distance", "Every hull stays within the threshold of the surface, everywhere."],
         ["volume", "Volume", "Every hull adds at most a share of volume, as V-HACD and NavACD measure it."],
-        ["navigable", "Navigable space", "Hulls stay out of where a ball can go. Dents too narrow for the ball are filled, which saves hulls."],
+        ["navigable", "Navigable", "Hulls stay out of where a ball can go. Dents too narrow for the ball are filled, which saves hulls."],
       ],
       given.criterion,
       (value) => {

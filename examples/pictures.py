@@ -1,0 +1,146 @@
+"""Draw every picture of README and docs anew: what ``make pictures`` runs.
+
+    python examples/pictures.py docs MESHES
+
+MESHES holds V-HACD's and CoACD's examples, as `test/vhacd` and `test/coacd_examples`. Needs the extras ``view`` and
+``sim``, the packages coacd and playwright, and Chromium (on the path, or RLACD_CHROMIUM). No picture shows a time.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import shutil
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import coacd
+import furnished_room
+import gallery
+import mug
+import numpy as np
+import tight_fits
+import trimesh
+from PIL import Image, ImageDraw, ImageFont
+from playwright.sync_api import sync_playwright
+from sample import sample
+
+import rlacd
+from rlacd.result import Result
+from rlacd.view.apart import renderer
+from rlacd.view.picture import picture_bytes
+from rlacd.view.viewer import open_viewer
+
+
+def main(docs: Path, meshes: Path) -> None:
+    """Draw them all into the folder of the documentation."""
+    with step("the chair of make demo"):
+        rlacd.decompose(sample()).picture(docs / "demo.png", up="y")
+    with step("its boxes"):
+        rlacd.decompose(sample(), primitives="all").picture(docs / "primitives.png", up="y", width=1200)
+    with step("a mug on a peg"), TemporaryDirectory() as folder:
+        mug.draw(mug.main(Path(folder)), docs / "mug.png")
+    with step("furnished rooms"), TemporaryDirectory() as folder:
+        furnished_room.main(Path(folder))
+        for picture in Path(folder).glob("*.png"):
+            shutil.copy(picture, docs)
+    with step("a tight fit"):
+        tight_fits.main(docs / "tight_fits.webp")
+    with step("open bodies"):
+        stacked([panels(rlacd.decompose(body)) for body in open_bodies()]).save(docs / "open_bodies.webp", quality=80)
+    with step("a kettle by CoACD and by rlacd"):
+        stacked(kettles(meshes / "test/coacd_examples/Kettle.ply")).save(docs / "side_by_side.webp", quality=80)
+    with step("the viewer"):
+        shoot_viewer(docs)
+    with step("the gallery"):
+        gallery.main(meshes, docs / "gallery_objects")
+
+
+@contextmanager
+def step(what: str) -> Iterator[None]:
+    """Print a line for what is drawn."""
+    print(f"drawing {what} ...", flush=True)
+    yield
+
+
+def panels(result: Result) -> Image.Image:
+    """The input, its hulls, and the hulls pulled apart, on white."""
+    with renderer() as render:
+        drawn = Image.open(io.BytesIO(picture_bytes(result, width=900, clear=True, render=render)))
+    return Image.alpha_composite(Image.new("RGBA", drawn.size, "white"), drawn).convert("RGB")
+
+
+def stacked(rows: list[Image.Image]) -> Image.Image:
+    """Pictures of one width, one above the other."""
+    sheet = Image.new("RGB", (rows[0].width, sum(row.height for row in rows)), "white")
+    for number, row in enumerate(rows):
+        sheet.paste(row, (0, sum(above.height for above in rows[:number])))
+    return sheet
+
+
+def open_bodies() -> Iterator[trimesh.Trimesh]:
+    """A ball with holes, a box without its lid, a bottle, a cup and a lampshade."""
+    ball = trimesh.creation.icosphere(3)
+    ball.update_faces(np.arange(len(ball.faces)) % 97 != 0)
+    yield ball
+    box = trimesh.creation.box((1.6, 1.0, 1.0)).subdivide().subdivide()
+    yield box.submesh([np.flatnonzero(box.triangles_center[:, 2] < 0.49)], append=True)
+    for profile in (
+        [(0.0, 0.0), (0.3, 0.0), (0.3, 0.7), (0.1, 0.95), (0.1, 1.2)],
+        [(0.0, 0.0), (0.35, 0.0), (0.45, 0.9)],
+        [(0.5, 0.0), (0.25, 0.6)],
+    ):
+        turned = trimesh.creation.revolve(np.array(profile), sections=32)
+        turned.merge_vertices()
+        yield turned
+
+
+def kettles(path: Path) -> list[Image.Image]:
+    """CoACD's kettle by CoACD and by rlacd, both with their default options."""
+    own = rlacd.decompose(path)
+    coacd.set_log_level("error")
+    theirs = coacd.run_coacd(coacd.Mesh(own.source.vertices, own.source.faces), seed=0)
+    hulls = [trimesh.Trimesh(vertices, faces, process=False) for vertices, faces in theirs]
+    rows = []
+    for name, result in (("CoACD", Result(hulls, {}, own.source, input=own.input)), ("rlacd", own)):
+        row = panels(result)
+        text = f"{name}: {len(result)} hulls, {sum(len(hull.faces) for hull in result):,} triangles"
+        ImageDraw.Draw(row).text((24, 20), text, font=ImageFont.load_default(size=22), fill="black")
+        rows.append(row)
+    return rows
+
+
+def shoot_viewer(docs: Path) -> None:
+    """The viewer with the chair: pulled apart, its error, the balls that fit between its hulls."""
+    with TemporaryDirectory() as folder, sync_playwright() as driver:
+        mesh = Path(folder) / "chair.glb"
+        sample().export(mesh)
+        path = os.environ.get("RLACD_CHROMIUM") or shutil.which("chromium")
+        browser = driver.chromium.launch(executable_path=path, args=["--no-sandbox", "--use-angle=swiftshader"])
+        for name, options, key in (
+            ("viewer", {}, "]"),
+            ("viewer_error", {"threshold": 0.15, "quality": "fast"}, "h"),
+            ("viewer_balls", {"criterion": "navigable", "quality": "fast"}, "b"),
+        ):
+            with open_viewer(mesh, rlacd.decompose, options, port=0) as viewer:
+                page = browser.new_page(viewport={"width": 1440, "height": 900})
+                page.goto(viewer.address)
+                page.wait_for_selector("body[data-run='1']", timeout=120_000)
+                for _ in range(6 if key == "]" else 1):
+                    page.keyboard.press(key)
+                page.evaluate(WITHOUT_TIME)
+                page.wait_for_timeout(500)
+                page.screenshot(path=docs / f"{name}.png")
+                page.close()
+        browser.close()
+
+
+WITHOUT_TIME = "const words = document.querySelector('#summary'); words.lastChild.remove(); words.lastChild.remove()"
+"""Takes how long it took, and the dot before it, off the page."""
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), Path(sys.argv[2]))
