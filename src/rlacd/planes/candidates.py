@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rlacd import _native
-from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
 
 OFFSETS_PER_AXIS = 25
@@ -66,58 +66,13 @@ def axis_and_principal(component: Component, per_axis: int = OFFSETS_PER_AXIS) -
     return Candidates(np.ascontiguousarray(directions[::per_axis]), offsets.reshape(-1, per_axis))
 
 
-@dataclass(frozen=True, eq=False)
-class ConcaveEdges:
-    """Reflex edges of a component.
-
-    Attributes
-    ----------
-    ends : int32 [E, 2]
-        Vertices of the component.
-    faces : int32 [E, 2]
-        The faces on both sides; the first one runs from the first end to the second.
-    normals : float64 [E, 2, 3]
-        Their outward unit normals.
-    angle : float64 [E]
-        Interior dihedral angle minus pi, in (0, pi).
-    """
-
-    ends: IntArray
-    faces: IntArray
-    normals: FloatArray
-    angle: FloatArray
-
-    def __len__(self) -> int:
-        return len(self.ends)
-
-
-def reflex_edges(component: Component) -> ConcaveEdges:
-    """Find all edges whose interior dihedral angle exceeds 190 degrees, except at folds and needles."""
-    ends, faces, normals, angle = _native.reflex_edges(component.vertices, component.faces)
-    return ConcaveEdges(ends, faces, normals.reshape(-1, 2, 3), angle)
-
-
-def concave_edges(component: Component, count: int = 4) -> ConcaveEdges:
-    """Choose up to `count` reflex edges of a component: deep, sharp edges of long creases first, and spread out.
-
-    The first edge has the greatest depth x angle x length: the depth of its midpoint below the hull's surface, and the
-    length of its whole crease. For each further edge, the product is multiplied by its distance from the nearest chosen
-    one and by how much its planes differ from those chosen. Edges that offer no new plane are never chosen.
-
-    Returns
-    -------
-    ConcaveEdges
-        In the order of choice.
-    """
-    hull = component.hull
-    ends, faces, normals, angle = _native.concave_edges(
-        component.vertices, component.faces, hull.vertices, hull.faces, count
-    )
-    return ConcaveEdges(ends, faces, normals.reshape(-1, 2, 3), angle)
-
-
 def concave_edge_planes(component: Component, count: int = 4) -> Candidates:
     """Candidates of one component: three planes for each of `count` concave edges, without near-duplicates.
+
+    Edges are deep, sharp ones of long creases first, and spread out. The first has the greatest depth x angle x length:
+    the depth of its midpoint below the hull's surface, and the length of its whole crease. For each further edge, the
+    product is multiplied by its distance from the nearest chosen one and by how much its planes differ from those
+    chosen. Edges that offer no new plane are never chosen.
 
     Each edge gives the plane that bisects the reflex angle, and the planes of its two faces. A face plane is moved
     outwards by 1e-9, so that its face and all that is coplanar with it in single precision lie below; planes normal to
