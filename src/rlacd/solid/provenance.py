@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from rlacd._native import poll_stop
+from rlacd._native import poll_stop, sample_surface
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import Frame
 from rlacd.solid.topology import IntArray
@@ -69,22 +69,16 @@ def owners(
 
 def _spread(vertices: FloatArray, faces: NDArray[np.integer], label_of: IntArray) -> tuple[FloatArray, IntArray]:
     """Points spread over the surface in proportion to its area, with their labels; the same for the same surface."""
-    corners = vertices[faces]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    draw = np.random.default_rng(0)
-    whole = area.sum()
-    chosen = []
+    area = trimesh.triangles.area(vertices[faces])
     order = np.argsort(label_of, kind="stable")
+    points, labels = [], []
     for mine in np.split(order, np.flatnonzero(np.diff(label_of[order])) + 1):
         poll_stop()
-        weight = area[mine]
-        count = max(LEAST_OF_LABEL, round(SURFACE_SAMPLES * weight.sum() / whole)) if whole > 0 else LEAST_OF_LABEL
-        share = weight / weight.sum() if weight.sum() > 0 else None
-        chosen.append(draw.choice(mine, count, p=share))
-    face = np.concatenate(chosen)
-    u, v = draw.random((2, len(face)))
-    over = u + v > 1
-    u[over], v[over] = 1 - u[over], 1 - v[over]
-    a, b, c = corners[face].swapaxes(0, 1)
-    points = a + u[:, None] * (b - a) + v[:, None] * (c - a)
-    return points, np.asarray(label_of[face], dtype=np.int64)
+        own, own_faces = float(area[mine].sum()), np.ascontiguousarray(faces[mine], dtype=np.int32)
+        if own > 0:
+            count = max(LEAST_OF_LABEL, round(SURFACE_SAMPLES * own / float(area.sum())))
+            points.append(sample_surface(vertices, own_faces, count, 0)[0])
+        else:
+            points.append(vertices[own_faces[:, 0]])
+        labels.append(np.full(len(points[-1]), label_of[mine[0]], dtype=np.int64))
+    return np.concatenate(points), np.concatenate(labels)

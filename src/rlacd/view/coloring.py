@@ -10,7 +10,7 @@ import numpy.typing as npt
 import trimesh
 
 from rlacd.io.write.palette import DISTINCT, hull_colors
-from rlacd.solid.arrays import BoolArray, FloatArray, IntArray
+from rlacd.solid.arrays import FloatArray, IntArray
 
 HUES = len(DISTINCT) // 3
 """Colours that are easy to tell apart, also for the colour-blind; see `rlacd.io.write.palette`."""
@@ -61,7 +61,7 @@ def neighbours(hulls: Sequence[trimesh.Trimesh]) -> list[set[int]]:
     beside: list[set[int]] = [set() for _ in hulls]
     if not hulls:
         return beside
-    solids = [HalfSpaces.of(np.asarray(hull.vertices, dtype=np.float64), np.asarray(hull.faces)) for hull in hulls]
+    solids = [_HalfSpaces.of(np.asarray(hull.vertices, dtype=np.float64), np.asarray(hull.faces)) for hull in hulls]
     lower, upper = np.array([solid.lower for solid in solids]), np.array([solid.upper for solid in solids])
     near = TOO_CLOSE_TO_SEE * float((upper.max(axis=0) - lower.min(axis=0)).max())
     for one, solid in enumerate(solids):
@@ -74,7 +74,7 @@ def neighbours(hulls: Sequence[trimesh.Trimesh]) -> list[set[int]]:
 
 
 @dataclass(frozen=True, eq=False)
-class HalfSpaces:
+class _HalfSpaces:
     """A convex hull as its corners and its facets' planes n·x <= d, and its bounding box."""
 
     corners: FloatArray
@@ -84,7 +84,7 @@ class HalfSpaces:
     upper: FloatArray
 
     @classmethod
-    def of(cls, corners: FloatArray, faces: IntArray) -> HalfSpaces:
+    def of(cls, corners: FloatArray, faces: IntArray) -> _HalfSpaces:
         """Make them from a closed mesh; facets too thin to have a normal are skipped."""
         triangles = corners[faces]
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
@@ -94,15 +94,7 @@ class HalfSpaces:
         offsets = np.einsum("ij,ij->i", normals, triangles[sound, 0])
         return cls(corners, normals, offsets, corners.min(axis=0), corners.max(axis=0))
 
-    def holds(self, points: FloatArray, near: float) -> BoolArray:
-        """Tell which points [N, 3] lie in the hull or within `near` of its planes."""
-        held = np.all((points >= self.lower - near) & (points <= self.upper + near), axis=1)
-        inside = np.flatnonzero(held)
-        if len(inside):
-            held[inside] = np.all(points[inside] @ self.normals.T <= self.offsets + near, axis=1)
-        return np.asarray(held)
-
-    def lies_apart(self, other: HalfSpaces, near: float) -> bool:
+    def lies_apart(self, other: _HalfSpaces, near: float) -> bool:
         """Whether another hull is further than `near` above one of the planes."""
         above = (self.normals @ other.corners.T).min(axis=1, initial=np.inf) > self.offsets + near
         return bool(above.any())

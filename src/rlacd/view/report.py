@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from rlacd._version import __version__
-from rlacd.errors import MissingExtraError, OptionError
-from rlacd.io.write import check_file, write_file
-from rlacd.options.fields import path_like, read, shown
+from rlacd.errors import MissingExtraError
+from rlacd.io.write import write_file
+from rlacd.io.write.target import checked_place
 from rlacd.result import Result
 from rlacd.view.heat import heat_map
 from rlacd.view.page import still_page
@@ -29,12 +29,8 @@ def check_report_page(path: str | os.PathLike[str], up: str | None = None) -> Pa
     OutputError
         The place is not writable.
     """
-    place = Path(read(path_like(), "path", path))
-    if place.suffix.lower() not in (".html", ".htm"):
-        raise OptionError(f"cannot write the report {shown(str(place))}: it must end in .html; rename it.")
     check_up(up)
-    check_file(place)
-    return place
+    return checked_place(path, "the report", (".html", ".htm"))
 
 
 def save_report_page(
