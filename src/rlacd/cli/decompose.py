@@ -165,8 +165,10 @@ def _named(mesh: Path, asked: OutputOptions, preset: str | None) -> OutputOption
 
 def _check_mesh(mesh: Path, wanted: OutputOptions) -> None:
     """Check before any work that all outputs can be written."""
-    from rlacd.io.write import check_balls, check_file, file_stem, hull_target
+    from rlacd.io.write import file_stem, hull_target
+    from rlacd.io.write.balls import check_balls
     from rlacd.io.write.folder import check_names
+    from rlacd.io.write.target import check_file
 
     flags = {"one_mesh": bool(wanted.one_mesh), "keep_input": bool(wanted.keep_input), "scene": bool(wanted.scene)}
     target = hull_target(str(wanted.output), wanted.file_format, **flags)
@@ -187,7 +189,7 @@ def _check_mesh(mesh: Path, wanted: OutputOptions) -> None:
 
 def _check_robot(asked: OutputOptions, wanted: OutputOptions) -> None:
     """Reject options for single meshes, and check that the report can be written."""
-    from rlacd.io.write import check_file
+    from rlacd.io.write.target import check_file
 
     if wanted.report is not None and is_html(wanted.report):
         raise OptionError("--report as a page is for a single mesh; for a robot give a .json file.")

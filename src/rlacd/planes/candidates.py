@@ -59,10 +59,7 @@ def axis_and_principal(component: Component, per_axis: int = OFFSETS_PER_AXIS) -
     The planes divide the component's extent along each direction into `per_axis` + 1 equal slabs (the paper, 3.2).
     Principal axes within 0.001 radians of a coordinate axis are replaced by it.
     """
-    hull = component.hull
-    directions, offsets = _native.candidate_planes(
-        component.vertices, component.faces, hull.vertices, hull.faces, per_axis, 0
-    )
+    directions, offsets = _planes(component, per_axis, 0)
     return Candidates(np.ascontiguousarray(directions[::per_axis]), offsets.reshape(-1, per_axis))
 
 
@@ -84,8 +81,15 @@ def concave_edge_planes(component: Component, count: int = 4) -> Candidates:
     Candidates
         K <= 3 * `count` directions with one plane each, in the order of choice; K = 0 for a convex component.
     """
-    hull = component.hull
-    normals, offsets = _native.candidate_planes(
-        component.vertices, component.faces, hull.vertices, hull.faces, 0, count
-    )
+    return all_planes(component, 0, count)
+
+
+def all_planes(component: Component, per_axis: int, edges: int) -> Candidates:
+    """Those of `axis_and_principal` and of `concave_edge_planes`, one direction a plane."""
+    normals, offsets = _planes(component, per_axis, edges)
     return Candidates(normals, offsets[:, None])
+
+
+def _planes(component: Component, per_axis: int, edges: int) -> tuple[FloatArray, FloatArray]:
+    hull = component.hull
+    return _native.candidate_planes(component.vertices, component.faces, hull.vertices, hull.faces, per_axis, edges)

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rlacd import _native
-from rlacd.errors import OptionError
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.hull import Hull
 
@@ -78,14 +77,7 @@ def hull_distances(
     Facets are clipped exactly against the other hulls, and the surface's triangles against all hulls; the maximum over
     the remaining pieces is found by branch and bound, with distance to a triangle or to a hull convex on each piece.
     Without hulls, nothing is added (0) and everything is missed (infinity).
-
-    Raises
-    ------
-    OptionError
-        The tolerance is not positive.
     """
-    if not tolerance > 0:
-        raise OptionError(f"The tolerance must be positive, not {tolerance}; {DISTANCE_ACCURACY} is usual.")
     union = hull_union(hulls, threads)
     surface = surface or _native.Surface(vertices, faces)
     least_over, over, over_at = union.over(surface, tolerance, CRACK, threads or 0)

@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from rlacd._native import poll_stop, sample_surface
+from rlacd._native import HullUnion, poll_stop, sample_surface
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import Frame
 from rlacd.solid.topology import IntArray
@@ -44,23 +44,15 @@ def owners(
         return [int(label_of[0])] * len(hulls)
     frame = Frame.of(vertices)  # areas and squares of any finite coordinates fit in a double there
     points, labels = _spread(frame.to_frame(vertices), faces, label_of)
-    order = np.argsort(points[:, 0], kind="stable")
-    points, labels = points[order], labels[order]
+    shapes = [(frame.to_frame(hull.vertices), hull.faces.astype(np.int32)) for hull in hulls]
+    union = HullUnion([vertices for vertices, _ in shapes], [faces for _, faces in shapes])
     found = []
-    for hull in hulls:
+    for number, (corners, _) in enumerate(shapes):
         poll_stop()
-        corners = frame.to_frame(hull.vertices)[hull.faces]
-        lower, upper = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+        lower, upper = corners.min(axis=0), corners.max(axis=0)
         slack = OUTSIDE_HULL * float((upper - lower).max())
-        first, last = np.searchsorted(points[:, 0], (lower[0] - slack, upper[0] + slack))
-        some = points[first:last]
-        near = first + np.flatnonzero(((some >= lower - slack) & (some <= upper + slack)).all(axis=1))
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
-        x, y, z = points[near].T[:, :, None]
-        limit = (normals * corners[:, 0]).sum(axis=1) + slack
-        # Not a product of matrices: those start threads of their own.
-        inside = near[(x * normals[:, 0] + y * normals[:, 1] + z * normals[:, 2] <= limit).all(axis=1)]
+        near = np.flatnonzero(((points >= lower - slack) & (points <= upper + slack)).all(axis=1))
+        inside = near[union.only([number]).distance(points[near], 1) <= slack]
         if len(inside) == 0:
             inside = np.array([((points - (lower + upper) / 2) ** 2).sum(axis=1).argmin()])
         found.append(int(np.bincount(labels[inside]).argmax()))

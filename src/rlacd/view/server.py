@@ -206,12 +206,11 @@ class ViewServer(BoundedServer):
         except OSError as error:
             if port is None:
                 super().__init__((ADDRESS, 0), _Handler)
-            elif error.errno == errno.EADDRINUSE:
-                raise OptionError(
-                    f"port {port} is in use; choose another with --port, or leave it out to get a free one."
-                ) from error
-            else:
-                raise OptionError(f"cannot listen on port {port} ({error.strerror}); choose another.") from error
+                return
+            why = "is in use" if error.errno == errno.EADDRINUSE else f"cannot be listened on ({error.strerror})"
+            raise OptionError(
+                f"port {port} {why}; choose another with --port, or leave it out to get a free one."
+            ) from error
 
 
 class _Handler(BoundedHandler):

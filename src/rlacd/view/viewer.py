@@ -13,7 +13,10 @@ from rlacd.options import Options
 from rlacd.view.controls import read_controls, read_subject
 from rlacd.view.picture import check_up
 from rlacd.view.server import ViewServer
-from rlacd.view.session import AT_EXIT, Run, Session
+from rlacd.view.session import Run, Session
+
+AT_EXIT = 30.0
+"""Seconds that work may take to end when Python exits."""
 
 
 @contextlib.contextmanager
@@ -77,4 +80,5 @@ def open_viewer(
         session.close(0.0)  # first, so that event streams end
         if not server.end(until - time.monotonic()):
             atexit.register(server.end, AT_EXIT)  # an answer is still being computed
-        session.close(max(0.0, until - time.monotonic()))
+        if not session.close(max(0.0, until - time.monotonic())):
+            atexit.register(session.close, AT_EXIT)  # its thread holds objects that C++ libraries report as leaked

@@ -24,10 +24,11 @@ from rlacd.io.robots.plan import MeshUse, Plan
 from rlacd.io.robots.references import References
 from rlacd.io.robots.spans import LARGEST_DESCRIPTION, Element, edited, parse
 from rlacd.io.robots.urdf import plan_urdf
-from rlacd.io.write import check_file, check_name, file_stem, write_file
+from rlacd.io.write import file_stem, write_file
 from rlacd.io.write.encode import encode_plain_obj
 from rlacd.io.write.folder import check_names, write_folder
 from rlacd.io.write.single_precision import Triangles
+from rlacd.io.write.target import check_file, check_name
 from rlacd.options import LENGTHS, OPTION_NAMES, Options
 from rlacd.options.fields import checked, path_like, read, shown
 from rlacd.options.output import OutputOptions
