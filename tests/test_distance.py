@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 from rlacd import _native
-from rlacd.errors import OptionError
 from rlacd.solid.distance import HullDistances, hull_distances, hull_union
 from rlacd.solid.hull import Hull
 from tests.shapes import Closed, Floats, box, depth_in, from_manifold, point_to_triangles, to_manifold
@@ -368,10 +367,3 @@ def test_no_hulls_add_nothing_and_miss_everything() -> None:
 def measured_none() -> HullDistances:
     brick = from_manifold(box(*BRICK))
     return hull_distances([], brick.vertices, brick.faces)
-
-
-@pytest.mark.parametrize("tolerance", [0.0, -1.0, float("nan")])
-def test_bad_tolerances_are_refused(tolerance: float) -> None:
-    brick = from_manifold(box(*BRICK))
-    with pytest.raises(OptionError, match="must be positive"):
-        hull_distances(hulls_of(box(*BRICK)), brick.vertices, brick.faces, tolerance)

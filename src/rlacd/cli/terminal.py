@@ -8,14 +8,14 @@ import threading
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from rlacd._native import count_interrupts, forget_interrupts
 from rlacd.cli.exit_codes import ExitCode, say
 from rlacd.cli.options import METRES
 from rlacd.fit import Fit
-from rlacd.run import Progress
+from rlacd.run import Progress, ProgressCallback
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars
@@ -24,32 +24,27 @@ if TYPE_CHECKING:
     from rlacd.io.robots import Rewritten
 
 
-class Watch:
-    """Shows progress on a terminal and turns Ctrl-C into a graceful stop.
+@contextmanager
+def watching(*, quiet: bool) -> Iterator[ProgressCallback]:
+    """Show progress on a terminal and turn Ctrl-C into a graceful stop.
 
     The first Ctrl-C makes the decomposition stop at its next step and keep its result so far; the second interrupts at
     once. The bar is drawn only if stderr is a terminal.
     """
+    bar = None if quiet else open_bar("{task.description:<12}", None, "{task.fields[parts]} parts", parts=0)
 
-    def __init__(self, *, quiet: bool) -> None:
-        self._stop = graceful_stop("the result so far will be written", in_kernels=True)
-        self._bar = None if quiet else open_bar("{task.description:<12}", None, "{task.fields[parts]} parts", parts=0)
-
-    def __enter__(self) -> Watch:
-        self._wanted = self._stop.__enter__()
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        if self._bar is not None:
-            self._bar.stop()
-        self._stop.__exit__(kind, error, at)
-
-    def __call__(self, progress: Progress) -> bool:
-        """Show `progress`; returns False if the user wants to stop."""
-        if self._bar is not None:
+    def shown(progress: Progress) -> bool:
+        if bar is not None:
             known: dict[str, Any] = {"description": progress.stage, "completed": progress.done, "total": progress.total}
-            self._bar.update(self._bar.task_ids[0], **known, parts=progress.parts)
-        return not self._wanted.is_set()
+            bar.update(bar.task_ids[0], **known, parts=progress.parts)
+        return not wanted.is_set()
+
+    try:
+        with graceful_stop("the result so far will be written", in_kernels=True) as wanted:
+            yield shown
+    finally:
+        if bar is not None:
+            bar.stop()
 
 
 @contextmanager
