@@ -76,4 +76,4 @@ def joint_mass(masses: Sequence[Mass]) -> Mass:
 
 def _times(value: Any, factor: np.float64) -> FloatArray:
     """Multiply, within the range of floats."""
-    return np.nan_to_num(value * factor, nan=0.0, posinf=_GREATEST, neginf=-_GREATEST)
+    return np.asarray(np.nan_to_num(value * factor, nan=0.0, posinf=_GREATEST, neginf=-_GREATEST))

@@ -22,7 +22,7 @@ def hull_colors(count: int) -> npt.NDArray[np.uint8]:
     twelve = np.frombuffer(DISTINCT, dtype=np.uint8).reshape(-1, 3)
     index = np.arange(count)
     shaded = twelve[index % len(twelve)] + 255 * SHADES * _spread(index // len(twelve))[:, None]
-    return np.rint(shaded.clip(0, 255)).astype(np.uint8)
+    return np.asarray(np.rint(shaded.clip(0, 255)), dtype=np.uint8)
 
 
 def _spread(index: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
