@@ -1,6 +1,8 @@
-"""The tree of cuts: films that no plane cuts are halved."""
+"""The tree of cuts: a second policy takes over where the first leaves thousands of components; films are halved."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 import pytest
@@ -9,10 +11,31 @@ from manifold3d import CrossSection
 from rlacd import cut
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
+from rlacd.decompose_mesh import decompose
+from rlacd.policies import Greedy
 from rlacd.run import Run
-from rlacd.solid.component import Component
+from rlacd.solid.component import Component, Plane
+from tests.shapes import box, from_manifold
 
 CRITERION = Concavity(0.02)
+
+
+class Slices:
+    """A policy that fails: cuts 4 % off the lower end, whatever the shape."""
+
+    def choose(self, component: Component, threads: int = 1) -> Plane:
+        lower, upper = component.box[:, 0].tolist()
+        return Plane((1.0, 0.0, 0.0), lower + 0.04 * (upper - lower))
+
+
+def cross() -> Component:
+    arms = [box((-1, -0.1, -0.1), (1, 0.1, 0.1)), box((-0.1, -1, -0.1), (0.1, 1, 0.1))]
+    return Component(arms[0] + arms[1])
+
+
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cut, "MANY_COMPONENTS", 12)
 
 
 def cut_by(tree: CutTree, criterion: Concavity = CRITERION) -> list[Component]:
@@ -20,6 +43,57 @@ def cut_by(tree: CutTree, criterion: Concavity = CRITERION) -> list[Component]:
     assert not left
     assert all(criterion.is_met(part) for part in done)
     return done
+
+
+@pytest.mark.usefixtures("few")
+def test_where_one_policy_fails_the_other_takes_over_for_good() -> None:
+    solid = cross()
+    with Run(1) as run:
+        sliced = len(cut_by(CutTree(solid, Slices(), run)))
+        alone = cut_by(CutTree(solid, Greedy(), run))
+        tree = CutTree(solid, Slices(), run, second=Greedy())
+        both = cut_by(tree)
+        assert len(alone) < 12 < sliced
+        assert [part.volume for part in both] == [part.volume for part in alone]
+        coarser = Concavity(2 * CRITERION.threshold)
+        assert len(cut_by(tree, coarser)) == len(cut_by(CutTree(solid, Greedy(), run), coarser))
+
+
+@pytest.mark.usefixtures("few")
+def test_a_second_policy_that_is_no_better_changes_nothing() -> None:
+    solid = cross()
+    with Run(1) as run:
+        alone = cut_by(CutTree(solid, Slices(), run))
+        both = cut_by(CutTree(solid, Slices(), run, second=Slices()))
+    assert [part.volume for part in both] == [part.volume for part in alone]
+
+
+def test_below_the_limit_the_second_policy_is_not_asked() -> None:
+    class Never:
+        def choose(self, component: Component, threads: int = 1) -> Plane:
+            raise AssertionError
+
+    with Run(1) as run:
+        cut_by(CutTree(cross(), Slices(), run, second=Never()))
+
+
+@pytest.mark.parametrize("units", [0.0, 3e3])
+def test_work_ends_the_cutting(units: float) -> None:
+    with Run(1) as run:
+        _, left = CutTree(cross(), Slices(), run).cut_until(CRITERION, math.inf, units)
+    assert left
+    assert run.work.done > units
+
+
+def test_limits_on_parts_see_the_same_tree(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The default policy, made to fail, is replaced in `decompose` too; a chosen one is not."""
+    monkeypatch.setattr(cut, "MANY_COMPONENTS", 12)
+    monkeypatch.setattr("rlacd.find_parts.make_policy", lambda *_: Slices())
+    solid = from_manifold(box((-1, -0.1, -0.1), (1, 0.1, 0.1)) + box((-0.1, -1, -0.1), (0.1, 1, 0.1)))
+    options = {"quality": "fast", "merge": False, "threshold": 0.02, "threads": 1}
+    mesh = solid.vertices, solid.faces
+    assert len(decompose(mesh, **options)) <= 7
+    assert len(decompose(mesh, policy="greedy-excess-norm", **options)) > 12
 
 
 def gutter(thickness: float) -> Component:

@@ -20,6 +20,16 @@ FILM = 2e-4
 SHAVING = 1e-3
 """No point of a shaving is farther than this from the solid across the cut."""
 
+MANY_COMPONENTS = 1000
+"""With more components than this, the policy may have failed: there are solids that one breaks into thousands of parts
+and another into tens (research/learning.md). So a second one is tried, ..."""
+
+FAR_FEWER = 1 / 2
+"""... and abandoned at this share of the components, or of the work done for them."""
+
+AGAIN = 4
+"""The second policy is tried again each time there are this many times as many components."""
+
 
 class CutCache:
     """Pieces and sides of components, each cut made once: several trees of cuts share their first levels."""
@@ -59,7 +69,7 @@ class CutTree:
     """The tree of cuts that a policy makes of a solid, computed on demand.
 
     Which plane cuts a component does not depend on the criterion's threshold, so a coarser criterion only stops higher
-    up in the same tree.
+    up in the same tree. Only with more than `MANY_COMPONENTS` components, a second policy may take over for good.
 
     Parameters
     ----------
@@ -70,22 +80,36 @@ class CutTree:
     run : Run
     cache : CutCache, optional
         Cuts shared with other trees.
+    second : Policy, optional
+        Takes over if it leaves far fewer components than thousands.
     """
 
-    def __init__(self, root: Component, policy: Policy, run: Run, cache: CutCache | None = None) -> None:
+    def __init__(
+        self,
+        root: Component,
+        policy: Policy,
+        run: Run,
+        cache: CutCache | None = None,
+        second: Policy | None = None,
+    ) -> None:
         self.root = root
         self._policy = policy
         self._run = run
         self._cache = cache or CutCache()
         self._children: dict[Component, list[Component]] = {}
+        self._second = None if second is None else CutTree(root, second, run, self._cache)
 
-    def cut_until(self, criterion: Criterion, most: float = math.inf) -> tuple[list[Component], list[Component]]:
+    def cut_until(
+        self, criterion: Criterion, most: float = math.inf, units: float = math.inf
+    ) -> tuple[list[Component], list[Component]]:
         """Cut the solid until each component meets the criterion.
 
         Parameters
         ----------
         most : float
             Stop as soon as it is clear that there will be more components than this.
+        units : float
+            Stop after a round in which more units of work than this have been done (see `rlacd.run.work`).
 
         Returns
         -------
@@ -94,7 +118,8 @@ class CutTree:
         left : list of Component
             Components that do not: no plane cuts them, the run ended, or there would be more than `most`.
         """
-        run = self._run
+        run, many = self._run, MANY_COMPONENTS
+        begin = run.work.done
         done: list[Component] = []
         left: list[Component] = []
         frontier = [self.root]
@@ -108,8 +133,13 @@ class CutTree:
                 unmet = [c for c, met in zip(frontier, verdicts, strict=True) if not met]
                 if not run.step(len(done), None, len(done) + len(left) + len(unmet)):
                     return done, left + unmet
-                if len(done) + len(left) + 2 * len(unmet) > most:  # each becomes two
+                count, spent = len(done) + len(left) + 2 * len(unmet), run.work.done - begin  # each becomes two
+                if count > most or spent > units:
                     return done, left + unmet
+                if unmet and count > many:
+                    if (parts := self._by_second(criterion, FAR_FEWER * count, FAR_FEWER * spent)) is not None:
+                        return parts, []
+                    many = AGAIN * count
                 new = [c for c in unmet if c not in self._children]
                 if not run.work.pay(sum(work.choosing(c.size) + work.cutting(c.size) for c in new)):
                     return done, left + unmet
@@ -123,6 +153,17 @@ class CutTree:
                 if not self._children[component]:
                     left.append(component)
         return done, left
+
+    def _by_second(self, criterion: Criterion, most: float, units: float) -> list[Component] | None:
+        """Cut by the second policy, which takes over if it finishes within the limits; None if it does not."""
+        second = self._second
+        if second is None:
+            return None
+        done, left = second.cut_until(criterion, most, units)
+        if left:
+            return None
+        self._policy, self._children, self._second = second._policy, second._children, None
+        return done
 
     def _divide(self, components: Sequence[Component]) -> None:
         """Split components into their connected pieces, and cut those that are connected."""

@@ -16,7 +16,7 @@ from rlacd.cut_and_merge import cut_and_merge
 from rlacd.merge import best_within, drop_slivers
 from rlacd.options import Options
 from rlacd.planes.sweep import SweepCache
-from rlacd.policies import AS_PUBLISHED, make_policy
+from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
 from rlacd.proxy import Model
 from rlacd.repair.repair import repair
 from rlacd.run import Run
@@ -108,8 +108,9 @@ class _Decomposer:
     def of(cls, model: Model, goal: Criterion, options: Options, run: Run) -> _Decomposer:
         """Prepare to decompose a model."""
         sweeps = SweepCache()
+        second = Greedy("hull-sum", sweeps=sweeps) if options.policy == "greedy" else None
         policy = make_policy(options.policy, sweeps, _scale(model.tighter(goal)))
-        tree = CutTree(model.component, policy, run)
+        tree = CutTree(model.component, policy, run, second=second)
         return cls(model, options, run, sweeps, tree)
 
     def decompose(self, goal: Criterion, factor: float = 1.0) -> tuple[list[Part], Criterion, SearchSummary | None]:
