@@ -16,13 +16,13 @@ from scipy.spatial.transform import Rotation
 import rlacd
 from rlacd import _native
 from rlacd.io.read.load import load_mesh
-from rlacd.planes.candidates import Candidates, concave_edge_planes, concave_edges, reflex_edges
+from rlacd.planes.candidates import Candidates, concave_edge_planes
 from rlacd.policies import Greedy, NavACD, Policy
 from rlacd.policies.greedy import mid_planes
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component, Plane
 from tests import reference_concave_edges as reference
-from tests.reference_concave_edges import FLAT, HAIR, REFLEX
+from tests.reference_concave_edges import FLAT, HAIR, REFLEX, ConcaveEdges
 from tests.shapes import Floats, box, to_manifold
 
 
@@ -72,6 +72,20 @@ SOLIDS: dict[str, Callable[[], Manifold]] = {
     "two bodies": lambda: l_shape() + l_shape().translate((5, 0, 0)),
     "open box": lambda: box((0, 0, 0), (2, 2, 1)) - box((0.1, 0.1, 0.1), (1.9, 1.9, 2)),
 }
+
+
+def edges_of(found: tuple[np.ndarray, ...]) -> ConcaveEdges:
+    ends, faces, normals, angle = found
+    return ConcaveEdges(ends, faces, normals.reshape(-1, 2, 3), angle)
+
+
+def reflex_edges(component: Component) -> ConcaveEdges:
+    return edges_of(_native.reflex_edges(component.vertices, component.faces))
+
+
+def concave_edges(component: Component, count: int = 4) -> ConcaveEdges:
+    hull = component.hull
+    return edges_of(_native.concave_edges(component.vertices, component.faces, hull.vertices, hull.faces, count))
 
 
 def planes_of(candidates: Candidates) -> list[Plane]:

@@ -14,22 +14,32 @@ from manifold3d import Manifold
 from rlacd import _native
 from rlacd.io.read.load import load_mesh
 from rlacd.planes.candidates import Candidates, axis_and_principal
-from rlacd.planes.sweep import SLIVER, Sweep, SweepCache, least_excess, sweep
+from rlacd.planes.sweep import SLIVER, SLIVERS, TIE, Sweep, SweepCache, least_excess, sweep
 from rlacd.policies import SCORES, Greedy
-from rlacd.policies.greedy import cheapest, excess_norm, hull_sum, max_excess
+from rlacd.policies.greedy import excess_norm, hull_sum
 from rlacd.repair.repair import repair
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Plane
 from tests.test_sweep import SOLIDS, crowded_pyramid, finned_tetrahedron, gear
 
 EXPONENTS = {"hull_sum": 1.0, "max_excess": math.inf, "excess_norm": SCORES["excess-norm"]}
-COSTS = {"hull_sum": hull_sum, "max_excess": max_excess, "excess_norm": excess_norm}
+COSTS = {"hull_sum": hull_sum, "max_excess": lambda swept: excess_cost(swept, math.inf), "excess_norm": excess_norm}
 
 
 def excess_cost(swept: Sweep, exponent: float) -> FloatArray:
     below = np.maximum(swept.hull_below - swept.solid_below, 0)
     above = np.maximum(swept.hull_above - swept.solid_above, 0)
     return np.maximum(below, above) if math.isinf(exponent) else below**exponent + above**exponent
+
+
+def cheapest(scored: Sweep, cost: FloatArray) -> Plane | None:
+    """The first of the valid planes of least cost; those that leave slivers only if there is no other."""
+    for sliver in SLIVERS:
+        valid = scored.valid(sliver)
+        if valid.any():
+            equal = cost[valid].min() + TIE * cost[valid].max()
+            return scored.candidates.plane(int(np.argmax(valid & (cost <= equal))))
+    return None
 
 
 @pytest.mark.parametrize("score", EXPONENTS)

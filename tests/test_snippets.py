@@ -57,7 +57,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "</robot>"
     )
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(viewer.Viewer, "wait", lambda self: None)
+    monkeypatch.setattr(viewer.ViewServer, "wait", lambda self: None)
     monkeypatch.setattr(trimesh.decomposition, "convex_decomposition", trimesh.decomposition.convex_decomposition)
     return tmp_path
 

@@ -28,7 +28,7 @@ from rlacd.io.read.load import load_mesh
 from rlacd.options.navigable import NavigableSpace
 from rlacd.planes.sweep import SLIVERS, Sweep, SweepCache
 from rlacd.policies import Greedy
-from rlacd.policies.greedy import excess_norm, hull_sum, max_excess
+from rlacd.policies.greedy import excess_norm, hull_sum
 from rlacd.repair.repair import repair
 from rlacd.run import Run
 from rlacd.solid.component import Component, Plane
@@ -86,7 +86,7 @@ def planes_of(s: Sweep, valid: NDArray[np.bool_], rng: np.random.Generator) -> l
     chosen.extend([least] if least not in chosen else [])
     take(norm, 3)
     take(total, 2)
-    take(max_excess(s), 1)
+    take(np.maximum(s.hull_below - s.solid_below, s.hull_above - s.solid_above), 1)
     near = np.argsort(np.where(valid, norm, np.inf))[: min(NEAR, int(valid.sum()))]
     return chosen + [int(p) for p in rng.permutation(near)[:2] if int(p) not in chosen]
 

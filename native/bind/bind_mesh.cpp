@@ -141,22 +141,21 @@ void bind_mesh(nb::module_& m) {
       "2 f + 1 its back. Coincident faces, and trusted ones [F], alternate as their windings require.");
   m.def(
       "least_bent",
-      [](const PointsIn& points, const PointsIn& beside, const std::optional<MarksIn>& taken, double bend) {
+      [](const PointsIn& points, const PointsIn& beside, const std::optional<MarksIn>& taken) {
         const std::size_t count = points.shape(0);
         if (count < 3) throw std::invalid_argument("a loop has at least three points");
         if (beside.shape(0) != count) throw std::invalid_argument("not as many normals as points");
-        if (!(bend >= 0)) throw std::invalid_argument("the weight of bending must not be negative");
-        const Loop loop = {to_points(points), to_points(beside), to_marks(taken, count * count), bend};
+        const Loop loop = {to_points(points), to_points(beside), to_marks(taken, count * count)};
         require_finite(loop.points);
         std::vector<Triangle> triangles = least_bent(loop);
         return rows<std::int32_t>(std::move(triangles));
       },
-      Released(), nb::arg("points"), nb::arg("beside"), nb::arg("taken") = nb::none(), nb::arg("bend") = 1.0,
+      Released(), nb::arg("points"), nb::arg("beside"), nb::arg("taken") = nb::none(),
       "Triangulates a closed loop [N, 3] with the least bending; [N - 2, 3], wound like the loop. `beside` [N, 3] has "
       "the\n"
       "unit normals of the faces beyond its edges, which run against it; `taken` [N, N] marks pairs of points that "
       "should\n"
-      "not get an edge; `bend` weighs bending, and with 0 the area is least.");
+      "not get an edge.");
   m.def(
       "components",
       [](std::int64_t count, const IndicesIn& a, const IndicesIn& b) {

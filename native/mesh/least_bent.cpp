@@ -32,7 +32,7 @@ std::vector<Triangle> least_bent(const Loop& loop) {
   std::vector<Chord> chords(static_cast<std::size_t>(n) * n);  // from i to k > i, at i n + k
   const auto chord = [&](int i, int k) -> Chord& { return chords[static_cast<std::size_t>(i) * n + k]; };
   for (int i = 0; i < n; ++i)
-    for (int k = i + 1; k < n; ++k) chord(i, k).length = loop.bend * norm(points[i] - points[k]);
+    for (int k = i + 1; k < n; ++k) chord(i, k).length = norm(points[i] - points[k]);
   // Triangles run with the loop, the faces beyond it against it.
   for (int i = 0; i + 1 < n; ++i) chord(i, i + 1).normal = -loop.beside[i];
 

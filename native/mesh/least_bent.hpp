@@ -20,7 +20,6 @@ struct Loop {
   std::vector<Vec3> points;  // [N], N >= 3
   std::vector<Vec3> beside;  // [N], unit normals of the faces beyond the edges from each point to the next
   std::vector<bool> taken;   // [N N] or empty, pairs of points that should not get an edge
-  double bend = 1;           // weight of bending
 };
 
 // [N - 2], wound like the loop; the faces beyond its edges run against it.

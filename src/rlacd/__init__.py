@@ -4,53 +4,25 @@ from importlib import import_module
 
 from rlacd._version import __version__
 
-__all__ = [
-    "PRESETS",
-    "Component",
-    "Decomposition",
-    "EmptyMeshError",
-    "ImplausibleBodyWarning",
-    "MeshDataError",
-    "MeshError",
-    "MeshFileError",
-    "MissingExtraError",
-    "NavigableSpace",
-    "OptionError",
-    "OutputError",
-    "Plane",
-    "Policy",
-    "Preset",
-    "Primitive",
-    "Progress",
-    "Rewritten",
-    "RlacdError",
-    "Sweep",
-    "SweepCache",
-    "__version__",
-    "decompose",
-    "rewrite_robot",
-]
-
 # Where each public name lives; `__init__.pyi` says the same to editors and type checkers. Its module is imported when
 # the name is first used (PEP 562), so that `rlacd --help` and programs that might not decompose do not wait for trimesh
 # and numpy. No module may be called like a public name: importing it would hide that.
-_HOME = {
-    "NavigableSpace": "options.navigable",
-    "decompose": "decompose_mesh",
-    "Decomposition": "decomposition",
-    "PRESETS": "options.presets",
-    "Preset": "options.presets",
-    "Progress": "run",
-    "Rewritten": "io.robots",
-    "rewrite_robot": "io.robots",
-    "Policy": "policies",
-    "Component": "solid.component",
-    "Plane": "solid.component",
-    "Primitive": "solid.primitive",
-    "Sweep": "planes.sweep",
-    "SweepCache": "planes.sweep",
-    **dict.fromkeys((name for name in __all__ if name.endswith(("Error", "Warning"))), "errors"),
+_NAMES = {
+    "decompose_mesh": "decompose",
+    "decomposition": "Decomposition",
+    "errors": "RlacdError MeshError MeshFileError MeshDataError EmptyMeshError OptionError OutputError "
+    "MissingExtraError ImplausibleBodyWarning",
+    "io.robots": "Rewritten rewrite_robot",
+    "options.navigable": "NavigableSpace",
+    "options.presets": "PRESETS Preset",
+    "planes.sweep": "Sweep SweepCache",
+    "policies": "Policy",
+    "run": "Progress",
+    "solid.component": "Component Plane",
+    "solid.primitive": "Primitive",
 }
+_HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
+__all__ = ["__version__", *_HOME]
 
 
 def __getattr__(name: str) -> object:

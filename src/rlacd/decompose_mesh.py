@@ -239,7 +239,7 @@ def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
     meshes = [source.of_node(index) for index in used]
     reached = []
     for mesh in meshes:
-        of_node = options.for_node(scale, _scale_of(mesh))
+        of_node = options.for_node(scale, Frame.of(mesh.vertices).scale)
         reached.append(_whole(find_parts(mesh, of_node, run), mesh, of_node, run))
     run.begin_finishing()
     done = [finish(one, run) for one in reached]
@@ -255,10 +255,6 @@ def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
     report["options"] |= {name: getattr(options, name) for name in ("threshold", "threshold_abs")}
     report["warnings"][:0] = source.warnings
     return Finished([hull for one in done for hull in one.hulls], report)
-
-
-def _scale_of(mesh: InputMesh) -> float:
-    return Frame.of(mesh.vertices).scale
 
 
 def in_metres(source: InputMesh, options: Options) -> InputMesh:

@@ -182,7 +182,7 @@ class Decomposition(Result):
         OutputError
             The place cannot be written to.
         """
-        from rlacd.io.write import save_balls
+        from rlacd.io.write.balls import save_balls
 
         if self.balls is None:
             raise OptionError("there are no balls to write; decompose with a NavigableSpace.")

@@ -161,18 +161,18 @@ class _Decomposer:
         eliminates = options.merge and goal.eliminates and policy not in AS_PUBLISHED
         searches = options.quality != "fast"
         first = eliminates and (not searches or goal.obstacles is not None)
+        if run.stopped_by is not None or not (first or searches):
+            return parts, None
         try:
-            if first and run.stopped_by is None:
-                with run.stage("search"):
-                    parts = eliminate_parts(context, parts, run)
-            if searches and run.stopped_by is None:
-                with run.stage("search"):
-                    if asked is not None:
-                        context = replace(context, enough=at_least(self.model.solid, parts, asked.overhang, run))
-                    merged = parts
-                    parts, found = search(context, merged, run, quality, seconds, steps, policy)
-                    if eliminates and not first and run.stopped_by is None:  # no level is worse than the one before it
-                        parts = min(parts, eliminate_parts(context, merged, run), key=cost)
+            with run.stage("search"):
+                merged = parts = eliminate_parts(context, parts, run) if first else parts
+                if not searches or run.stopped_by is not None:
+                    return parts, None
+                if asked is not None:
+                    context = replace(context, enough=at_least(self.model.solid, parts, asked.overhang, run))
+                parts, found = search(context, merged, run, quality, seconds, steps, policy)
+                if eliminates and not first and run.stopped_by is None:  # no level is worse than the one before it
+                    parts = min(parts, eliminate_parts(context, merged, run), key=cost)
         except Stopped:
             run.note_stop()
         return parts, found

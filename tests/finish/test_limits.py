@@ -15,7 +15,6 @@ from hypothesis.extra import numpy as hnp
 
 from rlacd import _native
 from rlacd.criteria import Concavity
-from rlacd.errors import OptionError
 from rlacd.finish.limit import limit_part
 from rlacd.options.presets import HullLimits
 from rlacd.solid.component import Part
@@ -209,14 +208,6 @@ def test_real_hulls(corpus: Path) -> None:
                 growth.append(limited.volume / hull.volume - 1)
     assert len(growth) > 100
     assert np.mean(growth) < 0.03
-
-
-@pytest.mark.parametrize("limits", [{"max_vertices": 3}, {"max_faces": 3}, {"max_vertices": -1}])
-def test_impossible_limits_are_refused(limits: dict[str, int]) -> None:
-    with pytest.raises(OptionError, match="at least 4"):
-        limit_hull(ball(20), HullLimits(**limits))
-    with pytest.raises(OptionError, match="tolerance"):
-        limit_hull(ball(20), tolerance=-1.0)
 
 
 def test_bad_hulls_are_refused() -> None:

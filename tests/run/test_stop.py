@@ -345,8 +345,8 @@ def test_ctrl_c_twice_ends_a_command_that_no_handler_of_python_can_interrupt() -
     code = """if True:
         import signal
         signal.signal(signal.SIGINT, signal.default_int_handler)
-        from rlacd.cli.terminal import Watch
-        with Watch(quiet=True):
+        from rlacd.cli.terminal import watching
+        with watching(quiet=True):
             print("busy", flush=True)
             sum(range(10**12))  # holds the GIL for hours, as a boolean of manifold3d may
     """

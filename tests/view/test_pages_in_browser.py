@@ -13,7 +13,7 @@ import pytest
 import trimesh
 
 import rlacd
-from rlacd.view.viewer import Viewer
+from rlacd.view.server import ViewServer
 from tests.view.browser import Watched, change, open_browser, open_driver, open_page, pixels
 from tests.view.viewing import open_viewer
 
@@ -31,7 +31,7 @@ def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def viewer(mesh: Path) -> Iterator[Viewer]:
+def viewer(mesh: Path) -> Iterator[ViewServer]:
     with open_viewer(mesh, {"quality": "fast"}, port=0) as viewer:
         yield viewer
 
@@ -49,7 +49,7 @@ def browser(driver: Any) -> Iterator[Any]:
 
 
 @pytest.fixture
-def seen(viewer: Viewer, browser: Any) -> Iterator[Watched]:
+def seen(viewer: ViewServer, browser: Any) -> Iterator[Watched]:
     with open_page(browser) as watched:
         watched.page.goto(viewer.address)
         wait_for_run(watched.page, 1)
@@ -73,7 +73,7 @@ def rows(page: Any) -> int:
 
 
 @pytest.mark.slow
-def test_the_hulls_are_seen_and_listed(seen: Watched, viewer: Viewer) -> None:
+def test_the_hulls_are_seen_and_listed(seen: Watched, viewer: ViewServer) -> None:
     page = seen.page
     assert viewer.session.result is not None
     faces = viewer.session.result[1].report["faces"]
@@ -100,7 +100,7 @@ def test_the_explode_slider_pulls_the_hulls_apart(seen: Watched) -> None:
 
 
 @pytest.mark.nightly
-def test_another_threshold_decomposes_again(seen: Watched, viewer: Viewer) -> None:
+def test_another_threshold_decomposes_again(seen: Watched, viewer: ViewServer) -> None:
     page = seen.page
     before = pixels(page)
     page.fill("#threshold-number", "1.9")
@@ -150,7 +150,7 @@ def test_files_are_downloaded(seen: Watched, name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.nightly
-def test_another_mesh_is_dropped_and_shown(seen: Watched, viewer: Viewer, tmp_path: Path) -> None:
+def test_another_mesh_is_dropped_and_shown(seen: Watched, viewer: ViewServer, tmp_path: Path) -> None:
     page = seen.page
     ball = trimesh.creation.icosphere(1).export(file_type="glb")
     sent = page.evaluate_handle(
@@ -178,7 +178,7 @@ def test_another_mesh_is_dropped_and_shown(seen: Watched, viewer: Viewer, tmp_pa
 
 
 @pytest.mark.nightly
-def test_a_preset_limits_the_hulls_and_points_out_its_format(seen: Watched, viewer: Viewer) -> None:
+def test_a_preset_limits_the_hulls_and_points_out_its_format(seen: Watched, viewer: ViewServer) -> None:
     page = seen.page
     page.select_option("#preset", "mujoco")
     wait_for_run(page, 2)
@@ -189,7 +189,7 @@ def test_a_preset_limits_the_hulls_and_points_out_its_format(seen: Watched, view
 
 
 @pytest.mark.nightly
-def test_the_command_is_copied(viewer: Viewer, mesh: Path, browser: Any) -> None:
+def test_the_command_is_copied(viewer: ViewServer, mesh: Path, browser: Any) -> None:
     with open_page(browser, permissions=["clipboard-read", "clipboard-write"]) as watched:
         page = watched.page
         page.goto(viewer.address)
@@ -221,7 +221,7 @@ def test_terms_are_explained_where_they_stand(seen: Watched) -> None:
 
 
 @pytest.mark.nightly
-def test_nothing_covers_the_model_on_a_phone(viewer: Viewer, browser: Any) -> None:
+def test_nothing_covers_the_model_on_a_phone(viewer: ViewServer, browser: Any) -> None:
     with open_page(browser) as watched:
         page = watched.page
         page.set_viewport_size({"width": 390, "height": 844})
@@ -299,7 +299,7 @@ def test_nothing_is_asked_about_openings_of_a_closed_mesh(seen: Watched) -> None
 
 
 @pytest.mark.nightly
-def test_volume_is_a_criterion(seen: Watched, viewer: Viewer) -> None:
+def test_volume_is_a_criterion(seen: Watched, viewer: ViewServer) -> None:
     page = seen.page
     assert page.locator("#volume_tolerance").is_hidden()
     page.check("#criterion input[value=volume]")
@@ -384,7 +384,7 @@ def test_balls_come_with_navigable_space(seen: Watched) -> None:
 
 
 @pytest.mark.nightly
-def test_parts_become_primitives_and_overlap(seen: Watched, viewer: Viewer) -> None:
+def test_parts_become_primitives_and_overlap(seen: Watched, viewer: ViewServer) -> None:
     page = seen.page
     page.check("#shapes input[value=primitives]")
     wait_for_run(page, 2)

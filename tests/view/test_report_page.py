@@ -21,7 +21,7 @@ from rlacd.cli.main import app
 from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError
 from rlacd.view.page import MODULES
-from rlacd.view.report import check_report_page, report_page, save_report_page
+from rlacd.view.report import report_page, save_report_page
 from rlacd.view.scene import scene
 from tests.hulls import hull_of
 
@@ -193,7 +193,7 @@ def test_the_command_checks_the_report_before_the_work(tmp_path: Path) -> None:
 
 def test_bad_places_and_axes_are_refused(result: Decomposition, tmp_path: Path) -> None:
     with pytest.raises(OptionError, match=r"must end in \.html"):
-        check_report_page(tmp_path / "out.pdf")
+        save_report_page(result, tmp_path / "out.pdf")
     with pytest.raises(OptionError, match="x, y or z"):
         save_report_page(result, tmp_path / "out.html", up="w")
     assert list(tmp_path.iterdir()) == []

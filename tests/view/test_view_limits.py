@@ -19,11 +19,11 @@ import pytest
 import trimesh
 
 from rlacd.view import connections
-from rlacd.view.connections import LONGEST_HEAD, MOST_CONNECTIONS, MOST_STREAMS
-from rlacd.view.server import UPLOADS
-from rlacd.view.viewer import Viewer
+from rlacd.view.connections import MOST_CONNECTIONS, MOST_STREAMS
+from rlacd.view.server import UPLOADS, ViewServer
 from tests.view.viewing import open_viewer
 
+LONGEST_LINE = 1 << 16
 PATIENCE = 60.0
 
 
@@ -35,7 +35,7 @@ def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def viewer(mesh: Path) -> Iterator[Viewer]:
+def viewer(mesh: Path) -> Iterator[ViewServer]:
     with open_viewer(mesh, {"quality": "fast"}, port=0) as viewer:
         yield viewer
 
@@ -45,7 +45,7 @@ def port_of(address: str) -> int:
 
 
 @contextmanager
-def connected(viewer: Viewer) -> Iterator[socket.socket]:
+def connected(viewer: ViewServer) -> Iterator[socket.socket]:
     with socket.create_connection(("127.0.0.1", port_of(viewer.address)), timeout=PATIENCE) as connection:
         yield connection
 
@@ -69,7 +69,7 @@ def head(path: str, *lines: str, method: str = "GET") -> bytes:
 
 
 @pytest.mark.slow
-def test_sixty_streams_hold_no_more_than_their_threads(viewer: Viewer) -> None:
+def test_sixty_streams_hold_no_more_than_their_threads(viewer: ViewServer) -> None:
     before = threading.active_count()
     with ExitStack() as stack:
         streams = [stack.enter_context(connected(viewer)) for _ in range(60)]
@@ -85,7 +85,7 @@ def test_sixty_streams_hold_no_more_than_their_threads(viewer: Viewer) -> None:
         assert status_of(again.recv(100)) == 200, "streams that have gone make room"
 
 
-def test_connections_beyond_the_limit_are_reported_and_make_room_when_they_end(viewer: Viewer) -> None:
+def test_connections_beyond_the_limit_are_reported_and_make_room_when_they_end(viewer: ViewServer) -> None:
     with ExitStack() as stack:
         for _ in range(MOST_CONNECTIONS):
             stack.enter_context(connected(viewer))
@@ -113,7 +113,9 @@ def wait_until(true: Callable[[], bool]) -> None:
     [b"", b"GET /", head("/")[:-2] + b"X-Slow: 1\r\n", head("/cancel", "Content-Length: 9000", method="POST")],
     ids=["nothing", "request line", "headers", "body"],
 )
-def test_a_request_that_trickles_in_is_ended(viewer: Viewer, trickle: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_request_that_trickles_in_is_ended(
+    viewer: ViewServer, trickle: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(connections, "REQUEST_SECONDS", 0.5)
     monkeypatch.setattr("rlacd.view.server.REQUEST_SECONDS", 0.5)
     trickle = trickle.replace(b"Content-Length", b"Content-Type: application/json\r\nContent-Length")
@@ -137,9 +139,8 @@ def test_a_request_that_trickles_in_is_ended(viewer: Viewer, trickle: bytes, mon
 @pytest.mark.parametrize(
     ("request_", "status"),
     [
-        (b"GET /" + b"a" * LONGEST_HEAD + b" HTTP/1.1\r\n\r\n", 431),
-        (head("/", "X-Long: " + "a" * LONGEST_HEAD), 431),
-        (head("/", *[f"X-{i}: {'a' * 1000}" for i in range(20)]), 431),
+        (b"GET /" + b"a" * LONGEST_LINE + b" HTTP/1.1\r\n\r\n", 414),
+        (head("/", "X-Long: " + "a" * LONGEST_LINE), 431),
         (head("/", *[f"X-{i}: 1" for i in range(200)]), 431),
         (head("/decompose", "Content-Type: application/json", "Content-Length: 20000", method="POST"), 413),
         (head("/decompose", "Content-Type: application/json", f"Content-Length: {'9' * 5000}", method="POST"), 413),
@@ -165,7 +166,7 @@ def test_a_request_that_trickles_in_is_ended(viewer: Viewer, trickle: bytes, mon
     ],
     ids=lambda value: str(value) if isinstance(value, int) else repr(value[:24]),
 )
-def test_what_is_too_long_or_no_request_is_refused(viewer: Viewer, request_: bytes, status: int) -> None:
+def test_what_is_too_long_or_no_request_is_refused(viewer: ViewServer, request_: bytes, status: int) -> None:
     with connected(viewer) as connection:
         connection.sendall(request_)
         assert status_of(all_of(connection)) == status
@@ -174,7 +175,7 @@ def test_what_is_too_long_or_no_request_is_refused(viewer: Viewer, request_: byt
         assert status_of(all_of(connection)) == 200, "others are served"
 
 
-def test_slow_uploads_keep_nothing_else_waiting(viewer: Viewer) -> None:
+def test_slow_uploads_keep_nothing_else_waiting(viewer: ViewServer) -> None:
     upload = head("/open?name=a.stl", "Content-Type: application/octet-stream", "Content-Length: 1000", method="POST")
     with ExitStack() as stack:
         for _ in range(UPLOADS):

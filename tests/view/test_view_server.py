@@ -32,7 +32,7 @@ from rlacd.options import Options
 from rlacd.options.navigable import NavigableSpace
 from rlacd.view.controls import ViewerControls, read_controls
 from rlacd.view.downloads import offered
-from rlacd.view.viewer import Viewer
+from rlacd.view.server import ViewServer
 from tests.view.viewing import open_viewer
 
 PATIENCE = 60.0
@@ -48,7 +48,7 @@ def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def viewer(mesh: Path) -> Iterator[Viewer]:
+def viewer(mesh: Path) -> Iterator[ViewServer]:
     with open_viewer(mesh, {"threshold": 0.05}, port=0) as viewer:
         yield viewer
 
@@ -64,7 +64,7 @@ class Answer:
         return json.loads(self.body)
 
 
-def ask(viewer: Viewer, method: str, path: str, body: Any = None, **headers: str) -> Answer:
+def ask(viewer: ViewServer, method: str, path: str, body: Any = None, **headers: str) -> Answer:
     place = urllib.parse.urlsplit(viewer.address)
     connection = http.client.HTTPConnection(str(place.hostname), int(place.port or 0), timeout=PATIENCE)
     try:
@@ -76,7 +76,7 @@ def ask(viewer: Viewer, method: str, path: str, body: Any = None, **headers: str
         connection.close()
 
 
-def events(viewer: Viewer) -> Iterator[dict[str, Any]]:
+def events(viewer: ViewServer) -> Iterator[dict[str, Any]]:
     """States as the page gets them."""
     place = urllib.parse.urlsplit(viewer.address)
     connection = http.client.HTTPConnection(str(place.hostname), int(place.port or 0), timeout=PATIENCE)
@@ -91,11 +91,11 @@ def events(viewer: Viewer) -> Iterator[dict[str, Any]]:
         connection.close()
 
 
-def settled(viewer: Viewer, run: int) -> dict[str, Any]:
+def settled(viewer: ViewServer, run: int) -> dict[str, Any]:
     return next(state for state in events(viewer) if state["state"] == "idle" and state["run"] == run)
 
 
-def test_the_page_comes_with_its_controls(viewer: Viewer) -> None:
+def test_the_page_comes_with_its_controls(viewer: ViewServer) -> None:
     answer = ask(viewer, "GET", "/")
     page = answer.body.decode()
     assert answer.status == 200
@@ -107,7 +107,7 @@ def test_the_page_comes_with_its_controls(viewer: Viewer) -> None:
         assert ask(viewer, "GET", script.removeprefix(".")).headers["Content-Type"].startswith("text/javascript")
 
 
-def test_every_answer_is_hardened(viewer: Viewer) -> None:
+def test_every_answer_is_hardened(viewer: ViewServer) -> None:
     settled(viewer, run=1)
     for path in ("/", "/page/list.js", "/state", "/scene", "/download?format=glb", "/nothing"):
         headers = ask(viewer, "GET", path).headers
@@ -118,7 +118,7 @@ def test_every_answer_is_hardened(viewer: Viewer) -> None:
         assert "Python" not in headers["Server"]
 
 
-def test_the_content_policy_names_every_script_by_its_hash(viewer: Viewer) -> None:
+def test_the_content_policy_names_every_script_by_its_hash(viewer: ViewServer) -> None:
     answer = ask(viewer, "GET", "/")
     policy, page = answer.headers["Content-Security-Policy"], answer.body.decode()
     assert "default-src 'none'" in policy
@@ -131,7 +131,7 @@ def test_the_content_policy_names_every_script_by_its_hash(viewer: Viewer) -> No
         assert base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() in policy
 
 
-def test_hulls_come_with_progress_and_again_with_other_options(viewer: Viewer) -> None:
+def test_hulls_come_with_progress_and_again_with_other_options(viewer: ViewServer) -> None:
     settled(viewer, run=1)
     first = ask(viewer, "GET", "/scene").json
     assert len(first["parts"]) == 2
@@ -144,7 +144,7 @@ def test_hulls_come_with_progress_and_again_with_other_options(viewer: Viewer) -
     assert stages <= {"load", "repair", "cut", "merge", "search", "finish", "measure"}
 
 
-def events_of_a_run(viewer: Viewer, options: dict[str, Any]) -> list[dict[str, Any]]:
+def events_of_a_run(viewer: ViewServer, options: dict[str, Any]) -> list[dict[str, Any]]:
     states = events(viewer)
     before = next(states)["run"]
     assert ask(viewer, "POST", "/decompose", options).status == 202
@@ -156,7 +156,7 @@ def events_of_a_run(viewer: Viewer, options: dict[str, Any]) -> list[dict[str, A
     raise AssertionError("the viewer closed")
 
 
-def test_navigable_space_has_balls(viewer: Viewer) -> None:
+def test_navigable_space_has_balls(viewer: ViewServer) -> None:
     settled(viewer, run=1)
     assert ask(viewer, "GET", "/scene").json["balls"] is None
     ask(viewer, "POST", "/decompose", {"criterion": "navigable", "radius": 0.05, "tolerance": 0.02})
@@ -167,7 +167,7 @@ def test_navigable_space_has_balls(viewer: Viewer) -> None:
     assert len(lines) == 1 + scene["balls"]["of"]
 
 
-def test_the_heat_map_belongs_to_the_hulls_shown(viewer: Viewer) -> None:
+def test_the_heat_map_belongs_to_the_hulls_shown(viewer: ViewServer) -> None:
     settled(viewer, run=1)
     assert ask(viewer, "GET", "/heat").json["max"] == pytest.approx(0.0, abs=1e-6)
     ask(viewer, "POST", "/decompose", {"threshold": 1.9})
@@ -178,7 +178,7 @@ def test_the_heat_map_belongs_to_the_hulls_shown(viewer: Viewer) -> None:
 
 
 @pytest.mark.slow
-def test_everything_offered_can_be_downloaded_and_read(viewer: Viewer) -> None:
+def test_everything_offered_can_be_downloaded_and_read(viewer: ViewServer) -> None:
     settled(viewer, run=1)
     volume = sum(hull.volume for hull in viewer.session.result[1])  # type: ignore[index]
     names = set()
@@ -213,7 +213,7 @@ def test_everything_offered_can_be_downloaded_and_read(viewer: Viewer) -> None:
             assert b"connect-src 'none'" in answer.body
 
 
-def test_a_report_under_way_holds_up_no_decomposition(viewer: Viewer, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_report_under_way_holds_up_no_decomposition(viewer: ViewServer, monkeypatch: pytest.MonkeyPatch) -> None:
     settled(viewer, run=1)
     begun, done = threading.Event(), threading.Event()
 
@@ -258,7 +258,7 @@ def test_a_report_under_way_holds_up_no_decomposition(viewer: Viewer, monkeypatc
         (b"{", "not a JSON object"),
     ],
 )
-def test_bad_options_are_answered_in_a_sentence_and_change_nothing(viewer: Viewer, options: Any, says: str) -> None:
+def test_bad_options_are_answered_in_a_sentence_and_change_nothing(viewer: ViewServer, options: Any, says: str) -> None:
     settled(viewer, run=1)
     answer = ask(viewer, "POST", "/decompose", options)
     assert answer.status == 400
@@ -285,7 +285,7 @@ def test_the_input_is_there_before_any_hull(mesh: Path) -> None:
         assert scene["scale"] == pytest.approx(1.0)
 
 
-def test_a_first_pass_is_shown_while_the_search_goes_on(viewer: Viewer) -> None:
+def test_a_first_pass_is_shown_while_the_search_goes_on(viewer: ViewServer) -> None:
     settled(viewer, run=1)
     seen = events_of_a_run(viewer, {"threshold": 0.04, "quality": "balanced"})
     drafts = [state for state in seen if state["draft"]]
@@ -295,12 +295,12 @@ def test_a_first_pass_is_shown_while_the_search_goes_on(viewer: Viewer) -> None:
     assert not seen[-1]["draft"]
 
 
-def post_file(viewer: Viewer, name: str, content: bytes, **headers: str) -> Answer:
+def post_file(viewer: ViewServer, name: str, content: bytes, **headers: str) -> Answer:
     kind = {"Content_Type": "application/octet-stream", **headers}
     return ask(viewer, "POST", f"/open?{urllib.parse.urlencode({'name': name})}", content, **kind)
 
 
-def test_another_mesh_is_opened(viewer: Viewer) -> None:
+def test_another_mesh_is_opened(viewer: ViewServer) -> None:
     settled(viewer, run=1)
     content = trimesh.creation.icosphere(1).export(file_type="glb")
     assert post_file(viewer, "../../a ball.glb", content).status == 202
@@ -332,7 +332,7 @@ def test_another_mesh_is_opened(viewer: Viewer) -> None:
     ],
 )
 def test_a_file_that_is_no_mesh_is_refused_and_nothing_is_lost(
-    viewer: Viewer, name: str, content: bytes, status: int, says: str
+    viewer: ViewServer, name: str, content: bytes, status: int, says: str
 ) -> None:
     settled(viewer, run=1)
     answer = post_file(viewer, name, content)
@@ -342,7 +342,7 @@ def test_a_file_that_is_no_mesh_is_refused_and_nothing_is_lost(
     assert len(ask(viewer, "GET", "/scene").json["parts"]) == 2
 
 
-def test_files_come_from_the_own_page_only(viewer: Viewer) -> None:
+def test_files_come_from_the_own_page_only(viewer: ViewServer) -> None:
     settled(viewer, run=1)
     content = trimesh.creation.box().export(file_type="stl")
     assert post_file(viewer, "cube.stl", content, Origin="http://evil.example").status == 403
@@ -364,7 +364,7 @@ def test_files_come_from_the_own_page_only(viewer: Viewer) -> None:
         ({"open": "solid"}, ["--open solid"]),
     ],
 )
-def test_the_options_are_a_command(viewer: Viewer, mesh: Path, wanted: dict[str, Any], says: list[str]) -> None:
+def test_the_options_are_a_command(viewer: ViewServer, mesh: Path, wanted: dict[str, Any], says: list[str]) -> None:
     command = ask(viewer, "POST", "/command", wanted).json["command"]
     words = shlex.split(command)
     assert words[:3] == ["rlacd", "decompose", str(mesh)]
@@ -381,7 +381,7 @@ def test_the_options_are_a_command(viewer: Viewer, mesh: Path, wanted: dict[str,
         {"quality": "fast", "overlap": 0.04, "primitives": True},
     ],
 )
-def test_the_command_gives_the_hulls_that_are_shown(viewer: Viewer, tmp_path: Path, wanted: dict[str, Any]) -> None:
+def test_the_command_gives_the_hulls_that_are_shown(viewer: ViewServer, tmp_path: Path, wanted: dict[str, Any]) -> None:
     settled(viewer, run=1)
     events_of_a_run(viewer, wanted)
     words = shlex.split(ask(viewer, "POST", "/command", wanted).json["command"])
@@ -391,7 +391,7 @@ def test_the_command_gives_the_hulls_that_are_shown(viewer: Viewer, tmp_path: Pa
     assert ask(viewer, "GET", "/download?format=glb").body == place.read_bytes()
 
 
-def test_parts_are_primitives_and_overlap_when_asked_for(viewer: Viewer) -> None:
+def test_parts_are_primitives_and_overlap_when_asked_for(viewer: ViewServer) -> None:
     """An L of two flush beams: two boxes, or two hulls of which one reaches into the other."""
     settled(viewer, run=1)
     apart = ask(viewer, "GET", "/scene").json["parts"]
@@ -420,14 +420,14 @@ def test_an_open_box_is_filled_when_asked_for(tmp_path: Path) -> None:
         assert len(ask(viewer, "GET", "/scene").json["parts"]) == 1
 
 
-def test_volume_decides_when_asked_for(viewer: Viewer) -> None:
+def test_volume_decides_when_asked_for(viewer: ViewServer) -> None:
     settled(viewer, run=1)
     events_of_a_run(viewer, {"quality": "fast", "criterion": "volume", "volume_tolerance": 5.0})
     assert ask(viewer, "GET", "/scene").json["report"]["volume"]["tolerance"] == 5.0
     assert len(ask(viewer, "GET", "/scene").json["parts"]) == 1
 
 
-def test_what_is_not_there_is_reported(viewer: Viewer, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_not_there_is_reported(viewer: ViewServer, monkeypatch: pytest.MonkeyPatch) -> None:
     settled(viewer, run=1)
     assert "no balls" in ask(viewer, "GET", "/download?format=balls.csv").json["error"]
     monkeypatch.setitem(sys.modules, "pxr", None)
@@ -440,7 +440,7 @@ def test_what_is_not_there_is_reported(viewer: Viewer, monkeypatch: pytest.Monke
 
 
 @pytest.mark.promise("viewer-private")
-def test_pages_of_other_sites_are_turned_away(viewer: Viewer) -> None:
+def test_pages_of_other_sites_are_turned_away(viewer: ViewServer) -> None:
     own = urllib.parse.urlsplit(viewer.address).netloc
     options = {"threshold": 1.9}
     settled(viewer, run=1)
@@ -458,10 +458,10 @@ def test_pages_of_other_sites_are_turned_away(viewer: Viewer) -> None:
 
 
 @pytest.mark.promise("viewer-private")
-def test_no_other_machine_can_reach_it(viewer: Viewer) -> None:
+def test_no_other_machine_can_reach_it(viewer: ViewServer) -> None:
     port = int(urllib.parse.urlsplit(viewer.address).port or 0)
     assert urllib.parse.urlsplit(viewer.address).hostname == "127.0.0.1"
-    assert viewer._server.socket.getsockname() == ("127.0.0.1", port)
+    assert viewer.socket.getsockname() == ("127.0.0.1", port)
     outward = [info[4][0] for info in socket.getaddrinfo(socket.gethostname(), port, socket.AF_INET)]
     for address in outward:
         if not address.startswith("127."):
@@ -510,7 +510,7 @@ def test_closing_ends_every_thread_and_page(mesh: Path) -> None:
     assert threading.active_count() <= before
 
 
-def test_a_port_in_use_is_one_sentence(viewer: Viewer, mesh: Path) -> None:
+def test_a_port_in_use_is_one_sentence(viewer: ViewServer, mesh: Path) -> None:
     port = int(urllib.parse.urlsplit(viewer.address).port or 0)
     with (
         pytest.raises(OptionError, match=f"port {port} is in use; choose another with --port"),

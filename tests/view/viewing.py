@@ -7,9 +7,9 @@ from typing import Any
 
 import rlacd
 from rlacd.view import viewer
-from rlacd.view.viewer import Viewer
+from rlacd.view.server import ViewServer
 
 
-def open_viewer(mesh: Any, options: dict[str, Any] | None = None, **given: Any) -> AbstractContextManager[Viewer]:
+def open_viewer(mesh: Any, options: dict[str, Any] | None = None, **given: Any) -> AbstractContextManager[ViewServer]:
     """Open it with what decomposes here."""
     return viewer.open_viewer(mesh, rlacd.decompose, options, **given)

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import signal
-import threading
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Any, Literal
 
 from rlacd.cli.commands import Argument, Command, options_of, taken
@@ -123,25 +119,15 @@ def _print_plan(batch: Batch) -> None:
 
 def _run(batch: Batch, where: PoolOptions, *, quiet: bool) -> None:
     from rlacd.cli.batch_screen import Screen, summary_lines
+    from rlacd.cli.terminal import graceful_stop
     from rlacd.run import available_cpus
 
-    stop = threading.Event()
-
-    def on_interrupt(number: int, frame: FrameType | None) -> None:
-        if stop.is_set():
-            raise KeyboardInterrupt
-        stop.set()
-        say("stopping; what is running will be finished (Ctrl-C again to quit at once)")
-
-    previous: Any = None
-    with suppress(ValueError):  # not in the main thread, which alone receives Ctrl-C
-        previous = signal.signal(signal.SIGINT, on_interrupt)
-    try:
-        with where.open(available_cpus()) as pool, Screen(quiet=quiet) as screen:
-            summary = batch.run(pool, screen, stop)
-    finally:
-        if previous is not None:
-            signal.signal(signal.SIGINT, previous)
+    with (
+        graceful_stop("what is running will be finished") as stop,
+        where.open(available_cpus()) as pool,
+        Screen(quiet=quiet) as screen,
+    ):
+        summary = batch.run(pool, screen, stop)
     if not quiet:
         say("\n".join(summary_lines(summary, batch.out)))
     if summary.stopped:

@@ -68,12 +68,12 @@ def _decompose(mesh: Path, **how: Any) -> None:
 
 def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any], unit: str | None) -> bool:
     """Decompose a mesh and write all requested files; returns whether it is complete."""
-    from rlacd.cli.terminal import Watch, summary, writing
+    from rlacd.cli.terminal import summary, watching, writing
     from rlacd.decompose_mesh import decompose
     from rlacd.plain_json import to_json
 
     up, quiet = wanted.up, bool(wanted.quiet)
-    with Watch(quiet=quiet) as watch:
+    with watching(quiet=quiet) as watch:
         result = decompose(mesh, **options, progress=watch)
     place = str(wanted.output)
     names = ("file_format", "density", "mass", "one_mesh", "keep_input", "scene")
@@ -118,11 +118,11 @@ def is_html(path: str) -> bool:
 
 def _rewrite(robot: Path, wanted: OutputOptions, options: dict[str, Any], unit: str | None) -> bool:
     """Replace the collision meshes of a robot; returns whether all are complete."""
-    from rlacd.cli.terminal import Watch, rewrite_summary
+    from rlacd.cli.terminal import rewrite_summary, watching
     from rlacd.io.robots import rewrite_robot
     from rlacd.plain_json import to_json
 
-    with Watch(quiet=bool(wanted.quiet)) as watch:
+    with watching(quiet=bool(wanted.quiet)) as watch:
         packages = wanted.package_dirs or ()
         done = rewrite_robot(robot, str(wanted.output), package_dirs=packages, **options, progress=watch)
     if not wanted.quiet:
@@ -165,8 +165,10 @@ def _named(mesh: Path, asked: OutputOptions, preset: str | None) -> OutputOption
 
 def _check_mesh(mesh: Path, wanted: OutputOptions) -> None:
     """Check before any work that all outputs can be written."""
-    from rlacd.io.write import check_balls, check_file, file_stem, hull_target
+    from rlacd.io.write import file_stem, hull_target
+    from rlacd.io.write.balls import check_balls
     from rlacd.io.write.folder import check_names
+    from rlacd.io.write.target import check_file
 
     flags = {"one_mesh": bool(wanted.one_mesh), "keep_input": bool(wanted.keep_input), "scene": bool(wanted.scene)}
     target = hull_target(str(wanted.output), wanted.file_format, **flags)
@@ -187,7 +189,7 @@ def _check_mesh(mesh: Path, wanted: OutputOptions) -> None:
 
 def _check_robot(asked: OutputOptions, wanted: OutputOptions) -> None:
     """Reject options for single meshes, and check that the report can be written."""
-    from rlacd.io.write import check_file
+    from rlacd.io.write.target import check_file
 
     if wanted.report is not None and is_html(wanted.report):
         raise OptionError("--report as a page is for a single mesh; for a robot give a .json file.")

@@ -56,15 +56,14 @@ def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
     MeshError
         The file cannot be read or holds nothing usable.
     """
-    import numpy as np
-
     from rlacd._native import mesh_volume
     from rlacd.io.read.load import load_mesh
     from rlacd.repair.repair import repair
+    from rlacd.solid.topology import compacted
 
     mesh = load_mesh(path)
     solid = repair(mesh)
-    used = mesh.vertices[np.unique(mesh.faces)] if len(mesh.faces) else mesh.vertices
+    used = compacted(mesh.vertices, mesh.faces)[0] if len(mesh.faces) else mesh.vertices
     return {
         "file": os.fspath(path),
         "name": mesh.name,
@@ -72,16 +71,7 @@ def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
         "faces": len(mesh.faces),
         "bounds": [used.min(axis=0).tolist(), used.max(axis=0).tolist()],
         "scale": float(solid.frame.scale),
-        "repair": [
-            {
-                "body": int(body.body),
-                "step": body.step,
-                "faces_in": int(body.faces_in),
-                "faces_out": int(body.faces_out),
-                "deviation": float(body.deviation),
-            }
-            for body in solid.bodies
-        ],
+        "repair": [vars(body) for body in solid.bodies],
         "solid": {
             "faces": len(solid.faces),
             "volume": mesh_volume(solid.vertices, solid.faces) / float(solid.frame.scale) ** 3,

@@ -8,14 +8,14 @@ import threading
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from rlacd._native import count_interrupts, forget_interrupts
 from rlacd.cli.exit_codes import ExitCode, say
 from rlacd.cli.options import METRES
 from rlacd.fit import Fit
-from rlacd.run import Progress
+from rlacd.run import Progress, ProgressCallback
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars
@@ -24,44 +24,51 @@ if TYPE_CHECKING:
     from rlacd.io.robots import Rewritten
 
 
-class Watch:
-    """Shows progress on a terminal and turns Ctrl-C into a graceful stop.
+@contextmanager
+def watching(*, quiet: bool) -> Iterator[ProgressCallback]:
+    """Show progress on a terminal and turn Ctrl-C into a graceful stop.
 
     The first Ctrl-C makes the decomposition stop at its next step and keep its result so far; the second interrupts at
     once. The bar is drawn only if stderr is a terminal.
     """
+    bar = None if quiet else open_bar("{task.description:<12}", None, "{task.fields[parts]} parts", parts=0)
 
-    def __init__(self, *, quiet: bool) -> None:
-        self.interrupted = False
-        self._bar = None if quiet else open_bar("{task.description:<12}", None, "{task.fields[parts]} parts", parts=0)
-        self._previous: Any = None
-
-    def __enter__(self) -> Watch:
-        # Python runs signal handlers only in the main thread, and refuses to set them from any other.
-        if threading.current_thread() is threading.main_thread():
-            self._previous = signal.signal(signal.SIGINT, self._on_interrupt)
-            count_interrupts(ExitCode.INTERRUPTED, 1.0)  # the second one leaves a second to end in good order
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        if self._bar is not None:
-            self._bar.stop()
-        if self._previous is not None:
-            forget_interrupts()
-            signal.signal(signal.SIGINT, self._previous)
-
-    def __call__(self, progress: Progress) -> bool:
-        """Show `progress`; returns False if the user wants to stop."""
-        if self._bar is not None:
+    def shown(progress: Progress) -> bool:
+        if bar is not None:
             known: dict[str, Any] = {"description": progress.stage, "completed": progress.done, "total": progress.total}
-            self._bar.update(self._bar.task_ids[0], **known, parts=progress.parts)
-        return not self.interrupted
+            bar.update(bar.task_ids[0], **known, parts=progress.parts)
+        return not wanted.is_set()
 
-    def _on_interrupt(self, number: int, frame: FrameType | None) -> None:
-        if self.interrupted:
+    try:
+        with graceful_stop("the result so far will be written", in_kernels=True) as wanted:
+            yield shown
+    finally:
+        if bar is not None:
+            bar.stop()
+
+
+@contextmanager
+def graceful_stop(said: str, *, in_kernels: bool = False) -> Iterator[threading.Event]:
+    """Set an event at the first Ctrl-C, and say what happens then; the second interrupts at once, also kernels."""
+    wanted = threading.Event()
+
+    def on_interrupt(number: int, frame: FrameType | None) -> None:
+        if wanted.is_set():
             raise KeyboardInterrupt
-        self.interrupted = True
-        say("stopping; the result so far will be written (Ctrl-C again to quit at once)")
+        wanted.set()
+        say(f"stopping; {said} (Ctrl-C again to quit at once)")
+
+    if threading.current_thread() is not threading.main_thread():  # which alone receives Ctrl-C
+        yield wanted
+        return
+    previous = signal.signal(signal.SIGINT, on_interrupt)
+    if in_kernels:
+        count_interrupts(ExitCode.INTERRUPTED, 1.0)  # the second one leaves a second to end in good order
+    try:
+        yield wanted
+    finally:
+        forget_interrupts()
+        signal.signal(signal.SIGINT, previous)
 
 
 def open_bar(*columns: str | None, **fields: Any) -> Bars | None:

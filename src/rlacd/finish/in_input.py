@@ -11,9 +11,8 @@ from rlacd.options.navigable import LARGEST_COORDINATE
 from rlacd.options.presets import HullLimits
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
-from rlacd.solid.distance import hull_union
 from rlacd.solid.frame import Frame
-from rlacd.solid.hull import NO_LIMITS, TOLERANCE, Hull, keeps, limit_hull
+from rlacd.solid.hull import NO_LIMITS, TOLERANCE, Hull, keeps
 from rlacd.solid.primitive import PRIMITIVE
 
 _LARGEST = float(np.finfo(np.float64).max)
@@ -66,27 +65,7 @@ def _thickened(points: FloatArray, limits: HullLimits) -> Hull:
     lower, upper = np.maximum(points, step - _LARGEST) - step, np.minimum(points, _LARGEST - step) + step
     corners = itertools.product(*zip(lower.T, upper.T, strict=True))
     hull = Hull.of(np.concatenate([np.stack(corner, axis=1) for corner in corners]))
-    if hull is not None and keeps(hull, limits):
-        return hull
-    plain = plain_hull(points, limits)
-    limited = None if hull is None else _limited(hull, limits, 2 * step)
-    return plain if limited is None else min(limited, plain, key=lambda hull: float(np.ptp(hull.box, axis=0).max()))
-
-
-def _limited(hull: Hull, limits: HullLimits, slack: float) -> Hull | None:
-    """A hull within the limits around one in the input's unit; None if rounding leaves more than `slack` outside."""
-    near = Frame.of(hull.vertices)
-    full = Hull.of(near.to_frame(hull.vertices))
-    if full is None:
-        return None
-    points = near.to_input(limit_hull(full, limits).vertices)
-    limited = Hull.of(points) if np.isfinite(points).all() else None
-    if limited is None or not keeps(limited, limits):
-        return None
-    in_frame = Hull.of(near.to_frame(limited.vertices))
-    if in_frame is None or np.max(hull_union([in_frame]).distance(full.vertices)) > slack * near.scale:
-        return None
-    return limited
+    return hull if hull is not None and keeps(hull, limits) else plain_hull(points, limits)
 
 
 def plain_hull(points: FloatArray, limits: HullLimits) -> Hull:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -120,16 +120,16 @@ def fit_primitives(hull: Hull, kinds: Collection[PrimitiveKind] = PRIMITIVE_KIND
     if not {"box", "capsule", "cylinder"} & set(kinds):
         return fitted
     shadows = [shadow for axis in _candidate_axes(hull) if (shadow := _Shadow.of(points, axis)) is not None]
+    if not shadows:
+        return fitted
     if "box" in kinds:
-        fitted += sorted((shadow.box() for shadow in shadows), key=lambda box: box.volume)[:1]
+        fitted.append(_least(shadow.box() for shadow in shadows))
     shadows = sorted(shadows, key=lambda shadow: shadow.area * shadow.length)[:ROUND_AXES]
     circles = [(shadow, *smallest_ball(shadow.outline)) for shadow in shadows]
     if "cylinder" in kinds:
-        cylinders = [shadow.cylinder(centre, radius) for shadow, centre, radius in circles]
-        fitted += sorted(cylinders, key=lambda cylinder: cylinder.volume)[:1]
+        fitted.append(_least(shadow.cylinder(centre, radius) for shadow, centre, radius in circles))
     if "capsule" in kinds:
-        capsules = [shadow.capsule(centre, radius) for shadow, centre, radius in circles]
-        fitted += sorted(capsules, key=lambda capsule: capsule.volume)[:1]
+        fitted.append(_least(shadow.capsule(centre, radius) for shadow, centre, radius in circles))
     return fitted
 
 
@@ -220,17 +220,14 @@ class _Shadow:
     def capsule(self, centre: FloatArray, radius: float) -> Primitive:
         """The smallest capsule about the circle's axis."""
         away = ((self._points[:, :2] - centre) ** 2).sum(axis=1)
-        best: Primitive | None = None
-        for wider in radius * RADII:
+
+        def of_radius(wider: float) -> Primitive:
             reach = np.sqrt(np.maximum(wider**2 - away, 0.0))  # of the ends' spheres beyond their centres
             first, last = float((self._points[:, 2] + reach).min()), float((self._points[:, 2] - reach).max())
-            length = max(last - first, 0.0)
             place = self._axes @ [*centre, (first + last) / 2]
-            capsule = Primitive("capsule", place, self._axes, (float(wider), length))
-            if best is None or capsule.volume < best.volume:
-                best = capsule
-        assert best is not None
-        return best
+            return Primitive("capsule", place, self._axes, (wider, max(last - first, 0.0)))
+
+        return _least(map(of_radius, (radius * RADII).tolist()))
 
 
 def _candidate_axes(hull: Hull) -> FloatArray:
@@ -289,3 +286,7 @@ def _axes_along(axis: FloatArray) -> FloatArray:
 
 def _rank(primitive: Primitive) -> int:
     return PRIMITIVE_KINDS.index(primitive.kind)
+
+
+def _least(primitives: Iterable[Primitive]) -> Primitive:
+    return min(primitives, key=lambda primitive: primitive.volume)

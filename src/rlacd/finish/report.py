@@ -98,7 +98,7 @@ def make_report(
             **summary.entries,
             "hausdorff": {"over": apart and apart.over, "under": apart and apart.under},
             "scale": solid.frame.scale,
-            "mass": _mass(mass_of(*concatenated(stands_for_mass), solid.frame)),
+            "mass": mass_of(*concatenated(stands_for_mass), solid.frame).as_plain(),
             "repair": [{**vars(body)} for body in solid.bodies],
             "holes": _holes(solid),
             "search": reached.found and reached.found.as_plain(),
@@ -176,7 +176,7 @@ def joint_report(reports: Sequence[tuple[str, dict[str, Any]]], scale: float) ->
         **_joint_fit(each),
         "hausdorff": {side: _farthest([(r["hausdorff"][side], f) for _, r, f in each]) for side in ("over", "under")},
         "scale": scale,
-        "mass": _mass(joint_mass([_read_mass(report["mass"]) for _, report in reports])),
+        "mass": joint_mass([Mass.of_plain(report["mass"]) for _, report in reports]).as_plain(),
         "repair": [
             {**body, "body": begin + i, "deviation": body["deviation"] * factor, "node": name}
             for (name, report, factor), begin in begins
@@ -233,16 +233,6 @@ def _joint_seams(reports: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 def _added(counts: Sequence[dict[str, int]]) -> dict[str, int]:
     return {kind: sum(count[kind] for count in counts) for kind in counts[0]}
-
-
-def _read_mass(plain: dict[str, Any]) -> Mass:
-    return Mass(plain["volume_abs"], np.array(plain["centre_abs"]), np.array(plain["inertia_abs"]))
-
-
-def _mass(mass: Mass) -> dict[str, Any]:
-    """The mass in the input's unit."""
-    centre, inertia = mass.centre_abs.tolist(), mass.inertia_abs.tolist()
-    return {"volume_abs": mass.volume_abs, "centre_abs": centre, "inertia_abs": inertia}
 
 
 def _distances(reached: Reached, parts: Sequence[Part], run: Run) -> _Distances:

@@ -336,8 +336,6 @@ def check_callback(name: str, value: Any, taken: str) -> None:
     """
     if value is None:
         return
-    import inspect
-
     fits = callable(value) and not inspect.iscoroutinefunction(value)
     try:
         if fits:

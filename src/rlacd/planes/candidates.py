@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rlacd import _native
-from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
 
 OFFSETS_PER_AXIS = 25
@@ -59,65 +59,17 @@ def axis_and_principal(component: Component, per_axis: int = OFFSETS_PER_AXIS) -
     The planes divide the component's extent along each direction into `per_axis` + 1 equal slabs (the paper, 3.2).
     Principal axes within 0.001 radians of a coordinate axis are replaced by it.
     """
-    hull = component.hull
-    directions, offsets = _native.candidate_planes(
-        component.vertices, component.faces, hull.vertices, hull.faces, per_axis, 0
-    )
+    directions, offsets = _planes(component, per_axis, 0)
     return Candidates(np.ascontiguousarray(directions[::per_axis]), offsets.reshape(-1, per_axis))
-
-
-@dataclass(frozen=True, eq=False)
-class ConcaveEdges:
-    """Reflex edges of a component.
-
-    Attributes
-    ----------
-    ends : int32 [E, 2]
-        Vertices of the component.
-    faces : int32 [E, 2]
-        The faces on both sides; the first one runs from the first end to the second.
-    normals : float64 [E, 2, 3]
-        Their outward unit normals.
-    angle : float64 [E]
-        Interior dihedral angle minus pi, in (0, pi).
-    """
-
-    ends: IntArray
-    faces: IntArray
-    normals: FloatArray
-    angle: FloatArray
-
-    def __len__(self) -> int:
-        return len(self.ends)
-
-
-def reflex_edges(component: Component) -> ConcaveEdges:
-    """Find all edges whose interior dihedral angle exceeds 190 degrees, except at folds and needles."""
-    ends, faces, normals, angle = _native.reflex_edges(component.vertices, component.faces)
-    return ConcaveEdges(ends, faces, normals.reshape(-1, 2, 3), angle)
-
-
-def concave_edges(component: Component, count: int = 4) -> ConcaveEdges:
-    """Choose up to `count` reflex edges of a component: deep, sharp edges of long creases first, and spread out.
-
-    The first edge has the greatest depth x angle x length: the depth of its midpoint below the hull's surface, and the
-    length of its whole crease. For each further edge, the product is multiplied by its distance from the nearest chosen
-    one and by how much its planes differ from those chosen. Edges that offer no new plane are never chosen.
-
-    Returns
-    -------
-    ConcaveEdges
-        In the order of choice.
-    """
-    hull = component.hull
-    ends, faces, normals, angle = _native.concave_edges(
-        component.vertices, component.faces, hull.vertices, hull.faces, count
-    )
-    return ConcaveEdges(ends, faces, normals.reshape(-1, 2, 3), angle)
 
 
 def concave_edge_planes(component: Component, count: int = 4) -> Candidates:
     """Candidates of one component: three planes for each of `count` concave edges, without near-duplicates.
+
+    Edges are deep, sharp ones of long creases first, and spread out. The first has the greatest depth x angle x length:
+    the depth of its midpoint below the hull's surface, and the length of its whole crease. For each further edge, the
+    product is multiplied by its distance from the nearest chosen one and by how much its planes differ from those
+    chosen. Edges that offer no new plane are never chosen.
 
     Each edge gives the plane that bisects the reflex angle, and the planes of its two faces. A face plane is moved
     outwards by 1e-9, so that its face and all that is coplanar with it in single precision lie below; planes normal to
@@ -129,8 +81,15 @@ def concave_edge_planes(component: Component, count: int = 4) -> Candidates:
     Candidates
         K <= 3 * `count` directions with one plane each, in the order of choice; K = 0 for a convex component.
     """
-    hull = component.hull
-    normals, offsets = _native.candidate_planes(
-        component.vertices, component.faces, hull.vertices, hull.faces, 0, count
-    )
+    return all_planes(component, 0, count)
+
+
+def all_planes(component: Component, per_axis: int, edges: int) -> Candidates:
+    """Those of `axis_and_principal` and of `concave_edge_planes`, one direction a plane."""
+    normals, offsets = _planes(component, per_axis, edges)
     return Candidates(normals, offsets[:, None])
+
+
+def _planes(component: Component, per_axis: int, edges: int) -> tuple[FloatArray, FloatArray]:
+    hull = component.hull
+    return _native.candidate_planes(component.vertices, component.faces, hull.vertices, hull.faces, per_axis, edges)

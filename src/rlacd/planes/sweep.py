@@ -7,15 +7,19 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from rlacd import _native
-from rlacd.planes.candidates import OFFSETS_PER_AXIS, Candidates, axis_and_principal
+from rlacd.planes.candidates import OFFSETS_PER_AXIS, Candidates, all_planes, axis_and_principal
 from rlacd.solid.arrays import BoolArray, FloatArray
 from rlacd.solid.component import NEGLIGIBLE_VOLUME, Component, Plane
+
+Made = TypeVar("Made")
 
 SLIVER = 0.02
 """A side thinner than this share of its largest extent (an inscribed ball of 1/100) is a sliver."""
@@ -90,32 +94,27 @@ class SweepCache:
 
     def candidates(self, component: Component) -> Candidates:
         """Get the planes of a component."""
+        return self._once(self._candidates, component, self._found)
+
+    def of(self, component: Component, threads: int = 1) -> Sweep:
+        """Get the sweep of a component."""
+        return self._once(self._sweeps, component, lambda one: sweep(one, self.candidates(one), threads))
+
+    def _once(
+        self, known: WeakKeyDictionary[Component, Made], component: Component, make: Callable[[Component], Made]
+    ) -> Made:
         with self._lock:
-            known = self._candidates.get(component)
-        if known is None:
-            known = self._found(component)
+            made = known.get(component)
+        if made is None:
+            made = make(component)
             with self._lock:  # another thread may have done the same, with the same result
-                self._candidates[component] = known
-        return known
+                known[component] = made
+        return made
 
     def _found(self, component: Component) -> Candidates:
         if self._concave_edges == 0:
             return axis_and_principal(component, self._per_axis)
-        hull = component.hull
-        normals, offsets = _native.candidate_planes(
-            component.vertices, component.faces, hull.vertices, hull.faces, self._per_axis, self._concave_edges
-        )
-        return Candidates(normals, offsets[:, None])
-
-    def of(self, component: Component, threads: int = 1) -> Sweep:
-        """Get the sweep of a component."""
-        with self._lock:
-            known = self._sweeps.get(component)
-        if known is None:
-            known = sweep(component, self.candidates(component), threads)
-            with self._lock:
-                self._sweeps[component] = known
-        return known
+        return all_planes(component, self._per_axis, self._concave_edges)
 
 
 SLIVERS = (SLIVER, SLIVER / 100)

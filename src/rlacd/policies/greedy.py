@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd.planes.candidates import Candidates, axis_and_principal, concave_edge_planes
-from rlacd.planes.sweep import SLIVERS, TIE, Sweep, SweepCache, least_excess, sweep, valid_planes
+from rlacd.planes.sweep import Sweep, SweepCache, least_excess, valid_planes
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
 
@@ -26,11 +26,6 @@ def hull_sum(s: Sweep) -> FloatArray:
     return s.hull_below + s.hull_above
 
 
-def max_excess(s: Sweep) -> FloatArray:
-    """max(|CH(m_i)| - |m_i|): orders planes as the larger R_v of the two sides does (CoACD's one-step cost)."""
-    return np.maximum(s.hull_below - s.solid_below, s.hull_above - s.solid_above)
-
-
 def excess_norm(s: Sweep) -> FloatArray:
     """p-th power of the p-norm of the two sides' |CH(m_i)| - |m_i|, p = `EXPONENT`: between the sum and the maximum."""
     below, above = np.maximum(s.hull_below - s.solid_below, 0), np.maximum(s.hull_above - s.solid_above, 0)
@@ -39,21 +34,8 @@ def excess_norm(s: Sweep) -> FloatArray:
 
 
 SCORES: Mapping[str, float] = MappingProxyType({"hull-sum": 1.0, "max-excess": math.inf, "excess-norm": EXPONENT})
-"""Exponents of the norms that order planes as the functions of a sweep above do."""
-
-
-def cheapest(scored: Sweep, cost: FloatArray) -> Plane | None:
-    """Get the valid plane of least cost; None if every plane misses the solid or shaves off a film.
-
-    Planes that leave slivers are taken only if there is no other. Of planes whose costs are equal up to rounding, as in
-    symmetric shapes, the first is taken, so that the cuts do not depend on the unit and position of the input.
-    """
-    for sliver in SLIVERS:
-        valid = scored.valid(sliver)
-        if valid.any():
-            equal = cost[valid].min() + TIE * cost[valid].max()
-            return scored.candidates.plane(int(np.argmax(valid & (cost <= equal))))
-    return None
+"""Exponents of the norm of the two sides' |CH(m_i)| - |m_i| that orders planes: hull-sum is the paper's greedy baseline
+(its reward r1), max-excess orders them as the larger R_v of the two sides does (CoACD's one-step cost)."""
 
 
 class Greedy:
@@ -99,8 +81,7 @@ class NavACD:
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None if every candidate misses it or shaves off a film."""
         candidates = Candidates.joined(mid_planes(component), concave_edge_planes(component, EDGES_PER_COMPONENT))
-        scored = sweep(component, candidates, threads)
-        return cheapest(scored, hull_sum(scored))
+        return least_excess(component, candidates, SCORES["hull-sum"], threads)
 
 
 def mid_planes(component: Component) -> Candidates:
@@ -126,11 +107,8 @@ def least_hulls(
     short = Candidates(directions, candidates.offsets.ravel()[chosen][:, None])
     if concave_edges:
         short = Candidates.joined(short, concave_edge_planes(component, concave_edges))
-    if not len(short):
-        return None
-    scored = sweep(component, short, threads)
     fallback = candidates.plane(int(chosen[0])) if len(chosen) else None
-    return cheapest(scored, hull_sum(scored)) or fallback
+    return least_excess(component, short, SCORES["hull-sum"], threads) or fallback
 
 
 def generator_of(component: Component, seed: int = 0) -> np.random.Generator:

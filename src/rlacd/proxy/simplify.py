@@ -48,10 +48,7 @@ LOST_OF_SOLID, LOST_OF_PIECES = 0.02, 0.1
 may lose more: a sheet of even thickness has less volume once its noise, and so some of its area, is gone."""
 
 WORTHWHILE = 0.5
-"""A proxy has at most this share of the solid's triangles."""
-
-LARGE_STEP = 0.5
-"""The same while the proxy is larger than any that is looked at."""
+"""A proxy has at most this share of the solid's triangles; also the step while it is larger than any looked at."""
 
 TYPICAL_REDUCTION = 8
 """Proxies with more than one triangle in this many are only looked at where smaller ones are not near enough."""
@@ -156,7 +153,7 @@ def _smallest(
     looked_at = mesh[0][_samples(mesh, samples)]
     best: _Copy | None = None
     copy = mesh
-    while (count := math.floor((STEP if len(copy[1]) <= largest else LARGE_STEP) * len(copy[1]))) >= coarsest:
+    while (count := math.floor((STEP if len(copy[1]) <= largest else WORTHWHILE) * len(copy[1]))) >= coarsest:
         copy = _reduced(copy, count, threads)
         if len(copy[1]) <= largest:
             if not _is_alike(copy, volume, lost):

@@ -33,8 +33,7 @@ class SurfaceQuery:
 
     @cached_property
     def _surface(self) -> Surface:
-        vertices = np.ascontiguousarray(self.vertices, dtype=np.float64)
-        return Surface(vertices, np.ascontiguousarray(self.faces, dtype=np.int32), self.threads or 0)
+        return Surface(self.vertices, self.faces.astype(np.int32), self.threads or 0)
 
     @property
     def index(self) -> Surface | None:
@@ -43,28 +42,20 @@ class SurfaceQuery:
 
     def distance(self, points: FloatArray) -> FloatArray:
         """Return the distance ``[N]`` of each point to the faces."""
-        if len(points) == 0:
-            return np.empty(0)
-        return np.asarray(self._surface.distance(np.ascontiguousarray(points), threads=self.threads or 0))
+        return self._surface.distance(points, threads=self.threads or 0)
 
     def closest(self, points: FloatArray) -> tuple[FloatArray, IntArray]:
         """Return the closest point ``[N, 3]`` of the faces and the face ``[N]`` it lies on."""
-        if len(points) == 0:
-            return np.empty((0, 3)), np.empty(0, dtype=np.int64)
-        found, face = self._surface.closest(np.ascontiguousarray(points), threads=self.threads or 0)
-        return np.asarray(found), np.asarray(face, dtype=np.int64)
+        found, face = self._surface.closest(points, threads=self.threads or 0)
+        return found, face.astype(np.int64)
 
     def winding(self, points: FloatArray, *, is_closed: bool = False) -> FloatArray:
         """Return ``[N]`` how many times the faces wind around each point: a whole number if they are closed."""
-        if len(points) == 0:
-            return np.empty(0)
-        points = np.ascontiguousarray(points)
-        return np.asarray(self._surface.winding(points, threads=self.threads or 0, is_closed=is_closed))
+        return self._surface.winding(points, threads=self.threads or 0, is_closed=is_closed)
 
     def inside(self, points: FloatArray) -> BoolArray:
         """Return ``[N]`` whether the faces, a closed outward surface, wind around each point."""
-        result: BoolArray = self.winding(points, is_closed=True) > 0.5
-        return result
+        return self.winding(points, is_closed=True) > 0.5
 
 
 def probes(vertices: FloatArray, faces: IntArray) -> FloatArray:

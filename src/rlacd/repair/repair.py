@@ -44,7 +44,16 @@ from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import BodyRepair, Solid
-from rlacd.solid.topology import NO_FILM, BoolArray, IntArray, bodies_of, detach_films, face_areas, signed_tetrahedra
+from rlacd.solid.topology import (
+    NO_FILM,
+    BoolArray,
+    IntArray,
+    bodies_of,
+    compacted,
+    detach_films,
+    face_areas,
+    signed_tetrahedra,
+)
 
 CELLS_ACROSS = 1.5
 """Least radius of a ball, in cells of the grid that it rolls on."""
@@ -158,7 +167,7 @@ def repair(
         There is no time left: `rlacd.solid.cover` needs next to none.
     """
     poll_stop()
-    points, corners = _used(mesh)
+    points, corners = compacted(mesh.vertices, mesh.faces) if len(mesh.faces) else (mesh.vertices, mesh.faces)
     if len(points) == 0:
         raise EmptyMeshError("the mesh has no points, so there is nothing to decompose: check the file or its export")
     poll_stop()
@@ -198,15 +207,6 @@ def _take_steps(work: Work) -> None:
     for is_needed, step in AT_LAST:
         if is_needed(work):
             step(work)
-
-
-def _used(mesh: InputMesh) -> tuple[FloatArray, IntArray]:
-    """The points that faces use and the faces by these; all points if there are no faces."""
-    used = np.zeros(len(mesh.vertices), dtype=bool)
-    used[mesh.faces] = True
-    if used.all() or len(mesh.faces) == 0:
-        return mesh.vertices, mesh.faces
-    return mesh.vertices[used], (np.cumsum(used) - 1)[mesh.faces]
 
 
 def _is_inside(vertices: FloatArray, faces: IntArray, film: BoolArray, threads: int | None) -> BoolArray:

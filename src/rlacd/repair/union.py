@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Sequence
-from typing import TypeVar
 
 import numpy as np
 from manifold3d import Manifold, OpType
-from numpy.typing import NDArray
 
 from rlacd import _native
 from rlacd._native import poll_stop
@@ -19,9 +17,7 @@ from rlacd.solid.component import concatenated
 from rlacd.solid.frame import thickened
 from rlacd.solid.manifold import require_time_for, to_manifold
 from rlacd.solid.solid import Shape, mesh_of, surface_of
-from rlacd.solid.topology import IntArray
-
-Index = TypeVar("Index", bound=np.signedinteger)
+from rlacd.solid.topology import IntArray, compacted
 
 # manifold3d collapses edges shorter than 1e-12, and swaps those of faces that are no higher, or folded back onto a
 # neighbour in a plane within 1e-12.
@@ -106,7 +102,7 @@ def slab_of_faces(vertices: FloatArray, faces: IntArray) -> Manifold:
 def split_labels(vertices: FloatArray, faces: IntArray, label: IntArray) -> list[tuple[FloatArray, IntArray]]:
     """Split a mesh into the faces of each label, in ascending order of the labels."""
     if len(label) and (label == label[0]).all():
-        return [_of_faces(vertices, faces)]
+        return [compacted(vertices, faces)]
     order = np.argsort(label, kind="stable")
     cuts = np.flatnonzero(np.diff(label[order])) + 1
     parts = []
@@ -187,8 +183,7 @@ def _without_cavities(solid: Manifold) -> Shape:
     """
     vertices, faces = surface_of(solid)
     shells = _native.closed_bodies(vertices, faces)
-    if shells is None:  # more than two faces share an edge
-        return _outer_united(solid)
+    assert shells is not None, "two faces of a manifold share an edge"
     shell, volume, _, boxes = shells[:4]
     is_cavity = volume <= 0
     if not is_cavity.any() or is_cavity.all():
@@ -205,25 +200,7 @@ def _without_cavities(solid: Manifold) -> Shape:
         around = _native.Surface(vertices, np.ascontiguousarray(faces[order[begin[cavity] : begin[cavity + 1]]]))
         standing = around.winding(vertices[faces[order[begin[some]], 0]], is_closed=True) < 0
         kept[some[standing]] = False
-    return _of_faces(vertices, faces[kept[shell]])
-
-
-def _outer_united(solid: Manifold) -> Manifold:
-    shells = solid.decompose()
-    outer = [s for s in shells if s.volume() > 0]
-    if len(outer) == len(shells) or not outer:
-        return solid
-    # Solids inside a cavity overlap the filled solid now.
-    return _united(outer)
-
-
-def _of_faces(vertices: FloatArray, faces: NDArray[Index]) -> tuple[FloatArray, NDArray[Index]]:
-    """Some faces and the vertices that they use, in the same order."""
-    used = np.zeros(len(vertices), dtype=bool)
-    used[faces] = True
-    if used.all():
-        return vertices, faces
-    return vertices[used], (np.cumsum(used, dtype=faces.dtype) - 1).astype(faces.dtype)[faces]
+    return compacted(vertices, faces[kept[shell]])
 
 
 def _united(solids: list[Manifold]) -> Manifold:

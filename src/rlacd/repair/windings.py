@@ -6,15 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from rlacd._native import poll_stop
-from rlacd.repair.distance import SurfaceQuery
-from rlacd.repair.soup import FLAPS, FLAT, Soup, face_normals
+from rlacd.repair.soup import FLAPS, FLAT, Soup
 from rlacd.repair.union import split_labels
 from rlacd.repair.work import Piece, Work
-from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.manifold import to_manifold
-from rlacd.solid.topology import BoolArray, IntArray, is_balanced, marked, signed_tetrahedra
+from rlacd.solid.topology import BoolArray, is_balanced, marked, signed_tetrahedra
 
 BESIDE = HALF_THICKNESS / 5
 """Distance from a face at which the winding number is evaluated."""
@@ -45,8 +42,8 @@ def are_crowded(work: Work) -> bool:
 
 
 def sort_out(work: Work) -> None:
-    """Find the sides of crowded bodies by windings where angles fail, and without the faces that hide inside."""
-    work.soup = _without_hidden(trust_windings(work.soup, work.record.bodies), work)
+    """Find the sides of crowded bodies by windings where angles fail."""
+    work.soup = trust_windings(work.soup, work.record.bodies)
 
 
 def trust_windings(soup: Soup, bodies: int, flap: BoolArray | bool = False) -> Soup:
@@ -78,37 +75,3 @@ def trust_windings(soup: Soup, bodies: int, flap: BoolArray | bool = False) -> S
     trusting = replace(soup, known_edges=soup.edges, trusted=before | doubted[soup.body])
     better = doubted & (trusting.sheet_share(bodies, flap) < share / 2)
     return replace(soup, known_edges=soup.edges, trusted=before | better[soup.body]) if better.any() else soup
-
-
-def _without_hidden(soup: Soup, work: Work) -> Soup:
-    """Drop faces that lie inside their own body, if they are what keeps the body from having an inside.
-
-    Where parts meet in faces that overlap without matching, the order of faces around an edge is undecided, and one
-    wrong guess joins the inside with the outside. The winding number is not affected.
-    """
-    bodies = work.record.bodies
-    crowded = marked(soup.body[soup.at_valence(soup.edges.valence > 2)], bodies)
-    share = soup.sheet_share(bodies)
-    hidden = np.zeros(len(soup.faces), dtype=bool)
-    for body in np.flatnonzero(crowded & (share > FLAPS)):
-        poll_stop()
-        some = np.flatnonzero(soup.body == body)
-        hidden[some] = _hidden_faces(soup.vertices, soup.faces[some])
-    if not hidden.any():
-        return soup
-    better = soup.only(~hidden).sheet_share(bodies) < share / 2
-    work.record.note(soup.body[hidden & better[soup.body]], "outer skin")
-    return soup.only(~hidden | ~better[soup.body])
-
-
-def _hidden_faces(vertices: FloatArray, faces: IntArray) -> BoolArray:
-    """Return ``[F]`` which faces of one body it winds around on both sides."""
-    middle, step = vertices[faces].mean(axis=1), BESIDE * face_normals(vertices, faces)
-    query = SurfaceQuery(vertices, faces)
-    sign = -1 if signed_tetrahedra(vertices, faces).sum() < 0 else 1
-    # On a skin the sides have 0 and 1; a wall inside has 0.5 and 1.5. A skin that lies double has 0 and 2.
-    before = sign * query.winding(middle + step)
-    hidden: BoolArray = before > 0.25
-    behind = sign * query.winding((middle - step)[hidden])
-    hidden[hidden] = (behind > 0.25) & ((before[hidden] + behind) / 2 > 0.75)
-    return hidden

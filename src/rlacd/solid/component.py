@@ -77,6 +77,7 @@ class Part:
         self.within: Part | None = None
         self.tree: _native.TreeCache | None = None
         self._size = len(faces)
+        self._members: tuple[Component, ...] = ()
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}(volume {self.volume:.4g}, hull {self.hull.volume:.4g})"
@@ -84,7 +85,7 @@ class Part:
     @property
     def members(self) -> tuple[Component, ...]:
         """The components it consists of; empty if it was not made from components."""
-        return ()
+        return self._members
 
     @property
     def vertices(self) -> FloatArray:
@@ -145,11 +146,6 @@ class _Union(Part):
         self._size = first.size + second.size
         self._members = (*first.members, *second.members)
 
-    @property
-    def members(self) -> tuple[Component, ...]:
-        """The members of both parts."""
-        return self._members
-
     def _resolved(self) -> tuple[FloatArray, IntArray]:
         if self._surface is None:
             for union in reversed(self._unresolved()):  # a loop: a thousand nested unions are too deep to recurse
@@ -199,11 +195,6 @@ class ClippedPart(Part):
         self.tree = inside.tree
         self.solid = solid
         self._members = (*first.members, *second.members)
-
-    @property
-    def members(self) -> tuple[Component, ...]:
-        """The members of both parts."""
-        return self._members
 
     @property
     def is_whole(self) -> bool:

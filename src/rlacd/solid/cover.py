@@ -18,6 +18,7 @@ from rlacd.solid.hull import Hull
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import Solid, surface_of
+from rlacd.solid.topology import compacted
 
 MOST_HULLS = 2000
 """If there are more bodies, neighbours along a space-filling curve share a hull."""
@@ -54,7 +55,7 @@ def cover(mesh: InputMesh, run: Run) -> tuple[Solid, list[Part]]:
         Each is its own hull.
     """
     with run.shielded():
-        used = mesh.vertices if len(mesh.faces) == 0 else mesh.vertices[_used(mesh)]
+        used = compacted(mesh.vertices, mesh.faces)[0] if len(mesh.faces) else mesh.vertices
         frame = Frame.of(used)
         vertices = frame.to_frame(mesh.vertices)
         faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
@@ -67,12 +68,6 @@ def cover(mesh: InputMesh, run: Run) -> tuple[Solid, list[Part]]:
     )
     solid = Solid(Manifold(), (vertices, faces), frame, (), (*mesh.warnings, warning))
     return solid, [Part(hull.vertices, hull.faces, hull.volume, hull) for hull in hulls]
-
-
-def _used(mesh: InputMesh) -> NDArray[np.bool_]:
-    used = np.zeros(len(mesh.vertices), dtype=bool)
-    used[mesh.faces] = True
-    return used
 
 
 def _bodies(vertices: FloatArray, faces: IntArray) -> list[FloatArray]:

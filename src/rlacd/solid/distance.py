@@ -10,10 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from rlacd import _native
-from rlacd.errors import OptionError
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.hull import Hull
 
@@ -27,36 +24,6 @@ DISTANCE_ACCURACY = 2e-3
 
 CRACK = 1e-6
 """Cracks between hulls narrower than this are closed: the two sides of a cut are not part of the union's surface."""
-
-
-def directed_hausdorff(
-    vertices: FloatArray,
-    faces: IntArray,
-    surface: _native.Surface,
-    tolerance: float = DISTANCE_ACCURACY,
-    threads: int | None = None,
-) -> Interval:
-    """Greatest distance from a point on the triangles of a mesh to a surface.
-
-    Parameters
-    ----------
-    vertices : float64 [N, 3]
-    faces : int32 [F, 3]
-        The mesh, of any quality.
-    surface : _native.Surface
-        The surface to measure to.
-    tolerance
-        Width of the interval.
-    threads
-        None uses every core.
-
-    Raises
-    ------
-    OptionError
-        The tolerance is not positive.
-    """
-    _require_positive(tolerance)
-    return _native.directed_hausdorff(vertices, faces, surface, tolerance, threads or 0)
 
 
 @dataclass(frozen=True)
@@ -110,13 +77,7 @@ def hull_distances(
     Facets are clipped exactly against the other hulls, and the surface's triangles against all hulls; the maximum over
     the remaining pieces is found by branch and bound, with distance to a triangle or to a hull convex on each piece.
     Without hulls, nothing is added (0) and everything is missed (infinity).
-
-    Raises
-    ------
-    OptionError
-        The tolerance is not positive.
     """
-    _require_positive(tolerance)
     union = hull_union(hulls, threads)
     surface = surface or _native.Surface(vertices, faces)
     least_over, over, over_at = union.over(surface, tolerance, CRACK, threads or 0)
@@ -126,13 +87,4 @@ def hull_distances(
 
 def hull_union(hulls: Sequence[Hull], threads: int | None = None) -> _native.HullUnion:
     """Prepare the union of hulls for queries: ``distance(points)``, ``exposed()``, ``over(...)``, ``under(...)``."""
-    return _native.HullUnion(
-        [np.ascontiguousarray(hull.vertices, dtype=np.float64) for hull in hulls],
-        [np.ascontiguousarray(hull.faces, dtype=np.int32) for hull in hulls],
-        threads or 0,
-    )
-
-
-def _require_positive(tolerance: float) -> None:
-    if not tolerance > 0:
-        raise OptionError(f"The tolerance must be positive, not {tolerance}; {DISTANCE_ACCURACY} is usual.")
+    return _native.HullUnion([hull.vertices for hull in hulls], [hull.faces for hull in hulls], threads or 0)

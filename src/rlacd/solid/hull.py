@@ -8,7 +8,6 @@ from functools import cached_property
 import numpy as np
 
 from rlacd import _native
-from rlacd.errors import OptionError
 from rlacd.options.presets import HullLimits
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.primitive import Primitive
@@ -99,22 +98,12 @@ def limit_hull(
     Hull
         Convex; contains the given hull (up to rounding, about 1e-12). The given hull itself if nothing changed.
 
-    Raises
-    ------
-    OptionError
-        A limit below 4, or a negative tolerance.
-
     Notes
     -----
     Edges are collapsed outwards, cheapest first, each by solving a linear program (progressive hulls: Sander et al.,
     "Silhouette Clipping", SIGGRAPH 2000). Then the remaining corners are moved one at a time to minimise the volume
     while the hull stays convex and contains the given one.
     """
-    for name, limit in limits._asdict().items():
-        if limit is not None and limit < 4:
-            raise OptionError(f"{name} must be at least 4, the corners and faces of a tetrahedron, not {limit}.")
-    if not tolerance >= 0:
-        raise OptionError(f"The tolerance must not be negative, as {tolerance} is; 1e-6 is usual.")
     most, most_faces = (min(limit or _NO_LIMIT, _NO_LIMIT) for limit in limits)
     vertices, faces = _native.simplify_hull(hull.vertices, hull.faces, most, most_faces, tolerance, sides)
     if len(vertices) == len(hull.vertices) and (vertices == hull.vertices).all():

@@ -6,11 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from rlacd.options.output import Axis
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.topology import IntArray
+from rlacd.solid.topology import IntArray, compacted
 
 _UNITS = {1e-6: "µm", 1e-3: "mm", 1e-2: "cm", 1.0: "m", 0.0254: "in", 0.3048: "ft"}
 
@@ -112,12 +110,5 @@ class InputMesh:
     def of_node(self, index: int) -> InputMesh:
         """Get only the triangles that one node places, and the vertices that they use."""
         assert self.node_of is not None
-        used, faces = np.unique(self.faces[self.node_of == index], return_inverse=True)
-        return replace(
-            self,
-            vertices=np.ascontiguousarray(self.vertices[used]),
-            faces=np.ascontiguousarray(faces.reshape(-1, 3).astype(np.int64)),
-            warnings=(),
-            nodes=(),
-            node_of=None,
-        )
+        vertices, faces = compacted(self.vertices, self.faces[self.node_of == index])
+        return replace(self, vertices=vertices, faces=faces, warnings=(), nodes=(), node_of=None)

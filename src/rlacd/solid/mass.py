@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -37,18 +37,28 @@ class Mass:
         """Return the same body at another density."""
         return Mass(self.volume_abs * density, self.centre_abs, self.inertia_abs * density)
 
+    def as_plain(self) -> dict[str, Any]:
+        """Plain values that ``json`` can write."""
+        centre, inertia = self.centre_abs.tolist(), self.inertia_abs.tolist()
+        return {"volume_abs": self.volume_abs, "centre_abs": centre, "inertia_abs": inertia}
+
+    @classmethod
+    def of_plain(cls, plain: Mapping[str, Any]) -> Mass:
+        """The mass that `as_plain` describes."""
+        return cls(float(plain["volume_abs"]), np.array(plain["centre_abs"]), np.array(plain["inertia_abs"]))
+
 
 def mass_of(vertices: FloatArray, faces: IntArray, frame: Frame) -> Mass:
     """Integrate over a closed, outward mesh ``[V, 3]``, ``[F, 3]`` in the frame."""
     volume, centre, inertia = _native.mesh_mass(
         np.ascontiguousarray(vertices, dtype=np.float64), np.ascontiguousarray(faces, dtype=np.int32)
     )
-    with np.errstate(over="ignore", under="ignore"):  # at the ends of float64's range, volumes overflow or underflow
+    with np.errstate(all="ignore"):  # at the ends of float64's range, volumes overflow or underflow
         unit = np.minimum(np.float64(1.0) / frame.scale, _GREATEST)
         return Mass(
-            float(_times(volume, unit, 3)),
+            float(_times(volume, unit**3)),
             frame.to_input(centre[None])[0],
-            _times(inertia, unit, 5),
+            _times(inertia, unit**5),
         )
 
 
@@ -64,9 +74,6 @@ def joint_mass(masses: Sequence[Mass]) -> Mass:
     return Mass(float(volume), centre, inertia)
 
 
-def _times(value: Any, unit: np.float64, power: int) -> FloatArray:
-    """Multiply step by step, clipped to the largest float: a power of the unit itself may be infinite."""
-    result = np.asarray(value, dtype=np.float64)
-    for _ in range(power):
-        result = np.clip(result * unit, -_GREATEST, _GREATEST)
-    return result
+def _times(value: Any, factor: np.float64) -> FloatArray:
+    """Multiply, within the range of floats."""
+    return np.asarray(np.nan_to_num(value * factor, nan=0.0, posinf=_GREATEST, neginf=-_GREATEST))

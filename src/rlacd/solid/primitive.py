@@ -69,12 +69,8 @@ class Primitive:
     @property
     def roll_pitch_yaw(self) -> tuple[float, float, float]:
         """The rotation `axes` as angles about the fixed x, then y, then z axis."""
-        (r00, _, _), (r10, r11, r12), (r20, r21, r22) = self.axes.tolist()
-        cosine = math.hypot(r00, r10)
-        pitch = math.atan2(-r20, cosine)
-        if cosine < 1e-9:  # x and z are one axis: leave z out
-            return math.atan2(-r12, r11), pitch, 0.0
-        return math.atan2(r21, r22), pitch, math.atan2(r10, r00)
+        roll, pitch, yaw = trimesh.transformations.euler_from_matrix(self.axes)
+        return roll, pitch, yaw
 
     def beyond(self, points: FloatArray) -> float:
         """How far the farthest of points [N, 3] lies outside; 0 if none does, at most sqrt(3) too little."""

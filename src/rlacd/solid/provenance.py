@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from rlacd._native import poll_stop
+from rlacd._native import HullUnion, poll_stop, sample_surface
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import Frame
 from rlacd.solid.topology import IntArray
@@ -44,23 +44,15 @@ def owners(
         return [int(label_of[0])] * len(hulls)
     frame = Frame.of(vertices)  # areas and squares of any finite coordinates fit in a double there
     points, labels = _spread(frame.to_frame(vertices), faces, label_of)
-    order = np.argsort(points[:, 0], kind="stable")
-    points, labels = points[order], labels[order]
+    shapes = [(frame.to_frame(hull.vertices), hull.faces.astype(np.int32)) for hull in hulls]
+    union = HullUnion([vertices for vertices, _ in shapes], [faces for _, faces in shapes])
     found = []
-    for hull in hulls:
+    for number, (corners, _) in enumerate(shapes):
         poll_stop()
-        corners = frame.to_frame(hull.vertices)[hull.faces]
-        lower, upper = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+        lower, upper = corners.min(axis=0), corners.max(axis=0)
         slack = OUTSIDE_HULL * float((upper - lower).max())
-        first, last = np.searchsorted(points[:, 0], (lower[0] - slack, upper[0] + slack))
-        some = points[first:last]
-        near = first + np.flatnonzero(((some >= lower - slack) & (some <= upper + slack)).all(axis=1))
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
-        x, y, z = points[near].T[:, :, None]
-        limit = (normals * corners[:, 0]).sum(axis=1) + slack
-        # Not a product of matrices: those start threads of their own.
-        inside = near[(x * normals[:, 0] + y * normals[:, 1] + z * normals[:, 2] <= limit).all(axis=1)]
+        near = np.flatnonzero(((points >= lower - slack) & (points <= upper + slack)).all(axis=1))
+        inside = near[union.only([number]).distance(points[near], 1) <= slack]
         if len(inside) == 0:
             inside = np.array([((points - (lower + upper) / 2) ** 2).sum(axis=1).argmin()])
         found.append(int(np.bincount(labels[inside]).argmax()))
@@ -69,22 +61,16 @@ def owners(
 
 def _spread(vertices: FloatArray, faces: NDArray[np.integer], label_of: IntArray) -> tuple[FloatArray, IntArray]:
     """Points spread over the surface in proportion to its area, with their labels; the same for the same surface."""
-    corners = vertices[faces]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    draw = np.random.default_rng(0)
-    whole = area.sum()
-    chosen = []
+    area = trimesh.triangles.area(vertices[faces])
     order = np.argsort(label_of, kind="stable")
+    points, labels = [], []
     for mine in np.split(order, np.flatnonzero(np.diff(label_of[order])) + 1):
         poll_stop()
-        weight = area[mine]
-        count = max(LEAST_OF_LABEL, round(SURFACE_SAMPLES * weight.sum() / whole)) if whole > 0 else LEAST_OF_LABEL
-        share = weight / weight.sum() if weight.sum() > 0 else None
-        chosen.append(draw.choice(mine, count, p=share))
-    face = np.concatenate(chosen)
-    u, v = draw.random((2, len(face)))
-    over = u + v > 1
-    u[over], v[over] = 1 - u[over], 1 - v[over]
-    a, b, c = corners[face].swapaxes(0, 1)
-    points = a + u[:, None] * (b - a) + v[:, None] * (c - a)
-    return points, np.asarray(label_of[face], dtype=np.int64)
+        own, own_faces = float(area[mine].sum()), np.ascontiguousarray(faces[mine], dtype=np.int32)
+        if own > 0:
+            count = max(LEAST_OF_LABEL, round(SURFACE_SAMPLES * own / float(area.sum())))
+            points.append(sample_surface(vertices, own_faces, count, 0)[0])
+        else:
+            points.append(vertices[own_faces[:, 0]])
+        labels.append(np.full(len(points[-1]), label_of[mine[0]], dtype=np.int64))
+    return np.concatenate(points), np.concatenate(labels)

@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,7 @@ from rlacd import _native
 from rlacd._native import poll_stop
 from rlacd.solid.arrays import FloatArray
 
+Index = TypeVar("Index", bound=np.signedinteger)
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
@@ -49,6 +51,15 @@ def has_marked(mark: BoolArray, corners: IntArray) -> BoolArray:
     a, b, c = corners.T
     result: BoolArray = mark[a] | mark[b] | mark[c]
     return result
+
+
+def compacted(vertices: FloatArray, faces: NDArray[Index]) -> tuple[FloatArray, NDArray[Index]]:
+    """The vertices that faces use, in the same order, and the faces."""
+    used = np.zeros(len(vertices), dtype=bool)
+    used[faces] = True
+    if used.all():
+        return vertices, faces
+    return vertices[used], (np.cumsum(used, dtype=faces.dtype) - 1).astype(faces.dtype)[faces]
 
 
 def first_of_doubled(faces: IntArray, count: int) -> BoolArray:

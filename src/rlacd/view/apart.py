@@ -30,12 +30,10 @@ def renderer() -> Iterator[Render]:
     def render_apart(
         bodies: Sequence[Body], width: int, height: int, *, spheres: Spheres | None = None, **how: Any
     ) -> npt.NDArray[np.uint8]:
-        arrays = {f"body {index}": body.triangles for index, body in enumerate(bodies)}
-        colors = [body.color.tolist() for body in bodies]
-        if spheres is not None:
-            arrays |= {"centres": spheres.centres, "radii": spheres.radii, "ink": spheres.color}
+        arrays = {f"{name} {index}": array for index, body in enumerate(bodies) for name, array in vars(body).items()}
+        arrays |= {} if spheres is None else vars(spheres)
         blobs = {name: np.asarray(array, dtype=np.float64).tobytes() for name, array in arrays.items()}
-        values = {"colors": colors, "width": width, "height": height, "how": how}
+        values = {"bodies": len(bodies), "width": width, "height": height, "how": how}
         try:
             answer = worker.ask(Request(SERVER, values, blobs, limits=ProcessLimits(memory=0)))
         except WorkerDiedError as died:
@@ -58,12 +56,9 @@ class RenderServer:
     def __call__(self, values: Values, blobs: Blobs, shared: Mapping[str, Shared]) -> tuple[Values, dict[str, bytes]]:
         """Render one picture."""
         arrays = {name: np.frombuffer(blob) for name, blob in blobs.items()}
-        bodies = [
-            Body(arrays[f"body {index}"].reshape(-1, 3, 3), np.array(color))
-            for index, color in enumerate(values["colors"])
-        ]
-        spheres = None
-        if "ink" in arrays:
-            spheres = Spheres(arrays["centres"].reshape(-1, 3), arrays["radii"], arrays["ink"])
+        shapes = [(arrays[f"triangles {index}"], arrays[f"color {index}"]) for index in range(values["bodies"])]
+        bodies = [Body(triangles.reshape(-1, 3, 3), color) for triangles, color in shapes]
+        centres = arrays.get("centres")
+        spheres = None if centres is None else Spheres(centres.reshape(-1, 3), arrays["radii"], arrays["color"])
         pixels = render(bodies, values["width"], values["height"], spheres=spheres, **values["how"])
         return {}, {"pixels": pixels.tobytes()}

@@ -10,7 +10,6 @@ import numpy.typing as npt
 import trimesh
 
 from rlacd.io.write.palette import DISTINCT, hull_colors
-from rlacd.solid.arrays import BoolArray, FloatArray, IntArray
 
 HUES = len(DISTINCT) // 3
 """Colours that are easy to tell apart, also for the colour-blind; see `rlacd.io.write.palette`."""
@@ -61,51 +60,22 @@ def neighbours(hulls: Sequence[trimesh.Trimesh]) -> list[set[int]]:
     beside: list[set[int]] = [set() for _ in hulls]
     if not hulls:
         return beside
-    solids = [HalfSpaces.of(np.asarray(hull.vertices, dtype=np.float64), np.asarray(hull.faces)) for hull in hulls]
-    lower, upper = np.array([solid.lower for solid in solids]), np.array([solid.upper for solid in solids])
+    lower, upper = np.array([hull.bounds for hull in hulls]).swapaxes(0, 1)
     near = TOO_CLOSE_TO_SEE * float((upper.max(axis=0) - lower.min(axis=0)).max())
-    for one, solid in enumerate(solids):
+    for one, hull in enumerate(hulls):
         boxes = np.all((lower[one + 1 :] <= upper[one] + near) & (upper[one + 1 :] >= lower[one] - near), axis=1)
         for other in (one + 1 + np.flatnonzero(boxes)).tolist():
-            if not (solid.lies_apart(solids[other], near) or solids[other].lies_apart(solid, near)):
+            if not (_lies_above(hulls[other], hull, near) or _lies_above(hull, hulls[other], near)):
                 beside[one].add(other)
                 beside[other].add(one)
     return beside
 
 
-@dataclass(frozen=True, eq=False)
-class HalfSpaces:
-    """A convex hull as its corners and its facets' planes n·x <= d, and its bounding box."""
-
-    corners: FloatArray
-    normals: FloatArray
-    offsets: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-
-    @classmethod
-    def of(cls, corners: FloatArray, faces: IntArray) -> HalfSpaces:
-        """Make them from a closed mesh; facets too thin to have a normal are skipped."""
-        triangles = corners[faces]
-        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        lengths = np.linalg.norm(normals, axis=1)
-        sound = lengths > 0
-        normals = normals[sound] / lengths[sound, None]
-        offsets = np.einsum("ij,ij->i", normals, triangles[sound, 0])
-        return cls(corners, normals, offsets, corners.min(axis=0), corners.max(axis=0))
-
-    def holds(self, points: FloatArray, near: float) -> BoolArray:
-        """Tell which points [N, 3] lie in the hull or within `near` of its planes."""
-        held = np.all((points >= self.lower - near) & (points <= self.upper + near), axis=1)
-        inside = np.flatnonzero(held)
-        if len(inside):
-            held[inside] = np.all(points[inside] @ self.normals.T <= self.offsets + near, axis=1)
-        return np.asarray(held)
-
-    def lies_apart(self, other: HalfSpaces, near: float) -> bool:
-        """Whether another hull is further than `near` above one of the planes."""
-        above = (self.normals @ other.corners.T).min(axis=1, initial=np.inf) > self.offsets + near
-        return bool(above.any())
+def _lies_above(one: trimesh.Trimesh, other: trimesh.Trimesh, near: float) -> bool:
+    """Whether a hull is further than `near` above the plane of a facet of another."""
+    normals = other.face_normals  # zero where a facet is too thin to have one
+    heights = (normals @ one.vertices.T).min(axis=1) - (normals * other.triangles[:, 0]).sum(axis=1)
+    return bool((heights > near).any())
 
 
 def _smallest_last(beside: list[set[int]]) -> list[int]:

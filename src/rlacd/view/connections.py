@@ -1,4 +1,4 @@
-"""Connections of the viewer's server, with bounds on their number, duration and size.
+"""Connections of the viewer's server, with bounds on their number and duration.
 
 Every connection has a thread, so their number is bounded; one more is answered 503 at once, without a thread. Each has
 a deadline: a request that trickles in, a client that does not read and an idle connection are closed when it has
@@ -8,23 +8,19 @@ passed.
 from __future__ import annotations
 
 import contextlib
-import http.client
 import json
 import math
 import socket
 import threading
 import time
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import Any, BinaryIO
+from typing import Any
 
 MOST_CONNECTIONS = 48
 """Concurrent connections; a browser opens up to six."""
 
 MOST_STREAMS = 16
 """Concurrent event streams, one per open page."""
-
-LONGEST_HEAD = 16_384
-"""Bytes of the request line and headers."""
 
 REQUEST_SECONDS = 10.0
 """Seconds to receive headers and body, from the first byte expected; also how long an idle connection is kept."""
@@ -33,10 +29,6 @@ ANSWER_SECONDS = 120.0
 """Seconds to send an answer of any size."""
 
 FULL = "too many connections to this viewer are open; close a page and reload this one."
-
-
-class HeadTooLong(http.client.HTTPException):
-    """A request whose request line and headers exceed `LONGEST_HEAD`."""
 
 
 class BoundedServer(ThreadingHTTPServer):
@@ -107,36 +99,22 @@ class BoundedServer(ThreadingHTTPServer):
 
 
 class BoundedHandler(BaseHTTPRequestHandler):
-    """A handler that reads heads of bounded size in bounded time, and reports errors as JSON."""
+    """A handler that reads requests in bounded time, and reports errors as JSON.
+
+    The base class bounds heads: to 100 lines of 64 KiB.
+    """
 
     server: BoundedServer
     protocol_version = "HTTP/1.1"
     timeout = 20.0  # seconds for a single send or receive
 
-    def setup(self) -> None:
-        """Bound the input before the first byte is read."""
-        super().setup()
-        self.rfile: Any = _BoundedReader(self.rfile)
-
     def handle_one_request(self) -> None:
-        """Give each request its own deadline and size limit."""
-        self.rfile.left = LONGEST_HEAD
+        """Give each request its own deadline."""
         self.server.expect(self.connection, REQUEST_SECONDS)
         try:
             super().handle_one_request()
-        except HeadTooLong:  # in the request line; the base class answers headers that are too long
-            self.close_connection = True
-            self.command = self.requestline = ""
-            self.request_version = self.protocol_version
-            self.send_error(431)
         except ConnectionError:
             self.close_connection = True
-
-    def read_body(self, length: int) -> bytes:
-        """Read the body of a request; shorter than `length` if the connection ends early."""
-        self.rfile.left = length
-        body: bytes = self.rfile.read(length)
-        return body
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
         """Answer what the base class refuses (methods, versions, heads) with JSON, and close the connection."""
@@ -153,37 +131,6 @@ class BoundedHandler(BaseHTTPRequestHandler):
         """Log nothing."""
 
 
-class _BoundedReader:
-    """Reads a connection, up to `left` bytes."""
-
-    def __init__(self, file: BinaryIO) -> None:
-        self._file = file
-        self.left = 0
-
-    def readline(self, size: int = -1) -> bytes:
-        most = self.left + 1 if size < 0 else min(size, self.left + 1)
-        line = self._file.readline(most)
-        self.left -= len(line)
-        if self.left < 0:
-            raise HeadTooLong("the request's headers are too long")
-        return line
-
-    def read(self, size: int) -> bytes:
-        content = self._file.read(min(size, self.left))
-        self.left -= len(content)
-        return content
-
-    def flush(self) -> None:
-        self._file.flush()
-
-    def close(self) -> None:
-        self._file.close()
-
-    @property
-    def closed(self) -> bool:
-        return self._file.closed
-
-
 FOREVER = math.inf
 
 
@@ -197,7 +144,7 @@ def _turn_away(connection: socket.socket) -> None:
     """Answer 503 without blocking."""
     connection.setblocking(False)
     with contextlib.suppress(OSError):
-        connection.recv(LONGEST_HEAD)  # closing a connection with unread input can destroy the answer
+        connection.recv(1 << 16)  # closing a connection with unread input can destroy the answer
     with contextlib.suppress(OSError):
         _send_refusal(connection, 503, "Service Unavailable", FULL)
 

@@ -148,7 +148,7 @@ def as_command(mesh: str | os.PathLike[str], given: dict[str, Any], usual: Any) 
         One line, quoted for a POSIX shell.
     """
     own = CRITERIA.get(str(given.get("criterion")), Options().numbers)
-    others = {number for numbers in CRITERIA.values() for number in numbers} - {*own}
+    others = _NUMBERS - {*own}
     words = ["rlacd", "decompose", os.fspath(mesh)]
     for field in dataclasses.fields(usual):
         value = given.get(field.name)

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import cast
 
 from rlacd.errors import MissingExtraError, OptionError
-from rlacd.io.write import FORMATS, MODELS, file_stem, save, save_balls
+from rlacd.io.write import FORMATS, MODELS, file_stem, save
+from rlacd.io.write.balls import save_balls
 from rlacd.io.write.target import WITH_MESHES
 from rlacd.io.write.usd import require_usd
 from rlacd.options.output import Axis

@@ -16,7 +16,6 @@ from rlacd import _native
 from rlacd.result import Result
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.frame import Frame
-from rlacd.view.coloring import HalfSpaces
 
 FINEST = 0.02
 """Facets are not subdivided below this edge length: 1 % of the input's longest side."""
@@ -69,16 +68,13 @@ def heat_map(decomposition: Result, *, triangles: int = 60_000, threads: int | N
     # Equilateral triangles of edge h have the area sqrt(3)/4 h²; narrow facets give smaller ones, hence more of them.
     area = sum(float(trimesh.triangles.area(corners[faces]).sum()) for corners, faces in hulls)
     edge = max(FINEST, float(np.sqrt(4.0 * area / max(triangles, 1))))
-    solids = [HalfSpaces.of(*hull) for hull in hulls]
-    lower, upper = np.array([solid.lower for solid in solids]), np.array([solid.upper for solid in solids])
+    union = _native.HullUnion([corners for corners, _ in hulls], [faces.astype(np.int32) for _, faces in hulls])
     result = []
     for index, hull in enumerate(hulls):
         vertices, faces = _divided(*hull, edge)
-        distance = np.asarray(surface.distance(vertices, threads or 0), dtype=np.float64)
-        meets = np.all((lower <= upper[index] + ON_HULL) & (upper >= lower[index] - ON_HULL), axis=1)
-        for other in np.flatnonzero(meets):
-            if other != index:
-                distance[solids[other].holds(vertices, ON_HULL)] = INNER
+        distance = surface.distance(vertices, threads or 0)
+        others = union.only([other for other in range(len(hulls)) if other != index])
+        distance[others.distance(vertices, threads or 0) <= ON_HULL] = INNER
         result.append(HeatMesh(vertices, faces, distance))
     return result
 

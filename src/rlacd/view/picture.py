@@ -12,11 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from rlacd._native import PointTree
-from rlacd.errors import OptionError
 from rlacd.fit import Fit
-from rlacd.io.write import check_file, write_file
+from rlacd.io.write import write_file
 from rlacd.io.write.palette import linear_from_srgb
-from rlacd.options.fields import checked, integer, path_like, read, shown
+from rlacd.io.write.target import checked_place
+from rlacd.options.fields import checked, integer, read
 from rlacd.options.output import OutputOptions
 from rlacd.result import Result
 from rlacd.solid.primitive import Balls
@@ -46,11 +46,8 @@ def check_picture(path: str | os.PathLike[str], up: str | None = None) -> Path:
     MissingExtraError
         The extra ``view`` is not installed.
     """
-    place = Path(read(path_like(), "path", path))
     check_up(up)
-    if place.suffix.lower() != ".png":
-        raise OptionError(f"cannot write the picture {shown(str(place))}: it must end in .png; rename it.")
-    check_file(place)
+    place = checked_place(path, "the picture", [".png"])
     for module in ("mitsuba", "PIL"):
         require_extra(module)
     return place

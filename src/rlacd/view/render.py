@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-import os
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -48,32 +46,12 @@ Render: TypeAlias = Callable[..., npt.NDArray[np.uint8]]
 def require_extra(module: str) -> Any:
     """Import a module of the extra ``view``, or raise an error that says how to get it."""
     try:
-        with _without_native_stderr():
-            return importlib.import_module(module)
+        return importlib.import_module(module)
     except ModuleNotFoundError as error:
         raise MissingExtraError("pictures need an extra: run  pip install 'rlacd[view]'  and try again.") from error
     except ImportError as error:
         # Installed, but a system library is missing, such as libatomic in a container without a compiler.
         raise MissingExtraError(f"pictures need {module}, which does not load here ({error}); install that.") from error
-
-
-@contextlib.contextmanager
-def _without_native_stderr() -> Iterator[None]:
-    """Silence stderr of C++ code: Mitsuba's compiler, which is not used here, complains about LLVM while loading."""
-    if sys.stderr is not None:
-        sys.stderr.flush()
-    try:
-        kept = os.dup(2)
-    except OSError:  # there is no stderr to silence
-        yield
-        return
-    try:
-        with open(os.devnull, "wb") as nowhere:
-            os.dup2(nowhere.fileno(), 2)
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
 
 
 def render(
@@ -123,9 +101,10 @@ def render(
             placed = (body.triangles - (low + high) / 2.0) / size
             scene[f"body_{index}"] = _mesh(mi, placed, body.color)
         if spheres is not None:
-            for index, (centre, radius) in enumerate(zip(spheres.centres, spheres.radii, strict=True)):
-                placed = (centre - (low + high) / 2.0) / size
-                scene[f"sphere_{index}"] = _sphere(placed, radius / size, spheres)
+            surface = {"type": "diffuse", "reflectance": {"type": "rgb", "value": spheres.color.tolist()}}
+            centres = ((spheres.centres - (low + high) / 2.0) / size).tolist()
+            for index, (centre, radius) in enumerate(zip(centres, (spheres.radii / size).tolist(), strict=True)):
+                scene[f"sphere_{index}"] = {"type": "sphere", "center": centre, "radius": radius, "surface": surface}
         light = np.array(mi.render(mi.load_dict(scene), spp=samples))
     if clear:
         covered = np.clip(light[..., 3:], 0.0, 1.0)
@@ -189,16 +168,6 @@ def _mesh(mi: Any, triangles: npt.NDArray[np.float64], color: npt.NDArray[np.flo
     arrays["faces"] = np.arange(3 * len(triangles), dtype=np.uint32)
     arrays.update()
     return mesh
-
-
-def _sphere(centre: npt.NDArray[np.float64], radius: float, look: Spheres) -> dict[str, Any]:
-    surface = {"type": "diffuse", "reflectance": {"type": "rgb", "value": look.color.tolist()}}
-    return {
-        "type": "sphere",
-        "center": centre.tolist(),
-        "radius": float(radius),
-        "surface": surface,
-    }
 
 
 @contextlib.contextmanager

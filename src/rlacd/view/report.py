@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from rlacd._version import __version__
-from rlacd.errors import MissingExtraError, OptionError
-from rlacd.io.write import check_file, write_file
-from rlacd.options.fields import path_like, read, shown
+from rlacd.errors import MissingExtraError
+from rlacd.io.write import write_file
+from rlacd.io.write.target import checked_place
 from rlacd.result import Result
 from rlacd.view.heat import heat_map
 from rlacd.view.page import still_page
@@ -19,54 +19,16 @@ from rlacd.view.render import Render, render
 from rlacd.view.scene import heat_scene, scene
 
 
-def check_report_page(path: str | os.PathLike[str], up: str | None = None) -> Path:
-    """Check, before any work, that `save_report_page` will be able to write to `path`.
-
-    Raises
-    ------
-    OptionError
-        The name does not end in ``.html``, or `up` is not an axis.
-    OutputError
-        The place is not writable.
-    """
-    place = Path(read(path_like(), "path", path))
-    if place.suffix.lower() not in (".html", ".htm"):
-        raise OptionError(f"cannot write the report {shown(str(place))}: it must end in .html; rename it.")
-    check_up(up)
-    check_file(place)
-    return place
-
-
 def save_report_page(
     decomposition: Result, path: str | os.PathLike[str], *, up: str | None = None, picture: bool = True
 ) -> Path:
-    """Write a report as one self-contained HTML file.
+    """Write a report; see `rlacd.Decomposition.save_report`.
 
-    It holds a 3-D view that can be rotated and exploded, the list of parts, an error heat map, the repairs, timings,
-    options and warnings. The same decomposition gives the same bytes.
-
-    Parameters
-    ----------
-    decomposition : Result
-    path : path-like
-        A ``.html`` file.
-    up : {"x", "y", "z"}, optional
-        The axis of the input that points up.
-    picture : bool
-        Include the picture, which takes a few seconds to render. Without the extra ``view`` it is left out, and a note
-        says so.
-
-    Returns
-    -------
-    pathlib.Path
-        Where it was written.
-
-    Raises
-    ------
-    OutputError, OptionError
-        As for `check_report_page`.
+    It may leave out the picture, which takes a few seconds to render. Without the extra ``view`` it always does, and a
+    note says so.
     """
-    place = check_report_page(path, up)
+    check_up(up)
+    place = checked_place(path, "the report", (".html", ".htm"))
     write_file(place, report_page(decomposition, up=up, picture=picture).encode())
     return place
 

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from rlacd.fit import Fit
 from rlacd.result import Result
+from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.frame import Frame
 from rlacd.solid.primitive import PRIMITIVE
 from rlacd.view.coloring import color_hulls
@@ -55,12 +56,8 @@ def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, 
             "of": len(decomposition.balls),
         }
     return {
-        "name": decomposition.name,
-        "up": up,
-        "unit": unit,
-        "scale": frame.scale,
+        **_scene(decomposition.name, up, unit, frame, source.vertices, source.faces),
         "report": report,
-        "input": _mesh(frame.to_frame(source.vertices), source.faces) if len(source.faces) else None,
         "parts": [
             {
                 **_mesh(frame.to_frame(hull.vertices), hull.faces),
@@ -80,6 +77,10 @@ def input_scene(name: str, vertices: ArrayLike, faces: ArrayLike, up: str = "z",
     """Describe an input without hulls yet: as `scene`, without parts or report."""
     points, corners = np.asarray(vertices, dtype=np.float64), np.asarray(faces)
     frame = Frame.of(points[np.unique(corners)] if len(corners) else points)
+    return _scene(name, up, unit, frame, points, corners)
+
+
+def _scene(name: str, up: str, unit: str, frame: Frame, points: FloatArray, corners: IntArray) -> dict[str, Any]:
     return {
         "name": name,
         "up": up,

@@ -113,6 +113,7 @@ class ViewServer(BoundedServer):
         )
         self.page, self.policy = page.text.encode(), f"{page.policy}; frame-ancestors 'none'"
         self._bind(port)
+        self._thread = threading.Thread(target=self.serve_forever, args=(0.1,), name="rlacd-view-server", daemon=True)
 
     @property
     def address(self) -> str:
@@ -123,6 +124,21 @@ class ViewServer(BoundedServer):
     def folder(self) -> Path | None:
         """Folder of an uploaded mesh; None if there is none."""
         return None if self._folder is None else Path(self._folder.name)
+
+    @property
+    def at_work(self) -> bool:
+        """Whether work is still running, even after the viewer is closed: a kernel cannot be interrupted."""
+        return not self.session.ended or self.connections > 0
+
+    def begin(self) -> None:
+        """Serve, on a thread of its own."""
+        self._thread.start()
+
+    def wait(self) -> None:
+        """Serve until Ctrl-C."""
+        with contextlib.suppress(KeyboardInterrupt):
+            while self._thread.is_alive():  # a wait without timeout would not notice Ctrl-C on Windows
+                self._thread.join(0.5)
 
     def decompose(self, controls: ViewerControls, *, other_input: bool = False) -> None:
         """Decompose the subject next: first a draft, then with the requested options."""
@@ -190,12 +206,11 @@ class ViewServer(BoundedServer):
         except OSError as error:
             if port is None:
                 super().__init__((ADDRESS, 0), _Handler)
-            elif error.errno == errno.EADDRINUSE:
-                raise OptionError(
-                    f"port {port} is in use; choose another with --port, or leave it out to get a free one."
-                ) from error
-            else:
-                raise OptionError(f"cannot listen on port {port} ({error.strerror}); choose another.") from error
+                return
+            why = "is in use" if error.errno == errno.EADDRINUSE else f"cannot be listened on ({error.strerror})"
+            raise OptionError(
+                f"port {port} {why}; choose another with --port, or leave it out to get a free one."
+            ) from error
 
 
 class _Handler(BoundedHandler):
@@ -307,7 +322,7 @@ class _Handler(BoundedHandler):
         if len(length) > len(str(longest)) or int(length) > longest:
             raise _Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"the request is longer than {longest:,} bytes.")
         self.server.expect(self.connection, seconds)
-        content = self.read_body(int(length))
+        content = self.rfile.read(int(length))
         self.server.expect(self.connection, FOREVER)
         if len(content) != int(length):
             raise ConnectionError("the request ended early")

@@ -6,10 +6,7 @@ result so far. All other threads read the state and wait for it to change.
 
 from __future__ import annotations
 
-import atexit
 import threading
-import time
-import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
@@ -53,10 +50,6 @@ class SessionState:
     error: str | None = None
 
 
-_SESSIONS: weakref.WeakSet[Session] = weakref.WeakSet()
-AT_EXIT = 30.0  # seconds that work may take to end when Python exits
-
-
 class Session:
     """Runs decompositions on its own thread.
 
@@ -76,7 +69,6 @@ class Session:
         self._result: Result | None = None
         self._thread = threading.Thread(target=self._work, name="rlacd-view", daemon=True)
         self._thread.start()
-        _SESSIONS.add(self)
 
     def __enter__(self) -> Session:
         return self
@@ -209,14 +201,3 @@ class Session:
 def _is_cut_short(result: Result) -> bool:
     """Tell whether the work was stopped during its first pass."""
     return result.report.get("complete") is False and result.report.get("search") is None
-
-
-@atexit.register
-def _end_all() -> None:
-    """End running work when Python exits: its thread would hold objects that C++ libraries report as leaked."""
-    until = time.monotonic() + AT_EXIT
-    sessions = list(_SESSIONS)
-    for session in sessions:
-        session.close(0.0)
-    for session in sessions:
-        session.close(max(0.0, until - time.monotonic()))

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import atexit
 import contextlib
-import dataclasses
 import os
-import threading
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from rlacd.options import Options
 from rlacd.view.controls import read_controls, read_subject
 from rlacd.view.picture import check_up
 from rlacd.view.server import ViewServer
-from rlacd.view.session import AT_EXIT, Run, Session
+from rlacd.view.session import Run, Session
+
+AT_EXIT = 30.0
+"""Seconds that work may take to end when Python exits."""
 
 
 @contextlib.contextmanager
@@ -28,7 +28,7 @@ def open_viewer(
     up: str | None = None,
     port: int | None = None,
     threads: int | None = None,
-) -> Iterator[Viewer]:
+) -> Iterator[ViewServer]:
     """Serve a page that shows a mesh and its hulls, until the block ends.
 
     The first decomposition starts at once. The page is only reachable from this machine and needs no network.
@@ -50,7 +50,8 @@ def open_viewer(
 
     Yields
     ------
-    Viewer
+    ViewServer
+        Its session does the work.
 
     Raises
     ------
@@ -70,55 +71,14 @@ def open_viewer(
     except BaseException:
         session.close()
         raise
-    thread = threading.Thread(target=server.serve_forever, args=(0.1,), name="rlacd-view-server", daemon=True)
-    thread.start()
+    server.begin()
     server.decompose(controls)
     try:
-        yield Viewer(session, server, thread)
+        yield server
     finally:
         until = time.monotonic() + 0.8  # for current work to end
         session.close(0.0)  # first, so that event streams end
         if not server.end(until - time.monotonic()):
             atexit.register(server.end, AT_EXIT)  # an answer is still being computed
-        session.close(max(0.0, until - time.monotonic()))
-
-
-@dataclasses.dataclass(frozen=True)
-class Viewer:
-    """An open viewer.
-
-    Attributes
-    ----------
-    session : Session
-        The session that does the work.
-    """
-
-    session: Session
-    _server: ViewServer
-    _thread: threading.Thread
-
-    @property
-    def address(self) -> str:
-        """URL of the page."""
-        return self._server.address
-
-    @property
-    def connections(self) -> int:
-        """Number of open connections."""
-        return self._server.connections
-
-    @property
-    def folder(self) -> Path | None:
-        """Folder of an uploaded mesh; None if there is none."""
-        return self._server.folder
-
-    @property
-    def at_work(self) -> bool:
-        """Whether work is still running, even after the viewer is closed: a kernel cannot be interrupted."""
-        return not self.session.ended or self.connections > 0
-
-    def wait(self) -> None:
-        """Serve until Ctrl-C."""
-        with contextlib.suppress(KeyboardInterrupt):
-            while self._thread.is_alive():  # a wait without timeout would not notice Ctrl-C on Windows
-                self._thread.join(0.5)
+        if not session.close(max(0.0, until - time.monotonic())):
+            atexit.register(session.close, AT_EXIT)  # its thread holds objects that C++ libraries report as leaked

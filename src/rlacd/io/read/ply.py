@@ -222,6 +222,4 @@ def _triangles(lists: _Lists, are_strips: bool, points: FloatArray) -> IntArray:
         ]
         corners = np.concatenate(strips).ravel()
         counts = np.full(len(corners) // 3, 3)
-    if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
-        raise ValueError(f"a face uses vertex {corners.max()} of {len(points)}, or one below 0")
     return triangles_of(points, counts, corners)

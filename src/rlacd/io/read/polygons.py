@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from manifold3d import triangulate
 
-IntArray = npt.NDArray[np.int64]
-FloatArray = npt.NDArray[np.float64]
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.topology import IntArray
 
 TURNED_SHARE = 1e-9
 """A triangle of a fan is folded over if it is turned against its polygon by more than this share of its area."""
@@ -28,7 +27,7 @@ def triangles_of(points: FloatArray, counts: IntArray, corners: IntArray) -> Int
     counts
         ``[P]``, the number of corners of each polygon; none has triangles if it is below 3.
     corners
-        ``[sum of counts]``, their points, polygon by polygon; all within ``points``.
+        ``[sum of counts]``, their points, polygon by polygon.
 
     Returns
     -------
@@ -40,7 +39,9 @@ def triangles_of(points: FloatArray, counts: IntArray, corners: IntArray) -> Int
 
 
 def places_of(points: FloatArray, counts: IntArray, corners: IntArray) -> IntArray:
-    """The triangles of `triangles_of` as places in ``corners``."""
+    """The triangles of `triangles_of` as places in ``corners``. Raises ValueError where one has no point."""
+    if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
+        raise ValueError(f"a face uses vertex {corners.max()} of {len(points)}, or one below 0")
     if (counts == 3).all():
         return np.arange(len(corners)).reshape(-1, 3)
     places, owner = fans_of(counts)

@@ -13,8 +13,9 @@ from rlacd.errors import MissingExtraError
 from rlacd.io.read.apart import answer_of
 from rlacd.io.read.contents import Contents
 from rlacd.io.read.trimesh_scene import geometry_of
-from rlacd.io.read.usd_stage import SERVER
 from rlacd.solid.input_mesh import Asset
+
+SERVER = "rlacd.io.read.usd_stage:StageReader"
 
 
 def read_usd(path: Path, _: bytes) -> Contents:

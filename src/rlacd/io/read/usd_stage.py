@@ -1,4 +1,4 @@
-"""The meshes and primitives of a USD stage that are rendered, where they stand; runs in a process of its own.
+"""The meshes and primitives of a USD stage that are rendered, where they stand; imported only by a process of its own.
 
 A stage may name other files. They are read only from the folder of the file or below it, and named if they are missing.
 """
@@ -11,15 +11,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import trimesh
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade
 
-from rlacd.errors import MeshFileError, MissingExtraError
+from rlacd.errors import MeshFileError
 from rlacd.io.read.contents import MOST_PLACES, MOST_TRIANGLES
 from rlacd.io.read.open_file import read_file
 from rlacd.io.read.polygons import triangles_of
 from rlacd.pool import Blobs, Shared, Values
 from rlacd.solid.arrays import FloatArray
-
-SERVER = "rlacd.io.read.usd_stage:StageReader"
 
 PRIMITIVES = ("Cube", "Sphere", "Cylinder", "Capsule", "Cone")
 """The primitives that are read."""
@@ -40,10 +40,6 @@ class StageReader:
 
     def __call__(self, values: Values, blobs: Blobs, shared: Mapping[str, Shared]) -> tuple[Values, dict[str, bytes]]:
         """Read the stage at `values`' path: ``INDEX.points`` and ``INDEX.faces`` of every node, and its description."""
-        try:
-            from pxr import Tf
-        except ImportError as error:
-            raise MissingExtraError("USD needs an extra: run  pip install 'rlacd[usd]'  and try again.") from error
         path = Path(values["path"])
         try:
             return _stage(path)
@@ -52,8 +48,6 @@ class StageReader:
 
 
 def _stage(path: Path) -> tuple[Values, dict[str, bytes]]:
-    from pxr import Usd, UsdGeom
-
     check_files(path)
     stage = Usd.Stage.Open(str(path))
     cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
@@ -87,8 +81,6 @@ def _stage(path: Path) -> tuple[Values, dict[str, bytes]]:
 
 def _look(prim: Any) -> dict[str, list[float]] | None:
     """The colours and surface of a prim, as UsdPreviewSurface names them; None if it says nothing."""
-    from pxr import UsdGeom, UsdShade
-
     material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
     shader = material.ComputeSurfaceSource()[0] if material else None
     if shader and shader.GetShaderId() == "UsdPreviewSurface":
@@ -100,8 +92,6 @@ def _look(prim: Any) -> dict[str, list[float]] | None:
 
 def _numbers(value: Any, count: int) -> list[float] | None:
     """The numbers of an input of a shader; None if it has none, or a picture."""
-    from pxr import UsdShade
-
     attributes = UsdShade.Utils.GetValueProducingAttributes(value) if value else []
     if not attributes or UsdShade.Shader(attributes[0].GetPrim()).GetShaderId() == "UsdUVTexture":
         return None
@@ -112,8 +102,6 @@ def _numbers(value: Any, count: int) -> list[float] | None:
 
 def check_files(path: Path) -> None:
     """Refuse a file that names others outside its folder, or missing ones, before any of them is composed."""
-    from pxr import Sdf
-
     folder = path.parent.resolve()
     known, waiting = set(), [str(path)]
     while waiting:
@@ -136,8 +124,6 @@ def check_files(path: Path) -> None:
 
 
 def _is_rendered(prim: Any) -> bool:
-    from pxr import UsdGeom
-
     shown = UsdGeom.Imageable(prim)
     if not prim.IsA(UsdGeom.Gprim) or shown.ComputeVisibility() == UsdGeom.Tokens.invisible:
         return False
@@ -151,8 +137,6 @@ def prim_geometry(path: Path, prim: Any) -> tuple[FloatArray, np.ndarray[Any, An
 
 def _mesh(path: Path, prim: Any) -> tuple[FloatArray, np.ndarray[Any, Any]]:
     """The points and triangles of a mesh, in its own coordinates."""
-    from pxr import UsdGeom
-
     mesh = UsdGeom.Mesh(prim)
     points, counts, corners = (
         np.asarray(_value(attribute) or (), dtype=kind)
@@ -175,14 +159,11 @@ def _mesh(path: Path, prim: Any) -> tuple[FloatArray, np.ndarray[Any, Any]]:
 
 def _value(attribute: Any) -> Any:
     """The value of an attribute, at its first moment if it is animated."""
-    from pxr import Usd
-
     return attribute.Get(Usd.TimeCode.EarliestTime())
 
 
 def _primitive(prim: Any) -> tuple[FloatArray, np.ndarray[Any, Any]]:
     """A cube, sphere, cylinder, capsule or cone as points and triangles."""
-    import trimesh
 
     def measure(name: str) -> float:
         return float(_value(prim.GetAttribute(name)))

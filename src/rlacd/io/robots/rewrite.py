@@ -24,10 +24,11 @@ from rlacd.io.robots.plan import MeshUse, Plan
 from rlacd.io.robots.references import References
 from rlacd.io.robots.spans import LARGEST_DESCRIPTION, Element, edited, parse
 from rlacd.io.robots.urdf import plan_urdf
-from rlacd.io.write import check_file, check_name, file_stem, write_file
+from rlacd.io.write import file_stem, write_file
 from rlacd.io.write.encode import encode_plain_obj
 from rlacd.io.write.folder import check_names, write_folder
 from rlacd.io.write.single_precision import Triangles
+from rlacd.io.write.target import check_file, check_name
 from rlacd.options import LENGTHS, OPTION_NAMES, Options
 from rlacd.options.fields import checked, path_like, read, shown
 from rlacd.options.output import OutputOptions
@@ -154,7 +155,7 @@ def rewrite_robot(
 
 def _rewrite_stage(source: Path, place: Path, options: Mapping[str, Any]) -> Rewritten:
     """Write a layer over a USD stage."""
-    check_stage(source, place)
+    _check_place(source, place, usd.ENDINGS)
     _check_options(options)
     data, done, warnings = usd.rewrite_stage(source, place, lambda mesh: _coarse(mesh, options))
     meshes = [
@@ -167,10 +168,12 @@ def _rewrite_stage(source: Path, place: Path, options: Mapping[str, Any]) -> Rew
     return Rewritten(place, place, meshes, warnings)
 
 
-def check_stage(source: Path, place: Path) -> None:
-    """Check, before any work, that a USD stage can get a layer at `place`; raises as `rewrite_robot`."""
-    if place.suffix.lower() not in usd.ENDINGS:
-        raise OptionError(f"{source} can only be rewritten as {' or '.join(usd.ENDINGS)}, not as {shown(str(place))}.")
+def _check_place(source: Path, place: Path, endings: Sequence[str]) -> None:
+    """Check, before any work, that what `source` becomes can be written to `place`; raises as `rewrite_robot`."""
+    if place.suffix.lower() not in endings:
+        raise OptionError(
+            f"{source} can only be rewritten as another {' or '.join(endings)}, not as {shown(str(place))}."
+        )
     if os.path.realpath(source) == os.path.realpath(place):
         raise OptionError(f"{place} would overwrite the input; choose another name.")
     check_name(place)
@@ -200,12 +203,7 @@ def check_rewrite(source: Path, place: Path) -> None:
     """Check, before any work, that `source` can be rewritten as `place`; raises as `rewrite_robot`."""
     if not is_robot(source):
         raise MeshFileError(f"{source} is not a robot file: its name has to end in {' or '.join(ENDINGS)}.")
-    if place.suffix.lower() != source.suffix.lower():
-        raise OptionError(f"{source} can only be rewritten as another {source.suffix}, not as {shown(str(place))}.")
-    if os.path.realpath(source) == os.path.realpath(place):
-        raise OptionError(f"{place} would overwrite the input; choose another name.")
-    check_name(place)
-    check_file(place)
+    _check_place(source, place, [source.suffix.lower()])
     folder = place.with_name(f"{place.stem}_{ENDINGS[source.suffix.lower()]}")
     if folder.exists() and not folder.is_dir():
         raise OutputError(f"cannot write into {folder}: it is a file, not a folder; choose another name.")

@@ -15,7 +15,6 @@ import trimesh
 from rlacd.errors import ImplausibleBodyWarning, OutputError
 from rlacd.io.read import function_of
 from rlacd.io.write.atomic import write_file
-from rlacd.io.write.balls import check_balls, save_balls
 from rlacd.io.write.encode import ENCODERS, ENGINE_NAMES, encode_glb, encode_obj, hull_name
 from rlacd.io.write.folder import write_folder
 from rlacd.io.write.model import (
@@ -29,28 +28,12 @@ from rlacd.io.write.model import (
     shapes_of,
     visuals_of,
 )
-from rlacd.io.write.target import FORMATS, MODELS, WITH_MESHES, Target, check_file, check_name, hull_target, mesh_folder
+from rlacd.io.write.target import FORMATS, MODELS, WITH_MESHES, Target, hull_target, mesh_folder
 from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.options.output import DENSITY, Axis
 from rlacd.result import Result
 
-__all__ = [
-    "DENSITY",
-    "FORMATS",
-    "MODELS",
-    "Target",
-    "check_balls",
-    "check_file",
-    "check_model_options",
-    "check_name",
-    "file_stem",
-    "hull_target",
-    "save",
-    "save_balls",
-    "save_hulls",
-    "write_file",
-]
-
+__all__ = ["FORMATS", "MODELS", "file_stem", "hull_target", "save", "save_hulls", "write_file"]
 
 SIMULATED = (*WITH_MESHES, "usd")
 """Formats whose readers take lengths to be in metres."""

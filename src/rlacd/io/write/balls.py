@@ -8,10 +8,8 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from rlacd.errors import OptionError
 from rlacd.io.write.atomic import write_file
-from rlacd.io.write.target import check_file
-from rlacd.options.fields import path_like, read, shown
+from rlacd.io.write.target import checked_place
 from rlacd.solid.primitive import Balls
 
 COLOR = (86, 156, 214, 90)  # translucent, so that the hulls show through
@@ -27,13 +25,7 @@ def check_balls(path: str | os.PathLike[str]) -> Path:
     OutputError
         The place cannot be written to.
     """
-    place = Path(read(path_like(), "path", path))
-    if place.suffix.lower() not in _ENCODERS:
-        raise OptionError(
-            f"cannot write the balls {shown(str(place))}: the name must end in {' or '.join(_ENCODERS)}; rename it."
-        )
-    check_file(place)
-    return place
+    return checked_place(path, "the balls", _ENCODERS)
 
 
 def save_balls(balls: Balls, path: str | os.PathLike[str]) -> Path:

@@ -100,9 +100,7 @@ def painted_parts(mesh: InputMesh | None) -> list[Painted]:
     return [_part(index, parts, *materials[key]) for index, (key, parts) in enumerate(groups.items())]
 
 
-def _part(
-    index: int, parts: list[tuple[FloatArray, IntArray, FloatArray | None]], material: Any, picture: Any
-) -> Painted:
+def _part(index: int, parts: list[_Shape], material: Any, picture: Any) -> Painted:
     points, faces, textures = zip(*parts, strict=True)
     first = np.cumsum([0, *map(len, points)])
     mesh = Triangles(np.concatenate(points), np.concatenate([f + at for f, at in zip(faces, first, strict=False)]))

@@ -16,11 +16,11 @@ import trimesh
 from rlacd.io.write.glb import GltfFile, Placed
 from rlacd.io.write.palette import hull_colors, linear_from_srgb
 from rlacd.io.write.single_precision import Triangulated, placed_mesh, required_hull, rounded_hull
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.primitive import Primitive
 
 GENERATOR = "rlacd"
 
-FloatArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 Color: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
 VISUAL_COLOR: Color = np.array([180, 182, 186], dtype=np.uint8)

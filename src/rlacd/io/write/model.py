@@ -249,4 +249,4 @@ def _mass(result: Result) -> Mass:
     if mass is None:  # a result from elsewhere: its hulls stand for the solid
         hulls = trimesh.util.concatenate(result.hulls)
         return mass_of(hulls.vertices, hulls.faces, Frame(np.zeros(3), 1.0))
-    return Mass(float(mass["volume_abs"]), np.array(mass["centre_abs"]), np.array(mass["inertia_abs"]))
+    return Mass.of_plain(mass)

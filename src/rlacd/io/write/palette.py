@@ -10,7 +10,7 @@ import numpy.typing as npt
 # or tritanopic (Machado et al. 2009, https://doi.org/10.1109/TVCG.2009.113); tests/io/test_palette.py.
 DISTINCT = bytes.fromhex("5899e0f8d05cb05315ec8781abd2fe8a5e97ad8b1c65f2c353c1c54b7f5fbdba42d26ea4")
 
-SHADES = 0.08  # how far the lightness of repeated colours is spread
+SHADES = 0.1  # how far the lightness of repeated colours is spread
 
 
 def hull_colors(count: int) -> npt.NDArray[np.uint8]:
@@ -19,11 +19,10 @@ def hull_colors(count: int) -> npt.NDArray[np.uint8]:
     Twelve colours that colour-blind people can tell apart too, then the same colours slightly lighter or darker, and so
     on: the first two hundred all differ. The first colours do not depend on `count`.
     """
-    twelve = oklab_from_linear(linear_from_srgb(np.frombuffer(DISTINCT, dtype=np.uint8).reshape(-1, 3)))
+    twelve = np.frombuffer(DISTINCT, dtype=np.uint8).reshape(-1, 3)
     index = np.arange(count)
-    oklab = twelve[index % len(twelve)]
-    oklab[:, 0] += SHADES * _spread(index // len(twelve))
-    return srgb_from_linear(linear_from_oklab(oklab))
+    shaded = twelve[index % len(twelve)] + 255 * SHADES * _spread(index // len(twelve))[:, None]
+    return np.asarray(np.rint(shaded.clip(0, 255)), dtype=np.uint8)
 
 
 def _spread(index: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
@@ -45,31 +44,3 @@ def linear_from_srgb(srgb: npt.NDArray[np.uint8]) -> npt.NDArray[np.float64]:
     """Linear light in [0, 1] of sRGB bytes [..., 3] (IEC 61966-2-1)."""
     encoded = srgb / 255.0
     return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
-
-
-_CONE_FROM_RGB = np.array(
-    [
-        [0.4122214708, 0.5363325363, 0.0514459929],
-        [0.2119034982, 0.6806995451, 0.1073969566],
-        [0.0883024619, 0.2817188376, 0.6299787005],
-    ]
-)
-_OKLAB_FROM_CONE_ROOT = np.array(
-    [
-        [0.2104542553, 0.7936177850, -0.0040720468],
-        [1.9779984951, -2.4285922050, 0.4505937099],
-        [0.0259040371, 0.7827717662, -0.8086757660],
-    ]
-)
-
-
-def oklab_from_linear(linear: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Oklab colours [N, 3] of linear sRGB [N, 3]."""
-    oklab: npt.NDArray[np.float64] = np.cbrt(linear @ _CONE_FROM_RGB.T) @ _OKLAB_FROM_CONE_ROOT.T
-    return oklab
-
-
-def linear_from_oklab(oklab: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Linear sRGB [N, 3], clipped to [0, 1], of Oklab colours [N, 3]."""
-    cones = np.linalg.solve(_OKLAB_FROM_CONE_ROOT, oklab.T) ** 3
-    return np.clip(np.linalg.solve(_CONE_FROM_RGB, cones).T, 0.0, 1.0)

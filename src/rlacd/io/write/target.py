@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -179,6 +180,23 @@ def check_file(path: Path) -> None:
         if path.exists() and not path.is_file():
             raise OutputError(f"cannot write {path}: it is not an ordinary file; choose another name.")
         _check_parent(path)
+
+
+def checked_place(path: str | os.PathLike[str], what: str, endings: Collection[str]) -> Path:
+    """Check, before any work, that a file with one of some endings can be written, the first of which is named.
+
+    Raises
+    ------
+    OptionError
+        The ending is another.
+    OutputError
+        The place cannot be written to.
+    """
+    place = Path(read(path_like(), "path", path))
+    if place.suffix.lower() not in endings:
+        raise OptionError(f"cannot write {what} {shown(str(place))}: it must end in {' or '.join(endings)}; rename it.")
+    check_file(place)
+    return place
 
 
 def _check_folder(folder: Path) -> None:
