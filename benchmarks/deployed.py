@@ -95,11 +95,11 @@ class Deployed:
     Parameters
     ----------
     deployment : Deployment
-    threshold : float
-        The criterion's threshold, an input of the network.
+    threshold : float, optional
+        The criterion's length, an input of the network; its own by default.
     """
 
-    def __init__(self, deployment: Deployment, threshold: float) -> None:
+    def __init__(self, deployment: Deployment, threshold: float | None) -> None:
         self._of = deployment
         self._threshold = threshold
         self._network = None
@@ -118,7 +118,8 @@ class Deployed:
 
     def _cost(self, component: Component, swept: Sweep) -> FloatArray:
         if self._network is not None:
-            return np.asarray(-self._network(sweep_features(component, self._threshold))[:, 0], dtype=np.float64)
+            length = self._threshold or self._network.threshold
+            return np.asarray(-self._network(sweep_features(component, length))[:, 0], dtype=np.float64)
         if self._of.ranking == "random":
             return generator_of(component).random(len(swept.candidates))
         return excess_norm(swept)

@@ -33,10 +33,11 @@ from rlacd.repair.repair import repair
 from rlacd.run import Run
 from rlacd.solid.component import Component, Plane
 
-A_SHARD, FACES, LEAVES, NODES, NEAR = 8, (60, 2500), (3, 30), 4, 80
+A_SHARD, FACES, LEAVES, NODES, NEAR = 8, (60, 4000), (4, 60), 5, 80
 THRESHOLDS = (0.03, 0.04, 0.05, 0.05)
 KINDS = ("concavity", "concavity", "concavity", "navigable")
-MOST, MOST_AFTER = 60, 80
+MOST, MOST_AFTER = 120, 150
+LEAST_EXCESS = 5.0  # a little simpler than `SIMPLE` of the policy, in the same unit
 
 RUN, SWEEPS = Run(1), SweepCache()
 
@@ -115,6 +116,7 @@ def labels_of(path: Path, rng: np.random.Generator) -> list[dict[str, Any]]:
         return []
     cut = [c for c, below in tree._children.items() if len(below) == 2 and not criterion.is_met(c)]
     nodes = [c for c in cut if LEAVES[0] <= leaves(tree, c) <= LEAVES[1] and len(c.pieces()) == 1]
+    nodes = [c for c in nodes if np.cbrt(max(c.hull.volume - c.volume, 0)) > LEAST_EXCESS * threshold]
     nodes.sort(key=lambda c: -leaves(tree, c))
     nodes = nodes[:1] + [nodes[i] for i in rng.permutation(len(nodes) - 1)[:NODES] + 1] if len(nodes) > 1 else nodes
     found = []
@@ -170,7 +172,7 @@ def main() -> None:
         listed = [r for r in csv.DictReader(file) if r["split"] == "train"]
     listed = [r for r in listed if FACES[0] <= int(r["faces"]) <= FACES[1]]
     names = [listed[i]["file"] for i in np.random.default_rng(7).permutation(len(listed))]
-    number = 0
+    number = int(sys.argv[4]) if len(sys.argv) > 4 else 0
     while time.process_time() < limit:
         path = out / f"{number:05d}.npz"
         if not path.exists():
