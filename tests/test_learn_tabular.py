@@ -154,7 +154,7 @@ def saved(folder: Path, name: str, solid: Manifold) -> Component:
     folder.mkdir(exist_ok=True)
     mesh = from_manifold(solid)
     trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(folder / name)
-    read = Solids(folder).get(name)
+    read = Solids(folder, folder / "solids").get(name)
     assert read is not None
     return read
 
@@ -245,8 +245,8 @@ def test_networks_reach_the_optimum_of_their_objective(
 def cuts_by(policy: Policy, solid: Component) -> int:
     """Number of cuts that a policy needs, at most 40."""
     cutting, made = CutProcess(solid, LIMIT), 0
-    while cutting.frontier and made < 40:
-        plane = policy.choose(cutting.frontier[0])
+    while cutting.unfinished and made < 40:
+        plane = policy.choose(cutting.unfinished[0])
         assert plane is not None
         cutting.cut(0, plane)
         made += 1
@@ -268,8 +268,8 @@ def test_a_table_in_place_of_the_network_is_never_worse_than_the_best_sequence_i
             tried.setdefault(seen[state].key, {})[int(plane)] = children
         lengths.append(len(episode.planes))
     cutting, made = CutProcess(solid, CRITERION, memory), 0
-    while cutting.frontier:
-        component = cutting.frontier[0]
+    while cutting.unfinished:
+        component = cutting.unfinished[0]
         features = encoder.describe(component).astype(np.float16)
         known = tried[replay.seen(features, np.ones(150, bool)).key]
         cutting.cut(0, cutting.candidates(component).plane(min(known, key=lambda p: replay.cuts(known[p]))))
