@@ -16,8 +16,8 @@ import time
 from pathlib import Path
 
 import numpy as np
-from benchmarks.deployed import Deployed, Deployment
 
+from benchmarks.deployed import Deployed, Deployment
 from rlacd.criteria import Concavity, Criterion, Navigable
 from rlacd.cut import CutTree
 from rlacd.errors import RlacdError
