@@ -91,31 +91,24 @@ def test_reward_of_an_angle_by_hand() -> None:
     assert (cut.left.unfinished, cut.discounts, len(cut.left.finished)) == ([], [], 2)
 
 
-def test_rewards_are_relative_to_the_whole_solids_hull() -> None:
+def test_rewards_are_relative_to_the_whole_solids_hull_and_discounts_to_the_components() -> None:
     cutting = CutProcess(Component(small_solids()["table"]), CRITERION)
-    hull, before = cutting.unfinished[0].hull.volume, cutting.unfinished[0].hull.volume
+    hull = before = cutting.unfinished[0].hull.volume
     while cutting.unfinished:
-        cut = cutting.cut(0, cutting.candidates(cutting.unfinished[0]).plane(greedy_plane(cutting.unfinished[0]) or 0))
+        component = cutting.unfinished[0]
+        cut = cutting.cut(0, cutting.candidates(component).plane(greedy_plane(component) or 0))
         after = sum(c.hull.volume for c in cutting.all)
         assert cut.saved == pytest.approx((before - after) / hull)
         before = after
+        whole = max(component.hull.volume, sum(c.hull.volume for c in cut.left.all))
+        assert cut.discounts == [pytest.approx(c.hull.volume / whole) for c in cut.left.unfinished]
+        assert sum(cut.discounts) <= 1
 
 
 def test_terminal_reward_falls_with_the_number_of_parts() -> None:
     assert terminal_reward(2) == 1
     assert terminal_reward(3) == pytest.approx(1 / (1 + math.log(2)))
     assert terminal_reward(11) == pytest.approx(1 / (1 + math.log(10)))
-
-
-@pytest.mark.slow
-def test_discounts_are_shares_of_the_hull_and_never_exceed_one() -> None:
-    cutting = CutProcess(Component(small_solids()["table"]), CRITERION)
-    while cutting.unfinished:
-        component = cutting.unfinished[0]
-        cut = cutting.cut(0, cutting.candidates(component).plane(12))
-        whole = max(component.hull.volume, sum(c.hull.volume for c in cut.left.all))
-        assert cut.discounts == [pytest.approx(c.hull.volume / whole) for c in cut.left.unfinished]
-        assert sum(cut.discounts) <= 1
 
 
 def test_valid_planes_need_no_sweep_and_are_valid_by_it(corpus: Path) -> None:

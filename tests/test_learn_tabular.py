@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Container
 from pathlib import Path
 from typing import Any
 
@@ -207,39 +206,20 @@ def volume_worth(node: Node, unit: float) -> float:
 
 @pytest.mark.nightly
 @pytest.mark.parametrize(
-    ("changes", "cuts"),
-    [({"finish_reward": 0.0}, range(3, 11)), ({}, range(3, 11)), ({"objective": "fewest-cuts"}, [3])],
-    ids=["volume", "paper", "fewest cuts"],
+    "changes", [{"finish_reward": 0.0}, {"objective": "fewest-cuts"}], ids=["volume", "fewest cuts"]
 )
-def test_networks_reach_the_optimum_of_their_objective(
-    u_shape: Component, tmp_path: Path, changes: Any, cuts: Container[int]
-) -> None:
+def test_networks_reach_the_optimum_of_their_objective(u_shape: Component, tmp_path: Path, changes: Any) -> None:
     """The reward for finishing the whole solid is no part of a component's own value: there is none to compare with."""
-    options = TrainOptions(
-        **{
-            "threshold": LIMIT.threshold,
-            "iterations": 1500,
-            "warmup": 100,
-            "batch": 32,
-            "validation": 0,
-            "rotate": False,
-            "replay": 5000,
-            "learning_rate": 1e-3,
-            "target_every": 50,
-            "epsilon": 0.3,
-            "checkpoint_seconds": 1e9,
-            "environments": 1,
-            **changes,
-        }
-    )
+    steps = {"iterations": 1500, "warmup": 100, "batch": 32, "replay": 5000, "target_every": 50, "environments": 1}
+    given = {"learning_rate": 1e-3, "epsilon": 0.3, "validation": 0, "rotate": False, **steps, **changes}
+    options = TrainOptions(threshold=LIMIT.threshold, **given)
     train(tmp_path / "meshes", tmp_path / "run", options, say=lambda line: None)
     policy = load_policy(tmp_path / "run")
     [root] = grow(u_shape, LIMIT, TWO, depth=8)
-    value = {"volume": 1000 * volume_worth(root, root.hull_volume), "fewest": -math.log(fewest(root))}
-    if (known := value.get("fewest" if "objective" in changes else "volume" if changes else "")) is not None:
-        values = policy._values(u_shape)[TWO] * options.unit
-        assert values.max() == pytest.approx(known, abs=0.03 * options.unit)
-    assert cuts_by(policy, u_shape) in cuts
+    counts = "objective" in changes
+    known = -math.log(fewest(root)) if counts else 1000 * volume_worth(root, root.hull_volume)
+    assert (policy._values(u_shape)[TWO] * options.unit).max() == pytest.approx(known, abs=0.03 * options.unit)
+    assert cuts_by(policy, u_shape) in ([3] if counts else range(3, 11))
 
 
 def cuts_by(policy: Policy, solid: Component) -> int:
