@@ -3,7 +3,7 @@
 `python benchmarks/learned/labels.py MESHES OUT CPU_SECONDS`
 
 For meshes of the split train, trees of cuts are grown, greedily or with a share of random cuts among the ten best. Of
-up to five components of a tree that end in 3 to 30 parts, about nine planes are cut each: greedy's, that of least hull
+up to six components of a tree that end in 4 to 60 parts, about nine planes are cut each: greedy's, that of least hull
 sum, good ones apart from each other, and two random ones of the 80 best. Both sides are then completed by greedy, and
 the parts counted. Shards hold eight meshes each; random numbers depend on the shard's number alone, so a run that was
 interrupted goes on where it stopped.
@@ -172,7 +172,7 @@ def main() -> None:
         listed = [r for r in csv.DictReader(file) if r["split"] == "train"]
     listed = [r for r in listed if FACES[0] <= int(r["faces"]) <= FACES[1]]
     names = [listed[i]["file"] for i in np.random.default_rng(7).permutation(len(listed))]
-    number = int(sys.argv[4]) if len(sys.argv) > 4 else 0
+    number = 0
     while time.process_time() < limit:
         path = out / f"{number:05d}.npz"
         if not path.exists():
