@@ -19,7 +19,7 @@ from rlacd.finish.limit import limit_part
 from rlacd.io.read.load import load_mesh
 from rlacd.options.names import WEIGHTS_ENDING
 from rlacd.planes.candidates import OFFSETS_PER_AXIS, axis_and_principal
-from rlacd.planes.sweep import SLIVER, Sweep, paper_planes, sweep
+from rlacd.planes.sweep import SLIVERS, paper_planes, sweep, valid_planes
 from rlacd.policies.greedy import excess_norm, generator_of, least_hulls
 from rlacd.policies.network import KIND, load_network
 from rlacd.policies.plane_features import FEATURES, sweep_features
@@ -95,11 +95,11 @@ class Deployed:
     Parameters
     ----------
     deployment : Deployment
-    threshold : float
-        The criterion's threshold, an input of the network.
+    threshold : float, optional
+        The criterion's length, an input of the network; its own by default.
     """
 
-    def __init__(self, deployment: Deployment, threshold: float) -> None:
+    def __init__(self, deployment: Deployment, threshold: float | None) -> None:
         self._of = deployment
         self._threshold = threshold
         self._network = None
@@ -109,19 +109,18 @@ class Deployed:
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None when no candidate is valid."""
         candidates = axis_and_principal(component) if self._network is None else paper_planes(component)
-        swept = sweep(component, candidates, threads)
         exists = np.repeat([self._of.spatial, self._of.principal], 3 * OFFSETS_PER_AXIS)
-        valid = next((v for s in (SLIVER, SLIVER / 100) if (v := exists & swept.valid(s)).any()), exists & False)
-        ranked = np.argsort(np.where(valid, self._cost(component, swept), np.inf), kind="stable")
+        if self._network is None:
+            swept = sweep(component, candidates, threads)
+            random = self._of.ranking == "random"
+            cost = generator_of(component).random(len(candidates)) if random else excess_norm(swept)
+            valid = next((v for s in SLIVERS if (v := exists & swept.valid(s)).any()), exists & False)
+        else:
+            cost = -self._network(sweep_features(component, self._threshold or self._network.threshold))[:, 0]
+            valid = exists & valid_planes(component, candidates)
+        ranked = np.argsort(np.where(valid, cost, np.inf), kind="stable")
         best = np.sort(ranked[: min(self._of.planes, int(valid.sum()))])  # sweep order: ties go to the first
         return least_hulls(component, candidates, best, self._of.edges, threads)
-
-    def _cost(self, component: Component, swept: Sweep) -> FloatArray:
-        if self._network is not None:
-            return np.asarray(-self._network(sweep_features(component, self._threshold))[:, 0], dtype=np.float64)
-        if self._of.ranking == "random":
-            return generator_of(component).random(len(swept.candidates))
-        return excess_norm(swept)
 
 
 def decompose_as_deployed(

@@ -83,21 +83,19 @@ def grow(solid: Component, criterion: Criterion, planes: Sequence[int], depth: i
     list of Node
         The unfinished components of the solid.
     """
-    return [_grow(component, criterion, planes, depth, bins) for component in CutProcess(solid, criterion).frontier]
+    return [_grow(component, criterion, planes, depth, bins) for component in CutProcess(solid, criterion).unfinished]
 
 
 def _grow(component: Component, criterion: Criterion, planes: Sequence[int], depth: int, bins: int) -> Node:
     node = Node(component.hull.volume, _looks(component, bins))
     for action, plane in enumerate(planes if depth > 0 else ()):
         cutting = CutProcess(component, criterion)
-        if not cutting.frontier:
+        if not cutting.unfinished:
             break
         cut = cutting.cut(0, cutting.candidates(component).plane(plane))
-        if cut.made:
-            children = [_grow(child, criterion, planes, depth - 1, bins) for child in cut.unfinished]
-            node.outcomes.append(
-                TabularOutcome(action, cut.reward.saved, cut.reward.finished, children, list(cut.discounts))
-            )
+        if cut.left.stuck != [component]:
+            children = [_grow(child, criterion, planes, depth - 1, bins) for child in cut.left.unfinished]
+            node.outcomes.append(TabularOutcome(action, cut.saved, cut.finishes, children, cut.discounts))
     return node
 
 

@@ -17,10 +17,10 @@ pytest.importorskip("torch", reason="needs the extra train")
 
 import torch
 
-from rlacd.learn.encoders import PublishedEncoder
 from rlacd.learn.encoders.i2p_mae import I2PMAEEncoder
 from rlacd.learn.q_network import QNetwork, load_policy
 from rlacd.learn.train import train
+from rlacd.policies.plane_features import PLANES
 from tests.encoding import TINY as TINY_SIZES
 from tests.encoding import write_tiny_weights
 from tests.test_learn_train import TINY
@@ -85,7 +85,7 @@ def test_too_few_points_and_unusable_files_are_reported_before_a_run_begins(
 def test_the_paper_preset_sees_what_the_paper_sees() -> None:
     paper = TrainOptions.preset("paper")
     assert (paper.encoder, paper.points) == ("i2p-mae", 2048)
-    network = QNetwork(I2PMAEEncoder().dim, PublishedEncoder.outputs)
+    network = QNetwork(I2PMAEEncoder().dim, PLANES)
     widths = [layer.out_features for layer in network.layers if isinstance(layer, torch.nn.Linear)]
     assert widths == [1024, 512, 256, 128, 150]
     assert network.layers[0].in_features == 384 + 384

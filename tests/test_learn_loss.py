@@ -88,14 +88,18 @@ def test_replay_gives_back_the_last_transitions_also_when_restored(capacity: int
     kept = dict(list(added.items())[-capacity:])
     assert len(replay) == len(restored) == len(kept)
     batch, again = (r.sample(40, np.random.default_rng(0)) for r in (replay, restored))
-    for name in vars(batch):
-        assert np.array_equal(getattr(batch, name), getattr(again, name)), name
+    for name in batch:
+        assert np.array_equal(batch[name], again[name]), name
     for i in range(40):
-        cut, mine = kept[float(batch.features[i, 0])], batch.owner == i
-        assert (batch.planes[i], batch.rewards[i], batch.cuts[i]) == (cut.plane, cut.reward, 1 + len(cut.children))
-        assert batch.child_features[mine, 0].tolist() == [float(c.features[0]) for c, _ in cut.children]
-        assert [m.tolist() for m in batch.child_masks[mine]] == [c.mask.tolist() for c, _ in cut.children]
-        assert batch.child_discounts[mine] == pytest.approx([d for _, d in cut.children])
+        cut, mine = kept[float(batch["features"][i, 0])], batch["owner"] == i
+        assert (batch["planes"][i], batch["rewards"][i], batch["cuts"][i]) == (
+            cut.plane,
+            cut.reward,
+            1 + len(cut.children),
+        )
+        assert batch["child_features"][mine, 0].tolist() == [float(c.features[0]) for c, _ in cut.children]
+        assert [m.tolist() for m in batch["child_masks"][mine]] == [c.mask.tolist() for c, _ in cut.children]
+        assert batch["child_discounts"][mine] == pytest.approx([d for _, d in cut.children])
 
 
 def test_nothing_to_sample_is_reported() -> None:

@@ -15,7 +15,7 @@ from rlacd.cut import CutTree
 from rlacd.errors import TrainingError
 from rlacd.io.read.load import load_mesh
 from rlacd.learn.meshes import list_meshes
-from rlacd.learn.process import CutProcess, Reward, terminal_reward
+from rlacd.learn.process import Cut, CutProcess, terminal_reward
 from rlacd.planes.sweep import paper_planes, sweep, valid_planes
 from rlacd.repair.repair import repair
 from rlacd.run import Run
@@ -40,16 +40,16 @@ def volumes(components: list[Component]) -> list[tuple[float, float]]:
     return sorted((c.volume, c.hull.volume) for c in components)
 
 
-def cut_greedily(cutting: CutProcess) -> list[Reward]:
-    """Cut to the end; the rewards."""
+def cut_greedily(cutting: CutProcess) -> list[Cut]:
+    """Cut to the end."""
     earned = []
-    while not cutting.over:
+    while cutting.unfinished:
         index = cutting.largest()
-        component = cutting.frontier[index]
+        component = cutting.unfinished[index]
         number = greedy_plane(component)
         assert number is not None
         cut = cutting.cut(index, cutting.candidates(component).plane(number))
-        earned.append(cut.reward)
+        earned.append(cut)
     return earned
 
 
@@ -57,14 +57,14 @@ def check_same_as_decompose(solid: Component) -> None:
     with Run(1) as run:
         done, left = CutTree(solid, GreedyOverMask(), run).cut_until(CRITERION)
     cutting = CutProcess(solid, CRITERION)
-    start = sum(c.hull.volume for c in cutting.frontier + cutting.finished + cutting.stuck)
+    start = sum(c.hull.volume for c in cutting.all)
     earned = cut_greedily(cutting)
     assert volumes(cutting.finished) == volumes(done)
     assert volumes(cutting.stuck) == volumes(left)
     end = sum(c.hull.volume for c in cutting.finished + cutting.stuck)
-    assert sum(reward.saved for reward in earned) * solid.hull.volume == pytest.approx(start - end, abs=1e-9)
+    assert sum(cut.saved for cut in earned) * solid.hull.volume == pytest.approx(start - end, abs=1e-9)
     paid = terminal_reward(len(cutting.finished)) if earned and cutting.terminal else 0
-    assert sum(reward.finished for reward in earned) == paid
+    assert sum(cut.finishes for cut in earned) == paid
 
 
 @pytest.mark.parametrize("name", small_solids())
@@ -85,37 +85,30 @@ def test_reward_of_an_angle_by_hand() -> None:
     cut = cutting.cut(0, plane)
     hull = (2 * 1.5 - (2 - 0.3) * (1.5 - 0.3) / 2) * 1.0
     assert solid.hull.volume == pytest.approx(hull)
-    assert cut.reward.saved == pytest.approx((hull - 0.6 - 0.36) / hull)
-    assert cut.reward.finished == 1
+    assert cut.saved == pytest.approx((hull - 0.6 - 0.36) / hull)
+    assert cut.finishes == 1
     assert cutting.terminal
-    assert (cut.unfinished, cut.discounts, len(cut.finished)) == ([], [], 2)
+    assert (cut.left.unfinished, cut.discounts, len(cut.left.finished)) == ([], [], 2)
 
 
-def test_rewards_are_relative_to_the_whole_solids_hull() -> None:
+def test_rewards_are_relative_to_the_whole_solids_hull_and_discounts_to_the_components() -> None:
     cutting = CutProcess(Component(small_solids()["table"]), CRITERION)
-    hull, before = cutting.frontier[0].hull.volume, cutting.frontier[0].hull.volume
-    while not cutting.over:
-        cut = cutting.cut(0, cutting.candidates(cutting.frontier[0]).plane(greedy_plane(cutting.frontier[0]) or 0))
-        after = sum(c.hull.volume for c in cutting.frontier + cutting.finished + cutting.stuck)
-        assert cut.reward.saved == pytest.approx((before - after) / hull)
+    hull = before = cutting.unfinished[0].hull.volume
+    while cutting.unfinished:
+        component = cutting.unfinished[0]
+        cut = cutting.cut(0, cutting.candidates(component).plane(greedy_plane(component) or 0))
+        after = sum(c.hull.volume for c in cutting.all)
+        assert cut.saved == pytest.approx((before - after) / hull)
         before = after
+        whole = max(component.hull.volume, sum(c.hull.volume for c in cut.left.all))
+        assert cut.discounts == [pytest.approx(c.hull.volume / whole) for c in cut.left.unfinished]
+        assert sum(cut.discounts) <= 1
 
 
 def test_terminal_reward_falls_with_the_number_of_parts() -> None:
     assert terminal_reward(2) == 1
     assert terminal_reward(3) == pytest.approx(1 / (1 + math.log(2)))
     assert terminal_reward(11) == pytest.approx(1 / (1 + math.log(10)))
-
-
-@pytest.mark.slow
-def test_discounts_are_shares_of_the_hull_and_never_exceed_one() -> None:
-    cutting = CutProcess(Component(small_solids()["table"]), CRITERION)
-    while not cutting.over:
-        component = cutting.frontier[0]
-        cut = cutting.cut(0, cutting.candidates(component).plane(12))
-        whole = max(component.hull.volume, sum(c.hull.volume for c in cut.unfinished + cut.finished + cut.stuck))
-        assert cut.discounts == [pytest.approx(c.hull.volume / whole) for c in cut.unfinished]
-        assert sum(cut.discounts) <= 1
 
 
 def test_valid_planes_need_no_sweep_and_are_valid_by_it(corpus: Path) -> None:

@@ -94,33 +94,23 @@ def test_presets_are_valid_and_the_papers_is_the_papers() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "value"),
+    ("changes", "told"),
     [
-        ("batch", 0),
-        ("batch", 2.5),
-        ("threshold", 0.0),
-        ("threshold", float("nan")),
-        ("epsilon", 1.1),
-        ("objective", "both"),
-        ("rotate", 1),
-        ("seed", -1),
+        ({"batch": 0}, "batch is"),
+        ({"batch": 2.5}, "batch is"),
+        ({"threshold": float("nan")}, "threshold is"),
+        ({"epsilon": 1.1}, "epsilon is"),
+        ({"objective": "both"}, "objective is"),
+        ({"rotate": 1}, "rotate is"),
+        ({"seed": -1}, "seed is"),
+        ({"volume_reward": 0.0, "finish_reward": 0.0}, "both 0; there is nothing to learn"),
+        ({"speed": 1}, "no option 'speed'"),
+        ({"name": "best"}, "preset is 'best'"),
     ],
 )
-def test_options_out_of_range_are_reported(name: str, value: Any) -> None:
-    with pytest.raises(OptionError, match=f"{name} is"):
-        TrainOptions(**{name: value})
-
-
-def test_something_has_to_be_earned_or_paid() -> None:
-    with pytest.raises(OptionError, match="both 0; there is nothing to learn"):
-        TrainOptions(volume_reward=0.0, finish_reward=0.0)
-
-
-def test_unknown_presets_and_options_are_reported() -> None:
-    with pytest.raises(OptionError, match="preset is 'best'"):
-        TrainOptions.preset("best")
-    with pytest.raises(OptionError, match="no option 'speed'"):
-        TrainOptions.preset("two-cores", speed=1)
+def test_options_out_of_range_and_unknown_ones_are_reported(changes: dict[str, Any], told: str) -> None:
+    with pytest.raises(OptionError, match=told):
+        TrainOptions.preset(**{"name": "two-cores", **changes})
 
 
 def test_every_option_has_help_and_the_command_line_shows_it() -> None:
@@ -131,17 +121,18 @@ def test_every_option_has_help_and_the_command_line_shows_it() -> None:
         assert option.metadata["option"].help.split(";")[0][:30] in shown.output
 
 
-def test_the_main_job_does_not_load_torch() -> None:
+def test_without_torch_every_quality_and_both_networks_decompose() -> None:
     code = """
 import sys
-import numpy as np, trimesh
+sys.modules["torch"] = sys.modules["onnxruntime"] = None  # as if they were not installed
+import trimesh
 import rlacd, rlacd.cli.main
-parts = [trimesh.creation.box(size) for size in ((2, 0.4, 0.4), (0.4, 0.4, 2))]
-for quality in ("balanced", "best"):
-    rlacd.decompose(trimesh.util.concatenate(parts), quality=quality, search_steps=4 if quality == "best" else None)
-sys.exit("torch" in sys.modules or "gymnasium" in sys.modules)
+mesh = trimesh.util.concatenate([trimesh.creation.box(size) for size in ((2, 0.4, 0.4), (0.4, 0.4, 2))])
+found = [{"quality": "balanced"}, {"quality": "best", "search_steps": 4}]
+found += [{"quality": "fast", "policy": policy, "threshold": 0.02} for policy in ("learned", "rl-acd")]
+assert all(len(rlacd.decompose(mesh, **options)) > 1 for options in found)
 """
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 @pytest.mark.slow
@@ -157,6 +148,7 @@ def test_the_same_seed_gives_the_same_weights_and_another_does_not(meshes: Path,
 def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, tmp_path: Path) -> None:
     run(meshes, tmp_path / "whole")
     run(meshes, tmp_path / "halves", iterations=70)
+    (tmp_path / "halves" / "checkpoint.npz.1.part").write_bytes(b"what a crash left")
     run(meshes, tmp_path / "halves", resume=True)
     assert_same_run(tmp_path / "whole", tmp_path / "halves")
 
@@ -298,15 +290,6 @@ def test_damaged_checkpoints_and_folders_without_meshes_are_reported(meshes: Pat
         run(tmp_path / "nowhere", tmp_path / "another")
 
 
-@pytest.mark.slow
-def test_what_a_crash_left_beside_the_checkpoint_is_ignored(meshes: Path, tmp_path: Path) -> None:
-    run(meshes, tmp_path / "whole", validation=0)
-    run(meshes, tmp_path / "short", iterations=70, validation=0)
-    (tmp_path / "short" / "checkpoint.npz.1.part").write_bytes(b"half")
-    run(meshes, tmp_path / "short", resume=True, validation=0)
-    assert weights(tmp_path / "whole") == weights(tmp_path / "short")
-
-
 @pytest.mark.nightly
 @pytest.mark.parametrize(
     "name",
@@ -321,13 +304,10 @@ def test_what_a_crash_left_beside_the_checkpoint_is_ignored(meshes: Path, tmp_pa
 def test_alone_with_a_mesh_a_networks_own_planes_leave_no_more_parts_than_greedys(
     corpus: Path, name: str, tmp_path: Path
 ) -> None:
-    pytest.importorskip("torch", reason="needs the extra train")
-    from rlacd.learn.train import train
-
     (tmp_path / "meshes").mkdir()
     shutil.copy(corpus / "train" / f"{name}.ply", tmp_path / "meshes")
     said: list[str] = []
-    train(tmp_path / "meshes", tmp_path / "run", TrainOptions.preset("one-mesh"), say=said.append)
+    run(tmp_path / "meshes", tmp_path / "run", say=said.append, **vars(TrainOptions.preset("one-mesh")))
     points = [point for point in curves(tmp_path / "run") if "validation_own_plane" in point]
     assert min(point["validation_own_plane"] for point in points) <= 1 < points[0]["validation_random"]
     assert "Use it:" in said[-1]

@@ -110,6 +110,15 @@ def test_decompose_takes_shipped_networks_with_any_criterion_and_number_of_threa
     assert [hull.vertices.tobytes() for hull in one.hulls] == [hull.vertices.tobytes() for hull in two.hulls]
 
 
+def test_networks_choose_the_cuts_where_parts_are_not_merged() -> None:
+    mesh = hollow_table().to_mesh64()
+    given = (mesh.vert_properties[:, :3], mesh.tri_verts)
+    for merge, policy in ((False, "learned"), (True, "greedy")):
+        free, asked = (rlacd.decompose(given, merge=merge, quality="fast", **p) for p in ({}, {"policy": policy}))
+        assert free.report["options"]["policy"] == policy
+        assert [hull.vertices.tobytes() for hull in free.hulls] == [hull.vertices.tobytes() for hull in asked.hulls]
+
+
 def test_none_leaves_components_as_they_are() -> None:
     result = rlacd.decompose(table(), policy=Answers(None), quality="fast")
     assert len(result) == 1

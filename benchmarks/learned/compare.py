@@ -1,8 +1,10 @@
 """Compare policies on meshes: `python benchmarks/learned/compare.py MESHES OUT.jsonl [--split test] [--count 150] ...`.
 
-For each mesh, policy and criterion: parts before and after merging, and the CPU seconds of cutting. A run that was
-interrupted goes on where it stopped. In the end, geometric means of the ratios to the first policy's numbers, with
-95 % intervals by resampling meshes.
+For each mesh, policy and criterion: parts before merging, after merging neighbours (as NavACD does) and after all
+merging, and the CPU seconds of cutting. A criterion is a concavity threshold, or radius and tolerance of navigable
+space: ``0.05,0.01``. A policy is a name that ``decompose`` takes, or a deployment ``planes:ap=5:FILE.npz`` (see
+`benchmarks.deployed`). A run that was interrupted goes on where it stopped. In the end, means, and geometric means of
+the ratios to the first policy's numbers with 95 % intervals by resampling meshes.
 """
 
 from __future__ import annotations
@@ -15,13 +17,14 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.deployed import Deployed, Deployment
 from rlacd.criteria import Concavity, Criterion, Navigable
 from rlacd.cut import CutTree
 from rlacd.errors import RlacdError
 from rlacd.io.read.load import load_mesh
 from rlacd.merge import drop_slivers, merge_parts
 from rlacd.options.navigable import NavigableSpace
-from rlacd.policies import make_policy
+from rlacd.policies import Policy, make_policy
 from rlacd.repair.repair import repair
 from rlacd.run import Run
 from rlacd.solid.component import Component
@@ -34,27 +37,38 @@ SAMPLES = 4000
 
 
 def criterion_of(name: str, solid: Solid) -> tuple[Criterion, float | None]:
-    """Get a criterion and its length: ``navigable`` (5 %, 1 %), or a concavity threshold."""
-    if name == "navigable":
-        return Navigable.of(NavigableSpace(radius=0.05, tolerance=0.01), solid, 1), None
+    """Get a criterion, and its length if it has one."""
+    if "," in name:
+        radius, tolerance = map(float, name.split(","))
+        return Navigable.of(NavigableSpace(radius=radius, tolerance=tolerance), solid, 1), None
     return Concavity(float(name)), float(name)
 
 
-def measure(solid: Solid, policy: str, criterion: str, merge: bool) -> dict[str, float] | None:
+def policy_of(name: str, length: float | None) -> Policy:
+    """Get a policy by its name, or a deployment."""
+    if name.startswith("planes:"):
+        return Deployed(Deployment.parse(name.split(":")[1:]), length)
+    return make_policy(name, scale=length)
+
+
+def measure(
+    solid: Solid, policy: str, criterion: tuple[Criterion, float | None], merge: bool
+) -> dict[str, float] | None:
     """Cut and merge; None if there is nothing to cut, or too many parts."""
-    decides, length = criterion_of(criterion, solid)
+    decides, length = criterion
     root = Component(solid.shape)
     if decides.is_met(root):
         return None
     with Run(1) as run:
         begin = time.process_time()
-        done, left = CutTree(root, make_policy(policy, scale=length), run).cut_until(decides, MOST_PARTS)
+        done, left = CutTree(root, policy_of(policy, length), run).cut_until(decides, MOST_PARTS)
         row = {"cut_s": time.process_time() - begin, "raw": float(len(done) + len(left))}
         if left and row["raw"] >= MOST_PARTS:
             return None
         if merge:
             pieces = drop_slivers([*done, *left], run, suspects=left)
             settled = decides.settled(pieces)
+            row["navacd"] = float(len(drop_slivers(merge_parts(pieces, settled, run), run)))
             row["merged"] = float(len(drop_slivers(merge_parts(pieces, settled, run, solid=root), run)))
     return row
 
@@ -65,18 +79,18 @@ def summary(rows: list[dict[str, object]], policies: list[str], criteria: list[s
     for criterion in criteria:
         of = {(r["file"], r["policy"]): r for r in rows if r["criterion"] == criterion and "raw" in r}
         names = [f for f in dict.fromkeys(f for f, _ in of) if all((f, p) in of for p in policies)]
-        for policy in policies[1:] if names else ():
-            for key in ("raw", "merged", "cut_s"):
+        for policy in policies if names else ():
+            for key in ("raw", "navacd", "merged", "cut_s"):
                 pairs = [(of[f, policy].get(key), of[f, policies[0]].get(key)) for f in names]
                 logs = np.array([np.log(float(a) / float(b)) for a, b in pairs if a and b])  # type: ignore[arg-type]
                 if not len(logs):
                     continue
                 drawn = logs[rng.integers(len(logs), size=(SAMPLES, len(logs)))].mean(axis=1)
                 low, high = np.exp(np.quantile(drawn, [0.025, 0.975]))
-                total = sum(float(a) for a, _ in pairs if a) / sum(float(b) for _, b in pairs if b)  # type: ignore[arg-type, misc]
+                mean, other = (float(np.mean([x for x in column if x])) for column in zip(*pairs, strict=True))  # type: ignore[arg-type]
                 print(
                     f"{criterion:9s} {policy:22s} {key:6s} {np.exp(logs.mean()):.3f} ({low:.3f} to {high:.3f})"
-                    f"  of totals {total:.3f}  {len(logs)} meshes"
+                    f"  of totals {mean / other:.3f}  mean {mean:.4g}  {len(logs)} meshes"
                 )
 
 
@@ -105,14 +119,14 @@ def main() -> None:
                 solid = repair(load_mesh(args.meshes / name), threads=1) if wanted else None
             except RlacdError:
                 continue
+            made: dict[str, tuple[Criterion, float | None]] = {}
             for policy, criterion in wanted:
                 assert solid is not None
                 row = {"file": name, "policy": policy, "criterion": criterion}
-                row |= measure(solid, policy, criterion, args.merge) or {}
+                made[criterion] = made.get(criterion) or criterion_of(criterion, solid)
+                row |= measure(solid, policy, made[criterion], args.merge) or {}
                 rows.append(row)
                 print(json.dumps(row), file=out, flush=True)
-                if "raw" not in row and policy == args.policies[0]:
-                    break
     summary(rows, args.policies, args.criteria)
 
 

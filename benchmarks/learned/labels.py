@@ -3,7 +3,7 @@
 `python benchmarks/learned/labels.py MESHES OUT CPU_SECONDS`
 
 For meshes of the split train, trees of cuts are grown, greedily or with a share of random cuts among the ten best. Of
-up to five components of a tree that end in 3 to 30 parts, about nine planes are cut each: greedy's, that of least hull
+up to six components of a tree that end in 4 to 60 parts, about nine planes are cut each: greedy's, that of least hull
 sum, good ones apart from each other, and two random ones of the 80 best. Both sides are then completed by greedy, and
 the parts counted. Shards hold eight meshes each; random numbers depend on the shard's number alone, so a run that was
 interrupted goes on where it stopped.
@@ -33,10 +33,11 @@ from rlacd.repair.repair import repair
 from rlacd.run import Run
 from rlacd.solid.component import Component, Plane
 
-A_SHARD, FACES, LEAVES, NODES, NEAR = 8, (60, 2500), (3, 30), 4, 80
+A_SHARD, FACES, LEAVES, NODES, NEAR = 8, (60, 4000), (4, 60), 5, 80
 THRESHOLDS = (0.03, 0.04, 0.05, 0.05)
 KINDS = ("concavity", "concavity", "concavity", "navigable")
-MOST, MOST_AFTER = 60, 80
+MOST, MOST_AFTER = 120, 150
+LEAST_EXCESS = 5.0  # a little simpler than `SIMPLE` of the policy, in the same unit
 
 RUN, SWEEPS = Run(1), SweepCache()
 
@@ -115,6 +116,7 @@ def labels_of(path: Path, rng: np.random.Generator) -> list[dict[str, Any]]:
         return []
     cut = [c for c, below in tree._children.items() if len(below) == 2 and not criterion.is_met(c)]
     nodes = [c for c in cut if LEAVES[0] <= leaves(tree, c) <= LEAVES[1] and len(c.pieces()) == 1]
+    nodes = [c for c in nodes if np.cbrt(max(c.hull.volume - c.volume, 0)) > LEAST_EXCESS * threshold]
     nodes.sort(key=lambda c: -leaves(tree, c))
     nodes = nodes[:1] + [nodes[i] for i in rng.permutation(len(nodes) - 1)[:NODES] + 1] if len(nodes) > 1 else nodes
     found = []

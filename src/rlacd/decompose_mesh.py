@@ -59,7 +59,7 @@ def decompose(
     overlap: float = 0.0,
     overlap_abs: float | None = None,
     merge: bool = True,
-    policy: str | Policy = "greedy",
+    policy: str | Policy | None = None,
     resolution: int = 100,
     open: OpenName = "auto",
     gap: float = 0.015,
@@ -122,9 +122,10 @@ def decompose(
         The same in the input's unit; replaces `overlap`.
     merge : bool
         Unite parts whose joint hull still meets the threshold.
-    policy : str or Policy
-        What chooses the cuts of the first pass: ``greedy``, ``greedy-SCORE``, ``navacd``, ``random-N``, the path of
-        an .npz file of a network, or any object with a method ``choose``: see `rlacd.Policy`.
+    policy : str or Policy, optional
+        What chooses the cuts of the first pass: ``greedy``, the default; ``learned``, the default if parts are not
+        merged; ``rl-acd``, ``greedy-SCORE``, ``navacd``, ``random-N``, the path of an .npz file of a network, or any
+        object with a method ``choose``: see `rlacd.Policy`.
     resolution : int
         Cells along the longest side of the grid on which repair looks for enclosed spaces.
     open : "auto", "solid" or "thin"
@@ -186,7 +187,7 @@ def decompose(
     given = locals()
     options = Options(**{name: given[name] for name in OPTION_NAMES})
     check_callback("progress", progress, "a `rlacd.Progress`")
-    make_policy(options.policy)  # reports a bad network before any work is done
+    make_policy(options.first_policy)  # reports a bad network before any work is done
     with Run(options.threads, options.timeout, progress, options.seed) as run:
         with run.stage("load"):
             source = in_metres(load_mesh(mesh), options)

@@ -108,8 +108,8 @@ class _Decomposer:
     def of(cls, model: Model, goal: Criterion, options: Options, run: Run) -> _Decomposer:
         """Prepare to decompose a model."""
         sweeps = SweepCache()
-        second = Greedy("hull-sum", sweeps=sweeps) if options.policy == "greedy" else None
-        policy = make_policy(options.policy, sweeps, _scale(model.tighter(goal)))
+        second = Greedy("hull-sum", sweeps=sweeps) if options.first_policy == options.default_policy else None
+        policy = make_policy(options.first_policy, sweeps, _scale(model.tighter(goal)))
         tree = CutTree(model.component, policy, run, second=second)
         return cls(model, options, run, sweeps, tree)
 
@@ -124,7 +124,7 @@ class _Decomposer:
             parts, found = self._searched(done.parts, done.criterion, goal if factor == 1.0 else None)
             if self.model.proxy is None:
                 return parts, done.criterion, found
-            policy = make_policy(self.options.policy, SweepCache(), _scale(goal))
+            policy = make_policy(self.options.first_policy, SweepCache(), _scale(goal))
             scaled = goal if factor == 1.0 else goal.scaled(factor)
             return self.model.lift(parts, scaled, policy, self.run, merge=self.options.merge), goal, found
 

@@ -72,11 +72,11 @@ class JobSpec:
             The format is unknown, or needs an extra.
         """
         checked = Options(**{"threads": 1, **options})
-        if not isinstance(checked.policy, str):
+        if not isinstance(checked.first_policy, str):
             raise OptionError(
                 "in a batch, policy has to be a name or a file: an object cannot be sent to other processes."
             )
-        make_policy(checked.policy)
+        make_policy(checked.first_policy)
         asked = OutputOptions(**written)
         ending, file_format = _file_kind(asked.file_format, folders, checked.preset)
         flags = {name: bool(getattr(asked, name)) for name in ("one_mesh", "keep_input")}
@@ -88,7 +88,7 @@ class JobSpec:
         plain["criterion"] = checked.as_plain()["criterion"]
         density = DENSITY if asked.density is None else asked.density
         saved = {"file_format": file_format, "density": density, "mass": asked.mass, "up": asked.up, **flags}
-        return cls(plain, ending, saved, _weights(checked.policy))
+        return cls(plain, ending, saved, _weights(checked.first_policy))
 
     @property
     def threads(self) -> int:

@@ -81,8 +81,7 @@ def tensors(arrays: Arrays) -> dict[str, torch.Tensor]:
 
 def adam_state(optimizer: torch.optim.Adam) -> dict[str, torch.Tensor]:
     """Get Adam's moments and counts, by name."""
-    parameters = enumerate(optimizer.param_groups[0]["params"])
-    return {f"{i}.{key}": v for i, parameter in parameters for key, v in optimizer.state.get(parameter, {}).items()}
+    return {f"{i}.{key}": v for i, of_one in optimizer.state_dict()["state"].items() for key, v in of_one.items()}
 
 
 def restore_adam(optimizer: torch.optim.Adam, saved: Mapping[str, torch.Tensor]) -> None:

@@ -19,9 +19,6 @@ from rlacd.solid.component import Component
 
 Longs = NDArray[np.int64]
 
-ENDED = ("terminal", "stuck", "cap", "nothing", "lost")
-"""Ways to end: all parts finished; some cannot be cut; truncated; nothing to cut; the episode could not be played."""
-
 
 @dataclass(frozen=True, eq=False)
 class Episode:
@@ -38,8 +35,10 @@ class Episode:
     child, owner : int64 [C]
         Components that cuts left unfinished, and the cut of each.
     discounts : float64 [C]
-    parts, ended : int
-        Number of components at the end; index into `ENDED`.
+    parts : int
+        Number of components at the end.
+    ended : str
+        terminal: all parts finished; stuck: some cannot be cut; cap: truncated; nothing: to cut; lost: never played.
     """
 
     features: NDArray[np.float16]
@@ -51,19 +50,14 @@ class Episode:
     owner: Longs
     discounts: FloatArray
     parts: int
-    ended: int
+    ended: str
 
     @classmethod
     def empty(cls, ended: str) -> Episode:
         """Create an episode without a cut."""
         ints, floats = np.empty(0, np.int64), np.empty(0)
         none = np.empty((0, 0), np.float16), np.empty((0, 0), np.bool_)
-        return cls(*none, ints, ints, floats, ints, ints, floats, 0, ENDED.index(ended))
-
-    @property
-    def how(self) -> str:
-        """How it ended."""
-        return ENDED[self.ended]
+        return cls(*none, ints, ints, floats, ints, ints, floats, 0, ended)
 
     def children(self) -> list[dict[int, float]]:
         """Discounts of the unfinished children of each cut, by their numbers."""
@@ -79,7 +73,7 @@ class Episode:
     @classmethod
     def from_bytes(cls, content: bytes) -> Episode:
         """Unpack the result of `to_bytes`."""
-        values: dict[str, Any] = {name: a if a.ndim else int(a) for name, a in unpacked(content).items()}
+        values: dict[str, Any] = {name: a if a.ndim else a.item() for name, a in unpacked(content).items()}
         return cls(**values)
 
 
@@ -108,17 +102,17 @@ class Player:
 
     def play(self) -> Episode:
         """Cut the largest component again and again, epsilon-greedily."""
-        cutting, numbers = self.cutting, {c: i for i, c in enumerate(self.cutting.frontier)}
+        cutting, numbers = self.cutting, {c: i for i, c in enumerate(self.cutting.unfinished)}
         cuts: list[tuple[int, int, float]] = []
         children: list[tuple[int, int, float]] = []
         while not (ended := self._ended(len(cuts))):
-            component = cutting.frontier[cutting.largest()]
+            component = cutting.unfinished[cutting.largest()]
             plane = self._choose(component)
             cut = cutting.cut(cutting.largest(), cutting.candidates(component).plane(plane))
-            for child, share in zip(cut.unfinished, cut.discounts, strict=True):
+            for child, share in zip(cut.left.unfinished, cut.discounts, strict=True):
                 numbers[child] = len(numbers)
                 children.append((numbers[child], len(cuts), self.options.static_discount or share))
-            cuts.append((numbers[component], plane, cut.reward.worth(self.options)))
+            cuts.append((numbers[component], plane, cut.reward(self.options)))
         seen = [self._see(component) for component in numbers]
         state, planes, rewards = (np.array(column) for column in zip(*cuts, strict=True))
         of_child, owner, discounts = (np.array([c[i] for c in children]) for i in range(3))
@@ -126,14 +120,14 @@ class Player:
             np.stack([features for features, _ in seen]).astype(np.float16),
             np.stack([mask for _, mask in seen]),
             *(state, planes, rewards, of_child.astype(np.int64), owner.astype(np.int64), discounts),
-            parts=cutting.count,
-            ended=ENDED.index(ended),
+            parts=len(cutting.all),
+            ended=ended,
         )
 
     def _ended(self, cuts: int) -> str:
-        if self.cutting.over:
+        if not self.cutting.unfinished:
             return "terminal" if self.cutting.terminal else "stuck"
-        return "cap" if cuts and self.cutting.count >= self.options.max_parts else ""
+        return "cap" if cuts and len(self.cutting.all) >= self.options.max_parts else ""
 
     def _see(self, component: Component) -> tuple[Float32Array, BoolArray]:
         """Features, as exact as they are stored, and valid planes."""

@@ -5,21 +5,16 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 from manifold3d import Manifold, Mesh64
-from numpy.typing import NDArray
 
-from rlacd.errors import MeshFileError, RlacdError, TrainingError
-from rlacd.io.read.beside import lay_out, mesh_files
+from rlacd.errors import RlacdError, TrainingError
 from rlacd.io.read.load import load_mesh
 from rlacd.learn.files import packed, save_bytes, unpacked
 from rlacd.repair.repair import repair
-from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component
 from rlacd.solid.frame import Frame
 
@@ -71,7 +66,7 @@ def list_meshes(folder: Path, max_faces: int, validation: int, seed: int) -> Mes
             f"{folder} holds {len(names)} meshes to learn on ({unreadable} cannot be read, {too_large} have more than "
             f"{max_faces} triangles); more than {validation} are needed, since that many are held out for validation."
         )
-    drawn = shuffled(names, seed)
+    drawn = [names[i] for i in np.random.default_rng(seed).permutation(len(names))]
     return MeshList(tuple(sorted(drawn[validation:])), tuple(sorted(drawn[:validation])), unreadable, too_large)
 
 
@@ -95,114 +90,47 @@ def list_once(meshes: Path, run: Path, max_faces: int, validation: int, seed: in
     return found
 
 
-def shuffled(names: Sequence[str], seed: int) -> list[str]:
-    """Shuffle names by the seed alone."""
-    return [names[i] for i in np.random.default_rng(seed).permutation(len(names))]
-
-
-NOTHING = np.empty((0, 3)), np.empty((0, 3), dtype=np.uint64)
-"""Vertices and faces that stand for a failed repair."""
-
-SOLID = "solid.npz"
-"""Name of a repaired solid among the blobs of a request and of its answer."""
-
-
-def repaired(path: Path) -> bytes:
-    """Repair a mesh and pack it for `unpack_solid`."""
-    try:
-        solid = repair(load_mesh(path), threads=1)
-        Component(solid.shape)
-    except (RlacdError, ValueError):  # flat or empty: nothing to cut
-        return pack_solid(*NOTHING)
-    return pack_solid(solid.vertices, solid.faces.astype(np.uint64))
-
-
-def pack_solid(vertices: FloatArray, faces: NDArray[np.uint64]) -> bytes:
-    """Pack a solid for `unpack_solid`."""
-    return packed({"vertices": vertices, "faces": faces})
-
-
-def unpack_solid(content: bytes) -> Manifold | None:
-    """Unpack a solid; None if it could not be repaired."""
+def turned(content: bytes, axis: int, degrees: float) -> Component | None:
+    """Turn the solid of `Solids.packed` about a coordinate axis, in its frame; None if it could not be repaired."""
     arrays = unpacked(content)
-    return Manifold(Mesh64(arrays["vertices"], arrays["faces"])) if len(arrays["faces"]) else None
-
-
-def take_solid(blobs: Mapping[str, bytes], staging: Path) -> tuple[Manifold | None, dict[str, bytes]]:
-    """Return the solid of a request (see `Solids.files`), and the blobs for the answer: `SOLID` if it is new.
-
-    Parameters
-    ----------
-    blobs : mapping of bytes
-        The repaired solid, or the files of a mesh.
-    staging : Path
-        A folder for temporary files.
-    """
-    if SOLID in blobs:
-        return unpack_solid(blobs[SOLID]), {}
-    with TemporaryDirectory(dir=staging) as folder:
-        solid = repaired(lay_out(blobs, Path(folder)))
-    return unpack_solid(solid), {SOLID: solid}
-
-
-def turned(solid: Manifold, axis: int, degrees: float) -> Component:
-    """Turn a solid about a coordinate axis, and move it to its frame."""
+    if not len(arrays["faces"]):
+        return None
+    solid = Manifold(Mesh64(arrays["vertices"], arrays["faces"]))
     return Component(_framed(solid.rotate([degrees if i == axis else 0.0 for i in range(3)])) if degrees else solid)
 
 
 class Solids:
-    """Repaired solids by name, read from the cache folder, or repaired and stored there.
+    """Repaired solids by name, each repaired once.
 
     Parameters
     ----------
     folder : Path
         Folder of the meshes.
-    cache : Path, optional
-        A folder used by this class only; several processes may share it. By default solids are kept in memory only.
+    cache : Path
+        A folder used by this class only.
     """
 
-    def __init__(self, folder: Path, cache: Path | None = None) -> None:
-        self._folder = folder
-        self._cache = cache
-        self._held: dict[str, Manifold | None] = {}
-        if cache is not None:
-            cache.mkdir(parents=True, exist_ok=True)
+    def __init__(self, folder: Path, cache: Path) -> None:
+        self._folder, self._cache = folder, cache
 
-    def get(self, name: str, axis: int = 0, degrees: float = 0.0) -> Component | None:
-        """Return a solid turned about a coordinate axis, in its frame; None if it cannot be repaired."""
-        solid = self.manifold(name)
-        return None if solid is None else turned(solid, axis, degrees)
+    def get(self, name: str) -> Component | None:
+        """Get a solid in its frame; None if it cannot be repaired."""
+        return turned(self.packed(name), 0, 0.0)
 
-    def manifold(self, name: str) -> Manifold | None:
-        """Return a solid as in its file; None if it cannot be repaired."""
-        if name not in self._held:
-            kept = self._kept(name)
-            if kept is None:
-                kept = repaired(self._folder / name)
-                self.keep(name, kept)
-            self._held[name] = unpack_solid(kept)
-        return self._held[name]
-
-    def files(self, name: str) -> dict[str, bytes]:
-        """Return what another machine needs to get the solid: the solid itself (`SOLID`), or the files of the mesh."""
-        kept = self._kept(name)
+    def packed(self, name: str) -> bytes:
+        """Get the arrays of a solid, for `turned` on any machine; empty ones if it cannot be repaired."""
+        place = self._cache / f"{hashlib.sha256(name.encode()).hexdigest()[:24]}.npz"
+        if place.exists():
+            return place.read_bytes()
         try:
-            return mesh_files(self._folder / name) if kept is None else {SOLID: kept}
-        except MeshFileError:
-            return {SOLID: pack_solid(*NOTHING)}
-
-    def keep(self, name: str, content: bytes) -> None:
-        """Store the result of `repaired` in the cache."""
-        if (place := self._place(name)) is not None:
-            save_bytes(place, content)
-
-    def _kept(self, name: str) -> bytes | None:
-        place = self._place(name)
-        return place.read_bytes() if place is not None and place.exists() else None
-
-    def _place(self, name: str) -> Path | None:
-        digest = hashlib.sha256(name.encode()).hexdigest()[:24]
-        return None if self._cache is None else self._cache / f"{digest}.npz"
+            solid = repair(load_mesh(self._folder / name), threads=1)
+            Component(solid.shape)
+            vertices, faces = solid.vertices, solid.faces.astype(np.uint64)
+        except (RlacdError, ValueError):  # flat or empty: nothing to cut
+            vertices, faces = np.empty((0, 3)), np.empty((0, 3), np.uint64)
+        content = packed({"vertices": vertices, "faces": faces})
+        save_bytes(place, content)
+        return content
 
 
 def _framed(solid: Manifold) -> Manifold:

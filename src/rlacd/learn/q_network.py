@@ -15,8 +15,6 @@ from rlacd.errors import OptionError
 from rlacd.learn.encoders import Encoder, make_encoder
 from rlacd.learn.options import TrainOptions
 from rlacd.policies.network import KIND, Network, QPolicy, load_network
-from rlacd.solid.arrays import Float32Array
-from rlacd.solid.component import Component
 
 HIDDEN = (1024, 512, 256, 128)
 """Widths of the paper's layers."""
@@ -94,11 +92,7 @@ def bellman_loss(q: Tensor, planes: Tensor, target: Tensor, unit: float) -> Tens
 def policy_of(network: QNetwork | Network, encoder: Encoder, **deployment: int) -> QPolicy:
     """Make a policy of a network; `deployment` is `QPolicy`'s shortlist and concave_edges."""
     fixed = network if isinstance(network, Network) else network.plain({"threshold": 1.0})
-
-    def values(component: Component) -> Float32Array:
-        return fixed(encoder.describe(component)).reshape(-1)
-
-    return QPolicy(values, **deployment)
+    return QPolicy(lambda component: fixed(encoder.describe(component)).reshape(-1), **deployment)
 
 
 def load_policy(run: Path, **deployment: int) -> QPolicy:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd.errors import RlacdError
-from rlacd.solid.arrays import BoolArray, Float32Array
+from rlacd.solid.arrays import BoolArray
 
 KEY = 16
 """Bytes of a component's key."""
@@ -45,35 +45,6 @@ class Transition:
     features: NDArray[np.float16]
     reward: float
     children: Children
-
-
-@dataclass(frozen=True, eq=False)
-class TransitionBatch:
-    """B transitions and their C unfinished children.
-
-    Attributes
-    ----------
-    features : float32 [B, D]
-    planes : int64 [B]
-    rewards, cuts : float32 [B]
-        Rewards; the fewest cuts seen, from this one on.
-    child_features : float32 [C, D] or [C, A, D]
-    child_masks : bool [C, A]
-        Never all False in a row.
-    child_discounts : float32 [C]
-        gamma.
-    owner : int64 [C]
-        Batch row of each child.
-    """
-
-    features: Float32Array
-    planes: NDArray[np.int64]
-    rewards: Float32Array
-    cuts: Float32Array
-    child_features: Float32Array
-    child_masks: BoolArray
-    child_discounts: Float32Array
-    owner: NDArray[np.int64]
 
 
 class Replay:
@@ -122,23 +93,32 @@ class Replay:
             self._held[self._next] = transition
         self._next = (self._next + 1) % self.capacity
 
-    def sample(self, count: int, rng: np.random.Generator) -> TransitionBatch:
-        """Draw `count` transitions uniformly, with replacement."""
+    def sample(self, count: int, rng: np.random.Generator) -> dict[str, NDArray[Any]]:
+        """Draw B = `count` transitions uniformly, with replacement.
+
+        Returns
+        -------
+        dict of arrays
+            features float32 [B, D], planes int64 [B], rewards float32 [B], and cuts float32 [B], the fewest seen from
+            this one on. Of the C unfinished children: owner int64 [C], their row; child_features float32 [C, D] or
+            [C, A, D]; child_masks bool [C, A], never all False in a row; child_discounts float32 [C].
+        """
         if not self._held:
             raise RlacdError("there is nothing to learn from yet; let `warmup` be at least 1.")
         drawn = [self._held[i] for i in rng.integers(len(self._held), size=count)]
         children = [(row, child, discount) for row, t in enumerate(drawn) for child, discount in t.children]
         first = drawn[0].state
-        return TransitionBatch(
-            np.stack([t.features for t in drawn]).astype(np.float32),
-            np.array([t.plane for t in drawn]),
-            np.array([t.reward for t in drawn], np.float32),
-            np.array([self.cuts(t.children) for t in drawn], np.float32),
-            np.array([c.features for _, c, _ in children], np.float32).reshape(len(children), *first.features.shape),
-            np.array([c.mask for _, c, _ in children], np.bool_).reshape(len(children), len(first.mask)),
-            np.array([discount for _, _, discount in children], np.float32),
-            np.array([row for row, _, _ in children], np.int64),
-        )
+        shape = len(children), *first.features.shape
+        return {
+            "features": np.stack([t.features for t in drawn]).astype(np.float32),
+            "planes": np.array([t.plane for t in drawn]),
+            "rewards": np.array([t.reward for t in drawn], np.float32),
+            "cuts": np.array([self.cuts(t.children) for t in drawn], np.float32),
+            "child_features": np.array([c.features for _, c, _ in children], np.float32).reshape(shape),
+            "child_masks": np.array([c.mask for _, c, _ in children], np.bool_).reshape(-1, len(first.mask)),
+            "child_discounts": np.array([discount for _, _, discount in children], np.float32),
+            "owner": np.array([row for row, _, _ in children], np.int64),
+        }
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Return everything as arrays, for a checkpoint; each component once."""

@@ -23,10 +23,9 @@ from rlacd.criteria import Concavity
 from rlacd.errors import TrainingError
 from rlacd.learn.encoders import make_encoder
 from rlacd.learn.episodes import Episode, Player
-from rlacd.learn.meshes import SOLID, TURNS, Solids, take_solid, turned
+from rlacd.learn.meshes import TURNS, Solids, turned
 from rlacd.learn.options import TrainOptions
 from rlacd.learn.process import CutProcess, Memory
-from rlacd.learn.q_network import QNetwork
 from rlacd.policies.network import Network, parse_network
 from rlacd.pool import Answer, Blobs, Pool, ProcessLimits, Request, Shared, WorkerDiedError
 from rlacd.solid.component import Component
@@ -50,11 +49,6 @@ class Acting:
 
     network: Shared | None
     epsilon: float
-
-    @classmethod
-    def by(cls, network: QNetwork, epsilon: float) -> Acting:
-        """Let a network choose."""
-        return cls(Shared({"network": network.plain({"threshold": 1.0}).to_bytes()}), epsilon)
 
 
 class Rollouts:
@@ -110,7 +104,7 @@ class Rollouts:
         """
         episode = self._played(self._ahead.popleft())
         self._without_cuts = 0 if len(episode.planes) else self._without_cuts + 1
-        self._lost = self._lost + 1 if episode.how == "lost" else 0
+        self._lost = self._lost + 1 if episode.ended == "lost" else 0
         if self._lost == LOST_IN_A_ROW:
             raise TrainingError(
                 f"{LOST_IN_A_ROW} episodes in a row were lost with their processes; give more --memory or a longer "
@@ -146,7 +140,8 @@ class Rollouts:
             "seed": [options.seed, ACT, number],
         }
         shared = {"setting": self._setting} | ({} if acting.network is None else {"network": acting.network})
-        request = Request(SERVER, values, self._solids.files(name), shared, self._limits, tries=2)
+        blobs = {"solid": self._solids.packed(name)}
+        request = Request(SERVER, values, blobs, shared, self._limits, tries=2)
         return number, name, self._pool.submit(request)
 
     def _played(self, episode: tuple[int, str, Future[Answer]] | Episode) -> Episode:
@@ -159,8 +154,6 @@ class Rollouts:
             words = (died.last_words.splitlines() or [""])[-1]
             self._say(f"episode {number}, {name}, is left out: {died} {words}".rstrip())
             return Episode.empty("lost")
-        if SOLID in answer.blobs:
-            self._solids.keep(name, answer.blobs[SOLID])
         return Episode.from_bytes(answer.blobs["episode"])
 
 
@@ -193,7 +186,7 @@ class RolloutServer:
         values : dict
             See `Rollouts`.
         blobs : dict of bytes
-            The repaired solid (`rlacd.learn.meshes.SOLID`), or the files of the mesh.
+            ``solid``: see `rlacd.learn.meshes.Solids.packed`.
         shared : dict of Shared
             ``setting``: ``options`` as JSON, and the ``encoder``'s file of weights if it has one. ``network``: that of
             `Acting`.
@@ -203,19 +196,17 @@ class RolloutServer:
         dict
             Empty.
         dict of bytes
-            ``episode``, and `SOLID` if it had to be repaired.
+            ``episode``.
         """
         self._take_over(shared)
-        solid, kept = take_solid(blobs, self._staging)
-        if solid is None:
-            return {}, {"episode": Episode.empty("nothing").to_bytes(), **kept}
         key = f"{values['name']} {values['axis'] if values['degrees'] else 0} {values['degrees']}"
-        if key not in self._known:
-            self._known[key] = turned(solid, values["axis"], values["degrees"]), Memory()
-        component, memory = self._known.pop(key)
-        cutting = CutProcess(component, Concavity(self._options.threshold), memory)
-        if cutting.over or cutting.count > self._options.max_parts:
-            return {}, {"episode": Episode.empty("nothing").to_bytes(), **kept}
+        component, memory = self._known.pop(key, None) or (
+            turned(blobs["solid"], values["axis"], values["degrees"]),
+            Memory(),
+        )
+        cutting = None if component is None else CutProcess(component, Concavity(self._options.threshold), memory)
+        if cutting is None or not cutting.unfinished or len(cutting.all) > self._options.max_parts:
+            return {}, {"episode": Episode.empty("nothing").to_bytes()}
         network = self._network if "network" in shared else None
         rng = np.random.default_rng(values["seed"])
         player = Player(cutting, self._options, self._encoder, network, values["epsilon"], rng)
@@ -223,7 +214,7 @@ class RolloutServer:
         self._known[key] = component, memory
         while sum(len(memory.met) for _, memory in self._known.values()) > REMEMBERED:
             self._known.popitem(last=False)
-        return {}, {"episode": episode.to_bytes(), **kept}
+        return {}, {"episode": episode.to_bytes()}
 
     def _take_over(self, shared: Mapping[str, Shared]) -> None:
         """Rebuild whatever changed in the shared data since the last request."""

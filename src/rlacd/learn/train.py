@@ -31,10 +31,10 @@ from rlacd.learn.q_network import QNetwork, bellman_loss, dual_state_target, pol
 from rlacd.learn.replay import Replay, Transition
 from rlacd.learn.rollouts import Acting, Rollouts
 from rlacd.options.fields import require_same
-from rlacd.policies import make_policy
+from rlacd.policies import Policy, make_policy
 from rlacd.policies.greedy import RandomShortlist
 from rlacd.policies.network import KIND, SHORTLIST
-from rlacd.pool import Pool, ProcessLimits
+from rlacd.pool import Pool, ProcessLimits, Shared
 from rlacd.pool.local import InProcessPool
 
 VALIDATED = 16
@@ -152,7 +152,8 @@ class Training:
         if self.cuts < self.options.warmup:
             return Acting(None, 1.0)
         thousands = (self.cuts - self.options.warmup) // 1000
-        return Acting.by(self.network, self.options.epsilon * self.options.epsilon_decay**thousands)
+        network = Shared({"network": self.network.plain({"threshold": 1.0}).to_bytes()})
+        return Acting(network, self.options.epsilon * self.options.epsilon_decay**thousands)
 
     def learn_from(self, episode: Episode) -> None:
         """Add an episode to the replay buffer cut by cut, and learn after each."""
@@ -168,12 +169,12 @@ class Training:
                 self.learn()
         if len(episode.planes):
             self._add(reward=float(episode.rewards.mean()), parts=float(episode.parts))
-        self._add(**{f"ended_{episode.how}": 1.0})
+        self._add(**{f"ended_{episode.ended}": 1.0})
 
     def learn(self) -> None:
         """Take a gradient step on one batch: the dual-state Bellman loss (eq. 8), or that to the fewest cuts seen."""
         options, batch = self.options, self.replay.sample(self.options.batch, self.rng)
-        tensor = {name: torch.from_numpy(array).to(self.device) for name, array in vars(batch).items()}
+        tensor = {name: torch.from_numpy(array).to(self.device) for name, array in batch.items()}
         target = -tensor["cuts"].log()
         if options.objective == "rewards":
             with torch.no_grad():
@@ -212,7 +213,7 @@ class Training:
         arrays |= under("adam", adam_state(self.optimizer)) | under("replay", self.replay.state())
         arrays |= under("rollouts", self.rollouts.state())
         state = {name: getattr(self, name) for name in ("cuts", "learned", "seconds", "sums", "best")}
-        state |= {"options": dataclasses.asdict(self.options), "encoder": self.encoder.digest()}
+        state |= {"options": dataclasses.asdict(self.options), "encoder": self.encoder.digest}
         save_checkpoint(self.folder / "checkpoint.npz", arrays, {**state, "generator": self.rng.bit_generator.state})
 
     def restore(self) -> None:
@@ -224,7 +225,7 @@ class Training:
             return
         arrays, state = found
         require_same(state["options"], self.options, MAY_CHANGE)
-        if state["encoder"] != self.encoder.digest():
+        if state["encoder"] != self.encoder.digest:
             raise OptionError(
                 f"{self.options.encoder_weights} holds other weights than the run began with; give the same "
                 "--encoder-weights, or begin another run."
@@ -257,31 +258,27 @@ class Validation:
     """Raw parts of a few solids, as geometric means of their ratios to greedy's over the 150 planes alone."""
 
     def __init__(self, listed: MeshList, solids: Solids, options: TrainOptions) -> None:
-        self._names = (listed.validation or listed.training)[:VALIDATED]
+        names = (listed.validation or listed.training)[:VALIDATED]
+        self._solids = [solid for name in names if (solid := solids.get(name)) is not None]
+        if not self._solids:
+            raise TrainingError("none of the meshes held out for validation can be repaired; hold out more.")
         self._held_out = bool(listed.validation)
-        self._solids, self._options = solids, options
-        self._greedy: list[int] = []
-        self._random = np.nan
+        self._criterion, self._most = Concavity(options.threshold), options.max_parts
+        self._greedy = self._parts(make_policy("greedy-hull-sum"))
+        self._random = mean_ratio(self._parts(RandomShortlist(1, concave_edges=0)), self._greedy)
 
     def ratios(self, network: QNetwork, encoder: Encoder) -> dict[str, float]:
         """Ratios of the network's own plane, its ten best, and of random planes."""
-        criterion, most = Concavity(self._options.threshold), self._options.max_parts
-        solids = [solid for name in self._names if (solid := self._solids.get(name)) is not None]
-        if not solids:
-            raise TrainingError("none of the meshes held out for validation can be repaired; hold out more.")
-        if not self._greedy:
-            self._greedy = count_parts(make_policy("greedy-hull-sum"), solids, criterion, most)
-            by_chance = count_parts(RandomShortlist(1, concave_edges=0), solids, criterion, most)
-            self._random = mean_ratio(by_chance, self._greedy)
-        own, ten = (
-            count_parts(policy_of(network, encoder, shortlist=n), solids, criterion, most) for n in (1, SHORTLIST)
-        )
+        own, ten = (self._parts(policy_of(network, encoder, shortlist=n)) for n in (1, SHORTLIST))
         return {
             "parts": sum(own) / len(own),
             "own_plane": mean_ratio(own, self._greedy),
             "ten_best": mean_ratio(ten, self._greedy),
             "random": self._random,
         }
+
+    def _parts(self, policy: Policy) -> list[int]:
+        return count_parts(policy, self._solids, self._criterion, self._most)
 
     def verdict(self, best: float, folder: Path, options: TrainOptions) -> str:
         """Say what the run has reached, and the next command."""

@@ -219,7 +219,7 @@ class Options:
     overlap: float = option(0.0, LIMITS, number(*LENGTHS["overlap"], typed=str), metavar="NUMBER")
     overlap_abs: float | None = option(None, LIMITS, LENGTH)
     merge: bool = option(True, METHOD, usual="merge")
-    policy: str | Policy = option("greedy", METHOD, _POLICY, metavar="NAME")
+    policy: str | Policy | None = option(None, METHOD, _POLICY, metavar="NAME", usual="greedy; learned with --no-merge")
     resolution: int = option(100, METHOD, least=RESOLUTIONS[0], most=RESOLUTIONS[1])
     open: OpenName = option("auto", METHOD, one_of=OpenName)
     gap: float = option(0.015, METHOD, number(*GAPS, typed=str), metavar="NUMBER")
@@ -246,6 +246,8 @@ class Options:
             object.__setattr__(self, "criterion", "concavity" if self.threshold_abs is None else "distance")
         if self.quality is None:  # searching means merging
             object.__setattr__(self, "quality", "balanced" if self.merge else FAST)
+        if self.policy is None:
+            object.__setattr__(self, "policy", self.default_policy)
         for name, rule in self._conflicts():
             raise OptionError(f"{name} is {getattr(self, name)!r}; it has to be {rule}.")
 
@@ -280,6 +282,16 @@ class Options:
         return cast("tuple[PrimitiveKind, ...]", self.primitives)
 
     @property
+    def default_policy(self) -> str:
+        """What cuts best: the networks do, but merging and searching gain less from their parts."""
+        return "greedy" if self.merge else "learned"
+
+    @property
+    def first_policy(self) -> str | Policy:
+        """What chooses the cuts of the first pass."""
+        return self.default_policy if self.policy is None else self.policy
+
+    @property
     def hull_limits(self) -> HullLimits:
         """Limits on each hull."""
         return HullLimits(self.max_vertices, self.max_faces)
@@ -292,7 +304,7 @@ class Options:
     def as_plain(self) -> dict[str, Any]:
         """Everything as plain values, the criterion by its name or its own options, a policy by its name."""
         plain = dataclasses.asdict(dataclasses.replace(self, policy="greedy"))
-        return plain | {"policy": policy_name(self.policy), "primitives": [*plain["primitives"]]}
+        return plain | {"policy": policy_name(self.first_policy), "primitives": [*plain["primitives"]]}
 
     def at_scale(self, scale: float) -> Options:
         """Get the same options with lengths as bare numbers, where a unit of the input is `scale` units of the frame.

@@ -31,9 +31,10 @@ others."""
 LEAST_GAIN = 0.02
 """Predicted saving in log(parts) for which the plane of least hull sum is given up: below it, predictions are noise."""
 
-SIMPLE = 3.0
-"""Excess of the component's hull, as the edge of a cube over the criterion's length, below which greedy decides:
-nearly all such components end in two parts, whatever the plane, and a sweep takes longer than greedy's bounds."""
+SIMPLE = 8.0
+"""Excess of the component's hull, as the edge of a cube over the criterion's length, below which greedy decides: a
+sweep takes three times as long as greedy's bounds. Of 78 meshes of `train/`, 3, 5 and 8 leave 0.969, 0.974 and 0.971 of
+the raw parts of the least hull sum, in 2.8, 2.1 and 1.5 times the time."""
 
 TYPICAL_LENGTH = 0.05
 """Stands for the criterion's length if it has none."""

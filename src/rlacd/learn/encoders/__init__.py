@@ -18,48 +18,45 @@ PUBLISHED = "https://github.com/ZrrSkywalker/I2P-MAE"
 
 
 class Encoder(Protocol):
-    """Describes components; nothing of it is learned."""
+    """Describes components; nothing of it is learned.
 
-    @property
-    def dim(self) -> int:
-        """Number of features, of a component or of each of its planes."""
+    Attributes
+    ----------
+    dim : int
+        Number of features, of a component or of each of its planes.
+    outputs : int
+        Values that the network finds from them: one of each plane's own features, or those of all 150 at once.
+    digest : str
+        Identifies the encoder's weights; empty if it has none.
+    """
 
-    @property
-    def outputs(self) -> int:
-        """Values that the network finds from them: one of each plane's own features, or those of all 150 at once."""
+    dim: int
+    outputs: int
+    digest: str
 
     def describe(self, component: Component) -> Float32Array:
         """Features of a component, [dim] or [150, dim]; the same component always has the same."""
-
-    def digest(self) -> str:
-        """Identify the encoder's weights; empty if it has none."""
 
 
 class SweepEncoder:
     """The cheap default: see `sweep_features`. One small network values any plane, also those never tried."""
 
-    dim, outputs = FEATURES, 1
-
     def __init__(self, threshold: float) -> None:
+        self.dim, self.outputs, self.digest = FEATURES, 1, ""
         self._threshold = threshold
 
     def describe(self, component: Component) -> Float32Array:
         """See `Encoder`."""
         return sweep_features(component, self._threshold)
 
-    def digest(self) -> str:
-        """See `Encoder`."""
-        return ""
-
 
 class PublishedEncoder:
     """I2P-MAE of the component's surface and of its hull's, as in the paper."""
 
-    outputs = PLANES
-
     def __init__(self, network: I2PMAEEncoder, points: int) -> None:
         network.require_points(points)
-        self.dim, self._network, self._points = network.dim, network, points
+        self.dim, self.outputs, self.digest = network.dim, PLANES, network.digest()
+        self._network, self._points = network, points
 
     def describe(self, component: Component) -> Float32Array:
         """See `Encoder`."""
@@ -67,10 +64,6 @@ class PublishedEncoder:
         with torch.inference_mode():
             features: Float32Array = self._network.encode(points[None])[0].numpy()
         return features
-
-    def digest(self) -> str:
-        """See `Encoder`."""
-        return self._network.digest()
 
 
 def make_encoder(options: TrainOptions) -> Encoder:

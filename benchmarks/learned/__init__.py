@@ -1,0 +1,1 @@
+"""`policy="learned"`: labels, networks, and the comparison of policies."""
