@@ -18,6 +18,7 @@ from typing import Any, Literal, TypeVar
 from manifold3d import Manifold
 
 from rlacd._native import Stop, Stopped, poll_stop, use_stop
+from rlacd.run.trace import Trace
 from rlacd.run.work import Work
 
 
@@ -121,9 +122,13 @@ class Run:
         self._stopped_at = self._finish_by = math.inf
         self._outer: Run | None = None
         self._pool: ThreadPoolExecutor | None = None
+        self._trace = Trace()
 
     def __enter__(self) -> Run:
         _start_booleans(self.threads)
+        self._trace = Trace(os.environ.get("RLACD_TRACE", ""))
+        self._whole = self._trace.span("run", "run")
+        self._whole.__enter__()
         self._pool = ThreadPoolExecutor(self.threads, initializer=use_stop, initargs=(self.stop,))
         self._before = use_stop(self.stop)
         self.stop.begin(self._look)
@@ -135,6 +140,8 @@ class Run:
         use_stop(self._before)
         assert self._pool is not None
         self._pool.shutdown()
+        self._whole.__exit__(None, None, None)
+        self._trace.write()
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -143,7 +150,8 @@ class Run:
         self._stage = outer if self._is_quiet else name
         self.step(0, None, self._parts)
         try:
-            yield
+            with self._trace.span("stage", name):
+                yield
         finally:
             self._stage = outer
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
@@ -264,6 +272,7 @@ class Run:
         items = list(items)
         results: list[Any] = [None] * len(items)
         numbers, end = count(), len(items)
+        function = self._trace.each("item", self._stage, function)
 
         def work() -> None:
             nonlocal end
@@ -279,8 +288,9 @@ class Run:
         try:
             if self._pool is not None and self.threads > 1:
                 others += (self._pool.submit(work) for _ in range(min(self.threads, len(items)) - 1))
-            work()
-            self._watch(others)
+            with self._trace.span("map", self._stage):
+                work()
+                self._watch(others)
             for other in others:
                 other.result()
         except BaseException as error:
@@ -292,15 +302,18 @@ class Run:
 
     def start(self, function: Callable[[], _R]) -> Future[_R]:
         """Begin some work on another thread, or do it at once where there is only this one."""
-        if self._pool is not None and self.threads > 1:
-            return self._pool.submit(function)
-        done: Future[_R] = Future()
-        done.set_result(function())
-        return done
+        function = self._trace.each("begun", self._stage, function)
+        with self._trace.span("begin", self._stage):
+            if self._pool is not None and self.threads > 1:
+                return self._pool.submit(function)
+            done: Future[_R] = Future()
+            done.set_result(function())
+            return done
 
     def result(self, begun: Future[_R]) -> _R:
         """Wait for what was begun."""
-        self._watch([begun])
+        with self._trace.span("wait", self._stage):
+            self._watch([begun])
         return begun.result()
 
     @staticmethod
