@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from rlacd._native import poll_stop
+from rlacd._native import FlushBody, poll_stop
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import Frame
 from rlacd.solid.topology import IntArray
@@ -49,18 +49,14 @@ def owners(
     found = []
     for hull in hulls:
         poll_stop()
-        corners = frame.to_frame(hull.vertices)[hull.faces]
-        lower, upper = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+        corners = frame.to_frame(hull.vertices)
+        lower, upper = corners.min(axis=0), corners.max(axis=0)
         slack = OUTSIDE_HULL * float((upper - lower).max())
         first, last = np.searchsorted(points[:, 0], (lower[0] - slack, upper[0] + slack))
         some = points[first:last]
         near = first + np.flatnonzero(((some >= lower - slack) & (some <= upper + slack)).all(axis=1))
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
-        x, y, z = points[near].T[:, :, None]
-        limit = (normals * corners[:, 0]).sum(axis=1) + slack
-        # Not a product of matrices: those start threads of their own.
-        inside = near[(x * normals[:, 0] + y * normals[:, 1] + z * normals[:, 2] <= limit).all(axis=1)]
+        body = FlushBody(corners, np.ascontiguousarray(hull.faces, dtype=np.int32))
+        inside = near[body.depths(points[near]) >= -slack]
         if len(inside) == 0:
             inside = np.array([((points - (lower + upper) / 2) ** 2).sum(axis=1).argmin()])
         found.append(int(np.bincount(labels[inside]).argmax()))
