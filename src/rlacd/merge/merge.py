@@ -11,9 +11,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from rlacd import _native
-from rlacd._native import Stopped
+from rlacd._native import Boxes, Stopped
 from rlacd.criteria.criterion import Criterion, Feasibility
-from rlacd.merge.boxes import Boxes
 from rlacd.run import Run, Work, work
 from rlacd.solid.arrays import IntArray
 from rlacd.solid.component import LOST_VOLUME, ClippedPart, Component, Part
@@ -143,7 +142,7 @@ def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, run: Run) -
         refused[second].add(first)
 
     try:
-        boxes = Boxes(alive)
+        boxes = _boxes(alive)
         queue, never = pairing.pairs(alive, boxes, range(new))
         heapq.heapify(queue)
         for first, second in never:
@@ -168,7 +167,8 @@ def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, run: Run) -
                 origin[newest] = min(origin[pair.first], origin[pair.second])
                 del alive[pair.first], alive[pair.second]
                 alive[newest] = union
-                boxes.add(newest, union, [pair.first, pair.second])
+                boxes = boxes.without([pair.first, pair.second])
+                boxes.add(newest, union.hull.corners)
                 refused[newest] = refused.pop(pair.first) | refused.pop(pair.second)
                 never_with = refused[newest] & alive.keys()
                 for i in never_with:
@@ -239,7 +239,7 @@ class _Bridged:
     ) -> tuple[list[_Pair], list[tuple[int, int]]]:
         """Pairs that may be feasible: how much of the joint hull the solid fills is not known yet."""
         screen = self.criterion.screen
-        reach = np.inf if len(boxes.ids) <= self.few else screen.reach
+        reach = np.inf if len(boxes) <= self.few else screen.reach
         pairs = boxes.pairs(new, reach, across=True)
         found: list[_Pair] = []
         never: list[tuple[int, int]] = []
@@ -301,24 +301,26 @@ class Uniter:
     account: Work
 
     def feasible(self, part: Part, others: Sequence[Part]) -> list[tuple[int, float]]:
-        """Find which of other parts may be united with a part, and the volumes of the joint hulls.
+        """Find which of other parts within reach may be united with a part, and the volumes of the joint hulls.
 
         Returns
         -------
         list of (int, float)
             Index and volume. Empty if too little work is left.
         """
-        hulls = [part.hull, *(other.hull for other in others)]
-        pairs = np.zeros((len(others), 2), dtype=np.int32)
-        pairs[:, 1] = range(1, len(hulls))
-        corners = [len(hull.vertices) for hull in hulls]
-        if not self.account.pay(sum(work.screening(corners[0] + corner) for corner in corners[1:])):
+        hulls, screen = [part.hull, *(other.hull for other in others)], self.criterion.screen
+        corners = [hull.corners for hull in hulls]
+        pairs = Boxes(corners).pairs([0], screen.reach)
+        near = pairs[:, 1].tolist()
+        own = len(part.hull.vertices)
+        if not self.account.pay(sum(work.screening(own + len(hulls[i].vertices)) for i in near)):
             return []
-        screen = self.criterion.screen
         if not screen.looks_inside:
-            return list(enumerate(_native.joint_hull_volumes([hull.vertices for hull in hulls], pairs, 1).tolist()))
+            volumes = _native.joint_hull_volumes(corners, pairs, 1)
+            return [(i - 1, volume) for i, volume in zip(near, volumes.tolist(), strict=True)]
         volumes, verdicts = screen.feasibilities(self.solid.filling, hulls, pairs, 1)
-        return [(i, float(volumes[i])) for i in np.flatnonzero(verdicts == Feasibility.MAYBE).tolist()]
+        found = zip(near, volumes.tolist(), verdicts.tolist(), strict=True)
+        return [(i - 1, volume) for i, volume, verdict in found if verdict == Feasibility.MAYBE]
 
     def unite_feasible(self, first: Part, second: Part) -> Part | None:
         """Unite two parts that may be united; None if no union meets the criterion after all."""
@@ -362,14 +364,17 @@ def neighbours(
     alive: Mapping[int, Part], new: Sequence[int], reach: float, threads: int
 ) -> list[tuple[int, int, float, float]]:
     """Pairs of a new part and any other with boxes within reach: (first, second, volume, joint hull's volume)."""
-    return joint_volumes(alive, Boxes(alive).pairs(new, reach), threads)
+    return joint_volumes(alive, _boxes(alive).pairs(new, reach), threads)
+
+
+def _boxes(alive: Mapping[int, Part]) -> Boxes:
+    return Boxes([part.hull.corners for part in alive.values()], list(alive))
 
 
 def joint_volumes(alive: Mapping[int, Part], pairs: IntArray, threads: int) -> list[tuple[int, int, float, float]]:
     """Volumes of pairs of parts [P, 2]: (first, second, volume of both, joint hull's volume)."""
     used, places = _places(pairs)
-    corners = [alive[i].hull.vertices for i in used]
-    hulls = _native.joint_hull_volumes(corners, places, threads)
+    hulls = _native.joint_hull_volumes([alive[i].hull.corners for i in used], places, threads)
     return [
         (i, j, alive[i].volume + alive[j].volume, hull)
         for (i, j), hull in zip(pairs.tolist(), hulls.tolist(), strict=True)

@@ -16,7 +16,6 @@ from rlacd.criteria.criterion import Criterion
 from rlacd.merge.merge import Uniter
 from rlacd.run import Run, work
 from rlacd.search.recut import Exchange
-from rlacd.solid.arrays import FloatArray, dots
 from rlacd.solid.component import Component, Part, reunite
 
 TAKERS = 6
@@ -120,14 +119,5 @@ class _Piece:
 
 def _takers(parts: Sequence[Part], piece: Part, uniter: Uniter) -> list[int]:
     """The parts that may take a piece, those first whose hulls would grow the least."""
-    boxes = np.array([part.box for part in parts]).reshape(-1, 2, 3)
-    near = np.flatnonzero(_gaps(boxes, piece.box) <= uniter.criterion.screen.reach).tolist()
-    feasible = uniter.feasible(piece, [parts[i] for i in near])
-    by_growth = sorted(feasible, key=lambda found: found[1] - parts[near[found[0]]].hull.volume)
-    return [near[k] for k, _ in by_growth[:TAKERS]]
-
-
-def _gaps(boxes: FloatArray, box: FloatArray) -> FloatArray:
-    """Distances of boxes [N, 2, 3] from another [2, 3]."""
-    apart = np.maximum(np.maximum(box[0] - boxes[:, 1], boxes[:, 0] - box[1]), 0.0)
-    return np.sqrt(dots(apart, apart))
+    by_growth = sorted(uniter.feasible(piece, parts), key=lambda found: found[1] - parts[found[0]].hull.volume)
+    return [i for i, _ in by_growth[:TAKERS]]

@@ -338,10 +338,12 @@ def _joined_again(components: Sequence[Component]) -> list[Component]:
 
 def touch(first: Part, second: Part) -> bool:
     """Tell whether two parts, or members of them, touch face to face."""
-    return any(
-        _native.do_touch(a.vertices, a.faces, b.vertices, b.faces)
-        for a in _disjoint_pieces(first)
-        for b in _disjoint_pieces(second)
+    ours, theirs = _disjoint_pieces(first), _disjoint_pieces(second)
+    return _native.do_touch(
+        [one.vertices for one in ours],
+        [one.faces for one in ours],
+        [one.vertices for one in theirs],
+        [one.faces for one in theirs],
     )
 
 
