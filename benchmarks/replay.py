@@ -38,8 +38,13 @@ SLICES = 300
 LOOK = 2e-5
 """Seconds after which a thread with nothing to do looks again."""
 
-Step = tuple[str, list[Cost]]
-"""What the first thread does: "do" something, "map" items, "begin" a trial, or "wait" for the first that is left."""
+
+class Step(NamedTuple):
+    """Of the first thread: to "do" something, "map" items, "begin" a task, or "wait" for the task of a number."""
+
+    kind: str
+    costs: list[Cost]
+    number: int | None = None
 
 
 def steps_of(spans: list[dict[str, Any]]) -> Iterator[Step]:
@@ -47,21 +52,21 @@ def steps_of(spans: list[dict[str, Any]]) -> Iterator[Step]:
     spans = sorted(spans, key=lambda span: span["ts"])
     whole = next(span for span in spans if span["cat"] == "run")
     items = deque(span for span in spans if span["cat"] == "item")
-    begun = deque(span for span in spans if span["cat"] == "begun")
+    begun = {span["args"]["number"]: span for span in spans if span["cat"] == "begun"}
     at = _counted(whole, 0)
     for span in spans:
         if span["tid"] == whole["tid"] and span["cat"] in ("map", "begin", "wait"):
-            inside: list[dict[str, Any]] = []
+            number, inside = span["args"]["number"], list[dict[str, Any]]()
             if span["cat"] == "map":
                 while items and items[0]["ts"] < span["ts"] + span["dur"]:
                     inside.append(items.popleft())
-            elif span["cat"] == "begin":
-                inside = [begun.popleft()]
+            elif span["cat"] == "begin" and number in begun:  # otherwise it was dropped
+                inside = [begun[number]]
             own = sum(_cost(one) for one in inside if one["tid"] == whole["tid"])
-            yield "do", [Cost(*(_counted(span, 1) - at - own))]
-            yield span["cat"], [Cost(*_cost(one)) for one in inside]
+            yield Step("do", [Cost(*(_counted(span, 1) - at - own))])
+            yield Step(span["cat"], [Cost(*_cost(one)) for one in inside], number)
             at = _counted(span, 1)
-    yield "do", [Cost(*(_counted(whole, 1) - at))]
+    yield Step("do", [Cost(*(_counted(whole, 1) - at))])
 
 
 def _counted(span: dict[str, Any], end: int) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -125,18 +130,16 @@ class _Machine:
                 yield self.now + LOOK
 
     def _first(self, steps: Iterable[Step]) -> Iterator[float]:
-        left: deque[_Task] = deque()
-        for what, costs in steps:
-            if what == "do":
+        begun: dict[int | None, list[_Task]] = {}
+        for kind, costs, number in steps:
+            if kind == "do":
                 yield from self._work(costs[0])
                 continue
-            tasks = [_Task(cost) for cost in costs]
-            self._waiting += tasks
-            if what == "begin":
-                left += tasks
+            tasks = [_Task(cost) for cost in costs] if kind != "wait" else begun[number]
+            self._waiting += tasks if kind != "wait" else []
+            if kind == "begin":
+                begun[number] = tasks
                 continue
-            if what == "wait":
-                tasks = [left.popleft()]
             while not all(task.is_done for task in tasks):
                 yield self.now + LOOK
 
@@ -156,10 +159,8 @@ def replay(
     for path in traces:
         spans = json.loads(path.read_text())["traceEvents"]
         steps = list(steps_of(spans))
-        sums = np.sum([cost for _, costs in steps for cost in costs], axis=0)
-        first = sum(
-            cost.locked + cost.unlocked - cost.in_loops for what, costs in steps if what == "do" for cost in costs
-        )
+        sums = np.sum([cost for step in steps for cost in step.costs], axis=0)
+        first = np.sum([step.costs[0] for step in steps if step.kind == "do"], axis=0)[:3] @ (1, 1, -1)
         traced = next(span["dur"] for span in spans if span["cat"] == "run") / 1e6
         cpu = sums[0] + sums[1] - sums[2] + sums[3]
         rows.append([path.stem, traced, cpu, sums[0], first, *(_Machine(number).run(steps) for number in numbers)])

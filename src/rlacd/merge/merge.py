@@ -5,7 +5,9 @@ from __future__ import annotations
 import heapq
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -141,47 +143,52 @@ def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, run: Run) -
         refused[first].add(second)
         refused[second].add(first)
 
+    def begin(pair: _Pair) -> Future[_Verdict]:
+        return run.start(partial(pairing.unite, alive[pair.first], alive[pair.second]))
+
+    begun: dict[_Pair, Future[_Verdict]] = {}  # more than are needed, if an earlier one takes their parts away
     try:
         boxes = _boxes(alive)
         queue, never = pairing.pairs(alive, boxes, range(new))
         heapq.heapify(queue)
         for first, second in never:
             refuse(first, second)
-        verdicts: dict[_Pair, _Verdict] = {}  # for pairs put back into the queue
+        next_ones: list[_Pair] = []  # the cheapest, in their order
         count = newest = len(alive)
-        while queue and run.step(count - len(alive), None, len(alive)):
-            batch = _cheapest(queue, alive, run.threads)
-            fresh = [pair for pair in batch if pair not in verdicts]
-            verdicts.update(
-                zip(fresh, run.map(lambda p: pairing.unite(alive[p.first], alive[p.second]), fresh), strict=True)
-            )
-            for taken, pair in enumerate(batch, start=1):
-                union, price, for_good = verdicts.pop(pair)
-                # Pay in the order of the pairs: the batch size, which depends on the threads, must not matter.
-                if not run.work.pay(price):
-                    break
-                if union is None:
-                    if for_good:
-                        refuse(pair.first, pair.second)
-                    continue
-                origin[newest] = min(origin[pair.first], origin[pair.second])
-                del alive[pair.first], alive[pair.second]
-                alive[newest] = union
-                boxes = boxes.without([pair.first, pair.second])
-                boxes.add(newest, union.hull.corners)
-                refused[newest] = refused.pop(pair.first) | refused.pop(pair.second)
-                never_with = refused[newest] & alive.keys()
-                for i in never_with:
-                    refused[i].add(newest)
-                found, never = pairing.pairs(alive, boxes.without([*never_with]), [newest])
-                for first, second in never:
-                    refuse(first, second)
-                for other in [*batch[taken:], *found]:
-                    heapq.heappush(queue, other)
-                newest += 1
+        while run.step(count - len(alive), None, len(alive)):
+            next_ones += _cheapest(queue, alive, run.at_once - len(next_ones))
+            if not next_ones:
                 break
+            begun |= {pair: begin(pair) for pair in next_ones if pair not in begun}
+            pair = next_ones.pop(0)
+            union, price, for_good = run.result(begun.pop(pair))
+            # Pay in the order of the pairs: how many are begun, which depends on the threads, must not matter.
+            if not run.work.pay(price):
+                break
+            if union is None:
+                if for_good:
+                    refuse(pair.first, pair.second)
+                continue
+            origin[newest] = min(origin[pair.first], origin[pair.second])
+            del alive[pair.first], alive[pair.second]
+            alive[newest] = union
+            boxes = boxes.without([pair.first, pair.second])
+            boxes.add(newest, union.hull.corners)
+            refused[newest] = refused.pop(pair.first) | refused.pop(pair.second)
+            never_with = refused[newest] & alive.keys()
+            for i in never_with:
+                refused[i].add(newest)
+            found, never = pairing.pairs(alive, boxes.without([*never_with]), [newest])
+            for first, second in never:
+                refuse(first, second)
+            for other in [*next_ones, *found]:
+                heapq.heappush(queue, other)
+            next_ones = []
+            newest += 1
     except Stopped:  # raised between two unions
         run.note_stop()
+    finally:
+        run.drop(begun.values())
     return [alive[i] for i in sorted(alive, key=origin.__getitem__)]
 
 

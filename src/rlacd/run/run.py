@@ -6,7 +6,7 @@ import contextlib
 import math
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from concurrent.futures import TimeoutError as NotYet
 from contextlib import contextmanager
@@ -167,6 +167,11 @@ class Run:
         return self._end - time.perf_counter()
 
     @property
+    def at_once(self) -> int:
+        """How many things to `start` so that no thread waits for the next."""
+        return self.threads if self.threads == 1 else self.threads + 1
+
+    @property
     def is_over(self) -> bool:
         """Whether the work has to end: the run was stopped, or the time or the work allowed for it is used up."""
         stopped = self.stopped_by if self._outer is None else self._outer.stopped_by
@@ -272,7 +277,7 @@ class Run:
         items = list(items)
         results: list[Any] = [None] * len(items)
         numbers, end = count(), len(items)
-        function = self._trace.each("item", self._stage, function)
+        function = self._trace.each(self._stage, function)
 
         def work() -> None:
             nonlocal end
@@ -302,22 +307,23 @@ class Run:
 
     def start(self, function: Callable[[], _R]) -> Future[_R]:
         """Begin some work on another thread, or do it at once where there is only this one."""
-        function = self._trace.each("begun", self._stage, function)
-        with self._trace.span("begin", self._stage):
-            if self._pool is not None and self.threads > 1:
-                return self._pool.submit(function)
-            done: Future[_R] = Future()
-            done.set_result(function())
-            return done
+        return self._trace.begin(self._stage, function, self._started)
+
+    def _started(self, function: Callable[[], _R]) -> Future[_R]:
+        if self._pool is not None and self.threads > 1:
+            return self._pool.submit(function)
+        done: Future[_R] = Future()
+        done.set_result(function())
+        return done
 
     def result(self, begun: Future[_R]) -> _R:
         """Wait for what was begun."""
-        with self._trace.span("wait", self._stage):
+        with self._trace.wait(self._stage, begun):
             self._watch([begun])
         return begun.result()
 
     @staticmethod
-    def drop(begun: Sequence[Future[_R]]) -> None:
+    def drop(begun: Collection[Future[_R]]) -> None:
         """Leave undone what has not been begun in earnest, and wait for the rest."""
         for future in begun:
             future.cancel()
