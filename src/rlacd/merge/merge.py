@@ -16,7 +16,7 @@ from rlacd import _native
 from rlacd._native import Boxes, Stopped
 from rlacd.criteria.criterion import Criterion, Feasibility
 from rlacd.run import Run, Work, work
-from rlacd.solid.arrays import IntArray
+from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import LOST_VOLUME, ClippedPart, Component, Part
 from rlacd.solid.hull import Hull
 
@@ -215,14 +215,12 @@ class _Adjoining:
         """Pairs that the volume bound allows."""
         screen = self.criterion.screen
         pairs = boxes.pairs(new, screen.reach)
-        if not self.run.work.pay(_sum_over(alive, pairs, work.joining)):
+        if not self.run.work.pay(_price(alive, pairs, work.joining)):
             return [], []
-        found = [
-            _Pair(hull_volume - (screen.filled(alive[first]) + screen.filled(alive[second])), first, second)
-            for first, second, volume, hull_volume in joint_volumes(alive, pairs, self.run.threads)
-            if not screen.excludes(volume, hull_volume)
-        ]
-        return found, []
+        volumes, hulls = joint_volumes(alive, pairs, self.run.threads)
+        kept = ~screen.excludes(volumes, hulls)
+        costs = hulls - _sums(alive, pairs, screen.filled)
+        return _queue(pairs[kept], costs[kept]), []
 
     def unite(self, first: Part, second: Part) -> _Verdict:
         """Glue the two parts."""
@@ -251,19 +249,14 @@ class _Bridged:
         found: list[_Pair] = []
         never: list[tuple[int, int]] = []
         for some in np.split(pairs, range(PAIRS_AT_ONCE, len(pairs), PAIRS_AT_ONCE)):
-            if not self.run.may_continue() or not self.run.work.pay(_sum_over(alive, some, work.screening)):
+            if not self.run.may_continue() or not self.run.work.pay(_price(alive, some, work.screening)):
                 break
             used, places = _places(some)
             hulls = [alive[i].hull for i in used]
-            volumes, feasibilities = screen.feasibilities(self.solid.filling, hulls, places, self.run.threads)
-            for (first, second), volume, feasibility in zip(
-                some.tolist(), volumes.tolist(), feasibilities.tolist(), strict=True
-            ):
-                if feasibility == Feasibility.MAYBE:
-                    free = screen.filled(alive[first]) + screen.filled(alive[second])
-                    found.append(_Pair(volume - free, first, second))
-                elif feasibility == Feasibility.NEVER:
-                    never.append((first, second))
+            volumes, verdicts = screen.feasibilities(self.solid.filling, hulls, places, self.run.threads)
+            may = verdicts == Feasibility.MAYBE
+            found += _queue(some[may], volumes[may] - _sums(alive, some[may], screen.filled))
+            never += map(tuple, some[verdicts == Feasibility.NEVER].tolist())
         return found, never
 
     def unite(self, first: Part, second: Part) -> _Verdict:
@@ -369,23 +362,21 @@ def _clipped(first: Part, second: Part, hull: Hull, criterion: Criterion, solid:
 
 def neighbours(
     alive: Mapping[int, Part], new: Sequence[int], reach: float, threads: int
-) -> list[tuple[int, int, float, float]]:
+) -> Iterator[tuple[int, int, float, float]]:
     """Pairs of a new part and any other with boxes within reach: (first, second, volume, joint hull's volume)."""
-    return joint_volumes(alive, _boxes(alive).pairs(new, reach), threads)
+    pairs = _boxes(alive).pairs(new, reach)
+    return zip(*pairs.T.tolist(), *(own.tolist() for own in joint_volumes(alive, pairs, threads)), strict=True)
+
+
+def joint_volumes(alive: Mapping[int, Part], pairs: IntArray, threads: int) -> tuple[FloatArray, FloatArray]:
+    """The volume of both parts of each pair [P, 2], and that of their joint hull."""
+    used, places = _places(pairs)
+    hulls = _native.joint_hull_volumes([alive[i].hull.corners for i in used], places, threads)
+    return _sums(alive, pairs, lambda part: part.volume), hulls
 
 
 def _boxes(alive: Mapping[int, Part]) -> Boxes:
     return Boxes([part.hull.corners for part in alive.values()], list(alive))
-
-
-def joint_volumes(alive: Mapping[int, Part], pairs: IntArray, threads: int) -> list[tuple[int, int, float, float]]:
-    """Volumes of pairs of parts [P, 2]: (first, second, volume of both, joint hull's volume)."""
-    used, places = _places(pairs)
-    hulls = _native.joint_hull_volumes([alive[i].hull.corners for i in used], places, threads)
-    return [
-        (i, j, alive[i].volume + alive[j].volume, hull)
-        for (i, j), hull in zip(pairs.tolist(), hulls.tolist(), strict=True)
-    ]
 
 
 def _places(pairs: IntArray) -> tuple[list[int], IntArray]:
@@ -394,10 +385,20 @@ def _places(pairs: IntArray) -> tuple[list[int], IntArray]:
     return used.tolist(), np.searchsorted(used, pairs).astype(np.int32)
 
 
-def _sum_over(alive: Mapping[int, Part], pairs: IntArray, price: Callable[[int], float]) -> float:
+def _sums(alive: Mapping[int, Part], pairs: IntArray, of: Callable[[Part], float]) -> FloatArray:
+    """Sums [P] of something over the two parts of each pair [P, 2]."""
+    used, places = _places(pairs)
+    first, second = np.array([of(alive[i]) for i in used], dtype=np.float64)[places.T]
+    return np.asarray(first + second)
+
+
+def _price(alive: Mapping[int, Part], pairs: IntArray, price: Callable[[int], float]) -> float:
     """Total price of pairs [P, 2], each priced by the number of vertices of its two hulls."""
-    corners = {i: len(alive[i].hull.vertices) for i in np.unique(pairs).tolist()}
-    return sum(price(corners[i] + corners[j]) for i, j in pairs.tolist())
+    return sum(map(price, _sums(alive, pairs, lambda part: len(part.hull.vertices)).astype(int).tolist()))
+
+
+def _queue(pairs: IntArray, costs: FloatArray) -> list[_Pair]:
+    return list(map(_Pair, costs.tolist(), *pairs.T.tolist()))
 
 
 def united_in_turn(
