@@ -144,6 +144,11 @@ class _Machine:
                 yield self.now + LOOK
 
 
+def replayed(steps: Iterable[Step], threads: int) -> float:
+    """Seconds that the steps take on as many cores as threads."""
+    return _Machine(threads).run(steps)
+
+
 @app.command()
 def replay(
     traces: Annotated[list[Path], typer.Argument(help="Written by RLACD_TRACE=FILE, best on two threads or more.")],
@@ -163,7 +168,7 @@ def replay(
         first = np.sum([step.costs[0] for step in steps if step.kind == "do"], axis=0)[:3] @ (1, 1, -1)
         traced = next(span["dur"] for span in spans if span["cat"] == "run") / 1e6
         cpu = sums[0] + sums[1] - sums[2] + sums[3]
-        rows.append([path.stem, traced, cpu, sums[0], first, *(_Machine(number).run(steps) for number in numbers)])
+        rows.append([path.stem, traced, cpu, sums[0], first, *(replayed(steps, number) for number in numbers)])
     rows.append(["all", *np.sum([row[1:] for row in rows], axis=0)])
     header = [
         "trace",
